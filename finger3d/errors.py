@@ -1,0 +1,40 @@
+"""Errors a user can mend, and outcomes a solver can report."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+
+class Finger3dError(Exception):
+    """A mistake in the input, told in one line: what, where, and what to do. Exit code 2."""
+
+    exit_code = 2
+
+
+class MissingError(Finger3dError):
+    """Something needed is not there (a package, a driver, a finished step). Exit code 3."""
+
+    exit_code = 3
+
+
+class Outcome(Enum):
+    """How a step ended. The value of a member is the text a user reads: what failed, and what to try."""
+
+    CONVERGED = "converged"
+    NO_CONVERGENCE = (
+        "contact did not settle to the tolerance; try more steps, a finer mesh, or a smaller friction coefficient"
+    )
+    CYCLED = (
+        "the paper's swap rule repeated a state and has no answer for this increment; use [contact] rule = 'projection'"
+    )
+    INDEFINITE = "the compliance is not positive: the body is not held; fix its base, or check the mesh"
+    NOT_FINITE = "the compliance or the gap contains NaN or infinity; check the mesh and the material"
+    OUTSIDE = "the surface touches the object outside the candidate contact points; make the press shallower"
+
+    @property
+    def ok(self) -> bool:
+        """Whether the step may be trusted."""
+        return self is Outcome.CONVERGED
+
+    def __str__(self) -> str:
+        return str(self.value)

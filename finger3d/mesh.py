@@ -1,0 +1,146 @@
+"""Simplex meshes with labelled boundary facets, in two and three dimensions.
+
+Cells and facets are stored in VTK's order for quadratic elements: vertices first, then the mid-edge nodes of
+edges (0,1) (1,2) (2,0) for a triangle, and (0,1) (1,2) (2,0) (0,3) (1,3) (2,3) for a tetrahedron.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+EDGES = {
+    1: np.array([[0, 1]]),
+    2: np.array([[0, 1], [1, 2], [2, 0]]),
+    3: np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]]),
+}
+"""Edges of a simplex of dimension 1, 2, 3, in the order of the mid-edge nodes."""
+
+FACETS = {
+    2: np.array([[0, 1], [1, 2], [2, 0]]),
+    3: np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]),
+}
+"""Facets of a simplex, oriented outward for a positive cell."""
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A mesh of simplices.
+
+    Attributes
+    ----------
+    points : (n, d) mm
+    cells : (e, d + 1) linear, or (e, 6 | 10) quadratic, node numbers in VTK order
+    facets : label -> (m, d) linear, or (m, 3 | 6) quadratic boundary facets, oriented outward
+        Labels in use: contact, base, ends, walls, symmetry_x, symmetry_z.
+    """
+
+    points: Float
+    cells: Int
+    facets: Mapping[str, Int]
+
+    @property
+    def dim(self) -> int:
+        """Number of space dimensions."""
+        return self.points.shape[1]
+
+    @property
+    def is_quadratic(self) -> bool:
+        """Whether cells carry mid-edge nodes."""
+        return self.cells.shape[1] > self.dim + 1
+
+    @property
+    def vertices(self) -> Int:
+        """Numbers of the corner nodes, ascending."""
+        return np.unique(self.cells[:, : self.dim + 1])
+
+
+def boundary(cells: Int, dim: int) -> Int:
+    """Facets (m, dim) of linear cells that belong to one cell only, oriented outward."""
+    faces = cells[:, FACETS[dim]].reshape(-1, dim)
+    _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
+    return faces[np.sort(first[count == 1])]
+
+
+def signed_volumes(mesh: Mesh) -> Float:
+    """Signed volume (area in 2D) (e,) of the straight cells, mm^d."""
+    corners = mesh.points[mesh.cells[:, : mesh.dim + 1]]
+    edges = corners[:, 1:] - corners[:, :1]
+    return np.linalg.det(edges) / (2.0 if mesh.dim == 2 else 6.0)
+
+
+def quadratic(mesh: Mesh) -> Mesh:
+    """Add a node in the middle of every edge of a linear mesh; the new nodes follow the old ones.
+
+    The midpoints lie on the chords; a caller that knows the surface moves them onto it.
+    """
+    d, n = mesh.dim, len(mesh.points)
+    pairs = np.sort(mesh.cells[:, EDGES[d]], axis=2)
+    key = pairs[..., 0] * n + pairs[..., 1]
+    edge_keys, number = np.unique(key, return_inverse=True)
+    ends = np.stack([edge_keys // n, edge_keys % n], axis=1)
+    mids = mesh.points[ends].mean(axis=1)
+
+    def mid_nodes(simplices: Int, edges: Int) -> Int:
+        ordered = np.sort(simplices[:, edges], axis=2)
+        return n + np.searchsorted(edge_keys, ordered[..., 0] * n + ordered[..., 1])
+
+    facets = {
+        label: np.hstack([f, mid_nodes(f, EDGES[d - 1])]) if len(f) else np.zeros((0, 3 if d == 2 else 6), dtype=np.int64)
+        for label, f in mesh.facets.items()
+    }
+    cells = np.hstack([mesh.cells, n + number.reshape(key.shape)])
+    return Mesh(np.vstack([mesh.points, mids]), cells, facets)
+
+
+# A reflection swaps nodes 0 and 1 of every simplex, and the mid-edge nodes with them, to keep it positive.
+_MIRROR = {
+    2: [1, 0],
+    3: [1, 0, 2],
+    4: [1, 0, 2, 3],
+    6: [1, 0, 2, 3, 5, 4],
+    10: [1, 0, 2, 3, 4, 6, 5, 8, 7, 9],
+}
+
+
+def _mirrored(simplices: Int) -> Int:
+    # 3 columns are a linear triangle or a quadratic edge; the latter keeps its middle node, so one list serves both.
+    return simplices[:, _MIRROR[simplices.shape[1]]]
+
+
+def unfold(mesh: Mesh, axes: tuple[int, ...]) -> tuple[Mesh, Int, Float]:
+    """Mirror a half or quarter mesh about the planes ``x[axis] = 0``.
+
+    Returns
+    -------
+    whole : Mesh
+    parent : (n,) number of the node of `mesh` that each node of `whole` is an image of
+    sign : (n, d) what a vector at the parent is multiplied with, +1 or -1
+    """
+    parent = np.arange(len(mesh.points))
+    sign = np.ones_like(mesh.points)
+    for axis in axes:
+        n = len(mesh.points)
+        off = np.abs(mesh.points[:, axis]) > 0.0
+        image = np.where(off, n + np.cumsum(off) - 1, np.arange(n))
+        flipped = mesh.points[off].copy()
+        flipped[:, axis] *= -1.0
+        flipped_sign = sign[off].copy()
+        flipped_sign[:, axis] *= -1.0
+        plane = "symmetry_" + "xyz"[axis]
+        facets = {
+            label: np.vstack([f, _mirrored(image[f])])
+            for label, f in mesh.facets.items()
+            if label != plane
+        }
+        cells = np.vstack([mesh.cells, _mirrored(image[mesh.cells])])
+        mesh = replace(mesh, points=np.vstack([mesh.points, flipped]), cells=cells, facets=facets)
+        parent = np.concatenate([parent, parent[off]])
+        sign = np.vstack([sign, flipped_sign])
+    return mesh, parent, sign

@@ -1,0 +1,76 @@
+"""The model: what is pressed, on what, how. The baseline is the paper; effects fill slots."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from finger3d.contact.law import Coulomb
+from finger3d.objects import Plane, RigidObject
+
+Domain = Literal["solid", "plane-strain", "plane-stress"]
+
+
+@dataclass(frozen=True)
+class Material:
+    """Isotropic elasticity: Young's modulus (MPa) and Poisson's ratio, 0 <= nu <= 0.5."""
+
+    E_MPa: float
+    nu: float
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A target reached from the one before, in equal steps (``auto``: by a step-halving estimate)."""
+
+    depth_mm: float
+    slide_x_mm: float = 0.0
+    slide_z_mm: float = 0.0
+    steps: int | Literal["auto"] = 10
+    duration_s: float | None = None
+
+
+@dataclass(frozen=True)
+class Gauge:
+    """Normal strain at a point along a direction in the x-y plane; over `length_mm` its mean. Angle in radians."""
+
+    name: str
+    x_mm: float
+    y_mm: float
+    z_mm: float = 0.0
+    angle: float = 0.0
+    length_mm: float = 0.0
+
+
+@dataclass(frozen=True)
+class MeshOptions:
+    """Edge lengths at the contact and far from it (mm), and the mesher (solids only; sections are structured)."""
+
+    size_mm: float
+    base_size_mm: float
+    mesher: Literal["ftetwild", "swept"] = "ftetwild"
+
+
+@dataclass(frozen=True)
+class Model:
+    """Everything that determines the numbers.
+
+    Attributes
+    ----------
+    design : a frozen dataclass from geometries/
+    domain : solid, or a 2D section; forces are always N, for the design's width
+    held_ends : both end faces held in z (plane strain realised in 3D; Python only)
+    symmetry : planes used, "x" and "z"; None finds them
+    """
+
+    design: Any
+    material: Material
+    mesh: MeshOptions
+    legs: tuple[Leg, ...]
+    object: RigidObject = field(default_factory=Plane)
+    friction: Coulomb = field(default_factory=Coulomb)
+    gauges: tuple[Gauge, ...] = ()
+    domain: Domain = "solid"
+    rule: Literal["projection", "paper"] = "projection"
+    held_ends: bool = False
+    symmetry: tuple[str, ...] | None = None
