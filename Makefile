@@ -1,0 +1,39 @@
+# Everything from nothing but python3 (>= 3.11, with venv), make and git.
+BIN := .venv/bin
+PYTHON ?= $(shell for p in python3.11 python3 python3.12 python3.13; do \
+	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
+PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet install --constraint constraints.txt
+
+.PHONY: install demo test test-all lint clean
+
+install: .venv/.installed
+
+# The stamp is younger than what it was made from, so nothing is installed twice. The build tools come first and
+# from the same pins: pip would otherwise fetch whatever is newest for its isolated build.
+.venv/.installed: pyproject.toml constraints.txt
+	@test -n "$(PYTHON)" || { echo "finger3d needs Python 3.11 or newer; none found (set PYTHON=/path/to/python3)"; exit 1; }
+	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { echo "$(PYTHON) has no venv module: apt install python3-venv"; exit 1; }
+	@test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	@echo "installing finger3d and its packages into .venv (once)"
+	@$(PIP) hatchling editables
+	@$(PIP) --no-build-isolation --editable '.[dev]'
+	@touch $@
+
+demo: install
+	$(BIN)/finger3d press geometries/fig9.toml --out out/demo
+	@echo "pictures:"; ls out/demo/*.png
+
+test: install
+	$(BIN)/python -m pytest -q -m "not slow"
+
+test-all: install
+	$(BIN)/python -m pytest -q
+
+lint: install
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy finger3d
+	$(BIN)/lint-imports
+
+clean:
+	rm -rf .venv out dist build .pytest_cache .hypothesis .ruff_cache .mypy_cache .import_linter_cache
