@@ -1,0 +1,160 @@
+"""Stiffness of linear isotropic elasticity, displacement or mixed, in 2D and 3D by the same text.
+
+Displacement form: ``lam div(u) div(v) + 2 G eps(u):eps(v)``.  Mixed form (Taylor-Hood, quadratic u and linear p):
+``2 G eps(u):eps(v) + p div(v) + q div(u) - p q / lam`` with p = lam div(u), which stays finite at nu = 0.5.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from finger3d.fem.elements import physical_gradients, quadrature, shape
+from finger3d.mesh import Mesh
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+MIXED_FROM = 0.48
+"""Poisson's ratio from which the mixed form is used (linear elements lock, and the pressure of quadratic ones
+oscillates, design.md sec. 5)."""
+
+# The compressibility 1/lam never falls below this share of 1/G: it keeps every pivot away from zero at nu = 0.5,
+# where it changes results by about 1e-7 (relative), below any mesh error.
+_LEAST_COMPRESSIBILITY = 1e-7
+
+_CHUNK = 2048
+
+
+@dataclass(frozen=True)
+class Elasticity:
+    """Lame constants (MPa) as the assembled form uses them, for a state of 2D or 3D strain."""
+
+    shear: float
+    lame: float
+    mixed: bool
+
+    @classmethod
+    def of(cls, E_MPa: float, nu: float, plane_stress: bool = False, mixed: bool | None = None) -> Elasticity:
+        """From Young's modulus and Poisson's ratio; plane stress condenses the thickness strain into `lame`."""
+        shear = E_MPa / (2.0 * (1.0 + nu))
+        if plane_stress:
+            return cls(shear, E_MPa * nu / (1.0 - nu**2), False)
+        compressibility = max((1.0 - 2.0 * nu) * (1.0 + nu) / (E_MPa * nu), _LEAST_COMPRESSIBILITY / shear) if nu else np.inf
+        return cls(shear, 1.0 / compressibility, nu >= MIXED_FROM if mixed is None else mixed)
+
+
+@dataclass(frozen=True)
+class Stiffness:
+    """Upper triangle of the stiffness, and how its unknowns are numbered.
+
+    Attributes
+    ----------
+    upper : (N, N) csr, N/mm
+        Unknown ``node * d + axis``, then scaled pressures in the mixed form.  Every diagonal entry is stored.
+    pressure_scale : MPa
+        Pressure unknowns are in this unit, so that all entries are of one size.
+    """
+
+    upper: sp.csr_matrix
+    pressure_vertices: Int
+    pressure_scale: float
+
+
+def _pairs(nodes: Int, count: int) -> tuple[Int, Int, Int]:
+    """Sparse pattern of the upper node-node blocks: slot (e, k, k) of every local pair, and the slots' row and column."""
+    small = np.minimum(nodes[:, :, None], nodes[:, None, :])
+    large = np.maximum(nodes[:, :, None], nodes[:, None, :])
+    local = np.triu_indices(nodes.shape[1])
+    key = (small * count + large)[:, local[0], local[1]]
+    unique, slot = np.unique(key, return_inverse=True)
+    return slot.reshape(key.shape), unique // count, unique % count
+
+
+def _cell_blocks(gradients: Float, weights: Float, elastic: Elasticity, lame: float) -> Float:
+    """Element stiffness blocks (e, k, k, d, d) from gradients (e, q, k, d) and weights (e, q)."""
+    e, q, k, d = gradients.shape
+    flat = gradients.reshape(e, q, k * d)
+    outer = np.matmul(np.swapaxes(flat * weights[:, :, None], 1, 2), flat).reshape(e, k, d, k, d)
+    outer = outer.transpose(0, 1, 3, 2, 4)  # (e, a, b, i, j) = sum_q w G_ai G_bj
+    blocks = elastic.shear * np.swapaxes(outer, 3, 4)
+    if lame:
+        blocks = blocks + lame * outer
+    laplace = elastic.shear * np.einsum("eabii->eab", outer)
+    for i in range(d):
+        blocks[..., i, i] += laplace
+    return blocks
+
+
+def stiffness(mesh: Mesh, elastic: Elasticity, thickness: float = 1.0) -> Stiffness:
+    """Assemble the upper triangle.
+
+    Parameters
+    ----------
+    mesh : linear or quadratic mesh
+    elastic : constants; `mixed` needs a quadratic mesh
+    thickness : mm
+        Width of a 2D section (1 for a solid), so that forces are N.
+    """
+    n, d = mesh.points.shape
+    k = mesh.cells.shape[1]
+    bary, w = quadrature(d, 2 if mesh.is_quadratic else 1)
+    slot, row, col = _pairs(mesh.cells, n)
+    local = np.triu_indices(k)
+    swapped = mesh.cells[:, local[0]] > mesh.cells[:, local[1]]
+    blocks = np.zeros((len(row), d, d))
+    hats = shape(bary, False)
+    p_blocks, masses = [], []
+    lame = 0.0 if elastic.mixed else elastic.lame
+    for start in range(0, len(mesh.cells), _CHUNK):
+        part = slice(start, start + _CHUNK)
+        gradients, det = physical_gradients(mesh.points[mesh.cells[part]], bary, mesh.is_quadratic)
+        weights = det * (w * thickness)
+        cell = _cell_blocks(gradients, weights, elastic, lame)[:, local[0], local[1]]
+        turn = swapped[part]
+        cell[turn] = np.swapaxes(cell[turn], 1, 2)
+        where = slot[part].ravel()
+        np.add.at(blocks, where, cell.reshape(-1, d, d))
+        if elastic.mixed:
+            p_blocks.append(np.einsum("eq,qp,eqkd->epkd", weights, hats, gradients, optimize=True))
+            masses.append(np.einsum("eq,qp,qr->epr", weights, hats, hats, optimize=True))
+    diagonal = np.flatnonzero(row == col)
+    i, j = np.meshgrid(np.arange(d), np.arange(d), indexing="ij")
+    rows = row[:, None, None] * d + i
+    cols = col[:, None, None] * d + j
+    keep = np.ones(blocks.shape, dtype=bool)
+    keep[diagonal] = i <= j
+    entries = [(blocks[keep], rows[keep], cols[keep])]
+    vertices = np.zeros(0, dtype=np.int64)
+    scale = 1.0
+    size = n * d
+    if elastic.mixed:
+        vertices = mesh.vertices
+        scale = elastic.shear * len(mesh.cells) ** (1.0 / d) / np.ptp(mesh.points, axis=0).max()
+        entries += _pressure_entries(mesh, elastic, np.concatenate(p_blocks), np.concatenate(masses), vertices, scale)
+        size += len(vertices)
+    data, r, c = (np.concatenate(parts) for parts in zip(*entries, strict=True))
+    return Stiffness(sp.csr_matrix((data, (r, c)), shape=(size, size)), vertices, scale)
+
+
+def _pressure_entries(
+    mesh: Mesh, elastic: Elasticity, divergence: Float, mass: Float, vertices: Int, scale: float
+) -> list[tuple[Float, Int, Int]]:
+    """Entries of D^T (above the diagonal) and of -M / lam, in scaled pressures."""
+    n, d = mesh.points.shape
+    number = np.full(n, -1)
+    number[vertices] = n * d + np.arange(len(vertices))
+    pressures = number[mesh.cells[:, : d + 1]]
+    dof = mesh.cells[:, :, None] * d + np.arange(d)
+    rows = np.broadcast_to(dof[:, None], divergence.shape)
+    cols = np.broadcast_to(pressures[:, :, None, None], divergence.shape)
+    r = np.broadcast_to(pressures[:, :, None], mass.shape)
+    c = np.broadcast_to(pressures[:, None, :], mass.shape)
+    upper = r <= c
+    return [
+        ((scale * divergence).ravel(), rows.ravel(), cols.ravel()),
+        ((-(scale**2) / elastic.lame * mass)[upper], r[upper], c[upper]),
+    ]

@@ -1,0 +1,129 @@
+"""MKL PARDISO: one symmetric indefinite factorisation with a Schur complement, through pypardiso's loaded library."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+import weakref
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+
+_MTYPE = ctypes.c_int32(-2)  # real, symmetric, indefinite
+_INT32_MAX = 2**31 - 1
+
+
+def _library() -> Any:
+    if "PYPARDISO_MKL_RT" not in os.environ:
+        # pypardiso's own search walks the whole environment, which costs more than a small solve.
+        found = sorted(Path(sys.prefix, "lib").glob("libmkl_rt.so*"))
+        if found:
+            os.environ["PYPARDISO_MKL_RT"] = str(found[0])
+    from pypardiso.pardiso_wrapper import PyPardisoSolver
+
+    return PyPardisoSolver().libmkl.pardiso
+
+
+def available() -> bool:
+    """Whether PARDISO can be loaded on this machine."""
+    try:
+        _library()
+    except (ImportError, OSError):
+        return False
+    return True
+
+
+class PardisoError(RuntimeError):
+    """PARDISO refused the matrix; carries its error number."""
+
+
+class SchurFactor:
+    """Factor of ``[[K, R^T], [R, 0]]`` that stops before the last rows, and their Schur complement.
+
+    Parameters
+    ----------
+    upper : (n + r, n + r) sparse
+        Upper triangle of the augmented matrix, every diagonal entry stored.
+    rows : int
+        Number r of last rows that are kept.
+
+    Attributes
+    ----------
+    schur : (r, r)
+        ``-R K^-1 R^T``.
+    perturbed : int
+        Pivots that PARDISO had to perturb; 0 for a trustworthy factor.
+    """
+
+    def __init__(self, upper: sp.csr_matrix, rows: int) -> None:
+        upper = upper.tocsr()
+        upper.sort_indices()
+        if upper.nnz > _INT32_MAX:
+            raise PardisoError("matrix has more entries than 32-bit PARDISO can index")
+        self._call = _library()
+        self._n = upper.shape[0]
+        self._rows = rows
+        self._a = np.ascontiguousarray(upper.data, dtype=np.float64)
+        self._ia = upper.indptr.astype(np.int32) + 1
+        self._ja = upper.indices.astype(np.int32) + 1
+        self._pt = np.zeros(64, dtype=np.int64)
+        self._perm = np.zeros(self._n, dtype=np.int32)
+        self._perm[self._n - rows :] = 1
+        self._iparm = np.zeros(64, dtype=np.int32)
+        self._iparm[[0, 1, 9, 20]] = 1, 3, 13, 1  # own settings, parallel METIS, pivot threshold 1e-13, Bunch-Kaufman
+        self._iparm[35] = 2  # Schur complement, and keep the factor for solves
+        self._finalizer = weakref.finalize(self, _release, self._call, self._pt, self._n, self._iparm)
+        schur = np.zeros((rows, rows), order="F")
+        self._phase(11, np.zeros(1), np.zeros(1), 1)
+        self._phase(22, np.zeros(1), schur, 1)
+        self.schur = np.asarray(schur)
+        self.perturbed = int(self._iparm[13])
+        self.memory_mb = float(max(self._iparm[14], self._iparm[15] + self._iparm[16])) / 1024.0
+
+    def _phase(self, phase: int, b: Float, x: Float, nrhs: int) -> None:
+        _run(self._call, self._pt, phase, self._n, self._a, self._ia, self._ja, self._perm, nrhs, self._iparm, b, x)
+
+    def solve(self, load: Float) -> Float:
+        """Displacements ``K^-1 load`` (n, m) for loads (n, m): forward, diagonal, backward with the kept rows at 0."""
+        n = self._n - self._rows
+        columns = load.reshape(n, -1)
+        m = columns.shape[1]
+        b = np.zeros((self._n, m), order="F")
+        b[:n] = columns
+        x = np.zeros_like(b, order="F")
+        self._phase(331, b, x, m)
+        b[:n], b[n:] = x[:n], 0.0
+        self._phase(332, b, x, m)
+        b[:n], b[n:] = x[:n], 0.0
+        self._phase(333, b, x, m)
+        return x[:n].reshape(load.shape)
+
+
+def _run(call: Any, pt: Any, phase: int, n: int, a: Any, ia: Any, ja: Any, perm: Any, nrhs: int, iparm: Any, b: Any, x: Any) -> None:
+    def i32(value: int) -> Any:
+        return ctypes.byref(ctypes.c_int32(value))
+
+    def pointer(array: Any, kind: Any = ctypes.c_int32) -> Any:
+        return array.ctypes.data_as(ctypes.POINTER(kind))
+
+    error = ctypes.c_int32(0)
+    call(
+        pointer(pt, ctypes.c_int64), i32(1), i32(1), ctypes.byref(_MTYPE), i32(phase), i32(n),
+        a.ctypes.data_as(ctypes.c_void_p), pointer(ia), pointer(ja), pointer(perm), i32(nrhs), pointer(iparm), i32(0),
+        b.ctypes.data_as(ctypes.c_void_p), x.ctypes.data_as(ctypes.c_void_p), ctypes.byref(error),
+    )  # fmt: skip
+    if error.value:
+        reason = {-1: "inconsistent input", -2: "not enough memory", -3: "reordering", -4: "zero pivot"}
+        raise PardisoError(f"PARDISO phase {phase}: error {error.value} ({reason.get(error.value, 'see MKL manual')})")
+
+
+def _release(call: Any, pt: Any, n: int, iparm: Any) -> None:
+    one = np.zeros(1)
+    index = np.ones(1, dtype=np.int32)
+    _run(call, pt, -1, n, one, index, index, index, 1, iparm, one, one)
