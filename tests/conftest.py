@@ -1,0 +1,24 @@
+"""Shared by all tests: one thread for the numerics, a cache that is not the user's."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+# Before numpy or MKL is loaded: several test processes share few cores, and one thread is reproducible.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Meshes made by tests live in a folder of their own, shared by one run."""
+    if "FINGER3D_CACHE" not in os.environ:
+        os.environ["FINGER3D_CACHE"] = str(tmp_path_factory.mktemp("cache"))
+
+
+@pytest.fixture(scope="session")
+def root() -> Path:
+    """The top of the repository."""
+    return Path(__file__).resolve().parent.parent
