@@ -1,0 +1,128 @@
+"""One increment of frictional contact: the same stick and slip conditions in 2D and 3D, solved and then proved."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.contact.conditions import TOLERANCE, Increments, project, residual, stiffness_weights
+from finger3d.contact.law import OPEN
+from finger3d.contact.newton import Iterate, newton, sweeps
+from finger3d.contact.state import ContactState, Increment
+from finger3d.errors import Outcome
+
+Float = NDArray[np.float64]
+
+
+class Law(Protocol):
+    """What `advance` asks of a friction law; see `finger3d.contact.law`."""
+
+    def coefficients(self, status: NDArray[np.int8]) -> Float: ...
+
+    def revised(self, mu: Float, status: NDArray[np.int8]) -> Float | None: ...
+
+
+def advance(previous: ContactState, free: Float, compliance: Float, law: Law, length_scale: float) -> Increment:
+    """Solve one increment.
+
+    Parameters
+    ----------
+    previous : state at its begin
+    free : (c, d) mm
+        Gap, and tangential position relative to the object, that each point would have under no contact force.
+    compliance : (c, d, c, d) mm/N
+    law : coefficients per point, and their revision
+    length_scale : mm
+        What gaps are measured by in the residual: the depth.
+
+    Returns
+    -------
+    Increment
+        With outcome CONVERGED only if every condition holds to 1e-8, checked after the solution.
+    """
+    c, d = free.shape
+    matrix = compliance.reshape(c * d, c * d)
+    refusal = _refusal(free, matrix)
+    if refusal:
+        return Increment(previous, refusal, np.inf, 0, "none")
+    change = free.copy()
+    change[:, 1:] -= previous.position
+    rho = stiffness_weights(matrix, d)
+    mu = law.coefficients(previous.status)
+    start = previous.force
+    total, worst = 0, np.inf
+    while True:
+        problem = Increments(change, matrix, mu, rho)
+        for method, attempt in _ladder(problem, start):
+            total += attempt.iterations
+            if not attempt.solved:
+                continue
+            force, moved, status = _settled(problem, attempt.force)
+            error = residual(force, moved, status, mu, length_scale)
+            if error <= TOLERANCE:
+                break
+            worst = min(worst, error)
+        else:
+            return Increment(previous, Outcome.NO_CONVERGENCE, worst, total, "none")
+        revised = law.revised(mu, status)
+        if revised is None:
+            break
+        mu, start = revised, force
+    return Increment(_next_state(previous, force, moved, status), Outcome.CONVERGED, error, total, method)
+
+
+def _refusal(free: Float, matrix: Float) -> Outcome | None:
+    if not (np.isfinite(free).all() and np.isfinite(matrix).all()):
+        return Outcome.NOT_FINITE
+    if np.diagonal(matrix).min(initial=np.inf) <= 0.0:
+        return Outcome.INDEFINITE
+    return None
+
+
+def _ladder(problem: Increments, start: Float) -> Iterator[tuple[str, Iterate]]:
+    """Attempts from the fastest to the most patient; each is tried only if the one before failed."""
+    yield "newton", newton(problem, start, 30, damped=False)
+    yield "damped", newton(problem, start, 60, damped=True)
+    yield "ramp", _ramp(problem, start)
+    force, spent = start, 0
+    for count in (20, 50, 100, 200, 400, 800):
+        force = sweeps(problem, force, count)
+        spent = count
+        attempt = newton(problem, force, 30, damped=True)
+        yield "sweeps", replace(attempt, iterations=attempt.iterations + spent)
+
+
+def _ramp(problem: Increments, start: Float) -> Iterate:
+    """Follow the solution from no friction to the coefficient asked for, halving the stride where it breaks."""
+    attempt = newton(replace(problem, mu=np.zeros_like(problem.mu)), start, 60, damped=True)
+    spent = attempt.iterations
+    reached, stride = 0.0, 0.25
+    force = attempt.force
+    # beyond mu ~ 5 nothing changes but full stick, so the share runs over a saturating scale
+    while attempt.solved and reached < 1.0 and stride > 1e-3:
+        share = min(reached + stride, 1.0)
+        mu = problem.mu if share == 1.0 else problem.mu * share / (1.0 + (1.0 - share) * problem.mu)
+        trial = newton(replace(problem, mu=mu), force, 40, damped=True)
+        spent += trial.iterations
+        if trial.solved:
+            force, reached, stride = trial.force, share, stride * 1.5
+        else:
+            stride *= 0.5
+    return Iterate(force, reached >= 1.0, spent)
+
+
+def _settled(problem: Increments, force: Float) -> tuple[Float, Float, NDArray[np.int8]]:
+    """Forces put exactly on their cones, what they move, and the states that follow."""
+    projected, status, _ = project(problem, force, problem.moved(force))
+    return projected, problem.moved(projected), status
+
+
+def _next_state(previous: ContactState, force: Float, moved: Float, status: NDArray[np.int8]) -> ContactState:
+    touching = (status != OPEN)[:, None]
+    return ContactState(
+        status, force, moved[:, 0], previous.position + moved[:, 1:], previous.slip + np.where(touching, moved[:, 1:], 0.0)
+    )

@@ -1,0 +1,105 @@
+"""The contact conditions, once for every dimension: as a projection to solve with, and as inequalities to check.
+
+Maeno 2004, Eqs. (1)-(4): a point is open (gap > 0, no force), or touches (gap 0, f_n > 0) and then sticks
+(no change of position, |f_t| < mu f_n) or slips (|f_t| = mu f_n); and friction opposes slip, which the paper leaves out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.contact.law import OPEN, SLIP, STICK
+
+Float = NDArray[np.float64]
+
+TOLERANCE = 1e-8
+"""Largest residual at which a step may call itself converged (contract.md)."""
+
+
+@dataclass(frozen=True)
+class Increments:
+    """One increment to be solved: find force (c, d) such that ``moved = free + C force`` meets the conditions.
+
+    Attributes
+    ----------
+    free : (c, d) mm
+        Gap and change of tangential position of each point under no contact force.
+    compliance : (c d, c d) mm/N
+    mu : (c,)
+    rho : (c, d) N/mm
+        Stiffness that weighs a violated gap or slip against a force: 1 / diagonal of the compliance, tangents alike.
+    """
+
+    free: Float
+    compliance: Float
+    mu: Float
+    rho: Float
+
+    def moved(self, force: Float) -> Float:
+        """Gap and change of position (c, d) mm under forces (c, d) N."""
+        return self.free + (self.compliance @ force.ravel()).reshape(force.shape)
+
+
+def stiffness_weights(compliance: Float, dim: int) -> Float:
+    """Weights rho (c, d) N/mm from the diagonal of a compliance (c d, c d); the tangents of a point share the least."""
+    rho = 1.0 / np.diagonal(compliance).reshape(-1, dim)
+    rho = rho.copy()
+    rho[:, 1:] = rho[:, 1:].min(axis=1, keepdims=True)
+    return rho
+
+
+def project(problem: Increments, force: Float, moved: Float) -> tuple[Float, NDArray[np.int8], Float]:
+    """Projection of ``force - rho moved`` on the friction cone of its own normal force.
+
+    Returns
+    -------
+    projected : (c, d) N
+    status : (c,) read off the projection
+    trial : (c, d) N, normal force cut at 0, tangential force before it is cut back to length mu n
+    """
+    trial = force - problem.rho * moved
+    trial[:, 0] = np.maximum(trial[:, 0], 0.0)
+    normal = trial[:, 0]
+    length = np.linalg.norm(trial[:, 1:], axis=1)
+    bound = problem.mu * normal
+    slips = (length > bound) | (problem.mu == 0.0)
+    cut = np.where(slips, bound / np.where(length > 0.0, length, 1.0), 1.0)
+    projected = trial.copy()
+    projected[:, 1:] *= cut[:, None]
+    status = np.where(normal <= 0.0, OPEN, np.where(slips, SLIP, STICK)).astype(np.int8)
+    return projected, status, trial
+
+
+def residual(force: Float, moved: Float, status: NDArray[np.int8], mu: Float, length_scale: float) -> float:
+    """Largest violation of the conditions: lengths by `length_scale` (mm), forces by the largest nodal force.
+
+    Parameters
+    ----------
+    force, moved : (c, d) N and mm, as in `Increments`
+    status : (c,)
+    mu : (c,) coefficient that limits each point
+    """
+    if not len(force):
+        return 0.0
+    force_scale = float(np.linalg.norm(force, axis=1).max()) or 1.0
+    normal, friction = force[:, 0], force[:, 1:]
+    gap, slip = moved[:, 0], moved[:, 1:]
+    length = np.linalg.norm(friction, axis=1)
+    opened, stuck, slips = status == OPEN, status == STICK, status == SLIP
+    against = friction / np.where(length > 0.0, length, 1.0)[:, None]
+    backward = np.maximum(-np.sum(slip * against, axis=1), 0.0)
+    astray = np.linalg.norm(slip + backward[:, None] * against, axis=1)
+    lengths = [
+        np.where(opened, np.maximum(-gap, 0.0), np.abs(gap)),
+        np.where(stuck, np.linalg.norm(slip, axis=1), 0.0),
+        np.where(slips & (length > 0.0), astray, 0.0),
+    ]
+    forces = [
+        np.where(opened, np.abs(normal) + length, np.maximum(-normal, 0.0)),
+        np.where(stuck, np.maximum(length - mu * normal, 0.0), 0.0),
+        np.where(slips, np.abs(length - mu * normal), 0.0),
+    ]
+    return float(max(np.max(lengths) / length_scale, np.max(forces) / force_scale))

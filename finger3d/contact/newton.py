@@ -1,0 +1,134 @@
+"""Semismooth Newton on the projection, and block Gauss-Seidel sweeps: the two engines of `advance`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.contact.conditions import Increments, project
+from finger3d.contact.law import SLIP
+
+Float = NDArray[np.float64]
+
+_EXACT = 1e-13
+"""Residual force, relative to the largest trial force, at which an iterate is a solution."""
+
+
+@dataclass(frozen=True)
+class Iterate:
+    """Forces (c, d) N after some iterations, whether they solve the projection, and if a set of states came back."""
+
+    force: Float
+    solved: bool
+    iterations: int
+    repeated: bool = False
+
+
+def _newton_force(problem: Increments, status: NDArray[np.int8], trial: Float) -> Float:
+    """Forces (c, d) that solve the equations of the sets, slip rows with the normal force unknown."""
+    c, d = trial.shape
+    active = np.flatnonzero(status)
+    force = np.zeros((c, d))
+    if not len(active):
+        return force
+    dof = (active[:, None] * d + np.arange(d)).ravel()
+    weight = problem.rho[active].ravel()
+    matrix = problem.compliance[np.ix_(dof, dof)]
+    matrix *= weight[:, None]
+    right = -weight * problem.free[active].ravel()
+    slip = np.flatnonzero(status[active] == SLIP)
+    if len(slip):
+        _slip_rows(problem, active, slip, trial, matrix, right)
+    force[active] = np.linalg.solve(matrix, right).reshape(-1, d)
+    return force
+
+
+def _slip_rows(
+    problem: Increments, active: NDArray[np.int64], slip: NDArray[np.int64], trial: Float, matrix: Float, right: Float
+) -> None:
+    """Replace the tangential rows of slipping points: f_t - mu f_n e, with e turning as the slip does (3D)."""
+    d = trial.shape[1]
+    points = active[slip]
+    tangent = trial[points, 1:]
+    length = np.linalg.norm(tangent, axis=1)
+    direction = tangent / np.where(length > 0.0, length, 1.0)[:, None]
+    mu = problem.mu[points]
+    turn = np.minimum(mu * trial[points, 0] / np.where(length > 0.0, length, 1.0), 1.0)
+    across = np.eye(d - 1) - direction[:, :, None] * direction[:, None, :]
+    across *= turn[:, None, None]
+    rows = slip[:, None] * d + np.arange(1, d)
+    matrix[rows] = across @ matrix[rows] if d > 2 else 0.0
+    right[rows] = np.einsum("sij,sj->si", across, right[rows])
+    for i in range(d - 1):
+        matrix[rows[:, i], slip * d] -= mu * direction[:, i]
+        for j in range(d - 1):
+            matrix[rows[:, i], rows[:, j]] += (i == j) - across[:, i, j]
+
+
+def newton(problem: Increments, start: Float, limit: int, damped: bool) -> Iterate:
+    """Semismooth Newton from forces `start` (c, d) N; full steps, or with a backtracking search on the residual force."""
+    force = start
+    moved = problem.moved(force)
+    projected, status, trial = project(problem, force, moved)
+    merit = float(np.linalg.norm(force - projected))
+    seen: dict[bytes, float] = {}
+    repeated = False
+    for iteration in range(1, limit + 1):
+        key = status.tobytes()
+        if seen.get(key) == merit:
+            repeated = True
+            break
+        seen[key] = merit
+        try:
+            target = _newton_force(problem, status, trial)
+        except np.linalg.LinAlgError:
+            return Iterate(force, False, iteration)
+        share = 1.0
+        while True:
+            candidate = force + share * (target - force)
+            moved = problem.moved(candidate)
+            projected, next_status, next_trial = project(problem, candidate, moved)
+            next_merit = float(np.linalg.norm(candidate - projected))
+            if not damped or next_merit <= (1.0 - 1e-4 * share) * merit or share < 1e-3:
+                break
+            share *= 0.5
+        force, status, trial, merit = candidate, next_status, next_trial, next_merit
+        scale = max(float(np.abs(trial).max()), float(np.abs(force).max()))
+        if not np.isfinite(merit):
+            return Iterate(start, False, iteration)
+        if merit <= _EXACT * max(scale, 1e-300) * np.sqrt(len(force)):
+            return Iterate(projected, True, iteration)
+    return Iterate(force, False, limit if not repeated else iteration, repeated)
+
+
+def sweeps(problem: Increments, start: Float, count: int) -> Float:
+    """Forces (c, d) after `count` projected block Gauss-Seidel sweeps over the points that may touch."""
+    c, d = start.shape
+    force = start.copy()
+    moved = problem.moved(force)
+    columns = problem.compliance.reshape(c, d, c, d)
+    for _ in range(count):
+        for i in np.flatnonzero((force[:, 0] > 0.0) | (moved[:, 0] < 0.0)):
+            trial = force[i] - problem.rho[i] * moved[i]
+            trial[0] = max(trial[0], 0.0)
+            length = float(np.linalg.norm(trial[1:]))
+            bound = problem.mu[i] * trial[0]
+            if length > bound:
+                trial[1:] *= bound / length
+            change = trial - force[i]
+            force[i] = trial
+            moved += columns[:, :, i] @ change
+    return force
+
+
+def uniqueness(problem_mu: Float, compliance: Float, dim: int) -> float:
+    """Largest mu |K_tt^-1 K_tn| over points, K the inverse of each point's own block; above 1 answers may be several."""
+    c = len(problem_mu)
+    blocks = compliance.reshape(c, dim, c, dim)[np.arange(c), :, np.arange(c)]
+    stiff = np.linalg.inv(blocks)
+    coupling = np.linalg.solve(stiff[:, 1:, 1:], stiff[:, 1:, :1])[:, :, 0]
+    return float(np.max(problem_mu * np.linalg.norm(coupling, axis=1), initial=0.0))
+
+

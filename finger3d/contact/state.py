@@ -1,0 +1,66 @@
+"""Contact states: what is known of every contact point at one instant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.contact.law import OPEN
+from finger3d.errors import Outcome
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ContactState:
+    """State of c contact points in d dimensions, in each point's frame: normal first, then tangents.
+
+    Attributes
+    ----------
+    status : (c,) OPEN, STICK or SLIP
+    force : (c, d) N, on the body
+    gap : (c,) mm
+    position : (c, d - 1) mm
+        Tangential displacement relative to the object, w_t of Maeno 2004, Eq. 3; kept for open points too.
+    slip : (c, d - 1) mm
+        Sum of the changes of `position` while the point touched.
+    """
+
+    status: NDArray[np.int8]
+    force: Float
+    gap: Float
+    position: Float
+    slip: Float
+
+    @classmethod
+    def at_rest(cls, gap: Float, dim: int) -> ContactState:
+        """No force, no displacement; gap (c,) mm."""
+        c = len(gap)
+        return cls(
+            np.full(c, OPEN, dtype=np.int8), np.zeros((c, dim)), gap, np.zeros((c, dim - 1)), np.zeros((c, dim - 1))
+        )
+
+
+@dataclass(frozen=True)
+class Increment:
+    """What one call of `advance` found.
+
+    Attributes
+    ----------
+    state : ContactState
+        To be trusted only if `outcome` is CONVERGED; the state before the increment otherwise.
+    residual : float
+        Largest violation of Eqs. (1)-(4) and of "friction opposes slip", dimensionless.
+    iterations : int
+        Linear solves, all attempts together.
+    method : str
+        Which member of the ladder settled it: newton, damped, ramp, sweeps; or paper.
+    """
+
+    state: ContactState
+    outcome: Outcome
+    residual: float
+    iterations: int
+    method: str
