@@ -7,6 +7,7 @@ strain the gap is measured along the frame's normal: vertical, as in the paper, 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -15,6 +16,8 @@ from numpy.typing import NDArray
 
 Float = NDArray[np.float64]
 Axis = Literal["x", "z"]
+
+_ZOOMS = 6
 
 
 class RigidObject(Protocol):
@@ -33,6 +36,10 @@ class RigidObject(Protocol):
 
     def mirrors(self) -> tuple[str, ...]:
         """Axes along which the object is its own mirror image about the finger's middle."""
+        ...
+
+    def lowest(self, slide_x: float, slide_z: float) -> tuple[float, float]:
+        """Place (x, z) mm of the lowest point after a slide."""
         ...
 
 
@@ -55,6 +62,10 @@ class _Placed:
     def frame(self, dim: int) -> Float:
         """Vertical normal."""
         return vertical_frame(dim)
+
+    def lowest(self, slide_x: float, slide_z: float) -> tuple[float, float]:
+        """The placed point, carried along."""
+        return self.x_mm + slide_x, self.z_mm + slide_z
 
     def _across(self, x: Float, z: Float, axis: Axis) -> Float:
         """Distance (n,) from the object's line along `axis`."""
@@ -83,6 +94,10 @@ class Plane(_Placed):
     def mirrors(self) -> tuple[str, ...]:
         """A level plane is the same everywhere, a tilted one along z."""
         return ("x", "z") if self.tilt == 0.0 else ("z",)
+
+    def lowest(self, slide_x: float, slide_z: float) -> tuple[float, float]:
+        """A plane that slides in itself has no point to carry along."""
+        return self.x_mm, self.z_mm
 
 
 @dataclass(frozen=True)
@@ -150,6 +165,21 @@ class Wave(_Placed):
         return tuple(sorted({self.axis, *super().mirrors()}))
 
 
-def first_touch(finger_top: Float, object_height: Float) -> float:
-    """Height of the object's lowest point (mm) at which it just touches: the largest difference of the surfaces."""
-    return float(np.max(finger_top - object_height))
+def first_touch(top: Callable[[Float, Float], Float], obj: RigidObject, half_length: float, half_width: float) -> float:
+    """Height (mm) of the object's lowest point at first touch: the largest difference of the two surfaces.
+
+    `top` is the finger's height over (x, z), nan beside it; the maximum is searched on a grid that zooms in on it.
+    """
+    x_range, z_range = (-half_length, half_length), (-half_width, half_width)
+    best = -np.inf
+    for level in range(_ZOOMS):
+        count = 401 if level == 0 else 21
+        x, z = np.meshgrid(np.linspace(*x_range, count), np.linspace(*z_range, 41 if level == 0 else 21), indexing="ij")
+        difference = np.nan_to_num(top(x.ravel(), z.ravel()) - obj.height(x.ravel(), z.ravel()), nan=-np.inf)
+        at = int(np.argmax(difference))
+        best = max(best, float(difference[at]))
+        dx, dz = x[1, 0] - x[0, 0], z[0, 1] - z[0, 0]
+        cx, cz = x.ravel()[at], z.ravel()[at]
+        x_range = max(cx - dx, -half_length), min(cx + dx, half_length)
+        z_range = max(cz - dz, -half_width), min(cz + dz, half_width)
+    return best

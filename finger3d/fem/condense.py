@@ -42,17 +42,16 @@ class Condensed:
     solver: str
     _rows: sp.csr_matrix = field(repr=False)
     _free: Int = field(repr=False)
-    _nodes_dofs: int = field(repr=False)
     _solve: Callable[[Float], Float] = field(repr=False)
 
-    def displacement(self, force: Float, dim: int) -> Float:
-        """Displacements (n, d) mm of all nodes under row forces (r,) N, with the factor at hand."""
+    def unknowns(self, force: Float) -> Float:
+        """All unknowns (N,) under row forces (r,) N, with the factor at hand: displacements mm, then pressures."""
         whole = np.zeros(self._rows.shape[1])
         whole[self._free] = self._solve(self._rows.T[self._free] @ force)
-        return whole[: self._nodes_dofs].reshape(-1, dim)
+        return whole
 
 
-def condense(stiffness: Stiffness, fixed: Int, rows: sp.csr_matrix, nodes: int, solver: str | None = None) -> Condensed:
+def condense(stiffness: Stiffness, fixed: Int, rows: sp.csr_matrix, solver: str | None = None) -> Condensed:
     """Condense a stiffness to rows.
 
     Parameters
@@ -61,7 +60,6 @@ def condense(stiffness: Stiffness, fixed: Int, rows: sp.csr_matrix, nodes: int, 
     fixed : numbers of the unknowns held at zero
     rows : (r, n d) sparse
         What is read: row displacement = rows @ u; row forces act through the transpose.
-    nodes : number n of nodes
     solver : "pardiso" or "superlu"; default FINGER3D_SOLVER, else PARDISO where it is installed
     """
     start = time.perf_counter()
@@ -77,7 +75,7 @@ def condense(stiffness: Stiffness, fixed: Int, rows: sp.csr_matrix, nodes: int, 
     compliance, perturbed, solve = build(upper, reduced)
     compliance = 0.5 * (compliance + compliance.T)
     seconds = time.perf_counter() - start
-    return Condensed(compliance, perturbed, 1, seconds, solver, padded, free, rows.shape[1], solve)
+    return Condensed(compliance, perturbed, 1, seconds, solver, padded, free, solve)
 
 
 def _default_solver() -> str:

@@ -112,9 +112,7 @@ def locate(mesh: Mesh, point: Float) -> list[tuple[int, Float]]:
 
 def strain_row(mesh: Mesh, point: Float, direction: Float) -> sp.csr_matrix:
     """Row (1, n d) of the normal strain at `point` (d,) along the unit `direction` (d,), mean over cells that hold it."""
-    found = locate(mesh, point)
-    if not found:
-        raise Finger3dError(f"gauge: the point {tuple(round(float(x), 6) for x in point)} mm lies outside the body")
+    found = _holding(mesh, point)
     row = np.zeros(mesh.points.shape)
     for cell, bary in found:
         nodes = mesh.cells[cell]
@@ -124,16 +122,18 @@ def strain_row(mesh: Mesh, point: Float, direction: Float) -> sp.csr_matrix:
     return sp.csr_matrix(row.reshape(1, -1))
 
 
-def elongation_row(mesh: Mesh, start: Float, end: Float) -> sp.csr_matrix:
-    """Row (1, n d) of the mean normal strain over a straight gauge: relative elongation between its ends."""
-    length = float(np.linalg.norm(end - start))
-    direction = (end - start) / length
+def displacement_row(mesh: Mesh, point: Float, direction: Float) -> sp.csr_matrix:
+    """Row (1, n d) of the displacement at `point` (d,) along `direction` (d,)."""
+    found = _holding(mesh, point)
     row = np.zeros(mesh.points.shape)
-    for point, sign in ((end, 1.0), (start, -1.0)):
-        found = locate(mesh, point)
-        if not found:
-            raise Finger3dError(f"gauge: its end {tuple(round(float(x), 6) for x in point)} mm lies outside the body")
-        cell, bary = found[0]
+    for cell, bary in found:
         values = shape(bary[None], mesh.is_quadratic)[0]
-        np.add.at(row, mesh.cells[cell], sign / length * np.outer(values, direction))
+        np.add.at(row, mesh.cells[cell], np.outer(values, direction) / len(found))
     return sp.csr_matrix(row.reshape(1, -1))
+
+
+def _holding(mesh: Mesh, point: Float) -> list[tuple[int, Float]]:
+    found = locate(mesh, point)
+    if not found:
+        raise Finger3dError(f"gauge: the point {tuple(round(float(x), 6) for x in point)} mm lies outside the body")
+    return found

@@ -1,0 +1,159 @@
+"""What a press leaves behind: frames, and the numbers of the contract measured on them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.contact.law import OPEN, STATUS_NAMES, STICK
+from finger3d.contact.state import ContactState
+from finger3d.errors import Outcome
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Target:
+    """Where the object is: pressed down by a depth, slid along x and z, at a time (s)."""
+
+    depth_mm: float
+    slide_x_mm: float = 0.0
+    slide_z_mm: float = 0.0
+    time_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class ContactPoints:
+    """The contact points of the whole finger, mirrored halves included.
+
+    Attributes
+    ----------
+    nodes : (m,) numbers in the whole mesh
+    points : (m, 3) mm at rest, z = 0 in a section
+    area : (m,) mm2
+    frame : (d, d) normal into the finger, then tangents
+    half_width_mm, band_mm : float
+        A point counts to the line z = 0 within `band_mm`; a section counts whole.
+    """
+
+    nodes: NDArray[np.int64]
+    points: Float
+    area: Float
+    frame: Float
+    half_width_mm: float
+    band_mm: float
+
+    @property
+    def dim(self) -> int:
+        """2 for a section, 3 for a solid."""
+        return len(self.frame)
+
+    def world(self, local: Float) -> Float:
+        """Vectors (m, 3) in x, y, z from vectors (m, d) in the frame."""
+        out = np.zeros((len(local), 3))
+        out[:, : self.dim] = local @ self.frame
+        return out
+
+    def friction(self, force: Float) -> Float:
+        """Tangential part (m, 3) of forces (m, d), in x, y, z."""
+        tangential = force.copy()
+        tangential[:, 0] = 0.0
+        return self.world(tangential)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One increment as reported: whole contact state (m points), gauge strains, work, and how it was settled."""
+
+    target: Target
+    state: ContactState
+    lowest: tuple[float, float]
+    gauges: dict[str, float]
+    external_work_mJ: float
+    dissipation_mJ: float
+    outcome: Outcome
+    residual: float
+    iterations: int
+    method: str
+
+
+@dataclass(frozen=True)
+class History:
+    """Frames of one press, with the points they speak of."""
+
+    points: ContactPoints
+    frames: tuple[Frame, ...]
+    details: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def outcome(self) -> Outcome:
+        """CONVERGED if every increment is."""
+        return next((f.outcome for f in self.frames if not f.outcome.ok), Outcome.CONVERGED)
+
+
+def _half_extent(x: Float) -> float:
+    return float(np.ptp(x) / 2.0) if len(x) else 0.0
+
+
+def measure(points: ContactPoints, frame: Frame) -> dict[str, Any]:
+    """The entry of `steps` in summary.json for one frame (contract.md)."""
+    state, target = frame.state, frame.target
+    world = points.world(state.force)
+    friction = points.friction(state.force)
+    touching, sticking = state.status != OPEN, state.status == STICK
+    x, z = points.points[:, 0], points.points[:, 2]
+    middle = np.abs(z) <= points.band_mm
+    outward_x = friction[:, 0] * np.sign(x - frame.lowest[0])
+    outward_z = friction[:, 2] * np.sign(z - frame.lowest[1])
+    numbers: dict[str, Any] = {
+        "depth_mm": target.depth_mm,
+        "slide_x_mm": target.slide_x_mm,
+        "slide_z_mm": target.slide_z_mm,
+        "time_s": target.time_s,
+        "normal_force_N": -float(world[:, 1].sum()),
+        "tangential_force_x_N": float(friction[:, 0].sum()),
+        "tangential_force_z_N": float(friction[:, 2].sum()),
+        "friction_sum_N": float(np.linalg.norm(friction, axis=1).sum()),
+        "outward_friction_x_N": float(outward_x.sum()),
+        "outward_friction_z_N": float(outward_z.sum()),
+        "contact_area_mm2": float(points.area[touching].sum()),
+        "stick_area_mm2": float(points.area[sticking].sum()),
+        "contact_half_length_mm": _half_extent(x[touching & middle]),
+        "stick_half_length_mm": _half_extent(x[sticking & middle]),
+    }
+    if points.dim == 3:
+        end = np.abs(z - points.half_width_mm) <= 1e-6 * points.half_width_mm
+        numbers["contact_half_length_end_mm"] = _half_extent(x[touching & end])
+    return numbers | {
+        "external_work_mJ": frame.external_work_mJ,
+        "dissipation_mJ": frame.dissipation_mJ,
+        "gauges": dict(frame.gauges),
+        "iterations": frame.iterations,
+        "residual": frame.residual,
+        "method": frame.method,
+        "outcome": str(frame.outcome),
+    }
+
+
+def contact_table(points: ContactPoints, state: ContactState) -> dict[str, Any]:
+    """Columns of contact.csv; pressure and shear are the traction on the finger, slip is in x and z."""
+    friction = points.friction(state.force)
+    padded = np.zeros((len(state.slip), points.dim))
+    padded[:, 1:] = state.slip
+    slip = points.world(padded)
+    return {
+        "x_mm": points.points[:, 0],
+        "y_mm": points.points[:, 1],
+        "z_mm": points.points[:, 2],
+        "area_mm2": points.area,
+        "pressure_MPa": state.force[:, 0] / points.area,
+        "shear_x_MPa": friction[:, 0] / points.area,
+        "shear_z_MPa": friction[:, 2] / points.area,
+        "gap_mm": state.gap,
+        "slip_x_mm": slip[:, 0],
+        "slip_z_mm": slip[:, 2],
+        "status": [STATUS_NAMES[s] for s in state.status],
+    }

@@ -1,0 +1,292 @@
+"""The main job: a scene to numbers, tables, fields and pictures, written as they come."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from finger3d.errors import Outcome
+from finger3d.export import atomic, write_csv, write_json, write_vtu
+from finger3d.history import Frame, History, contact_table, measure
+from finger3d.report import Report
+
+if TYPE_CHECKING:
+    from finger3d.scene import Scene
+    from finger3d.solve import Problem
+
+_SHAPING = ("numpy", "scipy", "pypardiso", "mkl", "build123d", "cadquery-ocp-novtk", "pytetwild")
+_WRITE_EVERY_S = 0.5
+
+
+@dataclass(frozen=True)
+class PressResult:
+    """A finished (or interrupted) press: its history, its summary.json as a dict, and where everything was written."""
+
+    history: History
+    summary: dict[str, Any]
+    out: Path
+
+    @property
+    def outcome(self) -> Outcome:
+        """CONVERGED if every increment is."""
+        return self.history.outcome
+
+
+def versions() -> dict[str, str]:
+    """Versions of finger3d and of every installed package that shapes the numbers."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    found = {}
+    for name in ("finger3d", *_SHAPING):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def _peak_memory_mb() -> float:
+    import resource
+
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+
+
+class _Output:
+    """The files of a press that grow with its steps."""
+
+    def __init__(self, scene: Scene, problem: Problem, out: Path, started: float, factorizations: int) -> None:
+        self.scene, self.problem, self.out, self.started = scene, problem, out, started
+        self.factorizations = factorizations
+        self.frames: list[Frame] = []
+        self.seconds = {"cad": 0.0, "mesh": 0.0, **problem.seconds, "contact": 0.0, "output": 0.0}
+        self._written = -math.inf
+
+    def add(self, frame: Frame, seconds: float) -> None:
+        self.frames.append(frame)
+        self.seconds["contact"] += seconds
+        if time.perf_counter() - self._written > _WRITE_EVERY_S:
+            self.write("incomplete: the press was still running, or was interrupted; the steps written are good")
+
+    def write(self, outcome: str) -> dict[str, Any]:
+        begin = time.perf_counter()
+        steps = [measure(self.problem.points, f) for f in self.frames]
+        summary = self._summary(steps, outcome)
+        write_json(self.out / "summary.json", summary)
+        if steps:
+            flat = [{**s, **{f"gauge_{k}": v for k, v in s["gauges"].items()}} for s in steps]
+            write_csv(self.out / "history.csv", {k: [row[k] for row in flat] for k in flat[0] if k != "gauges"})
+            last = next((f for f in reversed(self.frames) if f.outcome.ok), self.frames[-1])
+            write_csv(self.out / "contact.csv", contact_table(self.problem.points, last.state))
+        self._written = time.perf_counter()
+        self.seconds["output"] += self._written - begin
+        return summary
+
+    def _summary(self, steps: list[dict[str, Any]], outcome: str) -> dict[str, Any]:
+        problem, report = self.problem, self.problem.report
+        return {
+            "scene": self.scene.as_dict(),
+            "effects": list(self.scene.effects),
+            "outcome": outcome,
+            "steps": steps,
+            "mesh": {
+                "points": report.points,
+                "cells": report.cells,
+                "dofs": int(problem.stiffness.upper.shape[0]),
+                "contact_points": len(problem.surface.nodes),
+                "min_dihedral_deg": report.min_dihedral_deg,
+                "volume_mm3": report.volume_mm3,
+                "cad_volume_mm3": report.cad_volume_mm3,
+                "hash": report.hash,
+                "from_cache": report.from_cache,
+                "cache_path": report.cache_path,
+                "symmetry": list(problem.axes),
+                "formulation": "mixed quadratic/linear" if problem.elastic.mixed else "quadratic displacement",
+            },
+            "cost": {
+                "seconds": {**self.seconds, "total": time.perf_counter() - self.started},
+                "factorizations": self.factorizations,
+                "peak_memory_MB": _peak_memory_mb(),
+                "solver": problem.condensed.solver,
+                "perturbed_pivots": problem.condensed.perturbed_pivots,
+            },
+            "versions": versions(),
+        }
+
+
+def press(scene: Scene | str | Path, out: str | Path, report: Report | None = None, figures: bool = True) -> PressResult:
+    """Press a scene and write its results into a folder.
+
+    Parameters
+    ----------
+    scene : a loaded scene, or the path of a TOML file
+    out : folder, made if it is not there
+    report : told about stages and steps
+    figures : whether to draw PNG files
+
+    Returns
+    -------
+    PressResult
+        With the outcome of the last step; steps up to a failure or an interruption are kept and written.
+    """
+    from finger3d.scene import load
+
+    started = time.perf_counter()
+    report = report or Report()
+    scene = load(scene) if isinstance(scene, str | Path) else scene
+    folder = Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    _clear(folder)
+    with atomic(folder / "scene.toml") as path:
+        path.write_text(scene.to_toml(), encoding="utf-8")
+    problem, output = _solve(scene, folder, report, started)
+    if output.frames and output.frames[-1].outcome.ok and not _covers(problem, output.frames[-1]):
+        report.say("contact reached beyond the candidate points; solving again with all of the contact face")
+        problem, output = _solve(scene, folder, report, started, margin=math.inf, before=output)
+    begin = time.perf_counter()
+    report.stage("writing fields")
+    _fields(problem, output, folder, figures)
+    output.seconds["output"] += time.perf_counter() - begin
+    history = History(problem.points, tuple(output.frames))
+    return PressResult(history, output.write(str(history.outcome)), folder)
+
+
+def _clear(folder: Path) -> None:
+    """Remove results of an earlier run, so that no old number stands beside a new one."""
+    for name in ("summary.json", "history.csv", "contact.csv", "fields.vtu", "finger.png", "contact.png", "force.png"):
+        (folder / name).unlink(missing_ok=True)
+
+
+def _solve(
+    scene: Scene, folder: Path, report: Report, started: float, margin: float | None = None, before: _Output | None = None
+) -> tuple[Problem, _Output]:
+    from finger3d.solve import build, march, targets
+
+    model = scene.model()
+    report.stage("meshing")
+    problem = build(model, report.say) if margin is None else build(model, report.say, margin)
+    factorizations = problem.condensed.factorizations + (before.factorizations if before else 0)
+    output = _Output(scene, problem, folder, started, factorizations)
+    total = len(targets(model.legs))
+    report.stage("pressing")
+    output.write("incomplete: no step was finished")
+    begin = time.perf_counter()
+    for done, frame in enumerate(march(problem), start=1):
+        output.add(frame, time.perf_counter() - begin)
+        force = measure(problem.points, frame)["normal_force_N"]
+        report.step(done, total, f"depth {frame.target.depth_mm:.4g} mm, force {force:.5g} N, residual {frame.residual:.1e}")
+        begin = time.perf_counter()
+    return problem, output
+
+
+def _covers(problem: Problem, frame: Frame) -> bool:
+    """Whether no point of the contact face outside the candidates went through the object."""
+    from finger3d.fem.recover import displacement
+    from finger3d.fem.surface import surface
+
+    thickness = 1.0 if problem.dim == 3 else problem.model.design.width_mm
+    face = surface(problem.mesh, "contact", thickness)
+    if len(face.nodes) == len(problem.surface.nodes):
+        return True
+    u = displacement(problem.mesh, problem.unknowns(part_force(problem, frame)))
+    gap = problem.gap(frame.target, face) + (face.trace @ u) @ problem.points.frame[0]
+    others = ~np.isin(face.nodes, problem.surface.nodes)
+    return bool(gap[others].min() > -1e-9 * frame.target.depth_mm)
+
+
+def part_force(problem: Problem, frame: Frame) -> np.ndarray[Any, Any]:
+    """Forces (c, d) on the meshed part from those on the whole finger."""
+    first = np.zeros(len(problem.surface.nodes), dtype=np.int64)
+    own = np.all(problem.sign == 1.0, axis=1)
+    first[problem.parent[own]] = np.flatnonzero(own)
+    return frame.state.force[first] / problem.share[first][:, None]
+
+
+def _fields(problem: Problem, output: _Output, folder: Path, figures: bool) -> None:
+    """fields.vtu and the pictures, from the last good step; the field is recovered with the factor at hand."""
+    from finger3d.fem.recover import displacement, nodal_strain, pressure, stress
+    from finger3d.mesh import unfold
+
+    good = [f for f in output.frames if f.outcome.ok]
+    if not good:
+        return
+    frame, points = good[-1], problem.points
+    unknowns = problem.unknowns(part_force(problem, frame))
+    u = displacement(problem.mesh, unknowns)
+    strain = nodal_strain(problem.mesh, u)
+    p = pressure(problem.mesh, problem.stiffness, unknowns) if problem.elastic.mixed else None
+    sigma = stress(strain, problem.elastic, p)
+    mesh, parent, sign = unfold(problem.mesh, tuple("xyz".index(a) for a in problem.axes))
+    strain, sigma = _three_dimensional(problem, strain, sigma)
+    flip = np.ones((len(parent), 3))
+    flip[:, : problem.dim] = sign
+    both = flip[:, :, None] * flip[:, None, :]
+    table = contact_table(points, frame.state)
+    on_surface = {name: np.zeros(len(parent)) for name in ("pressure", "shear_x", "shear_z", "status")}
+    for name in ("pressure", "shear_x", "shear_z"):
+        on_surface[name][points.nodes] = table[f"{name}_MPa"]
+    on_surface["status"][points.nodes] = frame.state.status
+    whole_u = u[parent] * sign
+    write_vtu(
+        folder / "fields.vtu",
+        mesh,
+        {"displacement": whole_u, "strain": _voigt(strain[parent] * both), "stress": _voigt(sigma[parent] * both), **on_surface},
+    )
+    if figures:
+        _figures(problem, output, frame, mesh, whole_u, folder)
+
+
+def _voigt(tensor: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    """Components xx yy zz xy yz xz (n, 6), VTK's order of a symmetric tensor."""
+    return np.stack([tensor[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))], axis=1)
+
+
+def _three_dimensional(problem: Problem, strain: Any, sigma: Any) -> tuple[Any, Any]:
+    """Strain and stress (n, 3, 3); a section gets the out-of-plane component that its assumption implies."""
+    if problem.dim == 3:
+        return strain, sigma
+    e, s = np.zeros((len(strain), 3, 3)), np.zeros((len(strain), 3, 3))
+    e[:, :2, :2], s[:, :2, :2] = strain, sigma
+    nu, modulus = problem.model.material.nu, problem.model.material.E_MPa
+    in_plane = np.trace(sigma, axis1=1, axis2=2)
+    if problem.model.domain == "plane-strain":
+        s[:, 2, 2] = nu * in_plane
+    else:
+        e[:, 2, 2] = -nu / modulus * in_plane
+    return e, s
+
+
+def _figures(problem: Problem, output: _Output, frame: Frame, mesh: Any, u: Any, folder: Path) -> None:
+    from finger3d import view
+
+    steps = [measure(problem.points, f) for f in output.frames if f.outcome.ok]
+    table = contact_table(problem.points, frame.state)
+    view.contact_figure(
+        folder / "contact.png", table, problem.model.friction.static, problem.points.band_mm,
+        problem.points.half_width_mm if problem.dim == 3 else None,
+    )  # fmt: skip
+    view.force_figure(folder / "force.png", steps)
+    view.finger_picture(
+        folder / "finger.png", mesh, u, table, problem.points.nodes,
+        f"{steps[-1]['normal_force_N']:.4g} N at {frame.target.depth_mm:g} mm",
+    )  # fmt: skip
+
+
+def with_mesh(model: Any, size_mm: float, base_size_mm: float | None = None) -> Any:
+    """The model with other edge lengths; the base in proportion unless given."""
+    base = base_size_mm or model.mesh.base_size_mm * size_mm / model.mesh.size_mm
+    return replace(model, mesh=replace(model.mesh, size_mm=size_mm, base_size_mm=base))
+
+
+def writable(folder: Path, names: Iterable[str] = ("summary.json",)) -> bool:
+    """Whether files can be made in a folder (or in the nearest parent that exists)."""
+    at = folder
+    while not at.exists():
+        at = at.parent
+    return os.access(at, os.W_OK | os.X_OK) and (at.is_dir())

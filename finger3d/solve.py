@@ -1,0 +1,314 @@
+"""From a model to a problem, and from a problem to frames: one condensation, then contact increment by increment."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from finger3d.contact.advance import advance
+from finger3d.contact.law import SLIP
+from finger3d.contact.state import ContactState, Increment
+from finger3d.design import MeshReport, mesh_section, mesh_solid
+from finger3d.errors import Finger3dError
+from finger3d.fem.assembly import Elasticity, Stiffness, stiffness
+from finger3d.fem.condense import Condensed, condense
+from finger3d.fem.surface import Surface, displacement_row, local_rows, restrict, strain_row, surface
+from finger3d.history import ContactPoints, Frame, Target
+from finger3d.mesh import Mesh, unfold
+from finger3d.model import Gauge, Leg, Model
+from finger3d.objects import first_touch
+
+Float = NDArray[np.float64]
+
+_MARGIN = 0.3  # candidate points reach to a rigid gap of this share of the depth; checked after the solution
+_CUTS = 6
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A condensed body over its contact points (of the meshed part; symmetry unfolds them).
+
+    Attributes
+    ----------
+    compliance : (c, d, c, d) mm/N, in the object's frame
+    gauge_rows : (g, c d) strain per N
+    touch_mm : height of the object's lowest point at first touch
+    parent, sign, share : (m,), (m, d), (m,)
+        Whole point -> part point, its mirror signs in the frame, and how often the part's force and area count there.
+    """
+
+    model: Model
+    mesh: Mesh
+    report: MeshReport
+    elastic: Elasticity
+    stiffness: Stiffness
+    surface: Surface
+    condensed: Condensed
+    compliance: Float
+    gauge_rows: Float
+    touch_mm: float
+    axes: tuple[str, ...]
+    points: ContactPoints
+    parent: NDArray[np.int64]
+    sign: Float
+    share: Float
+    seconds: dict[str, float]
+
+    @property
+    def dim(self) -> int:
+        """Space dimensions."""
+        return self.mesh.dim
+
+    def gap(self, target: Target, surface: Surface | None = None) -> Float:
+        """Weighted gap (c,) mm at rest under a target, from the exact object at the surface's quadrature points."""
+        where = surface or self.surface
+        return _rigid_gap(self.model, where, self.touch_mm, target)
+
+    def free(self, target: Target) -> Float:
+        """Gap and tangential position (c, d) mm of every point under no contact force."""
+        frame = self.model.object.frame(self.dim)
+        moved = np.array([target.slide_x_mm, -target.depth_mm, target.slide_z_mm])[: self.dim]
+        out = np.empty((len(self.surface.nodes), self.dim))
+        out[:, 0] = self.gap(target)
+        out[:, 1:] = -(frame[1:] @ moved)
+        return out
+
+    def whole(self, state: ContactState) -> ContactState:
+        """The state of the whole finger's points from that of the part's."""
+        p = self.parent
+        tangent = self.sign[:, 1:]
+        return ContactState(
+            state.status[p],
+            state.force[p] * self.sign * self.share[:, None],
+            state.gap[p],
+            state.position[p] * tangent,
+            state.slip[p] * tangent,
+        )
+
+    def unknowns(self, force: Float) -> Float:
+        """All unknowns of the part's body under contact forces (c, d)."""
+        rows = np.zeros(len(self.condensed.compliance))
+        rows[: force.size] = force.ravel()
+        return self.condensed.unknowns(rows)
+
+
+def _rigid_gap(model: Model, where: Surface, touch: float, target: Target) -> Float:
+    x, y = where.samples[:, 0], where.samples[:, 1]
+    z = where.samples[:, 2] if where.samples.shape[1] == 3 else np.zeros_like(x)
+    height = model.object.height(x - target.slide_x_mm, z - target.slide_z_mm)
+    vertical = height + touch - target.depth_mm - y
+    upright = -model.object.frame(where.samples.shape[1])[0, 1]
+    return np.asarray(where.average @ vertical) * upright
+
+
+def targets(legs: tuple[Leg, ...]) -> list[Target]:
+    """Every increment of the legs, the start not among them."""
+    out: list[Target] = []
+    at = Target(0.0)
+    for leg in legs:
+        count = leg.steps if isinstance(leg.steps, int) else 10
+        end = Target(leg.depth_mm, leg.slide_x_mm, leg.slide_z_mm, at.time_s + (leg.duration_s or 0.0))
+        out += [between(at, end, k / count) for k in range(1, count)] + [end]
+        at = end
+    return out
+
+
+def between(a: Target, b: Target, share: float) -> Target:
+    """The target a share of the way from a to b."""
+    values = [u + share * (v - u) for u, v in zip(_values(a), _values(b), strict=True)]
+    return Target(*values)
+
+
+def _values(t: Target) -> tuple[float, float, float, float]:
+    return t.depth_mm, t.slide_x_mm, t.slide_z_mm, t.time_s
+
+
+def symmetry(model: Model) -> tuple[str, ...]:
+    """Planes about which body, object and path are mirror images."""
+    if model.symmetry is not None:
+        return model.symmetry
+    slides = {"x": [leg.slide_x_mm for leg in model.legs], "z": [leg.slide_z_mm for leg in model.legs]}
+    axes = ("x", "z") if model.domain == "solid" else ("x",)
+    return tuple(a for a in axes if a in model.object.mirrors() and not any(slides[a]))
+
+
+def contact_zone(model: Model, touch: float) -> tuple[float, float, float, float]:
+    """Box (x_min, x_max, z_min, z_max) mm over which the rigid object would overlap the finger at rest."""
+    design = model.design
+    half_width = design.width_mm / 2.0
+    x, z = np.meshgrid(
+        np.linspace(-design.half_length_mm, design.half_length_mm, 401), np.linspace(-half_width, half_width, 41)
+    )
+    x, z = x.ravel(), z.ravel()
+    top = design.top(x, z)
+    overlap = np.zeros(len(x), dtype=bool)
+    for target in targets(model.legs):
+        height = model.object.height(x - target.slide_x_mm, z - target.slide_z_mm) + touch - target.depth_mm
+        overlap |= height < top
+    if not overlap.any():
+        raise Finger3dError("press: the object never touches the finger at any depth of this scene; press deeper")
+    return float(x[overlap].min()), float(x[overlap].max()), float(z[overlap].min()), float(z[overlap].max())
+
+
+def build(model: Model, say: Callable[[str], None] = lambda text: None, margin: float = _MARGIN) -> Problem:
+    """Mesh, assemble and condense a model."""
+    design = model.design
+    half_width = design.width_mm / 2.0 if model.domain == "solid" else 0.0
+    touch = first_touch(design.top, model.object, design.half_length_mm, half_width)
+    axes = symmetry(model)
+    zone = contact_zone(model, touch)
+    if model.domain == "solid":
+        mesh, report = mesh_solid(design, model.mesh, zone, axes, say)
+    else:
+        mesh, report = mesh_section(design, model.mesh, zone, axes)
+    say("assembling")
+    start = time.perf_counter()
+    elastic = Elasticity.of(model.material.E_MPa, model.material.nu, model.domain == "plane-stress")
+    thickness = 1.0 if mesh.dim == 3 else design.width_mm
+    matrix = stiffness(mesh, elastic, thickness)
+    face = _candidates(model, surface(mesh, "contact", thickness), touch, margin)
+    rows, dummy = _contact_rows(model, face, axes)
+    gauges = [_gauge_row(mesh, g, axes) for g in model.gauges]
+    assembly = time.perf_counter() - start
+    say(f"condensing {matrix.upper.shape[0]} unknowns to {len(face.nodes)} contact points")
+    condensed = condense(matrix, _held(model, mesh, axes), sp.vstack([rows, *gauges], format="csr"))
+    c, d = len(face.nodes), mesh.dim
+    compliance = condensed.compliance[: c * d, : c * d].copy()
+    compliance[dummy, dummy] = np.diagonal(compliance).max()  # no motion along the normal of a symmetry plane
+    parent, sign, share, points = _unfolded(model, mesh, face, axes)
+    return Problem(
+        model, mesh, report, elastic, matrix, face, condensed, compliance.reshape(c, d, c, d),
+        condensed.compliance[c * d :, : c * d], touch, axes, points, parent, sign, share,
+        {**report.seconds, "assembly": assembly, "condensation": condensed.seconds},
+    )  # fmt: skip
+
+
+def _candidates(model: Model, face: Surface, touch: float, margin: float) -> Surface:
+    path = targets(model.legs)
+    reach = margin * max(t.depth_mm for t in path)
+    nearest = np.min([_rigid_gap(model, face, touch, t) for t in path], axis=0)
+    return restrict(face, nearest < reach)
+
+
+def _contact_rows(model: Model, face: Surface, axes: tuple[str, ...]) -> tuple[sp.csr_matrix, NDArray[np.int64]]:
+    """Rows of the contact points; on a symmetry plane the tangent across it is cut out and named."""
+    d = face.points.shape[1]
+    frame = model.object.frame(d)
+    rows = local_rows(face, frame)
+    dummy = [np.flatnonzero(face.points[:, "xyz".index(a)] == 0.0) * d + {"x": 1, "z": 2}[a] for a in axes]
+    cut = np.concatenate([*dummy, np.zeros(0, dtype=np.int64)]).astype(np.int64)
+    keep = np.ones(rows.shape[0])
+    keep[cut] = 0.0
+    rows = (sp.diags_array(keep) @ rows).tocsr()
+    rows.eliminate_zeros()
+    return sp.csr_matrix(rows), cut
+
+
+def _gauge_row(mesh: Mesh, gauge: Gauge, axes: tuple[str, ...]) -> sp.csr_matrix:
+    """Row of one gauge, read from the mirrored part where the gauge lies in an image."""
+    d = mesh.dim
+    direction = np.array([np.cos(gauge.angle), np.sin(gauge.angle), 0.0])
+    middle = np.array([gauge.x_mm, gauge.y_mm, gauge.z_mm])
+
+    def folded(point: Float) -> tuple[Float, Float]:
+        sign = np.array([-1.0 if a in axes and v < 0.0 else 1.0 for a, v in zip("xyz", point, strict=True)])
+        return (point * sign)[:d], (direction * sign)[:d]
+
+    if gauge.length_mm == 0.0:
+        return strain_row(mesh, *folded(middle))
+    half = 0.5 * gauge.length_mm * direction
+    end = displacement_row(mesh, *folded(middle + half))
+    start = displacement_row(mesh, *folded(middle - half))
+    return sp.csr_matrix((end - start) / gauge.length_mm)
+
+
+def _held(model: Model, mesh: Mesh, axes: tuple[str, ...]) -> NDArray[np.int64]:
+    """Unknowns that are zero: the base, across each symmetry plane, and the end faces where they are held."""
+    d = mesh.dim
+    base = np.unique(mesh.facets["base"])
+    held = [(base[:, None] * d + np.arange(d)).ravel()]
+    held += [np.unique(mesh.facets["symmetry_" + a]) * d + "xyz".index(a) for a in axes]
+    if model.held_ends and d == 3:
+        held.append(np.unique(mesh.facets["ends"]) * d + 2)
+    return np.unique(np.concatenate(held))
+
+
+def _unfolded(
+    model: Model, mesh: Mesh, face: Surface, axes: tuple[str, ...]
+) -> tuple[NDArray[np.int64], Float, Float, ContactPoints]:
+    d = mesh.dim
+    numbers = tuple("xyz".index(a) for a in axes)
+    _, parent_all, sign_all = unfold(Mesh(mesh.points, np.zeros((0, d + 1), dtype=np.int64), {}), numbers)
+    number = np.full(len(mesh.points), -1)
+    number[face.nodes] = np.arange(len(face.nodes))
+    nodes = np.flatnonzero(number[parent_all] >= 0)
+    parent, world_sign = number[parent_all[nodes]], sign_all[nodes]
+    on_planes = sum((face.points[parent][:, i] == 0.0).astype(int) for i in numbers) if numbers else np.zeros(len(nodes))
+    share = 2.0 ** np.asarray(on_planes)
+    at = np.zeros((len(nodes), 3))
+    at[:, :d] = face.points[parent] * world_sign
+    points = ContactPoints(
+        nodes, at, face.area[parent] * share, model.object.frame(d), model.design.width_mm / 2.0,
+        0.75 * model.mesh.size_mm,
+    )  # fmt: skip
+    return parent, world_sign[:, [1, 0, 2][:d]], share, points
+
+
+def march(problem: Problem) -> Iterator[Frame]:
+    """Frames of all legs in turn; stops after the first increment that did not settle."""
+    at = Target(0.0)
+    state = ContactState.at_rest(problem.gap(at), problem.dim)
+    work = dissipation = 0.0
+    for target in targets(problem.model.legs):
+        found, done = _increment(problem, state, at, target, _CUTS)
+        for before, after, a, b in done:
+            work += _work(problem, before, after, a, b)
+            dissipation += _dissipated(problem, before, after)
+        state, at = found.state, target
+        yield Frame(
+            target, problem.whole(state), problem.model.object.lowest(target.slide_x_mm, target.slide_z_mm),
+            dict(zip([g.name for g in problem.model.gauges], map(float, problem.gauge_rows @ state.force.ravel()), strict=True)),
+            work, dissipation, found.outcome, found.residual, found.iterations, found.method,
+        )  # fmt: skip
+        if not found.outcome.ok:
+            return
+
+
+_Done = list[tuple[ContactState, ContactState, Target, Target]]
+
+
+def _increment(problem: Problem, state: ContactState, a: Target, b: Target, cuts: int) -> tuple[Increment, _Done]:
+    """Advance from a to b; an increment that does not settle is cut in two, from the state restored."""
+    found = advance(state, problem.free(b), problem.compliance, problem.model.friction, max(b.depth_mm, a.depth_mm))
+    if found.outcome.ok or cuts == 0:
+        return found, [(state, found.state, a, b)]
+    middle = between(a, b, 0.5)
+    first, done = _increment(problem, state, a, middle, cuts - 1)
+    if not first.outcome.ok:
+        return replace(first, state=state, iterations=first.iterations + found.iterations), done
+    second, more = _increment(problem, first.state, middle, b, cuts - 1)
+    return replace(
+        second,
+        residual=max(first.residual, second.residual),
+        iterations=found.iterations + first.iterations + second.iterations,
+        method="cut back",
+    ), done + more
+
+
+def _work(problem: Problem, before: ContactState, after: ContactState, a: Target, b: Target) -> float:
+    """Work (mJ) of the object on the finger, forces taken as their mean over the increment."""
+    mean = 0.5 * (problem.whole(before).force + problem.whole(after).force)
+    moved = np.array([b.slide_x_mm - a.slide_x_mm, a.depth_mm - b.depth_mm, b.slide_z_mm - a.slide_z_mm])
+    return float(problem.points.world(mean).sum(axis=0) @ moved)
+
+
+def _dissipated(problem: Problem, before: ContactState, after: ContactState) -> float:
+    """Frictional dissipation (mJ): end force times slip, never negative at any point."""
+    slips = after.status == SLIP
+    lost = -np.sum(after.force[:, 1:] * (after.slip - before.slip), axis=1) * slips
+    return float((lost[problem.parent] * problem.share).sum())

@@ -1,0 +1,81 @@
+"""Small structured meshes and loads that tests compare with."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+
+import numpy as np
+
+from finger3d.fem.elements import physical_gradients, quadrature, shape, surface_measure
+from finger3d.mesh import Mesh, boundary, quadratic, signed_volumes
+
+
+def grid(counts: tuple[int, ...], shuffle: float = 0.0, seed: int = 0) -> Mesh:
+    """Linear Kuhn mesh of the unit square or cube; interior nodes moved at random by `shuffle` of a cell."""
+    d = len(counts)
+    axes = [np.linspace(0.0, 1.0, n + 1) for n in counts]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, d)
+    strides = np.array([np.prod([n + 1 for n in counts[i + 1 :]]) for i in range(d)], dtype=np.int64)
+    low = np.stack(np.meshgrid(*[np.arange(n) for n in counts], indexing="ij"), axis=-1).reshape(-1, d) @ strides
+    cells = []
+    for order in itertools.permutations(range(d)):
+        path = np.concatenate([[0], np.cumsum(strides[list(order)])])
+        cells.append(low[:, None] + path)
+    mesh = Mesh(points, np.vstack(cells), {})
+    turned = signed_volumes(mesh) < 0
+    mesh.cells[turned] = mesh.cells[turned][:, [1, 0, *range(2, d + 1)]]
+    inside = np.all((points > 0) & (points < 1), axis=1)
+    step = np.random.default_rng(seed).uniform(-shuffle, shuffle, points.shape) / np.array(counts)
+    moved = points + step * inside[:, None]
+    outer = boundary(mesh.cells, d)
+    facets = {}
+    for axis, side in itertools.product(range(d), (0.0, 1.0)):
+        on = np.all(points[outer][:, :, axis] == side, axis=1)
+        facets["xyz"[axis] + ("-" if side == 0.0 else "+")] = outer[on]
+    return Mesh(moved, mesh.cells, facets)
+
+
+def mapped(mesh: Mesh, function: Callable[[np.ndarray], np.ndarray]) -> Mesh:
+    """Quadratic mesh with its nodes moved by a function of the points (n, d)."""
+    whole = quadratic(mesh) if not mesh.is_quadratic else mesh
+    return Mesh(function(whole.points), whole.cells, whole.facets)
+
+
+def body_load(mesh: Mesh, force: Callable[[np.ndarray], np.ndarray], degree: int = 6) -> np.ndarray:
+    """Consistent nodal loads (n, d) of a body force."""
+    bary, w = quadrature(mesh.dim, degree)
+    _, det = physical_gradients(mesh.points[mesh.cells], bary, mesh.is_quadratic)
+    psi = shape(bary, mesh.is_quadratic)
+    at = np.einsum("qk,ekd->eqd", psi, mesh.points[mesh.cells])
+    value = force(at.reshape(-1, mesh.dim)).reshape(at.shape)
+    load = np.zeros_like(mesh.points)
+    np.add.at(load, mesh.cells, np.einsum("eq,qk,eqd->ekd", det * w, psi, value))
+    return load
+
+
+def edge_load(mesh: Mesh, label: str, traction: Callable[[np.ndarray], np.ndarray], degree: int = 6) -> np.ndarray:
+    """Consistent nodal loads (n, d) of a traction, a function of the points (q, d), on a boundary."""
+    facets = mesh.facets[label]
+    bary, w = quadrature(mesh.dim - 1, degree)
+    weights = surface_measure(mesh.points[facets], bary, mesh.is_quadratic) * w
+    psi = shape(bary, mesh.is_quadratic)
+    at = np.einsum("qk,mkd->mqd", psi, mesh.points[facets])
+    value = traction(at.reshape(-1, mesh.dim)).reshape(at.shape)
+    load = np.zeros_like(mesh.points)
+    np.add.at(load, facets, np.einsum("mq,qk,mqd->mkd", weights, psi, value))
+    return load
+
+
+def error_norms(mesh: Mesh, u: np.ndarray, exact: Callable, exact_slope: Callable) -> tuple[float, float]:
+    """L2 norm of the error of u (n, d), and of its gradient; `exact_slope` gives (q, d, d), row the component."""
+    bary, w = quadrature(mesh.dim, 6)
+    gradients, det = physical_gradients(mesh.points[mesh.cells], bary, mesh.is_quadratic)
+    psi = shape(bary, mesh.is_quadratic)
+    at = np.einsum("qk,ekd->eqd", psi, mesh.points[mesh.cells]).reshape(-1, mesh.dim)
+    value = np.einsum("qk,ekd->eqd", psi, u[mesh.cells]).reshape(-1, mesh.dim)
+    slope = np.einsum("ekj,eqki->eqji", u[mesh.cells], gradients).reshape(-1, mesh.dim, mesh.dim)
+    weight = (det * w).ravel()
+    l2 = np.sqrt(np.sum(weight * np.sum((value - exact(at)) ** 2, axis=1)))
+    h1 = np.sqrt(np.sum(weight * np.sum((slope - exact_slope(at)) ** 2, axis=(1, 2))))
+    return float(l2), float(h1)

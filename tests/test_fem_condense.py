@@ -1,0 +1,66 @@
+"""Condensation: the Schur complement is R K^-1 R^T, by either solver, and gives the field back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from finger3d.fem.assembly import Elasticity, stiffness
+from finger3d.fem.condense import condense
+from finger3d.fem.pardiso import available
+from finger3d.fem.surface import displacement_row, local_rows, strain_row, surface
+from finger3d.mesh import quadratic
+from finger3d.objects import vertical_frame
+from tests.meshes import grid
+
+
+def setup(nu: float, dim: int = 3):
+    mesh = quadratic(grid((3,) * dim, 0.2))
+    held = np.unique(mesh.facets["y-"])
+    fixed = (held[:, None] * dim + np.arange(dim)).ravel()
+    top = surface(mesh, "y+")
+    rows = sp.vstack([local_rows(top, vertical_frame(dim)), strain_row(mesh, np.full(dim, 0.4), np.eye(dim)[0])])
+    return mesh, stiffness(mesh, Elasticity.of(1.0, nu)), fixed, sp.csr_matrix(rows)
+
+
+@pytest.mark.parametrize("nu", [0.3, 0.49, 0.5])
+@pytest.mark.parametrize("solver", ["superlu", *(["pardiso"] if available() else [])])
+def test_compliance_equals_a_dense_inverse(nu: float, solver: str) -> None:
+    mesh, matrix, fixed, rows = setup(nu)
+    full = (matrix.upper + sp.triu(matrix.upper, 1).T).toarray()
+    free = np.setdiff1d(np.arange(len(full)), fixed)
+    r = np.zeros((rows.shape[0], len(full)))
+    r[:, : rows.shape[1]] = rows.toarray()
+    want = r[:, free] @ np.linalg.solve(full[np.ix_(free, free)], r[:, free].T)
+    found = condense(matrix, fixed, rows, solver)
+    assert found.perturbed_pivots == 0
+    # at nu = 0.5 the floor of the compressibility, 1e-7 / G, costs both solutions that many digits
+    assert np.abs(found.compliance - want).max() < (1e-12 if nu < 0.5 else 1e-9) * np.abs(want).max()
+
+
+@pytest.mark.parametrize("solver", ["superlu", *(["pardiso"] if available() else [])])
+def test_field_follows_from_the_same_factor(solver: str) -> None:
+    mesh, matrix, fixed, rows = setup(0.3)
+    found = condense(matrix, fixed, rows, solver)
+    force = np.random.default_rng(0).normal(size=rows.shape[0])
+    u = found.unknowns(force)
+    assert np.abs(rows @ u[: rows.shape[1]] - found.compliance @ force).max() < 1e-11
+    assert np.all(u[fixed] == 0.0)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_traces_and_strains_read_a_linear_field_exactly(dim: int) -> None:
+    mesh = quadratic(grid((3,) * dim, 0.2))
+    slope = np.random.default_rng(1).normal(size=(dim, dim))
+    u = mesh.points @ slope.T
+    top = surface(mesh, "y+", thickness=2.0)
+    assert top.area.sum() == pytest.approx(2.0, rel=1e-13)
+    centre = top.average @ top.samples  # the hat's centre of gravity, where a weighted mean of a linear field is read
+    assert np.abs(top.trace @ u - centre @ slope.T).max() < 1e-13
+    direction = np.eye(dim)[0] * 0.6 + np.eye(dim)[1] * 0.8
+    point = np.full(dim, 1 / 3)  # on a shared facet
+    assert (strain_row(mesh, point, direction) @ u.ravel())[0] == pytest.approx(direction @ slope @ direction, abs=1e-12)
+    assert (displacement_row(mesh, point, direction) @ u.ravel())[0] == pytest.approx(
+        direction @ slope @ point, abs=1e-12
+    )
