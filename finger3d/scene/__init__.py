@@ -1,0 +1,5 @@
+"""Scenes: a TOML file, strictly checked, turned into a model, and written back with its defaults filled in."""
+
+from finger3d.scene.scene import Scene, load, parse
+
+__all__ = ["Scene", "load", "parse"]

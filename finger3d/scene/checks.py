@@ -1,0 +1,124 @@
+"""What no single key can tell: presses against the finger's height, gauges against its outline, sizes against both."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from typing import Any
+
+import numpy as np
+
+from finger3d.model import MeshOptions
+from finger3d.scene.mistakes import dotted, shown
+from finger3d.scene.tables import GaugeTable, LegTable, MeshTable, SceneTable
+
+SIZE_SHARE, BASE_SHARE = 1 / 25, 1 / 6.25
+"""Default edge lengths in a solid as shares of the finger's height; sections take half of them."""
+
+
+def check(tables: SceneTable, legs: tuple[LegTable, ...], design: Any) -> list[str]:
+    """Return the mistakes that only the whole scene shows, each in one line."""
+    solid = tables.model.domain == "solid"
+    lines = []
+    if not solid and not hasattr(design, "width_mm"):
+        lines.append(
+            f"model.domain = {shown(tables.model.domain)}: finger.geometry = {shown(design.name)} has no constant "
+            'section; must be "solid"'
+        )
+    lines += _legs(tables.press, legs, design.height_mm, solid)
+    lines += _sizes(tables.mesh, design, solid)
+    twice = [name for name, n in Counter(g.name for g in tables.gauge).items() if n > 1]
+    lines += [f"gauge.name = {shown(name)}: used more than once; every gauge needs its own name" for name in twice]
+    for i, gauge in enumerate(tables.gauge):
+        lines += _gauge(i, gauge, design)
+    return lines
+
+
+def _legs(press: dict[str, Any], legs: tuple[LegTable, ...], height: float, solid: bool) -> list[str]:
+    lines = []
+    for i, leg in enumerate(legs):
+        at = ("press", "leg", i) if "leg" in press else ("press",)
+        allowed = f"a number above 0 and below the finger's height of {height:.6g} mm"
+        if leg.depth_mm >= height or (i == 0 and leg.depth_mm == 0.0):
+            lines.append(f"{dotted((*at, 'depth_mm'))} = {shown(leg.depth_mm)}: must be {allowed}")
+        if not solid and leg.slide_z_mm != 0.0:
+            lines.append(f"{dotted((*at, 'slide_z_mm'))} = {shown(leg.slide_z_mm)}: must be 0.0 in a 2D domain")
+    return lines
+
+
+def smallest_mm(design: Any, solid: bool) -> float:
+    """Smallest extent of what is meshed, mm."""
+    extents = [design.height_mm, 2.0 * design.half_length_mm]
+    if solid and hasattr(design, "width_mm"):
+        extents.append(design.width_mm)
+    return min(extents)
+
+
+def _sizes(mesh: MeshTable, design: Any, solid: bool) -> list[str]:
+    extent = smallest_mm(design, solid)
+    section = smallest_mm(design, solid=False)
+    if mesh.size_mm is not None and mesh.size_mm > extent:
+        return [
+            f"mesh.size_mm = {shown(mesh.size_mm)}: larger than the finger; must be at most {extent:.6g}, "
+            "its smallest extent"
+        ]
+    if mesh.base_size_mm is not None and mesh.base_size_mm > section:
+        return [
+            f"mesh.base_size_mm = {shown(mesh.base_size_mm)}: larger than the finger; must be at most {section:.6g}, "
+            "its smallest extent in the section"
+        ]
+    if mesh.size_mm and mesh.base_size_mm and mesh.base_size_mm < mesh.size_mm:
+        return [
+            f"mesh.base_size_mm = {shown(mesh.base_size_mm)}: finer than the contact; "
+            f"must be at least mesh.size_mm = {shown(mesh.size_mm)}"
+        ]
+    return []
+
+
+def chosen(mesh: MeshTable, design: Any, solid: bool) -> MeshOptions:
+    """Return the mesh options, with sizes chosen where they are absent."""
+    share = design.height_mm * (1.0 if solid else 0.5)
+    size, base = mesh.size_mm, mesh.base_size_mm
+    if size is None:
+        # A thin finger gets two elements across its width; four significant digits keep scene.toml readable.
+        size = _rounded(min(share * SIZE_SHARE, smallest_mm(design, solid) / 2.0, base or math.inf))
+    if base is None:
+        base = max(_rounded(min(share * BASE_SHARE, smallest_mm(design, solid=False))), size)
+    return MeshOptions(size, base, mesh.mesher)
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.4g}")
+
+
+def _gauge(index: int, gauge: GaugeTable, design: Any) -> list[str]:
+    at = ("gauge", index)
+    half_length, height = design.half_length_mm, design.height_mm
+    half_width = design.width_mm / 2.0 if hasattr(design, "width_mm") else half_length
+    for key, value, low, high in (
+        ("x_mm", gauge.x_mm, -half_length, half_length),
+        ("y_mm", gauge.y_mm, 0.0, height),
+        ("z_mm", gauge.z_mm, -half_width, half_width),
+    ):
+        if not low <= value <= high:
+            return [
+                f"{dotted((*at, key))} = {shown(value)}: gauge {shown(gauge.name)} is outside the finger; "
+                f"must be a number from {low:.6g} to {high:.6g}"
+            ]
+    along = np.array([-0.5, 0.5]) * gauge.length_mm if gauge.length_mm else np.zeros(1)
+    x = gauge.x_mm + along * math.cos(math.radians(gauge.angle_deg))
+    y = gauge.y_mm + along * math.sin(math.radians(gauge.angle_deg))
+    top = design.top(x, np.full_like(x, gauge.z_mm))
+    slack = 1e-9 * height
+    if not np.all((y >= -slack) & (y <= top + slack)):
+        here = float(design.top(np.array([gauge.x_mm]), np.array([gauge.z_mm]))[0])
+        if gauge.length_mm and gauge.y_mm <= here + slack:
+            return [
+                f"{dotted((*at, 'length_mm'))} = {shown(gauge.length_mm)}: an end of gauge {shown(gauge.name)} "
+                "leaves the finger; must be shorter, or the gauge moved inward"
+            ]
+        return [
+            f"{dotted((*at, 'y_mm'))} = {shown(gauge.y_mm)}: gauge {shown(gauge.name)} is outside the finger; "
+            f"must be a number from 0 to {here:.6g} at x_mm = {shown(gauge.x_mm)}"
+        ]
+    return []

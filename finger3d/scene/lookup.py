@@ -1,0 +1,20 @@
+"""Which effects this version knows. Asking for the names imports none of them."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from typing import Any
+
+import finger3d.effects
+
+
+def effect_names() -> tuple[str, ...]:
+    """Return the names of the effects: one file each in finger3d/effects, besides base.py."""
+    found = (m.name for m in pkgutil.iter_modules(finger3d.effects.__path__))
+    return tuple(sorted(n for n in found if n != "base" and not n.startswith("_")))
+
+
+def effect_type(name: str) -> Any:
+    """Import one effect and return its settings: a frozen dataclass with ``apply(model) -> model``."""
+    return importlib.import_module(f"finger3d.effects.{name}").Effect

@@ -1,0 +1,243 @@
+"""From a tree of tables to a Scene, and from a Scene to a Model."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import ValidationError
+
+from finger3d.contact.law import Coulomb
+from finger3d.design import designs
+from finger3d.errors import Finger3dError
+from finger3d.model import Domain, Gauge, Leg, Material, MeshOptions, Model
+from finger3d.objects import RigidObject
+from finger3d.scene import checks, tree
+from finger3d.scene.lookup import effect_names, effect_type
+from finger3d.scene.mistakes import Place, choose, dotted, listed, nearest, shown, unknown, worded
+from finger3d.scene.tables import SHAPES, LegsTable, LegTable, ObjectTable, PressTable, SceneTable, Table, table_of
+
+AnyTable = TypeVar("AnyTable", bound=Table)
+LATER = "not yet available in this version"
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A checked scene. Two scenes are equal when they say the same after defaults are filled in.
+
+    Attributes
+    ----------
+    tables : the file's tables with every default filled in; angles in degrees, as in the file
+    design : the finger, a frozen dataclass from geometries/
+    object : the rigid object
+    mesh : edge lengths and mesher
+    effects : name -> settings of the effects that are on
+    given : what the user wrote, overrides included
+    path : the file, or None
+    """
+
+    tables: SceneTable
+    design: Any = field(compare=False)
+    object: RigidObject = field(compare=False)
+    mesh: MeshOptions = field(compare=False)
+    effects: Mapping[str, Any] = field(compare=False)
+    given: Mapping[str, Any] = field(compare=False)
+    path: Path | None = field(compare=False, default=None)
+
+    @property
+    def title(self) -> str:
+        """The title, or the file's name."""
+        return self.tables.title or (self.path.stem if self.path else "scene")
+
+    @property
+    def domain(self) -> Domain:
+        """solid, plane-strain or plane-stress."""
+        return self.tables.model.domain
+
+    @property
+    def legs(self) -> tuple[Leg, ...]:
+        """Targets of the press; the shorthand is one leg."""
+        press = self.tables.press
+        return tuple(Leg(**leg) for leg in (press["leg"] if "leg" in press else (press,)))
+
+    def model(self) -> Model:
+        """Return the model: the baseline, and then every effect that is on. Angles are in radians."""
+        t = self.tables
+        model = Model(
+            design=self.design,
+            material=Material(t.material.E_MPa, t.material.nu),
+            mesh=self.mesh,
+            legs=self.legs,
+            object=self.object,
+            friction=Coulomb(t.friction.mu),
+            gauges=tuple(
+                Gauge(g.name, g.x_mm, g.y_mm, g.z_mm, math.radians(g.angle_deg), g.length_mm) for g in t.gauge
+            ),
+            domain=t.model.domain,
+            rule=t.contact.rule,
+        )
+        for name in sorted(self.effects):
+            model = self.effects[name].apply(model)
+        return model
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the tables with every default filled in, as plain dicts and lists."""
+        return tree.plain(self.tables.model_dump())
+
+    def to_toml(self, defaults: bool = True) -> str:
+        """Return TOML text that loads as this scene: with every default, or just what was given."""
+        return tree.written(self.as_dict() if defaults else self.given)
+
+
+def load(path: str | Path, overrides: Iterable[str] = ()) -> Scene:
+    """Read and check a scene file.
+
+    Parameters
+    ----------
+    path : TOML file
+    overrides : texts such as ``friction.mu=0.5``, applied before anything is checked
+
+    Raises
+    ------
+    Finger3dError
+        With one line that names the file, the key, the value and what is allowed.
+    """
+    path = Path(path)
+    overrides = list(overrides)
+    given = tree.override(tree.read(path), overrides)
+    return parse(given, path=path, set_keys=[o.partition("=")[0].strip() for o in overrides])
+
+
+def parse(given: Mapping[str, Any], path: Path | None = None, set_keys: Iterable[str] = ()) -> Scene:
+    """Check a tree of tables (lists or tuples for arrays) and return it as a Scene.
+
+    Parameters
+    ----------
+    path : the file it came from, for messages
+    set_keys : keys that came from the command line, for messages
+    """
+    given = tree.frozen(given)
+    found: dict[Place, str] = {}
+    tables = _checked(SceneTable, given, (), found)
+    geometry, dimensions = _named(given, "finger", "geometry", designs(), found)
+    design = _built(designs()[geometry], dimensions, ("finger",), found) if dimensions else None
+    shape, placed = _named({"object": {"shape": "plane"}} | given, "object", "shape", SHAPES, found)
+    press = _press(given, found)
+    effects = _effects(given, found)
+    for key in ("tolerance", "max_seconds"):
+        if tables and getattr(tables.mesh, key) is not None:
+            found["mesh", key] = f"mesh.{key} = {shown(getattr(tables.mesh, key))}: {LATER}; give mesh.size_mm instead"
+    if found or tables is None or dimensions is None or press is None or not isinstance(placed, ObjectTable):
+        order = [*given]
+        places = sorted(found, key=lambda p: order.index(p[0]) if p[0] in order else len(order))
+        raise _refusal([found[p] for p in places], path, set_keys)
+    legs = press.leg if isinstance(press, LegsTable) else (press,)
+    if lines := checks.check(tables, legs, design):
+        raise _refusal(lines, path, set_keys)
+    mesh = checks.chosen(tables.mesh, design, tables.model.domain == "solid")
+    tables = tables.model_copy(
+        update={
+            "finger": {"geometry": geometry, **dimensions.model_dump()},
+            "object": {"shape": shape, **placed.model_dump()},
+            "press": press.model_dump(),
+            "mesh": tables.mesh.model_copy(update=asdict(mesh)),
+            "effects": {name: settings.model_dump() for name, (settings, _) in effects.items()},
+        }
+    )
+    on = {name: effect for name, (_, effect) in effects.items()}
+    return Scene(tables, design, placed.build(), mesh, on, given, path)
+
+
+def _refusal(lines: list[str], path: Path | None, set_keys: Iterable[str]) -> Finger3dError:
+    first, more = lines[0], len(lines) - 1
+    source = str(path) if path else "scene"
+    place = re.split(r"[: ]", first, maxsplit=1)[0] + "."
+    if key := next((k for k in set_keys if place.startswith(f"{k}.") or f"{k}.".startswith(place)), None):
+        source += f" with --set {key}"
+    rest = f" (and {more} more mistake{'s' if more > 1 else ''})" if more else ""
+    return Finger3dError(f"{source}: {first}{rest}")
+
+
+def _checked(
+    table: type[AnyTable], given: Mapping[str, Any], under: Place, found: dict[Place, str], also: tuple[str, ...] = ()
+) -> AnyTable | None:
+    try:
+        return table.model_validate(given)
+    except ValidationError as error:
+        found |= worded(error, table, given, under, also)
+        return None
+
+
+def _built(record: Any, settings: Table, place: Place, found: dict[Place, str]) -> Any:
+    """Build a design or an effect; what its own rules refuse is a mistake like any other."""
+    try:
+        return record(**dict(settings))
+    except Finger3dError as error:
+        found[place] = f"{dotted(place)}: {error}"
+        return None
+
+
+def _named(
+    given: Mapping[str, Any], name: str, key: str, known: Mapping[str, type], found: dict[Place, str]
+) -> tuple[str, Table | None]:
+    """Check a table whose `key` says which other keys it takes."""
+    given_table = given.get(name)
+    if not isinstance(given_table, Mapping):
+        return "", None  # found by the check of the whole file
+    if key not in given_table:
+        misspelt = next((k for k in given_table if nearest(k, (key,))), None)
+        line = (
+            unknown((name, misspelt), given_table[misspelt], (key,))
+            if misspelt
+            else f"{name}.{key} is missing: must be {listed(known)}"
+        )
+        found[name, misspelt or key] = line
+        return "", None
+    value = given_table[key]
+    later = (".step", ".stp", ".stl") if name == "finger" else ("mesh",)
+    if isinstance(value, str) and value.lower().endswith(later):
+        found[name, key] = f"{name}.{key} = {shown(value)}: {LATER}; must be {listed(known)}"
+    elif not isinstance(value, str) or value not in known:
+        found[name, key] = choose((name, key), value, list(known))
+    else:
+        table = known[value] if issubclass(known[value], Table) else table_of(known[value])
+        rest = {k: v for k, v in given_table.items() if k != key}
+        return value, _checked(table, rest, (name,), found, also=(key,))
+    return "", None
+
+
+def _press(given: Mapping[str, Any], found: dict[Place, str]) -> PressTable | LegsTable | None:
+    press = given.get("press")
+    if not isinstance(press, Mapping):
+        return None  # found by the check of the whole file
+    if "leg" not in press:
+        return _checked(PressTable, press, ("press",), found, also=("leg",))
+    if both := [k for k in press if k in LegTable.model_fields]:
+        found["press", both[0]] = (
+            f"press.{both[0]} = {shown(press[both[0]])}: must not stand beside [[press.leg]]; "
+            "give either one press or its legs"
+        )
+        return None
+    return _checked(LegsTable, press, ("press",), found)
+
+
+def _effects(given: Mapping[str, Any], found: dict[Place, str]) -> dict[str, tuple[Table, Any]]:
+    """Check the effects that are present; those that are absent are not even imported."""
+    effects: dict[str, tuple[Table, Any]] = {}
+    present = given.get("effects")
+    for name, settings in present.items() if isinstance(present, Mapping) else ():
+        place = ("effects", name)
+        if name not in effect_names():
+            found[place] = unknown(place, settings, effect_names(), kind="effect")
+        elif not isinstance(settings, Mapping):
+            found[place] = f"{dotted(place)} = {shown(settings)}: must be a table, [{dotted(place)}]"
+        else:
+            kind = effect_type(name)
+            table = _checked(table_of(kind), settings, place, found)
+            if table is not None:
+                effects[name] = (table, _built(kind, table, place, found))
+    return effects

@@ -1,0 +1,102 @@
+"""A scene file as a tree of dicts and tuples: read it, override keys in it, write it back."""
+
+from __future__ import annotations
+
+import copy
+import tomllib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from finger3d.errors import Finger3dError
+from finger3d.scene.mistakes import shown
+
+Tree = dict[str, Any]
+
+
+def read(path: Path) -> Tree:
+    """Read a TOML file; lists become tuples, which the strict tables ask for."""
+    try:
+        text = path.read_bytes().decode("utf-8-sig")
+    except FileNotFoundError:
+        near = " (a scene to start from: finger3d new)" if path.name == "scene.toml" else ""
+        raise Finger3dError(f"{path}: there is no such file{near}") from None
+    except IsADirectoryError:
+        raise Finger3dError(f"{path}: this is a folder; name the scene file in it") from None
+    except UnicodeDecodeError as error:
+        raise Finger3dError(f"{path}: not TOML: byte {error.start} is not UTF-8 text") from None
+    except OSError as error:
+        raise Finger3dError(f"{path}: cannot be read: {error.strerror}") from None
+    try:
+        return frozen(tomllib.loads(text.replace("\r\n", "\n")))
+    except tomllib.TOMLDecodeError as error:
+        raise Finger3dError(f"{path}: not TOML: {_located(str(error), text)}") from None
+    except (ValueError, RecursionError):
+        raise Finger3dError(f"{path}: not TOML: a number is too long, or brackets are nested too deep") from None
+
+
+def _located(message: str, text: str) -> str:
+    lines = text.splitlines() or [""]
+    end = f"(at line {len(lines)}, column {len(lines[-1]) + 1}, the end of the file)"
+    return message.replace("(at end of document)", end)
+
+
+def frozen(value: Any) -> Any:
+    """Copy of a tree with tuples for lists, which the strict tables ask for."""
+    if isinstance(value, Mapping):
+        return {k: frozen(v) for k, v in value.items()}
+    return tuple(frozen(v) for v in value) if isinstance(value, list | tuple) else value
+
+
+def plain(value: Any) -> Any:
+    """Copy of a tree with lists for tuples and without None, as TOML and JSON want it."""
+    if isinstance(value, Mapping):
+        return {k: plain(v) for k, v in value.items() if v is not None}
+    return [plain(v) for v in value] if isinstance(value, list | tuple) else value
+
+
+def override(tree: Tree, overrides: Iterable[str]) -> Tree:
+    """Return `tree` with keys set from texts such as ``friction.mu=0.5`` or ``press.leg.0.depth_mm=3``."""
+    changed = copy.deepcopy(plain(tree))
+    for text in overrides:
+        key, equals, value = text.partition("=")
+        parts = [p.strip() for p in key.split(".")]
+        if not equals or not all(parts):
+            raise Finger3dError(f"--set {shown(text)}: must be KEY=VALUE, for instance --set friction.mu=0.5")
+        _set(changed, parts, _parsed(value.strip()), key.strip())
+    return frozen(changed)
+
+
+def _parsed(text: str) -> Any:
+    try:
+        parsed = tomllib.loads(f"value = {text}")
+    except (ValueError, RecursionError):
+        return text
+    return parsed["value"] if parsed.keys() == {"value"} else text
+
+
+def _set(node: Any, parts: list[str], value: Any, key: str) -> None:
+    for depth, part in enumerate(parts):
+        last = depth == len(parts) - 1
+        if isinstance(node, list):
+            if not part.isdecimal() or int(part) >= len(node):
+                allowed = f"0 to {len(node) - 1}" if node else "none, the list is empty"
+                raise Finger3dError(f"--set {key}: no item {shown(part)} in {'.'.join(parts[:depth])} ({allowed})")
+            index: Any = int(part)
+        elif isinstance(node, dict):
+            index = part
+            if not last:
+                node.setdefault(part, {})
+        else:
+            raise Finger3dError(f"--set {key}: {'.'.join(parts[:depth])} = {shown(node)} is not a table")
+        if last:
+            node[index] = value
+        else:
+            node = node[index]
+
+
+def written(tree: Mapping[str, Any]) -> str:
+    """Write a tree as TOML text."""
+    import tomli_w
+
+    return tomli_w.dumps(plain(tree))

@@ -1,0 +1,259 @@
+"""Every mistake in a scene is told in one line that names the file, the key, the value and what is allowed."""
+
+from __future__ import annotations
+
+import pytest
+
+from finger3d.cli import main
+
+SCENE = """\
+title = "test"
+
+[finger]
+geometry = "clipped_cylinder"
+radius_mm = 100.0
+half_length_mm = 50.0
+edge_height_mm = 36.6
+width_mm = 20.0
+
+[material]
+E_MPa = 1.0
+nu = 0.49
+
+[object]
+shape = "plane"
+
+[friction]
+mu = 0.25
+
+[press]
+depth_mm = 10.0
+steps = 10
+
+[mesh]
+size_mm = 2.0
+
+[[gauge]]
+name = "g36"
+x_mm = 36.0
+y_mm = 40.0
+"""
+PRESS = "[press]\ndepth_mm = 10.0\nsteps = 10\n"
+
+# what is replaced, by what, and what the line must say
+MISTAKES = {
+    "misspelt key": ("nu = 0.49", "nuu = 0.49", ["material.nuu = 0.49", 'did you mean "nu"?']),
+    "wrong case": ("E_MPa", "e_mpa", ["material.e_mpa", 'did you mean "E_MPa"?']),
+    "forgotten unit": ("radius_mm", "radius", ["finger.radius", 'did you mean "radius_mm"?']),
+    "unknown key": ("mu = 0.25", "mu = 0.25\ncolour = 3", ["friction.colour = 3", "takes mu"]),
+    "misspelt table": ("[friction]", "[frction]", ["frction", 'did you mean "friction"?']),
+    "unknown table": ("[friction]", "[sound]", ["sound", "takes title, finger"]),
+    "missing nu": ("nu = 0.49\n", "", ["material.nu is missing", "from 0 to 0.5"]),
+    "missing E": ("E_MPa = 1.0\n", "", ["material.E_MPa is missing", "above 0"]),
+    "missing table": ("[material]\nE_MPa = 1.0\nnu = 0.49\n", "", ["material is missing", "E_MPa, nu"]),
+    "missing press": (PRESS, "", ["press is missing"]),
+    "missing depth": ("depth_mm = 10.0\n", "", ["press.depth_mm is missing"]),
+    "missing dimension": ("width_mm = 20.0\n", "", ["finger.width_mm is missing"]),
+    "missing geometry": ('geometry = "clipped_cylinder"\n', "", ["finger.geometry is missing", '"half_cylinder"']),
+    "misspelt geometry key": ("geometry =", "geometri =", ["finger.geometri", 'did you mean "geometry"?']),
+    "nu above 0.5": ("nu = 0.49", "nu = 0.6", ["material.nu = 0.6", "from 0 to 0.5"]),
+    "nu below 0": ("nu = 0.49", "nu = -0.1", ["material.nu = -0.1", "from 0 to 0.5"]),
+    "E of 0": ("E_MPa = 1.0", "E_MPa = 0", ["material.E_MPa = 0", "above 0"]),
+    "negative width": ("width_mm = 20.0", "width_mm = -20.0", ["finger.width_mm = -20.0", "above 0"]),
+    "edge too high": ("36.6", "120.0", ["edge_height_mm = 120", "at most radius_mm = 100"]),
+    "longer than round": (
+        "half_length_mm = 50.0",
+        "half_length_mm = 150.0",
+        ["half_length_mm = 150", "at most radius_mm"],
+    ),
+    "misspelt geometry": ("clipped_cylinder", "clipped_cilinder", ['did you mean "clipped_cylinder"?']),
+    "geometry of another": (
+        '"clipped_cylinder"',
+        '"half_cylinder"',
+        ["no such key", "[finger] takes geometry, radius_mm, width_mm"],
+    ),
+    "geometry not a text": ('"clipped_cylinder"', "3", ["finger.geometry = 3", '"block"']),
+    "geometry from a file": ("clipped_cylinder", "finger.STEP", ['"finger.STEP"', "not yet available in this version"]),
+    "depth 0": ("depth_mm = 10.0", "depth_mm = 0.0", ["press.depth_mm = 0.0", "above 0"]),
+    "depth negative": ("depth_mm = 10.0", "depth_mm = -1.0", ["press.depth_mm = -1.0", "above 0"]),
+    "too deep": (
+        "depth_mm = 10.0",
+        "depth_mm = 50.0",
+        ["press.depth_mm = 50.0", "below the finger's height of 49.9975 mm"],
+    ),
+    "steps 0": ("steps = 10", "steps = 0", ["press.steps = 0", 'from 1 up or "auto"']),
+    "steps a fraction": ("steps = 10", "steps = 2.5", ["press.steps = 2.5", "whole number"]),
+    "steps a word": ("steps = 10", 'steps = "many"', ['press.steps = "many"', '"auto"']),
+    "text for a number": ("mu = 0.25", 'mu = "rough"', ['friction.mu = "rough"', "a number from 0 up"]),
+    "true for a number": ("mu = 0.25", "mu = true", ["friction.mu = true", "a number from 0 up"]),
+    "date for a number": ("mu = 0.25", "mu = 2024-01-01", ["friction.mu = 2024-01-01", "a number from 0 up"]),
+    "NaN": ("mu = 0.25", "mu = nan", ["friction.mu = nan", "a finite number"]),
+    "infinity": ("depth_mm = 10.0", "depth_mm = inf", ["press.depth_mm = inf", "a finite number"]),
+    "too large for a float": ("mu = 0.25", f"mu = 1{'0' * 400}", ["friction.mu = ", "a number from 0 up"]),
+    "negative mu": ("mu = 0.25", "mu = -0.25", ["friction.mu = -0.25", "from 0 up"]),
+    "number for a text": ('title = "test"', "title = 5", ["title = 5", "a text"]),
+    "number for a table": ('title = "test"', 'title = "test"\nmodel = 2', ["model = 2", "a table"]),
+    "one gauge in single brackets": ("[[gauge]]", "[gauge]", ["gauge = a table", "double brackets"]),
+    "mesh larger than the finger": ("size_mm = 2.0", "size_mm = 21.0", ["mesh.size_mm = 21.0", "at most 20"]),
+    "base larger than the finger": (
+        "size_mm = 2.0",
+        "base_size_mm = 60",
+        ["mesh.base_size_mm = 60", "at most 49.9975"],
+    ),
+    "base finer than contact": (
+        "size_mm = 2.0",
+        "size_mm = 2.0\nbase_size_mm = 1.0",
+        ["mesh.base_size_mm = 1.0", "at least"],
+    ),
+    "mesh size 0": ("size_mm = 2.0", "size_mm = 0.0", ["mesh.size_mm = 0.0", "above 0"]),
+    "mesh tolerance": (
+        "size_mm = 2.0",
+        "tolerance = 0.01",
+        ["mesh.tolerance = 0.01", "not yet available in this version"],
+    ),
+    "mesh time": ("size_mm = 2.0", "max_seconds = 9", ["mesh.max_seconds = 9", "not yet available in this version"]),
+    "mesher": ("size_mm = 2.0", 'mesher = "gmsh"', ['mesh.mesher = "gmsh"', '"ftetwild" or "swept"']),
+    "domain": ("[mesh]", '[model]\ndomain = "planestrain"\n[mesh]', ['model.domain = "planestrain"', '"plane-strain"']),
+    "rule": ("[mesh]", '[contact]\nrule = "papr"\n[mesh]', ['contact.rule = "papr"', '"projection" or "paper"']),
+    "unknown shape": ('"plane"', '"spher"', ['object.shape = "spher"', 'did you mean "sphere"?']),
+    "mesh shape": ('"plane"', '"mesh"', ['object.shape = "mesh"', "not yet available in this version"]),
+    "object without shape": ('shape = "plane"', "x_mm = 1.0", ["object.shape is missing", '"wedge"']),
+    "sphere without radius": ('"plane"', '"sphere"', ["object.radius_mm is missing"]),
+    "tilt": ('"plane"', '"plane"\ntilt_deg = 90.0', ["object.tilt_deg = 90.0", "above -90 and below 90"]),
+    "axis": ('"plane"', '"cylinder"\nradius_mm = 1.0\naxis = "y"', ['object.axis = "y"', '"x" or "z"']),
+    "gauge beside": ("x_mm = 36.0", "x_mm = 51.0", ["gauge.0.x_mm = 51.0", "from -50 to 50"]),
+    "gauge above the dome": ("y_mm = 40.0", "y_mm = 45.0", ["gauge.0.y_mm = 45.0", "from 0 to 43.2927"]),
+    "gauge below the base": ("y_mm = 40.0", "y_mm = -1.0", ["gauge.0.y_mm = -1.0", "from 0 to"]),
+    "gauge out of the width": ("y_mm = 40.0", "y_mm = 40.0\nz_mm = 11.0", ["gauge.0.z_mm = 11.0", "from -10 to 10"]),
+    "gauge too long": ("y_mm = 40.0", "y_mm = 40.0\nlength_mm = 40.0", ["gauge.0.length_mm = 40.0", "shorter"]),
+    "gauge twice": (
+        "[[gauge]]",
+        '[[gauge]]\nname = "g36"\nx_mm = 0.0\ny_mm = 1.0\n[[gauge]]',
+        ['gauge.name = "g36"', "more than once"],
+    ),
+    "gauge without name": ('name = "g36"', 'name = ""', ['gauge.0.name = ""', "not empty"]),
+    "press twice": (
+        PRESS,
+        PRESS + "[[press.leg]]\ndepth_mm = 1.0\n",
+        ["press.depth_mm = 10.0", "beside [[press.leg]]"],
+    ),
+    "leg misspelt": (
+        PRESS,
+        "[[press.leg]]\ndept_mm = 1.0\n",
+        ["press.leg.0.dept_mm = 1.0", 'did you mean "depth_mm"?'],
+    ),
+    "leg too deep": (
+        PRESS,
+        "[[press.leg]]\ndepth_mm = 1.0\n[[press.leg]]\ndepth_mm = 60.0\n",
+        ["press.leg.1.depth_mm = 60.0"],
+    ),
+    "leg that starts at 0": (PRESS, "[[press.leg]]\ndepth_mm = 0.0\n", ["press.leg.0.depth_mm = 0.0", "above 0"]),
+    "leg in single brackets": (PRESS, "[press.leg]\ndepth_mm = 1.0\n", ["press.leg = a table", "double brackets"]),
+    "no legs": (PRESS, "[press]\nleg = []\n", ["press.leg = []", "not empty"]),
+    "slide in z of a section": (
+        PRESS,
+        PRESS + 'slide_z_mm = 1.0\n[model]\ndomain = "plane-strain"\n',
+        ["press.slide_z_mm = 1.0", "0.0 in a 2D domain"],
+    ),
+    "unknown effect": (PRESS, PRESS + "[effects.telepathy]\n", ["effects.telepathy", "no such effect"]),
+    "effects not tables": (
+        PRESS,
+        PRESS + "[effects]\ntelepathy = true\n",
+        ["effects.telepathy = true", "no such effect"],
+    ),
+    "not TOML": ("mu = 0.25", "mu is 0.25", ["not TOML", "at line 18, column 4"]),
+    "key twice": ("mu = 0.25", "mu = 0.25\nmu = 0.3", ["not TOML", "line 19"]),
+    "open end": ("y_mm = 40.0\n", "y_mm = [", ["not TOML", "at line 30, column 9, the end of the file"]),
+    "a number without end": ("mu = 0.25", f"mu = {'9' * 5000}", ["not TOML", "too long"]),
+    "line break in a key": ("mu = 0.25", '"m\\nu" = 0.25', ['friction."m\\nu" = 0.25', "no such key"]),
+    "line break in a value": ("mu = 0.25", 'mu = "a\\nb"', ['friction.mu = "a\\nb"', "a number"]),
+}
+
+
+def refused(capsys, *arguments: str) -> str:
+    """Run the command line; it must end with 2 and one line."""
+    code = main([str(a) for a in arguments])
+    out, err = capsys.readouterr()
+    assert code == 2
+    assert out == ""
+    assert err.endswith("\n")
+    assert len(err.splitlines()) == 1, err
+    assert "Traceback" not in err
+    assert "pydantic" not in err.lower()
+    return err
+
+
+@pytest.fixture
+def scene(tmp_path):
+    path = tmp_path / "test.toml"
+    path.write_text(SCENE, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("command", ["press", "plan"])
+@pytest.mark.parametrize("name", MISTAKES)
+def test_one_line_for_a_mistake(name, command, scene, capsys):
+    old, new, expected = MISTAKES[name]
+    assert old in SCENE
+    scene.write_text(SCENE.replace(old, new, 1), encoding="utf-8")
+    out = scene.parent / "out"
+    err = refused(capsys, command, scene, *(["--out", out] if command == "press" else []))
+    assert err.startswith(f"finger3d: {scene}: ")
+    for text in expected:
+        assert text in err
+    assert not out.exists()
+
+
+def test_the_first_of_several_mistakes_is_told_and_the_others_counted(scene, capsys):
+    bad = SCENE.replace("nu = 0.49", "nu = 0.6").replace("mu = 0.25", "mu = -1").replace("steps = 10", "steps = 0")
+    scene.write_text(bad, encoding="utf-8")
+    err = refused(capsys, "plan", scene)
+    assert "material.nu = 0.6" in err
+    assert "(and 2 more mistakes)" in err
+
+
+def test_a_misspelt_required_key_is_one_mistake(scene, capsys):
+    scene.write_text(SCENE.replace("nu = 0.49", "nuu = 0.49"), encoding="utf-8")
+    assert "more mistake" not in refused(capsys, "plan", scene)
+
+
+@pytest.mark.parametrize(
+    ("override", "expected"),
+    [
+        ("friction.mu=-1", ["with --set friction.mu: friction.mu = -1", "from 0 up"]),
+        ("friction.mu=rough", ['friction.mu = "rough"', "a number from 0 up"]),
+        ("frction.mu=1", ["frction", 'did you mean "friction"?']),
+        ("friction.mu", ["--set", "must be KEY=VALUE"]),
+        ("=3", ["--set", "must be KEY=VALUE"]),
+        ("a..b=3", ["--set", "must be KEY=VALUE"]),
+        ("gauge.1.x_mm=3", ["--set gauge.1.x_mm", "no item", "0 to 0"]),
+        ("gauge.x_mm=3", ["--set gauge.x_mm", "no item", "0 to 0"]),
+        ("press.leg.0.depth_mm=3", ["press.depth_mm = 10.0", "beside [[press.leg]]"]),
+        ("title.first=3", ["--set title.first", 'title = "test" is not a table']),
+    ],
+)
+def test_a_mistake_in_an_override(override, expected, scene, capsys):
+    err = refused(capsys, "plan", scene, "--set", override)
+    for text in expected:
+        assert text in err
+
+
+def test_a_scene_that_is_not_there(tmp_path, capsys):
+    path = tmp_path / "nothing.toml"
+    assert f"{path}: there is no such file" in refused(capsys, "plan", path)
+
+
+def test_a_folder_for_a_scene(tmp_path, capsys):
+    assert f"{tmp_path}: this is a folder" in refused(capsys, "plan", tmp_path)
+
+
+def test_a_file_that_is_not_text(tmp_path, capsys):
+    path = tmp_path / "scene.toml"
+    path.write_bytes(b"mu = \xff\xfe")
+    assert f"{path}: not TOML: byte 5 is not UTF-8" in refused(capsys, "plan", path)
+
+
+def test_an_empty_file(tmp_path, capsys):
+    path = tmp_path / "scene.toml"
+    path.write_text("")
+    assert "finger is missing" in refused(capsys, "plan", path)
