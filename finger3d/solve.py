@@ -37,6 +37,7 @@ class Problem:
     ----------
     compliance : (c, d, c, d) mm/N, in the object's frame
     gauge_rows : (g, c d) strain per N
+    kept : (r,) directions among c d that the condensed rows stand for
     touch_mm : height of the object's lowest point at first touch
     parent, sign, share : (m,), (m, d), (m,)
         Whole point -> part point, its mirror signs in the frame, and how often the part's force and area count there.
@@ -51,6 +52,7 @@ class Problem:
     condensed: Condensed
     compliance: Float
     gauge_rows: Float
+    kept: NDArray[np.int64]
     touch_mm: float
     axes: tuple[str, ...]
     points: ContactPoints
@@ -93,7 +95,7 @@ class Problem:
     def unknowns(self, force: Float) -> Float:
         """All unknowns of the part's body under contact forces (c, d)."""
         rows = np.zeros(len(self.condensed.compliance))
-        rows[: force.size] = force.ravel()
+        rows[: len(self.kept)] = force.ravel()[self.kept]
         return self.condensed.unknowns(rows)
 
 
@@ -172,18 +174,22 @@ def build(model: Model, say: Callable[[str], None] = lambda text: None, margin: 
     thickness = 1.0 if mesh.dim == 3 else design.width_mm
     matrix = stiffness(mesh, elastic, thickness)
     face = _candidates(model, surface(mesh, "contact", thickness), touch, margin)
-    rows, dummy = _contact_rows(model, face, axes)
+    kept = _kept_rows(face, axes)
+    rows = local_rows(face, model.object.frame(mesh.dim))[kept]
     gauges = [_gauge_row(mesh, g, axes) for g in model.gauges]
     assembly = time.perf_counter() - start
     say(f"condensing {matrix.upper.shape[0]} unknowns to {len(face.nodes)} contact points")
     condensed = condense(matrix, _held(model, mesh, axes), sp.vstack([rows, *gauges], format="csr"))
-    c, d = len(face.nodes), mesh.dim
-    compliance = condensed.compliance[: c * d, : c * d].copy()
-    compliance[dummy, dummy] = np.diagonal(compliance).max()  # no motion along the normal of a symmetry plane
+    c, d, r = len(face.nodes), mesh.dim, len(kept)
+    # a point on a symmetry plane cannot move across it: that direction is left uncoupled, and never sees a force
+    compliance = np.diag(np.full(c * d, np.diagonal(condensed.compliance)[:r].max()))
+    compliance[np.ix_(kept, kept)] = condensed.compliance[:r, :r]
+    gauge_rows = np.zeros((len(gauges), c * d))
+    gauge_rows[:, kept] = condensed.compliance[r:, :r]
     parent, sign, share, points = _unfolded(model, mesh, face, axes)
     return Problem(
         model, mesh, report, elastic, matrix, face, condensed, compliance.reshape(c, d, c, d),
-        condensed.compliance[c * d :, : c * d], touch, axes, points, parent, sign, share,
+        gauge_rows, kept, touch, axes, points, parent, sign, share,
         {**report.seconds, "assembly": assembly, "condensation": condensed.seconds},
     )  # fmt: skip
 
@@ -195,18 +201,12 @@ def _candidates(model: Model, face: Surface, touch: float, margin: float) -> Sur
     return restrict(face, nearest < reach)
 
 
-def _contact_rows(model: Model, face: Surface, axes: tuple[str, ...]) -> tuple[sp.csr_matrix, NDArray[np.int64]]:
-    """Rows of the contact points; on a symmetry plane the tangent across it is cut out and named."""
-    d = face.points.shape[1]
-    frame = model.object.frame(d)
-    rows = local_rows(face, frame)
-    dummy = [np.flatnonzero(face.points[:, "xyz".index(a)] == 0.0) * d + {"x": 1, "z": 2}[a] for a in axes]
-    cut = np.concatenate([*dummy, np.zeros(0, dtype=np.int64)]).astype(np.int64)
-    keep = np.ones(rows.shape[0])
-    keep[cut] = 0.0
-    rows = (sp.diags_array(keep) @ rows).tocsr()
-    rows.eliminate_zeros()
-    return sp.csr_matrix(rows), cut
+def _kept_rows(face: Surface, axes: tuple[str, ...]) -> NDArray[np.int64]:
+    """Numbers point * d + direction of the contact rows, less the tangent across a symmetry plane for points on it."""
+    keep = np.ones(face.points.shape, dtype=bool)
+    for axis in axes:
+        keep[:, {"x": 1, "z": 2}[axis]] &= face.points[:, "xyz".index(axis)] != 0.0
+    return np.flatnonzero(keep.ravel())
 
 
 def _gauge_row(mesh: Mesh, gauge: Gauge, axes: tuple[str, ...]) -> sp.csr_matrix:
