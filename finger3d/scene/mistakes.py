@@ -123,7 +123,8 @@ def _is_table(hint: Any) -> bool:
 
 def _target(table: type[Table], place: Place) -> tuple[Place, type[Table], Any]:
     """Follow `place` from `table`: the part of it that a user typed, the table that holds its key, the key's type."""
-    holder, hint = table, table
+    holder: type[Table] = table
+    hint: Any = table
     typed: list[str | int] = []
     for part in place:
         origin = typing.get_origin(hint)

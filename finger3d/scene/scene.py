@@ -125,7 +125,7 @@ def parse(given: Mapping[str, Any], path: Path | None = None, set_keys: Iterable
     tables = _checked(SceneTable, given, (), found)
     geometry, dimensions = _named(given, "finger", "geometry", designs(), found)
     design = _built(designs()[geometry], dimensions, ("finger",), found) if dimensions else None
-    shape, placed = _named({"object": {"shape": "plane"}} | given, "object", "shape", SHAPES, found)
+    shape, placed = _named({"object": {"shape": "plane"}, **given}, "object", "shape", SHAPES, found)
     press = _press(given, found)
     effects = _effects(given, found)
     for key in ("tolerance", "max_seconds"):

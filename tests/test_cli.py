@@ -1,0 +1,258 @@
+"""The command line: exit codes, one-line errors, and what each command prints. Presses are faked here."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+import finger3d
+import finger3d.press
+from finger3d.cli import main
+from finger3d.errors import MissingError, Outcome
+from finger3d.model import MeshOptions
+from finger3d.scene import load
+
+HEAVY = ("OCP", "build123d", "vtk", "vtkmodules", "pyvista", "pytetwild", "trimesh", "scipy", "numpy", "pydantic")
+STEP = {
+    "depth_mm": 10.0,
+    "normal_force_N": 304.5,
+    "contact_half_length_mm": 36.0,
+    "stick_half_length_mm": 8.5,
+    "residual": 3e-11,
+    "gauges": {"g36": -0.0123},
+    "outcome": "converged",
+}
+
+
+def run(*arguments: object) -> int:
+    return main([str(a) for a in arguments])
+
+
+@pytest.fixture
+def scene(tmp_path) -> Path:
+    path = tmp_path / "scene.toml"
+    assert run("new", path) == 0
+    return path
+
+
+@pytest.fixture
+def fake_press(monkeypatch):
+    """Replace the driver: writes two steps, then ends as told."""
+    calls = SimpleNamespace(end=Outcome.CONVERGED, scene=None, figures=None)
+
+    def press(scene, out, report, figures=True):
+        calls.scene, calls.figures = scene, figures
+        steps = [{**STEP, "depth_mm": 5.0}, STEP]
+        if isinstance(calls.end, Outcome) and not calls.end.ok:
+            steps[1] = {**STEP, "outcome": str(calls.end)}
+        summary = {"outcome": str(calls.end), "steps": steps, "cost": {"seconds": {"total": 1.5}}}
+        report.stage("meshing")
+        report.say("mesh taken from the cache")
+        (out / "summary.json").write_text(json.dumps(summary))
+        for i in range(2):
+            report.step(i + 1, 2, f"remark {i}")
+        if isinstance(calls.end, BaseException):
+            raise calls.end
+        return SimpleNamespace(summary=summary, outcome=calls.end, out=out)
+
+    monkeypatch.setattr(finger3d.press, "press", press)
+    return calls
+
+
+def test_new_says_what_to_do_next(tmp_path, capsys):
+    path = tmp_path / "mine.toml"
+    assert run("new", path) == 0
+    assert f"finger3d press {path} --out out" in capsys.readouterr().out
+
+
+def test_new_writes_a_scene_that_loads_and_is_the_papers_finger(scene):
+    loaded = load(scene)
+    assert loaded.design.width_mm == 20.0
+    assert loaded.model().mesh == MeshOptions(2.0, 8.0, "ftetwild")
+    assert [leg.depth_mm for leg in loaded.legs] == [10.0]
+
+
+def test_new_explains_every_key(scene):
+    text = scene.read_text(encoding="utf-8")
+    for table in ("finger", "material", "object", "friction", "press", "contact", "model", "mesh", "gauge"):
+        assert re.search(rf"^\[+{table}\]+", text, re.MULTILINE)
+    for key in ("slide_x_mm", "duration_s", "wavelength_mm", "tip_radius_mm", "length_mm", "plane-strain", "swept"):
+        assert key in text
+    optional = [line for line in text.splitlines() if re.match(r"# \w+ = |# \[\[", line)]
+    assert len(optional) >= 10
+
+
+def test_new_leaves_a_file_alone_that_is_there(scene, capsys):
+    scene.write_text("mine", encoding="utf-8")
+    assert run("new", scene) == 2
+    assert f"{scene}: there already" in capsys.readouterr().err
+    assert scene.read_text(encoding="utf-8") == "mine"
+
+
+def test_new_without_a_name_writes_scene_toml(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert run("new") == 0
+    assert load("scene.toml").title == "Fig. 9 finger, 20 mm wide"
+
+
+def test_new_in_a_folder_that_is_not_there(tmp_path, capsys):
+    assert run("new", tmp_path / "no" / "scene.toml") == 2
+    assert "cannot be written" in capsys.readouterr().err
+
+
+def test_press_prints_the_closing_table(scene, tmp_path, fake_press, capsys):
+    assert run("press", scene, "--out", tmp_path / "out", "--set", "friction.mu=0.5", "--set=press.steps=2") == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    assert fake_press.figures is True
+    assert fake_press.scene.model().friction.mu == 0.5
+    assert fake_press.scene.legs[0].steps == 2
+    for text in ("converged", "304.5 N", "72 mm", "17 mm", "3.0e-11", "-0.0123", "summary.json", "Fig. 9 finger"):
+        assert text in out
+    for text in ("meshing", "mesh taken from the cache", "step 2 of 2: remark 1"):
+        assert text in out
+
+
+def test_press_without_figures(scene, tmp_path, fake_press):
+    assert run("press", scene, "--out", tmp_path / "out", "--no-figures") == 0
+    assert fake_press.figures is False
+
+
+def test_press_that_does_not_converge_ends_with_3(scene, tmp_path, fake_press, capsys):
+    fake_press.end = Outcome.NO_CONVERGENCE
+    assert run("press", scene, "--out", tmp_path / "out") == 3
+    err = capsys.readouterr().err
+    assert len(err.splitlines()) == 1
+    assert str(Outcome.NO_CONVERGENCE) in err
+    assert "1 of 2 steps are kept" in err
+
+
+def test_press_that_misses_something_ends_with_3(scene, tmp_path, fake_press, capsys):
+    fake_press.end = MissingError("no mesher; install pytetwild")
+    assert run("press", scene, "--out", tmp_path / "out") == 3
+    assert capsys.readouterr().err == "finger3d: no mesher; install pytetwild\n"
+
+
+def test_an_interrupted_press_ends_with_130_and_says_what_is_kept(scene, tmp_path, fake_press, capsys):
+    fake_press.end = KeyboardInterrupt()
+    assert run("press", scene, "--out", tmp_path / "out") == 130
+    assert capsys.readouterr().err == f"finger3d: interrupted; 2 of 2 steps are kept in {tmp_path / 'out'}\n"
+
+
+def test_an_interruption_before_the_first_step(scene, tmp_path, monkeypatch, capsys):
+    def press(scene, out, report, figures=True):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(finger3d.press, "press", press)
+    assert run("press", scene, "--out", tmp_path / "out") == 130
+    assert capsys.readouterr().err == "finger3d: interrupted; no step was finished, none is kept\n"
+
+
+@pytest.mark.parametrize(
+    ("out", "expected"),
+    [("scene.toml", "is a file"), ("scene.toml/deeper", "cannot be written"), (".", "holds scene.toml")],
+)
+def test_press_refuses_a_folder_it_cannot_use_before_any_work(out, expected, scene, tmp_path, fake_press, capsys):
+    before = scene.read_bytes()
+    assert run("press", scene, "--out", tmp_path / out) == 2
+    printed, err = capsys.readouterr()
+    assert len(err.splitlines()) == 1
+    assert "--out" in err
+    assert expected in err
+    assert printed == ""
+    assert fake_press.scene is None
+    assert scene.read_bytes() == before
+
+
+def test_plan_tells_effects_and_forecast_and_solves_nothing(scene, fake_press, monkeypatch, capsys):
+    forecast = {"unknowns": 38904, "expected_time": "12 s", "symmetry": "x and z: a quarter is solved"}
+    monkeypatch.setattr(finger3d.press, "forecast", lambda model: forecast, raising=False)
+    assert run("plan", scene, "--set", "title=planned [b]") == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    for text in ("planned [b]", "unknowns", "38904", "expected time", "12 s", "a quarter is solved"):
+        assert text in out
+    assert fake_press.scene is None
+
+
+def test_info_names_versions_and_machine(capsys):
+    assert run("info") == 0
+    out = capsys.readouterr().out
+    for text in ("finger3d", "numpy", "build123d", "pytetwild", "vtk", "python", "cores", "memory", "cache", "PARDISO"):
+        assert text in out
+    assert finger3d.__version__ in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["prss"], 'Did you mean "press"?'),
+        (["press"], "SCENE requires an argument"),
+        (["press", "scene.toml"], "--out"),
+        (["press", "scene.toml", "--out"], "--out requires an argument"),
+        (["press", "scene.toml", "--out", "out", "--fast"], "--fast"),
+        (["press", "scene.toml", "more.toml", "--out", "out"], "more.toml"),
+        (["plan", "scene.toml", "--set"], "--set requires an argument"),
+        (["new", "a.toml", "b.toml"], "b.toml"),
+        (["info", "--loud"], "--loud"),
+    ],
+)
+def test_wrong_arguments_end_with_2_and_one_line(arguments, expected, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert run(*arguments) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert len(err.splitlines()) == 1
+    assert expected in err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["press", "--help"], []])
+def test_help_shows_examples(arguments, capsys):
+    assert run(*arguments) == 0
+    assert "finger3d press scene.toml --out out" in capsys.readouterr().out
+
+
+def test_version(capsys):
+    assert run("--version") == 0
+    assert capsys.readouterr().out.strip() == finger3d.__version__
+
+
+def test_python_m_runs_the_command_line(tmp_path):
+    command = [sys.executable, "-m", "finger3d", "plan", "nothing.toml"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr == "finger3d: nothing.toml: there is no such file\n"
+    assert done.stdout == ""
+
+
+@pytest.mark.parametrize("code", ["import finger3d", "from finger3d.cli import main; main(['--help'])"])
+def test_import_and_help_load_nothing_heavy(code):
+    check = f"import sys; print(*sorted(set({HEAVY!r}) & set(sys.modules)), file=sys.stderr)"
+    done = subprocess.run([sys.executable, "-c", f"{code}\n{check}"], capture_output=True, text=True, check=True)
+    assert done.stderr == "\n"
+
+
+def test_the_table_prints_where_only_ascii_can_be_written():
+    command = [sys.executable, "-m", "finger3d", "info"]
+    environment = {"PYTHONIOENCODING": "ascii", "PATH": ""}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0
+    assert "PARDISO" in done.stdout
+
+
+def test_every_public_name_is_there():
+    for name in finger3d.__all__:
+        assert getattr(finger3d, name) is not None
+    assert set(finger3d.__all__) <= set(dir(finger3d))
+
+
+def test_an_unknown_public_name_is_an_attribute_error():
+    with pytest.raises(AttributeError, match="has no attribute 'pres'"):
+        _ = finger3d.pres
