@@ -17,6 +17,7 @@ install: .venv/.installed
 	@echo "installing finger3d and its packages into .venv (once)"
 	@$(PIP) hatchling editables
 	@$(PIP) --no-build-isolation --editable '.[dev]'
+	@$(BIN)/python -c 'import OCP.gp' 2>/dev/null || { echo "build123d cannot be loaded; it needs libGL and libX11: apt install libgl1"; exit 1; }
 	@touch $@
 
 demo: install

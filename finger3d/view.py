@@ -1,0 +1,352 @@
+"""Pictures of a result, drawn without a display: the pressed finger, the contact forces, the force against depth.
+
+Solids are rendered by PyVista in a child process, because VTK ends the whole process where no OpenGL driver works;
+then, and with ``FINGER3D_RENDERER=matplotlib``, matplotlib draws them.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from finger3d.contact.law import OPEN, SLIP, STICK
+from finger3d.export import atomic
+from finger3d.mesh import Mesh
+from finger3d.render import BODY, COLOURS, LINE, OBJECT, REST, Skin, draw_solid, render_solid, skin_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+_CMAP = "viridis"
+_LABELS = {STICK: "stick", SLIP: "slip", OPEN: "open"}
+_SHADES = {STICK: "#c9d9ee", SLIP: "#fde3c4"}
+_DPI = 120
+
+
+def finger_picture(
+    path: str | Path,
+    mesh: Mesh,
+    displacement: Float,
+    pressure: Float,
+    shear: Float,
+    status: ArrayLike,
+    contact_nodes: ArrayLike,
+    title: str = "",
+    profile: Float | None = None,
+) -> str:
+    """Draw the deformed finger at true scale: contact pressure on the left, stick and slip on the right.
+
+    Parameters
+    ----------
+    mesh : the whole finger at rest (unfolded, if symmetry was used), mm
+    displacement : (n, d) mm
+    pressure : (c,) MPa
+    shear : (c, d - 1) MPa, friction on the finger along x (and z)
+    status : (c,) 0 open, 1 stick, 2 slip
+    contact_nodes : (c,) numbers of the contact points in `mesh`
+    profile : (k, 2) x and y in mm of the object's surface, drawn as a line (2D) or an outline (solid)
+
+    Returns
+    -------
+    str
+        What drew it: ``pyvista`` or ``matplotlib``.
+    """
+    nodes, state = np.asarray(contact_nodes, dtype=np.int64), np.asarray(status).astype(np.int64)
+    if mesh.dim == 2:
+        figure, renderer = _section(mesh, displacement, pressure, state, nodes, profile, title), "matplotlib"
+    else:
+        skin = skin_of(mesh, displacement, pressure, shear, state, nodes, profile)
+        figure, renderer = _solid(skin, title)
+    _save(figure, path)
+    return renderer
+
+
+def contact_figure(
+    path: str | Path,
+    x: Float,
+    pressure: Float,
+    shear_x: Float,
+    status: ArrayLike,
+    mu: float,
+    z: Float | None = None,
+    shear_z: Float | None = None,
+    tolerance_mm: float | None = None,
+    title: str = "",
+) -> None:
+    """Draw f_n, f_t and mu f_n along x with the zones that stick and slip, as in the paper's Fig. 4.
+
+    Parameters
+    ----------
+    x, z : (c,) mm; without z, or if it is the same everywhere, the points are those of a section
+    pressure, shear_x, shear_z : (c,) MPa; shear is friction on the finger
+    status : (c,) 0 open, 1 stick, 2 slip
+    mu : friction coefficient
+    tolerance_mm : how far from the lines z = 0 and z = max(z) a point may lie; default 0.4 of the points' distance
+    """
+    x, pressure, shear_x, state = np.asarray(x), np.asarray(pressure), np.asarray(shear_x), np.asarray(status)
+    z = np.zeros_like(x) if z is None else np.asarray(z)
+    solid = bool(np.ptp(z) > 0.0)
+    tolerance = (0.4 * _spacing(x, z) if solid else 0.0) if tolerance_mm is None else tolerance_mm
+    lines = [(0.0, "in the middle, z = 0")] if solid else [(float(z[0]), "")]
+    if solid:
+        lines.append((float(z.max()), f"at the end, z = {z.max():g} mm"))
+    figure = _figure(9.0, 4.2 * len(lines))
+    top: Axes | None = None
+    for row, (at, where) in enumerate(lines):
+        axes = figure.add_subplot(len(lines), 1, row + 1, sharex=top)
+        top = top or axes
+        chosen = np.flatnonzero(np.abs(z - at) <= tolerance)
+        chosen = chosen[np.argsort(x[chosen], kind="stable")]
+        across = None if shear_z is None or not solid else np.asarray(shear_z)[chosen]
+        _contact_line(axes, x[chosen], pressure[chosen], shear_x[chosen], across, state[chosen], mu)
+        axes.set_title(where, fontsize=10, loc="left")
+        axes.set_ylabel("traction on the finger (MPa)")
+    axes.set_xlabel("x at rest (mm)")
+    if title:
+        figure.suptitle(title, fontsize=12)
+    _save(figure, path)
+
+
+def force_figure(
+    path: str | Path,
+    depth: Sequence[float] | Float,
+    normal_force: Sequence[float] | Float,
+    friction_sum: Sequence[float] | Float,
+    contact_half_length: Sequence[float] | Float,
+    stick_half_length: Sequence[float] | Float,
+    title: str = "",
+) -> None:
+    """Draw forces (N) and the half lengths of contact and stick zone (mm) against depth (mm), a point a step."""
+    figure = _figure(10.0, 4.2)
+    left, right = figure.subplots(1, 2)
+    left.plot(depth, normal_force, "o-", color="#222222", ms=4, label="normal force")
+    left.plot(depth, friction_sum, "s-", color="#c0392b", ms=4, label="sum of |friction|")
+    left.set_ylabel("force (N)")
+    right.plot(depth, contact_half_length, "o-", color="#555555", ms=4, label="contact")
+    right.plot(depth, stick_half_length, "s-", color=COLOURS[STICK], ms=4, label="stick")
+    right.set_ylabel("half length along x, z = 0 (mm)")
+    for axes in (left, right):
+        axes.set_xlabel("depth (mm)")
+        axes.set_xlim(left=min(0.0, float(np.min(depth))))
+        axes.set_ylim(bottom=0.0)
+        _plain(axes)
+        axes.legend(frameon=False, loc="upper left")
+    if title:
+        figure.suptitle(title, fontsize=12)
+    _save(figure, path)
+
+
+# --- shared -------------------------------------------------------------------------------------------------------
+
+
+def _figure(width: float, height: float, layout: Literal["constrained"] | None = "constrained") -> Figure:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    # No pyplot: it keeps state, and looks for a display.
+    figure = Figure(figsize=(width, height), layout=layout)
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def _save(figure: Figure, path: str | Path) -> None:
+    with atomic(path) as temporary:
+        figure.savefig(temporary, format="png", dpi=_DPI)
+
+
+def _plain(axes: Axes) -> None:
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(True, color="#e4e4e4", lw=0.6)
+    axes.set_axisbelow(True)
+
+
+def _spacing(x: Float, z: Float) -> float:
+    """Typical distance of neighbouring points in the x-z plane, mm."""
+    from scipy.spatial import KDTree
+
+    points = np.column_stack([x, z])
+    return float(np.median(KDTree(points).query(points, k=2)[0][:, 1])) if len(points) > 1 else 0.0
+
+
+def _patches(colours: dict[int, str], states: Sequence[int]) -> list[Any]:
+    from matplotlib.patches import Patch
+
+    return [Patch(facecolor=colours[s], edgecolor="#888888", lw=0.5, label=_LABELS[s]) for s in states]
+
+
+def _two_panels(aspect: float, title: str, ticks: bool = False) -> tuple[Figure, list[Axes]]:
+    """Two panels of this height over width, with room for a key below each, and for ticks."""
+    width, panel, below = 14.0, 6.2 if ticks else 6.5, 1.4 if ticks else 0.95
+    above = 0.85 if title else 0.45
+    high = panel * aspect
+    figure = _figure(width, below + high + above, layout=None)
+    total = below + high + above
+    panels = []
+    for left, name in ((width / 2 - panel - 0.1, "contact pressure"), (width - panel - 0.1, "stick and slip")):
+        axes = figure.add_axes((left / width, below / total, panel / width, high / total))
+        axes.set_title(name, fontsize=11)
+        axes.set_aspect("equal")
+        panels.append(axes)
+    if title:
+        figure.suptitle(title, fontsize=13, y=1.0 - 0.12 / total, va="top")
+    return figure, panels
+
+
+def _keys(figure: Figure, highest: float, lines: dict[str, str]) -> None:
+    """The colour bar below the left panel, zones and lines (name -> colour) below the right one."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+    from matplotlib.lines import Line2D
+
+    inch = 1.0 / figure.get_figheight()
+    bar = figure.add_axes((0.10, 0.62 * inch, 0.3, 0.16 * inch))
+    figure.colorbar(ScalarMappable(Normalize(0.0, highest), _CMAP), cax=bar, orientation="horizontal")
+    bar.set_xlabel("contact pressure (MPa)")
+    handles = _patches(COLOURS, (STICK, SLIP, OPEN)) + [Line2D([], [], color=c, label=n) for n, c in lines.items()]
+    figure.legend(
+        handles=handles,
+        loc="center",
+        bbox_to_anchor=(0.75, 0.6 * inch),
+        ncols=len(handles),
+        frameon=False,
+        fontsize=11,
+        columnspacing=1.4,
+    )
+
+
+def _palette() -> Float:
+    """Colours (3, 3) of open, stick, slip."""
+    from matplotlib.colors import to_rgb
+
+    return np.array([to_rgb(COLOURS[s]) for s in (OPEN, STICK, SLIP)])
+
+
+def _pressure_colours(values: Float, highest: float) -> Float:
+    """Colours (..., 3) for pressures; the body's own where there is none."""
+    import matplotlib
+    from matplotlib.colors import to_rgb
+
+    colours = matplotlib.colormaps[_CMAP](values / highest)[..., :3]
+    return np.where((values > 0.0)[..., None], colours, np.array(to_rgb(BODY)))
+
+
+def _highest(pressure: Float) -> float:
+    # A finger that does not touch has no pressure; any scale will do.
+    return float(pressure.max(initial=0.0)) or 1.0
+
+
+# --- the line of contact ------------------------------------------------------------------------------------------
+
+
+def zones(x: Float, status: Int) -> list[tuple[float, float, int]]:
+    """Intervals (from, to, status) of equal status along ascending x; they meet halfway between two points."""
+    if len(x) == 0:
+        return []
+    change = np.flatnonzero(np.diff(status))
+    middle = 0.5 * (x[change] + x[change + 1])
+    ends = np.concatenate([[x[0]], middle, [x[-1]]])
+    first = np.concatenate([[0], change + 1])
+    return [(float(a), float(b), int(status[i])) for a, b, i in zip(ends[:-1], ends[1:], first, strict=True)]
+
+
+def _contact_line(axes: Axes, x: Float, fn: Float, fx: Float, fz: Float | None, status: Int, mu: float) -> None:
+    from matplotlib.lines import Line2D
+
+    for start, end, state in zones(x, status):
+        if state in _SHADES:
+            axes.axvspan(start, end, color=_SHADES[state], lw=0)
+    axes.axhline(0.0, color="#999999", lw=0.8)
+    axes.plot(x, fn, "-", color="#222222", lw=1.6)
+    axes.plot(x, mu * fn, "--", color="#777777", lw=1.2)
+    axes.plot(x, -mu * fn, "--", color="#777777", lw=1.2)
+    axes.plot(x, fx, "o-", color="#c0392b", lw=1.2, ms=3)
+    handles = [
+        Line2D([], [], color="#222222", lw=1.6, label="fₙ, pressure"),
+        Line2D([], [], color="#777777", ls="--", lw=1.2, label=f"± μ fₙ, μ = {mu:g}"),
+        Line2D([], [], color="#c0392b", marker="o", ms=3, lw=1.2, label="fₜ along x"),
+    ]
+    shown = [fn, fx]
+    if fz is not None and np.any(fz):
+        axes.plot(x, fz, ".:", color="#8e44ad", lw=1.0, ms=4)
+        handles.append(Line2D([], [], color="#8e44ad", marker=".", ls=":", label="fₜ along z"))
+        shown.append(fz)
+    # The limit lines of a large mu would flatten everything else, so they may leave the picture.
+    high = max([float(v.max(initial=0.0)) for v in shown] + [1e-12])
+    low = min([float(v.min(initial=0.0)) for v in shown] + [-min(mu, 0.5) * high])
+    axes.set_ylim(1.12 * low, 1.12 * high)
+    touching = np.flatnonzero(status != OPEN)
+    if len(touching):
+        reach = 1.15 * float(np.abs(x[touching]).max())
+        axes.set_xlim(-reach, reach)
+    handles += _patches(_SHADES, [s for s in (STICK, SLIP) if np.any(status == s)])
+    axes.legend(handles=handles, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    _plain(axes)
+    axes.grid(False, axis="x")
+
+
+# --- a section ----------------------------------------------------------------------------------------------------
+
+
+def _section(
+    mesh: Mesh, u: Float, pressure: Float, status: Int, nodes: Int, profile: Float | None, title: str
+) -> Figure:
+    from matplotlib.collections import LineCollection, PolyCollection
+
+    moved = mesh.points + u
+    ring = [0, 3, 1, 4, 2, 5] if mesh.is_quadratic else [0, 1, 2]
+    value, state = np.zeros(len(moved)), np.full(len(moved), OPEN)
+    value[nodes], state[nodes] = pressure, status
+    arc = mesh.facets["contact"]
+    middle = moved[arc[:, 2]] if mesh.is_quadratic else moved[arc].mean(axis=1)
+    # Each facet in two halves, one for each end: pressure is the mean over a half, status that of its end.
+    halves = np.stack([moved[arc[:, :2]], np.repeat(middle[:, None], 2, axis=1)], axis=2).reshape(-1, 2, 2)
+    of_half = (0.75 * value[arc[:, :2]] + 0.25 * value[arc[:, 1::-1]]).ravel()
+    highest = _highest(pressure)
+    low, span = moved.min(axis=0), np.ptp(moved, axis=0)
+    limits = low - 0.04 * span, low + 1.08 * span
+    figure, panels = _two_panels(span[1] / span[0], title, ticks=True)
+    by_status = _palette()[state[arc[:, :2]].ravel()]
+    for axes, colours in zip(panels, (_pressure_colours(of_half, highest), by_status), strict=True):
+        axes.add_collection(PolyCollection(list(moved[mesh.cells[:, ring]]), facecolor=BODY, edgecolor=LINE, lw=0.25))
+        if profile is not None:
+            axes.plot(*profile.T, color=OBJECT, lw=1.5, zorder=2)
+        axes.add_collection(LineCollection(list(halves), colors=colours, lw=5, capstyle="butt", zorder=3))
+        axes.set(xlim=(limits[0][0], limits[1][0]), ylim=(limits[0][1], limits[1][1]))
+        axes.set_xlabel("x (mm)", labelpad=1)
+        axes.spines[["top", "right"]].set_visible(False)
+    panels[0].set_ylabel("y (mm)")
+    _keys(figure, highest, {} if profile is None else {"object": OBJECT})
+    return figure
+
+
+# --- a solid ------------------------------------------------------------------------------------------------------
+
+
+def _solid(skin: Skin, title: str) -> tuple[Figure, str]:
+    highest = _highest(skin.pressure)
+    by_pressure = _pressure_colours(skin.pressure, highest)
+    by_status = np.repeat(_palette()[skin.status][:, None], 3, axis=1)
+    wanted = os.environ.get("FINGER3D_RENDERER", "")
+    images = None if wanted == "matplotlib" else render_solid(skin, [by_pressure, by_status], must=wanted == "pyvista")
+    aspect = skin.aspect if images is None else images[0].shape[0] / images[0].shape[1]
+    figure, panels = _two_panels(aspect, title)
+    for number, (axes, colours) in enumerate(zip(panels, (by_pressure, by_status), strict=True)):
+        if images is not None:
+            axes.imshow(images[number], interpolation="antialiased")
+        else:
+            draw_solid(axes, skin, colours, arrows=number == 1)
+        axes.set_axis_off()
+    if skin.largest_shear > 0.0:
+        text = f"stick and slip; arrows: friction on the finger, at most {skin.largest_shear:.3g} MPa"
+        panels[1].set_title(text, fontsize=11)
+    _keys(figure, highest, {"finger at rest": REST} | ({"object": OBJECT} if len(skin.outline) else {}))
+    return figure, "matplotlib" if images is None else "pyvista"
