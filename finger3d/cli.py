@@ -130,7 +130,7 @@ def info() -> int:
     """Print versions, machine and folders: what a bug report needs."""
     import platform
 
-    from finger3d.design import cache_folder
+    from finger3d.design.cache import folder
     from finger3d.fem import pardiso
     from finger3d.versions import cores, memory_bytes, versions
 
@@ -142,7 +142,7 @@ def info() -> int:
             ("platform", platform.platform()),
             ("cores", cores()),
             ("memory", f"{memory[0] / 1e9:.1f} GB" if memory else "unknown"),
-            ("mesh cache", cache_folder()),
+            ("mesh cache", folder()),
             ("PARDISO", "available" if pardiso.available() else "not available; SuperLU is used, which is slower"),
         ],
     )
@@ -209,7 +209,9 @@ def _print_rows(title: str, rows: Iterable[tuple[str, Any]]) -> None:
     table.add_column(overflow="fold")
     for key, value in rows:
         table.add_row(Text(key), Text(str(value)))
-    Console(highlight=False).print(table)
+    # In a pipe nothing limits the width: a folded path could not be copied.
+    width = None if sys.stdout.isatty() else 500
+    Console(highlight=False, width=width).print(table)
 
 
 def summary_rows(summary: Mapping[str, Any], out: Path) -> list[tuple[str, str]]:
