@@ -204,6 +204,26 @@ def test_one_line_for_a_mistake(name, command, scene, capsys):
     assert not out.exists()
 
 
+@pytest.mark.parametrize(
+    ("override", "expected"),
+    [
+        ("model.domain=plane-strain", ['model.domain = "plane-strain"', 'must be "solid"']),
+        ("mesh.mesher=swept", ['mesh.mesher = "swept"', 'must be "ftetwild"']),
+        ("gauge=[{name='a', x_mm=9.0, y_mm=1.0, z_mm=9.0}]", ["gauge.0.z_mm = 9.0", "nearer to 0"]),
+        ("gauge=[{name='a', x_mm=7.0, y_mm=9.0}]", ["gauge.0.y_mm = 9.0", "from 0 to 7.14143"]),
+    ],
+)
+def test_a_hemisphere_is_a_solid_without_a_section(override, expected, tmp_path, capsys):
+    path = tmp_path / "ball.toml"
+    path.write_text(
+        '[finger]\ngeometry = "hemisphere"\nradius_mm = 10.0\n'
+        "[material]\nE_MPa = 1.0\nnu = 0.4\n[press]\ndepth_mm = 1.0\n"
+    )
+    err = refused(capsys, "plan", path, "--set", override)
+    for text in expected:
+        assert text in err
+
+
 def test_the_first_of_several_mistakes_is_told_and_the_others_counted(scene, capsys):
     bad = SCENE.replace("nu = 0.49", "nu = 0.6").replace("mu = 0.25", "mu = -1").replace("steps = 10", "steps = 0")
     scene.write_text(bad, encoding="utf-8")

@@ -20,11 +20,12 @@ def check(tables: SceneTable, legs: tuple[LegTable, ...], design: Any) -> list[s
     """Return the mistakes that only the whole scene shows, each in one line."""
     solid = tables.model.domain == "solid"
     lines = []
-    if not solid and not hasattr(design, "width_mm"):
-        lines.append(
-            f"model.domain = {shown(tables.model.domain)}: finger.geometry = {shown(design.name)} has no constant "
-            'section; must be "solid"'
-        )
+    if not hasattr(design, "section"):
+        lacks = f"finger.geometry = {shown(design.name)} has no constant section"
+        if not solid:
+            lines.append(f'model.domain = {shown(tables.model.domain)}: {lacks}; must be "solid"')
+        if tables.mesh.mesher == "swept":
+            lines.append(f'mesh.mesher = "swept": {lacks}; must be "ftetwild"')
     lines += _legs(tables.press, legs, design.height_mm, solid)
     lines += _sizes(tables.mesh, design, solid)
     twice = [name for name, n in Counter(g.name for g in tables.gauge).items() if n > 1]
@@ -49,7 +50,7 @@ def _legs(press: dict[str, Any], legs: tuple[LegTable, ...], height: float, soli
 def smallest_mm(design: Any, solid: bool) -> float:
     """Smallest extent of what is meshed, mm."""
     extents = [design.height_mm, 2.0 * design.half_length_mm]
-    if solid and hasattr(design, "width_mm"):
+    if solid:
         extents.append(design.width_mm)
     return min(extents)
 
@@ -94,7 +95,7 @@ def _rounded(value: float) -> float:
 def _gauge(index: int, gauge: GaugeTable, design: Any) -> list[str]:
     at = ("gauge", index)
     half_length, height = design.half_length_mm, design.height_mm
-    half_width = design.width_mm / 2.0 if hasattr(design, "width_mm") else half_length
+    half_width = design.width_mm / 2.0
     for key, value, low, high in (
         ("x_mm", gauge.x_mm, -half_length, half_length),
         ("y_mm", gauge.y_mm, 0.0, height),
@@ -112,6 +113,11 @@ def _gauge(index: int, gauge: GaugeTable, design: Any) -> list[str]:
     slack = 1e-9 * height
     if not np.all((y >= -slack) & (y <= top + slack)):
         here = float(design.top(np.array([gauge.x_mm]), np.array([gauge.z_mm]))[0])
+        if math.isnan(here):
+            return [
+                f"{dotted((*at, 'z_mm'))} = {shown(gauge.z_mm)}: gauge {shown(gauge.name)} is outside the finger; "
+                f"must be nearer to 0 at x_mm = {shown(gauge.x_mm)}"
+            ]
         if gauge.length_mm and gauge.y_mm <= here + slack:
             return [
                 f"{dotted((*at, 'length_mm'))} = {shown(gauge.length_mm)}: an end of gauge {shown(gauge.name)} "
