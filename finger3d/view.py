@@ -7,14 +7,14 @@ then, and with ``FINGER3D_RENDERER=matplotlib``, matplotlib draws them.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from finger3d.contact.law import OPEN, SLIP, STICK
+from finger3d.contact.law import OPEN, SLIP, STATUS_NAMES, STICK
 from finger3d.export import atomic
 from finger3d.mesh import Mesh
 from finger3d.render import BODY, COLOURS, LINE, OBJECT, REST, Skin, draw_solid, render_solid, skin_of
@@ -27,7 +27,6 @@ Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
 _CMAP = "viridis"
-_LABELS = {STICK: "stick", SLIP: "slip", OPEN: "open"}
 _SHADES = {STICK: "#c9d9ee", SLIP: "#fde3c4"}
 _DPI = 120
 
@@ -36,9 +35,7 @@ def finger_picture(
     path: str | Path,
     mesh: Mesh,
     displacement: Float,
-    pressure: Float,
-    shear: Float,
-    status: ArrayLike,
+    table: Mapping[str, ArrayLike],
     contact_nodes: ArrayLike,
     title: str = "",
     profile: Float | None = None,
@@ -49,9 +46,7 @@ def finger_picture(
     ----------
     mesh : the whole finger at rest (unfolded, if symmetry was used), mm
     displacement : (n, d) mm
-    pressure : (c,) MPa
-    shear : (c, d - 1) MPa, friction on the finger along x (and z)
-    status : (c,) 0 open, 1 stick, 2 slip
+    table : columns of contact.csv, of which pressure_MPa, shear_x_MPa, shear_z_MPa and status are read, each (c,)
     contact_nodes : (c,) numbers of the contact points in `mesh`
     profile : (k, 2) x and y in mm of the object's surface, drawn as a line (2D) or an outline (solid)
 
@@ -60,11 +55,13 @@ def finger_picture(
     str
         What drew it: ``pyvista`` or ``matplotlib``.
     """
-    nodes, state = np.asarray(contact_nodes, dtype=np.int64), np.asarray(status).astype(np.int64)
+    nodes, status = np.asarray(contact_nodes, dtype=np.int64), _status(table)
+    pressure = _column(table, "pressure_MPa")
     if mesh.dim == 2:
-        figure, renderer = _section(mesh, displacement, pressure, state, nodes, profile, title), "matplotlib"
+        figure, renderer = _section(mesh, displacement, pressure, status, nodes, profile, title), "matplotlib"
     else:
-        skin = skin_of(mesh, displacement, pressure, shear, state, nodes, profile)
+        shear = np.column_stack([_column(table, "shear_x_MPa"), _column(table, "shear_z_MPa")])
+        skin = skin_of(mesh, displacement, pressure, shear, status, nodes, profile)
         figure, renderer = _solid(skin, title)
     _save(figure, path)
     return renderer
@@ -72,42 +69,37 @@ def finger_picture(
 
 def contact_figure(
     path: str | Path,
-    x: Float,
-    pressure: Float,
-    shear_x: Float,
-    status: ArrayLike,
+    table: Mapping[str, ArrayLike],
     mu: float,
-    z: Float | None = None,
-    shear_z: Float | None = None,
-    tolerance_mm: float | None = None,
+    band_mm: float | None = None,
+    half_width_mm: float | None = None,
     title: str = "",
 ) -> None:
     """Draw f_n, f_t and mu f_n along x with the zones that stick and slip, as in the paper's Fig. 4.
 
     Parameters
     ----------
-    x, z : (c,) mm; without z, or if it is the same everywhere, the points are those of a section
-    pressure, shear_x, shear_z : (c,) MPa; shear is friction on the finger
-    status : (c,) 0 open, 1 stick, 2 slip
+    table : columns of contact.csv, of which x_mm, z_mm, pressure_MPa, shear_x_MPa, shear_z_MPa and status are read
     mu : friction coefficient
-    tolerance_mm : how far from the lines z = 0 and z = max(z) a point may lie; default 0.4 of the points' distance
+    band_mm : how far from z = 0 a point may lie to count to that line; default 0.4 of the points' distance
+    half_width_mm : of a solid, whose line at the end z = half_width_mm is a second panel; None for a section
     """
-    x, pressure, shear_x, state = np.asarray(x), np.asarray(pressure), np.asarray(shear_x), np.asarray(status)
-    z = np.zeros_like(x) if z is None else np.asarray(z)
-    solid = bool(np.ptp(z) > 0.0)
-    tolerance = (0.4 * _spacing(x, z) if solid else 0.0) if tolerance_mm is None else tolerance_mm
-    lines = [(0.0, "in the middle, z = 0")] if solid else [(float(z[0]), "")]
-    if solid:
-        lines.append((float(z.max()), f"at the end, z = {z.max():g} mm"))
+    x, z, status = _column(table, "x_mm"), _column(table, "z_mm"), _status(table)
+    band = 0.4 * _spacing(x, z) if band_mm is None else band_mm
+    lines = [("", np.arange(len(x)))]
+    if half_width_mm is not None:
+        # Meshes place points exactly on the end, but on the line in the middle only if it is a symmetry plane.
+        end = np.flatnonzero(np.abs(z - half_width_mm) <= 1e-6 * half_width_mm)
+        lines = [("in the middle, z = 0", np.flatnonzero(np.abs(z) <= band))]
+        lines += [(f"at the end, z = {half_width_mm:g} mm", end)] if len(end) else []
+    fn, fx, fz = (_column(table, name) for name in ("pressure_MPa", "shear_x_MPa", "shear_z_MPa"))
     figure = _figure(9.0, 4.2 * len(lines))
     top: Axes | None = None
-    for row, (at, where) in enumerate(lines):
-        axes = figure.add_subplot(len(lines), 1, row + 1, sharex=top)
+    for row, (where, points) in enumerate(lines, start=1):
+        axes = figure.add_subplot(len(lines), 1, row, sharex=top)
         top = top or axes
-        chosen = np.flatnonzero(np.abs(z - at) <= tolerance)
-        chosen = chosen[np.argsort(x[chosen], kind="stable")]
-        across = None if shear_z is None or not solid else np.asarray(shear_z)[chosen]
-        _contact_line(axes, x[chosen], pressure[chosen], shear_x[chosen], across, state[chosen], mu)
+        on = points[np.argsort(x[points], kind="stable")]
+        _contact_line(axes, x[on], fn[on], fx[on], fz[on], status[on], mu)
         axes.set_title(where, fontsize=10, loc="left")
         axes.set_ylabel("traction on the finger (MPa)")
     axes.set_xlabel("x at rest (mm)")
@@ -116,27 +108,30 @@ def contact_figure(
     _save(figure, path)
 
 
-def force_figure(
-    path: str | Path,
-    depth: Sequence[float] | Float,
-    normal_force: Sequence[float] | Float,
-    friction_sum: Sequence[float] | Float,
-    contact_half_length: Sequence[float] | Float,
-    stick_half_length: Sequence[float] | Float,
-    title: str = "",
-) -> None:
-    """Draw forces (N) and the half lengths of contact and stick zone (mm) against depth (mm), a point a step."""
+def force_figure(path: str | Path, steps: Sequence[Mapping[str, Any]], title: str = "") -> None:
+    """Draw forces (N) and the half lengths of contact and stick zone (mm) against depth (mm), a point a step.
+
+    Parameters
+    ----------
+    steps : entries of summary.json's ``steps``
+    """
+    depth, normal, friction, contact, stick = (
+        [float(step[key]) for step in steps]
+        for key in (
+            "depth_mm", "normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm",
+        )
+    )  # fmt: skip
     figure = _figure(10.0, 4.2)
     left, right = figure.subplots(1, 2)
-    left.plot(depth, normal_force, "o-", color="#222222", ms=4, label="normal force")
-    left.plot(depth, friction_sum, "s-", color="#c0392b", ms=4, label="sum of |friction|")
+    left.plot(depth, normal, "o-", color="#222222", ms=4, label="normal force")
+    left.plot(depth, friction, "s-", color="#c0392b", ms=4, label="sum of |friction|")
     left.set_ylabel("force (N)")
-    right.plot(depth, contact_half_length, "o-", color="#555555", ms=4, label="contact")
-    right.plot(depth, stick_half_length, "s-", color=COLOURS[STICK], ms=4, label="stick")
+    right.plot(depth, contact, "o-", color="#555555", ms=4, label="contact")
+    right.plot(depth, stick, "s-", color=COLOURS[STICK], ms=4, label="stick")
     right.set_ylabel("half length along x, z = 0 (mm)")
     for axes in (left, right):
         axes.set_xlabel("depth (mm)")
-        axes.set_xlim(left=min(0.0, float(np.min(depth))))
+        axes.set_xlim(left=min(0.0, *depth))
         axes.set_ylim(bottom=0.0)
         _plain(axes)
         axes.legend(frameon=False, loc="upper left")
@@ -146,6 +141,15 @@ def force_figure(
 
 
 # --- shared -------------------------------------------------------------------------------------------------------
+
+
+def _column(table: Mapping[str, ArrayLike], name: str) -> Float:
+    return np.asarray(table[name], dtype=np.float64)
+
+
+def _status(table: Mapping[str, ArrayLike]) -> Int:
+    """Status (c,) as numbers, from names."""
+    return np.array([STATUS_NAMES.index(name) for name in np.asarray(table["status"]).tolist()], dtype=np.int64)
 
 
 def _figure(width: float, height: float, layout: Literal["constrained"] | None = "constrained") -> Figure:
@@ -180,7 +184,7 @@ def _spacing(x: Float, z: Float) -> float:
 def _patches(colours: dict[int, str], states: Sequence[int]) -> list[Any]:
     from matplotlib.patches import Patch
 
-    return [Patch(facecolor=colours[s], edgecolor="#888888", lw=0.5, label=_LABELS[s]) for s in states]
+    return [Patch(facecolor=colours[s], edgecolor="#888888", lw=0.5, label=STATUS_NAMES[s]) for s in states]
 
 
 def _two_panels(aspect: float, title: str, ticks: bool = False) -> tuple[Figure, list[Axes]]:
@@ -258,7 +262,7 @@ def zones(x: Float, status: Int) -> list[tuple[float, float, int]]:
     return [(float(a), float(b), int(status[i])) for a, b, i in zip(ends[:-1], ends[1:], first, strict=True)]
 
 
-def _contact_line(axes: Axes, x: Float, fn: Float, fx: Float, fz: Float | None, status: Int, mu: float) -> None:
+def _contact_line(axes: Axes, x: Float, fn: Float, fx: Float, fz: Float, status: Int, mu: float) -> None:
     from matplotlib.lines import Line2D
 
     for start, end, state in zones(x, status):
@@ -275,7 +279,7 @@ def _contact_line(axes: Axes, x: Float, fn: Float, fx: Float, fz: Float | None, 
         Line2D([], [], color="#c0392b", marker="o", ms=3, lw=1.2, label="fₜ along x"),
     ]
     shown = [fn, fx]
-    if fz is not None and np.any(fz):
+    if np.any(np.abs(fz) > 1e-6 * np.abs(fn).max(initial=0.0)):
         axes.plot(x, fz, ".:", color="#8e44ad", lw=1.0, ms=4)
         handles.append(Line2D([], [], color="#8e44ad", marker=".", ls=":", label="fₜ along z"))
         shown.append(fz)

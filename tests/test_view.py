@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from finger3d import render
-from finger3d.contact.law import OPEN, SLIP, STICK
+from finger3d.contact.law import OPEN, SLIP, STATUS_NAMES, STICK
 from finger3d.errors import MissingError
 from finger3d.mesh import Mesh, boundary, quadratic
 from finger3d.view import contact_figure, finger_picture, force_figure, zones
@@ -72,7 +72,15 @@ def pressed(mesh: Mesh) -> dict[str, Any]:
     limit = MU * pressure
     shear = wanted * np.minimum(1.0, limit / np.maximum(size, 1e-12))[:, None]
     status = np.where(~inside, OPEN, np.where(size < limit, STICK, SLIP))
-    return {"displacement": u, "pressure": pressure, "shear": shear, "status": status, "contact_nodes": nodes}
+    table = {
+        "x_mm": x[nodes],
+        "z_mm": mesh.points[nodes, 2] if mesh.dim == 3 else np.zeros(len(nodes)),
+        "pressure_MPa": pressure,
+        "shear_x_MPa": shear[:, 0],
+        "shear_z_MPa": shear[:, 1] if mesh.dim == 3 else np.zeros(len(nodes)),
+        "status": [STATUS_NAMES[s] for s in status],
+    }
+    return {"displacement": u, "table": table, "contact_nodes": nodes}
 
 
 def pixels(path: Path) -> np.ndarray:
@@ -179,18 +187,22 @@ def test_a_section_is_drawn_without_vtk(tmp_path: Path) -> None:
 def test_a_finger_that_does_not_touch_is_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, dim: int) -> None:
     monkeypatch.setenv("FINGER3D_RENDERER", "matplotlib")
     mesh = finger((10, 4, 3)[:dim])
-    result = {k: np.zeros_like(v) for k, v in pressed(mesh).items() if k != "contact_nodes"}
-    nodes = np.unique(mesh.facets["contact"][:, :dim])
-    finger_picture(tmp_path / "f.png", mesh, **result, contact_nodes=nodes)
+    result = pressed(mesh)
+    count = len(result["contact_nodes"])
+    none = {name: np.zeros(count) for name in ("pressure_MPa", "shear_x_MPa", "shear_z_MPa")}
+    table = {**result["table"], **none, "status": ["open"] * count}
+    finger_picture(tmp_path / "f.png", mesh, np.zeros_like(mesh.points), table, result["contact_nodes"])
     assert pixels(tmp_path / "f.png").std() > 0.05
     assert share(tmp_path / "f.png", render.COLOURS[STICK]) < 5e-3  # the legend's patch only
 
 
 def test_the_skin_is_the_whole_boundary_and_lies_on_the_curved_surface(solid: tuple[Mesh, dict[str, Any]]) -> None:
     mesh, result = solid
-    still = {**result, "displacement": np.zeros_like(mesh.points)}
-    order = ("displacement", "pressure", "shear", "status", "contact_nodes")
-    skin = render.skin_of(mesh, *(still[k] for k in order), None)
+    table = result["table"]
+    status = np.array([STATUS_NAMES.index(s) for s in table["status"]])
+    shear = np.column_stack([table["shear_x_MPa"], table["shear_z_MPa"]])
+    still = np.zeros_like(mesh.points)
+    skin = render.skin_of(mesh, still, table["pressure_MPa"], shear, status, result["contact_nodes"], None)
     assert len(skin.contact) == 6 * len(mesh.facets["contact"])
     assert len(skin.body) == sum(len(f) for k, f in mesh.facets.items() if k != "contact")
     assert np.abs(skin.contact[..., 1] - top(skin.contact[..., 0])).max() < 0.2  # sagitta of a facet 5 mm long
@@ -221,10 +233,8 @@ def test_zones_meet_between_points_of_different_status() -> None:
 @pytest.mark.parametrize("dim", [2, 3])
 def test_contact_forces_are_drawn_with_their_zones(tmp_path: Path, dim: int) -> None:
     mesh = finger((40, 4, 6)[:dim])
-    result = pressed(mesh)
-    at, shear = mesh.points[result["contact_nodes"]], result["shear"]
-    across = {"z": at[:, 2], "shear_z": shear[:, 1]} if dim == 3 else {}
-    contact_figure(tmp_path / "c.png", at[:, 0], result["pressure"], shear[:, 0], result["status"], MU, **across)
+    half_width = 10.0 if dim == 3 else None
+    contact_figure(tmp_path / "c.png", pressed(mesh)["table"], MU, half_width_mm=half_width)
     assert share(tmp_path / "c.png", "#c9d9ee", within=0.02) > 0.05
     assert share(tmp_path / "c.png", "#fde3c4", within=0.02) > 0.05
     # The end line z = width/2 is a second panel below the middle one.
@@ -234,11 +244,9 @@ def test_contact_forces_are_drawn_with_their_zones(tmp_path: Path, dim: int) -> 
 
 def test_a_huge_mu_does_not_flatten_the_contact_forces(tmp_path: Path) -> None:
     mesh = finger((40, 4))
-    result = pressed(mesh)
-    rows = (mesh.points[result["contact_nodes"], 0], result["pressure"], result["shear"][:, 0])
     pictures = []
     for mu in (2.0, 1e6):
-        contact_figure(tmp_path / f"{mu}.png", *rows, result["status"], mu)
+        contact_figure(tmp_path / f"{mu}.png", pressed(mesh)["table"], mu)
         pictures.append(pixels(tmp_path / f"{mu}.png"))
     # The red curve of f_t is as tall in both.
     tall = [
@@ -249,9 +257,18 @@ def test_a_huge_mu_does_not_flatten_the_contact_forces(tmp_path: Path) -> None:
 
 
 def test_force_against_depth_is_drawn(tmp_path: Path) -> None:
-    depth = np.arange(1.0, 11.0)
-    force_figure(
-        tmp_path / "f.png", depth, 3.0 * depth**1.3, 0.5 * depth**1.3, 7.0 * depth**0.7, 5.0 * depth**0.7, "Fig. 9"
-    )
+    force_figure(tmp_path / "f.png", STEPS, "Fig. 9")
     assert share(tmp_path / "f.png", "#c0392b", within=0.05) > 1e-4
     assert share(tmp_path / "f.png", render.COLOURS[STICK], within=0.05) > 1e-4
+
+
+STEPS = [
+    {
+        "depth_mm": d,
+        "normal_force_N": 15.0 * d**1.3,
+        "friction_sum_N": 3.0 * d**1.3,
+        "contact_half_length_mm": 7.0 * d**0.7,
+        "stick_half_length_mm": 5.0 * d**0.7,
+    }
+    for d in range(1, 11)
+]
