@@ -9,9 +9,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.contact.conditions import TOLERANCE, Increments, project, residual, stiffness_weights
+from finger3d.contact.conditions import TOLERANCE, Increments, residual, stiffness_weights
 from finger3d.contact.law import OPEN
-from finger3d.contact.newton import Iterate, newton, sweeps
+from finger3d.contact.lemke import friction_start
+from finger3d.contact.newton import Iterate, force_of_sets, newton, sweeps
 from finger3d.contact.state import ContactState, Increment
 from finger3d.errors import Outcome
 
@@ -56,12 +57,13 @@ def advance(previous: ContactState, free: Float, compliance: Float, law: Law, le
     start = previous.force
     total, worst = 0, np.inf
     while True:
-        problem = Increments(change, matrix, mu, rho)
+        problem = Increments(change, matrix, mu, rho, length_scale)
         for method, attempt in _ladder(problem, start):
             total += attempt.iterations
             if not attempt.solved:
                 continue
-            force, moved, status = _settled(problem, attempt.force)
+            force, status = attempt.force, attempt.status
+            moved = problem.moved(force)
             error = residual(force, moved, status, mu, length_scale)
             if error <= TOLERANCE:
                 break
@@ -88,6 +90,7 @@ def _ladder(problem: Increments, start: Float) -> Iterator[tuple[str, Iterate]]:
     yield "newton", newton(problem, start, 30, damped=False)
     yield "damped", newton(problem, start, 60, damped=True)
     yield "ramp", _ramp(problem, start)
+    yield "pivots", _pivots(problem, start)
     force, spent = start, 0
     for count in (20, 50, 100, 200, 400, 800):
         force = sweeps(problem, force, count)
@@ -96,12 +99,31 @@ def _ladder(problem: Increments, start: Float) -> Iterator[tuple[str, Iterate]]:
         yield "sweeps", replace(attempt, iterations=attempt.iterations + spent)
 
 
+def _pivots(problem: Increments, start: Float) -> Iterate:
+    """Newton from the sets that Lemke's method finds; points it lets through the object join, and it is asked again."""
+    inside = (problem.free[:, 0] < 0.0) | (start[:, 0] > 0.0)
+    spent = 0
+    for _ in range(5):
+        found = friction_start(problem, np.flatnonzero(inside))
+        if found is None:
+            break
+        status, direction = found
+        force = force_of_sets(problem, status, np.hstack([np.zeros((len(status), 1)), direction]))
+        attempt = newton(problem, force, 30, damped=True)
+        spent += attempt.iterations
+        beyond = ~inside & (problem.moved(force)[:, 0] < 0.0)
+        if attempt.solved or not beyond.any():
+            return replace(attempt, iterations=spent)
+        inside |= beyond
+    return Iterate(start, np.zeros(len(start), dtype=np.int8), False, spent)
+
+
 def _ramp(problem: Increments, start: Float) -> Iterate:
     """Follow the solution from no friction to the coefficient asked for, halving the stride where it breaks."""
     attempt = newton(replace(problem, mu=np.zeros_like(problem.mu)), start, 60, damped=True)
     spent = attempt.iterations
     reached, stride = 0.0, 0.25
-    force = attempt.force
+    force, status = attempt.force, attempt.status
     # beyond mu ~ 5 nothing changes but full stick, so the share runs over a saturating scale
     while attempt.solved and reached < 1.0 and stride > 1e-3:
         share = min(reached + stride, 1.0)
@@ -109,16 +131,10 @@ def _ramp(problem: Increments, start: Float) -> Iterate:
         trial = newton(replace(problem, mu=mu), force, 40, damped=True)
         spent += trial.iterations
         if trial.solved:
-            force, reached, stride = trial.force, share, stride * 1.5
+            force, status, reached, stride = trial.force, trial.status, share, stride * 1.5
         else:
             stride *= 0.5
-    return Iterate(force, reached >= 1.0, spent)
-
-
-def _settled(problem: Increments, force: Float) -> tuple[Float, Float, NDArray[np.int8]]:
-    """Forces put exactly on their cones, what they move, and the states that follow."""
-    projected, status, _ = project(problem, force, problem.moved(force))
-    return projected, problem.moved(projected), status
+    return Iterate(force, status, reached >= 1.0, spent)
 
 
 def _next_state(previous: ContactState, force: Float, moved: Float, status: NDArray[np.int8]) -> ContactState:

@@ -31,12 +31,15 @@ class Increments:
     mu : (c,)
     rho : (c, d) N/mm
         Stiffness that weighs a violated gap or slip against a force: 1 / diagonal of the compliance, tangents alike.
+    length_scale : mm
+        What a violated gap or slip is measured by.
     """
 
     free: Float
     compliance: Float
     mu: Float
     rho: Float
+    length_scale: float
 
     def moved(self, force: Float) -> Float:
         """Gap and change of position (c, d) mm under forces (c, d) N."""
@@ -84,6 +87,8 @@ def residual(force: Float, moved: Float, status: NDArray[np.int8], mu: Float, le
     """
     if not len(force):
         return 0.0
+    if not np.isfinite(force).all():
+        return float("inf")
     force_scale = float(np.linalg.norm(force, axis=1).max()) or 1.0
     normal, friction = force[:, 0], force[:, 1:]
     gap, slip = moved[:, 0], moved[:, 1:]

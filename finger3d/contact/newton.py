@@ -7,27 +7,31 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.contact.conditions import Increments, project
+from finger3d.contact.conditions import Increments, project, residual
 from finger3d.contact.law import SLIP
 
 Float = NDArray[np.float64]
 
-_EXACT = 1e-13
-"""Residual force, relative to the largest trial force, at which an iterate is a solution."""
+_EXACT = 1e-11
+"""Residual of the conditions themselves at which an iterate is a solution; the projection's own residual would not do,
+since a gap's round-off enters its bound times mu."""
 
 
 @dataclass(frozen=True)
 class Iterate:
-    """Forces (c, d) N after some iterations, whether they solve the projection, and if a set of states came back."""
+    """Forces (c, d) N after some iterations with the sets (c,) they belong to, and whether they are a solution."""
 
     force: Float
+    status: NDArray[np.int8]
     solved: bool
     iterations: int
-    repeated: bool = False
 
 
-def _newton_force(problem: Increments, status: NDArray[np.int8], trial: Float) -> Float:
-    """Forces (c, d) that solve the equations of the sets, slip rows with the normal force unknown."""
+def force_of_sets(problem: Increments, status: NDArray[np.int8], trial: Float) -> Float:
+    """Forces (c, d) that solve the equations of the sets, slip rows with the normal force unknown.
+
+    `trial` (c, d) gives slipping points their direction, and how firmly it is held (see `project`).
+    """
     c, d = trial.shape
     active = np.flatnonzero(status)
     force = np.zeros((c, d))
@@ -68,39 +72,40 @@ def _slip_rows(
 
 
 def newton(problem: Increments, start: Float, limit: int, damped: bool) -> Iterate:
-    """Semismooth Newton from forces `start` (c, d) N; full steps, or with a backtracking search on the residual force."""
+    """Semismooth Newton from forces `start` (c, d) N; full steps, or with a backtracking search on the residual force.
+
+    A set of states that comes back with the same residual ends the full-step variant: it would cycle from there.
+    """
     force = start
-    moved = problem.moved(force)
-    projected, status, trial = project(problem, force, moved)
+    projected, status, trial = project(problem, force, problem.moved(force))
     merit = float(np.linalg.norm(force - projected))
     seen: dict[bytes, float] = {}
-    repeated = False
+    iteration = 0
     for iteration in range(1, limit + 1):
-        key = status.tobytes()
-        if seen.get(key) == merit:
-            repeated = True
+        if seen.get(status.tobytes()) == merit:
             break
-        seen[key] = merit
+        seen[status.tobytes()] = merit
         try:
-            target = _newton_force(problem, status, trial)
+            target = force_of_sets(problem, status, trial)
         except np.linalg.LinAlgError:
-            return Iterate(force, False, iteration)
+            break
+        moved = problem.moved(target)
+        if residual(target, moved, status, problem.mu, problem.length_scale) <= _EXACT:
+            return Iterate(target, status, True, iteration)
         share = 1.0
+        candidate = target
         while True:
-            candidate = force + share * (target - force)
-            moved = problem.moved(candidate)
             projected, next_status, next_trial = project(problem, candidate, moved)
             next_merit = float(np.linalg.norm(candidate - projected))
             if not damped or next_merit <= (1.0 - 1e-4 * share) * merit or share < 1e-3:
                 break
             share *= 0.5
+            candidate = force + share * (target - force)
+            moved = problem.moved(candidate)
+        if not np.isfinite(next_merit):
+            break
         force, status, trial, merit = candidate, next_status, next_trial, next_merit
-        scale = max(float(np.abs(trial).max()), float(np.abs(force).max()))
-        if not np.isfinite(merit):
-            return Iterate(start, False, iteration)
-        if merit <= _EXACT * max(scale, 1e-300) * np.sqrt(len(force)):
-            return Iterate(projected, True, iteration)
-    return Iterate(force, False, limit if not repeated else iteration, repeated)
+    return Iterate(force, status, False, iteration)
 
 
 def sweeps(problem: Increments, start: Float, count: int) -> Float:

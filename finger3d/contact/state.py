@@ -56,7 +56,7 @@ class Increment:
     iterations : int
         Linear solves, all attempts together.
     method : str
-        Which member of the ladder settled it: newton, damped, ramp, sweeps; or paper.
+        Which member of the ladder settled it: newton, damped, ramp, pivots, sweeps; or paper.
     """
 
     state: ContactState
