@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
 import sys
 import types
 from collections.abc import Callable
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from finger3d.mesh import Mesh
 __all__ = ["MeshReport", "designs", "mesh_section", "mesh_solid"]
 
 
-@cache
+@functools.cache
 def designs() -> dict[str, type]:
     """Designs by name: one file each in geometries/, beside the package in a checkout, inside it in a wheel."""
     package = Path(__file__).resolve().parents[1]
