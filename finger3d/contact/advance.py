@@ -100,21 +100,33 @@ def _ladder(problem: Increments, start: Float) -> Iterator[tuple[str, Iterate]]:
 
 
 def _pivots(problem: Increments, start: Float) -> Iterate:
-    """Newton from the sets that Lemke's method finds; points it lets through the object join, and it is asked again."""
-    inside = (problem.free[:, 0] < 0.0) | (start[:, 0] > 0.0)
+    """Newton from the sets that Lemke's method finds; points it lets through the object join, and it is asked again.
+
+    A coefficient of 1e6 can cost the pivots their digits; the sets under a smaller one are then the same.
+    """
     spent = 0
-    for _ in range(5):
-        found = friction_start(problem, np.flatnonzero(inside))
-        if found is None:
-            break
-        status, direction = found
-        force = force_of_sets(problem, status, np.hstack([np.zeros((len(status), 1)), direction]))
-        attempt = newton(problem, force, 30, damped=True)
-        spent += attempt.iterations
-        beyond = ~inside & (problem.moved(force)[:, 0] < 0.0)
-        if attempt.solved or not beyond.any():
-            return replace(attempt, iterations=spent)
-        inside |= beyond
+    for cap in (np.inf, 1e4, 1e3, 1e2):
+        if np.isfinite(cap) and problem.mu.max(initial=0.0) <= cap:
+            continue
+        capped = replace(problem, mu=np.minimum(problem.mu, cap))
+        inside = (problem.free[:, 0] < 0.0) | (start[:, 0] > 0.0)
+        for _ in range(5):
+            found = friction_start(capped, np.flatnonzero(inside))
+            if found is None:
+                break
+            status, direction = found
+            try:
+                force = force_of_sets(problem, status, np.hstack([np.zeros((len(status), 1)), direction]))
+            except np.linalg.LinAlgError:
+                break
+            attempt = newton(problem, force, 30, damped=True)
+            spent += attempt.iterations
+            if attempt.solved:
+                return replace(attempt, iterations=spent)
+            beyond = ~inside & (problem.moved(force)[:, 0] < 0.0)
+            if not beyond.any():
+                break
+            inside |= beyond
     return Iterate(start, np.zeros(len(start), dtype=np.int8), False, spent)
 
 

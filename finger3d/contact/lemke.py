@@ -17,8 +17,7 @@ from finger3d.contact.law import OPEN, SLIP, STICK
 Float = NDArray[np.float64]
 
 _PIVOT = 1e-11
-_CAP = 100.0
-LARGEST = 3000
+LARGEST = 2000
 """Rows beyond which the tableau costs more than cutting the step."""
 
 
@@ -67,10 +66,7 @@ def lemke(matrix: Float, q: Float, limit: int) -> Float | None:
 
 
 def friction_start(problem: Increments, points: NDArray[np.int64]) -> tuple[NDArray[np.int8], Float] | None:
-    """States (c,) and slip directions (c, d - 1) of the polygonal problem over `points`; None if none was found.
-
-    Coefficients are capped at `_CAP`: beyond it the sets no longer change, but the pivots lose their digits.
-    """
+    """States (c,) and slip directions (c, d - 1) of the polygonal problem over `points`; None if none was found."""
     c, d = problem.free.shape
     span = directions(d - 1)
     k, p = len(span), len(points)
@@ -80,7 +76,6 @@ def friction_start(problem: Increments, points: NDArray[np.int64]) -> tuple[NDAr
     stiff = 1.0 / np.diagonal(problem.compliance)[dof].mean()
     block = (problem.compliance[np.ix_(dof, dof)] * stiff).reshape(p, d, p, d)
     free = problem.free[points] / max(float(np.abs(problem.free[points]).max()), 1e-300)
-    mu = np.minimum(problem.mu[points], _CAP)
     m = p * (k + 2)
     matrix = np.zeros((m, m))
     n, b, lam = slice(0, p), slice(p, p + p * k), slice(p + p * k, m)
@@ -90,7 +85,7 @@ def friction_start(problem: Increments, points: NDArray[np.int64]) -> tuple[NDAr
     matrix[b, b] = np.einsum("kt,itju,lu->ikjl", span, block[:, 1:, :, 1:], span).reshape(p * k, p * k)
     choose = np.kron(np.eye(p), np.ones((k, 1)))
     matrix[b, lam] = choose
-    matrix[lam, n] = np.diag(mu)
+    matrix[lam, n] = np.diag(problem.mu[points])
     matrix[lam, b] = -choose.T
     q = np.concatenate([free[:, 0], (free[:, 1:] @ span.T).ravel(), np.zeros(p)])
     z = lemke(matrix, q, 20 * m)
