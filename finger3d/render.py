@@ -40,6 +40,8 @@ _TIME_LIMIT_S = 180.0
 _SIX = np.array([[0, 3, 6], [3, 1, 6], [1, 4, 6], [4, 2, 6], [2, 5, 6], [5, 0, 6]])
 _OWNER = np.array([0, 1, 1, 2, 2, 0])
 _RING = np.array([0, 3, 1, 4, 2, 5])
+_FOUR = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
+_SIDES = np.array([[0, 3, 1], [1, 4, 2], [2, 5, 0]])
 
 
 def _viewer_axes() -> Float:
@@ -59,13 +61,13 @@ class Skin:
 
     Attributes
     ----------
-    body : (b, 6, 3) facets without contact points, as rings of nodes
+    body : (b, 6, 3) facets that are not part of the contact surface, VTK's order of nodes
     contact : (t, 3, 3) triangles of the contact surface
     pressure : (t, 3) MPa at their corners
     status : (t,) of the contact point each belongs to
-    lines : (k, 3, 3) edges of facets of the contact surface, end, middle, end
-    features : (k, 3, 3) edges between faces of the body, deformed
-    rest : (k, 3, 3) the same at rest
+    lines : (k, 3, 3) edges of all facets: end, middle, end
+    features : (k, 3, 3) edges between faces of the body
+    rest : (k, 3, 3) edges of the contact surface, at rest
     outline : (o, 3) closed line around the object's surface, or none
     arrow_at, arrow, arrow_status : (a, 3), (a, 3), (a,) friction on the finger at some contact points; the longest
         has length 1
@@ -120,16 +122,17 @@ def skin_of(
     centre = (4.0 * rings[:, 3:].sum(axis=1) - rings[:, :3].sum(axis=1)) / 9.0
     points = np.concatenate([rings, centre[:, None]], axis=1)
 
-    features = _feature_edges([arc, *others])
+    body = np.concatenate([_six_nodes(f, moved) for f in others]) if others else np.zeros((0, 6, 3))
+    features = np.concatenate([_edge_points(_rim(f), moved) for f in (arc, *others)])
     chosen, arrow, largest = _arrows(moved[nodes], shear, status)
     return Skin(
-        body=np.concatenate([_six_nodes(f, moved) for f in others]) if others else np.zeros((0, 6, 3)),
+        body=body,
         contact=points[:, _SIX].reshape(-1, 3, 3),
         pressure=seven[:, _SIX].reshape(-1, 3),
         status=state[arc[:, _OWNER]].ravel(),
-        lines=rings[:, [[0, 3, 1], [1, 4, 2], [2, 5, 0]]].reshape(-1, 3, 3),
-        features=_edge_points(features, moved),
-        rest=_edge_points(features, mesh.points),
+        lines=np.concatenate([rings, body])[:, _SIDES].reshape(-1, 3, 3),
+        features=features,
+        rest=_edge_points(_rim(arc), mesh.points),
         outline=_outline(profile, moved),
         arrow_at=moved[nodes[chosen]],
         arrow=arrow,
@@ -146,15 +149,12 @@ def _six_nodes(facets: Int, points: Float) -> Float:
     return np.concatenate([corners, 0.5 * (corners + np.roll(corners, -1, axis=1))], axis=1)
 
 
-def _feature_edges(faces: list[Int]) -> Int:
-    """Edges (k, 2 or 3) on the rim of any face of the body."""
-    rims = []
-    for facets in faces:
-        ends = facets[:, EDGES[2]].reshape(-1, 2)
-        middles = facets[:, 3:].reshape(len(ends), -1)
-        _, first, count = np.unique(np.sort(ends, axis=1), axis=0, return_index=True, return_counts=True)
-        rims.append(np.hstack([ends, middles])[first[count == 1]])
-    return np.concatenate(rims)
+def _rim(facets: Int) -> Int:
+    """Edges (k, 2 or 3) that belong to one of these facets only."""
+    ends = facets[:, EDGES[2]].reshape(-1, 2)
+    middles = facets[:, 3:].reshape(len(ends), -1)
+    _, first, count = np.unique(np.sort(ends, axis=1), axis=0, return_index=True, return_counts=True)
+    return np.hstack([ends, middles])[first[count == 1]]
 
 
 def _edge_points(edges: Int, points: Float) -> Float:
@@ -322,8 +322,7 @@ def _add_body(plotter: Any, skin: Skin) -> Any:
     """Add all but the arrows; returns the contact surface, whose array "colour" may be changed."""
     shine = {"ambient": 0.25, "diffuse": 0.8, "specular": 0.1}
     if len(skin.body):
-        body = _poly(skin.body[:, _RING], lines=False)
-        plotter.add_mesh(body, color=BODY, show_edges=True, edge_color=LINE, line_width=1, **shine)
+        plotter.add_mesh(_poly(skin.body[:, _FOUR].reshape(-1, 3, 3), lines=False), color=BODY, **shine)
     contact = _poly(skin.contact, lines=False)
     contact["colour"] = np.zeros((contact.n_points, 3), dtype=np.uint8)
     plotter.add_mesh(contact, scalars="colour", rgb=True, **shine)

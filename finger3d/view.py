@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -81,16 +81,17 @@ def contact_figure(
     ----------
     table : columns of contact.csv, of which x_mm, z_mm, pressure_MPa, shear_x_MPa, shear_z_MPa and status are read
     mu : friction coefficient
-    band_mm : how far from z = 0 a point may lie to count to that line; default 0.4 of the points' distance
+    band_mm : how far from z = 0 a point may lie if none are on that line; default 0.4 of the points' distance
     half_width_mm : of a solid, whose line at the end z = half_width_mm is a second panel; None for a section
     """
     x, z, status = _column(table, "x_mm"), _column(table, "z_mm"), _status(table)
-    band = 0.4 * _spacing(x, z) if band_mm is None else band_mm
     lines = [("", np.arange(len(x)))]
     if half_width_mm is not None:
-        # Meshes place points exactly on the end, but on the line in the middle only if it is a symmetry plane.
-        end = np.flatnonzero(np.abs(z - half_width_mm) <= 1e-6 * half_width_mm)
-        lines = [("in the middle, z = 0", np.flatnonzero(np.abs(z) <= band))]
+        band = 0.4 * _spacing(x, z) if band_mm is None else band_mm
+        # A mesh has points exactly on the end, and on the middle if that is a symmetry plane; else those near it serve.
+        exact = 1e-6 * half_width_mm
+        middle, end = np.flatnonzero(np.abs(z) <= exact), np.flatnonzero(np.abs(z - half_width_mm) <= exact)
+        lines = [("in the middle, z = 0", middle if len(middle) >= 5 else np.flatnonzero(np.abs(z) <= band))]
         lines += [(f"at the end, z = {half_width_mm:g} mm", end)] if len(end) else []
     fn, fx, fz = (_column(table, name) for name in ("pressure_MPa", "shear_x_MPa", "shear_z_MPa"))
     figure = _figure(9.0, 4.2 * len(lines))
@@ -103,8 +104,7 @@ def contact_figure(
         axes.set_title(where, fontsize=10, loc="left")
         axes.set_ylabel("traction on the finger (MPa)")
     axes.set_xlabel("x at rest (mm)")
-    if title:
-        figure.suptitle(title, fontsize=12)
+    _frame(figure, (0.9, 1.9, 0.55, 0.35), title)
     _save(figure, path)
 
 
@@ -135,8 +135,7 @@ def force_figure(path: str | Path, steps: Sequence[Mapping[str, Any]], title: st
         axes.set_ylim(bottom=0.0)
         _plain(axes)
         axes.legend(frameon=False, loc="upper left")
-    if title:
-        figure.suptitle(title, fontsize=12)
+    _frame(figure, (0.7, 0.15, 0.55, 0.15), title)
     _save(figure, path)
 
 
@@ -152,14 +151,24 @@ def _status(table: Mapping[str, ArrayLike]) -> Int:
     return np.array([STATUS_NAMES.index(name) for name in np.asarray(table["status"]).tolist()], dtype=np.int64)
 
 
-def _figure(width: float, height: float, layout: Literal["constrained"] | None = "constrained") -> Figure:
+def _figure(width: float, height: float) -> Figure:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     # No pyplot: it keeps state, and looks for a display.
-    figure = Figure(figsize=(width, height), layout=layout)
+    figure = Figure(figsize=(width, height))
     FigureCanvasAgg(figure)
     return figure
+
+
+def _frame(figure: Figure, inches: tuple[float, float, float, float], title: str) -> None:
+    """Margins left, right, below, above, in inches; matplotlib's own layout engines take as long as the drawing."""
+    left, right, below, above = inches
+    width, height = figure.get_size_inches()
+    above += 0.3 if title else 0.0
+    figure.subplots_adjust(left / width, below / height, 1.0 - right / width, 1.0 - above / height)
+    if title:
+        figure.suptitle(title, fontsize=12, y=1.0 - 0.08 / height, va="top")
 
 
 def _save(figure: Figure, path: str | Path) -> None:
@@ -192,7 +201,7 @@ def _two_panels(aspect: float, title: str, ticks: bool = False) -> tuple[Figure,
     width, panel, below = 14.0, 6.2 if ticks else 6.5, 1.4 if ticks else 0.95
     above = 0.85 if title else 0.45
     high = panel * aspect
-    figure = _figure(width, below + high + above, layout=None)
+    figure = _figure(width, below + high + above)
     total = below + high + above
     panels = []
     for left, name in ((width / 2 - panel - 0.1, "contact pressure"), (width - panel - 0.1, "stick and slip")):

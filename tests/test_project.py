@@ -1,0 +1,159 @@
+"""The repository around the code: what is shipped, pinned, promised and held apart."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+
+HEAVY = {
+    "build123d",
+    "OCP",
+    "pyvista",
+    "vtk",
+    "vtkmodules",
+    "pytetwild",
+    "matplotlib",
+    "trimesh",
+    "dask",
+    "distributed",
+}
+TOP_LEVEL = {
+    "pyproject.toml", "finger3d", "geometries", "tests", "validation", "README.md", "LICENSE", "CITATION.cff",
+    "Makefile", "CHANGELOG.md", "CONTRIBUTING.md", "constraints.txt",
+}  # fmt: skip
+
+
+def sources(root: Path) -> list[Path]:
+    """Python files of the package and the designs."""
+    return [p for folder in ("finger3d", "geometries") for p in (root / folder).rglob("*.py")]
+
+
+def project(root: Path) -> dict:
+    return tomllib.loads((root / "pyproject.toml").read_text())["project"]
+
+
+def name_of(requirement: str) -> str:
+    """Name of a requirement as PyPI compares names."""
+    return re.sub(r"[-_.]+", "-", re.match(r"[\w.-]+", requirement)[0]).lower()
+
+
+@pytest.fixture(scope="module")
+def wheel(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("wheel")
+    command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
+    subprocess.run(command, cwd=root, check=True, capture_output=True)
+    (built,) = folder.glob("*.whl")
+    return built
+
+
+def test_the_wheel_carries_the_designs_and_nothing_by_accident(root: Path, wheel: Path) -> None:
+    names = zipfile.ZipFile(wheel).namelist()
+    for source in sources(root):
+        inside = source.relative_to(root).as_posix()
+        assert (f"finger3d/{inside}" if inside.startswith("geometries/") else inside) in names
+    assert "finger3d/geometries/fig9.toml" in names
+    assert {name.split("/")[0] for name in names} == {"finger3d", f"finger3d-{project(root)['version']}.dist-info"}
+    assert not [name for name in names if "__pycache__" in name]
+
+
+def test_the_wheel_works_from_any_folder(wheel: Path, tmp_path: Path) -> None:
+    zipfile.ZipFile(wheel).extractall(tmp_path / "site")
+    # -I and an own path: neither the checkout nor its editable install can be what is found.
+    code = (
+        f"import sys; sys.path[:0] = [{str(tmp_path / 'site')!r}]; import finger3d; print(finger3d.__file__);"
+        "print(*sorted(finger3d.designs()))"
+    )
+    done = subprocess.run([sys.executable, "-I", "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
+    file, designs = done.stdout.splitlines()
+    assert Path(file) == tmp_path / "site" / "finger3d" / "__init__.py"
+    assert {"half_cylinder", "clipped_cylinder", "block"} <= set(designs.split())
+
+
+def test_every_dependency_is_pinned(root: Path) -> None:
+    lines = [x for x in (root / "constraints.txt").read_text().splitlines() if x and not x.startswith("#")]
+    assert all(re.fullmatch(r"[a-z0-9-]+==[\w.+]+", line) for line in lines)
+    pinned = {line.split("==")[0] for line in lines}
+    wanted = project(root)["dependencies"] + project(root)["optional-dependencies"]["dev"]
+    assert {name_of(r) for r in wanted} <= pinned
+    assert "cadquery" not in pinned  # its OCP wheel clashes with VTK
+
+
+def test_versions_agree(root: Path) -> None:
+    version = project(root)["version"]
+    assert f"\nversion: {version}\n" in (root / "CITATION.cff").read_text()
+    assert f"## {version}" in (root / "CHANGELOG.md").read_text()
+
+
+def test_the_readmes_first_screen_has_a_sentence_the_picture_and_the_two_commands(root: Path) -> None:
+    first_screen = "\n".join((root / "README.md").read_text().splitlines()[:20])
+    assert "](validation/figures/fig9.png)" in first_screen
+    targets = re.findall(r"^make (\w+)", first_screen, flags=re.MULTILINE)
+    assert targets == ["demo", "test"]
+    makefile = (root / "Makefile").read_text()
+    assert all(re.search(rf"^{target}: install$", makefile, flags=re.MULTILINE) for target in targets)
+
+
+def test_what_the_readme_shows_of_the_command_line_exists(root: Path) -> None:
+    readme = (root / "README.md").read_text()
+    shown = set(re.findall(r"^finger3d (\w+)", readme, flags=re.MULTILINE))
+    assert {"new", "plan", "press", "info"} <= shown
+    done = subprocess.run(
+        [sys.executable, "-m", "finger3d", "--help"], cwd=root, capture_output=True, text=True, check=True
+    )
+    assert all(re.search(rf"\b{command}\b", done.stdout) for command in shown)
+
+
+def test_local_links_lead_somewhere(root: Path) -> None:
+    for page in ("README.md", "CONTRIBUTING.md"):
+        for target in re.findall(r"\]\((?!https?://)([^)#]+)\)", (root / page).read_text()):
+            assert (root / target).exists(), f"{page} links to {target}"
+
+
+def test_the_demo_scene_is_the_papers_finger(root: Path) -> None:
+    scene = tomllib.loads((root / "geometries" / "fig9.toml").read_text())
+    finger = {"radius_mm": 100.0, "half_length_mm": 50.0, "edge_height_mm": 36.6, "width_mm": 20.0}
+    assert scene["finger"] == {"geometry": "clipped_cylinder", **finger}
+    assert (scene["material"]["nu"], scene["friction"]["mu"]) == (0.49, 0.25)
+    assert scene["press"] == {"depth_mm": 10.0, "steps": 10}
+
+
+def test_heavy_packages_are_imported_inside_functions(root: Path) -> None:
+    found = []
+    for path in sources(root):
+        for node in ast.parse(path.read_text()).body:
+            names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or ""] if isinstance(node, ast.ImportFrom) and node.level == 0 else []
+            found += [f"{path.name}: {n}" for n in names if n.split(".")[0] in HEAVY]
+    assert found == []
+
+
+def test_the_floors_name_every_module(root: Path) -> None:
+    contracts = tomllib.loads((root / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
+    (floors,) = (c for c in contracts if c["type"] == "layers")
+    assert floors["exhaustive"] is True
+    assert floors["containers"] == ["finger3d"]
+
+
+def test_the_top_level_is_the_agreed_one(root: Path) -> None:
+    tracked = subprocess.run(["git", "ls-files"], cwd=root, capture_output=True, text=True, check=True).stdout
+    top = {line.split("/")[0] for line in tracked.splitlines()}
+    assert {name for name in top if not name.startswith(".")} <= TOP_LEVEL
+
+
+def test_code_stays_short(root: Path) -> None:
+    long = []
+    for path in sources(root):
+        text = path.read_text()
+        if text.count("\n") > 400:
+            long.append(path.name)
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, ast.FunctionDef) and node.end_lineno - node.lineno >= 80:
+                long.append(f"{path.name}: {node.name}")
+    assert long == []
