@@ -27,9 +27,12 @@ class Outcome(Enum):
     CYCLED = (
         "the paper's swap rule repeated a state and has no answer for this increment; use [contact] rule = 'projection'"
     )
+    WRONG_WAY = (
+        "Eqs. (1)-(4) hold, but friction helps slip at some points, which the paper's rule does not exclude; "
+        "use [contact] rule = 'projection'"
+    )
     INDEFINITE = "the compliance is not positive: the body is not held; fix its base, or check the mesh"
     NOT_FINITE = "the compliance or the gap contains NaN or infinity; check the mesh and the material"
-    OUTSIDE = "the surface touches the object outside the candidate contact points; make the press shallower"
 
     @property
     def ok(self) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from finger3d.contact.law import Coulomb
+from finger3d.contact.law import Coulomb, FrictionLaw
 from finger3d.objects import Plane, RigidObject
 
 Domain = Literal["solid", "plane-strain", "plane-stress"]
@@ -61,6 +61,8 @@ class Model:
     domain : solid, or a 2D section; forces are always N, for the design's width
     held_ends : both end faces held in z (plane strain realised in 3D; Python only)
     symmetry : planes used, "x" and "z"; None finds them
+    filled : (slot, effect) of the slots that an effect has set
+    warnings : for the summary
     """
 
     design: Any
@@ -68,9 +70,11 @@ class Model:
     mesh: MeshOptions
     legs: tuple[Leg, ...]
     object: RigidObject = field(default_factory=Plane)
-    friction: Coulomb = field(default_factory=Coulomb)
+    friction: FrictionLaw = field(default_factory=Coulomb)
     gauges: tuple[Gauge, ...] = ()
     domain: Domain = "solid"
     rule: Literal["projection", "paper"] = "projection"
     held_ends: bool = False
     symmetry: tuple[str, ...] | None = None
+    filled: tuple[tuple[str, str], ...] = ()
+    warnings: tuple[str, ...] = ()

@@ -23,8 +23,15 @@ _ZOOMS = 6
 class RigidObject(Protocol):
     """What the contact problem asks of an object."""
 
-    x_mm: float
-    z_mm: float
+    @property
+    def x_mm(self) -> float:
+        """Place of the lowest point along x, mm."""
+        ...
+
+    @property
+    def z_mm(self) -> float:
+        """Place of the lowest point along z, mm."""
+        ...
 
     def height(self, x: Float, z: Float) -> Float:
         """Height (n,) mm of the surface above its lowest point, at x (n,), z (n,) mm."""

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-import os
 import time
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,13 +14,15 @@ from finger3d.errors import Outcome
 from finger3d.export import atomic, write_csv, write_json, write_vtu
 from finger3d.history import Frame, History, contact_table, measure
 from finger3d.report import Report
+from finger3d.versions import versions
 
 if TYPE_CHECKING:
     from finger3d.scene import Scene
+    from finger3d.increments import StepEstimate
     from finger3d.solve import Problem
 
-_SHAPING = ("numpy", "scipy", "pypardiso", "mkl", "build123d", "cadquery-ocp-novtk", "pytetwild")
 _WRITE_EVERY_S = 0.5
+_INCOMPLETE = "incomplete: the press was still running, or was interrupted; the steps written are good"
 
 
 @dataclass(frozen=True)
@@ -39,19 +39,6 @@ class PressResult:
         return self.history.outcome
 
 
-def versions() -> dict[str, str]:
-    """Versions of finger3d and of every installed package that shapes the numbers."""
-    from importlib.metadata import PackageNotFoundError, version
-
-    found = {}
-    for name in ("finger3d", *_SHAPING):
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            continue
-    return found
-
-
 def _peak_memory_mb() -> float:
     import resource
 
@@ -65,6 +52,9 @@ class _Output:
         self.scene, self.problem, self.out, self.started = scene, problem, out, started
         self.factorizations = factorizations
         self.frames: list[Frame] = []
+        self.estimate: StepEstimate | None = None
+        self.coupling = problem.coupling()
+        self.warnings = [*problem.model.warnings, *_coupling_warning(self.coupling)]
         self.seconds = {"cad": 0.0, "mesh": 0.0, **problem.seconds, "contact": 0.0, "output": 0.0}
         self._written = -math.inf
 
@@ -72,7 +62,7 @@ class _Output:
         self.frames.append(frame)
         self.seconds["contact"] += seconds
         if time.perf_counter() - self._written > _WRITE_EVERY_S:
-            self.write("incomplete: the press was still running, or was interrupted; the steps written are good")
+            self.write(_INCOMPLETE)
 
     def write(self, outcome: str) -> dict[str, Any]:
         begin = time.perf_counter()
@@ -94,7 +84,10 @@ class _Output:
             "scene": self.scene.as_dict(),
             "effects": list(self.scene.effects),
             "outcome": outcome,
+            "warnings": self.warnings,
             "steps": steps,
+            "step_estimate": self.estimate.as_dict() if self.estimate else None,
+            "uniqueness": {"largest_coupling": self.coupling},
             "mesh": {
                 "points": report.points,
                 "cells": report.cells,
@@ -157,6 +150,15 @@ def press(scene: Scene | str | Path, out: str | Path, report: Report | None = No
     return PressResult(history, output.write(str(history.outcome)), folder)
 
 
+def _coupling_warning(coupling: float) -> list[str]:
+    if coupling <= 1.0:
+        return []
+    return [
+        f"the largest mu |K_tt^-1 K_tn| is {coupling:.3g}, above 1: several contact states may satisfy all conditions; "
+        "the one reported follows from the history"
+    ]
+
+
 def _clear(folder: Path) -> None:
     """Remove results of an earlier run, so that no old number stands beside a new one."""
     for name in ("summary.json", "history.csv", "contact.csv", "fields.vtu", "finger.png", "contact.png", "force.png"):
@@ -166,23 +168,61 @@ def _clear(folder: Path) -> None:
 def _solve(
     scene: Scene, folder: Path, report: Report, started: float, margin: float | None = None, before: _Output | None = None
 ) -> tuple[Problem, _Output]:
-    from finger3d.solve import build, march, targets
+    from finger3d.increments import automatic
+    from finger3d.solve import build
 
     model = scene.model()
     report.stage("meshing")
     problem = build(model, report.say) if margin is None else build(model, report.say, margin)
     factorizations = problem.condensed.factorizations + (before.factorizations if before else 0)
     output = _Output(scene, problem, folder, started, factorizations)
-    total = len(targets(model.legs))
-    report.stage("pressing")
+    for warning in output.warnings:
+        report.say(f"warning: {warning}")
     output.write("incomplete: no step was finished")
+    try:
+        if automatic(problem):
+            _press_automatically(problem, output, report)
+        else:
+            _press_steps(problem, output, report)
+    finally:
+        output.write(_INCOMPLETE)
+    return problem, output
+
+
+def _press_steps(problem: Problem, output: _Output, report: Report) -> None:
+    from finger3d.solve import march, targets
+
+    total = len(targets(problem.model.legs))
+    report.stage("pressing")
     begin = time.perf_counter()
     for done, frame in enumerate(march(problem), start=1):
         output.add(frame, time.perf_counter() - begin)
-        force = measure(problem.points, frame)["normal_force_N"]
-        report.step(done, total, f"depth {frame.target.depth_mm:.4g} mm, force {force:.5g} N, residual {frame.residual:.1e}")
+        report.step(done, total, _remark(problem, frame))
         begin = time.perf_counter()
-    return problem, output
+
+
+def _press_automatically(problem: Problem, output: _Output, report: Report) -> None:
+    """Refine the increments; every finer run takes the place of the one before, also on disk."""
+    from finger3d.increments import refine
+
+    report.stage("pressing, increments chosen by step halving")
+    begin = time.perf_counter()
+    for frames, estimate in refine(problem):
+        output.seconds["contact"] += time.perf_counter() - begin
+        output.frames, output.estimate = list(frames), estimate
+        output.write(_INCOMPLETE)
+        report.step(len(frames), len(frames), _remark(problem, frames[-1]))
+        begin = time.perf_counter()
+    if estimate is not None and not estimate.met:
+        output.warnings.append(
+            f"steps = 'auto' stopped at {estimate.steps} increments a leg; the friction sum still changes by "
+            f"{100 * estimate.friction_sum:.2g} %, the dissipation by {100 * estimate.dissipation:.2g} %"
+        )
+
+
+def _remark(problem: Problem, frame: Frame) -> str:
+    force = measure(problem.points, frame)["normal_force_N"]
+    return f"depth {frame.target.depth_mm:.4g} mm, force {force:.5g} N, residual {frame.residual:.1e}"
 
 
 def _covers(problem: Problem, frame: Frame) -> bool:
@@ -276,17 +316,3 @@ def _figures(problem: Problem, output: _Output, frame: Frame, mesh: Any, u: Any,
         folder / "finger.png", mesh, u, table, problem.points.nodes,
         f"{steps[-1]['normal_force_N']:.4g} N at {frame.target.depth_mm:g} mm",
     )  # fmt: skip
-
-
-def with_mesh(model: Any, size_mm: float, base_size_mm: float | None = None) -> Any:
-    """The model with other edge lengths; the base in proportion unless given."""
-    base = base_size_mm or model.mesh.base_size_mm * size_mm / model.mesh.size_mm
-    return replace(model, mesh=replace(model.mesh, size_mm=size_mm, base_size_mm=base))
-
-
-def writable(folder: Path, names: Iterable[str] = ("summary.json",)) -> bool:
-    """Whether files can be made in a folder (or in the nearest parent that exists)."""
-    at = folder
-    while not at.exists():
-        at = at.parent
-    return os.access(at, os.W_OK | os.X_OK) and (at.is_dir())

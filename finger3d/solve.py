@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from finger3d.contact.advance import advance
 from finger3d.contact.law import SLIP
+from finger3d.contact.newton import uniqueness
+from finger3d.contact.paper import swap
 from finger3d.contact.state import ContactState, Increment
 from finger3d.design import MeshReport, mesh_section, mesh_solid
 from finger3d.errors import Finger3dError
@@ -25,8 +27,10 @@ from finger3d.objects import first_touch
 
 Float = NDArray[np.float64]
 
+_RULES = {"projection": advance, "paper": swap}
 _MARGIN = 0.3  # candidate points reach to a rigid gap of this share of the depth; checked after the solution
 _CUTS = 6
+AUTO_START = 10
 
 
 @dataclass(frozen=True)
@@ -92,6 +96,11 @@ class Problem:
             state.slip[p] * tangent,
         )
 
+    def coupling(self) -> float:
+        """Largest mu |K_tt^-1 K_tn| over points; above 1 a contact state need not be the only one."""
+        c, d = self.compliance.shape[:2]
+        return uniqueness(np.full(c, self.model.friction.static), self.compliance.reshape(c * d, c * d), d)
+
     def unknowns(self, force: Float) -> Float:
         """All unknowns of the part's body under contact forces (c, d)."""
         rows = np.zeros(len(self.condensed.compliance))
@@ -113,7 +122,7 @@ def targets(legs: tuple[Leg, ...]) -> list[Target]:
     out: list[Target] = []
     at = Target(0.0)
     for leg in legs:
-        count = leg.steps if isinstance(leg.steps, int) else 10
+        count = leg.steps if isinstance(leg.steps, int) else AUTO_START
         end = Target(leg.depth_mm, leg.slide_x_mm, leg.slide_z_mm, at.time_s + (leg.duration_s or 0.0))
         out += [between(at, end, k / count) for k in range(1, count)] + [end]
         at = end
@@ -260,12 +269,16 @@ def _unfolded(
 
 
 def march(problem: Problem) -> Iterator[Frame]:
-    """Frames of all legs in turn; stops after the first increment that did not settle."""
+    """Frames of all legs in turn; stops after the first increment that did not settle.
+
+    Under the paper's rule an increment that cycled is handed on as it is, and never cut: that is what the rule does.
+    """
+    literal = problem.model.rule == "paper"
     at = Target(0.0)
     state = ContactState.at_rest(problem.gap(at), problem.dim)
     work = dissipation = 0.0
     for target in targets(problem.model.legs):
-        found, done = _increment(problem, state, at, target, _CUTS)
+        found, done = _increment(problem, state, at, target, 0 if literal else _CUTS)
         for before, after, a, b in done:
             work += _work(problem, before, after, a, b)
             dissipation += _dissipated(problem, before, after)
@@ -275,7 +288,7 @@ def march(problem: Problem) -> Iterator[Frame]:
             dict(zip([g.name for g in problem.model.gauges], map(float, problem.gauge_rows @ state.force.ravel()), strict=True)),
             work, dissipation, found.outcome, found.residual, found.iterations, found.method,
         )  # fmt: skip
-        if not found.outcome.ok:
+        if not found.outcome.ok and not (literal and found.method == "paper"):
             return
 
 
@@ -284,7 +297,8 @@ _Done = list[tuple[ContactState, ContactState, Target, Target]]
 
 def _increment(problem: Problem, state: ContactState, a: Target, b: Target, cuts: int) -> tuple[Increment, _Done]:
     """Advance from a to b; an increment that does not settle is cut in two, from the state restored."""
-    found = advance(state, problem.free(b), problem.compliance, problem.model.friction, max(b.depth_mm, a.depth_mm))
+    rule = _RULES[problem.model.rule]
+    found = rule(state, problem.free(b), problem.compliance, problem.model.friction, max(b.depth_mm, a.depth_mm))
     if found.outcome.ok or cuts == 0:
         return found, [(state, found.state, a, b)]
     middle = between(a, b, 0.5)

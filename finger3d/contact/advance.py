@@ -4,30 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.contact.conditions import TOLERANCE, Increments, residual, stiffness_weights
-from finger3d.contact.law import OPEN
+from finger3d.contact.law import FrictionLaw
 from finger3d.contact.lemke import friction_start
 from finger3d.contact.newton import Iterate, force_of_sets, newton, sweeps
-from finger3d.contact.state import ContactState, Increment
+from finger3d.contact.state import ContactState, Increment, next_state, refusal
 from finger3d.errors import Outcome
 
 Float = NDArray[np.float64]
 
 
-class Law(Protocol):
-    """What `advance` asks of a friction law; see `finger3d.contact.law`."""
-
-    def coefficients(self, status: NDArray[np.int8]) -> Float: ...
-
-    def revised(self, mu: Float, status: NDArray[np.int8]) -> Float | None: ...
-
-
-def advance(previous: ContactState, free: Float, compliance: Float, law: Law, length_scale: float) -> Increment:
+def advance(previous: ContactState, free: Float, compliance: Float, law: FrictionLaw, length_scale: float) -> Increment:
     """Solve one increment.
 
     Parameters
@@ -47,9 +38,9 @@ def advance(previous: ContactState, free: Float, compliance: Float, law: Law, le
     """
     c, d = free.shape
     matrix = compliance.reshape(c * d, c * d)
-    refusal = _refusal(free, matrix)
-    if refusal:
-        return Increment(previous, refusal, np.inf, 0, "none")
+    refused = refusal(free, matrix)
+    if refused:
+        return Increment(previous, refused, np.inf, 0, "none")
     change = free.copy()
     change[:, 1:] -= previous.position
     rho = stiffness_weights(matrix, d)
@@ -74,15 +65,7 @@ def advance(previous: ContactState, free: Float, compliance: Float, law: Law, le
         if revised is None:
             break
         mu, start = revised, force
-    return Increment(_next_state(previous, force, moved, status), Outcome.CONVERGED, error, total, method)
-
-
-def _refusal(free: Float, matrix: Float) -> Outcome | None:
-    if not (np.isfinite(free).all() and np.isfinite(matrix).all()):
-        return Outcome.NOT_FINITE
-    if np.diagonal(matrix).min(initial=np.inf) <= 0.0:
-        return Outcome.INDEFINITE
-    return None
+    return Increment(next_state(previous, force, moved, status), Outcome.CONVERGED, error, total, method)
 
 
 def _ladder(problem: Increments, start: Float) -> Iterator[tuple[str, Iterate]]:
@@ -147,10 +130,3 @@ def _ramp(problem: Increments, start: Float) -> Iterate:
         else:
             stride *= 0.5
     return Iterate(force, status, reached >= 1.0, spent)
-
-
-def _next_state(previous: ContactState, force: Float, moved: Float, status: NDArray[np.int8]) -> ContactState:
-    touching = (status != OPEN)[:, None]
-    return ContactState(
-        status, force, moved[:, 0], previous.position + moved[:, 1:], previous.slip + np.where(touching, moved[:, 1:], 0.0)
-    )

@@ -3,12 +3,30 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 OPEN, STICK, SLIP = 0, 1, 2
 STATUS_NAMES = ("open", "stick", "slip")
+
+
+class FrictionLaw(Protocol):
+    """What the contact solution asks of friction: a limit for every point, and when to revise it."""
+
+    @property
+    def static(self) -> float:
+        """Coefficient that a sticking point may not exceed."""
+        ...
+
+    def coefficients(self, status: NDArray[np.int8]) -> NDArray[np.float64]:
+        """Coefficient (c,) that a step starts with, from the status (c,) at its begin."""
+        ...
+
+    def revised(self, mu: NDArray[np.float64], status: NDArray[np.int8]) -> NDArray[np.float64] | None:
+        """Coefficients to solve again with, given the status (c,) found with `mu` (c,); None when consistent."""
+        ...
 
 
 @dataclass(frozen=True)

@@ -64,3 +64,18 @@ class Increment:
     residual: float
     iterations: int
     method: str
+
+
+def next_state(previous: ContactState, force: Float, moved: Float, status: NDArray[np.int8]) -> ContactState:
+    """State after an increment with forces (c, d), gaps and changes of position `moved` (c, d), and sets (c,)."""
+    slid = np.where((status != OPEN)[:, None], moved[:, 1:], 0.0)
+    return ContactState(status, force, moved[:, 0], previous.position + moved[:, 1:], previous.slip + slid)
+
+
+def refusal(free: Float, compliance: Float) -> Outcome | None:
+    """Why an increment cannot be tried at all: NaN, or a compliance (c d, c d) with a direction that is not held."""
+    if not (np.isfinite(free).all() and np.isfinite(compliance).all()):
+        return Outcome.NOT_FINITE
+    if np.diagonal(compliance).min(initial=np.inf) <= 0.0:
+        return Outcome.INDEFINITE
+    return None

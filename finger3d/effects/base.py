@@ -1,0 +1,23 @@
+"""What effects share: each fills one slot of the model, and two that want the same slot are a mistake."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from finger3d.errors import Finger3dError
+from finger3d.model import Model
+
+
+def fill(model: Model, slot: str, value: Any, effect: str) -> Model:
+    """Return the model with `slot` set by `effect`; an effect that set it before is named in the error."""
+    taken = dict(model.filled).get(slot)
+    if taken is not None:
+        raise Finger3dError(f"effects: {taken} and {effect} both set the {slot}; keep one of them")
+    filled = tuple(sorted((*model.filled, (slot, effect))))
+    return replace(model, **{slot: value}, filled=filled)
+
+
+def warn(model: Model, text: str) -> Model:
+    """Return the model with one more warning for the summary."""
+    return replace(model, warnings=tuple(sorted({*model.warnings, text})))
