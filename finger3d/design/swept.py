@@ -22,6 +22,7 @@ Zone = tuple[float, float, float, float]
 
 _LAYER = 2.0  # thickness of a z-layer in contact edge lengths: stress varies less along z than along x
 _AXIS = {"x": 0, "z": 2}
+_FLATTEST_DEG = 0.5  # flatter ones come from a wall or an edge far thinner than the mesh
 
 
 def mesh_section(design: Any, options: Any, zone: Zone, symmetry: tuple[str, ...] = ()) -> tuple[Mesh, MeshReport]:
@@ -42,7 +43,7 @@ def mesh_section(design: Any, options: Any, zone: Zone, symmetry: tuple[str, ...
     whole = unfold(mesh, axes)[0]
     seconds = {"cad": 0.0, "mesh": time.perf_counter() - start}
     multiple = design.width_mm * (2 - len(axes))
-    return whole, report(whole, multiple, section.area_mm2 * design.width_mm, seconds)
+    return whole, _fit(report(whole, multiple, section.area_mm2 * design.width_mm, seconds), design, options)
 
 
 def mesh_swept(design: Any, options: Any, zone: Zone, symmetry: tuple[str, ...] = ()) -> tuple[Mesh, MeshReport]:
@@ -58,7 +59,18 @@ def mesh_swept(design: Any, options: Any, zone: Zone, symmetry: tuple[str, ...] 
     mesh = _on_curve(quadratic(_sweep(grid, levels)), section, np.tile(grid.arc, layers + 1))
     whole = unfold(mesh, axes)[0]
     seconds = {"cad": 0.0, "mesh": time.perf_counter() - start}
-    return whole, report(whole, 4.0 / 2 ** len(axes), section.area_mm2 * design.width_mm, seconds)
+    multiple = 4.0 / 2 ** len(axes)
+    return whole, _fit(report(whole, multiple, section.area_mm2 * design.width_mm, seconds), design, options)
+
+
+def _fit(made: MeshReport, design: Any, options: Any) -> MeshReport:
+    """The report, unless cells are too flat to trust."""
+    if made.min_dihedral_deg >= _FLATTEST_DEG:
+        return made
+    raise Finger3dError(
+        f"{design.name}: mesh.size_mm = {options.size_mm:g} gives cells of {made.min_dihedral_deg:.2g} deg, flatter "
+        f"than {_FLATTEST_DEG:g}; a wall or an edge is too thin for it: choose smaller sizes, or edge_height_mm = 0"
+    )
 
 
 def _grid(design: Any, options: Any, zone: Zone, dim: int, copies: int) -> tuple[Grid, Section]:
@@ -81,8 +93,9 @@ def _on_curve(mesh: Mesh, section: Section, arc: Float) -> Mesh:
     pairs = ((0, 1),) if d == 2 else ((0, 1), (1, 2), (2, 0))
     points = mesh.points.copy()
     for k, (i, j) in enumerate(pairs):
-        middle = facets[:, d + k]
-        points[middle, :2] = section.contact.at(0.5 * (arc[facets[:, i]] + arc[facets[:, j]]))
+        ends, middle = arc[facets[:, [i, j]]], facets[:, d + k]
+        bent = ends[:, 0] != ends[:, 1]  # edges along z lie where their ends lie, to the last bit
+        points[middle[bent], :2] = section.contact.at(ends[bent].mean(axis=1))
     points[mesh.facets["symmetry_x"].ravel(), 0] = 0.0
     return Mesh(points, mesh.cells, mesh.facets)
 
