@@ -50,7 +50,7 @@ def stiffness_weights(compliance: Float, dim: int) -> Float:
     """Weights rho (c, d) N/mm from the diagonal of a compliance (c d, c d); the tangents of a point share the least."""
     rho = 1.0 / np.diagonal(compliance).reshape(-1, dim)
     rho = rho.copy()
-    rho[:, 1:] = rho[:, 1:].min(axis=1, keepdims=True)
+    rho[:, 1:] = rho[:, 1:].min(axis=1, keepdims=True, initial=np.inf)
     return rho
 
 

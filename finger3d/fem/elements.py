@@ -37,8 +37,9 @@ def gradient(bary: Float, quadratic: bool) -> Float:
 def quadrature(dim: int, degree: int) -> tuple[Float, Float]:
     """Barycentric points (q, dim + 1) and weights (q,) that sum to the reference simplex's volume 1/dim!.
 
-    Degree 2 in 2D and 3D are the symmetric 3- and 4-point rules (Strang and Fix 1973); anything else is a Gauss-Jacobi
-    product on the collapsed square or cube (Stroud 1971), positive and of any degree.
+    Degree 2 in 2D and 3D are the symmetric 3- and 4-point rules (Strang and Fix 1973), degree 5 in 2D is Radon's
+    symmetric 7-point rule (1948); anything else is a Gauss-Jacobi product on the collapsed square or cube (Stroud
+    1971), positive and of any degree, but not symmetric.
     """
     if degree == 2 and dim > 1:
         a = 2.0 / 3.0 if dim == 2 else (5.0 + 3.0 * math.sqrt(5.0)) / 20.0
@@ -46,6 +47,12 @@ def quadrature(dim: int, degree: int) -> tuple[Float, Float]:
         return np.full((dim + 1, dim + 1), b) + (a - b) * np.eye(dim + 1), np.full(
             dim + 1, 1.0 / math.factorial(dim + 1)
         )
+    if degree == 5 and dim == 2:
+        root = math.sqrt(15.0)
+        orbits = [(6.0 - root) / 21.0, (6.0 + root) / 21.0]
+        bary = [np.full((1, 3), 1.0 / 3.0), *[np.full((3, 3), a) + (1.0 - 3.0 * a) * np.eye(3) for a in orbits]]
+        weights = [9.0 / 80.0, *[(155.0 - root) / 2400.0] * 3, *[(155.0 + root) / 2400.0] * 3]
+        return np.vstack(bary), np.array(weights)
     from scipy.special import roots_jacobi
 
     order = degree // 2 + 1

@@ -1,0 +1,53 @@
+"""Contact problems without a mesh: random ones, and the elastic half-plane by its closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from finger3d.contact.law import OPEN, SLIP, STICK
+from finger3d.contact.state import ContactState
+
+
+def random_compliance(rng: np.random.Generator, points: int, dim: int, softness: float = 0.05) -> np.ndarray:
+    """Symmetric positive compliance (c, d, c, d) with strong coupling between normal and tangential motion."""
+    a = rng.normal(size=(points * dim, points * dim))
+    c = a @ a.T / (points * dim) + softness * np.eye(points * dim)
+    return c.reshape(points, dim, points, dim)
+
+
+def half_plane(points: int, dim: int, beta: float, spacing: float = 0.1) -> np.ndarray:
+    """Compliance (c, d, c, d) of points on a line: log kernels, and beta times a sign kernel that couples n and x."""
+    x = spacing * np.arange(points)
+    r = np.abs(x[:, None] - x) + 0.3 * spacing * np.eye(points)
+    normal = -np.log(r / (40.0 * spacing * points)) / np.pi
+    sign = 0.5 * beta * np.sign(x[:, None] - x)
+    out = np.zeros((points, dim, points, dim))
+    for i in range(dim):
+        out[:, i, :, i] = normal
+    out[:, 1, :, 0], out[:, 0, :, 1] = sign, -sign
+    return out
+
+
+def violation(before: ContactState, after: ContactState, free: np.ndarray, compliance: np.ndarray, mu: float) -> float:
+    """Largest violation of Eqs. (1)-(4) and of friction opposing slip, written out point by point.
+
+    Independent of finger3d.contact.conditions; gaps in units of 1, forces in units of the largest.
+    """
+    moved = free + np.einsum("idjk,jk->id", compliance, after.force)
+    scale = max(np.abs(after.force).max(), 1e-300)
+    worst = max(np.abs(moved[:, 0] - after.gap).max(), np.abs(moved[:, 1:] - after.position).max(initial=0.0))
+    for i, status in enumerate(after.status):
+        n, t = after.force[i, 0], after.force[i, 1:]
+        slip = moved[i, 1:] - before.position[i]
+        if status == OPEN:  # Eq. 1
+            worst = max(worst, -moved[i, 0], np.abs(after.force[i]).max() / scale)
+            continue
+        worst = max(worst, abs(moved[i, 0]), -n / scale)  # Eq. 2
+        if status == STICK:  # Eq. 3
+            worst = max(worst, np.abs(slip).max(), (np.linalg.norm(t) - mu * n) / scale)
+        if status == SLIP:  # Eq. 4
+            worst = max(worst, abs(np.linalg.norm(t) - mu * n) / scale)
+            if np.linalg.norm(t) > 0:
+                e = t / np.linalg.norm(t)
+                worst = max(worst, slip @ e, np.linalg.norm(slip - (slip @ e) * e))
+    return float(worst)

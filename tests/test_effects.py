@@ -1,0 +1,97 @@
+"""What holds for every effect: one table over finger3d/effects."""
+
+from __future__ import annotations
+
+import itertools
+import subprocess
+import sys
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from finger3d.contact.law import Coulomb
+from finger3d.design import designs
+from finger3d.errors import Finger3dError
+from finger3d.model import Leg, Material, MeshOptions, Model
+from finger3d.scene.lookup import effect_names, effect_type
+from finger3d.solve import build, march
+
+TYPICAL: dict[str, dict[str, Any]] = {"kinetic_friction": {"ratio": 0.7}}
+NEUTRAL: dict[str, dict[str, Any]] = {"kinetic_friction": {"ratio": 1.0}}
+
+
+def baseline() -> Model:
+    finger = designs()["half_cylinder"](radius_mm=5.0, width_mm=2.0)
+    return Model(
+        finger, Material(1.0, 0.3), MeshOptions(0.3, 1.0, "swept"), (Leg(0.5, steps=5),), friction=Coulomb(0.1),
+        domain="plane-strain",
+    )  # fmt: skip
+
+
+def test_every_effect_is_in_the_tables() -> None:
+    assert set(effect_names()) == set(TYPICAL) == set(NEUTRAL)
+
+
+@pytest.mark.parametrize("name", effect_names())
+def test_neutral_setting_is_the_baseline_to_round_off(name: str) -> None:
+    problem = build(baseline())
+    neutral = effect_type(name)(**NEUTRAL[name]).apply(baseline())
+    for a, b in zip(march(problem), march(replace(problem, model=neutral)), strict=True):
+        assert np.abs(a.state.force - b.state.force).max() <= 1e-13 * np.abs(a.state.force).max()
+
+
+@pytest.mark.parametrize("name", effect_names())
+def test_an_effect_changes_the_answer(name: str) -> None:
+    problem = build(baseline())
+    changed = effect_type(name)(**TYPICAL[name]).apply(baseline())
+    a, b = (list(march(replace(problem, model=m)))[-1] for m in (baseline(), changed))
+    assert np.abs(a.state.force - b.state.force).max() > 1e-3 * np.abs(a.state.force).max()
+
+
+@pytest.mark.parametrize("names", list(itertools.permutations(effect_names(), 2)) or [effect_names()])
+def test_order_does_not_matter(names: tuple[str, ...]) -> None:
+    forth, back = baseline(), baseline()
+    for name in names:
+        forth = effect_type(name)(**TYPICAL[name]).apply(forth)
+    for name in reversed(names):
+        back = effect_type(name)(**TYPICAL[name]).apply(back)
+    assert forth == back
+
+
+@pytest.mark.parametrize("name", effect_names())
+def test_two_effects_in_one_slot_are_named(name: str) -> None:
+    effect = effect_type(name)(**TYPICAL[name])
+    with pytest.raises(Finger3dError, match=f"{name} and {name}"):
+        effect.apply(effect.apply(baseline()))
+
+
+def test_an_absent_effect_is_not_imported() -> None:
+    code = (
+        "import sys; from finger3d.scene import load; load(sys.argv[1]).model(); import finger3d.solve; "
+        "print([m for m in sys.modules if m.startswith('finger3d.effects.')])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, "geometries/fig9.toml"], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "[]"
+
+
+def test_a_point_that_slips_keeps_the_kinetic_limit_until_it_sticks() -> None:
+    from finger3d.contact.advance import advance
+    from finger3d.contact.law import SLIP, STICK
+    from finger3d.contact.state import ContactState
+    from finger3d.effects.kinetic_friction import TwoCoefficients
+
+    compliance = np.eye(2).reshape(1, 2, 1, 2)  # one point on two unit springs
+    law = TwoCoefficients(0.5, 0.6, "keep")
+    state = ContactState.at_rest(np.array([0.0]), 2)
+    wanted = [(0.2, STICK, 0.2), (0.6, SLIP, 0.3), (0.7, SLIP, 0.3), (0.6, STICK, 0.2), (0.3, STICK, -0.1)]
+    for slide, status, friction in wanted:
+        state = advance(state, np.array([[-1.0, -slide]]), compliance, law, 1.0).state
+        assert state.status[0] == status
+        assert state.force[0, 1] == pytest.approx(friction, abs=1e-12)
+    # after it stuck the static limit counts again
+    state = advance(state, np.array([[-1.0, 0.1]]), compliance, law, 1.0).state
+    assert (state.status[0], state.force[0, 1]) == (STICK, pytest.approx(-0.5, abs=1e-9))

@@ -1,0 +1,221 @@
+"""The paper's finger, pressed: the numbers of references.md and design.md, and what is always true."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from finger3d import solve as solve_module
+from finger3d.contact.law import OPEN, Coulomb
+from finger3d.design import designs
+from finger3d.errors import Outcome
+from finger3d.fem.recover import displacement
+from finger3d.fem.surface import displacement_row
+from finger3d.history import Frame, measure
+from finger3d.increments import refine
+from finger3d.model import Gauge, Leg, Material, MeshOptions, Model
+from finger3d.objects import Plane, Sphere
+from finger3d.press import part_force
+from finger3d.solve import Problem, build, march, targets
+
+
+def fig9(**changes: object) -> Model:
+    finger = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
+    model = Model(
+        finger, Material(1.0, 0.49), MeshOptions(2.0, 8.0, "swept"), (Leg(10.0, steps=10),), friction=Coulomb(0.25),
+        gauges=(Gauge("g36", 36.0, 40.0, 0.0, np.deg2rad(30.0)),),
+    )  # fmt: skip
+    return replace(model, **changes)
+
+
+def block(**changes: object) -> Model:
+    body = designs()["block"](half_length_mm=4.0, height_mm=3.0, width_mm=4.0)
+    model = Model(
+        body, Material(1.0, 0.3), MeshOptions(0.8, 1.2, "swept"), (Leg(0.3, steps=3),), object=Sphere(radius_mm=4.0),
+        friction=Coulomb(0.25),
+    )  # fmt: skip
+    return replace(model, **changes)
+
+
+def run(model: Model) -> tuple[Problem, list[Frame]]:
+    problem = build(model)
+    frames = list(march(problem))
+    assert all(f.outcome.ok and f.residual <= 1e-8 for f in frames)
+    return problem, frames
+
+
+def last(model: Model) -> dict[str, float]:
+    problem, frames = run(model)
+    return measure(problem.points, frames[-1])
+
+
+# references.md sec. 2, the paper's half cylinder; P within 1 %, lengths within .013 plus half a contact point
+@pytest.mark.parametrize(
+    ("depth", "force", "a", "c"), [(0.2, 0.12668, 0.862, 0.639), (0.5, 0.40495, 1.508, 1.376), (1.0, 1.01932, 2.297, 2.230)]
+)
+def test_half_cylinder_in_plane_stress(depth: float, force: float, a: float, c: float) -> None:
+    size = 0.04
+    finger = designs()["half_cylinder"](radius_mm=5.0, width_mm=1.0)
+    model = Model(
+        finger, Material(1.0, 0.3), MeshOptions(size, 0.5), (Leg(depth, steps=100),), friction=Coulomb(0.25),
+        domain="plane-stress",
+    )  # fmt: skip
+    got = last(model)
+    assert got["normal_force_N"] == pytest.approx(force, rel=0.01)
+    assert got["contact_half_length_mm"] == pytest.approx(a, abs=0.013 + size)
+    assert got["stick_half_length_mm"] == pytest.approx(c, abs=0.013 + size)
+    assert abs(got["tangential_force_x_N"]) < 1e-12
+
+
+def test_fig9_in_plane_strain_gives_26_4_newton_per_millimetre() -> None:
+    got = last(fig9(domain="plane-strain", mesh=MeshOptions(1.0, 4.0)))
+    assert got["normal_force_N"] / 20.0 == pytest.approx(26.4, rel=0.005)
+    assert 74.0 <= 2.0 * got["contact_half_length_mm"] <= 78.0  # design.md, at rest
+
+
+def test_fig9_as_a_solid_and_with_held_ends() -> None:
+    free = last(fig9())
+    assert free["normal_force_N"] == pytest.approx(305.0, rel=0.01)
+    assert abs(free["outward_friction_z_N"]) > 2.0 * abs(free["outward_friction_x_N"])  # mostly along the width
+    held = last(fig9(held_ends=True))
+    section = last(fig9(domain="plane-strain", mesh=MeshOptions(1.0, 4.0)))
+    assert held["normal_force_N"] == pytest.approx(section["normal_force_N"], rel=0.005)
+
+
+def test_swept_and_pytetwild_meshes_agree_within_one_percent() -> None:
+    swept, tetwild = last(fig9()), last(fig9(mesh=MeshOptions(2.0, 8.0, "ftetwild")))
+    assert tetwild["normal_force_N"] == pytest.approx(swept["normal_force_N"], rel=0.01)
+    assert tetwild["normal_force_N"] == pytest.approx(305.0, rel=0.01)
+
+
+@pytest.mark.parametrize("nu", [0.3, 0.49, 0.5])
+def test_quarter_and_whole_model_agree_on_a_mirrored_mesh(nu: float) -> None:
+    quarter, whole = (block(material=Material(1.0, nu), symmetry=axes) for axes in (("x", "z"), ()))
+    (p, f), (q, g) = run(quarter), run(whole)
+    a, b = measure(p.points, f[-1]), measure(q.points, g[-1])
+    assert (p.axes, q.axes) == (("x", "z"), ())
+    for key in ("normal_force_N", "friction_sum_N", "contact_area_mm2", "dissipation_mJ", "external_work_mJ"):
+        assert a[key] == pytest.approx(b[key], rel=1e-8)
+    assert abs(b["tangential_force_x_N"]) < 1e-10 * b["normal_force_N"]
+    order_a, order_b = (np.lexsort(np.round(r.points.points, 9).T) for r in (p, q))
+    assert np.abs(f[-1].state.force[order_a] - g[-1].state.force[order_b]).max() < 1e-9
+
+
+def test_contact_forces_and_base_reaction_balance() -> None:
+    problem, frames = run(block(symmetry=(), legs=(Leg(0.3, steps=2), Leg(0.3, slide_x_mm=0.1, slide_z_mm=0.05, steps=2))))
+    unknowns = problem.unknowns(part_force(problem, frames[-1]))
+    full = problem.stiffness.upper + sp.triu(problem.stiffness.upper, 1).T
+    residual = (full @ unknowns)[: problem.mesh.points.size].reshape(problem.mesh.points.shape)
+    base = np.unique(problem.mesh.facets["base"])
+    contact = problem.points.world(frames[-1].state.force).sum(axis=0)
+    scale = np.abs(frames[-1].state.force).sum()
+    assert np.abs(residual[base].sum(axis=0) + contact).max() < 1e-10 * scale
+    assert np.abs(residual.sum(axis=0)).max() < 1e-10 * scale  # K moves no rigid body, so inner forces cancel
+
+
+def test_flat_block_under_a_flat_plate_has_uniform_pressure() -> None:
+    # nu = 0: the clamped base does not disturb the bar, so p = E d / h everywhere
+    problem, frames = run(block(material=Material(2.0, 0.0), object=Plane(), friction=Coulomb(0.0)))
+    pressure = frames[-1].state.force[:, 0] / problem.points.area
+    assert (frames[-1].state.status != OPEN).all()
+    assert np.abs(pressure - 2.0 * 0.3 / 3.0).max() < 1e-10
+
+
+def test_gauge_reads_the_field_without_recovering_it() -> None:
+    at, angle = (0.93, 1.41, 0.57), 0.4  # inside a cell
+    gauges = (
+        Gauge("point", *at, angle),
+        Gauge("mirror", -at[0], at[1], -at[2], np.pi - angle),
+        Gauge("short", *at, angle, 1e-3),
+        Gauge("long", 0.0, 1.5, 0.0, 0.0, 2.0),
+    )
+    problem, frames = run(block(gauges=gauges))
+    read = frames[-1].gauges
+    assert read["point"] == pytest.approx(read["mirror"], rel=1e-12)
+    assert read["point"] == pytest.approx(read["short"], rel=1e-6)
+    u = displacement(problem.mesh, problem.unknowns(part_force(problem, frames[-1])))
+    row = displacement_row(problem.mesh, np.array([1.0, 1.5, 0.0]), np.array([1.0, 0.0, 0.0]))
+    assert read["long"] == pytest.approx((row @ u.ravel())[0], rel=1e-9)  # elongation 2 u_x(1) over length 2
+
+
+def test_solvers_behind_the_same_interface_agree(monkeypatch: pytest.MonkeyPatch) -> None:
+    a = last(block())
+    monkeypatch.setenv("FINGER3D_SOLVER", "superlu")
+    b = last(block())
+    assert b["normal_force_N"] == pytest.approx(a["normal_force_N"], rel=1e-11)
+
+
+def test_energy_balances_to_first_order_in_the_increment() -> None:
+    excess = []
+    for steps in (5, 10, 20):
+        problem, frames = run(block(legs=(Leg(0.3, steps=steps),)))
+        end = frames[-1]
+        force = part_force(problem, end)
+        stored = 0.5 * 4.0 * np.einsum("id,idje,je->", force, problem.compliance, force)  # four quarters
+        excess.append(abs(end.external_work_mJ - stored - end.dissipation_mJ) / end.external_work_mJ)
+    assert excess[0] > excess[1] > excess[2]
+    assert excess[2] < 0.35 * excess[0]  # first order: a quarter
+
+
+def test_press_slide_release_returns_to_rest() -> None:
+    legs = (Leg(0.3, steps=3), Leg(0.3, slide_x_mm=0.5, steps=5), Leg(0.0, slide_x_mm=0.5, steps=3), Leg(0.3, steps=3))
+    problem, frames = run(block(legs=legs))
+    assert problem.axes == ("z",)
+    slid, released = measure(problem.points, frames[7]), measure(problem.points, frames[10])
+    assert slid["tangential_force_x_N"] == pytest.approx(0.25 * slid["normal_force_N"], rel=1e-9)  # all slips
+    assert released["normal_force_N"] == 0.0
+    lost = [f.dissipation_mJ for f in frames]
+    assert all(b >= a for a, b in zip(lost, lost[1:], strict=False))
+
+
+def test_tilted_plane_pushes_along_its_own_normal() -> None:
+    tilt = np.deg2rad(5.0)
+    body = block(object=Plane(tilt=tilt), friction=Coulomb(0.0), legs=(Leg(0.5, steps=2),))
+    problem, frames = run(body)
+    world = problem.points.world(frames[-1].state.force).sum(axis=0)
+    assert world[0] / -world[1] == pytest.approx(np.tan(tilt), rel=1e-12)
+    assert world[1] < 0
+
+
+def test_targets_pass_through_every_leg() -> None:
+    path = targets((Leg(1.0, steps=2), Leg(1.0, slide_x_mm=3.0, steps=3)))
+    assert [(t.depth_mm, t.slide_x_mm) for t in path] == [(0.5, 0), (1, 0), (1, 1), (1, 2), (1, 3)]
+
+
+def test_an_increment_that_fails_is_cut_and_the_state_restored(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = build(block(legs=(Leg(0.3, steps=1),)))
+    true_rule = solve_module._RULES["projection"]
+
+    def timid(state, free, compliance, law, scale):  # fails on strides above a quarter of the leg
+        found = true_rule(state, free, compliance, law, scale)
+        if np.abs(free[:, 0] - timid.gap).max() > 0.076:
+            return replace(found, state=state, outcome=Outcome.NO_CONVERGENCE)
+        timid.gap = free[:, 0]
+        return found
+
+    timid.gap = problem.gap(targets(problem.model.legs)[0].__class__(0.0))
+    monkeypatch.setitem(solve_module._RULES, "projection", timid)
+    (cut,) = march(problem)
+    monkeypatch.undo()
+    four = list(march(replace(problem, model=replace(problem.model, legs=(Leg(0.3, steps=4),)))))
+    assert cut.method == "cut back"
+    assert cut.outcome.ok
+    assert np.array_equal(cut.state.force, four[-1].state.force)
+    assert cut.dissipation_mJ == four[-1].dissipation_mJ
+
+
+def test_automatic_increments_end_within_their_estimate() -> None:
+    problem = build(fig9(domain="plane-strain", legs=(Leg(10.0, steps="auto"),)))
+    *_, (frames, estimate) = refine(problem)
+    assert estimate is not None
+    assert estimate.met
+    assert estimate.friction_sum <= 0.01
+    assert estimate.dissipation <= 0.05
+    fine = list(march(replace(problem, model=replace(problem.model, legs=(Leg(10.0, steps=4 * len(frames)),)))))
+    a, b = measure(problem.points, frames[-1]), measure(problem.points, fine[-1])
+    # the error left is about the change by the last halving, since it falls as 1 / steps
+    assert a["friction_sum_N"] == pytest.approx(b["friction_sum_N"], rel=2 * 0.01)
+    assert a["dissipation_mJ"] == pytest.approx(b["dissipation_mJ"], rel=2 * 0.05)
