@@ -205,6 +205,8 @@ def test_a_design_without_section_cannot_be_swept() -> None:
     options = SimpleNamespace(size_mm=1.0, base_size_mm=2.0, mesher="swept")
     with pytest.raises(Finger3dError, match="hemisphere.*'ftetwild'"):
         mesh_solid(ball, options, (-1, 1, -1, 1))
+    with pytest.raises(Finger3dError, match="hemisphere.*'solid'"):
+        mesh_section(ball, options, (-1, 1, -1, 1))
 
 
 def test_structured_meshes_load_no_cad() -> None:

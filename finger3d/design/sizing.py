@@ -47,23 +47,28 @@ class Sizing:
         reach = cKDTree(self.zone).query(points)[0]
         return np.minimum(self.base_mm, self.size_mm + RATE * np.maximum(0.0, reach - _PLATEAU * self.step))
 
-    def background(self) -> tuple[Float, Int, Float]:
-        """Background mesh for pytetwild: points (n, 3), tets (m, 4) (Kuhn split), edge length at the points (n,)."""
-        margin = self.step
-        low, high = self.low - margin, self.high + margin
+    def grid(self) -> tuple[list[Float], Float]:
+        """Coordinates of the background grid along x, y, z, and the edge length (nx, ny, nz) on it."""
+        low, high = self.low - self.step, self.high + self.step
         counts = np.maximum(1, np.ceil((high - low) / self.step - 1e-9)).astype(int)
         if self._fills_width:
             counts[2] = 1
         axes = [np.linspace(a, b, n + 1) for a, b, n in zip(low, high, counts, strict=True)]
-        points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-        stride = np.array([(counts[1] + 1) * (counts[2] + 1), counts[2] + 1, 1])
-        cell = np.stack(np.meshgrid(*(np.arange(n) for n in counts), indexing="ij"), axis=-1).reshape(-1, 3) @ stride
-        paths = [[i, j, 3 - i - j] for i in range(3) for j in range(3) if i != j]
-        tets = np.vstack([cell[:, None] + np.concatenate([[0], np.cumsum(stride[p])]) for p in paths])
-        at = points.copy()
+        at = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
         if self._fills_width:
             at[:, 2] = np.clip(at[:, 2], self.zone[:, 2].min(), self.zone[:, 2].max())
-        return points, tets, self.at(at)
+        return axes, self.at(at).reshape(counts + 1)
+
+    def background(self) -> tuple[Float, Int, Float]:
+        """Background mesh for pytetwild: points (n, 3), tets (m, 4) (Kuhn split), edge length at the points (n,)."""
+        axes, values = self.grid()
+        points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        nodes = np.array(values.shape)
+        stride = np.array([nodes[1] * nodes[2], nodes[2], 1])
+        cell = np.stack(np.meshgrid(*(np.arange(n - 1) for n in nodes), indexing="ij"), axis=-1).reshape(-1, 3) @ stride
+        paths = [[i, j, 3 - i - j] for i in range(3) for j in range(3) if i != j]
+        tets = np.vstack([cell[:, None] + np.concatenate([[0], np.cumsum(stride[p])]) for p in paths])
+        return points, tets, values.ravel()
 
     @property
     def _fills_width(self) -> bool:
@@ -103,7 +108,14 @@ def sizing(design: Any, options: Any, zone: tuple[float, float, float, float], l
 
 
 def forecast(design: Any, field: Sizing, samples: int = 40) -> float:
-    """Number of tets the field asks for, 10 times the integral of dV / h^3 over the body."""
+    """Number of tets the field asks for, 10 times the integral of dV / h^3 over the body.
+
+    Measured against meshes made: 0.96 to 1.1 times their number at base/size = 4, up to 1.9 times at 20.
+    """
+    from scipy.interpolate import RegularGridInterpolator
+
+    # fTetWild sees the field between the grid's points, where it is coarser than the field itself.
+    seen = RegularGridInterpolator(*field.grid())
     middle = (np.arange(samples) + 0.5) / samples
     spans = field.high - field.low
     # Denser towards the surface, where the small elements are.
@@ -114,6 +126,6 @@ def forecast(design: Any, field: Sizing, samples: int = 40) -> float:
     column = spans[0] * spans[2] / samples**2 * top
     total = 0.0
     for d, w in zip(depth, weight, strict=True):
-        h = field.at(np.stack([x.ravel(), top * (1.0 - d), z.ravel()], axis=1))
+        h = seen(np.stack([x.ravel(), top * (1.0 - d), z.ravel()], axis=1))
         total += w * float(column @ h**-3.0)
     return _TETS * total

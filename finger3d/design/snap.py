@@ -25,6 +25,7 @@ MIN_DIHEDRAL_DEG = 3.0
 """Cells flatter than this are repaired, or the mesh is made anew. Good meshes were seen at 12 to 27 degrees."""
 
 _PARALLEL = 0.05  # singular values below this share stem from faces that touch smoothly: one condition, not two
+_SMOOTH = 1e-3  # share of the body by which a node near such a seam may miss one of the two
 _REPAIRS = 100
 
 
@@ -111,17 +112,24 @@ def project(points: Float, sets: Bool, faces: tuple[CadFace, ...]) -> Float:
         for _ in range(20):
             pairs = [f.surface.distance(p) for f in chosen]
             distance = np.stack([d for d, _ in pairs], axis=1)
+            normals = np.stack([n for _, n in pairs], axis=1)
             if np.abs(distance).max() < 1e-13 * scale:
                 break
-            inverse = np.linalg.pinv(np.stack([n for _, n in pairs], axis=1), rcond=_PARALLEL)
+            inverse = np.linalg.pinv(normals, rcond=_PARALLEL)
             p = p - np.einsum("nxk,nk->nx", inverse, distance)
-        if np.abs(distance).max() > 1e-7 * scale:
+        if np.abs(distance).max() > scale * (_SMOOTH if _touching(normals) else 1e-7):
             raise UnusableMeshError("a surface node finds no place on its CAD faces")
         for f in chosen:
             if isinstance(f.surface, Plane) and f.surface.axis is not None:
                 p[:, f.surface.axis] = f.surface.origin[f.surface.axis]
         points[at] = p
     return points
+
+
+def _touching(normals: Float) -> bool:
+    """Whether two of the surfaces (n, k, 3) run along each other, so that they meet in no sharp edge."""
+    along = np.abs(np.einsum("nix,njx->nij", normals, normals)) - np.eye(normals.shape[1])
+    return bool(along.max() > 0.9)
 
 
 def repair(points: Float, tets: Int, sets: Bool) -> tuple[Float, Int, Bool]:

@@ -76,9 +76,8 @@ def _fit(made: MeshReport, design: Any, options: Any) -> MeshReport:
 def _grid(design: Any, options: Any, zone: Zone, dim: int, copies: int) -> tuple[Grid, Section]:
     """Triangles of the half section, if the mesh made of `copies` cells for each of them may be afforded."""
     if not hasattr(design, "section"):
-        raise Finger3dError(
-            f"mesh.mesher = 'swept' needs an extruded design, and {design.name} is none; allowed here: 'ftetwild'"
-        )
+        what, allowed = ("model.domain", "'solid'") if dim == 2 else ("mesh.mesher = 'swept'", "'ftetwild'")
+        raise Finger3dError(f"{what}: {design.name} has no constant section to mesh; allowed: {allowed}")
     section = design.section()
     low, high = folded_zone(zone, section.half_length_mm)
     layout = rows(section, Sizes(options.size_mm, options.base_size_mm, low, high))
