@@ -276,12 +276,14 @@ def march(problem: Problem) -> Iterator[Frame]:
     literal = problem.model.rule == "paper"
     at = Target(0.0)
     state = ContactState.at_rest(problem.gap(at), problem.dim)
+    pace: tuple[Target, Float] | None = None
     work = dissipation = 0.0
     for target in targets(problem.model.legs):
-        found, done = _increment(problem, state, at, target, 0 if literal else _CUTS)
+        found, done = _increment(problem, state, at, target, 0 if literal else _CUTS, _guess(state, at, target, pace))
         for before, after, a, b in done:
             work += _work(problem, before, after, a, b)
             dissipation += _dissipated(problem, before, after)
+        pace = at, state.force
         state, at = found.state, target
         yield Frame(
             target, problem.whole(state), problem.model.object.lowest(target.slide_x_mm, target.slide_z_mm),
@@ -292,13 +294,27 @@ def march(problem: Problem) -> Iterator[Frame]:
             return
 
 
+def _guess(state: ContactState, a: Target, b: Target, pace: tuple[Target, Float] | None) -> Float | None:
+    """Forces continued at their pace, where the path goes straight on from the increment before."""
+    if pace is None:
+        return None
+    before, now = np.subtract(_values(a), _values(pace[0])), np.subtract(_values(b), _values(a))
+    ratio = float(now @ before) / float(before @ before)
+    if ratio <= 0.0 or not np.allclose(now, ratio * before):
+        return None
+    return state.force + ratio * (state.force - pace[1])
+
+
 _Done = list[tuple[ContactState, ContactState, Target, Target]]
 
 
-def _increment(problem: Problem, state: ContactState, a: Target, b: Target, cuts: int) -> tuple[Increment, _Done]:
+def _increment(
+    problem: Problem, state: ContactState, a: Target, b: Target, cuts: int, guess: Float | None = None
+) -> tuple[Increment, _Done]:
     """Advance from a to b; an increment that does not settle is cut in two, from the state restored."""
     rule = _RULES[problem.model.rule]
-    found = rule(state, problem.free(b), problem.compliance, problem.model.friction, max(b.depth_mm, a.depth_mm))
+    scale = max(a.depth_mm, b.depth_mm)
+    found = rule(state, problem.free(b), problem.compliance, problem.model.friction, scale, guess)
     if found.outcome.ok or cuts == 0:
         return found, [(state, found.state, a, b)]
     middle = between(a, b, 0.5)

@@ -189,8 +189,8 @@ def test_an_increment_that_fails_is_cut_and_the_state_restored(monkeypatch: pyte
     problem = build(block(legs=(Leg(0.3, steps=1),)))
     true_rule = solve_module._RULES["projection"]
 
-    def timid(state, free, compliance, law, scale):  # fails on strides above a quarter of the leg
-        found = true_rule(state, free, compliance, law, scale)
+    def timid(state, free, compliance, law, scale, guess):  # fails on strides above a quarter of the leg
+        found = true_rule(state, free, compliance, law, scale, guess)
         if np.abs(free[:, 0] - timid.gap).max() > 0.076:
             return replace(found, state=state, outcome=Outcome.NO_CONVERGENCE)
         timid.gap = free[:, 0]

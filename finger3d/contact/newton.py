@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from finger3d.contact.conditions import Increments, project, residual
-from finger3d.contact.law import SLIP
+from finger3d.contact.law import SLIP, STICK
 
 Float = NDArray[np.float64]
 
@@ -30,45 +31,51 @@ class Iterate:
 def force_of_sets(problem: Increments, status: NDArray[np.int8], trial: Float) -> Float:
     """Forces (c, d) that solve the equations of the sets, slip rows with the normal force unknown.
 
-    `trial` (c, d) gives slipping points their direction, and how firmly it is held (see `project`).
+    `trial` (c, d) gives slipping points their direction e, and how firmly it is held (see `project`).  A sticking
+    point has d unknowns; a slipping one its f_n, with f_t = mu f_n e, and in 3D the force across e, which follows the
+    slip's turning (the derivative of the projection).
     """
     c, d = trial.shape
-    active = np.flatnonzero(status)
-    force = np.zeros((c, d))
-    if not len(active):
-        return force
-    dof = (active[:, None] * d + np.arange(d)).ravel()
-    weight = problem.rho[active].ravel()
-    matrix = problem.compliance[np.ix_(dof, dof)]
-    matrix *= weight[:, None]
-    right = -weight * problem.free[active].ravel()
-    slip = np.flatnonzero(status[active] == SLIP)
-    if len(slip):
-        _slip_rows(problem, active, slip, trial, matrix, right)
-    force[active] = np.linalg.solve(matrix, right).reshape(-1, d)
-    return force
-
-
-def _slip_rows(
-    problem: Increments, active: NDArray[np.int64], slip: NDArray[np.int64], trial: Float, matrix: Float, right: Float
-) -> None:
-    """Replace the tangential rows of slipping points: f_t - mu f_n e, with e turning as the slip does (3D)."""
-    d = trial.shape[1]
-    points = active[slip]
-    tangent = trial[points, 1:]
+    slip, stick = np.flatnonzero(status == SLIP), np.flatnonzero(status == STICK)
+    if not len(slip) + len(stick):
+        return np.zeros((c, d))
+    tangent = trial[slip, 1:]
     length = np.linalg.norm(tangent, axis=1)
-    direction = tangent / np.where(length > 0.0, length, 1.0)[:, None]
-    mu = problem.mu[points]
-    turn = np.minimum(mu * trial[points, 0] / np.where(length > 0.0, length, 1.0), 1.0)
-    across = np.eye(d - 1) - direction[:, :, None] * direction[:, None, :]
-    across *= turn[:, None, None]
-    rows = slip[:, None] * d + np.arange(1, d)
-    matrix[rows] = across @ matrix[rows] if d > 2 else 0.0
-    right[rows] = np.einsum("sij,sj->si", across, right[rows])
-    for i in range(d - 1):
-        matrix[rows[:, i], slip * d] -= mu * direction[:, i]
-        for j in range(d - 1):
-            matrix[rows[:, i], rows[:, j]] += (i == j) - across[:, i, j]
+    length = np.where(length > 0.0, length, 1.0)
+    direction = tangent / length[:, None]
+    mu = problem.mu[slip]
+    turn = np.minimum(mu * trial[slip, 0] / length, 1.0) if d > 2 else np.zeros(0)
+    across = np.stack([-direction[:, 1], direction[:, 0]], axis=1) if d > 2 else np.zeros((0, 0))
+    # columns: force of the unknowns; rows: which displacement must vanish, weighted to a force
+    n, k, w = len(stick) * d, len(slip), len(turn)
+    free_dofs, normal = (stick[:, None] * d + np.arange(d)).ravel(), slip * d
+    sideways = (slip[:, None] * d + np.arange(1, d)).ravel()
+    at_n, at_w = n + np.arange(k), n + k + np.arange(w)
+    expand = sp.csr_matrix(
+        (
+            np.concatenate([np.ones(n + k), (mu[:, None] * direction).ravel(), across.ravel()]),
+            (
+                np.concatenate([np.arange(n), at_n, np.repeat(at_n, d - 1), np.repeat(at_w, d - 1)]),
+                np.concatenate([free_dofs, normal, sideways, sideways[: w * (d - 1)]]),
+            ),
+        ),
+        shape=(n + k + w, c * d),
+    )
+    rho = problem.rho.ravel()
+    test = sp.csr_matrix(
+        (
+            np.concatenate([rho[free_dofs], rho[normal], (turn[:, None] * across).ravel() * rho[sideways[: w * (d - 1)]]]),
+            (
+                np.concatenate([np.arange(n), at_n, np.repeat(at_w, d - 1)]),
+                np.concatenate([free_dofs, normal, sideways[: w * (d - 1)]]),
+            ),
+        ),
+        shape=(n + k + w, c * d),
+    )
+    matrix = test @ (expand @ problem.compliance).T  # the compliance is symmetric
+    matrix[at_w, at_w] += 1.0 - turn
+    unknowns = np.linalg.solve(matrix, -(test @ problem.free.ravel()))
+    return (expand.T @ unknowns).reshape(c, d)
 
 
 def newton(problem: Increments, start: Float, limit: int, damped: bool) -> Iterate:
