@@ -103,6 +103,52 @@ def plan(scene: Path, /, *, set_: Set = None) -> int:
 
 
 @app.command
+def validate(
+    studies: Annotated[list[str] | None, Parameter(negative=())] = None,
+    /,
+    *,
+    quick: Annotated[bool, Parameter(negative=())] = False,
+    out: Annotated[Path | None, Parameter(help="Folder for the results instead of validation/.")] = None,
+) -> int:
+    """Run studies of validation/: does the code reproduce closed forms, other codes, and the paper?
+
+    Without names all studies run, less those whose results are from the sources as they are.
+
+    Example: finger3d validate press_line --quick
+
+    Parameters
+    ----------
+    studies
+        Names of studies.
+    quick
+        Small meshes and few steps; the committed results are left alone.
+    """
+    from finger3d import study
+
+    known = study.studies()
+    selected = study.chosen(studies or [], known)
+    home = next(iter(known.values())).path.parent
+    if quick and out is not None and out.resolve() == home:
+        raise Finger3dError(f"--out {out}: quick results would overwrite the full ones there; name another folder")
+    folder = out or (Path(tempfile.mkdtemp(prefix="finger3d-validate-")) if quick else home)
+    _check_folder(folder)
+    report = reporter()
+    try:
+        with report:
+            found = study.validate(selected, quick, folder, report, resume=not studies and not quick, known=known)
+    except KeyboardInterrupt:
+        _complain(f"interrupted; {report.steps_done} of {len(selected)} studies are kept in {folder}")
+        return 130
+    _print_columns("study what kind reference wanted got error tolerance verdict".split(), study.table(found))
+    print(f"results: {folder}")
+    failed = [name for name, rows in found.items() if not all(row.passed for row in rows)]
+    if not failed:
+        return 0
+    _complain(f"validate: outside the tolerance: {', '.join(failed)} (see the rows marked FAIL)")
+    return MissingError.exit_code
+
+
+@app.command
 def new(file: Path = Path("scene.toml"), /) -> int:
     """Write a commented scene to start from: the paper's Fig. 9 finger.
 
@@ -178,6 +224,10 @@ def _check_writable(out: Path, scene: Path) -> None:
     """Refuse an output folder that cannot take the results, before any work."""
     if (out / "scene.toml").resolve() == scene.resolve():
         raise Finger3dError(f"--out {out}: holds {scene.name}, which the results would overwrite; name another folder")
+    _check_folder(out)
+
+
+def _check_folder(out: Path) -> None:
     try:
         out.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=out):
@@ -212,6 +262,20 @@ def _print_rows(title: str, rows: Iterable[tuple[str, Any]]) -> None:
     # In a pipe nothing limits the width: a folded path could not be copied.
     width = None if sys.stdout.isatty() else 500
     Console(highlight=False, width=width).print(table)
+
+
+def _print_columns(head: Sequence[str], lines: Iterable[Sequence[str]]) -> None:
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=box.SIMPLE)
+    for name in head:
+        table.add_column(name, overflow="fold")
+    for line in lines:
+        table.add_row(*(Text(cell.replace("**", "")) for cell in line))
+    Console(highlight=False, width=None if sys.stdout.isatty() else 240).print(table)
 
 
 def summary_rows(summary: Mapping[str, Any], out: Path) -> list[tuple[str, str]]:

@@ -1,0 +1,45 @@
+"""Every study, quick: all its rows pass; and the committed results, full: all rows pass and the index is theirs."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+
+from finger3d.study import Study, draw, kept_rows, studies, write_index
+
+STUDIES = studies()
+
+
+@pytest.mark.parametrize("study", STUDIES.values(), ids=STUDIES.keys())
+def test_study_quick(study: Study, tmp_path: Path) -> None:
+    start = time.process_time()
+    result = study.run(quick=True)
+    seconds = time.process_time() - start
+    assert result.rows
+    assert not [row for row in result.rows if not row.passed]
+    if result.figure is not None:
+        draw(result.figure, tmp_path / "figure.png")
+    # own processor time: the wall clock also counts whoever else is on the machine
+    assert seconds < 5.0, f"{study.name} takes {seconds:.1f} s; quick studies take 5 s at most (issue 4)"
+
+
+@pytest.mark.parametrize("study", STUDIES.values(), ids=STUDIES.keys())
+def test_study_tells_its_question_and_source(study: Study) -> None:
+    assert study.question.endswith("?")
+
+
+@pytest.mark.parametrize("study", STUDIES.values(), ids=STUDIES.keys())
+def test_committed_results_pass(study: Study) -> None:
+    rows = kept_rows(study.path.parent, study)
+    assert rows, f"no results: run finger3d validate {study.name}"
+    assert not [row for row in rows if not row.passed]
+
+
+def test_the_index_is_made_from_the_committed_results(tmp_path: Path) -> None:
+    home = next(iter(STUDIES.values())).path.parent
+    for name in ("results", "figures"):
+        (tmp_path / name).symlink_to(home / name)
+    write_index(tmp_path, STUDIES)
+    assert (tmp_path / "README.md").read_text() == (home / "README.md").read_text()

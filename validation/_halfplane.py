@@ -1,0 +1,127 @@
+"""A cylinder on a block so deep that it is a half-plane: the problem, and contact edges finer than the point spacing.
+
+Lengths are in units of the contact half-width a = 1 mm that the last increment aims at; E = 1 MPa.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.contact.law import OPEN, SLIP, STICK, Coulomb, FrictionLaw
+from finger3d.design import designs
+from finger3d.history import Frame
+from finger3d.model import Leg, Material, MeshOptions, Model
+from finger3d.objects import Cylinder
+from finger3d.solve import Problem, build, march
+
+Float = NDArray[np.float64]
+
+RADIUS = 100.0  # a/R = 0.01: the circle is a parabola to 2.5e-5
+DEPTH_OF_BLOCK = 200.0  # a/h = 0.005: the base's strain is 1 % of the contact's own at worst, see press_line
+_CANDIDATES = -0.2  # share of the depth; keeps the points within 2.2 a, which `a` needs beyond the edge
+
+
+def compliance(nu: float) -> float:
+    """A = 2 (1 - nu^2) / E, 1/MPa."""
+    return 2.0 * (1.0 - nu**2)
+
+
+def hertz(nu: float, a: Float) -> Float:
+    """Force (N) of a frictionless cylinder with contact half-width a (mm) on a width of 1 mm (Johnson 1985, ch. 4)."""
+    return np.pi * a**2 / (2.0 * RADIUS * compliance(nu))
+
+
+def depth(a: Float, height: float) -> Float:
+    """Depth (mm) that gives about the half-width a: a^2/2R ln(2h/a), as the bonded layer of references.md sec. 1."""
+    return a**2 / (2.0 * RADIUS) * np.log(2.0 * height / a)
+
+
+def loading(steps: int, height: float = DEPTH_OF_BLOCK, a: float = 1.0) -> tuple[Leg, ...]:
+    """Legs of one increment each with equal steps of a^2, that is of the force."""
+    return tuple(Leg(float(depth(a * np.sqrt(k / steps), height)), steps=1) for k in range(1, steps + 1))
+
+
+def line(nu: float, points: float, legs: tuple[Leg, ...], height: float = DEPTH_OF_BLOCK) -> Problem:
+    """Plane strain, `points` to the half-width; symmetric where the legs are."""
+    block = designs()["block"](half_length_mm=height, height_mm=height, width_mm=1.0)
+    mesh = MeshOptions(1.0 / points, height / 8.0, "swept")
+    model = Model(
+        block, Material(1.0, nu), mesh, legs, object=Cylinder(radius_mm=RADIUS), domain="plane-strain",
+    )  # fmt: skip
+    return build(model, margin=_CANDIDATES)
+
+
+def under(problem: Problem, friction: FrictionLaw | float, legs: tuple[Leg, ...] | None = None) -> list[Profile]:
+    """March the problem under another friction, and other legs if given; the condensation is shared."""
+    law = Coulomb(friction) if isinstance(friction, float) else friction
+    model = replace(problem.model, friction=law, legs=legs or problem.model.legs)
+    found = []
+    for frame in march(replace(problem, model=model)):
+        if not frame.outcome.ok:
+            raise AssertionError(f"mu = {law.static:g}, {frame.target}: {frame.outcome}")
+        found.append(Profile.of(problem, frame))
+    return found
+
+
+@dataclass(frozen=True)
+class Profile:
+    """One frame along x: tractions (MPa), with friction positive towards +x on the finger.
+
+    Attributes
+    ----------
+    x, area, p, q, gap, status : (m,) ascending in x
+    frame : what they come from
+    """
+
+    x: Float
+    area: Float
+    p: Float
+    q: Float
+    gap: Float
+    status: NDArray[np.int8]
+    frame: Frame
+
+    @classmethod
+    def of(cls, problem: Problem, frame: Frame) -> Profile:
+        """From a frame of a 2D problem."""
+        x = problem.points.points[:, 0]
+        order = np.argsort(x)
+        state, area = frame.state, problem.points.area[order]
+        force = state.force[order]
+        return cls(x[order], area, force[:, 0] / area, force[:, 1] / area, state.gap[order], state.status[order], frame)
+
+    @property
+    def force(self) -> float:
+        """Normal force P, N."""
+        return float(self.p @ self.area)
+
+    @property
+    def outward(self) -> float:
+        """Integral of q over x > 0, N; positive where friction pulls the surface outward."""
+        return float((self.q * self.area)[self.x > 0.0].sum())
+
+    @property
+    def touching(self) -> int:
+        """Points in contact at x >= 0."""
+        return int(((self.status != OPEN) & (self.x >= 0.0)).sum())
+
+    @property
+    def a(self) -> float:
+        """Half-width: the gap beyond the edge grows as (x - a)^1.5, so gap^(2/3) is extrapolated to 0."""
+        open_right = np.flatnonzero((self.status == OPEN) & (self.x > 0.0))[1:9]
+        if len(open_right) < 8:
+            raise AssertionError("the contact reaches the last candidate points")
+        # the first open point is left out: its weighted gap reaches into the contact
+        return float(np.polyfit(self.gap[open_right] ** (2.0 / 3.0), self.x[open_right], 2)[-1])
+
+    @property
+    def c(self) -> float:
+        """Half-width of the stick zone: half way between the last point that sticks and the next, which slips."""
+        stick = self.x[(self.status == STICK) & (self.x >= 0.0)]
+        slip = self.x[(self.status == SLIP) & (self.x > stick.max(initial=0.0))]
+        if not len(stick):
+            return 0.0
+        return float(0.5 * (stick.max() + slip.min())) if len(slip) else self.a

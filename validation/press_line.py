@@ -1,0 +1,197 @@
+"""Does a cylinder pressed on a half-plane with friction stick, slip and dissipate as Spence's solution says?
+
+Source: Spence 1968, 1975; Nowell, Hills and Sackfield 1988; Johnson 1985 sec. 5.4; numbers of references.md sec. 2,
+computed there from the coupled integral equations.  For a parabola c/a, P/P_Hertz(a), int q/P and dissipation/(A P^2)
+are constants of (beta, mu) while loading.
+
+The body is a block with a fixed base, half length and height h.  Its own strain at the surface is proportional to
+a/h: the integrals are computed at a/h = 1/100 and 1/200, and the gated values are extrapolated linearly to 0.  The
+force is compared at equal a.  A mean over the second half of the increments takes out the one-point scatter of a and c,
+which is legitimate because the solution is self-similar.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from finger3d.study import Result, Row
+
+from ._halfplane import RADIUS, Profile, compliance, hertz, line, loading, under
+
+C_OVER_A = {  # references.md sec. 2, fully coupled; (nu, mu)
+    (0.0, 0.25): 0.09910, (0.0, 0.5): 0.52191, (0.0, 1.0): 0.88959,
+    (0.3, 0.125): 0.09243, (0.3, 0.25): 0.54321, (0.3, 0.5): 0.94102, (0.3, 1.0): 0.99789,
+}  # fmt: skip
+INTEGRALS = {0.3: (1.04269, 0.09348, 4.18e-4), 0.0: (1.07903, 0.11847, 3.71e-3)}  # P/P_H, int q/P, D/(A P^2), mu = .25
+FULL_STICK = {0.0: 1.246419, 0.3: 1.065856}  # P/P_H(a), closed form of references.md sec. 2
+STEPS = {1: (0.2205, 64.1e-4), 5: (0.5128, 11.2e-4), 10: (0.5282, 7.1e-4), 50: (0.5385, 4.6e-4), 200: (0.5436, 4.3e-4)}
+# q A R/a at x/a = 0 ... 1, nu = .3, mu = .25
+CURVE = np.array([0, 0.0955, 0.1500, 0.1872, 0.2103, 0.2184, 0.2031, 0.1788, 0.1480, 0.1054, 0])
+SPENCE = "Spence 1968; references.md sec. 2"
+THREE = "issue 4: Spence integrals within 3 %"
+ONE = "issue 4: Hertz rows within 1 %"
+COLUMNS = "nu mu block_height_mm points_per_a increments P_over_Hertz q_over_P D_over_AP2 c_over_a".split()
+HEIGHTS = (100.0, 200.0)
+
+
+def numbers(profiles: list[Profile], nu: float) -> np.ndarray:
+    """P/P_H(a), int q/P, D/(A P^2), c/a: means over the second half of a self-similar loading, D at its end."""
+    half = [p for p in profiles[len(profiles) // 2 :] if p.touching >= 6] or profiles[-1:]
+    force = sum(p.force for p in half)
+    last = profiles[-1]
+    return np.array(
+        [
+            force / sum(hertz(nu, p.a) for p in half),
+            sum(p.outward for p in half) / force,
+            last.frame.dissipation_mJ / (compliance(nu) * last.force**2),
+            np.mean([p.c / p.a for p in half]),
+        ]
+    )
+
+
+def run(quick: bool) -> Result:
+    """Meshes of 10, 20, 40 points to a, 1 to 200 increments, the half-plane by extrapolation in a/h."""
+    meshes = (10, 14, 20) if quick else (10, 20, 40)
+    finest, most = meshes[-1], 50 if quick else 200
+    counts = [n for n in STEPS if n <= most]
+    rows: list[Row] = []
+    table: list[tuple[float, ...]] = []
+    curves: dict[float, Profile] = {}
+    for nu in (0.3,) if quick else (0.3, 0.0):
+        at: dict[tuple[float, int, float, int], np.ndarray] = {}
+        c_last = {}
+        for height, points in [(HEIGHTS[0], finest), *((HEIGHTS[1], n) for n in meshes)]:
+            problem = line(nu, points, loading(1), height)
+            full = numbers(under(problem, 1e6, loading(50, height)), nu)
+            at[height, points, 1e6, 50] = full
+            for count in counts if points == finest else (most,):
+                profiles = under(problem, 0.25, loading(count, height))
+                at[height, points, 0.25, count] = numbers(profiles, nu)
+                c_last[height, count] = profiles[-1].c / profiles[-1].a
+            if height == HEIGHTS[1] and points == finest:
+                curves[nu] = profiles[-1]
+                for mu in [m for n, m in C_OVER_A if n == nu and m != 0.25 and not quick]:
+                    at[height, points, mu, most] = numbers(under(problem, mu, loading(most, height)), nu)
+        table += [(nu, k[2], k[0], k[1], k[3], *v) for k, v in at.items()]
+        rows += _gates(nu, at, finest, most)
+        if nu == 0.3:
+            rows += _step_rows(at, c_last, finest, counts)
+            rows.append(_curve_row(curves[nu]))
+    columns = dict(zip(COLUMNS, map(list, zip(*table, strict=True)), strict=True))
+    return Result(tuple(rows), columns, lambda figure: _draw(figure, curves[0.3], columns, finest, most))
+
+
+def _extrapolated(at: dict[Any, np.ndarray], finest: int, mu: float, count: int) -> np.ndarray:
+    near, far = (at[h, finest, mu, count] for h in HEIGHTS)
+    return 2.0 * far - near
+
+
+def _gates(nu: float, at: dict[Any, np.ndarray], finest: int, most: int) -> list[Row]:
+    value = _extrapolated(at, finest, 0.25, most)
+    force, outward, lost = INTEGRALS[nu]
+    here = f"nu = {nu:g}, mu = .25"
+    rows = [
+        Row(f"P/P_Hertz(a), {here}", SPENCE, force, value[0], 0.01, ONE),
+        Row(f"int_0^a q/P, {here}", SPENCE, outward, value[1], 0.03, THREE),
+        Row(
+            f"P/P_Hertz(a), full stick, nu = {nu:g}", "closed form, references.md sec. 2", FULL_STICK[nu],
+            at[HEIGHTS[1], finest, 1e6, 50][0], 0.01, ONE,
+        ),
+    ]  # fmt: skip
+    if most == 200:  # fewer increments are not yet on the line ~ 1/N
+        in_steps = value[2] + (value[2] - _extrapolated(at, finest, 0.25, 50)[2]) * 50 / (200 - 50)
+        rows.append(
+            Row(
+                f"dissipation/(A P^2), {here}, extrapolated in 1/N from 50 and 200", SPENCE, lost, in_steps, 0.03, THREE
+            )
+        )
+    if nu == 0.0:
+        first, last = (at[HEIGHTS[1], n, 1e6, 50][0] - FULL_STICK[nu] for n in (finest // 4, finest))
+        rows.append(
+            Row(
+                "rate at which the error of the force falls with the mesh, full stick, nu = 0", "error ~ spacing", 1.0,
+                float(np.log(first / last) / np.log(4.0)), 0.1, "a mean over two halvings", measure="at least",
+            )
+        )  # fmt: skip
+    for (case_nu, mu), want in C_OVER_A.items():
+        key = (HEIGHTS[1], finest, mu, most)
+        if case_nu == nu and key in at:
+            rows.append(
+                Row(
+                    f"c/a, nu = {nu:g}, mu = {mu:g}", SPENCE, want, at[key][3], 0.5 / finest,
+                    f"half a point spacing, a/{finest}", measure="absolute",
+                )
+            )  # fmt: skip
+    return rows
+
+
+def _step_rows(at: dict[Any, np.ndarray], c_last: dict[Any, float], finest: int, counts: list[int]) -> list[Row]:
+    rows = []
+    for count in counts:
+        want_c, want_d = STEPS[count]
+        got = _extrapolated(at, finest, 0.25, count)[2]
+        rows.append(Row(f"dissipation/(A P^2), N = {count} increments", SPENCE, want_d, got, 0.03, THREE))
+        rows.append(
+            Row(
+                f"c/a, N = {count} increments", SPENCE, want_c, c_last[HEIGHTS[1], count], 1.0 / finest,
+                "one point spacing: a single increment, no mean", measure="absolute",
+            )
+        )  # fmt: skip
+    errors = [_extrapolated(at, finest, 0.25, n)[2] - INTEGRALS[0.3][2] for n in (1, 10)]
+    rows.append(
+        Row(
+            "rate at which the error of the dissipation falls with N, 1 to 10", "~ 1/N, references.md sec. 2", 1.0,
+            float(np.log10(errors[0] / errors[1])), 0.0, "a bound", measure="at least",
+        )
+    )  # fmt: skip
+    return rows
+
+
+def _curve_row(profile: Profile) -> Row:
+    got = _normalised(profile, np.linspace(0.0, 1.0, 11))
+    worst = float(np.abs(got - CURVE)[:-1].max() / CURVE.max())
+    return Row(
+        "q(x), largest deviation over its largest value, nu = .3, mu = .25", SPENCE, 0.0, worst, 0.05,
+        "q turns sharply at c, and c lies between two points", measure="absolute",
+    )  # fmt: skip
+
+
+def _normalised(profile: Profile, at: np.ndarray) -> np.ndarray:
+    """q A R / a at x = a `at`."""
+    return np.interp(at * profile.a, profile.x, profile.q) * compliance(0.3) * RADIUS / profile.a
+
+
+def _draw(figure: Any, profile: Profile, columns: dict[str, list[float]], finest: int, most: int) -> None:
+    left, middle, right = figure.subplots(1, 3)
+    here = np.abs(profile.x) <= profile.a
+    left.plot(profile.x[here] / profile.a, profile.q[here] * compliance(0.3) * RADIUS / profile.a, label="finger3d")
+    left.plot(np.linspace(0, 1, 11), CURVE, "k--", label="integral equations")
+    left.set(xlabel="x/a", ylabel="outward friction q A R/a", xlim=(0, 1), ylim=(0, None), title=_title(profile))
+    left.legend()
+    t = {k: np.array(v) for k, v in columns.items()}
+    tall = t["block_height_mm"] == HEIGHTS[1]
+    for nu, marker in ((0.3, "o"), (0.0, "s")):
+        of = tall & (t["nu"] == nu)
+        if of.any():
+            stuck, slip = of & (t["mu"] == 1e6), of & (t["mu"] == 0.25) & (t["increments"] == most)
+            for which, name, want in ((stuck, "full stick", FULL_STICK[nu]), (slip, "mu = .25", INTEGRALS[nu][0])):
+                error = 100 * np.abs(t["P_over_Hertz"][which] / want - 1)
+                middle.loglog(t["points_per_a"][which], error, marker + "-", label=f"P, nu = {nu:g}, {name}")
+    middle.loglog([10, 40], [2, 0.5], "k:", label="slope -1")
+    middle.set(xlabel="points per a", ylabel="error of P/P_Hertz(a), %")
+    middle.legend(fontsize=8)
+    of = (t["nu"] == 0.3) & (t["mu"] == 0.25) & (t["points_per_a"] == finest)
+    for height in HEIGHTS:
+        which = of & (t["block_height_mm"] == height)
+        right.loglog(t["increments"][which], 1e4 * t["D_over_AP2"][which], "o-", label=f"a/h = 1/{height:g}")
+    right.loglog(list(STEPS), [1e4 * d for _, d in STEPS.values()], "k+", ms=10, label="integral equations")
+    right.axhline(1e4 * INTEGRALS[0.3][2], color="k", ls="--", lw=0.8, label="N = infinity")
+    right.set(xlabel="increments N", ylabel="1e4 dissipation/(A P^2)", title="nu = .3, mu = .25")
+    right.legend(fontsize=8)
+
+
+def _title(profile: Profile) -> str:
+    got = _normalised(profile, np.linspace(0.0, 1.0, 11))
+    return f"nu = .3, mu = .25: error {100 * np.abs(got - CURVE)[:-1].max() / CURVE.max():.1f} % of the largest q"
