@@ -94,7 +94,7 @@ def plan(scene: Path, /, *, set_: Set = None) -> int:
         The scene file (TOML).
     """
     loaded = _load(scene, set_)
-    from finger3d.press import forecast
+    from finger3d.forecast import forecast
 
     expected = forecast(loaded.model())
     _print_rows("effects", effect_rows(loaded))

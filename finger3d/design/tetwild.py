@@ -77,7 +77,7 @@ def _made(
     if find_spec("pytetwild") is None:
         raise MissingError("mesh.mesher = 'ftetwild' needs the package pytetwild; install it, or use mesher = 'swept'")
     start = time.perf_counter()
-    low, high = _box(design, symmetry)
+    low, high = box(design, symmetry)
     field = sizing(design, options, zone, low, high)
     cells = forecast(design, field)
     check_count(cells, 3, options, MAX_TETS)
@@ -107,7 +107,7 @@ def _made(
     )
 
 
-def _box(design: Any, symmetry: tuple[str, ...]) -> tuple[Float, Float]:
+def box(design: Any, symmetry: tuple[str, ...]) -> tuple[Float, Float]:
     high = np.array([design.half_length_mm, design.height_mm, 0.5 * design.width_mm])
     low = np.array([0.0 if "x" in symmetry else -high[0], 0.0, 0.0 if "z" in symmetry else -high[2]])
     return low, high
