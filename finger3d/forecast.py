@@ -52,7 +52,7 @@ def forecast(model: Model) -> dict[str, Any]:
         "steps": count,
         **{f"{stage}_s": round(s, 2) for stage, s in seconds.items()},
         "total_s": round(sum(seconds.values()), 1),
-        "memory_MB": round(_memory(size, d, mixed)),
+        "memory_MB": round(_memory(size, d)),
     }
 
 
@@ -92,5 +92,6 @@ def _seconds(size: _Size, d: int, steps: int, tetwild: bool) -> dict[str, float]
     }
 
 
-def _memory(size: _Size, d: int, mixed: bool) -> float:
+def _memory(size: _Size, d: int) -> float:
     per_dof = 3.0 * (size.dofs / 85_000.0) ** 0.3 * 4e-3 if d == 3 else 2.5e-3
+    return _BASE_MB + per_dof * size.dofs + 40e-6 * (d * size.contact_points) ** 2
