@@ -1,0 +1,203 @@
+"""The main job through the command line: files, keys, cost, interruption (contract.md)."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from finger3d.cli import main
+
+SECTION = """
+[finger]
+geometry = "half_cylinder"
+radius_mm = 5.0
+width_mm = 2.0
+[material]
+E_MPa = 1.0
+nu = 0.3
+[friction]
+mu = 0.25
+[press]
+depth_mm = 0.5
+steps = 5
+[model]
+domain = "plane-stress"
+[mesh]
+size_mm = 0.2
+base_size_mm = 1.0
+[[gauge]]
+name = "g"
+x_mm = 1.0
+y_mm = 4.0
+angle_deg = 30.0
+"""
+SOLID = SECTION.replace('"plane-stress"', '"solid"').replace("size_mm = 0.2", 'size_mm = 0.4\nmesher = "swept"')
+STEP_KEYS = set(
+    """depth_mm slide_x_mm slide_z_mm time_s normal_force_N tangential_force_x_N tangential_force_z_N friction_sum_N
+    outward_friction_x_N outward_friction_z_N contact_area_mm2 stick_area_mm2 contact_half_length_mm
+    stick_half_length_mm external_work_mJ dissipation_mJ gauges iterations residual outcome""".split()
+)
+CONTACT_COLUMNS = (
+    "x_mm y_mm z_mm area_mm2 pressure_MPa shear_x_MPa shear_z_MPa gap_mm slip_x_mm slip_z_mm status".split()
+)
+
+
+def written(tmp_path: Path, text: str = SECTION, name: str = "scene.toml") -> Path:
+    path = tmp_path / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def table(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+@pytest.mark.parametrize("text", [SECTION, SOLID], ids=["section", "solid"])
+def test_press_writes_what_the_contract_names(tmp_path: Path, text: str) -> None:
+    out = tmp_path / "results with spaces, ü"
+    assert main(["press", str(written(tmp_path, text)), "--out", str(out)]) == 0
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    assert set(summary) >= {"scene", "effects", "outcome", "steps", "mesh", "cost", "versions"}
+    assert summary["outcome"] == "converged"
+    assert summary["effects"] == []
+    assert summary["scene"]["contact"]["rule"] == "projection"  # defaults are filled in
+    assert len(summary["steps"]) == 5
+    for step in summary["steps"]:
+        assert set(step) >= STEP_KEYS
+        assert ("contact_half_length_end_mm" in step) == (text is SOLID)
+        assert step["outcome"] == "converged"
+        assert step["residual"] <= 1e-8
+    assert summary["cost"]["factorizations"] == 1
+    assert set(summary["cost"]["seconds"]) >= {"cad", "mesh", "assembly", "condensation", "contact", "output", "total"}
+    assert set(summary["mesh"]) >= {"points", "cells", "dofs", "contact_points", "min_dihedral_deg", "volume_mm3",
+                                    "cad_volume_mm3", "hash", "from_cache"}  # fmt: skip
+    assert {"finger3d", "numpy", "scipy"} <= set(summary["versions"])
+    points = table(out / "contact.csv")
+    assert list(points[0]) == CONTACT_COLUMNS
+    force = sum(float(p["pressure_MPa"]) * float(p["area_mm2"]) for p in points)
+    assert force == pytest.approx(summary["steps"][-1]["normal_force_N"], rel=1e-12)
+    assert {p["status"] for p in points} <= {"open", "stick", "slip"}
+    history = table(out / "history.csv")
+    assert [float(h["normal_force_N"]) for h in history] == [s["normal_force_N"] for s in summary["steps"]]
+    assert float(history[-1]["gauge_g"]) == summary["steps"][-1]["gauges"]["g"]
+    assert all((out / name).stat().st_size > 10_000 for name in ("finger.png", "contact.png", "force.png"))
+    # the scene as run gives the same run
+    again = tmp_path / "again"
+    assert main(["press", str(out / "scene.toml"), "--out", str(again), "--no-figures"]) == 0
+    repeated = json.loads((again / "summary.json").read_text(encoding="utf-8"))
+    assert repeated["steps"][-1]["normal_force_N"] == pytest.approx(summary["steps"][-1]["normal_force_N"], rel=1e-12)
+
+
+def test_fields_open_in_pyvista_and_agree_with_the_contact_table(tmp_path: Path) -> None:
+    import numpy as np
+    import pyvista
+
+    out = tmp_path / "out"
+    assert main(["press", str(written(tmp_path, SOLID)), "--out", str(out), "--no-figures"]) == 0
+    grid = pyvista.read(out / "fields.vtu")
+    assert set(grid.point_data) >= {"displacement", "strain", "stress", "pressure", "shear_x", "shear_z", "status"}
+    assert grid["strain"].shape == grid["stress"].shape == (grid.n_points, 6)
+    points = table(out / "contact.csv")
+    pressure = np.sort([float(p["pressure_MPa"]) for p in points if float(p["pressure_MPa"]) > 0])
+    assert np.allclose(np.sort(grid["pressure"][grid["pressure"] > 0]), pressure, rtol=1e-6)
+    held = grid.points[:, 1] == 0.0
+    assert not grid["displacement"][held].any()
+    # the whole finger, mirrored from a quarter: normal displacement even, tangential odd
+    top = np.lexsort(np.round(np.abs(grid.points), 5).T)
+    four = grid["displacement"][top][: 4 * 10]
+    assert np.isfinite(four).all()
+    assert np.allclose(grid.bounds[0:2], [-5.0, 5.0], atol=1e-6)
+    # pressed by 0.5 mm: no vertex above the plane; mid-edge nodes by no more than the sagitta h^2 / 8 R, twice
+    assert (grid.points + grid["displacement"])[:, 1].max() <= 4.5 + 2 * 0.4**2 / (8 * 5.0)
+
+
+def test_effects_and_warnings_are_told(tmp_path: Path) -> None:
+    text = SECTION + '[effects.kinetic_friction]\nratio = 0.5\nbranch = "paper"\n'
+    out = tmp_path / "out"
+    assert main(["press", str(written(tmp_path, text)), "--out", str(out), "--no-figures"]) == 0
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    assert summary["effects"] == ["kinetic_friction"]
+    assert any("starts every step all stuck" in w for w in summary["warnings"])
+
+
+def test_steps_auto_reports_its_estimate(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    scene = written(tmp_path, SECTION.replace("steps = 5", 'steps = "auto"'))
+    assert main(["press", str(scene), "--out", str(out), "--no-figures"]) == 0
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    estimate = summary["step_estimate"]
+    assert estimate["met"]
+    assert len(summary["steps"]) == estimate["steps"] > 10
+    assert estimate["friction_sum"] <= estimate["friction_sum_tolerance"]
+
+
+def test_uniqueness_is_reported_and_warned_of(tmp_path: Path) -> None:
+    found = {}
+    for mu in ("0.25", "1000.0"):
+        out = tmp_path / mu
+        main(
+            ["press", str(written(tmp_path, SECTION)), "--out", str(out), "--no-figures", "--set", f"friction.mu={mu}"]
+        )
+        found[mu] = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    ratio = found["1000.0"]["uniqueness"]["largest_coupling"] / found["0.25"]["uniqueness"]["largest_coupling"]
+    assert ratio == pytest.approx(4000.0, rel=1e-9)
+    assert not found["0.25"]["warnings"]
+    assert any("several contact states" in w for w in found["1000.0"]["warnings"])
+
+
+def test_interruption_keeps_every_finished_step(tmp_path: Path) -> None:
+    scene = written(tmp_path, SECTION.replace("steps = 5", "steps = 100000"))
+    out = tmp_path / "out"
+    command = [sys.executable, "-m", "finger3d", "press", str(scene), "--out", str(out)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        history = out / "history.csv"
+        deadline = time.monotonic() + 60
+        while not (history.exists() and len(table(history)) >= 3):
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        os.kill(process.pid, signal.SIGINT)
+        _, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert err.count("\n") == 1
+    assert "Traceback" not in err
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    assert summary["outcome"].startswith("incomplete")
+    assert len(summary["steps"]) == len(table(out / "history.csv")) >= 3
+    assert all(s["outcome"] == "converged" for s in summary["steps"])
+
+
+def test_a_new_run_leaves_no_number_of_an_old_one(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    scene = written(tmp_path, SECTION)
+    assert main(["press", str(scene), "--out", str(out)]) == 0
+    assert main(["press", str(scene), "--out", str(out), "--no-figures", "--set", "press.steps=2"]) == 0
+    assert not (out / "finger.png").exists()
+    assert len(table(out / "history.csv")) == 2
+
+
+def test_contact_beyond_the_candidate_points_is_solved_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from finger3d import press, solve
+
+    scene = written(tmp_path, SECTION)
+    build = solve.build
+
+    def narrow(model, say, margin=-0.8):  # candidates only where the rigid overlap is deep
+        return build(model, say, margin)
+
+    monkeypatch.setattr(solve, "build", narrow)
+    result = press.press(scene, tmp_path / "narrow", figures=False)
+    monkeypatch.undo()
+    plain = press.press(scene, tmp_path / "plain", figures=False)
+    assert result.summary["cost"]["factorizations"] == 2
+    assert result.summary["steps"][-1]["normal_force_N"] == pytest.approx(
+        plain.summary["steps"][-1]["normal_force_N"], rel=1e-10
+    )
