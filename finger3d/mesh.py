@@ -92,7 +92,9 @@ def quadratic(mesh: Mesh) -> Mesh:
         return n + np.searchsorted(edge_keys, ordered[..., 0] * n + ordered[..., 1])
 
     facets = {
-        label: np.hstack([f, mid_nodes(f, EDGES[d - 1])]) if len(f) else np.zeros((0, 3 if d == 2 else 6), dtype=np.int64)
+        label: np.hstack([f, mid_nodes(f, EDGES[d - 1])])
+        if len(f)
+        else np.zeros((0, 3 if d == 2 else 6), dtype=np.int64)
         for label, f in mesh.facets.items()
     }
     cells = np.hstack([mesh.cells, n + number.reshape(key.shape)])
@@ -134,11 +136,7 @@ def unfold(mesh: Mesh, axes: tuple[int, ...]) -> tuple[Mesh, Int, Float]:
         flipped_sign = sign[off].copy()
         flipped_sign[:, axis] *= -1.0
         plane = "symmetry_" + "xyz"[axis]
-        facets = {
-            label: np.vstack([f, _mirrored(image[f])])
-            for label, f in mesh.facets.items()
-            if label != plane
-        }
+        facets = {label: np.vstack([f, _mirrored(image[f])]) for label, f in mesh.facets.items() if label != plane}
         cells = np.vstack([mesh.cells, _mirrored(image[mesh.cells])])
         mesh = replace(mesh, points=np.vstack([mesh.points, flipped]), cells=cells, facets=facets)
         parent = np.concatenate([parent, parent[off]])

@@ -17,8 +17,8 @@ from finger3d.report import Report
 from finger3d.versions import versions
 
 if TYPE_CHECKING:
-    from finger3d.scene import Scene
     from finger3d.increments import StepEstimate
+    from finger3d.scene import Scene
     from finger3d.solve import Problem
 
 _WRITE_EVERY_S = 0.5
@@ -113,7 +113,9 @@ class _Output:
         }
 
 
-def press(scene: Scene | str | Path, out: str | Path, report: Report | None = None, figures: bool = True) -> PressResult:
+def press(
+    scene: Scene | str | Path, out: str | Path, report: Report | None = None, figures: bool = True
+) -> PressResult:
     """Press a scene and write its results into a folder.
 
     Parameters
@@ -166,7 +168,12 @@ def _clear(folder: Path) -> None:
 
 
 def _solve(
-    scene: Scene, folder: Path, report: Report, started: float, margin: float | None = None, before: _Output | None = None
+    scene: Scene,
+    folder: Path,
+    report: Report,
+    started: float,
+    margin: float | None = None,
+    before: _Output | None = None,
 ) -> tuple[Problem, _Output]:
     from finger3d.increments import automatic
     from finger3d.solve import build
@@ -276,7 +283,12 @@ def _fields(problem: Problem, output: _Output, folder: Path, figures: bool) -> N
     write_vtu(
         folder / "fields.vtu",
         mesh,
-        {"displacement": whole_u, "strain": _voigt(strain[parent] * both), "stress": _voigt(sigma[parent] * both), **on_surface},
+        {
+            "displacement": whole_u,
+            "strain": _voigt(strain[parent] * both),
+            "stress": _voigt(sigma[parent] * both),
+            **on_surface,
+        },
     )
     if figures:
         _figures(problem, output, frame, mesh, whole_u, folder)

@@ -152,10 +152,10 @@ def contact_zone(model: Model, touch: float) -> tuple[float, float, float, float
     """Box (x_min, x_max, z_min, z_max) mm over which the rigid object would overlap the finger at rest."""
     design = model.design
     half_width = design.width_mm / 2.0
-    x, z = np.meshgrid(
+    grid = np.meshgrid(
         np.linspace(-design.half_length_mm, design.half_length_mm, 401), np.linspace(-half_width, half_width, 41)
     )
-    x, z = x.ravel(), z.ravel()
+    x, z = grid[0].ravel(), grid[1].ravel()
     top = design.top(x, z)
     overlap = np.zeros(len(x), dtype=bool)
     for target in targets(model.legs):
@@ -257,7 +257,9 @@ def _unfolded(
     number[face.nodes] = np.arange(len(face.nodes))
     nodes = np.flatnonzero(number[parent_all] >= 0)
     parent, world_sign = number[parent_all[nodes]], sign_all[nodes]
-    on_planes = sum((face.points[parent][:, i] == 0.0).astype(int) for i in numbers) if numbers else np.zeros(len(nodes))
+    on_planes = (
+        sum((face.points[parent][:, i] == 0.0).astype(int) for i in numbers) if numbers else np.zeros(len(nodes))
+    )
     share = 2.0 ** np.asarray(on_planes)
     at = np.zeros((len(nodes), 3))
     at[:, :d] = face.points[parent] * world_sign
@@ -287,11 +289,16 @@ def march(problem: Problem) -> Iterator[Frame]:
         state, at = found.state, target
         yield Frame(
             target, problem.whole(state), problem.model.object.lowest(target.slide_x_mm, target.slide_z_mm),
-            dict(zip([g.name for g in problem.model.gauges], map(float, problem.gauge_rows @ state.force.ravel()), strict=True)),
-            work, dissipation, found.outcome, found.residual, found.iterations, found.method,
+            _gauges(problem, state.force), work, dissipation,
+            found.outcome, found.residual, found.iterations, found.method,
         )  # fmt: skip
         if not found.outcome.ok and not (literal and found.method == "paper"):
             return
+
+
+def _gauges(problem: Problem, force: Float) -> dict[str, float]:
+    names = [g.name for g in problem.model.gauges]
+    return dict(zip(names, map(float, problem.gauge_rows @ force.ravel()), strict=True))
 
 
 def _guess(state: ContactState, a: Target, b: Target, pace: tuple[Target, Float] | None) -> Float | None:

@@ -191,7 +191,11 @@ def test_one_point_coulomb_is_unique_below_its_critical_coefficient() -> None:
 def test_no_touch_no_force() -> None:
     compliance, gap, _ = states_3d()
     found = advance(
-        ContactState.at_rest(gap, 3), np.column_stack([gap + 1.0, np.zeros((len(gap), 2))]), compliance, Coulomb(0.3), 1.0
+        ContactState.at_rest(gap, 3),
+        np.column_stack([gap + 1.0, np.zeros((len(gap), 2))]),
+        compliance,
+        Coulomb(0.3),
+        1.0,
     )
     assert found.outcome.ok
     assert not found.state.force.any()

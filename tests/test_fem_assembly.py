@@ -107,7 +107,9 @@ def test_manufactured_solution_converges_at_the_rates_of_quadratic_elements(nu: 
     for n in (3, 6):
         mesh = quadratic(grid((n, n, n)))
         load = body_load(mesh, lambda p: 2 * PI**2 * elastic.shear * exact(p))
-        errors.append(error_norms(mesh, solve(mesh, elastic, load, on_boundary(mesh), exact(mesh.points)), exact, slope))
+        errors.append(
+            error_norms(mesh, solve(mesh, elastic, load, on_boundary(mesh), exact(mesh.points)), exact, slope)
+        )
     rate_l2, rate_h1 = np.log2(np.array(errors[0]) / np.array(errors[1]))
     assert rate_l2 > 2.7
     assert rate_h1 > 1.8
@@ -138,7 +140,7 @@ def cook(n: int, elastic: Elasticity, force: float) -> float:
     ids=["stress", "0.3", "0.49", "0.4999", "0.5"],
 )
 def test_cook_membrane(elastic: Elasticity, force: float, want: float) -> None:
-    # references.md sec. 5.  The clamped corner's singularity governs: error ~ h^1.1 to h^1.3, so extrapolate with the ratio seen
+    # references.md sec. 5.  The clamped corner's singularity governs: error ~ h^1.1 to h^1.3; extrapolated as seen
     a, b, c = (cook(n, elastic, force) for n in (12, 24, 48))
     ratio = (c - b) / (b - a)
     assert 0.35 < ratio < 0.5
@@ -152,7 +154,9 @@ def test_linear_triangles_fail_cook_at_near_incompressibility() -> None:
         x, t = 48 * p.points[:, 0], p.points[:, 1]
         mesh = Mesh(np.stack([x, 44 * p.points[:, 0] + t * (44 - 28 * p.points[:, 0])], axis=1), p.cells, p.facets)
         load = edge_load(mesh, "x+", lambda q: np.tile([0.0, 100.0 / 16.0], (len(q), 1)))
-        u = solve(mesh, Elasticity.of(250.0, nu, mixed=False), load, on_boundary(mesh, "x-"), np.zeros_like(mesh.points))
+        u = solve(
+            mesh, Elasticity.of(250.0, nu, mixed=False), load, on_boundary(mesh, "x-"), np.zeros_like(mesh.points)
+        )
         at = np.argmin(np.linalg.norm(mesh.points - [48.0, 52.0], axis=1))
         mesh_error.append(abs(u[at, 1] / want - 1))
     assert mesh_error[0] < 0.1 < 0.25 < mesh_error[1]

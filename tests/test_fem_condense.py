@@ -60,7 +60,9 @@ def test_traces_and_strains_read_a_linear_field_exactly(dim: int) -> None:
     assert np.abs(top.trace @ u - centre @ slope.T).max() < 1e-13
     direction = np.eye(dim)[0] * 0.6 + np.eye(dim)[1] * 0.8
     point = np.full(dim, 1 / 3)  # on a shared facet
-    assert (strain_row(mesh, point, direction) @ u.ravel())[0] == pytest.approx(direction @ slope @ direction, abs=1e-12)
+    assert (strain_row(mesh, point, direction) @ u.ravel())[0] == pytest.approx(
+        direction @ slope @ direction, abs=1e-12
+    )
     assert (displacement_row(mesh, point, direction) @ u.ravel())[0] == pytest.approx(
         direction @ slope @ point, abs=1e-12
     )

@@ -54,7 +54,8 @@ def last(model: Model) -> dict[str, float]:
 
 # references.md sec. 2, the paper's half cylinder; P within 1 %, lengths within .013 plus half a contact point
 @pytest.mark.parametrize(
-    ("depth", "force", "a", "c"), [(0.2, 0.12668, 0.862, 0.639), (0.5, 0.40495, 1.508, 1.376), (1.0, 1.01932, 2.297, 2.230)]
+    ("depth", "force", "a", "c"),
+    [(0.2, 0.12668, 0.862, 0.639), (0.5, 0.40495, 1.508, 1.376), (1.0, 1.01932, 2.297, 2.230)],
 )
 def test_half_cylinder_in_plane_stress(depth: float, force: float, a: float, c: float) -> None:
     size = 0.04
@@ -105,7 +106,9 @@ def test_quarter_and_whole_model_agree_on_a_mirrored_mesh(nu: float) -> None:
 
 
 def test_contact_forces_and_base_reaction_balance() -> None:
-    problem, frames = run(block(symmetry=(), legs=(Leg(0.3, steps=2), Leg(0.3, slide_x_mm=0.1, slide_z_mm=0.05, steps=2))))
+    problem, frames = run(
+        block(symmetry=(), legs=(Leg(0.3, steps=2), Leg(0.3, slide_x_mm=0.1, slide_z_mm=0.05, steps=2)))
+    )
     unknowns = problem.unknowns(part_force(problem, frames[-1]))
     full = problem.stiffness.upper + sp.triu(problem.stiffness.upper, 1).T
     residual = (full @ unknowns)[: problem.mesh.points.size].reshape(problem.mesh.points.shape)

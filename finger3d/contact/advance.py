@@ -55,26 +55,35 @@ def advance(
     rho = stiffness_weights(matrix, d)
     mu = law.coefficients(previous.status)
     start = previous.force if guess is None else guess
-    total, worst = 0, np.inf
+    total = 0
     while True:
         problem = Increments(change, matrix, mu, rho, length_scale)
-        for method, attempt in _ladder(problem, start):
-            total += attempt.iterations
-            if not attempt.solved:
-                continue
-            force, status = attempt.force, attempt.status
-            moved = problem.moved(force)
-            error = residual(force, moved, status, mu, length_scale)
-            if error <= TOLERANCE:
-                break
-            worst = min(worst, error)
-        else:
-            return Increment(previous, Outcome.NO_CONVERGENCE, worst, total, "none")
-        revised = law.revised(mu, status)
+        method, found, error, spent = _settle(problem, start)
+        total += spent
+        if found is None:
+            return Increment(previous, Outcome.NO_CONVERGENCE, error, total, method)
+        revised = law.revised(mu, found.status)
         if revised is None:
             break
-        mu, start = revised, force
-    return Increment(next_state(previous, force, moved, status), Outcome.CONVERGED, error, total, method)
+        mu, start = revised, found.force
+    moved = problem.moved(found.force)
+    state = next_state(previous, found.force, moved, found.status)
+    return Increment(state, Outcome.CONVERGED, error, total, method)
+
+
+def _settle(problem: Increments, start: Float) -> tuple[str, Iterate | None, float, int]:
+    """Method, solution, its residual, and the iterations spent; None and the least residual where all attempts fail."""
+    spent, least = 0, np.inf
+    for method, attempt in _ladder(problem, start):
+        spent += attempt.iterations
+        if not attempt.solved:
+            continue
+        moved = problem.moved(attempt.force)
+        error = residual(attempt.force, moved, attempt.status, problem.mu, problem.length_scale)
+        if error <= TOLERANCE:
+            return method, attempt, error, spent
+        least = min(least, error)
+    return "none", None, least, spent
 
 
 def _ladder(problem: Increments, start: Float) -> Iterator[tuple[str, Iterate]]:

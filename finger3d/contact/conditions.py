@@ -1,7 +1,8 @@
 """The contact conditions, once for every dimension: as a projection to solve with, and as inequalities to check.
 
 Maeno 2004, Eqs. (1)-(4): a point is open (gap > 0, no force), or touches (gap 0, f_n > 0) and then sticks
-(no change of position, |f_t| < mu f_n) or slips (|f_t| = mu f_n); and friction opposes slip, which the paper leaves out.
+(no change of position, |f_t| < mu f_n) or slips (|f_t| = mu f_n); and friction opposes slip, which the paper leaves
+out.
 """
 
 from __future__ import annotations

@@ -64,7 +64,9 @@ def force_of_sets(problem: Increments, status: NDArray[np.int8], trial: Float) -
     rho = problem.rho.ravel()
     test = sp.csr_matrix(
         (
-            np.concatenate([rho[free_dofs], rho[normal], (turn[:, None] * across).ravel() * rho[sideways[: w * (d - 1)]]]),
+            np.concatenate(
+                [rho[free_dofs], rho[normal], (turn[:, None] * across).ravel() * rho[sideways[: w * (d - 1)]]]
+            ),
             (
                 np.concatenate([np.arange(n), at_n, np.repeat(at_w, d - 1)]),
                 np.concatenate([free_dofs, normal, sideways[: w * (d - 1)]]),
@@ -136,11 +138,9 @@ def sweeps(problem: Increments, start: Float, count: int) -> Float:
 
 
 def uniqueness(problem_mu: Float, compliance: Float, dim: int) -> float:
-    """Largest mu |K_tt^-1 K_tn| over points, K the inverse of each point's own block; above 1 answers may be several."""
+    """Largest mu |K_tt^-1 K_tn| over points, K the inverse of a point's own block; above 1 answers may be several."""
     c = len(problem_mu)
     blocks = compliance.reshape(c, dim, c, dim)[np.arange(c), :, np.arange(c)]
     stiff = np.linalg.inv(blocks)
     coupling = np.linalg.solve(stiff[:, 1:, 1:], stiff[:, 1:, :1])[:, :, 0]
     return float(np.max(problem_mu * np.linalg.norm(coupling, axis=1), initial=0.0))
-
-

@@ -43,7 +43,9 @@ class Elasticity:
         shear = E_MPa / (2.0 * (1.0 + nu))
         if plane_stress:
             return cls(shear, E_MPa * nu / (1.0 - nu**2), False)
-        compressibility = max((1.0 - 2.0 * nu) * (1.0 + nu) / (E_MPa * nu), _LEAST_COMPRESSIBILITY / shear) if nu else np.inf
+        compressibility = (
+            max((1.0 - 2.0 * nu) * (1.0 + nu) / (E_MPa * nu), _LEAST_COMPRESSIBILITY / shear) if nu else np.inf
+        )
         return cls(shear, 1.0 / compressibility, nu >= MIXED_FROM if mixed is None else mixed)
 
 
@@ -65,7 +67,7 @@ class Stiffness:
 
 
 def _pairs(nodes: Int, count: int) -> tuple[Int, Int, Int]:
-    """Sparse pattern of the upper node-node blocks: slot (e, k, k) of every local pair, and the slots' row and column."""
+    """Pattern of the upper node-node blocks: slot (e, pairs) of every local pair, and the slots' row and column."""
     small = np.minimum(nodes[:, :, None], nodes[:, None, :])
     large = np.maximum(nodes[:, :, None], nodes[:, None, :])
     local = np.triu_indices(nodes.shape[1])

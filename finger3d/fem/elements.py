@@ -50,9 +50,9 @@ def quadrature(dim: int, degree: int) -> tuple[Float, Float]:
     if degree == 5 and dim == 2:
         root = math.sqrt(15.0)
         orbits = [(6.0 - root) / 21.0, (6.0 + root) / 21.0]
-        bary = [np.full((1, 3), 1.0 / 3.0), *[np.full((3, 3), a) + (1.0 - 3.0 * a) * np.eye(3) for a in orbits]]
-        weights = [9.0 / 80.0, *[(155.0 - root) / 2400.0] * 3, *[(155.0 + root) / 2400.0] * 3]
-        return np.vstack(bary), np.array(weights)
+        points = [np.full((1, 3), 1.0 / 3.0), *[np.full((3, 3), a) + (1.0 - 3.0 * a) * np.eye(3) for a in orbits]]
+        values = [9.0 / 80.0, *[(155.0 - root) / 2400.0] * 3, *[(155.0 + root) / 2400.0] * 3]
+        return np.vstack(points), np.array(values)
     from scipy.special import roots_jacobi
 
     order = degree // 2 + 1

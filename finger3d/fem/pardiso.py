@@ -105,7 +105,9 @@ class SchurFactor:
         return x[:n].reshape(load.shape)
 
 
-def _run(call: Any, pt: Any, phase: int, n: int, a: Any, ia: Any, ja: Any, perm: Any, nrhs: int, iparm: Any, b: Any, x: Any) -> None:
+def _run(
+    call: Any, pt: Any, phase: int, n: int, a: Any, ia: Any, ja: Any, perm: Any, nrhs: int, iparm: Any, b: Any, x: Any
+) -> None:
     def i32(value: int) -> Any:
         return ctypes.byref(ctypes.c_int32(value))
 

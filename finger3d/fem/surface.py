@@ -62,12 +62,10 @@ def surface(mesh: Mesh, label: str, thickness: float = 1.0) -> Surface:
     samples = np.einsum("qk,mkd->mqd", psi, coords).reshape(-1, d)
     hat = weights[:, :, None] * phi  # (m, q, corner)
     m, q = weights.shape
-    area = np.bincount(number.ravel(), hat.sum(axis=1).ravel(), minlength=len(nodes))
+    area: Float = np.bincount(number.ravel(), hat.sum(axis=1).ravel(), minlength=len(nodes)).astype(np.float64)
     which = np.broadcast_to(number[:, None, :], hat.shape)
     at = np.broadcast_to(np.arange(m * q).reshape(m, q, 1), hat.shape)
-    average = sp.csr_matrix(
-        ((hat / area[which]).ravel(), (which.ravel(), at.ravel())), shape=(len(nodes), m * q)
-    )
+    average = sp.csr_matrix(((hat / area[which]).ravel(), (which.ravel(), at.ravel())), shape=(len(nodes), m * q))
     spread = np.broadcast_to(facets[:, None, :], (m, q, facets.shape[1]))
     values = sp.csr_matrix(
         (np.broadcast_to(psi, spread.shape).ravel(), (np.repeat(np.arange(m * q), psi.shape[1]), spread.ravel())),
@@ -111,7 +109,7 @@ def locate(mesh: Mesh, point: Float) -> list[tuple[int, Float]]:
 
 
 def strain_row(mesh: Mesh, point: Float, direction: Float) -> sp.csr_matrix:
-    """Row (1, n d) of the normal strain at `point` (d,) along the unit `direction` (d,), mean over cells that hold it."""
+    """Row (1, n d) of the normal strain at `point` (d,) along a unit `direction` (d,), mean over cells that hold it."""
     found = _holding(mesh, point)
     row = np.zeros(mesh.points.shape)
     for cell, bary in found:
