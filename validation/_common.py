@@ -1,0 +1,244 @@
+"""What element and contact studies share: graded boxes, consistent loads, a full solution, error norms, rates, axes."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from finger3d.contact.advance import advance
+from finger3d.contact.law import Coulomb
+from finger3d.contact.state import ContactState, Increment
+from finger3d.fem.assembly import Elasticity, stiffness
+from finger3d.fem.condense import condense
+from finger3d.fem.elements import physical_gradients, quadrature, shape, surface_measure
+from finger3d.fem.surface import Surface, local_rows, restrict, surface
+from finger3d.mesh import Mesh, boundary, quadratic, signed_volumes
+from finger3d.objects import vertical_frame
+
+Float = NDArray[np.float64]
+Field = Callable[[Float], Float]
+
+_DEGREE = 6  # integrates the square of a quadratic element's error, which is cubic, exactly
+
+
+def graded(length: float, first: float, growth: float) -> Float:
+    """Coordinates (n + 1,) from 0 to `length`, the first step near `first`, each next one `growth` times longer."""
+    if growth == 1.0:
+        return np.linspace(0.0, length, max(1, round(length / first)) + 1)
+    count = max(1, round(np.log1p(length * (growth - 1.0) / first) / np.log(growth)))
+    steps = growth ** np.arange(count)
+    return np.concatenate([[0.0], np.cumsum(steps) * length / steps.sum()])
+
+
+def halved(coordinates: Float) -> Float:
+    """Coordinates with a new one in every middle: the nested refinement."""
+    middle = 0.5 * (coordinates[1:] + coordinates[:-1])
+    return np.insert(coordinates, np.arange(1, len(coordinates)), middle)
+
+
+def box(axes: Sequence[Float]) -> Mesh:
+    """Linear Kuhn mesh of a box with the given coordinates along each axis; sides labelled x-, x+, y-, ..."""
+    d = len(axes)
+    counts = [len(a) - 1 for a in axes]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, d)
+    strides = np.array([np.prod([n + 1 for n in counts[i + 1 :]]) for i in range(d)], dtype=np.int64)
+    low = np.stack(np.meshgrid(*[np.arange(n) for n in counts], indexing="ij"), axis=-1).reshape(-1, d) @ strides
+    paths = [np.concatenate([[0], np.cumsum(strides[list(p)])]) for p in itertools.permutations(range(d))]
+    mesh = Mesh(points, np.vstack([low[:, None] + p for p in paths]), {})
+    turned = signed_volumes(mesh) < 0
+    mesh.cells[turned] = mesh.cells[turned][:, [1, 0, *range(2, d + 1)]]
+    outer = boundary(mesh.cells, d)
+    facets = {}
+    for axis, (sign, at) in itertools.product(range(d), (("-", 0), ("+", -1))):
+        facets["xyz"[axis] + sign] = outer[np.all(points[outer][:, :, axis] == axes[axis][at], axis=1)]
+    return Mesh(points, mesh.cells, facets)
+
+
+def cube(dim: int, count: int) -> Mesh:
+    """Linear mesh of the unit square or cube, `count` cells along each side."""
+    return box([np.linspace(0.0, 1.0, count + 1)] * dim)
+
+
+def shuffled(mesh: Mesh, share: float, seed: int = 0) -> Mesh:
+    """The mesh with its inner vertices moved at random by up to a share of the cells' size (cells all alike)."""
+    step = np.ptp(mesh.points[mesh.cells[0]], axis=0)
+    inside = np.ones(len(mesh.points), dtype=bool)
+    inside[nodes_of(mesh)] = False
+    moves = np.random.default_rng(seed).uniform(-share, share, mesh.points.shape) * step
+    return Mesh(mesh.points + moves * inside[:, None], mesh.cells, mesh.facets)
+
+
+def mapped(mesh: Mesh, function: Field) -> Mesh:
+    """Quadratic mesh with all its nodes moved by a function of the points (n, d)."""
+    whole = mesh if mesh.is_quadratic else quadratic(mesh)
+    return Mesh(function(whole.points), whole.cells, whole.facets)
+
+
+def nodes_of(mesh: Mesh, *labels: str) -> NDArray[np.int64]:
+    """Nodes of some sides, of all if none is named."""
+    return np.unique(np.concatenate([f.ravel() for k, f in mesh.facets.items() if not labels or k in labels]))
+
+
+def held_at(mesh: Mesh, sides: Mapping[str, Sequence[int]]) -> NDArray[np.bool_]:
+    """Mask (n, d) of the components that are held, from side -> axes."""
+    held = np.zeros(mesh.points.shape, dtype=bool)
+    for side, axes in sides.items():
+        held[np.ix_(nodes_of(mesh, side), list(axes))] = True
+    return held
+
+
+def body_load(mesh: Mesh, force: Field) -> Float:
+    """Consistent nodal loads (n, d) N of a body force (q, d) N/mm3 at points (q, d)."""
+    bary, w = quadrature(mesh.dim, _DEGREE)
+    _, det = physical_gradients(mesh.points[mesh.cells], bary, mesh.is_quadratic)
+    psi = shape(bary, mesh.is_quadratic)
+    at = np.einsum("qk,ekd->eqd", psi, mesh.points[mesh.cells])
+    value = force(at.reshape(-1, mesh.dim)).reshape(at.shape)
+    load = np.zeros_like(mesh.points)
+    np.add.at(load, mesh.cells, np.einsum("eq,qk,eqd->ekd", det * w, psi, value))
+    return load
+
+
+def side_load(mesh: Mesh, label: str, traction: Field) -> Float:
+    """Consistent nodal loads (n, d) N of a traction (q, d) MPa at points (q, d) of a side."""
+    facets = mesh.facets[label]
+    bary, w = quadrature(mesh.dim - 1, _DEGREE)
+    weights = surface_measure(mesh.points[facets], bary, mesh.is_quadratic) * w
+    psi = shape(bary, mesh.is_quadratic)
+    at = np.einsum("qk,mkd->mqd", psi, mesh.points[facets])
+    value = traction(at.reshape(-1, mesh.dim)).reshape(at.shape)
+    load = np.zeros_like(mesh.points)
+    np.add.at(load, facets, np.einsum("mq,qk,mqd->mkd", weights, psi, value))
+    return load
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Displacements (n, d) mm, vertex pressures (n,) MPa of the mixed form, else 0, and reactions (n, d) N."""
+
+    u: Float
+    pressure: Float
+    reaction: Float
+
+
+def solve(
+    mesh: Mesh, elastic: Elasticity, held: NDArray[np.bool_], value: Float | float = 0.0, load: Float | float = 0.0
+) -> Solution:
+    """Solve a body with nodal values prescribed where `held` (n, d), by the product's assembly and factorisation."""
+    matrix = stiffness(mesh, elastic)
+    upper = matrix.upper
+    whole = upper + sparse.triu(upper, 1).T
+    known = np.zeros(upper.shape[0])
+    known[: mesh.points.size] = np.where(held, value, 0.0).ravel()
+    outer = np.zeros(upper.shape[0])
+    outer[: mesh.points.size] = np.broadcast_to(load, mesh.points.shape).ravel()
+    right = sparse.csr_matrix((outer - whole @ known)[None])
+    x = known + condense(matrix, np.flatnonzero(held.ravel()), right).unknowns(np.ones(1))
+    pressure = np.zeros(len(mesh.points))
+    pressure[matrix.pressure_vertices] = matrix.pressure_scale * x[mesh.points.size :]
+    n = mesh.points.size
+    return Solution(x[:n].reshape(held.shape), pressure, (whole @ x - outer)[:n].reshape(held.shape))
+
+
+def error_norms(mesh: Mesh, u: Float, exact: Field, slope: Field) -> tuple[float, float]:
+    """L2 norms of the error of u (n, d) and of its gradient; `slope` gives (q, d, d), first index the component."""
+    bary, w = quadrature(mesh.dim, _DEGREE)
+    gradients, det = physical_gradients(mesh.points[mesh.cells], bary, mesh.is_quadratic)
+    psi = shape(bary, mesh.is_quadratic)
+    d = mesh.dim
+    at = np.einsum("qk,ekd->eqd", psi, mesh.points[mesh.cells]).reshape(-1, d)
+    value = np.einsum("qk,ekd->eqd", psi, u[mesh.cells]).reshape(-1, d)
+    steep = np.einsum("ekj,eqki->eqji", u[mesh.cells], gradients, optimize=True).reshape(-1, d, d)
+    weight = (det * w).ravel()
+    return (
+        float(np.sqrt(weight @ np.sum((value - exact(at)) ** 2, axis=1))),
+        float(np.sqrt(weight @ np.sum((steep - slope(at)) ** 2, axis=(1, 2)))),
+    )
+
+
+def pressure_error(mesh: Mesh, pressure: Float, exact: Field) -> float:
+    """L2 norm of the error of vertex pressures (n,), linear over each cell; `exact` gives (q,)."""
+    bary, w = quadrature(mesh.dim, _DEGREE)
+    _, det = physical_gradients(mesh.points[mesh.cells], bary, mesh.is_quadratic)
+    at = np.einsum("qk,ekd->eqd", shape(bary, mesh.is_quadratic), mesh.points[mesh.cells])
+    value = pressure[mesh.cells[:, : mesh.dim + 1]] @ bary.T
+    return float(np.sqrt(np.sum(det * w * (value - exact(at.reshape(-1, mesh.dim)).reshape(value.shape)) ** 2)))
+
+
+@dataclass(frozen=True)
+class Body:
+    """A body condensed to the contact points of one side: compliance (c, d, c, d) mm/N in the vertical frame."""
+
+    surface: Surface
+    compliance: Float
+
+    def press(
+        self, gap: Float, mu: float = 0.0, previous: ContactState | None = None, scale: float | None = None
+    ) -> Increment:
+        """Forces under a rigid gap (c,) mm at rest, negative where the object would overlap."""
+        d = self.compliance.shape[1]
+        free = np.zeros((len(gap), d))
+        free[:, 0] = gap
+        start = previous or ContactState.at_rest(np.maximum(gap, 0.0), d)
+        return advance(start, free, self.compliance, Coulomb(mu), scale or float(-gap.min()))
+
+    def gap(self, height: Field) -> Float:
+        """Weighted mean (c,) of a height above the surface, given at points (q, d)."""
+        return np.asarray(self.surface.average @ height(self.surface.samples))
+
+
+def body(
+    mesh: Mesh,
+    elastic: Elasticity,
+    held: NDArray[np.bool_],
+    label: str,
+    keep: Callable[[Float], Any] = lambda points: np.ones(len(points), dtype=bool),
+    solver: str | None = None,
+) -> Body:
+    """Condense to the points of a side where `keep` of their places (c, d) holds; normal -y."""
+    face = surface(mesh, label)
+    face = restrict(face, keep(face.points))
+    rows = local_rows(face, vertical_frame(mesh.dim))
+    matrix = stiffness(mesh, elastic)
+    c, d = face.points.shape
+    # a direction held at a point (a symmetry plane) cannot move: it is left out of the condensation
+    locked = held[face.nodes][:, [1, 0, 2][:d]].ravel()
+    free = np.flatnonzero(~locked)
+    small = condense(matrix, np.flatnonzero(held.ravel()), rows[free], solver).compliance
+    whole = np.diag(np.full(c * d, np.diagonal(small).max()))
+    whole[np.ix_(free, free)] = small
+    return Body(face, whole.reshape(c, d, c, d))
+
+
+def rate(sizes: Sequence[float], errors: Sequence[float]) -> float:
+    """Slope of the least-squares line through log(error) over log(size)."""
+    return float(np.polyfit(np.log(sizes), np.log(np.abs(errors)), 1)[0])
+
+
+def convergence(
+    axes: Any, sizes: Sequence[float], curves: Mapping[str, Sequence[float]], slope: float, xlabel: str, ylabel: str
+) -> None:
+    """Draw measured errors as solid points over the size, log-log, and the slope of theory dashed beside them."""
+    from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
+
+    sizes = np.asarray(sizes, dtype=float)
+    for (label, errors), marker in zip(curves.items(), itertools.cycle("osD^v")):
+        axes.loglog(sizes, np.abs(errors), marker + "-", label=label, markersize=4.5)
+    last = max(abs(errors[int(np.argmin(sizes))]) for errors in curves.values())
+    axes.loglog(
+        sizes, 1.6 * last * (sizes / sizes.min()) ** slope, "k--", linewidth=1.0, label=f"slope {slope:.3g} (theory)"
+    )
+    axes.xaxis.set_major_locator(FixedLocator(list(sizes)))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.3g}"))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.set_xlabel(xlabel)
+    axes.set_ylabel(ylabel)
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=8)

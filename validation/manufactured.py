@@ -1,0 +1,120 @@
+"""Do displacement and pressure converge at the rates of quadratic elements for every Poisson's ratio, 1/2 included?
+
+Manufactured solutions, free of divergence so that they hold for every nu: in 3D u = (sin py sin pz, sin pz sin px,
+sin px sin py), p = pi, under b = 2 p^2 G u; in 2D u = (sin py, sin px) under b = p^2 G u.  In the mixed form a pressure
+sin 2px cos py is added through b at nu = 1/2.  Theory: Ciarlet 1978 (L2 3, H1 2 for quadratic elements), Boffi, Brezzi
+and Fortin 2013 sec. 8.8 (Taylor-Hood: the same, pressure 2).  Reference: references.md sec. 5.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.fem.assembly import Elasticity
+from finger3d.mesh import quadratic
+from finger3d.study import Result, Row
+
+from ._common import body_load, convergence, cube, error_norms, held_at, pressure_error, rate, solve
+
+Float = NDArray[np.float64]
+PI = np.pi
+NUS = (0.3, 0.49, 0.4999, 0.5)
+_SOURCE = "Ciarlet 1978; Boffi, Brezzi, Fortin 2013"
+
+
+def exact(p: Float) -> Float:
+    """Displacement (n, d) at points (n, d)."""
+    s = np.sin(PI * p)
+    if p.shape[1] == 2:
+        return s[:, ::-1]
+    return np.stack([s[:, 1] * s[:, 2], s[:, 2] * s[:, 0], s[:, 0] * s[:, 1]], axis=1)
+
+
+def slope(p: Float) -> Float:
+    """Its gradient (n, d, d), first index the component."""
+    s, c = np.sin(PI * p), PI * np.cos(PI * p)
+    d = p.shape[1]
+    out = np.zeros((len(p), d, d))
+    if d == 2:
+        out[:, 0, 1], out[:, 1, 0] = c[:, 1], c[:, 0]
+        return out
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        out[:, i, j], out[:, i, k] = c[:, j] * s[:, k], s[:, j] * c[:, k]
+    return out
+
+
+def pressure(p: Float) -> Float:
+    """Pressure (n,) at points (n, d), mean zero; used at nu = 1/2, where it is free of the displacement."""
+    return np.sin(2 * PI * p[:, 0]) * np.cos(PI * p[:, 1])
+
+
+def pressure_slope(p: Float) -> Float:
+    """Its gradient (n, d)."""
+    out = np.zeros_like(p)
+    out[:, 0] = 2 * PI * np.cos(2 * PI * p[:, 0]) * np.cos(PI * p[:, 1])
+    out[:, 1] = -PI * np.sin(2 * PI * p[:, 0]) * np.sin(PI * p[:, 1])
+    return out
+
+
+def errors(dim: int, count: int, nu: float) -> tuple[float, float, float]:
+    """L2 and H1 errors of the displacement, L2 error of the pressure (nan in the displacement form)."""
+    mesh = quadratic(cube(dim, count))
+    elastic = Elasticity.of(1.0, nu)
+    share = float(nu == 0.5)
+    load = body_load(mesh, lambda p: (dim - 1) * PI**2 * elastic.shear * exact(p) - share * pressure_slope(p))
+    held = held_at(mesh, {side: range(dim) for side in mesh.facets})
+    found = solve(mesh, elastic, held, exact(mesh.points), load)
+    l2, h1 = error_norms(mesh, found.u, exact, slope)
+    if not elastic.mixed:
+        return l2, h1, np.nan
+    # the mean of p follows from the held boundary's round-off at nu = 1/2: compare without it
+    away = found.pressure - _mean(mesh, found.pressure)
+    return l2, h1, pressure_error(mesh, away, lambda p: share * pressure(p))
+
+
+def _mean(mesh: Any, values: Float) -> float:
+    lift = pressure_error(mesh, values + 1.0, lambda p: np.zeros(len(p))) ** 2
+    drop = pressure_error(mesh, values - 1.0, lambda p: np.zeros(len(p))) ** 2
+    return (lift - drop) / 4.0  # the cube's volume is 1
+
+
+def run(quick: bool) -> Result:
+    """Answer the question."""
+    counts = {2: (4, 8, 16), 3: (2, 4, 6)} if quick else {2: (8, 16, 32, 64), 3: (3, 5, 10)}
+    nus = {2: NUS, 3: (0.3, 0.5)} if quick else {2: NUS, 3: NUS}
+    found = {(d, nu): np.array([errors(d, n, nu) for n in counts[d]]) for d in (2, 3) for nu in nus[d]}
+    rows = []
+    for (d, nu), e in found.items():
+        sizes = 1.0 / np.array(counts[d])
+        reason = f"{counts[d][0]} cells to a side is before the asymptotic range; more than the rate is welcome"
+        for name, column, wanted in (("displacement, L2", 0, 3.0), ("gradient, L2", 1, 2.0), ("pressure, L2", 2, 2.0)):
+            if column < 2 or nu == 0.5:
+                got = rate(sizes[-2:], e[-2:, column])
+                what = f"rate of {name}, {d}D, nu = {nu:g}"
+                rows.append(Row(what, _SOURCE, wanted, got, 0.1, reason, measure="at least"))
+        if nu > 0.3:
+            growth = e[-1, 0] / found[d, 0.3][-1, 0]
+            what = f"L2 error over that at nu = 0.3, {d}D, nu = {nu:g}"
+            why = "a constant that grew with nu would mean locking; the pressure's own error adds a share"
+            rows.append(Row(what, "no locking", 1.0, growth, 0.05, why, measure="at most"))
+    flat = [(d, nu, n, *values) for (d, nu), e in found.items() for n, values in zip(counts[d], e, strict=True)]
+    names = ("dim", "nu", "cells_per_side", "displacement_L2", "gradient_L2", "pressure_L2")
+    table = dict(zip(names, map(list, zip(*flat, strict=True)), strict=True))
+    return Result(tuple(rows), table, lambda f: draw(f, found, counts))
+
+
+def draw(figure: Any, found: dict[tuple[int, float], Float], counts: dict[int, tuple[int, ...]]) -> None:
+    """Errors over the cell size, 2D and 3D; curves of all nu lie on each other, so two of them are drawn."""
+    for d, axes in zip((2, 3), figure.subplots(1, 2), strict=True):
+        sizes = 1.0 / np.array(counts[d])
+        for column, wanted, kind in ((1, 2.0, "gradient of u"), (0, 3.0, "u")):
+            curves = {f"{kind}, nu = {nu:g}": found[d, nu][:, column] for nu in (0.3, 0.5)}
+            if column == 1:
+                curves["pressure, nu = 0.5"] = found[d, 0.5][:, 2]
+            convergence(axes, sizes, curves, wanted, "cell size / side", "L2 error (mm, MPa), unit cube, E = 1 MPa")
+        axes.set_ylim(bottom=found[d, 0.3][-1, 0] / 100.0)
+        axes.set_title(f"{d}D, quadratic elements, mixed from nu = 0.48")
