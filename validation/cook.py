@@ -1,0 +1,175 @@
+"""Does Cook's membrane come out right from compressible to incompressible, where linear elements lock?
+
+Cook 1974: a tapered panel, 48 mm long, 44 and 16 mm high, clamped on the left, sheared on the right; wanted is the
+deflection at (48, 52).  Reference values: references.md sec. 5 (Cook 1974; Brink and Stein 1996), each of four digits.
+Theory of the rate: the upper clamped corner (108.4 degrees) has a displacement r^e (Williams 1952), and a deflection
+converges as h^(2e): 1.09 at nu = 1/2.  The gated value is extrapolated with that rate; a mesh graded towards the
+corner, with no extrapolation, must agree.  In 3D the panel is a slab whose faces are held, which is plane strain.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.fem.assembly import Elasticity
+from finger3d.mesh import Mesh
+from finger3d.study import Result, Row
+
+from ._common import box, convergence, held_at, mapped, side_load, solve
+from ._corner import clamped_free, extrapolated
+
+Float = NDArray[np.float64]
+CORNER = np.pi / 2 + np.arctan2(16.0, 48.0)
+_COOK = "Cook 1974; references.md sec. 5"
+_WILLIAMS = "Williams 1952: 2 e"
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A case: constants, force per thickness, published deflection (mm)."""
+
+    E_MPa: float
+    nu: float
+    force: float
+    wanted: float
+    plane_stress: bool = False
+
+    @property
+    def elastic(self) -> Elasticity:
+        """Constants as the code takes them."""
+        return Elasticity.of(self.E_MPa, self.nu, self.plane_stress)
+
+    @property
+    def rate(self) -> float:
+        """Rate that theory gives."""
+        return 2.0 * clamped_free(CORNER, self.nu, self.plane_stress)
+
+    @property
+    def name(self) -> str:
+        """For a reader."""
+        return f"{'plane stress' if self.plane_stress else 'plane strain'}, nu = {self.nu:.4g}"
+
+
+PANELS = (
+    Panel(1.0, 1 / 3, 1.0, 23.967, plane_stress=True),
+    Panel(250.0, 0.3, 100.0, 8.778),
+    Panel(250.0, 0.49, 100.0, 7.493),
+    Panel(250.0, 0.4999, 100.0, 7.403),
+    Panel(250.0, 0.5, 100.0, 7.4025),
+)
+
+
+def taper(p: Float) -> Float:
+    """The panel from the unit square; z, if any, stays."""
+    out = p.copy()
+    out[:, 0] = 48.0 * p[:, 0]
+    out[:, 1] = 44.0 * p[:, 0] + p[:, 1] * (44.0 - 28.0 * p[:, 0])
+    return out
+
+
+def deflection(flat: Mesh, panel: Panel, elastic: Elasticity | None = None) -> float:
+    """Deflection (mm) at (48, 52) from a mesh of the unit square, or of a unit square in a slab."""
+    mesh = mapped(flat, taper) if elastic is None else Mesh(taper(flat.points), flat.cells, flat.facets)
+    d = mesh.dim
+    load = side_load(mesh, "x+", lambda p: np.tile([0.0, panel.force / 16.0, 0.0][:d], (len(p), 1)))
+    held = held_at(mesh, {"x-": range(d)} | ({"z-": [2], "z+": [2]} if d == 3 else {}))
+    u = solve(mesh, elastic or panel.elastic, held, 0.0, load).u
+    return float(u[np.argmin(np.linalg.norm(mesh.points[:, :2] - [48.0, 52.0], axis=1)), 1])
+
+
+def square(count: int) -> Mesh:
+    """Unit square, `count` cells a side."""
+    return box([np.linspace(0.0, 1.0, count + 1)] * 2)
+
+
+def slab(count: int) -> Mesh:
+    """The same in one layer of cells, as thick as the panel's cells are long."""
+    return box([np.linspace(0.0, 1.0, count + 1)] * 2 + [np.array([0.0, 48.0 / count])])
+
+
+def towards_corner(size: float) -> Mesh:
+    """Unit square with cells of `size`, and 1e-5 at the upper left corner; a vertex at the middle of the right side."""
+    x, y = _from_corner(1.0, size), 0.5 * _from_corner(1.0, 2.0 * size)
+    return box([x, np.concatenate([np.linspace(0.0, 0.5, round(0.5 / size) + 1)[:-1], 1.0 - y[::-1]])])
+
+
+def _from_corner(length: float, size: float) -> Float:
+    """Coordinates from 0 to `length`: steps that grow by half until they are `size`."""
+    fine = np.cumsum(1e-5 * 1.5 ** np.arange(np.log(size / 1e-5) / np.log(1.5)))
+    return np.concatenate([[0.0], fine[:-1], np.linspace(fine[-1], length, round((length - fine[-1]) / size) + 1)])
+
+
+def run(quick: bool) -> Result:
+    """Uniform meshes of three and more sizes, one graded, slabs, and linear triangles for contrast."""
+    counts = (12, 24, 48) if quick else (16, 32, 64, 128)
+    thick = (3, 6, 12) if quick else (8, 16, 32)
+    rows: list[Row] = []
+    table: list[tuple[Any, ...]] = []
+    errors = {}
+    panels = tuple(p for p in PANELS if not quick or p.nu not in (0.49, 0.4999))
+    for panel in panels:
+        found = [deflection(square(n), panel) for n in counts]
+        limit = extrapolated(found[-2], found[-1], panel.rate)
+        corner = deflection(towards_corner(1 / 12 if quick else 1 / 32), panel)
+        steps = np.diff(found)
+        errors[panel.name] = [abs(v / limit - 1.0) for v in found]
+        table += [(panel.name, 2, n, v) for n, v in zip(counts, found, strict=True)]
+        why = "four published digits, extrapolated there from coarser meshes"
+        rows.append(Row(f"deflection at (48, 52), {panel.name} (mm)", _COOK, panel.wanted, limit, 1e-3, why))
+        why = "the extrapolation assumes the leading term alone; away from the corner the graded mesh is coarse"
+        rows.append(
+            Row(f"the same, extrapolated against graded, {panel.name} (mm)", "own mesh", corner, limit, 5e-4, why)
+        )
+        why = "differences of three levels; the next term decays slowly, and adds to the rate"
+        rate = float(np.log2(steps[-2] / steps[-1]))
+        rows.append(
+            Row(f"rate of the deflection, {panel.name}", _WILLIAMS, panel.rate, rate, 0.15, why, measure="absolute")
+        )
+        if not panel.plane_stress:
+            solid = [deflection(slab(n), panel) for n in thick]
+            table += [(panel.name, 3, n, v) for n, v in zip(thick, solid, strict=True)]
+            flat = deflection(square(thick[-1]), panel)
+            why = "the diagonals of the slab's cells differ from the section's"
+            rows.append(
+                Row(
+                    f"held slab against section, {thick[-1]} cells, {panel.name} (mm)", "2D", flat, solid[-1], 1e-3, why
+                )
+            )
+    rows += [_locking(0.3, "at most", 0.06), _locking(0.4999, "at least", 0.25)]
+    names = ("case", "dim", "cells_per_side", "deflection_mm")
+    columns = dict(zip(names, map(list, zip(*table, strict=True)), strict=True))
+    return Result(tuple(rows), columns, lambda figure: draw(figure, counts, errors, table))
+
+
+def _locking(nu: float, measure: Any, bound: float) -> Row:
+    """Linear triangles must fail at nu near 1/2, or the benchmark shows nothing."""
+    panel = next(p for p in PANELS if p.nu == nu)
+    got = abs(deflection(square(24), panel, Elasticity.of(250.0, nu, mixed=False)) / panel.wanted - 1.0)
+    what = f"error of linear triangles, 24 cells, nu = {nu:g}: {'fine' if measure == 'at most' else 'they must lock'}"
+    return Row(
+        what, _COOK, bound, got, 0.0, "a benchmark that linear elements pass would prove nothing", measure=measure
+    )
+
+
+def draw(figure: Any, counts: tuple[int, ...], errors: dict[str, list[float]], table: list[tuple[Any, ...]]) -> None:
+    """Errors over the cell size, and deflections of sections and slabs."""
+    left, right = figure.subplots(1, 2)
+    sizes = 1.0 / np.array(counts)
+    least = min(p.rate for p in PANELS if p.name in errors)
+    convergence(left, sizes, errors, least, "cell size / side", "error of the deflection, relative to the extrapolated")
+    for panel in (p for p in PANELS[1:] if p.name in errors):
+        for dim, line in ((2, "o-"), (3, "s:")):
+            n, v = np.array([(t[2], t[3]) for t in table if t[:2] == (panel.name, dim)]).T
+            colour = f"C{PANELS.index(panel)}"
+            right.plot(n, v, line, color=colour, markersize=4.5, label=f"{dim}D, nu = {panel.nu:g}")
+        right.axhline(panel.wanted, color=colour, linestyle="--", linewidth=0.8)
+    right.set_xscale("log", base=2)
+    right.set_xlabel("cells along a side")
+    right.set_ylabel("deflection at (48, 52), mm (dashed: published)")
+    right.set_xticks(ticks := sorted({t[2] for t in table}), [str(n) for n in ticks])
+    right.legend(fontsize=7, ncol=2)
+    right.grid(alpha=0.3)
