@@ -51,3 +51,26 @@ def violation(before: ContactState, after: ContactState, free: np.ndarray, compl
                 e = t / np.linalg.norm(t)
                 worst = max(worst, slip @ e, np.linalg.norm(slip - (slip @ e) * e))
     return float(worst)
+
+
+def half_space(x: np.ndarray, z: np.ndarray, spacing: float, nu: float, modulus: float = 1.0) -> np.ndarray:
+    """Compliance (c, 3, c, 3) of points on an elastic half-space: Boussinesq's and Cerruti's kernels (Johnson 1985, 3.2).
+
+    A point's own entry is that of a disc of the point's area under uniform traction, at its centre.
+    """
+    dx, dz = x[:, None] - x, z[:, None] - z
+    r = np.hypot(dx, dz)
+    own = np.eye(len(x), dtype=bool)
+    r[own] = 1.0
+    a = spacing / np.sqrt(np.pi)
+    shear = modulus / (2.0 * (1.0 + nu))
+    k = 1.0 / (2.0 * np.pi * shear)
+    out = np.empty((len(x), 3, len(x), 3))
+    out[:, 0, :, 0] = np.where(own, k * (1 - nu) * 2.0 / a, k * (1 - nu) / r)
+    for i, di in ((1, dx), (2, dz)):
+        out[:, i, :, i] = np.where(own, k * (2.0 - nu) / a, k * ((1 - nu) / r + nu * di**2 / r**3))
+        # gap and normal force point along the inward normal, so the coupling enters with this sign
+        out[:, i, :, 0] = np.where(own, 0.0, -k * 0.5 * (1 - 2 * nu) * di / r**2)
+        out[:, 0, :, i] = -out[:, i, :, 0]
+    out[:, 1, :, 2] = out[:, 2, :, 1] = np.where(own, 0.0, k * nu * dx * dz / r**3)
+    return out
