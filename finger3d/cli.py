@@ -103,6 +103,54 @@ def plan(scene: Path, /, *, set_: Set = None) -> int:
 
 
 @app.command
+def compare(
+    scene: Path,
+    /,
+    *,
+    out: Annotated[Path, Parameter(help="Folder for the results.")],
+    widths: Annotated[
+        str | None, Parameter(help="Further widths in mm, separated by commas; default 1, 4, 12 and 24 finger heights.")
+    ] = None,
+    set_: Set = None,
+) -> int:
+    """Solve a scene as plane stress, plane strain and solid: would 2D have done, and by how much not?
+
+    Example: finger3d compare scene.toml --out out --widths 5,20,50,200
+
+    Parameters
+    ----------
+    scene
+        The scene file (TOML).
+    """
+    chosen = None if widths is None else [_width(text) for text in widths.split(",")]
+    loaded = _load(scene, set_)
+    _check_writable(out, scene)
+    from finger3d.compare import compare as run
+
+    report = reporter()
+    try:
+        with report:
+            result = run(loaded, out, chosen, report)
+    except KeyboardInterrupt:
+        _complain(f"interrupted; {report.steps_done} of {report.steps_total} cases are kept in {out}")
+        return 130
+    print("\n".join(result.verdict))
+    print(f"results: {out}")
+    if result.outcome.ok:
+        return 0
+    failed = sum(not case.ok for case in result.cases)
+    _complain(f"{scene}: {failed} of {len(result.cases)} cases gave no numbers: {result.outcome}")
+    return MissingError.exit_code
+
+
+def _width(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise Finger3dError(f"--widths: {text.strip()!r} is no number; give mm and commas: 5,20,50,200") from None
+
+
+@app.command
 def validate(
     studies: Annotated[list[str] | None, Parameter(negative=())] = None,
     /,

@@ -1,0 +1,289 @@
+"""Compare: the passage from plane stress to plane strain, error bars that hold, and the verdict's words."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import finger3d.compare as compare_module
+from finger3d.cli import main
+from finger3d.compare import Case, cases, compare
+from finger3d.compare.cases import COARSER, corner_order, resized, solved, widened
+from finger3d.compare.verdict import FORCE, Deviation, deviation, matched, reached, rounded, sentences
+from finger3d.errors import Finger3dError, Outcome
+from finger3d.scene import load
+
+SCENE = """
+title = "coarse finger"
+[finger]
+geometry = "clipped_cylinder"
+radius_mm = 100.0
+half_length_mm = 50.0
+edge_height_mm = 36.6
+width_mm = 20.0
+[material]
+E_MPa = 1.0
+nu = 0.49
+[friction]
+mu = 0.25
+[press]
+depth_mm = 10.0
+steps = 4
+[mesh]
+size_mm = 5.0
+base_size_mm = 12.0
+mesher = "swept"
+[[gauge]]
+name = "g36"
+x_mm = 36.0
+y_mm = 38.0
+angle_deg = 30.0
+"""
+
+
+@pytest.fixture
+def scene(tmp_path) -> Path:
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE)
+    return path
+
+
+@pytest.fixture(scope="module")
+def compared(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("compare")
+    path = folder / "scene.toml"
+    path.write_text(SCENE)
+    return compare(path, folder / "out", widths=[5.0, 200.0, 1200.0])
+
+
+def case(model: str, width: float, force: float, error: float = 0.0, **more: float) -> Case:
+    numbers = {
+        FORCE: force, "contact_length_mm": 70.0, "stick_length_mm": 10.0, "friction_sum_N_per_mm": 1.0,
+        "friction_along_x_N_per_mm": 1.0, "friction_along_z_N_per_mm": 0.5, "peak_pressure_MPa": 0.3,
+    }  # fmt: skip
+    return Case(model, width, 2.0, "swept", Outcome.CONVERGED, numbers | more, {FORCE: error})
+
+
+def force(compared, model: str, width: float) -> float:
+    (found,) = (c for c in compared.cases if (c.model, c.width_mm) == (model, width))
+    return found.numbers[FORCE]
+
+
+def test_a_solid_passes_from_plane_stress_to_plane_strain_as_it_widens(compared):
+    forces = [force(compared, "solid", w) for w in (5.0, 20.0, 200.0, 1200.0)]
+    assert forces == sorted(forces)
+    assert force(compared, "plane stress", 5.0) < forces[0]
+    assert forces[-1] < force(compared, "plane strain", 1200.0) < 1.06 * forces[-1]
+
+
+def test_held_ends_make_plane_strain_of_a_narrow_solid(compared):
+    assert force(compared, "solid, ends held", 20.0) == pytest.approx(force(compared, "plane strain", 20.0), rel=5e-3)
+
+
+def test_the_verdict_of_the_papers_finger(compared):
+    text = " ".join(compared.verdict)
+    (percent,) = re.findall(r"At width/height 0.4 .* plane strain overstates the force by (\d+) %", text)
+    assert 70 <= int(percent) <= 78
+    assert "plane stress understates it by" in text
+    (width,) = re.findall(r"Plane strain comes within 5 % of the solid's force from a width of (\d+) mm", text)
+    assert 700 <= int(width) <= 1000
+    assert "Gauge g36: solid" in text
+    assert compared.outcome.ok
+
+
+def test_what_is_written_agrees_with_what_is_returned(compared):
+    told = json.loads((compared.out / "compare.json").read_text())
+    assert told["outcome"] == "converged"
+    assert tuple(told["verdict"]) == compared.verdict
+    assert [c["numbers"][FORCE] for c in told["cases"]] == [c.numbers[FORCE] for c in compared.cases]
+    with (compared.out / "compare.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert [float(r[FORCE]) for r in rows] == [c.numbers[FORCE] for c in compared.cases]
+    assert rows[0]["contact_length_end_mm"] == ""
+    with (compared.out / "lines.csv").open() as stream:
+        lines = list(csv.DictReader(stream))
+    assert {r["line"] for r in lines if r["model"] == "solid"} == {"z = 0", "end"}
+    assert {r["line"] for r in lines if r["model"] == "plane strain"} == {"z = 0"}
+    assert (compared.out / "compare.png").read_bytes().startswith(b"\x89PNG")
+    assert load(compared.out / "scene.toml").domain == "solid"
+
+
+def test_models_of_one_width_share_their_in_plane_mesh(compared):
+    for width in (5.0, 20.0, 200.0, 1200.0):
+        assert len({c.size_mm for c in compared.cases if c.width_mm == width and "held" not in c.model}) == 1
+
+
+@pytest.mark.parametrize("domain", ["plane-strain", "plane-stress"])
+@pytest.mark.parametrize("nu", [0.3, 0.49])
+def test_error_bars_hold_the_answer_of_a_fine_mesh(scene, domain, nu):
+    model = load(scene, [f"model.domain={domain}", f"material.nu={nu}"]).model()
+    fine = cases.measured_on("fine", resized(model, 0.4))
+    for size in (5.0, 3.0, 2.0):
+        coarse = solved("coarse", resized(model, size))
+        for key in (FORCE, "contact_length_mm"):
+            assert abs(coarse.numbers[key] - fine.numbers[key]) <= coarse.errors[key], (size, key)
+        assert coarse.force_error < 0.003 * size
+
+
+def test_no_error_bar_is_below_that_of_the_sections(scene):
+    model = load(scene).model()
+    assert solved("solid", model, 0.07).force_error >= 0.07
+
+
+@pytest.mark.parametrize(("nu", "order"), [(0.0, 2.0), (0.3, 1.42), (0.5, 1.19)])
+def test_corner_order_is_williams(nu, order):
+    assert corner_order(nu) == pytest.approx(order, abs=0.005)
+
+
+def test_plane_stress_has_the_corner_of_a_smaller_nu():
+    assert corner_order(0.5, plane_stress=True) == pytest.approx(corner_order(1.0 / 3.0))
+
+
+@pytest.mark.parametrize("width", [1.0, 20.0, 2000.0])
+def test_other_widths_are_structured_and_have_room_for_the_companion(scene, width):
+    wide = widened(load(scene, ["mesh.mesher=ftetwild"]).model(), width)
+    assert (wide.design.width_mm, wide.mesh.mesher) == (width, "swept")
+    assert wide.mesh.size_mm * COARSER <= min(width, 50.0)
+    assert wide.mesh.base_size_mm / wide.mesh.size_mm == pytest.approx(12.0 / 5.0)
+
+
+def test_the_width_is_interpolated_in_one_over_width():
+    # deviation = 40/width exactly: 5 % at 800
+    found = [Deviation(w, 40.0 / w, 0.1 * 40.0 / w) for w in (200.0, 20.0, 1000.0)]
+    at, low, high = reached(found, narrow=False)
+    assert at == pytest.approx(800.0)
+    assert (low, high) == (pytest.approx(720.0), pytest.approx(880.0))
+
+
+def test_narrow_enough_for_plane_stress_is_an_upper_width():
+    found = [Deviation(w, -0.002 * w, 0.0) for w in (5.0, 20.0, 50.0)]
+    assert reached(found, narrow=True)[0] == pytest.approx(25.0)
+
+
+def test_a_width_that_was_not_asked_for_is_not_made_up():
+    assert reached([Deviation(20.0, 0.7, 0.01), Deviation(200.0, 0.2, 0.01)], narrow=False) is None
+    solids = [case("solid", w, f) for w, f in ((20.0, 10.0), (200.0, 15.0))]
+    planes = [case("plane strain", w, 18.0) for w in (20.0, 200.0)]
+    text = " ".join(sentences([*planes, *solids], 20.0, 50.0))
+    assert "Plane strain does not come within 5 % of the solid's force within the widths asked (+20 % at 200 mm" in text
+    assert "at about 800 mm" in text
+
+
+def test_within_everywhere_is_said_so():
+    found = [case(m, w, 10.0 + 0.1 * (m == "plane strain")) for m in ("plane strain", "solid") for w in (20.0, 200.0)]
+    assert "Plane strain is within 5 % of the solid's force at every width asked, 20 to 200 mm." in sentences(
+        found, 20.0, 50.0
+    )
+
+
+def test_a_deviation_carries_both_error_bars():
+    d = deviation(case("plane strain", 20.0, 15.0, 0.15), case("solid", 20.0, 10.0, 0.2))
+    assert (d.value, d.error) == (pytest.approx(0.5), pytest.approx(1.5 * (0.01**2 + 0.02**2) ** 0.5))
+
+
+def test_on_swept_meshes_a_common_error_cancels():
+    plane, solid = case("plane strain", 20.0, 15.0, 0.15), case("solid", 20.0, 10.0, 0.1)
+    plane, solid = replace(plane, companion={FORCE: 15.3}), replace(solid, companion={FORCE: 10.2})
+    assert matched(plane, solid).error == pytest.approx(0.0, abs=1e-12)
+    assert matched(plane, replace(solid, mesher="ftetwild")).error > 0.01
+
+
+def test_what_the_mesh_cannot_tell_is_not_told():
+    told = sentences([case("plane strain", 20.0, 10.52, 0.1), case("solid", 20.0, 10.0, 0.1)], 20.0, 50.0)[-1]
+    assert "by this mesh not told from 5 % in force (+5.2 %)" in told
+
+
+def test_without_a_solid_there_is_no_verdict():
+    failed = Case("solid", 20.0, 2.0, "swept", Outcome.NO_CONVERGENCE)
+    text = sentences([case("plane strain", 20.0, 10.0), failed], 20.0, 50.0)
+    assert text[0].startswith("solid, 20 mm wide, gave no numbers: contact did not settle")
+    assert text[-1].startswith("No verdict")
+
+
+@pytest.mark.parametrize(("value", "text"), [(123.4, "120"), (8.16e2, "820"), (0.0567, "0.057")])
+def test_rounded_numbers_have_no_exponent(value, text):
+    assert rounded(value) == text
+
+
+@pytest.mark.parametrize(
+    ("overrides", "widths", "words"),
+    [
+        (["press.slide_z_mm=1.0"], [], "slide along its width"),
+        (["gauge.0.z_mm=9.0"], [10.0], 'gauge "g36" at z_mm = 9 is outside a finger 10 mm wide'),
+        ([], [0.0], "--widths 0: must be positive"),
+        ([], [float("nan")], "--widths nan: must be positive"),
+    ],
+)
+def test_what_a_section_cannot_stand_for_is_refused(scene, tmp_path, overrides, widths, words):
+    with pytest.raises(Finger3dError, match=re.escape(words)):
+        compare(load(scene, overrides), tmp_path / "out", widths)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_ball_has_no_section(scene, tmp_path):
+    ball = '[finger]\ngeometry = "hemisphere"\nradius_mm = 50.0\n[material]'
+    text = re.sub(r"\[finger\].*?\[material\]", ball, SCENE, flags=re.S)
+    scene.write_text(text.replace('mesher = "swept"\n', "").replace("y_mm = 38.0", "y_mm = 20.0"))
+    with pytest.raises(Finger3dError, match="no constant section"):
+        compare(scene, tmp_path / "out")
+
+
+def test_an_object_that_varies_along_the_width_is_pointed_out(scene, tmp_path):
+    told = compare(load(scene, ["object.shape=sphere", "object.radius_mm=200.0"]), tmp_path / "out", ()).verdict
+    assert any("changes along the width" in line for line in told)
+
+
+def test_the_scenes_own_domain_does_not_matter(scene, tmp_path):
+    as_strain = compare(load(scene, ["model.domain=plane-strain"]), tmp_path / "a", ())
+    as_solid = compare(load(scene), tmp_path / "b", ())
+    assert [c.numbers for c in as_strain.cases] == [c.numbers for c in as_solid.cases]
+
+
+def test_the_command_prints_the_verdict(scene, tmp_path, capsys):
+    assert main(["compare", str(scene), "--out", str(tmp_path / "out"), "--widths", "50"]) == 0
+    out = capsys.readouterr().out
+    assert "step 7 of 7" in out
+    assert "plane strain overstates the force by" in out
+
+
+@pytest.mark.parametrize("widths", ["5,abc", "5,,20", "-5", "inf"])
+def test_widths_that_are_none_are_refused_in_one_line(scene, tmp_path, capsys, widths):
+    assert main(["compare", str(scene), "--out", str(tmp_path / "out"), f"--widths={widths}"]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith("finger3d: --widths")
+    assert err.count("\n") == 1
+
+
+def test_a_case_that_fails_is_named_and_the_others_are_kept(scene, tmp_path, monkeypatch, capsys):
+    def failing(name, model, least=0.0):
+        if name == "solid":
+            return Case(name, model.design.width_mm, model.mesh.size_mm, "swept", Outcome.NO_CONVERGENCE)
+        return solved(name, model, least)
+
+    monkeypatch.setattr(compare_module, "solved", failing)
+    assert main(["compare", str(scene), "--out", str(tmp_path / "out"), "--widths", "50"]) == 3
+    captured = capsys.readouterr()
+    assert "2 of 7 cases gave no numbers" in captured.err
+    assert "solid, 20 mm wide, gave no numbers" in captured.out
+    told = json.loads((tmp_path / "out" / "compare.json").read_text())
+    assert told["outcome"] == str(Outcome.NO_CONVERGENCE)
+    assert sum(bool(c["numbers"]) for c in told["cases"]) == 5
+
+
+def test_an_interrupted_comparison_keeps_its_cases(scene, tmp_path, monkeypatch, capsys):
+    def interrupted(name, model, least=0.0):
+        if name == "solid":
+            raise KeyboardInterrupt
+        return solved(name, model, least)
+
+    monkeypatch.setattr(compare_module, "solved", interrupted)
+    assert main(["compare", str(scene), "--out", str(tmp_path / "out")]) == 130
+    assert "2 of 16 cases are kept" in capsys.readouterr().err
+    told = json.loads((tmp_path / "out" / "compare.json").read_text())
+    assert told["outcome"].startswith("incomplete")
+    assert [c["model"] for c in told["cases"]] == ["plane strain", "plane stress"]
