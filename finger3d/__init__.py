@@ -1,7 +1,7 @@
 """Frictional contact of an elastic, finger-shaped tactile sensor in 3D.
 
-Names are loaded when they are first used, so that ``import finger3d`` stays light. ``finger3d.press`` is the module
-with the main job: ``finger3d.press.press(finger3d.load("scene.toml"), "out")``.
+Names are loaded when they are first used, so that ``import finger3d`` stays light. The main job is
+``finger3d.press("scene.toml", "out")``.
 """
 
 from __future__ import annotations
@@ -10,10 +10,10 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from finger3d import press
     from finger3d.contact.law import Coulomb
     from finger3d.design import designs
     from finger3d.errors import Finger3dError, MissingError, Outcome
+    from finger3d.job import press
     from finger3d.mesh import Mesh
     from finger3d.model import Gauge, Leg, Material, MeshOptions, Model
     from finger3d.objects import Cylinder, Plane, Sphere, Wave, Wedge
@@ -41,6 +41,7 @@ _HOME = {
     "designs": "design",
     "load": "scene",
     "parse": "scene",
+    "press": "job",
 }
 
 __all__ = [
@@ -73,8 +74,6 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         return version("finger3d")
-    if name == "press":
-        return importlib.import_module("finger3d.press")
     if name in _HOME:
         return getattr(importlib.import_module(f"finger3d.{_HOME[name]}"), name)
     raise AttributeError(f"module 'finger3d' has no attribute {name!r}")

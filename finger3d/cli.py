@@ -66,7 +66,7 @@ def press(
     """
     loaded = _load(scene, set_)
     _check_writable(out, scene)
-    from finger3d.press import press as run
+    from finger3d.job import press as run
 
     report = reporter()
     try:

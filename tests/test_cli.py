@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import pytest
 
 import finger3d
-import finger3d.press
+import finger3d.job
 from finger3d.cli import main
 from finger3d.errors import MissingError, Outcome
 from finger3d.model import MeshOptions
@@ -61,7 +61,7 @@ def fake_press(monkeypatch):
             raise calls.end
         return SimpleNamespace(summary=summary, outcome=calls.end, out=out)
 
-    monkeypatch.setattr(finger3d.press, "press", press)
+    monkeypatch.setattr(finger3d.job, "press", press)
     return calls
 
 
@@ -149,7 +149,7 @@ def test_an_interruption_before_the_first_step(scene, tmp_path, monkeypatch, cap
     def press(scene, out, report, figures=True):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(finger3d.press, "press", press)
+    monkeypatch.setattr(finger3d.job, "press", press)
     assert run("press", scene, "--out", tmp_path / "out") == 130
     assert capsys.readouterr().err == "finger3d: interrupted; no step was finished, none is kept\n"
 

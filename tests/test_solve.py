@@ -16,9 +16,9 @@ from finger3d.fem.recover import displacement
 from finger3d.fem.surface import displacement_row
 from finger3d.history import Frame, measure
 from finger3d.increments import refine
+from finger3d.job import part_force
 from finger3d.model import Gauge, Leg, Material, MeshOptions, Model
 from finger3d.objects import Plane, Sphere
-from finger3d.press import part_force
 from finger3d.solve import Problem, build, march, targets
 
 

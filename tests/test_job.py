@@ -185,7 +185,7 @@ def test_a_new_run_leaves_no_number_of_an_old_one(tmp_path: Path) -> None:
 
 
 def test_contact_beyond_the_candidate_points_is_solved_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from finger3d import press, solve
+    from finger3d import job, solve
 
     scene = written(tmp_path, SECTION)
     build = solve.build
@@ -194,9 +194,9 @@ def test_contact_beyond_the_candidate_points_is_solved_again(tmp_path: Path, mon
         return build(model, say, margin)
 
     monkeypatch.setattr(solve, "build", narrow)
-    result = press.press(scene, tmp_path / "narrow", figures=False)
+    result = job.press(scene, tmp_path / "narrow", figures=False)
     monkeypatch.undo()
-    plain = press.press(scene, tmp_path / "plain", figures=False)
+    plain = job.press(scene, tmp_path / "plain", figures=False)
     assert result.summary["cost"]["factorizations"] == 2
     assert result.summary["steps"][-1]["normal_force_N"] == pytest.approx(
         plain.summary["steps"][-1]["normal_force_N"], rel=1e-10
