@@ -66,6 +66,12 @@ def test_nan_never_passes(measure: str) -> None:
     assert not Row("w", "r", 1.0, float("nan"), 1e9, "so", measure=measure).passed
 
 
+def test_a_statement_that_does_not_hold_fails_nothing() -> None:
+    rows = [Row("w", "r", 79.0, got, 0.02, "about", "statement") for got in (79.5, 60.0, float("nan"))]
+    assert [row.passed for row in rows] == [True, True, False]
+    assert [row.verdict for row in rows] == ["holds", "does not hold", "FAIL"]
+
+
 def test_results_are_kept_to_the_last_digit_and_indexed(folder: Path) -> None:
     known = studies(folder)
     found = validate(chosen(["good"], known), False, folder, known=known)
