@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from finger3d.contact.law import OPEN
 from finger3d.errors import Outcome
 from finger3d.export import atomic, write_csv, write_json, write_vtu
 from finger3d.history import Frame, History, contact_table, measure
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from finger3d.solve import Problem
 
 _WRITE_EVERY_S = 0.5
+_DEEP = 0.3  # the Fig. 9 finger is pressed by a fifth, the half cylinder too
+_FEW_POINTS = 6  # per direction
 _INCOMPLETE = "incomplete: the press was still running, or was interrupted; the steps written are good"
 
 
@@ -54,7 +57,7 @@ class _Output:
         self.frames: list[Frame] = []
         self.estimate: StepEstimate | None = None
         self.coupling = problem.coupling()
-        self.warnings = [*problem.model.warnings, *_coupling_warning(self.coupling)]
+        self.warnings = [*problem.model.warnings, *_coupling_warning(self.coupling), *_depth_warning(problem)]
         self.seconds = {"cad": 0.0, "mesh": 0.0, **problem.seconds, "contact": 0.0, "output": 0.0}
         self._written = -math.inf
 
@@ -148,6 +151,7 @@ def press(
     report.stage("writing fields")
     _fields(problem, output, folder, figures)
     output.seconds["output"] += time.perf_counter() - begin
+    output.warnings += _coarse_warning(problem, output.frames)
     history = History(problem.points, tuple(output.frames))
     return PressResult(history, output.write(str(history.outcome)), folder)
 
@@ -159,6 +163,26 @@ def _coupling_warning(coupling: float) -> list[str]:
         f"the largest mu |K_tt^-1 K_tn| is {coupling:.3g}, above 1: several contact states may satisfy all conditions; "
         "the one reported follows from the history"
     ]
+
+
+def _depth_warning(problem: Problem) -> list[str]:
+    height = problem.model.design.height_mm
+    share = max(leg.depth_mm for leg in problem.model.legs) / height
+    if share <= _DEEP:
+        return []
+    return [
+        f"the press reaches {100.0 * share:.0f} % of the finger's height of {height:.4g} mm: small strain is a poor "
+        "model there, whatever the residual says; press less, or read the numbers as trends"
+    ]
+
+
+def _coarse_warning(problem: Problem, frames: list[Frame]) -> list[str]:
+    """Whether the contact is wide enough in points to be called resolved, where it was widest."""
+    touching = max((f.state.status != OPEN for f in frames), key=np.count_nonzero, default=np.zeros(0, dtype=bool))
+    count = int(np.count_nonzero(touching))
+    if not count or count >= _FEW_POINTS ** (problem.dim - 1):
+        return []
+    return [f"only {count} points touch: too few for contact and stick lengths; lower mesh.size_mm"]
 
 
 def _clear(folder: Path) -> None:

@@ -154,6 +154,15 @@ def test_uniqueness_is_reported_and_warned_of(tmp_path: Path) -> None:
     assert any("several contact states" in w for w in found["1000.0"]["warnings"])
 
 
+@pytest.mark.parametrize(
+    ("key", "text"), [("press.depth_mm=3.0", "small strain is a poor model"), ("mesh.size_mm=0.9", "points touch")]
+)
+def test_a_scene_beyond_what_can_be_trusted_is_warned_of(tmp_path: Path, key: str, text: str) -> None:
+    out = tmp_path / "out"
+    assert main(["press", str(written(tmp_path)), "--out", str(out), "--no-figures", "--set", key]) == 0
+    assert any(text in w for w in json.loads((out / "summary.json").read_text(encoding="utf-8"))["warnings"])
+
+
 def test_interruption_keeps_every_finished_step(tmp_path: Path) -> None:
     scene = written(tmp_path, SECTION.replace("steps = 5", "steps = 100000"))
     out = tmp_path / "out"

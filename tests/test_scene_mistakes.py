@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from finger3d.cli import main
+from finger3d.errors import Finger3dError
 
 SCENE = """\
 title = "test"
@@ -277,3 +278,23 @@ def test_an_empty_file(tmp_path, capsys):
     path = tmp_path / "scene.toml"
     path.write_text("")
     assert "finger is missing" in refused(capsys, "plan", path)
+
+
+@pytest.mark.parametrize(
+    ("legs", "text"),
+    [
+        ([{"depth_mm": 0.0, "slide_x_mm": 1.0}], "slides before first touch"),
+        ([{"depth_mm": 1.0}, {"depth_mm": 1.0}], "goes nowhere"),
+    ],
+)
+def test_a_leg_that_does_nothing_is_refused(legs, text):
+    from finger3d.scene import parse
+
+    tables = {
+        "finger": {"geometry": "half_cylinder", "radius_mm": 5.0, "width_mm": 2.0},
+        "material": {"E_MPa": 1.0, "nu": 0.3},
+        "press": {"leg": legs},
+    }
+    with pytest.raises(Finger3dError, match=text) as refused:
+        parse(tables)
+    assert "\n" not in str(refused.value)

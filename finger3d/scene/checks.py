@@ -40,11 +40,19 @@ def _legs(press: dict[str, Any], legs: tuple[LegTable, ...], height: float, soli
     for i, leg in enumerate(legs):
         at = ("press", "leg", i) if "leg" in press else ("press",)
         allowed = f"a number above 0 and below the finger's height of {height:.6g} mm"
-        if leg.depth_mm >= height or (i == 0 and leg.depth_mm == 0.0):
+        if i > 0 and _target(leg) == _target(legs[i - 1]) and leg.duration_s is None:
+            lines.append(f"{dotted(at)}: goes nowhere, its depth and slide are those of the leg before; take it out")
+        if i == 0 and leg.depth_mm == 0.0 and (leg.slide_x_mm or leg.slide_z_mm):
+            lines.append(f"{dotted(at)}: slides before first touch; give the first leg a depth_mm above 0")
+        elif leg.depth_mm >= height or (i == 0 and leg.depth_mm == 0.0):
             lines.append(f"{dotted((*at, 'depth_mm'))} = {shown(leg.depth_mm)}: must be {allowed}")
         if not solid and leg.slide_z_mm != 0.0:
             lines.append(f"{dotted((*at, 'slide_z_mm'))} = {shown(leg.slide_z_mm)}: must be 0.0 in a 2D domain")
     return lines
+
+
+def _target(leg: LegTable) -> tuple[float, float, float]:
+    return leg.depth_mm, leg.slide_x_mm, leg.slide_z_mm
 
 
 def smallest_mm(design: Any, solid: bool) -> float:
