@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.optimize import brentq
@@ -28,3 +29,10 @@ def clamped_free(angle: float, nu: float, plane_stress: bool = False) -> float:
 def extrapolated(coarse: float, fine: float, rate: float, ratio: float = 2.0) -> float:
     """Value at zero size from two whose sizes stand in `ratio`, with the error falling at `rate`."""
     return fine + (fine - coarse) / (ratio**rate - 1.0)
+
+
+def observed(sizes: Sequence[float], values: Sequence[float]) -> float:
+    """Rate q with which the last three values, at these sizes, go as ``limit + c size^q``."""
+    (h0, h1, h2), (v0, v1, v2) = sizes[-3:], values[-3:]
+    wanted = (v0 - v1) / (v1 - v2)
+    return float(brentq(lambda q: (h0**q - h1**q) / (h1**q - h2**q) - wanted, 0.05, 12.0))
