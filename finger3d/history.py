@@ -66,10 +66,14 @@ class ContactPoints:
 
 @dataclass(frozen=True)
 class Frame:
-    """One increment as reported: whole contact state (m points), gauge strains, work, and how it was settled."""
+    """One increment as reported: whole contact state (m points), gauge strains, work, and how it was settled.
+
+    `part` is the state of the meshed part (c points), from which fields are recovered.
+    """
 
     target: Target
     state: ContactState
+    part: ContactState
     lowest: tuple[float, float]
     gauges: dict[str, float]
     external_work_mJ: float

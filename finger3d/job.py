@@ -265,18 +265,10 @@ def _covers(problem: Problem, frame: Frame) -> bool:
     face = surface(problem.mesh, "contact", thickness)
     if len(face.nodes) == len(problem.surface.nodes):
         return True
-    u = displacement(problem.mesh, problem.unknowns(part_force(problem, frame)))
+    u = displacement(problem.mesh, problem.model.kinematics.unknowns(problem, frame.part))
     gap = problem.gap(frame.target, face) + (face.trace @ u) @ problem.points.frame[0]
     others = ~np.isin(face.nodes, problem.surface.nodes)
     return bool(gap[others].min() > -1e-9 * frame.target.depth_mm)
-
-
-def part_force(problem: Problem, frame: Frame) -> np.ndarray[Any, Any]:
-    """Forces (c, d) on the meshed part from those on the whole finger."""
-    first = np.zeros(len(problem.surface.nodes), dtype=np.int64)
-    own = np.all(problem.sign == 1.0, axis=1)
-    first[problem.parent[own]] = np.flatnonzero(own)
-    return frame.state.force[first] / problem.share[first][:, None]
 
 
 def _fields(problem: Problem, output: _Output, folder: Path, figures: bool) -> None:
@@ -288,7 +280,7 @@ def _fields(problem: Problem, output: _Output, folder: Path, figures: bool) -> N
     if not good:
         return
     frame, points = good[-1], problem.points
-    unknowns = problem.unknowns(part_force(problem, frame))
+    unknowns = problem.model.kinematics.unknowns(problem, frame.part)
     u = displacement(problem.mesh, unknowns)
     strain = nodal_strain(problem.mesh, u)
     p = pressure(problem.mesh, problem.stiffness, unknowns) if problem.elastic.mixed else None

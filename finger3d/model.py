@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from finger3d.contact.law import Coulomb, FrictionLaw
+from finger3d.kinematics import Kinematics, SmallStrain
 from finger3d.objects import Plane, RigidObject
 
 Domain = Literal["solid", "plane-strain", "plane-stress"]
@@ -71,6 +72,7 @@ class Model:
     legs: tuple[Leg, ...]
     object: RigidObject = field(default_factory=Plane)
     friction: FrictionLaw = field(default_factory=Coulomb)
+    kinematics: Kinematics = field(default_factory=SmallStrain)
     gauges: tuple[Gauge, ...] = ()
     domain: Domain = "solid"
     rule: Literal["projection", "paper"] = "projection"

@@ -4,139 +4,31 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from finger3d.contact.advance import advance
 from finger3d.contact.law import SLIP
-from finger3d.contact.newton import uniqueness
-from finger3d.contact.paper import swap
 from finger3d.contact.state import ContactState, Increment
-from finger3d.design import MeshReport, mesh_section, mesh_solid
+from finger3d.design import mesh_section, mesh_solid
 from finger3d.errors import Finger3dError
-from finger3d.fem.assembly import Elasticity, Stiffness, stiffness
-from finger3d.fem.condense import Condensed, condense
+from finger3d.fem.assembly import Elasticity, stiffness
+from finger3d.fem.condense import condense
 from finger3d.fem.surface import Surface, displacement_row, local_rows, restrict, strain_row, surface
 from finger3d.history import ContactPoints, Frame, Target
 from finger3d.mesh import Mesh, unfold
-from finger3d.model import Gauge, Leg, Model
+from finger3d.model import Gauge, Model
 from finger3d.objects import first_touch
+from finger3d.problem import AUTO_START, Problem, between, rigid_gap, targets, values_of
 
 Float = NDArray[np.float64]
 
-_RULES = {"projection": advance, "paper": swap}
+__all__ = ["AUTO_START", "Problem", "build", "contact_zone", "march", "symmetry", "targets"]
+
 _MARGIN = 0.3  # candidate points reach to a rigid gap of this share of the depth; checked after the solution
 _CUTS = 6
-AUTO_START = 10
-
-
-@dataclass(frozen=True)
-class Problem:
-    """A condensed body over its contact points (of the meshed part; symmetry unfolds them).
-
-    Attributes
-    ----------
-    compliance : (c, d, c, d) mm/N, in the object's frame
-    gauge_rows : (g, c d) strain per N
-    kept : (r,) directions among c d that the condensed rows stand for
-    touch_mm : height of the object's lowest point at first touch
-    parent, sign, share : (m,), (m, d), (m,)
-        Whole point -> part point, its mirror signs in the frame, and how often the part's force and area count there.
-    """
-
-    model: Model
-    mesh: Mesh
-    report: MeshReport
-    elastic: Elasticity
-    stiffness: Stiffness
-    surface: Surface
-    condensed: Condensed
-    compliance: Float
-    gauge_rows: Float
-    kept: NDArray[np.int64]
-    touch_mm: float
-    axes: tuple[str, ...]
-    points: ContactPoints
-    parent: NDArray[np.int64]
-    sign: Float
-    share: Float
-    seconds: dict[str, float]
-
-    @property
-    def dim(self) -> int:
-        """Space dimensions."""
-        return self.mesh.dim
-
-    def gap(self, target: Target, surface: Surface | None = None) -> Float:
-        """Weighted gap (c,) mm at rest under a target, from the exact object at the surface's quadrature points."""
-        where = surface or self.surface
-        return _rigid_gap(self.model, where, self.touch_mm, target)
-
-    def free(self, target: Target) -> Float:
-        """Gap and tangential position (c, d) mm of every point under no contact force."""
-        frame = self.model.object.frame(self.dim)
-        moved = np.array([target.slide_x_mm, -target.depth_mm, target.slide_z_mm])[: self.dim]
-        out = np.empty((len(self.surface.nodes), self.dim))
-        out[:, 0] = self.gap(target)
-        out[:, 1:] = -(frame[1:] @ moved)
-        return out
-
-    def whole(self, state: ContactState) -> ContactState:
-        """The state of the whole finger's points from that of the part's."""
-        p = self.parent
-        tangent = self.sign[:, 1:]
-        return ContactState(
-            state.status[p],
-            state.force[p] * self.sign * self.share[:, None],
-            state.gap[p],
-            state.position[p] * tangent,
-            state.slip[p] * tangent,
-        )
-
-    def coupling(self) -> float:
-        """Largest mu |K_tt^-1 K_tn| over points; above 1 a contact state need not be the only one."""
-        c, d = self.compliance.shape[:2]
-        return uniqueness(np.full(c, self.model.friction.static), self.compliance.reshape(c * d, c * d), d)
-
-    def unknowns(self, force: Float) -> Float:
-        """All unknowns of the part's body under contact forces (c, d)."""
-        rows = np.zeros(len(self.condensed.compliance))
-        rows[: len(self.kept)] = force.ravel()[self.kept]
-        return self.condensed.unknowns(rows)
-
-
-def _rigid_gap(model: Model, where: Surface, touch: float, target: Target) -> Float:
-    x, y = where.samples[:, 0], where.samples[:, 1]
-    z = where.samples[:, 2] if where.samples.shape[1] == 3 else np.zeros_like(x)
-    height = model.object.height(x - target.slide_x_mm, z - target.slide_z_mm)
-    vertical = height + touch - target.depth_mm - y
-    upright = -model.object.frame(where.samples.shape[1])[0, 1]
-    return np.asarray(where.average @ vertical) * upright
-
-
-def targets(legs: tuple[Leg, ...]) -> list[Target]:
-    """Every increment of the legs, the start not among them."""
-    out: list[Target] = []
-    at = Target(0.0)
-    for leg in legs:
-        count = leg.steps if isinstance(leg.steps, int) else AUTO_START
-        end = Target(leg.depth_mm, leg.slide_x_mm, leg.slide_z_mm, at.time_s + (leg.duration_s or 0.0))
-        out += [between(at, end, k / count) for k in range(1, count)] + [end]
-        at = end
-    return out
-
-
-def between(a: Target, b: Target, share: float) -> Target:
-    """The target a share of the way from a to b."""
-    values = [u + share * (v - u) for u, v in zip(_values(a), _values(b), strict=True)]
-    return Target(*values)
-
-
-def _values(t: Target) -> tuple[float, float, float, float]:
-    return t.depth_mm, t.slide_x_mm, t.slide_z_mm, t.time_s
 
 
 def symmetry(model: Model) -> tuple[str, ...]:
@@ -206,7 +98,7 @@ def build(model: Model, say: Callable[[str], None] = lambda text: None, margin: 
 def _candidates(model: Model, face: Surface, touch: float, margin: float) -> Surface:
     path = targets(model.legs)
     reach = margin * max(t.depth_mm for t in path)
-    nearest = np.min([_rigid_gap(model, face, touch, t) for t in path], axis=0)
+    nearest = np.min([rigid_gap(model, face, touch, t) for t in path], axis=0)
     return restrict(face, nearest < reach)
 
 
@@ -276,8 +168,9 @@ def march(problem: Problem) -> Iterator[Frame]:
     Under the paper's rule an increment that cycled is handed on as it is, and never cut: that is what the rule does.
     """
     literal = problem.model.rule == "paper"
-    at = Target(0.0)
-    state = ContactState.at_rest(problem.gap(at), problem.dim)
+    at = problem.origin
+    kinematics = problem.model.kinematics
+    state = kinematics.start(problem)
     pace: tuple[Target, Float] | None = None
     work = dissipation = 0.0
     for target in targets(problem.model.legs):
@@ -288,24 +181,19 @@ def march(problem: Problem) -> Iterator[Frame]:
         pace = at, state.force
         state, at = found.state, target
         yield Frame(
-            target, problem.whole(state), problem.model.object.lowest(target.slide_x_mm, target.slide_z_mm),
-            _gauges(problem, state.force), work, dissipation,
+            target, problem.whole(state), state, problem.model.object.lowest(target.slide_x_mm, target.slide_z_mm),
+            kinematics.gauges(problem, state), work, dissipation,
             found.outcome, found.residual, found.iterations, found.method,
         )  # fmt: skip
         if not found.outcome.ok and not (literal and found.method == "paper"):
             return
 
 
-def _gauges(problem: Problem, force: Float) -> dict[str, float]:
-    names = [g.name for g in problem.model.gauges]
-    return dict(zip(names, map(float, problem.gauge_rows @ force.ravel()), strict=True))
-
-
 def _guess(state: ContactState, a: Target, b: Target, pace: tuple[Target, Float] | None) -> Float | None:
     """Forces continued at their pace, where the path goes straight on from the increment before."""
     if pace is None:
         return None
-    before, now = np.subtract(_values(a), _values(pace[0])), np.subtract(_values(b), _values(a))
+    before, now = np.subtract(values_of(a), values_of(pace[0])), np.subtract(values_of(b), values_of(a))
     ratio = float(now @ before) / float(before @ before)
     if ratio <= 0.0 or not np.allclose(now, ratio * before):
         return None
@@ -319,9 +207,7 @@ def _increment(
     problem: Problem, state: ContactState, a: Target, b: Target, cuts: int, guess: Float | None = None
 ) -> tuple[Increment, _Done]:
     """Advance from a to b; an increment that does not settle is cut in two, from the state restored."""
-    rule = _RULES[problem.model.rule]
-    scale = max(a.depth_mm, b.depth_mm)
-    found = rule(state, problem.free(b), problem.compliance, problem.model.friction, scale, guess)
+    found = problem.model.kinematics.increment(problem, state, a, b, guess)
     if found.outcome.ok or cuts == 0:
         return found, [(state, found.state, a, b)]
     middle = between(a, b, 0.5)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from finger3d import solve as solve_module
+from finger3d import kinematics
 from finger3d.contact.law import OPEN, Coulomb
 from finger3d.design import designs
 from finger3d.errors import Outcome
@@ -16,7 +16,6 @@ from finger3d.fem.recover import displacement
 from finger3d.fem.surface import displacement_row
 from finger3d.history import Frame, measure
 from finger3d.increments import refine
-from finger3d.job import part_force
 from finger3d.model import Gauge, Leg, Material, MeshOptions, Model
 from finger3d.objects import Plane, Sphere
 from finger3d.solve import Problem, build, march, targets
@@ -109,7 +108,7 @@ def test_contact_forces_and_base_reaction_balance() -> None:
     problem, frames = run(
         block(symmetry=(), legs=(Leg(0.3, steps=2), Leg(0.3, slide_x_mm=0.1, slide_z_mm=0.05, steps=2)))
     )
-    unknowns = problem.unknowns(part_force(problem, frames[-1]))
+    unknowns = problem.unknowns(frames[-1].part.force)
     full = problem.stiffness.upper + sp.triu(problem.stiffness.upper, 1).T
     residual = (full @ unknowns)[: problem.mesh.points.size].reshape(problem.mesh.points.shape)
     base = np.unique(problem.mesh.facets["base"])
@@ -139,7 +138,7 @@ def test_gauge_reads_the_field_without_recovering_it() -> None:
     read = frames[-1].gauges
     assert read["point"] == pytest.approx(read["mirror"], rel=1e-12)
     assert read["point"] == pytest.approx(read["short"], rel=1e-6)
-    u = displacement(problem.mesh, problem.unknowns(part_force(problem, frames[-1])))
+    u = displacement(problem.mesh, problem.unknowns(frames[-1].part.force))
     row = displacement_row(problem.mesh, np.array([1.0, 1.5, 0.0]), np.array([1.0, 0.0, 0.0]))
     assert read["long"] == pytest.approx((row @ u.ravel())[0], rel=1e-9)  # elongation 2 u_x(1) over length 2
 
@@ -156,7 +155,7 @@ def test_energy_balances_to_first_order_in_the_increment() -> None:
     for steps in (5, 10, 20):
         problem, frames = run(block(legs=(Leg(0.3, steps=steps),)))
         end = frames[-1]
-        force = part_force(problem, end)
+        force = end.part.force
         stored = 0.5 * 4.0 * np.einsum("id,idje,je->", force, problem.compliance, force)  # four quarters
         excess.append(abs(end.external_work_mJ - stored - end.dissipation_mJ) / end.external_work_mJ)
     assert excess[0] > excess[1] > excess[2]
@@ -190,7 +189,7 @@ def test_targets_pass_through_every_leg() -> None:
 
 def test_an_increment_that_fails_is_cut_and_the_state_restored(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = build(block(legs=(Leg(0.3, steps=1),)))
-    true_rule = solve_module._RULES["projection"]
+    true_rule = kinematics.RULES["projection"]
 
     def timid(state, free, compliance, law, scale, guess):  # fails on strides above a quarter of the leg
         found = true_rule(state, free, compliance, law, scale, guess)
@@ -200,7 +199,7 @@ def test_an_increment_that_fails_is_cut_and_the_state_restored(monkeypatch: pyte
         return found
 
     timid.gap = problem.gap(targets(problem.model.legs)[0].__class__(0.0))
-    monkeypatch.setitem(solve_module._RULES, "projection", timid)
+    monkeypatch.setitem(kinematics.RULES, "projection", timid)
     (cut,) = march(problem)
     monkeypatch.undo()
     four = list(march(replace(problem, model=replace(problem.model, legs=(Leg(0.3, steps=4),)))))

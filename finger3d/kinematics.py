@@ -1,0 +1,60 @@
+"""How a body answers to contact: the slot that small strain fills, and that effects replace or wrap."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.contact.advance import advance
+from finger3d.contact.paper import swap
+from finger3d.contact.state import ContactState, Increment
+
+Float = NDArray[np.float64]
+
+RULES = {"projection": advance, "paper": swap}
+
+
+class Kinematics(Protocol):
+    """What marching through a history asks of a body; `problem` is a `finger3d.problem.Problem`."""
+
+    def start(self, problem: Any) -> ContactState:
+        """State at rest, before the first increment."""
+        ...
+
+    def increment(self, problem: Any, state: ContactState, a: Any, b: Any, guess: Float | None) -> Increment:
+        """Advance a state from target a to target b; `guess` (c, d) N is where the forces may start."""
+        ...
+
+    def unknowns(self, problem: Any, state: ContactState) -> Float:
+        """All unknowns (N,) of the meshed part in a state."""
+        ...
+
+    def gauges(self, problem: Any, state: ContactState) -> dict[str, float]:
+        """Strain of every gauge by name."""
+        ...
+
+
+@dataclass(frozen=True)
+class SmallStrain:
+    """Linear elasticity over the condensed compliance: the paper's baseline."""
+
+    def start(self, problem: Any) -> ContactState:
+        """No force, gaps at rest."""
+        return ContactState.at_rest(problem.gap(problem.origin), problem.dim)
+
+    def increment(self, problem: Any, state: ContactState, a: Any, b: Any, guess: Float | None) -> Increment:
+        """One call of the contact rule; gaps are measured by the depth."""
+        rule = RULES[problem.model.rule]
+        scale = max(a.depth_mm, b.depth_mm)
+        return rule(state, problem.free(b), problem.compliance, problem.model.friction, scale, guess)
+
+    def unknowns(self, problem: Any, state: ContactState) -> Float:
+        """From the forces, with the factor at hand."""
+        return problem.unknowns(state.force)
+
+    def gauges(self, problem: Any, state: ContactState) -> dict[str, float]:
+        """From the forces, through the gauges' rows."""
+        return problem.gauge_strains(state.force)

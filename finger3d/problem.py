@@ -1,0 +1,141 @@
+"""A condensed body over its contact points, and the path that the object takes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.contact.newton import uniqueness
+from finger3d.contact.state import ContactState
+from finger3d.design import MeshReport
+from finger3d.fem.assembly import Elasticity, Stiffness
+from finger3d.fem.condense import Condensed
+from finger3d.fem.surface import Surface
+from finger3d.history import ContactPoints, Target
+from finger3d.mesh import Mesh
+from finger3d.model import Leg, Model
+
+Float = NDArray[np.float64]
+
+AUTO_START = 10
+"""Increments that ``steps = "auto"`` begins with."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A condensed body over its contact points (of the meshed part; symmetry unfolds them).
+
+    Attributes
+    ----------
+    compliance : (c, d, c, d) mm/N, in the object's frame
+    gauge_rows : (g, c d) strain per N
+    kept : (r,) directions among c d that the condensed rows stand for
+    touch_mm : height of the object's lowest point at first touch
+    parent, sign, share : (m,), (m, d), (m,)
+        Whole point -> part point, its mirror signs in the frame, and how often the part's force and area count there.
+    """
+
+    model: Model
+    mesh: Mesh
+    report: MeshReport
+    elastic: Elasticity
+    stiffness: Stiffness
+    surface: Surface
+    condensed: Condensed
+    compliance: Float
+    gauge_rows: Float
+    kept: NDArray[np.int64]
+    touch_mm: float
+    axes: tuple[str, ...]
+    points: ContactPoints
+    parent: NDArray[np.int64]
+    sign: Float
+    share: Float
+    seconds: dict[str, float]
+
+    @property
+    def origin(self) -> Target:
+        """Where every path begins: first touch."""
+        return Target(0.0)
+
+    @property
+    def dim(self) -> int:
+        """Space dimensions."""
+        return self.mesh.dim
+
+    def gap(self, target: Target, surface: Surface | None = None) -> Float:
+        """Weighted gap (c,) mm at rest under a target, from the exact object at the surface's quadrature points."""
+        where = surface or self.surface
+        return rigid_gap(self.model, where, self.touch_mm, target)
+
+    def free(self, target: Target) -> Float:
+        """Gap and tangential position (c, d) mm of every point under no contact force."""
+        frame = self.model.object.frame(self.dim)
+        moved = np.array([target.slide_x_mm, -target.depth_mm, target.slide_z_mm])[: self.dim]
+        out = np.empty((len(self.surface.nodes), self.dim))
+        out[:, 0] = self.gap(target)
+        out[:, 1:] = -(frame[1:] @ moved)
+        return out
+
+    def whole(self, state: ContactState) -> ContactState:
+        """The state of the whole finger's points from that of the part's."""
+        p = self.parent
+        tangent = self.sign[:, 1:]
+        return ContactState(
+            state.status[p],
+            state.force[p] * self.sign * self.share[:, None],
+            state.gap[p],
+            state.position[p] * tangent,
+            state.slip[p] * tangent,
+        )
+
+    def coupling(self) -> float:
+        """Largest mu |K_tt^-1 K_tn| over points; above 1 a contact state need not be the only one."""
+        c, d = self.compliance.shape[:2]
+        return uniqueness(np.full(c, self.model.friction.static), self.compliance.reshape(c * d, c * d), d)
+
+    def gauge_strains(self, force: Float) -> dict[str, float]:
+        """Strain by gauge name under contact forces (c, d), through the condensed rows."""
+        names = [g.name for g in self.model.gauges]
+        return dict(zip(names, map(float, self.gauge_rows @ force.ravel()), strict=True))
+
+    def unknowns(self, force: Float) -> Float:
+        """All unknowns of the part's body under contact forces (c, d)."""
+        rows = np.zeros(len(self.condensed.compliance))
+        rows[: len(self.kept)] = force.ravel()[self.kept]
+        return self.condensed.unknowns(rows)
+
+
+def rigid_gap(model: Model, where: Surface, touch: float, target: Target) -> Float:
+    """Weighted gap (c,) mm between the object under a target and a surface at rest, along the object's normal."""
+    x, y = where.samples[:, 0], where.samples[:, 1]
+    z = where.samples[:, 2] if where.samples.shape[1] == 3 else np.zeros_like(x)
+    height = model.object.height(x - target.slide_x_mm, z - target.slide_z_mm)
+    vertical = height + touch - target.depth_mm - y
+    upright = -model.object.frame(where.samples.shape[1])[0, 1]
+    return np.asarray(where.average @ vertical) * upright
+
+
+def targets(legs: tuple[Leg, ...]) -> list[Target]:
+    """Every increment of the legs, the start not among them."""
+    out: list[Target] = []
+    at = Target(0.0)
+    for leg in legs:
+        count = leg.steps if isinstance(leg.steps, int) else AUTO_START
+        end = Target(leg.depth_mm, leg.slide_x_mm, leg.slide_z_mm, at.time_s + (leg.duration_s or 0.0))
+        out += [between(at, end, k / count) for k in range(1, count)] + [end]
+        at = end
+    return out
+
+
+def between(a: Target, b: Target, share: float) -> Target:
+    """The target a share of the way from a to b."""
+    values = [u + share * (v - u) for u, v in zip(values_of(a), values_of(b), strict=True)]
+    return Target(*values)
+
+
+def values_of(t: Target) -> tuple[float, float, float, float]:
+    """Depth, slides and time."""
+    return t.depth_mm, t.slide_x_mm, t.slide_z_mm, t.time_s
