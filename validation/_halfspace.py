@@ -1,0 +1,134 @@
+"""A ball on a block so deep that it is a half-space, on a quarter of a graded box; lengths in a = 1 mm, E = 1 MPa."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.contact.advance import advance
+from finger3d.contact.law import OPEN, SLIP, STICK, Coulomb
+from finger3d.contact.state import ContactState
+from finger3d.fem.assembly import Elasticity
+from finger3d.mesh import quadratic
+from finger3d.objects import Sphere
+
+from ._common import Body, body, box, graded, held_at
+
+Float = NDArray[np.float64]
+
+RADIUS = 100.0  # a/R = 0.01
+_ZONE = 1.15  # half-width of the evenly spaced part, in a
+_GROWTH = 2.0  # of the cells beyond it; quadratic cells, and the field decays as 1 / distance
+
+
+def block(nu: float, points: int, height: float, mirrored: bool = True) -> Body:
+    """Points at x >= 0, z >= 0 of a block 2 height x height x 2 height held at its base, `points` to a.
+
+    `mirrored`: fields are even about x = 0 as in a press; else odd, as under a shear along x.
+    """
+    far = _ZONE + graded(height - _ZONE, _GROWTH / points, _GROWTH)
+    side = np.concatenate([np.linspace(0.0, _ZONE, round(_ZONE * points) + 1), far[1:]])
+    down = -graded(height, 1.0 / points, _GROWTH)[::-1]
+    mesh = quadratic(box([side, down, side]))
+    held = held_at(mesh, {"x-": (0,) if mirrored else (1, 2), "y-": (0, 1, 2), "z-": (2,)})
+    return body(mesh, Elasticity.of(1.0, nu), held, "y+", lambda p: np.hypot(p[:, 0], p[:, 2]) < 1.2)
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A pressed ball: contact points (c, 3), their area (c,), gap (c,) at first touch, compliance, and how many of such
+    parts make the whole."""
+
+    points: Float
+    area: Float
+    gap: Float
+    compliance: Float
+    parts: int
+
+
+@dataclass(frozen=True)
+class Step:
+    """One increment: depth and slide (mm), forces P, Q, T (N), dissipation (mJ), areas (mm2), and the state."""
+
+    depth: float
+    slide: float
+    P: float
+    Q: float
+    T: float
+    D: float
+    area: float
+    stick_area: float
+    state: ContactState
+    iterations: int
+
+
+def quarter(nu: float, points: int, height: float) -> Ball:
+    """The part x >= 0, z >= 0, for presses."""
+    half_space = block(nu, points, height)
+    surface = half_space.surface
+    return Ball(surface.points, surface.area, _gap(half_space), half_space.compliance, 4)
+
+
+def half(nu: float, points: int, height: float) -> Ball:
+    """The part z >= 0, for shear along x: the compliance from that under even and odd loads about x = 0."""
+    even, odd = block(nu, points, height), block(nu, points, height, mirrored=False)
+    surface, gap = even.surface, _gap(even)
+    c = len(gap)
+    plane = surface.points[:, 0] == 0.0
+    number = np.concatenate([np.arange(c), np.flatnonzero(~plane)])
+    sign = np.where(np.arange(len(number)) < c, 1.0, -1.0)
+    turn = np.ones((len(number), 3))
+    turn[:, 1] = sign
+    free_even, free_odd = np.ones((c, 3)), np.ones((c, 3))
+    free_even[plane, 1] = 0.0  # a point on the plane moves along x under odd loads only, else under even ones only
+    free_odd[plane, 0] = free_odd[plane, 2] = 0.0
+    together = _part(even.compliance, free_even)[number][:, :, number]
+    against = _part(odd.compliance, free_odd)[number][:, :, number]
+    whole = 0.5 * (together + against * (sign[:, None] * sign)[:, None, :, None])
+    whole *= turn[:, :, None, None] * turn
+    on_axis = surface.points[:, 2] == 0.0
+    locked = np.flatnonzero(on_axis[number]) * 3 + 2
+    flat = whole.reshape(3 * len(number), -1)
+    flat[locked, locked] = np.diagonal(flat).max()
+    at = surface.points[number].copy()
+    at[:, 0] *= sign
+    area = np.where(plane, 2.0 * surface.area, surface.area)[number]
+    return Ball(at, area, gap[number], whole, 2)
+
+
+def _part(compliance: Float, free: Float) -> Float:
+    return compliance * free[:, :, None, None] * free
+
+
+def _gap(half_space: Body) -> Float:
+    ball = Sphere(radius_mm=RADIUS)
+    return half_space.gap(lambda p: ball.height(p[:, 0], p[:, 2]))
+
+
+def press(ball: Ball, mu: float, path: Sequence[tuple[float, float]]) -> list[Step]:
+    """March through (depth, slide along x) mm, the start at first touch not among them."""
+    state = ContactState.at_rest(ball.gap, 3)
+    lost, steps = 0.0, []
+    for depth, slide in path:
+        free = np.zeros((len(ball.gap), 3))
+        free[:, 0], free[:, 1] = ball.gap - depth, -slide
+        found = advance(state, free, ball.compliance, Coulomb(mu), max(depth, 1e-3))
+        if not found.outcome.ok:
+            raise AssertionError(f"mu = {mu:g}, depth {depth:g}, slide {slide:g}: {found.outcome}")
+        friction, slips = found.state.force[:, 1:], found.state.status == SLIP
+        lost -= float((friction * (found.state.slip - state.slip))[slips].sum())
+        state = found.state
+        # points on a plane of symmetry carry the part's share of their force
+        total = ball.parts * state.force.sum(axis=0)
+        steps.append(
+            Step(
+                depth, slide, float(total[0]), float(total[1]),
+                ball.parts * float(np.linalg.norm(friction, axis=1).sum()), ball.parts * lost,
+                ball.parts * float(ball.area[state.status != OPEN].sum()),
+                ball.parts * float(ball.area[state.status == STICK].sum()), state, found.iterations,
+            )
+        )  # fmt: skip
+    return steps
