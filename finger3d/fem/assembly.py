@@ -66,14 +66,49 @@ class Stiffness:
     pressure_scale: float
 
 
-def _pairs(nodes: Int, count: int) -> tuple[Int, Int, Int]:
-    """Pattern of the upper node-node blocks: slot (e, pairs) of every local pair, and the slots' row and column."""
-    small = np.minimum(nodes[:, :, None], nodes[:, None, :])
-    large = np.maximum(nodes[:, :, None], nodes[:, None, :])
-    local = np.triu_indices(nodes.shape[1])
-    key = (small * count + large)[:, local[0], local[1]]
-    unique, slot = np.unique(key, return_inverse=True)
-    return slot.reshape(key.shape), unique // count, unique % count
+@dataclass(frozen=True)
+class Pattern:
+    """Where the cells' node-node blocks go in the upper triangle; one per mesh, for any number of assemblies.
+
+    Attributes
+    ----------
+    slot : (e, pairs) number of the block of every local pair a <= b
+    row, col : (blocks,) node numbers, row <= col
+    local : the local pairs, as two index arrays (pairs,)
+    swapped : (e, pairs) whether a pair's nodes stand the other way round in the matrix
+    """
+
+    slot: Int
+    row: Int
+    col: Int
+    local: tuple[Int, Int]
+    swapped: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, mesh: Mesh) -> Pattern:
+        """Find the pattern of a mesh."""
+        count = len(mesh.points)
+        a, b = np.triu_indices(mesh.cells.shape[1])
+        first, second = mesh.cells[:, a], mesh.cells[:, b]
+        key = np.minimum(first, second) * count + np.maximum(first, second)
+        unique, slot = np.unique(key, return_inverse=True)
+        return cls(slot.reshape(key.shape), unique // count, unique % count, (a, b), first > second)
+
+    def add(self, blocks: Float, part: slice, cell: Float) -> None:
+        """Add the blocks (e, k, k, d, d) of some cells to `blocks` (blocks, d, d)."""
+        upper = cell[:, self.local[0], self.local[1]]
+        turn = self.swapped[part]
+        upper[turn] = np.swapaxes(upper[turn], 1, 2)
+        np.add.at(blocks, self.slot[part].ravel(), upper.reshape(-1, *blocks.shape[1:]))
+
+    def entries(self, blocks: Float) -> tuple[Float, Int, Int]:
+        """Values, rows and columns of the upper triangle."""
+        d = blocks.shape[1]
+        i, j = np.meshgrid(np.arange(d), np.arange(d), indexing="ij")
+        keep = np.ones(blocks.shape, dtype=bool)
+        keep[self.row == self.col] = i <= j
+        rows, cols = self.row[:, None, None] * d + i, self.col[:, None, None] * d + j
+        return blocks[keep], rows[keep], cols[keep]
 
 
 def _cell_blocks(gradients: Float, weights: Float, elastic: Elasticity, lame: float) -> Float:
@@ -102,12 +137,9 @@ def stiffness(mesh: Mesh, elastic: Elasticity, thickness: float = 1.0) -> Stiffn
         Width of a 2D section (1 for a solid), so that forces are N.
     """
     n, d = mesh.points.shape
-    k = mesh.cells.shape[1]
     bary, w = quadrature(d, 2 if mesh.is_quadratic else 1)
-    slot, row, col = _pairs(mesh.cells, n)
-    local = np.triu_indices(k)
-    swapped = mesh.cells[:, local[0]] > mesh.cells[:, local[1]]
-    blocks = np.zeros((len(row), d, d))
+    pattern = Pattern.of(mesh)
+    blocks = np.zeros((len(pattern.row), d, d))
     hats = shape(bary, False)
     p_blocks, masses = [], []
     lame = 0.0 if elastic.mixed else elastic.lame
@@ -115,48 +147,43 @@ def stiffness(mesh: Mesh, elastic: Elasticity, thickness: float = 1.0) -> Stiffn
         part = slice(start, start + _CHUNK)
         gradients, det = physical_gradients(mesh.points[mesh.cells[part]], bary, mesh.is_quadratic)
         weights = det * (w * thickness)
-        cell = _cell_blocks(gradients, weights, elastic, lame)[:, local[0], local[1]]
-        turn = swapped[part]
-        cell[turn] = np.swapaxes(cell[turn], 1, 2)
-        where = slot[part].ravel()
-        np.add.at(blocks, where, cell.reshape(-1, d, d))
+        pattern.add(blocks, part, _cell_blocks(gradients, weights, elastic, lame))
         if elastic.mixed:
             p_blocks.append(np.einsum("eq,qp,eqkd->epkd", weights, hats, gradients, optimize=True))
             masses.append(np.einsum("eq,qp,qr->epr", weights, hats, hats, optimize=True))
-    diagonal = np.flatnonzero(row == col)
-    i, j = np.meshgrid(np.arange(d), np.arange(d), indexing="ij")
-    rows = row[:, None, None] * d + i
-    cols = col[:, None, None] * d + j
-    keep = np.ones(blocks.shape, dtype=bool)
-    keep[diagonal] = i <= j
-    entries = [(blocks[keep], rows[keep], cols[keep])]
+    entries = [pattern.entries(blocks)]
     vertices = np.zeros(0, dtype=np.int64)
     scale = 1.0
     size = n * d
     if elastic.mixed:
-        vertices = mesh.vertices
-        scale = elastic.shear * len(mesh.cells) ** (1.0 / d) / np.ptp(mesh.points, axis=0).max()
-        entries += _pressure_entries(mesh, elastic, np.concatenate(p_blocks), np.concatenate(masses), vertices, scale)
+        vertices, scale = mesh.vertices, pressure_scale(mesh, elastic.shear)
+        coupling, mass = scale * np.concatenate(p_blocks), -(scale**2) / elastic.lame * np.concatenate(masses)
+        entries += pressure_entries(mesh, coupling, mass, vertices)
         size += len(vertices)
-    data, r, c = (np.concatenate(parts) for parts in zip(*entries, strict=True))
-    return Stiffness(sp.csr_matrix((data, (r, c)), shape=(size, size)), vertices, scale)
+    return Stiffness(upper_triangle(entries, size), vertices, scale)
 
 
-def _pressure_entries(
-    mesh: Mesh, elastic: Elasticity, divergence: Float, mass: Float, vertices: Int, scale: float
-) -> list[tuple[Float, Int, Int]]:
-    """Entries of D^T (above the diagonal) and of -M / lam, in scaled pressures."""
+def upper_triangle(entries: list[tuple[Float, Int, Int]], size: int) -> sp.csr_matrix:
+    """Matrix (size, size) from lists of values, rows and columns; repeated entries add up."""
+    data, rows, cols = (np.concatenate(parts) for parts in zip(*entries, strict=True))
+    return sp.csr_matrix((data, (rows, cols)), shape=(size, size))
+
+
+def pressure_scale(mesh: Mesh, shear: float) -> float:
+    """Unit (MPa) of the pressure unknowns in which their entries are of the size of the displacements'."""
+    return float(shear * len(mesh.cells) ** (1.0 / mesh.dim) / np.ptp(mesh.points, axis=0).max())
+
+
+def pressure_entries(mesh: Mesh, coupling: Float, mass: Float, vertices: Int) -> list[tuple[Float, Int, Int]]:
+    """Entries above the diagonal of cell couplings (e, p, k, d) of u with p, and of cell blocks (e, p, p) of p."""
     n, d = mesh.points.shape
     number = np.full(n, -1)
     number[vertices] = n * d + np.arange(len(vertices))
     pressures = number[mesh.cells[:, : d + 1]]
     dof = mesh.cells[:, :, None] * d + np.arange(d)
-    rows = np.broadcast_to(dof[:, None], divergence.shape)
-    cols = np.broadcast_to(pressures[:, :, None, None], divergence.shape)
+    rows = np.broadcast_to(dof[:, None], coupling.shape)
+    cols = np.broadcast_to(pressures[:, :, None, None], coupling.shape)
     r = np.broadcast_to(pressures[:, :, None], mass.shape)
     c = np.broadcast_to(pressures[:, None, :], mass.shape)
     upper = r <= c
-    return [
-        ((scale * divergence).ravel(), rows.ravel(), cols.ravel()),
-        ((-(scale**2) / elastic.lame * mass)[upper], r[upper], c[upper]),
-    ]
+    return [(coupling.ravel(), rows.ravel(), cols.ravel()), (mass[upper], r[upper], c[upper])]
