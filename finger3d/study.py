@@ -31,7 +31,7 @@ Kind = Literal["verification", "validation", "sensitivity", "statement"]
 Measure = Literal["relative", "absolute", "at most", "at least"]
 
 _COLUMNS = ("what", "kind", "reference", "wanted", "got", "measure", "error", "tolerance", "reason", "verdict")
-_SHAPING = "contact design effects fem history.py increments.py mesh.py model.py objects.py solve.py".split()
+_SHAPING = "contact design effects fem history.py increments.py mesh.py model.py objects solve.py triangles".split()
 """What of the package shapes the numbers of a study: a change there makes its results old."""
 
 

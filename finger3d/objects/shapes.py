@@ -7,7 +7,6 @@ strain the gap is measured along the frame's normal: vertical, as in the paper, 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -16,8 +15,6 @@ from numpy.typing import NDArray
 
 Float = NDArray[np.float64]
 Axis = Literal["x", "z"]
-
-_ZOOMS = 6
 
 
 class RigidObject(Protocol):
@@ -34,7 +31,7 @@ class RigidObject(Protocol):
         ...
 
     def height(self, x: Float, z: Float) -> Float:
-        """Height (n,) mm of the surface above its lowest point, at x (n,), z (n,) mm."""
+        """Height (n,) mm of the surface above its lowest point, at x (n,), z (n,) mm; nan where there is no surface."""
         ...
 
     def frame(self, dim: int) -> Float:
@@ -47,6 +44,10 @@ class RigidObject(Protocol):
 
     def lowest(self, slide_x: float, slide_z: float) -> tuple[float, float]:
         """Place (x, z) mm of the lowest point after a slide."""
+        ...
+
+    def landmarks(self) -> Float:
+        """Places (k, 2), x and z mm, of tips and corners that may touch first and that a search could step over."""
         ...
 
 
@@ -62,7 +63,9 @@ def _circle(r: Float, radius: float) -> Float:
 
 
 @dataclass(frozen=True)
-class _Placed:
+class Placed:
+    """What objects share: the place (mm) of their lowest point, and the vertical frame."""
+
     x_mm: float = 0.0
     z_mm: float = 0.0
 
@@ -74,6 +77,10 @@ class _Placed:
         """The placed point, carried along."""
         return self.x_mm + slide_x, self.z_mm + slide_z
 
+    def landmarks(self) -> Float:
+        """The lowest point."""
+        return np.array([[self.x_mm, self.z_mm]])
+
     def _across(self, x: Float, z: Float, axis: Axis) -> Float:
         """Distance (n,) from the object's line along `axis`."""
         return np.abs(x - self.x_mm) if axis == "z" else np.abs(z - self.z_mm)
@@ -84,7 +91,7 @@ class _Placed:
 
 
 @dataclass(frozen=True)
-class Plane(_Placed):
+class Plane(Placed):
     """A plane, turned by `tilt` (radians) about z."""
 
     tilt: float = 0.0
@@ -108,7 +115,7 @@ class Plane(_Placed):
 
 
 @dataclass(frozen=True)
-class Cylinder(_Placed):
+class Cylinder(Placed):
     """A round bar along `axis`."""
 
     radius_mm: float = 1.0
@@ -124,7 +131,7 @@ class Cylinder(_Placed):
 
 
 @dataclass(frozen=True)
-class Sphere(_Placed):
+class Sphere(Placed):
     """A ball."""
 
     radius_mm: float = 1.0
@@ -135,7 +142,7 @@ class Sphere(_Placed):
 
 
 @dataclass(frozen=True)
-class Wedge(_Placed):
+class Wedge(Placed):
     """An edge along `axis`; `angle` (radians) between a face and the horizontal, tip rounded by a circle."""
 
     angle: float = math.pi / 6
@@ -155,7 +162,7 @@ class Wedge(_Placed):
 
 
 @dataclass(frozen=True)
-class Wave(_Placed):
+class Wave(Placed):
     """A cosine of `amplitude_mm` (half of peak to valley) with crests along `axis`, lowest at (x_mm, z_mm)."""
 
     wavelength_mm: float = 1.0
@@ -170,23 +177,3 @@ class Wave(_Placed):
     def mirrors(self) -> tuple[str, ...]:
         """Invariant along its crests."""
         return tuple(sorted({self.axis, *super().mirrors()}))
-
-
-def first_touch(top: Callable[[Float, Float], Float], obj: RigidObject, half_length: float, half_width: float) -> float:
-    """Height (mm) of the object's lowest point at first touch: the largest difference of the two surfaces.
-
-    `top` is the finger's height over (x, z), nan beside it; the maximum is searched on a grid that zooms in on it.
-    """
-    x_range, z_range = (-half_length, half_length), (-half_width, half_width)
-    best = -np.inf
-    for level in range(_ZOOMS):
-        count = 401 if level == 0 else 21
-        x, z = np.meshgrid(np.linspace(*x_range, count), np.linspace(*z_range, 41 if level == 0 else 21), indexing="ij")
-        difference = np.nan_to_num(top(x.ravel(), z.ravel()) - obj.height(x.ravel(), z.ravel()), nan=-np.inf)
-        at = int(np.argmax(difference))
-        best = max(best, float(difference[at]))
-        dx, dz = x[1, 0] - x[0, 0], z[0, 1] - z[0, 0]
-        cx, cz = x.ravel()[at], z.ravel()[at]
-        x_range = max(cx - dx, -half_length), min(cx + dx, half_length)
-        z_range = max(cz - dz, -half_width), min(cz + dz, half_width)
-    return best

@@ -1,0 +1,23 @@
+"""Rigid objects: the shape of the surface that is pressed on the finger, analytic or triangulated; where it touches."""
+
+from finger3d.objects.mesh import MeshObject
+from finger3d.objects.shapes import Axis, Cylinder, Plane, RigidObject, Sphere, Wave, Wedge, vertical_frame
+from finger3d.objects.slope import Slopes, slope_of
+from finger3d.objects.touch import approach, contact_box, first_touch
+
+__all__ = [
+    "Axis",
+    "Cylinder",
+    "MeshObject",
+    "Plane",
+    "RigidObject",
+    "Slopes",
+    "Sphere",
+    "Wave",
+    "Wedge",
+    "approach",
+    "contact_box",
+    "first_touch",
+    "slope_of",
+    "vertical_frame",
+]

@@ -1,0 +1,201 @@
+"""Where finger and object touch first, and approaches that the vertical gap cannot describe."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.errors import Finger3dError
+from finger3d.objects.shapes import Plane, RigidObject
+
+Float = NDArray[np.float64]
+Top = Callable[[Float, Float], Float]
+
+_GRID = (401, 41)
+_ZOOM = 11
+_ZOOMS = 8
+_PLACES = 8  # best places that are searched further: bumps and teeth may be equally high
+_STEEP = math.tan(math.radians(80.0))  # a flank that runs into the finger faster than this is a wall
+_STRIDES = 60
+
+
+def _grid(half_length: float, half_width: float) -> Float:
+    x, z = np.meshgrid(
+        np.linspace(-half_length, half_length, _GRID[0]), np.linspace(-half_width, half_width, _GRID[1]), indexing="ij"
+    )
+    return np.stack([x.ravel(), z.ravel()], axis=1)
+
+
+def _touching(
+    top: Top, obj: RigidObject, half_length: float, half_width: float, marks: Float | None
+) -> tuple[float, Float]:
+    """Height of the lowest point at first touch, and the place (2,) of it; -inf where nothing is above anything."""
+
+    def difference(at: Float) -> Float:
+        return np.nan_to_num(top(at[:, 0], at[:, 1]) - obj.height(at[:, 0], at[:, 1]), nan=-np.inf)
+
+    limit = np.array([half_length, half_width])
+    hints = obj.landmarks() if marks is None else np.vstack([obj.landmarks(), marks])
+    if half_width == 0.0:
+        hints = hints * [1.0, 0.0]
+    at = np.vstack([_grid(half_length, half_width), hints[np.all(np.abs(hints) <= limit, axis=1)]])
+    found = difference(at)
+    best, place = float(found.max()), at[np.argmax(found)]
+    step = 2.0 * limit / (np.array(_GRID) - 1)
+    places = _apart(at, found, 1.5 * step)
+    for _ in range(_ZOOMS):
+        t = np.linspace(-1.0, 1.0, _ZOOM)
+        window = np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1).reshape(1, -1, 2) * step
+        at = np.clip(places[:, None] + window, -limit, limit)
+        found = difference(at.reshape(-1, 2)).reshape(len(places), -1)
+        highest = found.argmax(axis=1)
+        places = at[np.arange(len(places)), highest]
+        top_found = found.max(axis=1)
+        if top_found.max() > best:
+            best, place = float(top_found.max()), places[int(top_found.argmax())]
+        step = step * 2.0 / (_ZOOM - 1)
+    return best, place
+
+
+def _apart(at: Float, value: Float, distance: Float) -> Float:
+    """The places (k, 2) of the largest values that are `distance` (2,) from each other."""
+    order = np.argsort(-value, kind="stable")[:2000]
+    kept: list[Float] = []
+    for i in order:
+        if np.isfinite(value[i]) and all((np.abs(at[i] - k) > distance).any() for k in kept):
+            kept.append(at[i])
+            if len(kept) == _PLACES:
+                break
+    return np.array(kept).reshape(-1, 2) if kept else at[order[:1]]
+
+
+def first_touch(top: Top, obj: RigidObject, half_length: float, half_width: float, marks: Float | None = None) -> float:
+    """Height (mm) of the object's lowest point at first touch: the largest difference of the two surfaces.
+
+    The maximum is searched on a grid and at corners that stand out, then on finer grids around the best places.
+
+    Parameters
+    ----------
+    top : the finger's height over (x, z), nan beside it
+    marks : (k, 2) mm, corners of the finger
+    """
+    return _touching(top, obj, half_length, half_width, marks)[0]
+
+
+def approach(
+    top: Top,
+    obj: RigidObject,
+    half_length: float,
+    half_width: float,
+    path: Float,
+    marks: Float | None = None,
+) -> float:
+    """First touch, as in :func:`first_touch`, of an object that then goes a way which the vertical gap can describe.
+
+    Parameters
+    ----------
+    path : (n, 3) depth, slide along x, slide along z of every target, mm
+
+    Raises
+    ------
+    Finger3dError
+        If the object is nowhere above the finger, reaches the base beside it, or runs into its side.
+    """
+    touch, place = _touching(top, obj, half_length, half_width, marks)
+    if not math.isfinite(touch):
+        raise Finger3dError(
+            f"object: no part of it is above the finger (|x| <= {half_length:g}, |z| <= {half_width:g} mm), so that it "
+            "never touches; change x_mm, z_mm"
+        )
+    deepest = float(path[:, 0].max())
+    if not isinstance(obj, Plane) and touch <= deepest:
+        raise Finger3dError(
+            f"object: at depth {deepest:g} mm its lowest point, beside the finger, is {deepest - touch:.4g} mm below "
+            "the finger's base: it touches the base first; press less deep, or change x_mm, z_mm"
+        )
+    _box(top, obj, half_length, half_width, touch, place, path)
+    _not_a_wall(obj, place, half_length, half_width)
+    if not isinstance(obj, Plane):
+        _no_side(top, obj, touch, path, half_length, half_width)
+    return touch
+
+
+def contact_box(
+    top: Top, obj: RigidObject, half_length: float, half_width: float, path: Float, marks: Float | None = None
+) -> tuple[float, float, float, float]:
+    """Box (x_min, x_max, z_min, z_max) mm over which the rigid object would overlap the finger at rest on its way."""
+    touch, place = _touching(top, obj, half_length, half_width, marks)
+    return _box(top, obj, half_length, half_width, touch, place, path)
+
+
+def _box(
+    top: Top, obj: RigidObject, half_length: float, half_width: float, touch: float, place: Float, path: Float
+) -> tuple[float, float, float, float]:
+    limit = np.array([half_length, half_width])
+    t = np.linspace(-1.0, 1.0, _ZOOM)
+    window = np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1).reshape(-1, 2) * 2.0 * limit / (np.array(_GRID) - 1)
+    at = [_grid(half_length, half_width)]
+    for k in range(_ZOOMS):  # a tip may lie between the points of the grid
+        near = window * 10.0**-k
+        at += [np.clip(place + [sx, sz] + near, -limit, limit) for sx, sz in {(p[1], p[2]) for p in path}]
+    points = np.vstack(at)
+    inside = np.zeros(len(points), dtype=bool)
+    for target in path:
+        inside |= _overlap(top, obj, points, touch, target) > 0.0
+    if not inside.any():
+        raise Finger3dError(
+            f"object: it touches the finger only at x = {place[0]:.4g}, z = {place[1]:.4g} mm, over no area: an edge "
+            "or a wall touches first; change x_mm, z_mm, or press deeper"
+        )
+    (x0, z0), (x1, z1) = points[inside].min(axis=0), points[inside].max(axis=0)
+    return float(x0), float(x1), float(z0), float(z1)
+
+
+def _overlap(top: Top, obj: RigidObject, at: Float, touch: float, target: Any) -> Float:
+    """How deep (n,) the object would reach into the finger at rest, mm; -inf where there is one of them only."""
+    depth, slide_x, slide_z = target
+    over = top(*at.T) - (obj.height(at[:, 0] - slide_x, at[:, 1] - slide_z) + touch - depth)
+    return np.nan_to_num(over, nan=-np.inf, posinf=np.inf, neginf=-np.inf)
+
+
+def _not_a_wall(obj: RigidObject, place: Float, half_length: float, half_width: float) -> None:
+    """Refuse a first touch at the finger's rim by a flank that hangs down beside it, or along its wall."""
+    reach = 1e-3 * half_length
+    for axis, limit in ((0, half_length), (1, half_width)):
+        if limit == 0.0 or abs(place[axis]) < limit * (1.0 - 1e-9):
+            continue
+        step = np.zeros(2)
+        step[axis] = math.copysign(reach, place[axis])
+        here, beside, before = obj.height(*np.stack([place, place + step, place - step], axis=1))
+        if here - beside > _STEEP * reach or before - here > _STEEP * reach:
+            raise Finger3dError(
+                f"object: it touches the finger's rim at x = {place[0]:.4g}, z = {place[1]:.4g} mm with a flank that "
+                "hangs down beside it: a wall touches first; change x_mm, z_mm"
+            )
+
+
+def _no_side(top: Top, obj: RigidObject, touch: float, path: Float, half_length: float, half_width: float) -> None:
+    """Refuse a slide during which the object enters the finger's rim at once, as a wall does, and not by its slope."""
+    t = np.linspace(-1.0, 1.0, _GRID[1])
+    sides = np.vstack([np.stack([t, s + 0.0 * t], axis=1) for s in (-1.0, 1.0)])
+    rim = np.vstack([sides, sides[:, ::-1]] if half_width else [[[-1.0, 0.0], [1.0, 0.0]]]) * [half_length, half_width]
+    before = np.zeros(3)
+    for target in path:
+        stride = math.hypot(*(target - before)[1:])
+        count = max(1, math.ceil(_STRIDES * stride / half_length))
+        over = None
+        for share in np.linspace(0.0, 1.0, count + 1) if stride else ():
+            at = before + share * (target - before)
+            now = np.maximum(_overlap(top, obj, rim, touch, at), 0.0)
+            if over is not None and (jump := now - over - _STEEP * stride / count).max() > 0.02 * touch:
+                x, z = rim[np.argmax(jump)]
+                raise Finger3dError(
+                    f"object: near slide ({at[1]:.4g}, {at[2]:.4g}) mm a wall of it runs into the finger's side at "
+                    f"x = {x:.4g}, z = {z:.4g} mm; slide less, or change x_mm, z_mm"
+                )
+            over = now
+        before = target

@@ -1,0 +1,111 @@
+"""A tree of boxes around triangles, walked for many queries at once: each level is one step of array operations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+Bool = NDArray[np.bool_]
+Test = Callable[[Int, int, Int], Bool]
+
+_FAN = 4  # children of a node, and triangles in a leaf
+_BITS = 16
+_CHUNK = 8192
+
+
+@dataclass(frozen=True)
+class Tree:
+    """A complete tree, four children to a node, over triangles that lie near each other in order.
+
+    Attributes
+    ----------
+    items : (leaves, 4) numbers of the triangles in every leaf, -1 where there is none
+    boxes : per level from the root, (4^level, 6) low and high corner; an empty node has low = inf, high = -inf
+    """
+
+    items: Int
+    boxes: tuple[Float, ...]
+
+    @classmethod
+    def over(cls, corners: Float) -> Tree:
+        """From the corners (m, 3, 3) of triangles, sorted along a Z-shaped curve (Morton 1966)."""
+        low, high = corners.min(axis=1), corners.max(axis=1)
+        order = np.argsort(_morton(0.5 * (low + high)), kind="stable")
+        leaves = 1
+        while leaves * _FAN < len(low):
+            leaves *= _FAN
+        slots = np.full(leaves * _FAN, -1, dtype=np.int64)
+        slots[: len(order)] = order
+        items = slots.reshape(leaves, _FAN)
+        empty = (items < 0)[:, :, None]
+        # low corner and minus high corner: one minimum does for both
+        both = np.where(empty, np.inf, np.hstack([low, -high])[items]).min(axis=1)
+        levels = [both]
+        while len(levels[-1]) > 1:
+            levels.append(levels[-1].reshape(-1, _FAN, 6).min(axis=1))
+        return cls(items, tuple(np.hstack([b[:, :3], -b[:, 3:]]) for b in reversed(levels)))
+
+    def pucks(self, corners: Float, area_vectors: Float) -> tuple[Float, ...]:
+        """Flat cylinders around the nodes, per level (4^level, 8): middle, axis, radius, half thickness (mm).
+
+        A surface is flat from near: its distance from a far point is bounded far better by these than by boxes.
+        """
+        empty = np.repeat((self.items < 0).ravel(), 3)
+        points = corners[self.items].reshape(-1, 3)
+        areas = np.where(self.items.reshape(-1, 1) < 0, 0.0, area_vectors[self.items].reshape(-1, 3))
+        levels = []
+        for box in self.boxes:
+            n = len(box)
+            used = np.isfinite(box[:, :3]).all(axis=1)
+            middle = np.zeros((n, 3))
+            middle[used] = 0.5 * (box[used, :3] + box[used, 3:])
+            axis = areas.reshape(n, -1, 3).sum(axis=1)
+            axis /= np.maximum(np.linalg.norm(axis, axis=1), 1e-300)[:, None]
+            off = points.reshape(n, -1, 3) - middle[:, None]
+            along = np.matmul(off, axis[:, :, None])[:, :, 0]
+            across = np.einsum("nkx,nkx->nk", off, off) - along**2
+            along, across = np.abs(along).ravel(), across.ravel()
+            along[empty] = across[empty] = -np.inf
+            thick, square = along.reshape(n, -1).max(axis=1), across.reshape(n, -1).max(axis=1)
+            radius = np.where(used, np.sqrt(np.maximum(square, 0.0)), -np.inf)
+            levels.append(np.hstack([middle, axis, radius[:, None], thick[:, None]]))
+        return tuple(levels)
+
+    def pairs(self, count: int, test: Test) -> Iterator[tuple[Int, Int]]:
+        """Pairs (query, triangle), in portions, whose node and all nodes around it pass `test(query, level, node)`."""
+        for start in range(0, count, _CHUNK):
+            query = np.arange(start, min(start + _CHUNK, count))
+            node = np.zeros(len(query), dtype=np.int64)
+            for level in range(len(self.boxes)):
+                if level:
+                    query, node = np.repeat(query, _FAN), (_FAN * node[:, None] + np.arange(_FAN)).ravel()
+                keep = test(query, level, node)
+                query, node = query[keep], node[keep]
+            found = self.items[node].ravel()
+            query = np.repeat(query, _FAN)
+            yield query[found >= 0], found[found >= 0]
+
+
+def puck_distance(p: Float, puck: Float) -> Float:
+    """Lower bound (n,) of the distance of points (n, 3) from what is in the pucks (n, 8); inf for an empty one."""
+    off = p - puck[:, :3]
+    along = np.einsum("ij,ij->i", off, puck[:, 3:6])
+    across = np.sqrt(np.maximum(np.einsum("ij,ij->i", off, off) - along**2, 0.0))
+    return np.hypot(np.maximum(np.abs(along) - puck[:, 7], 0.0), np.maximum(across - puck[:, 6], 0.0))
+
+
+def _morton(points: Float) -> Int:
+    """Interleaved bits (n,) of coordinates scaled to their box."""
+    low = points.min(axis=0)
+    span = np.maximum(np.ptp(points, axis=0).max(), 1e-300)
+    scaled = np.minimum((points - low) / span * 2**_BITS, 2**_BITS - 1).astype(np.int64)
+    code = np.zeros(len(points), dtype=np.int64)
+    for bit in range(_BITS):
+        for axis in range(3):
+            code |= ((scaled[:, axis] >> bit) & 1) << (3 * bit + axis)
+    return code
