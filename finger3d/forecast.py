@@ -10,7 +10,6 @@ from typing import Any
 
 from finger3d.fem.assembly import MIXED_FROM
 from finger3d.model import Model
-from finger3d.objects import first_touch
 from finger3d.solve import AUTO_START, contact_zone, symmetry
 
 _BASE_MB = 170.0
@@ -34,10 +33,9 @@ def forecast(model: Model) -> dict[str, Any]:
     dict
         Printable values by name: domain, symmetry, cells, dofs, contact points, steps, seconds of each stage, memory.
     """
-    design, d = model.design, 3 if model.domain == "solid" else 2
-    touch = first_touch(design.top, model.object, design.half_length_mm, design.width_mm / 2.0 if d == 3 else 0.0)
+    d = 3 if model.domain == "solid" else 2
     axes = symmetry(model)
-    zone = contact_zone(model, touch)
+    zone = contact_zone(model)
     mixed = model.domain != "plane-stress" and model.material.nu >= MIXED_FROM
     size = _size(model, zone, axes, mixed)
     count = sum(leg.steps if isinstance(leg.steps, int) else 8 * AUTO_START for leg in model.legs)

@@ -22,6 +22,9 @@ Float = NDArray[np.float64]
 AUTO_START = 10
 """Increments that ``steps = "auto"`` begins with."""
 
+_COVERED = 0.5  # least share of a point's hat that must be under the object
+_BESIDE = 2.0  # gap beside an object, in heights of the finger: finite, and never closed
+
 
 @dataclass(frozen=True)
 class Problem:
@@ -33,6 +36,8 @@ class Problem:
     gauge_rows : (g, c d) strain per N
     kept : (r,) directions among c d that the condensed rows stand for
     touch_mm : height of the object's lowest point at first touch
+    held : numbers of the unknowns that are zero
+    thickness : mm, the width of a section, 1 for a solid
     parent, sign, share : (m,), (m, d), (m,)
         Whole point -> part point, its mirror signs in the frame, and how often the part's force and area count there.
     """
@@ -47,6 +52,8 @@ class Problem:
     compliance: Float
     gauge_rows: Float
     kept: NDArray[np.int64]
+    held: NDArray[np.int64]
+    thickness: float
     touch_mm: float
     axes: tuple[str, ...]
     points: ContactPoints
@@ -89,7 +96,19 @@ class Problem:
             state.gap[p],
             state.position[p] * tangent,
             state.slip[p] * tangent,
+            self._whole_frames(state.frames),
         )
+
+    def _whole_frames(self, frames: Float | None) -> Float | None:
+        if frames is None:
+            return None
+        world = self.sign[:, [1, 0, 2][: self.dim]]
+        return frames[self.parent] * self.sign[:, :, None] * world[:, None, :]
+
+    def world_force(self, state: ContactState) -> Float:
+        """Forces (m, 3) N on the whole finger's points in x, y, z, from the part's state."""
+        whole = self.whole(state)
+        return self.points.seen_in(whole).world(whole.force)
 
     def coupling(self) -> float:
         """Largest mu |K_tt^-1 K_tn| over points; above 1 a contact state need not be the only one."""
@@ -115,7 +134,19 @@ def rigid_gap(model: Model, where: Surface, touch: float, target: Target) -> Flo
     height = model.object.height(x - target.slide_x_mm, z - target.slide_z_mm)
     vertical = height + touch - target.depth_mm - y
     upright = -model.object.frame(where.samples.shape[1])[0, 1]
-    return np.asarray(where.average @ vertical) * upright
+    there = np.isfinite(vertical)
+    if there.all():
+        return np.asarray(where.average @ vertical) * upright
+    # Beside the object there is no gap: a point's mean is over what the object covers, if that is half of its hat.
+    share = np.asarray(where.average @ there)
+    mean = np.asarray(where.average @ np.where(there, vertical, 0.0)) / np.maximum(share, _COVERED)
+    return np.where(share < _COVERED, _BESIDE * model.design.height_mm, mean * upright)
+
+
+def folded(point: Float, direction: Float, axes: tuple[str, ...], dim: int) -> tuple[Float, Float]:
+    """A place and a direction (3,) in the meshed part (d,), reflected back where they lie in a mirror image."""
+    sign = np.array([-1.0 if a in axes and v < 0.0 else 1.0 for a, v in zip("xyz", point, strict=True)])
+    return (point * sign)[:dim], (direction * sign)[:dim]
 
 
 def targets(legs: tuple[Leg, ...]) -> list[Target]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -13,15 +14,14 @@ from numpy.typing import NDArray
 from finger3d.contact.law import SLIP
 from finger3d.contact.state import ContactState, Increment
 from finger3d.design import mesh_section, mesh_solid
-from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import Elasticity, stiffness
 from finger3d.fem.condense import condense
 from finger3d.fem.surface import Surface, displacement_row, local_rows, restrict, strain_row, surface
 from finger3d.history import ContactPoints, Frame, Target
 from finger3d.mesh import Mesh, unfold
 from finger3d.model import Gauge, Model
-from finger3d.objects import first_touch
-from finger3d.problem import AUTO_START, Problem, between, rigid_gap, targets, values_of
+from finger3d.objects import approach, contact_box
+from finger3d.problem import AUTO_START, Problem, between, folded, rigid_gap, targets, values_of
 
 Float = NDArray[np.float64]
 
@@ -29,6 +29,7 @@ __all__ = ["AUTO_START", "Problem", "build", "contact_zone", "march", "symmetry"
 
 _MARGIN = 0.3  # candidate points reach to a rigid gap of this share of the depth; checked after the solution
 _CUTS = 6
+_STATIONS = 4  # places along a leg where the approach is looked at
 
 
 def symmetry(model: Model) -> tuple[str, ...]:
@@ -37,34 +38,31 @@ def symmetry(model: Model) -> tuple[str, ...]:
         return model.symmetry
     slides = {"x": [leg.slide_x_mm for leg in model.legs], "z": [leg.slide_z_mm for leg in model.legs]}
     axes = ("x", "z") if model.domain == "solid" else ("x",)
-    return tuple(a for a in axes if a in model.object.mirrors() and not any(slides[a]))
+    body = model.design.mirrors() if hasattr(model.design, "mirrors") else axes
+    return tuple(a for a in axes if a in body and a in model.object.mirrors() and not any(slides[a]))
 
 
-def contact_zone(model: Model, touch: float) -> tuple[float, float, float, float]:
-    """Box (x_min, x_max, z_min, z_max) mm over which the rigid object would overlap the finger at rest."""
+def _approached(model: Model) -> tuple[Any, ...]:
+    """Arguments that `finger3d.objects.approach` and `contact_box` take from a model."""
     design = model.design
-    half_width = design.width_mm / 2.0
-    grid = np.meshgrid(
-        np.linspace(-design.half_length_mm, design.half_length_mm, 401), np.linspace(-half_width, half_width, 41)
-    )
-    x, z = grid[0].ravel(), grid[1].ravel()
-    top = design.top(x, z)
-    overlap = np.zeros(len(x), dtype=bool)
-    for target in targets(model.legs):
-        height = model.object.height(x - target.slide_x_mm, z - target.slide_z_mm) + touch - target.depth_mm
-        overlap |= height < top
-    if not overlap.any():
-        raise Finger3dError("press: the object never touches the finger at any depth of this scene; press deeper")
-    return float(x[overlap].min()), float(x[overlap].max()), float(z[overlap].min()), float(z[overlap].max())
+    half_width = design.width_mm / 2.0 if model.domain == "solid" else 0.0
+    coarse = targets(tuple(replace(leg, steps=_STATIONS) for leg in model.legs))
+    path = np.array([[t.depth_mm, t.slide_x_mm, t.slide_z_mm] for t in coarse])
+    marks = design.landmarks() if hasattr(design, "landmarks") else None
+    return design.top, model.object, design.half_length_mm, half_width, path, marks
+
+
+def contact_zone(model: Model) -> tuple[float, float, float, float]:
+    """Box (x_min, x_max, z_min, z_max) mm over which the rigid object would overlap the finger at rest."""
+    return contact_box(*_approached(model))
 
 
 def build(model: Model, say: Callable[[str], None] = lambda text: None, margin: float = _MARGIN) -> Problem:
     """Mesh, assemble and condense a model."""
     design = model.design
-    half_width = design.width_mm / 2.0 if model.domain == "solid" else 0.0
-    touch = first_touch(design.top, model.object, design.half_length_mm, half_width)
+    touch = approach(*_approached(model))
     axes = symmetry(model)
-    zone = contact_zone(model, touch)
+    zone = contact_zone(model)
     if model.domain == "solid":
         mesh, report = mesh_solid(design, model.mesh, zone, axes, say)
     else:
@@ -80,7 +78,8 @@ def build(model: Model, say: Callable[[str], None] = lambda text: None, margin: 
     gauges = [_gauge_row(mesh, g, axes) for g in model.gauges]
     assembly = time.perf_counter() - start
     say(f"condensing {matrix.upper.shape[0]} unknowns to {len(face.nodes)} contact points")
-    condensed = condense(matrix, _held(model, mesh, axes), sp.vstack([rows, *gauges], format="csr"))
+    held = _held(model, mesh, axes)
+    condensed = condense(matrix, held, sp.vstack([rows, *gauges], format="csr"))
     c, d, r = len(face.nodes), mesh.dim, len(kept)
     # a point on a symmetry plane cannot move across it: that direction is left uncoupled, and never sees a force
     compliance = np.diag(np.full(c * d, np.diagonal(condensed.compliance)[:r].max()))
@@ -90,7 +89,7 @@ def build(model: Model, say: Callable[[str], None] = lambda text: None, margin: 
     parent, sign, share, points = _unfolded(model, mesh, face, axes)
     return Problem(
         model, mesh, report, elastic, matrix, face, condensed, compliance.reshape(c, d, c, d),
-        gauge_rows, kept, touch, axes, points, parent, sign, share,
+        gauge_rows, kept, held, thickness, touch, axes, points, parent, sign, share,
         {**report.seconds, "assembly": assembly, "condensation": condensed.seconds},
     )  # fmt: skip
 
@@ -112,19 +111,10 @@ def _kept_rows(face: Surface, axes: tuple[str, ...]) -> NDArray[np.int64]:
 
 def _gauge_row(mesh: Mesh, gauge: Gauge, axes: tuple[str, ...]) -> sp.csr_matrix:
     """Row of one gauge, read from the mirrored part where the gauge lies in an image."""
-    d = mesh.dim
-    direction = np.array([np.cos(gauge.angle), np.sin(gauge.angle), 0.0])
-    middle = np.array([gauge.x_mm, gauge.y_mm, gauge.z_mm])
-
-    def folded(point: Float) -> tuple[Float, Float]:
-        sign = np.array([-1.0 if a in axes and v < 0.0 else 1.0 for a, v in zip("xyz", point, strict=True)])
-        return (point * sign)[:d], (direction * sign)[:d]
-
+    along = gauge.direction
     if gauge.length_mm == 0.0:
-        return strain_row(mesh, *folded(middle))
-    half = 0.5 * gauge.length_mm * direction
-    end = displacement_row(mesh, *folded(middle + half))
-    start = displacement_row(mesh, *folded(middle - half))
+        return strain_row(mesh, *folded(gauge.middle, along, axes, mesh.dim))
+    start, end = (displacement_row(mesh, *folded(x, along, axes, mesh.dim)) for x in gauge.ends)
     return sp.csr_matrix((end - start) / gauge.length_mm)
 
 
@@ -225,9 +215,9 @@ def _increment(
 
 def _work(problem: Problem, before: ContactState, after: ContactState, a: Target, b: Target) -> float:
     """Work (mJ) of the object on the finger, forces taken as their mean over the increment."""
-    mean = 0.5 * (problem.whole(before).force + problem.whole(after).force)
+    mean = 0.5 * (problem.world_force(before) + problem.world_force(after))
     moved = np.array([b.slide_x_mm - a.slide_x_mm, a.depth_mm - b.depth_mm, b.slide_z_mm - a.slide_z_mm])
-    return float(problem.points.world(mean).sum(axis=0) @ moved)
+    return float(mean.sum(axis=0) @ moved)
 
 
 def _dissipated(problem: Problem, before: ContactState, after: ContactState) -> float:

@@ -47,7 +47,17 @@ class MeshObject(Placed):
 
     def height(self, x: Float, z: Float) -> Float:
         """Where a vertical line from below meets the body first, exact on its triangles; nan beside the body."""
-        return self.moved.height(np.asarray(x), np.asarray(z))
+        x, z = (np.ascontiguousarray(v, dtype=float) for v in np.broadcast_arrays(x, z))
+        # Every increment of a press asks at the same places again: the answer is kept until others are asked for.
+        key = (x.tobytes(), z.tobytes())
+        if key not in self._known:
+            self._known.clear()
+            self._known[key] = self.moved.height(x, z)
+        return self._known[key].copy()
+
+    @cached_property
+    def _known(self) -> dict[tuple[bytes, bytes], Float]:
+        return {}
 
     def signed_distance(self, points: Float) -> tuple[Float, Float]:
         """Distance (n,) mm of points (n, 3) from the body, negative inside, and the outward unit normal (n, 3).

@@ -144,8 +144,9 @@ def _box(
         at += [np.clip(place + [sx, sz] + near, -limit, limit) for sx, sz in {(p[1], p[2]) for p in path}]
     points = np.vstack(at)
     inside = np.zeros(len(points), dtype=bool)
-    for target in path:
-        inside |= _overlap(top, obj, points, touch, target) > 0.0
+    for slide in np.unique(path[:, 1:], axis=0):  # deeper at the same place covers what was touched before
+        depth = path[np.all(path[:, 1:] == slide, axis=1), 0].max()
+        inside |= _overlap(top, obj, points, touch, (depth, *slide)) > 0.0
     if not inside.any():
         raise Finger3dError(
             f"object: it touches the finger only at x = {place[0]:.4g}, z = {place[1]:.4g} mm, over no area: an edge "
