@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -34,7 +34,7 @@ class ContactPoints:
     nodes : (m,) numbers in the whole mesh
     points : (m, 3) mm at rest, z = 0 in a section
     area : (m,) mm2
-    frame : (d, d) normal into the finger, then tangents
+    frame : (d, d), or (m, d, d) where each point has its own: normal into the finger, then tangents
     half_width_mm, band_mm : float
         A point counts to the line z = 0 within `band_mm`; a section counts whole.
     """
@@ -49,12 +49,17 @@ class ContactPoints:
     @property
     def dim(self) -> int:
         """2 for a section, 3 for a solid."""
-        return len(self.frame)
+        return self.frame.shape[-1]
+
+    def seen_in(self, state: ContactState) -> ContactPoints:
+        """The points with the directions of a state, where they turn with the motion."""
+        return self if state.frames is None else replace(self, frame=state.frames)
 
     def world(self, local: Float) -> Float:
         """Vectors (m, 3) in x, y, z from vectors (m, d) in the frame."""
         out = np.zeros((len(local), 3))
-        out[:, : self.dim] = local @ self.frame
+        own = self.frame if self.frame.ndim == 3 else self.frame[None]
+        out[:, : self.dim] = np.einsum("ma,mak->mk", local, np.broadcast_to(own, (len(local), self.dim, self.dim)))
         return out
 
     def friction(self, force: Float) -> Float:
@@ -105,6 +110,7 @@ def _half_extent(x: Float) -> float:
 def measure(points: ContactPoints, frame: Frame) -> dict[str, Any]:
     """The entry of `steps` in summary.json for one frame (contract.md)."""
     state, target = frame.state, frame.target
+    points = points.seen_in(state)
     world = points.world(state.force)
     friction = points.friction(state.force)
     touching, sticking = state.status != OPEN, state.status == STICK
@@ -144,6 +150,7 @@ def measure(points: ContactPoints, frame: Frame) -> dict[str, Any]:
 
 def contact_table(points: ContactPoints, state: ContactState) -> dict[str, Any]:
     """Columns of contact.csv; pressure and shear are the traction on the finger, slip is in x and z."""
+    points = points.seen_in(state)
     friction = points.friction(state.force)
     padded = np.zeros((len(state.slip), points.dim))
     padded[:, 1:] = state.slip

@@ -258,35 +258,26 @@ def _remark(problem: Problem, frame: Frame) -> str:
 
 def _covers(problem: Problem, frame: Frame) -> bool:
     """Whether no point of the contact face outside the candidates went through the object."""
-    from finger3d.fem.recover import displacement
     from finger3d.fem.surface import surface
 
-    thickness = 1.0 if problem.dim == 3 else problem.model.design.width_mm
-    face = surface(problem.mesh, "contact", thickness)
-    if len(face.nodes) == len(problem.surface.nodes):
-        return True
-    u = displacement(problem.mesh, problem.model.kinematics.unknowns(problem, frame.part))
-    gap = problem.gap(frame.target, face) + (face.trace @ u) @ problem.points.frame[0]
+    face = surface(problem.mesh, "contact", problem.thickness)
     others = ~np.isin(face.nodes, problem.surface.nodes)
+    if not others.any():
+        return True
+    gap = problem.model.kinematics.gap(problem, frame.part, frame.target, face)
     return bool(gap[others].min() > -1e-9 * frame.target.depth_mm)
 
 
 def _fields(problem: Problem, output: _Output, folder: Path, figures: bool) -> None:
     """fields.vtu and the pictures, from the last good step; the field is recovered with the factor at hand."""
-    from finger3d.fem.recover import displacement, nodal_strain, pressure, stress
     from finger3d.mesh import unfold
 
     good = [f for f in output.frames if f.outcome.ok]
     if not good:
         return
     frame, points = good[-1], problem.points
-    unknowns = problem.model.kinematics.unknowns(problem, frame.part)
-    u = displacement(problem.mesh, unknowns)
-    strain = nodal_strain(problem.mesh, u)
-    p = pressure(problem.mesh, problem.stiffness, unknowns) if problem.elastic.mixed else None
-    sigma = stress(strain, problem.elastic, p)
+    u, strain, sigma = problem.model.kinematics.fields(problem, frame.part)
     mesh, parent, sign = unfold(problem.mesh, tuple("xyz".index(a) for a in problem.axes))
-    strain, sigma = _three_dimensional(problem, strain, sigma)
     flip = np.ones((len(parent), 3))
     flip[:, : problem.dim] = sign
     both = flip[:, :, None] * flip[:, None, :]
@@ -313,21 +304,6 @@ def _fields(problem: Problem, output: _Output, folder: Path, figures: bool) -> N
 def _voigt(tensor: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
     """Components xx yy zz xy yz xz (n, 6), VTK's order of a symmetric tensor."""
     return np.stack([tensor[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))], axis=1)
-
-
-def _three_dimensional(problem: Problem, strain: Any, sigma: Any) -> tuple[Any, Any]:
-    """Strain and stress (n, 3, 3); a section gets the out-of-plane component that its assumption implies."""
-    if problem.dim == 3:
-        return strain, sigma
-    e, s = np.zeros((len(strain), 3, 3)), np.zeros((len(strain), 3, 3))
-    e[:, :2, :2], s[:, :2, :2] = strain, sigma
-    nu, modulus = problem.model.material.nu, problem.model.material.E_MPa
-    in_plane = np.trace(sigma, axis1=1, axis2=2)
-    if problem.model.domain == "plane-strain":
-        s[:, 2, 2] = nu * in_plane
-    else:
-        e[:, 2, 2] = -nu / modulus * in_plane
-    return e, s
 
 
 def _figures(problem: Problem, output: _Output, frame: Frame, mesh: Any, u: Any, folder: Path) -> None:

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from finger3d.contact.advance import advance
 from finger3d.contact.paper import swap
 from finger3d.contact.state import ContactState, Increment
+from finger3d.fem.recover import across, displacement, nodal_strain, pressure, stress
+from finger3d.fem.surface import Surface
 
 Float = NDArray[np.float64]
 
@@ -36,6 +38,14 @@ class Kinematics(Protocol):
         """Strain of every gauge by name."""
         ...
 
+    def gap(self, problem: Any, state: ContactState, target: Any, face: Surface) -> Float:
+        """Gap (c,) mm of any points of the contact face in a state, candidates or not."""
+        ...
+
+    def fields(self, problem: Any, state: ContactState) -> tuple[Float, Float, Float]:
+        """Displacement (n, d) mm, strain (n, 3, 3) and stress (n, 3, 3) MPa at the nodes of the meshed part."""
+        ...
+
 
 @dataclass(frozen=True)
 class SmallStrain:
@@ -58,3 +68,20 @@ class SmallStrain:
     def gauges(self, problem: Any, state: ContactState) -> dict[str, float]:
         """From the forces, through the gauges' rows."""
         return problem.gauge_strains(state.force)
+
+    def gap(self, problem: Any, state: ContactState, target: Any, face: Surface) -> Float:
+        """Gap at rest, changed by the displacement along the object's normal."""
+        u = displacement(problem.mesh, self.unknowns(problem, state))
+        return problem.gap(target, face) + (face.trace @ u) @ problem.points.frame[0]
+
+    def fields(self, problem: Any, state: ContactState) -> tuple[Float, Float, Float]:
+        """Linear strain and stress; a section gets the component across it that its assumption implies."""
+        unknowns = self.unknowns(problem, state)
+        u = displacement(problem.mesh, unknowns)
+        strain = nodal_strain(problem.mesh, u)
+        p = pressure(problem.mesh, problem.stiffness, unknowns) if problem.elastic.mixed else None
+        sigma = stress(strain, problem.elastic, p)
+        if problem.dim == 3:
+            return u, strain, sigma
+        material, plane_strain = problem.model.material, problem.model.domain == "plane-strain"
+        return u, *across(strain, sigma, material.E_MPa, material.nu, plane_strain)

@@ -5,10 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from finger3d.contact.law import Coulomb, FrictionLaw
 from finger3d.kinematics import Kinematics, SmallStrain
 from finger3d.objects import Plane, RigidObject
 
+Float = NDArray[np.float64]
 Domain = Literal["solid", "plane-strain", "plane-stress"]
 
 
@@ -41,6 +45,22 @@ class Gauge:
     z_mm: float = 0.0
     angle: float = 0.0
     length_mm: float = 0.0
+
+    @property
+    def middle(self) -> Float:
+        """Place (3,) mm."""
+        return np.array([self.x_mm, self.y_mm, self.z_mm])
+
+    @property
+    def direction(self) -> Float:
+        """Unit vector (3,)."""
+        return np.array([np.cos(self.angle), np.sin(self.angle), 0.0])
+
+    @property
+    def ends(self) -> tuple[Float, Float]:
+        """Both ends (3,) mm."""
+        half = 0.5 * self.length_mm * self.direction
+        return self.middle - half, self.middle + half
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,8 @@ class ContactState:
         Tangential displacement relative to the object, w_t of Maeno 2004, Eq. 3; kept for open points too.
     slip : (c, d - 1) mm
         Sum of the changes of `position` while the point touched.
+    frames : (c, d, d), optional
+        Each point's own directions, where they turn with the motion; otherwise the object's frame holds for all.
     """
 
     status: NDArray[np.int8]
@@ -33,6 +35,7 @@ class ContactState:
     gap: Float
     position: Float
     slip: Float
+    frames: Float | None = None
 
     @classmethod
     def at_rest(cls, gap: Float, dim: int) -> ContactState:

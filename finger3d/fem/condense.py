@@ -46,8 +46,12 @@ class Condensed:
 
     def unknowns(self, force: Float) -> Float:
         """All unknowns (N,) under row forces (r,) N, with the factor at hand: displacements mm, then pressures."""
+        return self.solve(self._rows.T @ force)
+
+    def solve(self, load: Float) -> Float:
+        """All unknowns (N,) under loads (N,) on any of them; held ones stay zero."""
         whole = np.zeros(self._rows.shape[1])
-        whole[self._free] = self._solve(self._rows.T[self._free] @ force)
+        whole[self._free] = self._solve(load[self._free])
         return whole
 
 

@@ -48,3 +48,15 @@ def stress(strain: Float, elastic: Elasticity, p: Float | None = None) -> Float:
     d = strain.shape[-1]
     spherical = elastic.lame * np.trace(strain, axis1=1, axis2=2) if p is None else p
     return 2.0 * elastic.shear * strain + spherical[:, None, None] * np.eye(d)
+
+
+def across(strain: Float, sigma: Float, modulus: float, nu: float, plane_strain: bool) -> tuple[Float, Float]:
+    """Strain and stress (n, 3, 3) of a section (n, 2, 2), with what plane strain or plane stress implies across it."""
+    e, s = np.zeros((len(strain), 3, 3)), np.zeros((len(strain), 3, 3))
+    e[:, :2, :2], s[:, :2, :2] = strain, sigma
+    in_plane = np.trace(sigma, axis1=1, axis2=2)
+    if plane_strain:
+        s[:, 2, 2] = nu * in_plane
+    else:
+        e[:, 2, 2] = -nu / modulus * in_plane
+    return e, s

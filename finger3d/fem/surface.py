@@ -6,7 +6,7 @@ Contact unknowns live at surface vertices (design.md sec. 2): with phi_i the lin
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -38,6 +38,8 @@ class Surface:
     samples : (q, d) mm, quadrature points on the boundary at rest
     average : (c, q)
         Weighted mean at a point of anything sampled at `samples`.
+    interpolate : (q, n)
+        Value of a nodal field at `samples`.
     """
 
     nodes: Int
@@ -46,6 +48,7 @@ class Surface:
     trace: sp.csr_matrix
     samples: Float
     average: sp.csr_matrix
+    interpolate: sp.csr_matrix
 
 
 def surface(mesh: Mesh, label: str, thickness: float = 1.0) -> Surface:
@@ -71,15 +74,19 @@ def surface(mesh: Mesh, label: str, thickness: float = 1.0) -> Surface:
         (np.broadcast_to(psi, spread.shape).ravel(), (np.repeat(np.arange(m * q), psi.shape[1]), spread.ravel())),
         shape=(m * q, len(mesh.points)),
     )
-    return Surface(nodes, mesh.points[nodes], area, (average @ values).tocsr(), samples, average)
+    return Surface(nodes, mesh.points[nodes], area, (average @ values).tocsr(), samples, average, values)
 
 
 def restrict(surface: Surface, keep: NDArray[np.bool_]) -> Surface:
     """The contact points where `keep` (c,) holds."""
-    return Surface(
-        surface.nodes[keep], surface.points[keep], surface.area[keep], surface.trace[keep], surface.samples,
-        surface.average[keep],
-    )  # fmt: skip
+    return replace(
+        surface,
+        nodes=surface.nodes[keep],
+        points=surface.points[keep],
+        area=surface.area[keep],
+        trace=surface.trace[keep],
+        average=surface.average[keep],
+    )
 
 
 def local_rows(surface: Surface, frame: Float) -> sp.csr_matrix:
