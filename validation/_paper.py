@@ -1,0 +1,188 @@
+"""The two fingers of Maeno, Kawamura and Cheng 2004, strains along a line inside them, and the paper's statements.
+
+What the text leaves open is set here and swept in the studies: Poisson's ratio is not given; the line of nodes below
+the surface is drawn in Figs. 1 and 9 but not described, and is taken a tenth of the radius below the surface of the
+half cylinder, and so deep under Fig. 9's that it passes (36, 40) mm.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.contact.law import OPEN, STICK, Coulomb, FrictionLaw
+from finger3d.design import designs
+from finger3d.fem.recover import displacement
+from finger3d.history import Frame, contact_table
+from finger3d.model import Gauge, Leg, Material, MeshOptions, Model
+from finger3d.solve import Problem, build, march
+from finger3d.study import Measure, Row
+
+Float = NDArray[np.float64]
+
+MUS = (0.06, 0.125, 0.25, 0.5, 1.0)
+NUS = (0.3, 0.45, 0.49)
+STRESS, STRAIN = "plane stress", "plane strain"
+BELOW_R5, BELOW_FIG9 = 0.5, 3.29  # mm under the surface, see above
+PAPER = "Maeno 2004"
+
+
+def half_cylinder(
+    nu: float, plane: str = STRESS, size: float = 0.1, gauges: Sequence[Gauge] = (), mu: float = 0.25, steps: int = 10
+) -> Problem:
+    """Section II: R = 5 mm, E = 1 MPa, pressed 1 mm in 10 increments; plane stress in the paper; 1 mm wide."""
+    design = designs()["half_cylinder"](radius_mm=5.0, width_mm=1.0)
+    return _built(design, nu, plane, MeshOptions(size, max(0.5, size), "swept"), Leg(1.0, steps=steps), gauges, mu)
+
+
+def fig9(
+    nu: float, plane: str = STRAIN, size: float = 1.0, gauges: Sequence[Gauge] = (), mu: float = 0.25, steps: int = 10,
+    radius: float = 100.0, edge: float = 36.6,
+) -> Problem:  # fmt: skip
+    """Section III: R = 100 mm, H = 36.6 mm, 100 mm long, pressed 10 mm; plane strain in the paper.
+
+    A section is 1 mm wide, a solid 20 mm as the finger that was built.
+    """
+    width = 20.0 if plane == "solid" else 1.0
+    design = designs()["clipped_cylinder"](
+        radius_mm=radius, half_length_mm=50.0, edge_height_mm=edge, width_mm=width
+    )  # fmt: skip
+    return _built(design, nu, plane, MeshOptions(size, 4.0 * size, "swept"), Leg(10.0, steps=steps), gauges, mu)
+
+
+def _built(
+    design: Any, nu: float, plane: str, mesh: MeshOptions, leg: Leg, gauges: Sequence[Gauge], mu: float
+) -> Problem:
+    domain: Any = plane.replace(" ", "-")
+    model = Model(
+        design, Material(1.0, nu), mesh, (leg,), friction=Coulomb(mu), gauges=tuple(gauges), domain=domain
+    )  # fmt: skip
+    return build(model)
+
+
+def under(problem: Problem, friction: FrictionLaw | float, steps: int | None = None) -> list[Frame]:
+    """Frames under another friction and in other steps; the condensation is shared."""
+    law = Coulomb(friction) if isinstance(friction, int | float) else friction
+    legs = problem.model.legs if steps is None else tuple(replace(leg, steps=steps) for leg in problem.model.legs)
+    frames = list(march(replace(problem, model=replace(problem.model, friction=law, legs=legs))))
+    if not frames[-1].outcome.ok:
+        raise AssertionError(f"mu = {law.static:g}, {frames[-1].target}: {frames[-1].outcome}")
+    return frames
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Tractions (MPa) on the finger along x (mm), ascending, in a section or at z = 0 of a solid; friction along +x."""
+
+    x: Float
+    area: Float
+    p: Float
+    q: Float
+    status: NDArray[np.int8]
+    moved: Float
+
+    @classmethod
+    def of(cls, problem: Problem, frame: Frame) -> Profile:
+        """From a frame; `moved` is the displacement along x."""
+        points = problem.points
+        table = contact_table(points, frame.state)
+        on = np.flatnonzero(np.abs(points.points[:, 2]) <= 1e-9)
+        on = on[np.argsort(table["x_mm"][on])]
+        along = np.zeros((len(points.points), points.dim))
+        along[:, 1:] = frame.state.position
+        columns = [np.asarray(table[k])[on] for k in ("x_mm", "area_mm2", "pressure_MPa", "shear_x_MPa")]
+        return cls(*columns, frame.state.status[on], points.world(along)[on, 0])
+
+    @property
+    def force(self) -> float:
+        """Normal force (N) of a section."""
+        return float(self.p @ self.area)
+
+    @property
+    def a(self) -> float:
+        """Half-width of the contact at rest (mm): half way between the last point that touches and the next."""
+        return self._edge(self.status != OPEN)
+
+    @property
+    def c(self) -> float:
+        """Half-width of the stick zone (mm), likewise; 0 if the middle slips."""
+        return self._edge(self.status == STICK)
+
+    @property
+    def deformed(self) -> float:
+        """Half-width of the contact after the deformation, mm."""
+        return self.a + float(np.interp(self.a, self.x, self.moved))
+
+    @property
+    def slips_at_edges_only(self) -> bool:
+        """Whether one stick zone lies between two slip zones."""
+        inside = self.status[self.status != OPEN]
+        change = np.flatnonzero(np.diff((inside == STICK).astype(int)))
+        return len(change) == 2 and inside[0] != STICK and inside[-1] != STICK
+
+    def _edge(self, held: NDArray[np.bool_]) -> float:
+        right = self.x >= 0.0
+        if not (held & right).any():
+            return 0.0
+        last = np.flatnonzero(held & right).max()
+        return float(0.5 * (self.x[last] + self.x[min(last + 1, len(self.x) - 1)]))
+
+    def edge_error(self) -> float:
+        """Half the distance of the points at the edge of the contact, mm."""
+        return float(0.5 * np.median(np.diff(self.x[self.status != OPEN])))
+
+
+def line(x: Float, design: Any, below: float) -> list[Gauge]:
+    """Three gauges (0, 45, 90 degrees) at each x (n,), `below` mm under the surface."""
+    y = design.top(x, np.zeros_like(x)) - below
+    return _rosettes(x, y)
+
+
+def line_r5(below: float = BELOW_R5, count: int = 45, reach: float = 4.4) -> tuple[Float, list[Gauge]]:
+    """x (n,) and gauges along the line in the half cylinder: an arc about its centre, `below` mm under the surface."""
+    t = np.linspace(-1.0, 1.0, count) * math.asin(reach / 5.0)
+    radius = 5.0 - below
+    x, y = radius * np.sin(t), radius * np.cos(t)
+    return x, _rosettes(x, y)
+
+
+def _rosettes(x: Float, y: Float) -> list[Gauge]:
+    angles = (0.0, math.pi / 4, math.pi / 2)
+    return [
+        Gauge(f"{i}:{k}", float(a), float(b), angle=angle)
+        for i, (a, b) in enumerate(zip(x, y, strict=True))
+        for k, angle in enumerate(angles)
+    ]
+
+
+def strains(frame: Frame, count: int) -> Float:
+    """eps_x, eps_y, gamma_xy (3, n) of the `count` points of a line."""
+    read = np.array([[frame.gauges[f"{i}:{k}"] for k in range(3)] for i in range(count)])
+    along_x, slanted, along_y = read.T
+    return np.array([along_x, along_y, 2.0 * slanted - along_x - along_y])
+
+
+def moved(problem: Problem, frame: Frame) -> Float:
+    """Displacement (n, d) mm of the meshed part, recovered from the contact forces of a frame."""
+    own = np.flatnonzero(np.all(problem.sign == 1.0, axis=1))
+    first = own[np.argsort(problem.parent[own])]
+    force = frame.state.force[first] / problem.share[first][:, None]
+    return displacement(problem.mesh, problem.unknowns(force))
+
+
+def said(
+    what: str, where: str, wanted: float, got: float, reason: str, tolerance: float = 0.0, measure: Measure = "relative"
+) -> Row:
+    """A statement of the paper, measured; `where` is its section or figure."""
+    return Row(what, f"{PAPER}, {where}", wanted, float(got), tolerance, reason, "statement", measure)
+
+
+def columns(names: str, rows: Sequence[Sequence[Any]]) -> dict[str, list[Any]]:
+    """A table of a study from its lines; five digits keep the files small."""
+    short = [[float(f"{v:.5g}") if isinstance(v, float) else v for v in row] for row in rows]
+    return dict(zip(names.split(), map(list, zip(*short, strict=True)), strict=True))

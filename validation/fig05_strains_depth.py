@@ -1,0 +1,65 @@
+"""As the finger is pressed, does the shear strain inside it change while the normal strains do not noticeably?
+
+Source: Maeno 2004, Fig. 5 and Sec. II-B: R = 5 mm, mu = .25, plane stress: "the distribution of the shear strain
+changes as a function of the change in the tangential contact force, whereas the distribution of normal strains do not
+change noticeably".  Read to the letter: the largest change along the line of nodes between .2 and 1 mm, of each normal
+strain against the shear.  The line's depth is not told; half as deep and twice as deep are in the table.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from finger3d.study import Result
+
+from ._paper import BELOW_R5, STRAIN, STRESS, columns, half_cylinder, line_r5, said, strains, under
+
+CASES = ((STRESS, 0.0), (STRESS, 0.3), (STRESS, 0.45), (STRESS, 0.49), (STRAIN, 0.3), (STRAIN, 0.45), (STRAIN, 0.49))
+JUDGED = ((STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.49))
+NAMES = ("eps_x", "eps_y", "gamma_xy")
+
+
+def run(quick: bool) -> Result:
+    """Strains along lines under the surface at every increment."""
+    size, count = (0.2, 15) if quick else (0.05, 45)
+    found, lines, rows = {}, [], []
+    for below in (BELOW_R5,) if quick else (BELOW_R5 / 2.0, BELOW_R5, 2.0 * BELOW_R5):
+        x, gauges = line_r5(below, count)
+        for plane, nu in CASES:
+            frames = under(half_cylinder(nu, plane, size, gauges), 0.25)
+            found[below, plane, nu] = np.array([strains(f, count) for f in frames])
+            for frame, values in list(zip(frames, found[below, plane, nu], strict=True))[1::2]:
+                points, depth = zip(x, *values, strict=True), frame.target.depth_mm
+                lines += [(plane, nu, below, depth, *map(float, point)) for point in points]
+    x, _ = line_r5(BELOW_R5, count)
+    for plane, nu in JUDGED:
+        values = found[BELOW_R5, plane, nu]
+        change = np.abs(values[-1] - values[1]).max(axis=1)
+        for k in (0, 1):
+            where = f"{plane}, nu = {nu:g}"
+            what = f"{NAMES[k]} changes little from .2 to 1 mm: largest change over that of gamma_xy, {where}"
+            reason = "a quarter would still be noticed"
+            rows.append(said(what, "Fig. 5", 0.25, change[k] / change[2], reason, 0.0, "at most"))
+    table = columns("plane nu below_mm depth_mm x_mm eps_x eps_y gamma_xy", lines)
+    shown = {k[1:]: v for k, v in found.items() if k[0] == BELOW_R5}
+    return Result(tuple(rows), table, lambda figure: _draw(figure, x, shown))
+
+
+def _draw(figure: Any, x: np.ndarray, found: dict[Any, np.ndarray]) -> None:
+    from matplotlib import colormaps
+
+    figure.set_size_inches(12.0, 8.0)
+    panels = figure.subplots(3, 3, sharex=True, sharey="row")
+    figure.suptitle(f"Strains {BELOW_R5:g} mm under the surface, mu = .25")
+    for column, (plane, nu) in enumerate(JUDGED):
+        for row in range(3):
+            for i in range(1, 10, 2):
+                colour = colormaps["viridis"](0.9 * i / 9)
+                panels[row, column].plot(x, found[plane, nu][i, row], color=colour, label=f"{0.1 * (i + 1):.1f} mm")
+            panels[row, column].axhline(0.0, color="#999999", lw=0.7)
+            panels[row, 0].set_ylabel(NAMES[row])
+        panels[0, column].set_title(f"{plane}, nu = {nu:g}", fontsize=10)
+        panels[2, column].set_xlabel("x (mm)")
+    panels[1, 0].legend(title="depth", frameon=False, fontsize=8)

@@ -1,0 +1,94 @@
+"""Which strain in the half cylinder tells the friction coefficient: the shear near the edge, or eps_x in the middle?
+
+Source: Maeno 2004, Fig. 7 and Sec. II-B: R = 5 mm, 1 mm, plane stress, mu = .06 to 1: all strains change with mu; "the
+changes in tangential strain eps_x are not large"; "the shear strain near the slip area should be used ... rather than
+the tangential strain".  Shinoda used eps_x at x = 0.  The line's depth is not told; half and twice it are in the table.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from finger3d.study import Result, Row
+
+from ._paper import (
+    BELOW_R5,
+    MUS,
+    STRAIN,
+    STRESS,
+    Profile,
+    columns,
+    half_cylinder,
+    line_r5,
+    said,
+    strains,
+    under,
+)  # fmt: skip
+
+CASES = ((STRESS, 0.0), (STRESS, 0.3), (STRESS, 0.45), (STRESS, 0.49), (STRAIN, 0.3), (STRAIN, 0.45), (STRAIN, 0.49))
+JUDGED = ((STRESS, 0.0), (STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.49))
+DRAWN = ((STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.49))
+NAMES = ("eps_x", "eps_y", "gamma_xy")
+
+
+def run(quick: bool) -> Result:
+    """Strains along lines under the surface for five coefficients."""
+    size, count = (0.2, 15) if quick else (0.05, 45)
+    found, half, lines = {}, {}, []
+    for below in (BELOW_R5,) if quick else (BELOW_R5 / 2.0, BELOW_R5, 2.0 * BELOW_R5):
+        x, gauges = line_r5(below, count)
+        for plane, nu in CASES:
+            problem = half_cylinder(nu, plane, size, gauges)
+            for mu in MUS:
+                frame = under(problem, mu)[-1]
+                found[below, plane, nu, mu] = strains(frame, count)
+                half[plane, nu] = Profile.of(problem, frame).a
+                points = zip(x, *found[below, plane, nu, mu], strict=True)
+                lines += [(plane, nu, below, mu, *map(float, point)) for point in points]
+    x, _ = line_r5(BELOW_R5, count)
+    rows = []
+    for plane, nu in JUDGED:
+        values = np.array([found[BELOW_R5, plane, nu, mu] for mu in MUS])
+        rows += _statements(f"{plane}, nu = {nu:g}", x, values, half[plane, nu])
+    table = columns("plane nu below_mm mu x_mm eps_x eps_y gamma_xy", lines)
+    shown = {k[1:]: v for k, v in found.items() if k[0] == BELOW_R5}
+    return Result(tuple(rows), table, lambda figure: _draw(figure, x, shown))
+
+
+def _statements(here: str, x: np.ndarray, values: np.ndarray, a: float) -> list[Row]:
+    change = np.ptp(values, axis=0)
+    middle, most = len(x) // 2, int(np.argmax(change[2]))
+    return [
+        said(
+            f"gamma_xy changes with mu: its largest change over its largest value, {here}", "Fig. 7", 0.05,
+            change[2].max() / np.abs(values[:, 2]).max(), "5 % would be seen in a figure", 0.0, "at least",
+        ),
+        said(
+            f"eps_x at x = 0 changes little: its change over the largest of gamma_xy, {here}", "Fig. 7", 0.5,
+            change[0][middle] / change[2].max(), "half would still be a signal", 0.0, "at most",
+        ),
+        said(
+            f"gamma_xy changes most near the edge: |x|/a of its largest change, {here}", "Fig. 7", 0.5,
+            abs(x[most]) / a, "the outer half of the contact", 0.0, "at least",
+        ),
+    ]  # fmt: skip
+
+
+def _draw(figure: Any, x: np.ndarray, found: dict[Any, np.ndarray]) -> None:
+    from matplotlib import colormaps
+
+    figure.set_size_inches(12.0, 8.0)
+    panels = figure.subplots(3, 3, sharex=True, sharey="row")
+    figure.suptitle(f"Strains {BELOW_R5:g} mm under the surface at 1 mm under five friction coefficients")
+    for column, (plane, nu) in enumerate(DRAWN):
+        for row in range(3):
+            for i, mu in enumerate(MUS):
+                colour = colormaps["plasma"](0.85 * i / 4)
+                panels[row, column].plot(x, found[plane, nu, mu][row], color=colour, label=f"{mu:g}")
+            panels[row, column].axhline(0.0, color="#999999", lw=0.7)
+            panels[row, 0].set_ylabel(NAMES[row])
+        panels[0, column].set_title(f"{plane}, nu = {nu:g}", fontsize=10)
+        panels[2, column].set_xlabel("x (mm)")
+    panels[1, 0].legend(title="mu", frameon=False, fontsize=8)
