@@ -51,9 +51,9 @@ def _peak_memory_mb() -> float:
 class _Output:
     """The files of a press that grow with its steps."""
 
-    def __init__(self, scene: Scene, problem: Problem, out: Path, started: float, factorizations: int) -> None:
+    def __init__(self, scene: Scene, problem: Problem, out: Path, started: float, before: int) -> None:
         self.scene, self.problem, self.out, self.started = scene, problem, out, started
-        self.factorizations = factorizations
+        self.factorizations_before = before
         self.frames: list[Frame] = []
         self.estimate: StepEstimate | None = None
         self.coupling = problem.coupling()
@@ -107,7 +107,7 @@ class _Output:
             },
             "cost": {
                 "seconds": {**self.seconds, "total": time.perf_counter() - self.started},
-                "factorizations": self.factorizations,
+                "factorizations": self.factorizations_before + problem.factorizations,
                 "peak_memory_MB": _peak_memory_mb(),
                 "solver": problem.condensed.solver,
                 "perturbed_pivots": problem.condensed.perturbed_pivots,
@@ -205,8 +205,8 @@ def _solve(
     model = scene.model()
     report.stage("meshing")
     problem = build(model, report.say) if margin is None else build(model, report.say, margin)
-    factorizations = problem.condensed.factorizations + (before.factorizations if before else 0)
-    output = _Output(scene, problem, folder, started, factorizations)
+    spent = before.factorizations_before + before.problem.factorizations if before else 0
+    output = _Output(scene, problem, folder, started, spent)
     for warning in output.warnings:
         report.say(f"warning: {warning}")
     output.write("incomplete: no step was finished")

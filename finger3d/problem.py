@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,19 +13,42 @@ from finger3d.contact.newton import uniqueness
 from finger3d.contact.state import ContactState
 from finger3d.design import MeshReport
 from finger3d.fem.assembly import Elasticity, Stiffness
-from finger3d.fem.condense import Condensed
+from finger3d.fem.condense import Condensed, spring_forces
 from finger3d.fem.surface import Surface
 from finger3d.history import ContactPoints, Target
 from finger3d.mesh import Mesh
 from finger3d.model import Leg, Model
 
 Float = NDArray[np.float64]
+Made = TypeVar("Made")
 
 AUTO_START = 10
 """Increments that ``steps = "auto"`` begins with."""
 
 _COVERED = 0.5  # least share of a point's hat that must be under the object
 _BESIDE = 2.0  # gap beside an object, in heights of the finger: finite, and never closed
+_KEPT = 5  # a factor is what takes the memory; a path rarely has more than four lengths of increments
+
+
+@dataclass
+class Later:
+    """What is made of a problem after its build, once for each key; the last few are kept, factorisations counted."""
+
+    factorizations: int = 0
+    _kept: dict[Hashable, object] = field(default_factory=dict)
+
+    def once(self, key: Hashable, make: Callable[[], Made]) -> Made:
+        """Return what `make` gave for the key, now or before."""
+        found = self._kept.pop(key) if key in self._kept else self._counted(make())
+        self._kept[key] = found
+        while len(self._kept) > _KEPT:
+            self._kept.pop(next(iter(self._kept)))
+        return found  # type: ignore[return-value]
+
+    def _counted(self, made: object) -> object:
+        if isinstance(made, Condensed):
+            self.factorizations += made.factorizations
+        return made
 
 
 @dataclass(frozen=True)
@@ -40,6 +65,10 @@ class Problem:
     thickness : mm, the width of a section, 1 for a solid
     parent, sign, share : (m,), (m, d), (m,)
         Whole point -> part point, its mirror signs in the frame, and how often the part's force and area count there.
+    springs : (s,) N mm
+        Stiffness of the last s condensed rows, which inclusions add to the body; `condensed` is the body without.
+    bare : the same without inclusions, if there are any
+    later : what is made of the problem after its build
     """
 
     model: Model
@@ -61,6 +90,14 @@ class Problem:
     sign: Float
     share: Float
     seconds: dict[str, float]
+    springs: Float = field(default_factory=lambda: np.zeros(0))
+    bare: Problem | None = None
+    later: Later = field(default_factory=Later, compare=False)
+
+    @property
+    def factorizations(self) -> int:
+        """All so far: that of the build, and those that followed."""
+        return self.condensed.factorizations + self.later.factorizations
 
     @property
     def origin(self) -> Target:
@@ -120,10 +157,17 @@ class Problem:
         names = [g.name for g in self.model.gauges]
         return dict(zip(names, map(float, self.gauge_rows @ force.ravel()), strict=True))
 
-    def unknowns(self, force: Float) -> Float:
-        """All unknowns of the part's body under contact forces (c, d)."""
+    def row_forces(self, force: Float) -> Float:
+        """Forces on the condensed rows from contact forces (c, d); none on the rows of gauges and inclusions."""
         rows = np.zeros(len(self.condensed.compliance))
         rows[: len(self.kept)] = force.ravel()[self.kept]
+        return rows
+
+    def unknowns(self, force: Float) -> Float:
+        """All unknowns of the part's body under contact forces (c, d)."""
+        rows, compliance = self.row_forces(force), self.condensed.compliance
+        if len(self.springs):
+            rows[-len(self.springs) :] = spring_forces(compliance, self.springs, compliance @ rows)
         return self.condensed.unknowns(rows)
 
 
@@ -141,6 +185,17 @@ def rigid_gap(model: Model, where: Surface, touch: float, target: Target) -> Flo
     share = np.asarray(where.average @ there)
     mean = np.asarray(where.average @ np.where(there, vertical, 0.0)) / np.maximum(share, _COVERED)
     return np.where(share < _COVERED, _BESIDE * model.design.height_mm, mean * upright)
+
+
+def at_points(rows: Float, kept: NDArray[np.int64], count: int, dim: int) -> Float:
+    """Compliance (c, d, c, d) of contact points from that of the condensed rows (r, r), of which they are the first.
+
+    A point on a symmetry plane cannot move across it: that direction is left uncoupled, and never sees a force.
+    """
+    own = rows[: len(kept), : len(kept)]
+    out = np.diag(np.full(count * dim, np.diagonal(own).max()))
+    out[np.ix_(kept, kept)] = own
+    return out.reshape(count, dim, count, dim)
 
 
 def folded(point: Float, direction: Float, axes: tuple[str, ...], dim: int) -> tuple[Float, Float]:

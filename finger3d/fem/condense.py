@@ -54,6 +54,15 @@ class Condensed:
         whole[self._free] = self._solve(load[self._free])
         return whole
 
+    def read(self, unknowns: Float) -> Float:
+        """Row displacements (r,) mm of all unknowns (N,)."""
+        return np.asarray(self._rows @ unknowns)
+
+    def again(self, stiffness: Stiffness) -> Condensed:
+        """Another stiffness on the same numbering, held and condensed alike: one more factorisation."""
+        fixed = np.setdiff1d(np.arange(self._rows.shape[1]), self._free)
+        return condense(stiffness, fixed, self._rows, self.solver)
+
 
 def condense(stiffness: Stiffness, fixed: Int, rows: sp.csr_matrix, solver: str | None = None) -> Condensed:
     """Condense a stiffness to rows.
@@ -80,6 +89,27 @@ def condense(stiffness: Stiffness, fixed: Int, rows: sp.csr_matrix, solver: str 
     compliance = 0.5 * (compliance + compliance.T)
     seconds = time.perf_counter() - start
     return Condensed(compliance, perturbed, 1, seconds, solver, padded, free, solve)
+
+
+def spring_forces(compliance: Float, springs: Float, moved: Float) -> Float:
+    """Forces (s, ...) N of springs (s,) N/mm on the last s rows of a body, which without them would move by `moved`.
+
+    Woodbury's formula: with any number of springs on its rows a body keeps its factorisation.
+    """
+    first = len(compliance) - len(springs)
+    root = np.sqrt(springs)
+    inner = np.eye(len(springs)) + root[:, None] * compliance[first:, first:] * root
+    scaled = (root * moved[first:].T).T
+    return -(root * np.linalg.solve(inner, scaled).T).T
+
+
+def stiffened(compliance: Float, springs: Float) -> Float:
+    """Compliance (r, r) of a body once springs (s,) N/mm hold its last s rows."""
+    if not len(springs):
+        return compliance
+    first = len(compliance) - len(springs)
+    found = compliance + compliance[:, first:] @ spring_forces(compliance, springs, compliance)
+    return 0.5 * (found + found.T)
 
 
 def _default_solver() -> str:
