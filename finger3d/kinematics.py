@@ -47,6 +47,11 @@ class Kinematics(Protocol):
         ...
 
 
+def length_scale(problem: Any, a: Any, b: Any) -> float:
+    """What gaps are measured by (mm): the depth, or that of the deepest leg while the finger is let go."""
+    return max(a.depth_mm, b.depth_mm) or max(leg.depth_mm for leg in problem.model.legs)
+
+
 @dataclass(frozen=True)
 class SmallStrain:
     """Linear elasticity over the condensed compliance: the paper's baseline."""
@@ -56,9 +61,9 @@ class SmallStrain:
         return ContactState.at_rest(problem.gap(problem.origin), problem.dim)
 
     def increment(self, problem: Any, state: ContactState, a: Any, b: Any, guess: Float | None) -> Increment:
-        """One call of the contact rule; gaps are measured by the depth."""
+        """One call of the contact rule."""
         rule = RULES[problem.model.rule]
-        scale = max(a.depth_mm, b.depth_mm)
+        scale = length_scale(problem, a, b)
         return rule(state, problem.free(b), problem.compliance, problem.model.friction, scale, guess)
 
     def unknowns(self, problem: Any, state: ContactState) -> Float:
