@@ -1,0 +1,145 @@
+"""When a press is released, is the area of the force-depth loop the work lost, and does friction reverse at once?
+
+Source: references.md sec. 3, last line; Spence 1975 and Turner 1979 for unloading.  An elastic body gives back what it
+stored, so after release the work done on it is what friction took: exactly in time, within O(1/N) for N increments,
+because the forces at their ends stand for those within.  The rest force and the second cycle follow from it.
+
+On unloading, friction at the very edge reverses while the inner points still slip outward under their smaller limit.
+The edge point of a mesh stands for one spacing, so the drop of load at which it slips back must vanish with the mesh.
+The work lost while releasing falls slowly with the mesh (see the table): points leave contact one by one.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from finger3d.contact.law import OPEN, SLIP
+from finger3d.model import Leg
+from finger3d.solve import Problem
+from finger3d.study import Result, Row
+
+from . import _halfspace
+from ._halfplane import Profile, compliance, line, loading, under
+
+MU = 0.25
+REST = "a released body is at rest"
+BALANCE = "energy balance of an elastic body"
+COLUMNS = "body nu points_per_a increments work lost_pressing lost_releasing work_over_lost second_over_first".split()
+"""Work of the cylinder in A P^2, of the ball in P depth."""
+
+
+def cycle(problem: Problem, nu: float, points: int, count: int) -> tuple[tuple[Any, ...], list[Profile]]:
+    """A row of the table for two cycles of a cylinder with `count` increments each way, and the profiles."""
+    depth = problem.model.legs[-1].depth_mm
+    legs = tuple(Leg(d, steps=count) for d in (depth, 0.0, depth, 0.0))
+    found = under(problem, MU, legs)
+    top, first, last = (found[k * count - 1].frame for k in (1, 2, 4))
+    scale = compliance(nu) * found[count - 1].force ** 2
+    lost = first.dissipation_mJ
+    row = (
+        "cylinder", nu, points, count, first.external_work_mJ / scale, top.dissipation_mJ / scale,
+        (lost - top.dissipation_mJ) / scale, first.external_work_mJ / lost, (last.dissipation_mJ - lost) / lost,
+    )  # fmt: skip
+    return row, found
+
+
+def ball(nu: float, points: int, height: float, count: int) -> tuple[Any, ...]:
+    """A row of the table for one cycle of a ball."""
+    depth = 1.0 / _halfspace.RADIUS
+    path = [depth * k / count for k in (*range(1, count + 1), *range(count - 1, -1, -1))]
+    found = _halfspace.press(_halfspace.quarter(nu, points, height), MU, [(d, 0.0) for d in path])
+    work = float(np.trapezoid([0.0, *(s.P for s in found)], [0.0, *path]))
+    top, lost = found[count - 1], found[-1].D
+    scale = top.P * depth
+    return "ball", nu, points, count, work / scale, top.D / scale, (lost - top.D) / scale, work / lost, np.nan
+
+
+def reversal(problem: Problem) -> tuple[float, list[Profile]]:
+    """Share of the load that is gone when the outermost point first slips back, and the profiles up to there."""
+    depth = problem.model.legs[-1].depth_mm
+    found = under(problem, MU, (Leg(depth, steps=50), Leg(0.8 * depth, steps=200)))
+    top = found[49]
+    for k, profile in enumerate(found[50:]):
+        edge = np.flatnonzero((profile.status != OPEN) & (profile.x > 0.0))[-1]
+        if profile.status[edge] == SLIP and profile.q[edge] * top.outward < 0.0:
+            return 1.0 - profile.force / top.force, [top, *found[50 : 51 + k]]
+    raise AssertionError("friction at the edge did not reverse within the release")
+
+
+def run(quick: bool) -> Result:
+    """Cylinder: 10, 20, 40 points to a, 100 to 400 increments each way; ball: 6 points to a."""
+    counts = (25, 50, 100) if quick else (100, 200, 400)
+    meshes = (10, 20) if quick else (10, 20, 40)
+    table, rows = [], []
+    drops = {}
+    for nu in (0.3,) if quick else (0.3, 0.0):
+        for points in meshes:
+            problem = line(nu, points, loading(1))
+            if nu == 0.3:
+                drops[points], shown = reversal(problem)
+            for count in counts if points == 20 else (() if quick else (counts[-1],)):
+                row, found = cycle(problem, nu, points, count)
+                table.append(row)
+        rows += _cycle_rows(nu, table, counts, found)
+    table.append(ball(0.3, 4 if quick else 6, 20.0, 40))
+    what = f"work over work lost, ball, nu = 0.3, {table[-1][2]} points to a, 40 increments"
+    rows.append(Row(what, BALANCE, 1.0, table[-1][7], 0.05, "2/N, the error being ~ 1/N"))
+    rate = float(np.log(drops[meshes[0]] / drops[meshes[-1]]) / np.log(meshes[-1] / meshes[0]))
+    what = "rate at which the drop of load that reverses the edge point falls with the mesh, cylinder, nu = 0.3"
+    rows.append(Row(what, "at once, so ~ spacing at least", 1.0, rate, 0.0, "a bound", measure="at least"))
+    what = f"drop of load that reverses the edge point, cylinder, nu = 0.3, {meshes[-1]} points to a"
+    why = "the drop that moves the edge by a point is 2 spacings/a"
+    rows.append(Row(what, "at once", 2.0 / meshes[-1], drops[meshes[-1]], 0.0, why, measure="at most"))
+    columns = dict(zip(COLUMNS, map(list, zip(*table, strict=True)), strict=True))
+    return Result(tuple(rows), columns, lambda figure: _draw(figure, columns, found, shown))
+
+
+def _cycle_rows(nu: float, table: list[tuple[Any, ...]], counts: tuple[int, ...], found: list[Profile]) -> list[Row]:
+    at = {r[3]: r for r in table if r[1] == nu and r[2] == 20}
+    here = f"cylinder, nu = {nu:g}, 20 points to a"
+    few, many = counts[-2], counts[-1]
+    rate = float(np.log((at[few][7] - 1.0) / (at[many][7] - 1.0)) / np.log(many / few))
+    extrapolated = at[many][7] + (at[many][7] - at[few][7]) * few / (many - few)
+    released = found[2 * many - 1]
+    rows = [
+        Row(f"work over work lost, {here}, {many} increments", BALANCE, 1.0, at[many][7], 0.01, "error ~ 1/N"),
+        Row(f"work lost in the second cycle over the first, {here}", REST, 1.0, at[many][8], 1e-9, "round-off"),
+        Row(f"force after release, N, {here}", REST, 0.0, released.force, 1e-12, "round-off", measure="absolute"),
+    ]
+    if many == 400:
+        what = f"work over work lost, {here}, extrapolated in 1/N from {few} and {many}"
+        rows.append(Row(what, BALANCE, 1.0, extrapolated, 0.001, "terms beyond 1/N"))
+        what = f"rate at which the excess of the work falls with N, {here}"
+        rows.append(Row(what, "~ 1/N", 1.0, rate, 0.3, "points change state one by one", measure="at least"))
+    return rows
+
+
+def _draw(figure: Any, columns: dict[str, list[Any]], found: list[Profile], shown: list[Profile]) -> None:
+    left, middle, right = figure.subplots(1, 3)
+    half = found[: len(found) // 2]
+    force = np.array([0.0, *(p.force for p in half)]) / max(p.force for p in half)
+    depth = np.array([0.0, *(p.frame.target.depth_mm for p in half)])
+    top = len(half) // 2
+    pressing = np.interp(depth, depth[: top + 1], force[: top + 1])
+    left.plot(depth / depth.max(), 1e3 * (force - pressing), label=f"nu = {columns['nu'][-2]:g}, mu = {MU:g}")
+    left.set(xlabel="depth / largest", ylabel="1000 (P - P while pressing)/P_max", title="the loop, opened")
+    for nu in dict.fromkeys(columns["nu"]):
+        which = [
+            k
+            for k, n in enumerate(columns["nu"])
+            if n == nu and columns["body"][k] == "cylinder" and columns["points_per_a"][k] == 20
+        ]
+        excess = [100 * abs(columns["work_over_lost"][k] - 1.0) for k in which]
+        middle.loglog([columns["increments"][k] for k in which], excess, "o-", label=f"cylinder, nu = {nu:g}")
+    middle.set(xlabel="increments each way", ylabel="|work/work lost - 1|, %", title="energy balance")
+    for profile, name in (
+        (shown[0], "loaded"),
+        (shown[-1], f"load less {100 * (1 - shown[-1].force / shown[0].force):.2g} %"),
+    ):
+        inside = (profile.x >= 0.0) & (profile.status != OPEN)
+        right.plot(profile.x[inside] / shown[0].a, profile.q[inside] / (MU * profile.p[inside]), ".-", label=name)
+    right.set(xlabel="x/a", ylabel="q/(mu p)", title="friction reverses at the edge first")
+    for axes in (left, middle, right):
+        axes.legend(fontsize=7)
