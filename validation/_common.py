@@ -242,3 +242,16 @@ def convergence(
     axes.set_ylabel(ylabel)
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8)
+
+
+def contact_axis(a: float, count: int, length: float, growth: float = 1.6) -> Float:
+    """Coordinates from 0: steps a/count until a little beyond a, then growing to `length`."""
+    step = a / count
+    fine = np.arange(int(np.ceil(1.1 * count)) + 1) * step
+    return np.concatenate([fine, fine[-1] + graded(length - fine[-1], step * growth, growth)[1:]])
+
+
+def quarter_block(x: Float, depths: Float) -> tuple[Mesh, NDArray[np.bool_]]:
+    """Quarter of a square block on a fixed base: coordinates along x and z, and depths from the top."""
+    mesh = quadratic(box([x, depths[-1] - depths[::-1], x]))
+    return mesh, held_at(mesh, {"x-": [0], "z-": [2], "y-": [0, 1, 2]})

@@ -11,6 +11,7 @@ decays as exp(-2z) (Lebedev and Ufliand 1958; Gladwell 1980, ch. 5).  Lengths in
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,8 +44,11 @@ def softness(z: Float, nu: float) -> Float:
     return (k * (1.0 - e**2) - 4.0 * z * e) / (k * (1.0 + e**2) + (4.0 * z**2 + 1.0 + k**2) * e)
 
 
+_gauss = cache(np.polynomial.legendre.leggauss)
+
+
 def _rule(a: float, b: float, count: int) -> tuple[Float, Float]:
-    x, w = np.polynomial.legendre.leggauss(count)
+    x, w = _gauss(count)
     return 0.5 * (b - a) * (x + 1.0) + a, 0.5 * (b - a) * w
 
 
@@ -55,6 +59,7 @@ def _waves(a: float) -> tuple[Float, Float]:
     return np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts])
 
 
+@cache
 def line(a: float, nu: float) -> Indentation:
     """Cylinder on a layer, a = half-width over thickness."""
     t, w = _rule(0.0, a, _NODES)
@@ -70,6 +75,7 @@ def line(a: float, nu: float) -> Indentation:
     return Indentation(float(w @ phi / (np.pi * a**2 / 4.0)), float(depth / a**2))
 
 
+@cache
 def point(a: float, nu: float) -> Indentation:
     """Sphere on a layer, a = radius over thickness."""
     t, w = _rule(0.0, a, _NODES)
