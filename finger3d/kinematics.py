@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from finger3d.contact.advance import advance
 from finger3d.contact.paper import swap
 from finger3d.contact.state import ContactState, Increment
-from finger3d.fem.recover import across, displacement, nodal_strain, pressure, stress
-from finger3d.fem.surface import Surface
+
+if TYPE_CHECKING:
+    from finger3d.fem.surface import Surface
 
 Float = NDArray[np.float64]
 
@@ -76,11 +77,15 @@ class SmallStrain:
 
     def gap(self, problem: Any, state: ContactState, target: Any, face: Surface) -> Float:
         """Gap at rest, changed by the displacement along the object's normal."""
+        from finger3d.fem.recover import displacement
+
         u = displacement(problem.mesh, self.unknowns(problem, state))
         return problem.gap(target, face) + (face.trace @ u) @ problem.points.frame[0]
 
     def fields(self, problem: Any, state: ContactState) -> tuple[Float, Float, Float]:
         """Linear strain and stress; a section gets the component across it that its assumption implies."""
+        from finger3d.fem.recover import across, displacement, nodal_strain, pressure, stress
+
         unknowns = self.unknowns(problem, state)
         u = displacement(problem.mesh, unknowns)
         strain = nodal_strain(problem.mesh, u)

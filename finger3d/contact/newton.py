@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from finger3d.contact.conditions import Increments, project, residual
@@ -35,6 +34,8 @@ def force_of_sets(problem: Increments, status: NDArray[np.int8], trial: Float) -
     point has d unknowns; a slipping one its f_n, with f_t = mu f_n e, and in 3D the force across e, which follows the
     slip's turning (the derivative of the projection).
     """
+    import scipy.sparse as sp  # here, so that a scene is read and checked without it
+
     c, d = trial.shape
     slip, stick = np.flatnonzero(status == SLIP), np.flatnonzero(status == STICK)
     if not len(slip) + len(stick):
