@@ -1,0 +1,143 @@
+"""Does a square that loads push along a rigid plane stick and slip as in Code_Aster's SSNV128?
+
+Source: Code_Aster V6.04.128 (GRECO benchmark); numbers of references.md sec. 6.  Plane strain, 40 x 40 mm,
+E = 130 GPa, nu = .2, mu = 1, a rigid plane under the foot y = 0.  150 MPa push on the left side, 50 MPa on the top; the
+right side is held along x, and its foot also along y.  Both loads grow together.
+
+Nothing is pressed by an object here: the body is condensed to the contact points of its foot and the loads' own row,
+and the increments go to `advance` directly, `free` being what the loads alone would do.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+from finger3d.contact.advance import advance
+from finger3d.contact.law import SLIP, STATUS_NAMES, Coulomb
+from finger3d.contact.paper import swap
+from finger3d.contact.state import ContactState
+from finger3d.fem.assembly import Elasticity, stiffness
+from finger3d.fem.condense import Condensed, condense
+from finger3d.fem.surface import Surface, local_rows, surface
+from finger3d.mesh import quadratic
+from finger3d.study import Result, Row
+
+from ._common import box, held_at, nodes_of, side_load
+
+SIDE, LEFT, TOP = 40.0, 150.0, 50.0  # mm, MPa
+PLACES = np.array([0.0, 1.25, 5.0, 7.5, 11.25])  # mm
+ASTER = np.array([28.6, 27.2, 22.8, 19.8, 15.0])  # um
+NEWTON_96 = np.array([28.60, 27.22, 22.87, 19.81, 15.41])  # um
+FRICTIONLESS = 40.62  # um, at x = 0
+SOURCE = "Code_Aster SSNV128; references.md sec. 6"
+COLUMNS = (
+    "cells_per_side increments mu rule ux_0 ux_1.25 ux_5 ux_7.5 ux_11.25 iterations residual settled_increments".split()
+)
+
+
+class Square:
+    """The condensed square: foot, compliance (c, 2, c, 2), and what the full loads alone do there (c, 2)."""
+
+    def __init__(self, cells: int) -> None:
+        axis = np.linspace(0.0, SIDE, cells + 1)
+        self.mesh = quadratic(box([axis, axis]))
+        held = held_at(self.mesh, {"x+": (0,)})
+        held[np.all(self.mesh.points == [SIDE, 0.0], axis=1)] = True
+        load = side_load(self.mesh, "x-", lambda p: np.tile([LEFT, 0.0], (len(p), 1)))
+        load += side_load(self.mesh, "y+", lambda p: np.tile([0.0, -TOP], (len(p), 1)))
+        self.foot: Surface = surface(self.mesh, "y-")
+        # normal into the body: up
+        rows = local_rows(self.foot, np.array([[0.0, 1.0], [1.0, 0.0]]))
+        rows = sparse.vstack([rows, sparse.csr_matrix(load.reshape(1, -1))], format="csr")
+        matrix = stiffness(self.mesh, Elasticity.of(1.3e5, 0.2))
+        self.condensed: Condensed = condense(matrix, np.flatnonzero(held.ravel()), rows)
+        c = len(self.foot.nodes)
+        self.compliance = self.condensed.compliance[:-1, :-1].reshape(c, 2, c, 2)
+        self.loaded = self.condensed.compliance[:-1, -1].reshape(c, 2)
+        self.line = nodes_of(self.mesh, "y-")
+
+    def slide(self, state: ContactState) -> np.ndarray:
+        """u_x at PLACES, um, of the nodes under contact forces and full loads."""
+        u = self.condensed.unknowns(np.append(state.force.ravel(), 1.0))[: self.mesh.points.size].reshape(-1, 2)
+        x = self.mesh.points[self.line, 0]
+        order = np.argsort(x)
+        return 1e3 * np.interp(PLACES, x[order], u[self.line, 0][order])
+
+    def load(self, mu: float, count: int, rule: str = "projection") -> tuple[tuple[Any, ...], ContactState]:
+        """A row of the table, and the state under the full loads."""
+        state = ContactState.at_rest(np.zeros(len(self.foot.nodes)), 2)
+        iterations, worst, settled = 0, 0.0, 0
+        for k in range(1, count + 1):
+            step = {"projection": advance, "paper": swap}[rule]
+            found = step(state, k / count * self.loaded, self.compliance, Coulomb(mu), 1e-3 * SIDE)
+            state, settled = found.state, settled + found.outcome.ok
+            iterations, worst = max(iterations, found.iterations), max(worst, found.residual)
+        ux = self.slide(state)
+        return (round(np.sqrt(len(self.mesh.cells) / 2)), count, mu, rule, *ux, iterations, worst, settled), state
+
+
+def run(quick: bool) -> Result:
+    """Squares of 12 to 96 cells a side, 1 to 20 increments, the paper's rule beside."""
+    meshes = (8, 16, 32) if quick else (12, 24, 48, 96)
+    table, last, state = [], None, None
+    for cells in meshes:
+        last = Square(cells)
+        row, state = last.load(1.0, 5)
+        table += [last.load(0.0, 1)[0], row, last.load(1.0, 5, "paper")[0]]
+    table += [last.load(1.0, count)[0] for count in (1, 20)]
+    rows = _rows(table, meshes, [last.load(1.0, count)[1] for count in (1, 5, 20)])
+    columns = dict(zip(COLUMNS, map(list, zip(*table, strict=True)), strict=True))
+    return Result(tuple(rows), columns, lambda figure: _draw(figure, table, last, state))
+
+
+def _rows(table: list[tuple[Any, ...]], meshes: tuple[int, ...], states: list[ContactState]) -> list[Row]:
+    fine = meshes[-1]
+    got = np.array(next(r for r in table if r[:4] == (fine, 5, 1.0, "projection"))[4:9], dtype=float)
+    rows = []
+    for k, x in enumerate(PLACES):
+        rows.append(Row(f"u_x at {x:g} mm, um", SOURCE, ASTER[k], got[k], 0.05, "5 % of the benchmark"))
+    for k, x in enumerate(PLACES):
+        what, why = f"u_x at {x:g} mm, um, {fine} cells a side", "its last digit, and another element"
+        rows.append(Row(what, "96 x 96 Newton; references.md sec. 6", NEWTON_96[k], got[k], 0.005, why))
+    smooth = next(r for r in table if r[:4] == (fine, 1, 0.0, "projection"))[4]
+    rows.append(Row("u_x at 0 mm, um, mu = 0", SOURCE, FRICTIONLESS, smooth, 0.001, "four digits given"))
+    force = max(float(np.abs(s.force).max()) for s in states)
+    apart = max(float(np.abs(s.force - states[0].force).max()) for s in states) / force
+    what = "forces after 1, 5 and 20 increments, largest difference over the largest"
+    rows.append(Row(what, "one answer; references.md sec. 6", 0.0, apart, 1e-8, "the residual", measure="absolute"))
+    worst = max(r[10] for r in table if r[3] == "projection")
+    rows.append(Row("largest residual", "contract.md", 1e-8, worst, 0.0, "a bound", measure="at most"))
+    values = [next(r for r in table if r[:4] == (n, 5, 1.0, "projection"))[4] for n in meshes]
+    steps = np.abs(np.diff(values))
+    rate = float(np.log2(steps[0] / steps[-1]) / (len(steps) - 1))
+    what, why = "rate at which u_x at 0 mm settles with the mesh", "the stick zone ends at a point"
+    rows.append(Row(what, "stress jumps where stick ends: 1", 1.0, rate, 0.0, why, measure="at least"))
+    literal = next(r for r in table if r[:4] == (fine, 5, 1.0, "paper"))
+    what = f"increments of 5 that the paper's rule settles, {fine} cells a side"
+    rows.append(Row(what, SOURCE, 0.0, literal[11], 0.0, "it cycles in every step", "sensitivity", "absolute"))
+    return rows
+
+
+def _draw(figure: Any, table: list[tuple[Any, ...]], square: Square, state: ContactState) -> None:
+    left, right = figure.subplots(1, 2)
+    x = square.foot.points[:, 0]
+    order = np.argsort(x)
+    left.plot(x[order], 1e3 * state.position[order, 0], label=f"finger3d, {len(x) - 1} cells a side")
+    left.plot(PLACES, ASTER, "k+", ms=10, label="SSNV128")
+    worst = max(
+        100 * abs(np.array(r[4:9], dtype=float) / ASTER - 1).max()
+        for r in table
+        if r[:4] == (len(x) - 1, 5, 1.0, "projection")
+    )
+    left.set(xlabel="x, mm", ylabel="u_x, um", title=f"slide of the foot: error {worst:.1f} % at most")
+    area = square.foot.area
+    right.plot(x[order], (state.force[:, 0] / area)[order], label="pressure")
+    right.plot(x[order], -(state.force[:, 1] / area)[order], label="friction against the slide")
+    slips = state.status[order] == SLIP
+    right.plot(x[order][slips], np.zeros(slips.sum()), ".", ms=3, label=f"{STATUS_NAMES[SLIP]}s")
+    right.set(xlabel="x, mm", ylabel="MPa", title="traction on the foot")
+    for axes in (left, right):
+        axes.legend(fontsize=8)
