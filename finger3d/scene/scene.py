@@ -149,7 +149,12 @@ def parse(given: Mapping[str, Any], path: Path | None = None, set_keys: Iterable
         }
     )
     on = {name: effect for name, (_, effect) in effects.items()}
-    return Scene(tables, design, placed.build(), mesh, on, given, path)
+    scene = Scene(tables, design, placed.build(), mesh, on, given, path)
+    try:
+        scene.model()  # what effects ask of the rest of the scene is told before any work
+    except Finger3dError as error:
+        raise _refusal([str(error)], path, set_keys) from None
+    return scene
 
 
 def _refusal(lines: list[str], path: Path | None, set_keys: Iterable[str]) -> Finger3dError:

@@ -1,0 +1,386 @@
+"""Viscoelasticity: moduli that relax as a Prony series r(t) = 1 - sum g_i (1 - exp(-t/tau_i)), E_MPa at t = 0.
+
+With ``bulk`` Poisson's ratio is constant and everything follows from the instantaneous compliance C.  Let f_e be the
+row forces that would hold the present shape of the elastic body, u = K^-1 B^T f_e; then f = r * f_e', that is
+``f = r_inf f_e + sum h_i`` with ``h_i' = e_i h_i + g_i gamma_i (f_e' - f_e)``, e_i = exp(-dt/tau_i) and
+gamma_i = (1 - e_i) tau_i/dt: exact where f_e moves at a constant rate within the step (Taylor, Pister and Goudreau
+1970).  So ``f_e' = (f + past)/alpha``, alpha = r_inf + sum g_i gamma_i: the contact rule sees the compliance C/alpha
+and points that the past has moved.  f_e lives on all contact points: an open one has f = 0 and yet creeps back.
+
+Without ``bulk`` only the shear modulus relaxes.  The same holds of the shear part K_s of K = K_b + K_s, with the whole
+displacement in place of f_e: one factorisation of K_b + alpha K_s for each length of step.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, Any, Protocol
+
+import numpy as np
+import scipy.sparse as sp
+from annotated_types import Gt, MinLen
+from numpy.typing import NDArray
+from scipy.special import exprel
+
+from finger3d.contact.state import ContactState, Increment
+from finger3d.effects.base import fill
+from finger3d.errors import Finger3dError
+from finger3d.fem.assembly import Elasticity, Stiffness, stiffness
+from finger3d.fem.condense import Condensed, spring_forces, stiffened
+from finger3d.fem.recover import across, displacement, nodal_strain, pressure, stress
+from finger3d.kinematics import RULES, SmallStrain, length_scale
+from finger3d.model import Model
+from finger3d.problem import at_points
+
+Float = NDArray[np.float64]
+Positive = Annotated[float, Gt(0)]
+Prony = tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class Memory:
+    """What a body remembers: a vector (k,) that says its shape, and each branch's share of it that has not relaxed."""
+
+    now: Float
+    branches: Float
+
+    @classmethod
+    def empty(cls, size: int, branches: int) -> Memory:
+        """Nothing yet."""
+        return cls(np.zeros(size), np.zeros((branches, size)))
+
+
+@dataclass(frozen=True)
+class Step:
+    """A Prony series over a step of `seconds`, in which the shape moves at a constant rate."""
+
+    prony: Prony
+    seconds: float
+
+    @property
+    def _rates(self) -> Float:
+        return self.seconds / np.array([time for _, time in self.prony])
+
+    @property
+    def fade(self) -> Float:
+        """e_i: what is left of a branch at the end."""
+        return np.exp(-self._rates)
+
+    @property
+    def feed(self) -> Float:
+        """g_i gamma_i: what a branch takes of a change of shape."""
+        return np.array([share for share, _ in self.prony]) * exprel(-self._rates)
+
+    @property
+    def alpha(self) -> float:
+        """Stiffness against what moves in this step, in those of an instantaneous one."""
+        return long_time_share(self.prony) + float(self.feed.sum())
+
+    def past(self, memory: Memory) -> Float:
+        """Vector (k,) with ``alpha now' - past`` the stress at the end of the step."""
+        return self.feed.sum() * memory.now - self.fade @ memory.branches
+
+    def after(self, memory: Memory, now: Float) -> Memory:
+        """The memory once the shape is `now`."""
+        branches = self.fade[:, None] * memory.branches + self.feed[:, None] * (now - memory.now)
+        return Memory(now, branches)
+
+
+def long_time_share(prony: Prony) -> float:
+    """r_inf."""
+    return 1.0 - math.fsum(share for share, _ in prony)
+
+
+def relaxed(prony: Prony, memory: Memory) -> Float:
+    """Vector (k,) of which the present stress is the instantaneous elastic one."""
+    return long_time_share(prony) * memory.now + memory.branches.sum(axis=0)
+
+
+@dataclass(frozen=True)
+class Response:
+    """A body over one step, seen at its condensed rows.
+
+    Attributes
+    ----------
+    compliance : (r, r) mm/N
+    moved : (r,) mm
+        Where the past takes the rows under no force.
+    shape : row forces (r,) -> the memory's vector `now`
+    """
+
+    compliance: Float
+    moved: Float
+    shape: Callable[[Float], Float]
+
+
+class Body(Protocol):
+    """What remembers, and how it answers."""
+
+    @property
+    def size(self) -> int:
+        """Length of the memory's vectors."""
+        ...
+
+    def respond(self, step: Step, memory: Memory) -> Response:
+        """Rows over a step."""
+        ...
+
+    def unknowns(self, now: Float) -> Float:
+        """All unknowns (N,) of a shape; pressures as the instantaneous modulus would have them."""
+        ...
+
+    def read(self, now: Float) -> Float:
+        """Row displacements (r,) of a shape."""
+        ...
+
+    def stress(self, prony: Prony, memory: Memory) -> Float:
+        """Nodal stress (n, 3, 3), or (n, 2, 2) and (n,) across the section."""
+        ...
+
+
+@dataclass(frozen=True)
+class AllRelaxes:
+    """Poisson's ratio is constant: a shape is told by the row forces that would hold it elastically."""
+
+    problem: Any
+
+    @property
+    def size(self) -> int:
+        """Number of condensed rows."""
+        return len(self.problem.condensed.compliance)
+
+    def respond(self, step: Step, memory: Memory) -> Response:
+        """The instantaneous compliance over alpha."""
+        past, alpha = step.past(memory), step.alpha
+        compliance = self.problem.condensed.compliance / alpha
+        return Response(compliance, compliance @ past, lambda rows: (rows + past) / alpha)
+
+    def unknowns(self, now: Float) -> Float:
+        """With the factor at hand."""
+        return self.problem.condensed.unknowns(now)
+
+    def read(self, now: Float) -> Float:
+        """Through the compliance."""
+        return self.problem.condensed.compliance @ now
+
+    def stress(self, prony: Prony, memory: Memory) -> Float:
+        """That of the elastic body under the forces that are left."""
+        problem = self.problem
+        unknowns = self.unknowns(relaxed(prony, memory))
+        strain = nodal_strain(problem.mesh, displacement(problem.mesh, unknowns))
+        p = pressure(problem.mesh, problem.stiffness, unknowns) if problem.elastic.mixed else None
+        return stress(strain, problem.elastic, p)
+
+
+@dataclass(frozen=True)
+class ShearRelaxes:
+    """The bulk modulus is constant: a shape is told by displacements and, in the mixed form, vertex dilatations."""
+
+    problem: Any
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return self.problem.stiffness.upper.shape[0]
+
+    @property
+    def _bulk(self) -> float:
+        return self.problem.elastic.lame + 2.0 / 3.0 * self.problem.elastic.shear
+
+    def _lame(self, alpha: float) -> float:
+        return self._bulk - 2.0 / 3.0 * alpha * self.problem.elastic.shear
+
+    def respond(self, step: Step, memory: Memory) -> Response:
+        """The body with its shear modulus times alpha; the past is a load on all of it."""
+        # steps of one length differ by round-off of their ends
+        alpha = Step(step.prony, float(f"{step.seconds:.12g}")).alpha
+        problem = self.problem
+        body: Condensed = problem.later.once(
+            ("viscosity", alpha), lambda: problem.condensed.again(self._stiffness(alpha))
+        )
+        settled = body.solve(self._shear_force(step.past(memory)))
+
+        def shape(rows: Float) -> Float:
+            found = settled + body.unknowns(rows)
+            found[problem.mesh.points.size :] *= problem.stiffness.pressure_scale / self._lame(alpha)
+            return found
+
+        return Response(body.compliance, body.read(settled), shape)
+
+    def _shear_part(self) -> sp.csr_matrix:
+        """K_s (displacement form): the deviatoric stiffness, in the plane of a section too."""
+        problem, shear = self.problem, self.problem.elastic.shear
+        part = Elasticity(shear, -2.0 / 3.0 * shear, False)
+        return problem.later.once("viscosity", lambda: stiffness(problem.mesh, part, problem.thickness).upper)
+
+    def _stiffness(self, alpha: float) -> Stiffness:
+        """K_b + alpha K_s; in the mixed form every block has its own factor."""
+        problem = self.problem
+        whole: Stiffness = problem.stiffness
+        if not problem.elastic.mixed:
+            return Stiffness(whole.upper - (1.0 - alpha) * self._shear_part(), whole.pressure_vertices, 1.0)
+        upper, n = whole.upper.copy(), problem.mesh.points.size
+        row = np.repeat(np.arange(upper.shape[0]), np.diff(upper.indptr))
+        upper.data[upper.indices < n] *= alpha
+        upper.data[row >= n] *= problem.elastic.lame / self._lame(alpha)
+        return Stiffness(upper, whole.pressure_vertices, whole.pressure_scale)
+
+    def _shear_force(self, shape: Float) -> Float:
+        """K_s times a shape (N,), as loads (N,)."""
+        problem, n = self.problem, self.problem.mesh.points.size
+        if not problem.elastic.mixed:
+            return _times(self._shear_part(), shape)
+        deviator = shape.copy()
+        deviator[n:] *= -2.0 / 3.0 * problem.elastic.shear / problem.stiffness.pressure_scale
+        load = _times(problem.stiffness.upper, deviator)
+        load[n:] = 0.0
+        return load
+
+    def unknowns(self, now: Float) -> Float:
+        """The displacements as they are."""
+        n = self.problem.mesh.points.size
+        out = now.copy()
+        out[n:] *= self.problem.elastic.lame / self.problem.stiffness.pressure_scale
+        return out
+
+    def read(self, now: Float) -> Float:
+        """From the displacements."""
+        return self.problem.condensed.read(now)
+
+    def stress(self, prony: Prony, memory: Memory) -> Float:
+        """2 G dev(eps) of what has not relaxed, and the bulk modulus times the dilatation as it is; (n, 3, 3)."""
+        shear, left = self.problem.elastic.shear, relaxed(prony, memory)
+        strain, swelling = self._strain(left)
+        spherical = self._bulk * self._strain(memory.now)[1] - 2.0 / 3.0 * shear * swelling
+        d = self.problem.dim
+        whole = np.zeros((len(strain), 3, 3))
+        whole[:, :d, :d] = 2.0 * shear * strain
+        return whole + spherical[:, None, None] * np.eye(3)
+
+    def _strain(self, shape: Float) -> tuple[Float, Float]:
+        problem = self.problem
+        strain = nodal_strain(problem.mesh, displacement(problem.mesh, shape))
+        if not problem.elastic.mixed:
+            return strain, np.trace(strain, axis1=1, axis2=2)
+        return strain, pressure(problem.mesh, problem.stiffness, shape) / problem.stiffness.pressure_scale
+
+
+def _times(upper: sp.csr_matrix, vector: Float) -> Float:
+    """A symmetric matrix, given by its upper triangle, times a vector."""
+    return upper @ vector + upper.T @ vector - upper.diagonal() * vector
+
+
+@dataclass(frozen=True, kw_only=True)
+class ViscousState(ContactState):
+    """A contact state with the memory of the meshed part that goes with it."""
+
+    memory: Memory
+
+
+@dataclass(frozen=True)
+class Viscoelastic(SmallStrain):
+    """Small strain, with moduli that relax."""
+
+    prony: Prony
+    bulk: bool
+
+    def _body(self, problem: Any) -> Body:
+        return AllRelaxes(problem) if self.bulk else ShearRelaxes(problem)
+
+    def _memory(self, state: ContactState) -> Memory:
+        assert isinstance(state, ViscousState)
+        return state.memory
+
+    def start(self, problem: Any) -> ViscousState:
+        """Nothing to remember."""
+        _check_domain(problem.model, self.bulk)
+        empty = Memory.empty(self._body(problem).size, len(self.prony))
+        return ViscousState(**vars(super().start(problem)), memory=empty)
+
+    def increment(self, problem: Any, state: ContactState, a: Any, b: Any, guess: Float | None) -> Increment:
+        """One call of the contact rule, with the compliance of this length of step and points moved by the past."""
+        memory, step = self._memory(state), Step(self.prony, b.time_s - a.time_s)
+        body = self._body(problem).respond(step, memory)
+        own, springs, first = body.compliance, problem.springs, len(body.compliance) - len(problem.springs)
+        moved = body.moved
+        if len(springs):
+            moved = moved + own[:, first:] @ spring_forces(own, springs, moved)
+        c, d = len(problem.surface.nodes), problem.dim
+        free = problem.free(b)
+        free.reshape(-1)[problem.kept] += moved[: len(problem.kept)]
+        # what is elastic beside the body (an object that yields) stays so
+        rest = problem.compliance - at_points(stiffened(problem.condensed.compliance, springs), problem.kept, c, d)
+        compliance = at_points(stiffened(own, springs), problem.kept, c, d) + rest
+        rule = RULES[problem.model.rule]
+        found = rule(state, free, compliance, problem.model.friction, length_scale(problem, a, b), guess)
+        if found.state is state:
+            return found
+        rows = problem.row_forces(found.state.force)
+        if len(springs):
+            rows[first:] = spring_forces(own, springs, body.moved + own @ rows)
+        after = ViscousState(**vars(found.state), memory=step.after(memory, body.shape(rows)))
+        return Increment(after, found.outcome, found.residual, found.iterations, found.method)
+
+    def unknowns(self, problem: Any, state: ContactState) -> Float:
+        """From the memory."""
+        return self._body(problem).unknowns(self._memory(state).now)
+
+    def gauges(self, problem: Any, state: ContactState) -> dict[str, float]:
+        """From the memory, through the gauges' rows."""
+        first = len(problem.kept)
+        rows = self._body(problem).read(self._memory(state).now)[first:]
+        return {g.name: float(strain) for g, strain in zip(problem.model.gauges, rows, strict=False)}
+
+    def fields(self, problem: Any, state: ContactState) -> tuple[Float, Float, Float]:
+        """Linear strain, and the stress that has not relaxed."""
+        u = displacement(problem.mesh, self.unknowns(problem, state))
+        strain = nodal_strain(problem.mesh, u)
+        sigma = self._body(problem).stress(self.prony, self._memory(state))
+        if problem.dim == 3:
+            return u, strain, sigma
+        material, plane_strain = problem.model.material, problem.model.domain == "plane-strain"
+        whole = across(strain, sigma[:, :2, :2], material.E_MPa, material.nu, plane_strain)
+        return u, whole[0], (whole[1] if self.bulk else sigma)
+
+
+def _check_domain(model: Model, bulk: bool) -> None:
+    if model.domain == "plane-stress" and not bulk:
+        raise Finger3dError(
+            "effects.viscosity.bulk = false: not in plane stress, where the thickness follows neither modulus alone; "
+            'set bulk = true, or model.domain = "plane-strain" or "solid"'
+        )
+
+
+@dataclass(frozen=True)
+class Effect:
+    """Settings of [effects.viscosity].
+
+    Attributes
+    ----------
+    prony : (relative modulus, time in s) of every branch; the rest is the long-time modulus
+    bulk : whether the bulk modulus relaxes too, so that nu is constant; else only the shear modulus does
+    """
+
+    prony: Annotated[tuple[tuple[Positive, Positive], ...], MinLen(1)]
+    bulk: bool = True
+
+    def __post_init__(self) -> None:
+        """Refuse a body that would relax to nothing."""
+        total = math.fsum(share for share, _ in self.prony)
+        if total >= 1.0 - 1e-12:
+            raise Finger3dError(
+                f"prony: the relative moduli sum to {total:.6g}; must be below 1, the rest is the long-time modulus"
+            )
+
+    def apply(self, model: Model) -> Model:
+        """Fill the kinematics slot; every leg must say how long it takes."""
+        prony = tuple((share, time) for share, time in self.prony)
+        model = fill(model, "kinematics", Viscoelastic(prony, self.bulk), "viscosity")
+        timeless = [i for i, leg in enumerate(model.legs) if leg.duration_s is None]
+        if timeless:
+            which = f"press.leg.{timeless[0]}.duration_s" if len(model.legs) > 1 else "press.duration_s"
+            raise Finger3dError(f"{which} is missing: with effects.viscosity every leg needs its duration in seconds")
+        _check_domain(model, self.bulk)
+        return model
