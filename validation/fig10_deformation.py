@@ -1,0 +1,92 @@
+"""Is the contact of the Fig. 9 finger about 79 mm wide at 10 mm, as the paper reads off its Fig. 10?
+
+Source: Maeno 2004, Fig. 10 and Sec. III-B: R = 100 mm, H = 36.6 mm, plane strain, 10 mm: "the contact width is
+approximately 79 mm".  Neither nu nor mu of the figure nor the half length (50 mm, geometries/fig9.toml) is given; the
+width is taken at rest and as deformed, for nu from 0 to .5, under mu = .06, .25 and 1.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from finger3d.mesh import unfold
+from finger3d.study import Result, Row
+
+from ._paper import STRAIN, STRESS, Profile, columns, fig9, moved, said, under
+
+NUS = (0.0, 0.3, 0.4, 0.43, 0.45, 0.49, 0.5)
+SHOWN_MU = (0.06, 0.25, 1.0)
+DRAWN = (0.3, 0.43, 0.49)
+SAID = (  # plane, nu, mu, 0: at rest, 1: as deformed
+    (STRAIN, 0.3, 0.25, 1), (STRAIN, 0.43, 0.25, 1), (STRAIN, 0.45, 0.25, 1), (STRAIN, 0.49, 0.25, 1),
+    (STRAIN, 0.49, 0.25, 0), (STRAIN, 0.49, 1.0, 0), (STRESS, 0.49, 0.25, 1),
+)  # fmt: skip
+WANTED = 79.0
+
+
+def run(quick: bool) -> Result:
+    """Sections in both plane states; the width is judged by the distance of the points."""
+    size = 3.0 if quick else 0.5
+    widths, drawn, lines = {}, {}, []
+    for plane in (STRAIN, STRESS):
+        for nu in NUS:
+            problem = fig9(nu, plane, size)
+            for mu in SHOWN_MU:
+                frame = under(problem, mu)[-1]
+                profile = Profile.of(problem, frame)
+                widths[plane, nu, mu] = (2.0 * profile.a, 2.0 * profile.deformed, 2.0 * profile.edge_error())
+                lines.append((plane, nu, mu, profile.force, *widths[plane, nu, mu], 2.0 * profile.c))
+                if plane == STRAIN and mu == 0.25 and nu in DRAWN:
+                    drawn[nu] = (problem, frame, profile)
+    rows = [_said(*case, widths) for case in SAID]
+    rows.append(_sensitivity(widths))
+    names = "plane nu mu force_N_per_mm width_at_rest_mm width_deformed_mm error_mm stick_width_mm"
+    return Result(tuple(rows), columns(names, lines), lambda figure: _draw(figure, drawn, widths))
+
+
+def _said(plane: str, nu: float, mu: float, which: int, widths: dict[Any, tuple[float, ...]]) -> Row:
+    where = f"{('at rest', 'as deformed')[which]}, mm, {plane}, nu = {nu:g}, mu = {mu:g}"
+    got, error = widths[plane, nu, mu][which], widths[plane, nu, mu][2]
+    reason = '"approximately": a millimetre, and the points'
+    return said(f"contact about 79 mm wide: {where}", "Sec. III-B", WANTED, got, reason, 1.0 + error, "absolute")
+
+
+def _sensitivity(widths: dict[Any, tuple[float, ...]]) -> Row:
+    """By how much mu moves the width, beside what nu does."""
+    by_mu = np.ptp([widths[STRAIN, 0.49, mu][1] for mu in SHOWN_MU])
+    by_nu = np.ptp([widths[STRAIN, nu, 0.25][1] for nu in NUS])
+    return Row(
+        "deformed width in plane strain: what mu = .06 to 1 moves over what nu = 0 to .5 moves", "this code", 0.5,
+        float(by_mu / by_nu), 0.0, "79 mm tells nu rather than mu", "sensitivity", "at most",
+    )  # fmt: skip
+
+
+def _draw(figure: Any, drawn: dict[float, Any], widths: dict[Any, tuple[float, ...]]) -> None:
+    from matplotlib.collections import PolyCollection
+
+    figure.set_size_inches(13.0, 6.6)
+    grid = figure.add_gridspec(2, 3, height_ratios=(1.0, 1.1))
+    for column, nu in enumerate(DRAWN):
+        axes = figure.add_subplot(grid[0, column])
+        problem, frame, profile = drawn[nu]
+        mesh, parent, sign = unfold(problem.mesh, (0,))
+        now = mesh.points + moved(problem, frame)[parent] * sign
+        cells = list(now[mesh.cells[:, [0, 3, 1, 4, 2, 5]]])
+        axes.add_collection(PolyCollection(cells, facecolor="#e9eef5", edgecolor="#8296ad", lw=0.15))
+        x = np.linspace(-50.0, 50.0, 201)
+        axes.plot([-50, *x, 50], [0, *problem.model.design.top(x, 0 * x), 0], color="#999999", lw=0.8)
+        axes.axhline(problem.model.design.height_mm - 10.0, color="#c0392b", lw=1.2)
+        axes.set(xlim=(-62, 62), ylim=(-2, 54), aspect="equal", xlabel="x (mm)")
+        told = f"{profile.force:.1f} N/mm, {2 * profile.deformed:.1f} mm"
+        axes.set_title(f"plane strain, nu = {nu:g}: {told}", fontsize=10)
+    axes = figure.add_subplot(grid[1, :])
+    for plane, style in ((STRAIN, "o-"), (STRESS, "s--")):
+        for k, what in ((0, "at rest"), (1, "as deformed")):
+            value = [widths[plane, nu, 0.25][k] for nu in NUS]
+            axes.plot(NUS, value, style, ms=4, color=f"C{k}", label=f"{plane}, {what}")
+    axes.axhline(WANTED, color="k", lw=0.8)
+    axes.annotate("the paper: about 79 mm", (0.002, WANTED + 0.4), fontsize=9)
+    axes.set(xlabel="Poisson's ratio (not given in the paper)", ylabel="contact width (mm)", title="mu = .25")
+    axes.legend(frameon=False, fontsize=9)
