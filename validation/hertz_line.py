@@ -1,0 +1,181 @@
+"""Does a cylinder on a deep block show Hertz's force, pressure and contact width, and how fast do they converge?
+
+Hertz 1882, Johnson 1985 ch. 4: a^2 = 4 P R/(pi E*), p = p0 sqrt(1 - x^2/a^2), p0 = 2P/(pi a); E* = E/(1 - nu^2) in
+plane strain, E in plane stress.  The block is 200 a high, since a/h changes P(a) by 0.7 (a/h)^2.  Depth has no meaning
+here, so force is compared at equal a.  That cannot be read off the points that touch, which are h apart: p^2 is linear
+in x^2, and a is where its line through the points within 0.9 a ends; or a^2 is four times the mean of x^2 under p.
+
+Theory of the rates: pressures are piecewise linear, and the best of these misses a square-root edge by h in L2; a, read
+off the inner pressure, follows the force, h^2 (see bonded_layer).  Errors swing with the place of the edge between two
+points, so the root of the mean square over 20 depths is taken.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.design import designs
+from finger3d.history import Frame
+from finger3d.model import Leg, Material, MeshOptions, Model
+from finger3d.objects import Cylinder
+from finger3d.solve import Problem, build, march
+from finger3d.study import Result, Row
+
+from ._common import convergence, rate
+from ._layer import line
+
+Float = NDArray[np.float64]
+RADIUS = 1000.0  # a = 1: the circle is a parabola to 1e-6
+_HERTZ = "Johnson 1985 ch. 4"
+_ONE = "issue 4: Hertz rows within 1 %"
+CASES = (("plane-strain", 0.3), ("plane-strain", 0.5), ("plane-stress", 0.3))
+
+
+@dataclass(frozen=True)
+class Contact:
+    """One depth, against Hertz at the same force.
+
+    Attributes
+    ----------
+    half_width, peak : a from the line of p^2, and the peak of that line, relative to Hertz's at the force
+    moment : a from the second moment, likewise
+    pressure : L2 norm of the pressure's error over that of Hertz's
+    """
+
+    half_width: float
+    moment: float
+    peak: float
+    pressure: float
+
+
+def contact(x: Float, p: Float, force: float, modulus: float) -> Contact:
+    """Compare nodal pressures p (n,) MPa at ascending x (n,) with Hertz's at `force` (N per mm), modulus E*."""
+    a = float(np.sqrt(4.0 * force * RADIUS / (np.pi * modulus)))
+    p0 = 2.0 * force / (np.pi * a)
+    inner = np.abs(x) < 0.9 * a
+    slope, top = np.polyfit(x[inner] ** 2, p[inner] ** 2, 1)
+    fine = np.linspace(0.0, 1.3 * a, 8001)
+    hertz = p0 * np.sqrt(np.maximum(0.0, 1.0 - (fine / a) ** 2))
+    drawn = np.interp(fine, x, p)
+    moment = 2.0 * np.sqrt(np.sum(drawn * fine**2) / np.sum(drawn)) / a
+    away = np.sqrt(np.sum((drawn - hertz) ** 2) / np.sum(hertz**2))
+    return Contact(float(np.sqrt(-top / slope)) / a, float(moment), float(np.sqrt(top)) / p0, float(away))
+
+
+def press(domain: Any, nu: float, count: int, height: float = 200.0, width: float = 1.0) -> tuple[Problem, list[Frame]]:
+    """Press to 20 depths with half-widths near 0.7 to 1; `count` points to a."""
+    depths = [line(v / height, nu).depth * v**2 / RADIUS for v in np.linspace(0.7, 1.0, 20)]
+    block = designs()["block"](half_length_mm=height, height_mm=height, width_mm=width)
+    mesh = MeshOptions(1.0 / count, 0.25 * height, "swept")
+    legs = tuple(Leg(d, steps=1) for d in depths)
+    held = domain == "solid"
+    model = Model(block, Material(1.0, nu), mesh, legs, Cylinder(radius_mm=RADIUS), domain=domain, held_ends=held)
+    # points that the rigid cylinder overlaps by 0.2 of the depth reach to 2 a here, far beyond the contact
+    problem = build(model, margin=-0.2)
+    return problem, list(march(problem))
+
+
+def measured(domain: Any, nu: float, count: int) -> list[Contact]:
+    """All depths of a press."""
+    problem, frames = press(domain, nu, count)
+    order = np.argsort(problem.points.points[:, 0])
+    x = problem.points.points[order, 0]
+    modulus = 1.0 if domain == "plane-stress" else 1.0 / (1.0 - nu**2)
+    found = []
+    for frame in frames:
+        p = frame.state.force[order, 0] / problem.points.area[order]
+        found.append(contact(x, p, float(frame.state.force[:, 0].sum()), modulus))
+    return found
+
+
+def solid(count: int, nu: float) -> float:
+    """P(a)/P_Hertz(a) of a bar with held ends, mean of 20 depths; a from the second moment, good on coarse meshes."""
+    height, width = 20.0, 4.0 / count
+    problem, frames = press("solid", nu, count, height, width)
+    x, at = np.unique(np.round(problem.points.points[:, 0], 9), return_inverse=True)
+    area = np.bincount(at, problem.points.area)
+    found = []
+    for frame in frames:
+        force = frame.state.force[:, 0]
+        p = np.bincount(at, force) / area
+        found.append(contact(x, p, float(force.sum()) / width, 1.0 / (1.0 - nu**2)).moment)
+    return float(np.mean(np.power(found, -2.0))) / line(0.85 / height, nu).force
+
+
+def run(quick: bool) -> Result:
+    """Sections of three sizes and more; one solid with held ends."""
+    counts = (10, 20, 40) if quick else (10, 20, 40, 80)
+    rows: list[Row] = []
+    table: list[tuple[Any, ...]] = []
+    curves: dict[str, Float] = {}
+    slopes = []
+    for domain, nu in CASES:
+        name = f"{domain.replace('-', ' ')}, nu = {nu:g}"
+        levels = [measured(domain, nu, n) for n in counts]
+        last = levels[-1]
+        got = float(np.mean([c.half_width**-2 for c in last]))
+        rows.append(Row(f"P/P_Hertz(a), {name}, mean of 20 depths", _HERTZ, 1.0, got, 0.01, _ONE))
+        worst = max(abs(c.half_width**-2 - 1.0) for c in last)
+        why = "issue 4: Hertz rows within 1 %, wherever the edge lies between two points"
+        rows.append(Row(f"P/P_Hertz(a), {name}, worst of 20 depths", _HERTZ, 0.0, worst, 0.01, why, measure="absolute"))
+        peak = float(np.mean([c.peak for c in last]))
+        rows.append(Row(f"p0 over 2P/(pi a), {name}, mean of 20 depths", _HERTZ, 1.0, peak, 0.01, _ONE))
+        mean = float(np.mean([c.moment**-2 for c in last]))
+        rows.append(Row(f"the same, a from the second moment, {name}", _HERTZ, 1.0, mean, 0.01, _ONE))
+        errors = np.array([[_rms(c.half_width - 1.0 for c in cs), _rms(c.pressure for c in cs)] for cs in levels])
+        curves[name] = errors
+        slopes.append([rate(1.0 / np.array(counts[-3:]), e) for e in errors[-3:].T])
+        table += [(domain, nu, n, *e) for n, e in zip(counts, errors, strict=True)]
+    worst_rates = np.min(slopes, axis=0)
+    why = "the edge's place between points is sampled, not averaged exactly; more is welcome"
+    rows.append(
+        Row("rate of the half-width, lowest", "as the force, h^2", 2.0, worst_rates[0], 0.15, why, measure="at least")
+    )
+    why = "the edge's place is sampled, not averaged exactly"
+    rows.append(
+        Row("rate of the pressure in L2, lowest", "square-root edge", 1.0, worst_rates[1], 0.1, why, measure="at least")
+    )
+    count = 5 if quick else 10
+    what = f"P/P_Hertz(a), solid with held ends, nu = 0.3, {count} points to a, mean of 20 depths"
+    rows.append(Row(what, _HERTZ, 1.0, solid(count, 0.3), 0.01, _ONE))
+    names = ("domain", "nu", "points_per_a", "half_width_rms_error", "pressure_L2_error")
+    columns = dict(zip(names, map(list, zip(*table, strict=True)), strict=True))
+    return Result(tuple(rows), columns, lambda figure: draw(figure, counts, curves))
+
+
+def _rms(values: Any) -> float:
+    return float(np.sqrt(np.mean(np.square(list(values)))))
+
+
+def draw(figure: Any, counts: tuple[int, ...], curves: dict[str, Float]) -> None:
+    """Errors over the point spacing, and a pressure against Hertz's."""
+    left, right = figure.subplots(1, 2)
+    sizes = 1.0 / np.array(counts)
+    for column, kind, theory in ((1, "pressure, L2", 1.0), (0, "half-width", 2.0)):
+        chosen = {f"{kind}, {name}": e[:, column] for name, e in curves.items()}
+        convergence(left, sizes, chosen, theory, "point spacing / a", "error relative to Hertz, rms over 20 depths")
+    left.set_ylim(bottom=left.get_ylim()[0] / 30.0)
+    left.legend(fontsize=7, loc="lower right")
+    problem, frames = press("plane-strain", 0.3, counts[0])
+    order = np.argsort(problem.points.points[:, 0])
+    p = (frames[-1].state.force[:, 0] / problem.points.area)[order]
+    force = float(frames[-1].state.force[:, 0].sum())
+    a = np.sqrt(4.0 * force * RADIUS * (1.0 - 0.3**2) / np.pi)
+    x = np.linspace(-1.2, 1.2, 1001)
+    right.plot(x, np.sqrt(np.maximum(0.0, 1.0 - x**2)), "k--", linewidth=1.0, label="Hertz at the same force")
+    right.plot(
+        problem.points.points[order, 0] / a,
+        p * np.pi * a / (2.0 * force),
+        "o-",
+        markersize=4.5,
+        label=f"{counts[0]} points to a",
+    )
+    right.set_xlim(-1.3, 1.3)
+    right.set_xlabel("x / a")
+    right.set_ylabel("pressure / p0")
+    right.legend(fontsize=8)
+    right.grid(alpha=0.3)
