@@ -1,0 +1,109 @@
+"""With mu_k below mu_s, does a press have one answer?
+
+Source: references.md sec. 2, last lines; Maeno 2004, Sec. II-A and Fig. 8.  A cylinder on a half-plane, nu = .3,
+mu_s = .25.  Two rules for a point that slipped in the increment before:
+
+keep: it keeps slipping at mu_k until its slip would reverse (the default of effects.kinetic_friction).  In a press
+every point outside the stick zone slips from its first touch on, so the answer must be that of one coefficient mu_k.
+
+paper: every increment starts all stuck, so that the point is asked for mu_s again.  Its answer must be expected to
+depend on mesh and increments; the table shows how much.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from finger3d.contact.law import Coulomb, FrictionLaw
+from finger3d.effects.kinetic_friction import TwoCoefficients
+from finger3d.solve import Problem
+from finger3d.study import Kind, Result, Row
+
+from ._halfplane import compliance, line, loading, under
+
+NU, STATIC = 0.3, 0.25
+SOURCE = "references.md sec. 2, integral equations with mu_k"
+COLUMNS = "branch ratio points_per_a increments q_over_P D_over_AP2 c_over_a iterations".split()
+Key = tuple[str, float, int, int]
+
+
+def numbers(problem: Problem, law: FrictionLaw, count: int) -> np.ndarray:
+    """int q/P and c/a as means over the second half of the increments, D/(A P^2), and the most iterations."""
+    found = under(problem, law, loading(count))
+    half, last = found[count // 2 :], found[-1]
+    return np.array(
+        [
+            sum(p.outward for p in half) / sum(p.force for p in half),
+            last.frame.dissipation_mJ / (compliance(NU) * last.force**2),
+            np.mean([p.c / p.a for p in half]),
+            max(p.frame.iterations for p in found),
+        ]
+    )
+
+
+def run(quick: bool) -> Result:
+    """Ratios .9, .7, .4 under both rules and one coefficient mu_k; 10, 20, 40 points to a; 10, 50, 200 increments."""
+    meshes, counts, ratios = ((10, 20), (10, 50), (0.7,)) if quick else ((10, 20, 40), (10, 50, 200), (0.9, 0.7, 0.4))
+    found: dict[Key, np.ndarray] = {}
+    for points in meshes:
+        problem = line(NU, points, loading(1))
+        for ratio in ratios:
+            laws = {
+                "keep": TwoCoefficients(STATIC, ratio, "keep"),
+                "paper": TwoCoefficients(STATIC, ratio, "paper"),
+                "one coefficient": Coulomb(ratio * STATIC),
+            }
+            for branch, law in laws.items():
+                for count in counts:
+                    found[branch, ratio, points, count] = numbers(problem, law, count)
+    rows = _rows(found, meshes, counts, ratios)
+    table = [(*k, *v) for k, v in found.items()]
+    columns = dict(zip(COLUMNS, map(list, zip(*table, strict=True)), strict=True))
+    return Result(tuple(rows), columns, lambda figure: _draw(figure, found, meshes, counts))
+
+
+def _rows(found: dict[Key, np.ndarray], meshes: Any, counts: Any, ratios: Any) -> list[Row]:
+    fine, many = meshes[-1], counts[-1]
+    got = found["keep", 0.7, fine, many]
+    here = f"{fine} points to a, {many} increments"
+    near = f"half a point spacing, a/{fine}"
+    rows = [
+        Row(f"keep, ratio .7: int_0^a q/P, {here}", SOURCE, 0.0773, got[0], 0.03, "issue 4: integrals within 3 %"),
+        Row(f"keep, ratio .7: c/a, {here}", SOURCE, 0.263, got[2], 0.5 / fine, near, measure="absolute"),
+    ]
+    for ratio in ratios:
+        one, two = found["one coefficient", ratio, fine, many], found["keep", ratio, fine, many]
+        alike = f"over that of one coefficient mu_k, ratio {ratio:g}"
+        rows.append(Row(f"keep: int_0^a q/P {alike}", "Coulomb, same mesh", 1.0, two[0] / one[0], 1e-9, "same states"))
+        rows.append(Row(f"keep: dissipation {alike}", "Coulomb, same mesh", 1.0, two[1] / one[1], 1e-9, "same states"))
+    literal = found["paper", 0.7, fine, many]
+    kind: Kind = "sensitivity"
+    away = abs(literal[2] - 0.263)
+    what = f"paper, ratio .7: distance of c/a from the exact one, {here}"
+    rows.append(Row(what, SOURCE, 0.1, away, 0.0, "a bound: it goes elsewhere", kind, "at least"))
+    values = [found["paper", 0.7, fine, n][2] for n in counts]
+    what = f"paper, ratio .7: change of c/a from {counts[0]} to {many} increments, {fine} points to a"
+    why = "a bound: it depends on the increments"
+    rows.append(Row(what, "design.md sec. 4", 0.1, float(np.ptp(values)), 0.0, why, kind, "at least"))
+    what = f"paper, ratio .7: int_0^a q/P over the exact one, {here}"
+    why = "not to be relied on; seen within 10 %"
+    rows.append(Row(what, SOURCE, 1.0, literal[0] / 0.0773, 0.1, why, kind))
+    return rows
+
+
+def _draw(figure: Any, found: dict[Key, np.ndarray], meshes: Any, counts: Any) -> None:
+    axes = figure.subplots(1, 2)
+    for (k, label, exact), ax in zip(((2, "c/a", 0.263), (0, "int_0^a q/P", 0.0773)), axes, strict=True):
+        for branch, colour in (("keep", "C0"), ("paper", "C1")):
+            for points, mark in zip(meshes, "o^s", strict=False):
+                values = [found[branch, 0.7, points, n][k] for n in counts]
+                ax.semilogx(counts, values, colour + mark + "-", mfc="w", label=f"{branch}, {points} points to a")
+        ax.axhline(exact, color="k", ls="--", lw=1, label="exact, mu_k alone")
+        ax.set_xticks(counts, [str(n) for n in counts])
+        ax.set_xticks([], minor=True)
+        ax.set(xlabel="increments", ylabel=label)
+    best = found["keep", 0.7, meshes[-1], counts[-1]]
+    figure.suptitle(f"mu_k/mu_s = .7; keep: error of int q/P {100 * abs(best[0] / 0.0773 - 1):.1f} %")
+    axes[0].legend(fontsize=7)
