@@ -108,12 +108,14 @@ def solid(count: int, nu: float) -> float:
 
 def run(quick: bool) -> Result:
     """Sections of three sizes and more; one solid with held ends."""
-    counts = (10, 20, 40) if quick else (10, 20, 40, 80)
+    counts = (8, 16, 32) if quick else (10, 20, 40, 80)
     rows: list[Row] = []
     table: list[tuple[Any, ...]] = []
     curves: dict[str, Float] = {}
     slopes = []
     for domain, nu in CASES:
+        if quick and nu == 0.5:
+            continue
         name = f"{domain.replace('-', ' ')}, nu = {nu:g}"
         levels = [measured(domain, nu, n) for n in counts]
         last = levels[-1]
@@ -139,7 +141,7 @@ def run(quick: bool) -> Result:
     rows.append(
         Row("rate of the pressure in L2, lowest", "square-root edge", 1.0, worst_rates[1], 0.1, why, measure="at least")
     )
-    count = 5 if quick else 10
+    count = 4 if quick else 10
     what = f"P/P_Hertz(a), solid with held ends, nu = 0.3, {count} points to a, mean of 20 depths"
     rows.append(Row(what, _HERTZ, 1.0, solid(count, 0.3), 0.01, _ONE))
     names = ("domain", "nu", "points_per_a", "half_width_rms_error", "pressure_L2_error")
