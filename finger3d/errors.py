@@ -31,6 +31,11 @@ class Outcome(Enum):
         "Eqs. (1)-(4) hold, but friction helps slip at some points, which the paper's rule does not exclude; "
         "use [contact] rule = 'projection'"
     )
+    INVERTED = (
+        "a cell was turned inside out; the steps before are good; try more steps, a coarser mesh at the contact's edge, "
+        "or a shallower press"
+    )
+    NEWTON = "large deformation did not settle; the steps before are good; try more steps or a shallower press"
     INDEFINITE = "the compliance is not positive: the body is not held; fix its base, or check the mesh"
     NOT_FINITE = "the compliance or the gap contains NaN or infinity; check the mesh and the material"
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,10 @@ RULES = {"projection": advance, "paper": swap}
 
 
 class Kinematics(Protocol):
-    """What marching through a history asks of a body; `problem` is a `finger3d.problem.Problem`."""
+    """What marching through a history asks of a body; `problem` is a `finger3d.problem.Problem`.
+
+    One that also answers for inclusions (`problem.springs`) says so by a class attribute ``inclusions = True``.
+    """
 
     def start(self, problem: Any) -> ContactState:
         """State at rest, before the first increment."""
@@ -56,6 +59,8 @@ def length_scale(problem: Any, a: Any, b: Any) -> float:
 @dataclass(frozen=True)
 class SmallStrain:
     """Linear elasticity over the condensed compliance: the paper's baseline."""
+
+    inclusions: ClassVar[bool] = True
 
     def start(self, problem: Any) -> ContactState:
         """No force, gaps at rest."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,6 +72,18 @@ class MeshOptions:
     mesher: Literal["ftetwild", "swept"] = "ftetwild"
 
 
+class Inclusions(Protocol):
+    """Stiff things in the body that need no mesh of their own."""
+
+    def mirrors(self, model: Any) -> frozenset[str]:
+        """Planes, "x" and "z", about which they are mirror images."""
+        ...
+
+    def rows(self, model: Any, mesh: Any, axes: tuple[str, ...]) -> tuple[Any, Float]:
+        """Sparse rows (s, n d) that read how far each is strained, and their stiffness (s,) N mm in the meshed part."""
+        ...
+
+
 @dataclass(frozen=True)
 class Model:
     """Everything that determines the numbers.
@@ -94,6 +106,7 @@ class Model:
     friction: FrictionLaw = field(default_factory=Coulomb)
     kinematics: Kinematics = field(default_factory=SmallStrain)
     gauges: tuple[Gauge, ...] = ()
+    inclusions: Inclusions | None = None
     domain: Domain = "solid"
     rule: Literal["projection", "paper"] = "projection"
     held_ends: bool = False

@@ -15,13 +15,13 @@ from finger3d.contact.law import SLIP
 from finger3d.contact.state import ContactState, Increment
 from finger3d.design import mesh_section, mesh_solid
 from finger3d.fem.assembly import Elasticity, stiffness
-from finger3d.fem.condense import condense
+from finger3d.fem.condense import condense, stiffened
 from finger3d.fem.surface import Surface, displacement_row, local_rows, restrict, strain_row, surface
 from finger3d.history import ContactPoints, Frame, Target
 from finger3d.mesh import Mesh, unfold
-from finger3d.model import Gauge, Model
+from finger3d.model import Gauge, Leg, Model
 from finger3d.objects import approach, contact_box
-from finger3d.problem import AUTO_START, Problem, between, folded, rigid_gap, targets, values_of
+from finger3d.problem import AUTO_START, Problem, at_points, between, folded, rigid_gap, targets, values_of
 
 Float = NDArray[np.float64]
 
@@ -29,6 +29,7 @@ __all__ = ["AUTO_START", "Problem", "build", "contact_zone", "march", "symmetry"
 
 _MARGIN = 0.3  # candidate points reach to a rigid gap of this share of the depth; checked after the solution
 _CUTS = 6
+_LOOKS = 20  # and where rigid gaps are, for the candidate points
 _STATIONS = 4  # places along a leg where the approach is looked at
 
 
@@ -39,7 +40,8 @@ def symmetry(model: Model) -> tuple[str, ...]:
     slides = {"x": [leg.slide_x_mm for leg in model.legs], "z": [leg.slide_z_mm for leg in model.legs]}
     axes = ("x", "z") if model.domain == "solid" else ("x",)
     body = model.design.mirrors() if hasattr(model.design, "mirrors") else axes
-    return tuple(a for a in axes if a in body and a in model.object.mirrors() and not any(slides[a]))
+    inner = model.inclusions.mirrors(model) if model.inclusions else axes
+    return tuple(a for a in axes if a in body and a in inner and a in model.object.mirrors() and not any(slides[a]))
 
 
 def _approached(model: Model) -> tuple[Any, ...]:
@@ -76,29 +78,41 @@ def build(model: Model, say: Callable[[str], None] = lambda text: None, margin: 
     kept = _kept_rows(face, axes)
     rows = local_rows(face, model.object.frame(mesh.dim))[kept]
     gauges = [_gauge_row(mesh, g, axes) for g in model.gauges]
+    strips, springs = model.inclusions.rows(model, mesh, axes) if model.inclusions else (rows[:0], np.zeros(0))
     assembly = time.perf_counter() - start
     say(f"condensing {matrix.upper.shape[0]} unknowns to {len(face.nodes)} contact points")
     held = _held(model, mesh, axes)
-    condensed = condense(matrix, held, sp.vstack([rows, *gauges], format="csr"))
-    c, d, r = len(face.nodes), mesh.dim, len(kept)
-    # a point on a symmetry plane cannot move across it: that direction is left uncoupled, and never sees a force
-    compliance = np.diag(np.full(c * d, np.diagonal(condensed.compliance)[:r].max()))
-    compliance[np.ix_(kept, kept)] = condensed.compliance[:r, :r]
-    gauge_rows = np.zeros((len(gauges), c * d))
-    gauge_rows[:, kept] = condensed.compliance[r:, :r]
+    condensed = condense(matrix, held, sp.vstack([rows, *gauges, strips], format="csr"))
+    compliance, gauge_rows = _read(condensed.compliance, kept, len(face.nodes), mesh.dim, len(gauges))
     parent, sign, share, points = _unfolded(model, mesh, face, axes)
-    return Problem(
-        model, mesh, report, elastic, matrix, face, condensed, compliance.reshape(c, d, c, d),
+    bare = Problem(
+        model, mesh, report, elastic, matrix, face, condensed, compliance,
         gauge_rows, kept, held, thickness, touch, axes, points, parent, sign, share,
         {**report.seconds, "assembly": assembly, "condensation": condensed.seconds},
     )  # fmt: skip
+    if not len(springs):
+        return bare
+    held_by = stiffened(condensed.compliance, springs)
+    compliance, gauge_rows = _read(held_by, kept, len(face.nodes), mesh.dim, len(gauges))
+    return replace(bare, compliance=compliance, gauge_rows=gauge_rows, springs=springs, bare=bare)
+
+
+def _read(rows: Float, kept: NDArray[np.int64], count: int, dim: int, gauges: int) -> tuple[Float, Float]:
+    """Compliance of contact points, and strain of the gauges per force on them, from that of condensed rows."""
+    strain = np.zeros((gauges, count * dim))
+    strain[:, kept] = rows[len(kept) : len(kept) + gauges, : len(kept)]
+    return at_points(rows, kept, count, dim), strain
 
 
 def _candidates(model: Model, face: Surface, touch: float, margin: float) -> Surface:
-    path = targets(model.legs)
-    reach = margin * max(t.depth_mm for t in path)
+    path = targets(tuple(replace(leg, steps=_stations(leg)) for leg in model.legs))
     nearest = np.min([rigid_gap(model, face, touch, t) for t in path], axis=0)
+    reach = margin * max(t.depth_mm for t in path) + max(float(nearest.min()), 0.0)
     return restrict(face, nearest < reach)
+
+
+def _stations(leg: Leg) -> int:
+    return min(leg.steps, _LOOKS) if isinstance(leg.steps, int) else _LOOKS
 
 
 def _kept_rows(face: Surface, axes: tuple[str, ...]) -> NDArray[np.int64]:
@@ -163,6 +177,8 @@ def march(problem: Problem) -> Iterator[Frame]:
     state = kinematics.start(problem)
     pace: tuple[Target, Float] | None = None
     work = dissipation = 0.0
+    # what the gauges would read if nothing were embedded: the same path in the same body without
+    beside = march(replace(problem.bare, model=problem.model)) if problem.bare else None
     for target in targets(problem.model.legs):
         found, done = _increment(problem, state, at, target, 0 if literal else _CUTS, _guess(state, at, target, pace))
         for before, after, a, b in done:
@@ -172,11 +188,20 @@ def march(problem: Problem) -> Iterator[Frame]:
         state, at = found.state, target
         yield Frame(
             target, problem.whole(state), state, problem.model.object.lowest(target.slide_x_mm, target.slide_z_mm),
-            kinematics.gauges(problem, state), work, dissipation,
+            kinematics.gauges(problem, state) | _free(problem, beside), work, dissipation,
             found.outcome, found.residual, found.iterations, found.method,
         )  # fmt: skip
         if not found.outcome.ok and not (literal and found.method == "paper"):
             return
+
+
+def _free(problem: Problem, beside: Iterator[Frame] | None) -> dict[str, float]:
+    """Free strain of every gauge by name, ``_free`` added; NaN once the path beside has failed, none without one."""
+    if beside is None:
+        return {}
+    frame = next(beside, None)
+    known = frame is not None and (frame.outcome.ok or frame.method == "paper")
+    return {f"{g.name}_free": frame.gauges[g.name] if frame and known else np.nan for g in problem.model.gauges}
 
 
 def _guess(state: ContactState, a: Target, b: Target, pace: tuple[Target, Float] | None) -> Float | None:

@@ -25,6 +25,7 @@ def advance(
     law: FrictionLaw,
     length_scale: float,
     guess: Float | None = None,
+    weights: Float | None = None,
 ) -> Increment:
     """Solve one increment.
 
@@ -39,6 +40,9 @@ def advance(
         What gaps are measured by in the residual: the depth.
     guess : (c, d) N
         Where to start, the forces before the increment unless given.  It saves iterations, and decides nothing.
+    weights : (c, d) N/mm
+        What weighs a gap against a force, from the compliance's diagonal unless given.  With them an indefinite
+        compliance is taken: at finite strain a body under its contact forces may be stable by the contact alone.
 
     Returns
     -------
@@ -47,12 +51,12 @@ def advance(
     """
     c, d = free.shape
     matrix = compliance.reshape(c * d, c * d)
-    refused = refusal(free, matrix)
+    refused = refusal(free, matrix, weights is None)
     if refused:
         return Increment(previous, refused, np.inf, 0, "none")
     change = free.copy()
     change[:, 1:] -= previous.position
-    rho = stiffness_weights(matrix, d)
+    rho = stiffness_weights(matrix, d) if weights is None else weights
     mu = law.coefficients(previous.status)
     start = previous.force if guess is None else guess
     total = 0

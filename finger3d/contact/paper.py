@@ -27,20 +27,22 @@ def swap(
     law: FrictionLaw,
     length_scale: float,
     guess: Float | None = None,
+    weights: Float | None = None,
 ) -> Increment:
-    """Solve one increment by the paper's swaps; arguments as for `advance`, the guess is not used.
+    """Solve one increment by the paper's swaps; arguments as for `advance`; the guess is not used.
 
     A cycled increment hands on the last state it tried, so that a run can go on and show what became of it.
     """
     c, d = free.shape
     matrix = compliance.reshape(c * d, c * d)
-    refused = refusal(free, matrix)
+    refused = refusal(free, matrix, weights is None)
     if refused:
         return Increment(previous, refused, np.inf, 0, "none")
     change = free.copy()
     change[:, 1:] -= previous.position
     mu = law.coefficients(previous.status)
-    problem = Increments(change, matrix, mu, stiffness_weights(matrix, d), length_scale)
+    rho = stiffness_weights(matrix, d) if weights is None else weights
+    problem = Increments(change, matrix, mu, rho, length_scale)
     # in the last time frame's contact: stuck; all others: free
     status = np.where(previous.status == OPEN, OPEN, STICK).astype(np.int8)
     direction = np.zeros((c, d))

@@ -75,10 +75,10 @@ def next_state(previous: ContactState, force: Float, moved: Float, status: NDArr
     return ContactState(status, force, moved[:, 0], previous.position + moved[:, 1:], previous.slip + slid)
 
 
-def refusal(free: Float, compliance: Float) -> Outcome | None:
+def refusal(free: Float, compliance: Float, definite: bool = True) -> Outcome | None:
     """Why an increment cannot be tried at all: NaN, or a compliance (c d, c d) with a direction that is not held."""
     if not (np.isfinite(free).all() and np.isfinite(compliance).all()):
         return Outcome.NOT_FINITE
-    if np.diagonal(compliance).min(initial=np.inf) <= 0.0:
+    if definite and np.diagonal(compliance).min(initial=np.inf) <= 0.0:
         return Outcome.INDEFINITE
     return None

@@ -159,7 +159,7 @@ def stretch(mesh: Mesh, u: Float, point: Float, direction: Float) -> float:
     return float(np.mean(found))
 
 
-def nodal_fields(mesh: Mesh, law: NeoHooke, unknowns: Float, matrix: Stiffness) -> tuple[Float, Float]:
+def nodal_fields(mesh: Mesh, law: NeoHooke, unknowns: Float) -> tuple[Float, Float]:
     """Green-Lagrange strain and Cauchy stress (n, 3, 3) at the nodes, from the volume-weighted mean of F there."""
     n, d = mesh.points.shape
     k = mesh.cells.shape[1]
@@ -176,7 +176,7 @@ def nodal_fields(mesh: Mesh, law: NeoHooke, unknowns: Float, matrix: Stiffness) 
     p = None
     if law.mixed:
         p = np.zeros(n)
-        p[matrix.pressure_vertices] = matrix.pressure_scale * unknowns[n * d :]
+        p[mesh.vertices] = pressure_scale(mesh, law.shear) * unknowns[n * d :]
         p[mesh.cells[:, d + 1 :]] = p[mesh.cells[:, EDGES[d]]].mean(axis=2)
     stress, _ = response(law, f, p)
     cauchy = stress @ np.swapaxes(f, 1, 2) / np.linalg.det(f)[:, None, None]
