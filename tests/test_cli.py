@@ -174,7 +174,7 @@ def test_plan_tells_effects_and_forecast_and_solves_nothing(scene, fake_press, c
     assert run("plan", scene, "--set", "title=planned [b]") == 0
     out, err = capsys.readouterr()
     assert err == ""
-    for text in ("planned [b]", "dofs", "symmetry", "x and z", "memory MB", "kinetic_friction   off"):
+    for text in ("planned [b]", "dofs", "symmetry", "x and z", "memory MB", "no [effects.kinetic_friction]"):
         assert text in out
     assert fake_press.scene is None
 
