@@ -174,6 +174,21 @@ def test_a_width_that_was_not_asked_for_is_not_made_up():
     assert "at about 800 mm" in text
 
 
+def test_no_width_is_guessed_from_a_narrow_finger():
+    cases = [case("solid", w, f) for w, f in ((20.0, 10.0), (50.0, 11.0))]
+    cases += [case("plane strain", w, 18.0) for w in (20.0, 50.0)]
+    assert "1/width" not in " ".join(sentences(cases, 20.0, 50.0))
+
+
+def test_an_error_bar_that_leaves_the_widths_asked_says_on_which_side():
+    forces = {"solid": (10.0, 10.4), "plane strain": (11.0, 10.8), "plane stress": (9.7, 9.0)}
+    cases = [case(m, w, f, 0.15) for m, both in forces.items() for w, f in zip((20.0, 200.0), both, strict=True)]
+    cases = [replace(c, mesher="ftetwild") for c in cases]
+    text = " ".join(sentences(cases, 20.0, 50.0))
+    assert re.search(r"from a width of [\d.]+ mm \(error bar [\d.]+ to beyond the widest asked\)", text)
+    assert re.search(r"up to a width of [\d.]+ mm \(error bar below the narrowest asked to [\d.]+\)", text)
+
+
 def test_within_everywhere_is_said_so():
     found = [case(m, w, 10.0 + 0.1 * (m == "plane strain")) for m in ("plane strain", "solid") for w in (20.0, 200.0)]
     assert "Plane strain is within 5 % of the solid's force at every width asked, 20 to 200 mm." in sentences(

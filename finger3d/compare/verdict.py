@@ -16,6 +16,9 @@ Float = NDArray[np.float64]
 WITHIN = 0.05
 """Deviation from the solid up to which a plane model counts as good enough."""
 
+_ASYMPTOTIC = 0.25
+"""Deviation from plane strain below which it falls as 1/width: two ends of one kind on an ever longer middle."""
+
 FORCE = "force_N_per_mm"
 
 
@@ -163,7 +166,7 @@ def _passage(name: str, cases: Sequence[Case]) -> str:
     if reach is None:
         far = "the narrowest" if narrow else "the widest"
         more = ""
-        if not narrow:
+        if not narrow and abs(nearest.value) < _ASYMPTOTIC:
             guess = nearest.width_mm * abs(nearest.value) / WITHIN
             more = f"; falling on as 1/width it would be at about {rounded(guess)} mm"
         return f"{name.capitalize()} does not come {goal} within the widths asked ({widest}, {far} asked){more}."
@@ -174,7 +177,8 @@ def _passage(name: str, cases: Sequence[Case]) -> str:
     bar = [f"{v:.3g}" for v in sorted((low, high)) if math.isfinite(v)]
     between = f" (error bar {' to '.join(bar)})" if len(bar) == 2 else ""
     if len(bar) == 1:
-        between = f" (error bar {bar[0]} mm to beyond the widths asked)"
+        ends = f"below the narrowest asked to {bar[0]}" if narrow else f"{bar[0]} to beyond the widest asked"
+        between = f" (error bar {ends})"
     return f"{name.capitalize()} comes {goal} {side} a width of {at:.3g} mm{between}."
 
 
