@@ -42,8 +42,7 @@ def key(design: Any, options: Any, zone: tuple[float, ...], symmetry: tuple[str,
     text = json.dumps(
         {
             "format": FORMAT,
-            "design": design.name,
-            "dimensions": {f.name: repr(getattr(design, f.name)) for f in dataclasses.fields(design)},
+            **_told_by(design),
             "code": code,
             "sizes": [repr(float(options.size_mm)), repr(float(options.base_size_mm))],
             "zone": [repr(float(z)) for z in zone],
@@ -53,6 +52,16 @@ def key(design: Any, options: Any, zone: tuple[float, ...], symmetry: tuple[str,
         sort_keys=True,
     )
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _told_by(design: Any) -> dict[str, Any]:
+    """A design's name and dimensions; an imported body is told by its file's content, whatever its name."""
+    if hasattr(design, "cache_fields"):
+        return {"design": "imported", "dimensions": design.cache_fields}
+    return {
+        "design": design.name,
+        "dimensions": {f.name: repr(getattr(design, f.name)) for f in dataclasses.fields(design)},
+    }
 
 
 def _version(name: str) -> str:

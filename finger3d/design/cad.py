@@ -13,6 +13,7 @@ from finger3d.errors import Finger3dError
 LABELS = ("contact", "base", "ends", "walls", "symmetry_x", "symmetry_z")
 
 _ON = 1e-7  # mm; CAD's own tolerance
+_UPRIGHT = 1e-6  # a round wall's normal is level but for round-off
 
 
 def extruded(section: Section, width_mm: float, name: str) -> Any:
@@ -69,7 +70,7 @@ def _label(centre: np.ndarray, normal: np.ndarray, planar: Any) -> str:
             return "base" if down and abs(centre[1]) < _ON else "walls" if down else "contact"
         cut = down and abs(centre[along]) < _ON
         return ("symmetry_x" if cut else "walls") if along == 0 else ("symmetry_z" if cut else "ends")
-    return "contact" if normal[1] > 0.0 else "walls"
+    return "contact" if normal[1] > _UPRIGHT else "walls"
 
 
 def cut(solid: Any, symmetry: tuple[str, ...]) -> Any:

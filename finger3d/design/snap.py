@@ -12,6 +12,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d.design.faceted import Faceted, moved_onto
 from finger3d.design.quality import cell_angles_deg, curved_jacobians
 from finger3d.design.surfaces import Plane
 from finger3d.design.tessellate import Body, CadFace
@@ -27,6 +28,7 @@ MIN_DIHEDRAL_DEG = 3.0
 _PARALLEL = 0.05  # singular values below this share stem from faces that touch smoothly: one condition, not two
 _SMOOTH = 1e-3  # share of the body by which a node near such a seam may miss one of the two
 _REPAIRS = 100
+_FEW = 0.01  # of all cells: where a crease of the surface runs through them
 
 
 class UnusableMeshError(Exception):
@@ -51,10 +53,20 @@ def snap(points: Float, tets: Int, body: Body) -> Mesh:
     owner = _cad_faces(points, faces, body, sets)
     labels = np.array([f.label for f in body.faces])
     mesh = quadratic(Mesh(points, tets, {str(label): faces[labels[owner] == label] for label in np.unique(labels)}))
-    mesh = _curve(mesh, body)
+    mesh = _straightened(_curve(mesh, body))
     if (bad := int(np.sum(curved_jacobians(mesh) <= 0.0))) > 0:
         raise UnusableMeshError(f"{bad} curved cells turned inside out at the surface")
     return mesh
+
+
+def _straightened(mesh: Mesh) -> Mesh:
+    """The mesh with straight edges in the cells that curved edges turned inside out, if these are few."""
+    bad = curved_jacobians(mesh) <= 0.0
+    if not bad.any() or bad.mean() > _FEW:
+        return mesh
+    cells, points = mesh.cells[bad], mesh.points.copy()
+    points[cells[:, 4:]] = points[cells[:, EDGES[3]]].mean(axis=2)
+    return replace(mesh, points=points)
 
 
 def check_closed(faces: Int) -> None:
@@ -109,6 +121,11 @@ def project(points: Float, sets: Bool, faces: tuple[CadFace, ...]) -> Float:
             continue
         at = np.flatnonzero(member == g)
         p = points[at]
+        if faceted := [f.surface for f in chosen if isinstance(f.surface, Faceted)]:
+            if (found := moved_onto(faceted, p)) is None:
+                raise UnusableMeshError("a surface node lies between patches that do not meet")
+            points[at] = found
+            continue
         for _ in range(20):
             pairs = [f.surface.distance(p) for f in chosen]
             distance = np.stack([d for d, _ in pairs], axis=1)

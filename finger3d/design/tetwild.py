@@ -119,13 +119,17 @@ def _body(design: Any, symmetry: tuple[str, ...], field: Sizing) -> tuple[Body, 
     from finger3d.design.surfaces import surface_of
     from finger3d.design.tessellate import tessellate
 
-    solid = cut(design.solid(), symmetry)
-    radius = min(getattr(surface_of(face), "radius", math.inf) for face in labelled_faces(solid))
+    faceted = design.body() if hasattr(design, "body") else None
+    solid = None if faceted else cut(design.solid(), symmetry)
+    surfaces = [f.surface for f in faceted.faces] if faceted else [surface_of(f) for f in labelled_faces(solid)]
+    radius = min(getattr(surface, "radius", math.inf) for surface in surfaces)
     diagonal = float(np.linalg.norm(field.high - field.low))
     # An envelope below the sagitta of the longest edge makes a hemisphere take 20 times as long, and come out too fine.
     least, usual, most = _EPSILON
     epsilon = min(max(usual, field.base_mm**2 / (8.0 * radius * diagonal)), most, _FINE * field.size_mm / diagonal)
     epsilon = max(epsilon, least)
+    if faceted:
+        return faceted, epsilon
     half_width, half_length = 0.5 * design.width_mm, design.half_length_mm
     exact = (0.0, half_width, -half_width, half_length, -half_length, design.height_mm)
     return tessellate(solid, _FINE * epsilon * diagonal, exact=exact), epsilon

@@ -152,9 +152,11 @@ class Triangles:
         return face, bary
 
     def height(self, x: Float, z: Float, lowest: bool = True) -> Float:
-        """Height (n,) mm of the lowest (or highest) point of the surface over x, z (n,), exact on its triangles."""
-        face, bary = self.hits(x, z, lowest)
-        return np.where(face < 0, np.nan, np.einsum("ij,ij->i", bary, self.corners[face, :, 1]))
+        """Height (mm) of the surface's lowest or highest point over x, z, exact on its triangles; nan beside it."""
+        x, z = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(z, dtype=float))
+        face, bary = self.hits(x.ravel(), z.ravel(), lowest)
+        found = np.where(face < 0, np.nan, np.einsum("ij,ij->i", bary, self.corners[face, :, 1]))
+        return found.reshape(x.shape)
 
     def closest(self, points: Float) -> tuple[Float, Int, Int]:
         """Closest points of the surface.

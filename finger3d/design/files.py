@@ -1,0 +1,139 @@
+"""Bodies from files: STL and STEP as closed triangles, every defect told in one line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.errors import Finger3dError
+from finger3d.triangles import Triangles, mistake
+
+Float = NDArray[np.float64]
+
+STL, STEP = (".stl",), (".step", ".stp")
+SUFFIXES = (*STL, *STEP)
+
+_TESSELLATION = 5e-5  # of the diagonal: a curved CAD face comes this near
+_ANGLE = 0.2
+_WELD = 1e-6  # of the diagonal: gaps that single precision leaves between triangles that touch
+
+
+def read_surface(path: str | Path, scale: float = 1.0) -> Triangles:
+    """Read a closed body from an STL file (its numbers are mm) or a STEP file (its own unit, turned into mm).
+
+    Parameters
+    ----------
+    scale : what every coordinate is multiplied with, for instance 1000 for an STL drawn in metres
+
+    Raises
+    ------
+    Finger3dError
+        If there is no such file, or not one closed body with triangles facing outward in it.
+    """
+    path = Path(path)
+    if path.suffix.lower() in STEP:
+        surface = tessellated(read_solid(path))
+    elif path.suffix.lower() in STL:
+        surface = _stl(path)
+    else:
+        raise Finger3dError(f"{path}: must be a file named {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}")
+    surface = Triangles(surface.points * scale, surface.faces)
+    if reason := mistake(surface):
+        raise Finger3dError(f"{path}: the body {reason}")
+    return surface
+
+
+def _bytes(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise Finger3dError(f"{path}: there is no such file") from None
+    except OSError as error:
+        raise Finger3dError(f"{path}: cannot be read: {error.strerror}") from None
+
+
+def content(path: Path) -> str:
+    """SHA-256 of a file."""
+    import hashlib
+
+    return hashlib.sha256(_bytes(path)).hexdigest()
+
+
+def _stl(path: Path) -> Triangles:
+    import io
+
+    import trimesh
+
+    try:
+        mesh = trimesh.load(io.BytesIO(_bytes(path)), file_type="stl", process=False)
+    except (ValueError, IndexError, KeyError, TypeError, AttributeError, OverflowError, MemoryError):
+        mesh = None
+    if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
+        raise Finger3dError(f"{path}: this is no STL mesh, or an empty one")
+    return welded(np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int64))
+
+
+def welded(points: Float, faces: NDArray[np.int64]) -> Triangles:
+    """Join equal points, and near ones where a gap would stay open; triangles that vanish are left out."""
+    _, first, number = np.unique(points, axis=0, return_index=True, return_inverse=True)
+    points, faces = points[first], number.reshape(-1)[faces]
+    surface = Triangles(points, _proper(faces))
+    edges = np.sort(surface.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    unique, count = np.unique(edges, axis=0, return_counts=True)
+    loose = np.unique(unique[count == 1])
+    if not len(loose) or not np.isfinite(points).all():
+        return surface
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    near = loose[cKDTree(points[loose]).query_pairs(_WELD * surface.size, output_type="ndarray")]
+    joined = coo_matrix((np.ones(len(near)), (near[:, 0], near[:, 1])), shape=(len(points), len(points)))
+    _, number = connected_components(joined, directed=False)
+    _, first = np.unique(number, return_index=True)
+    return Triangles(points[first], _proper(number[faces].astype(np.int64)))
+
+
+def _proper(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    a, b, c = faces.T
+    return faces[(a != b) & (b != c) & (c != a)]
+
+
+def read_solid(path: Path) -> Any:
+    """The one build123d solid of a STEP file, mm."""
+    _bytes(path)
+    from build123d import Compound
+    from OCP.IFSelect import IFSelect_RetDone
+    from OCP.Message import Message, Message_PrinterOStream
+    from OCP.Standard import Standard_Failure
+    from OCP.STEPControl import STEPControl_Reader
+
+    # CAD writes its complaints past Python onto the terminal.
+    Message.DefaultMessenger_s().RemovePrinters(Message_PrinterOStream.get_type_descriptor_s())
+    reader = STEPControl_Reader()
+    try:
+        done = reader.ReadFile(str(path)) == IFSelect_RetDone and reader.TransferRoots() > 0
+        shape = reader.OneShape() if done else None
+    except Standard_Failure:
+        shape = None
+    if shape is None or shape.IsNull():
+        raise Finger3dError(f"{path}: this is no STEP file that can be read")
+    solids = Compound(shape).solids()
+    if len(solids) != 1:
+        what = f"has {len(solids)} solids" if solids else "has no solid, only faces or curves"
+        raise Finger3dError(f"{path}: the file {what}; give one solid body")
+    if not solids[0].is_valid:
+        raise Finger3dError(f"{path}: CAD calls its solid invalid; mend it where it was drawn")
+    return solids[0]
+
+
+def tessellated(solid: Any) -> Triangles:
+    """A CAD solid as triangles, within 5e-5 of its diagonal."""
+    from finger3d.design.tessellate import tessellate
+
+    box = solid.bounding_box()
+    body = tessellate(solid, _TESSELLATION * box.diagonal, _ANGLE)
+    return Triangles(body.points, body.triangles)
