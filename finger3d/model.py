@@ -83,6 +83,10 @@ class Inclusions(Protocol):
         """Sparse rows (s, n d) that read how far each is strained, and their stiffness (s,) N mm in the meshed part."""
         ...
 
+    def reads(self, model: Any, mesh: Any, axes: tuple[str, ...]) -> list[Any]:
+        """Sparse row (1, n d) of what each of the model's gauges reads, in their order."""
+        ...
+
 
 @dataclass(frozen=True)
 class Model:
@@ -113,3 +117,16 @@ class Model:
     symmetry: tuple[str, ...] | None = None
     filled: tuple[tuple[str, str], ...] = ()
     warnings: tuple[str, ...] = ()
+
+    @property
+    def approach(self) -> tuple[Any, ...]:
+        """What `finger3d.objects.approach` takes: top, object, half extents, path, the finger's corners."""
+        at, path = np.zeros(3), []
+        for leg in self.legs:
+            end = np.array([leg.depth_mm, leg.slide_x_mm, leg.slide_z_mm])
+            path += [at + share * (end - at) for share in (0.25, 0.5, 0.75, 1.0)]
+            at = end
+        design = self.design
+        half_width = design.width_mm / 2.0 if self.domain == "solid" else 0.0
+        marks = design.landmarks() if hasattr(design, "landmarks") else None
+        return design.top, self.object, design.half_length_mm, half_width, np.array(path), marks

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -30,7 +29,6 @@ __all__ = ["AUTO_START", "Problem", "build", "contact_zone", "march", "symmetry"
 _MARGIN = 0.3  # candidate points reach to a rigid gap of this share of the depth; checked after the solution
 _CUTS = 6
 _LOOKS = 20  # and where rigid gaps are, for the candidate points
-_STATIONS = 4  # places along a leg where the approach is looked at
 
 
 def symmetry(model: Model) -> tuple[str, ...]:
@@ -44,25 +42,15 @@ def symmetry(model: Model) -> tuple[str, ...]:
     return tuple(a for a in axes if a in body and a in inner and a in model.object.mirrors() and not any(slides[a]))
 
 
-def _approached(model: Model) -> tuple[Any, ...]:
-    """Arguments that `finger3d.objects.approach` and `contact_box` take from a model."""
-    design = model.design
-    half_width = design.width_mm / 2.0 if model.domain == "solid" else 0.0
-    coarse = targets(tuple(replace(leg, steps=_STATIONS) for leg in model.legs))
-    path = np.array([[t.depth_mm, t.slide_x_mm, t.slide_z_mm] for t in coarse])
-    marks = design.landmarks() if hasattr(design, "landmarks") else None
-    return design.top, model.object, design.half_length_mm, half_width, path, marks
-
-
 def contact_zone(model: Model) -> tuple[float, float, float, float]:
     """Box (x_min, x_max, z_min, z_max) mm over which the rigid object would overlap the finger at rest."""
-    return contact_box(*_approached(model))
+    return contact_box(*model.approach)
 
 
 def build(model: Model, say: Callable[[str], None] = lambda text: None, margin: float = _MARGIN) -> Problem:
     """Mesh, assemble and condense a model."""
     design = model.design
-    touch = approach(*_approached(model))
+    touch = approach(*model.approach)
     axes = symmetry(model)
     zone = contact_zone(model)
     if model.domain == "solid":
@@ -77,8 +65,10 @@ def build(model: Model, say: Callable[[str], None] = lambda text: None, margin: 
     face = _candidates(model, surface(mesh, "contact", thickness), touch, margin)
     kept = _kept_rows(face, axes)
     rows = local_rows(face, model.object.frame(mesh.dim))[kept]
-    gauges = [_gauge_row(mesh, g, axes) for g in model.gauges]
-    strips, springs = model.inclusions.rows(model, mesh, axes) if model.inclusions else (rows[:0], np.zeros(0))
+    gauges, strips, springs = [_gauge_row(mesh, g, axes) for g in model.gauges], rows[:0], np.zeros(0)
+    if model.inclusions:
+        gauges = model.inclusions.reads(model, mesh, axes)
+        strips, springs = model.inclusions.rows(model, mesh, axes)
     assembly = time.perf_counter() - start
     say(f"condensing {matrix.upper.shape[0]} unknowns to {len(face.nodes)} contact points")
     held = _held(model, mesh, axes)

@@ -1,0 +1,261 @@
+"""Embedded gauges: bars on condensed rows against a body that has them in its stiffness, closed forms, and mistakes."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from finger3d.cli import main
+from finger3d.contact.law import Coulomb
+from finger3d.design import designs
+from finger3d.effects.embedded_gauge import Effect, Strips
+from finger3d.effects.viscosity import Effect as Viscosity
+from finger3d.errors import Finger3dError
+from finger3d.fem.assembly import Stiffness
+from finger3d.fem.condense import condense, spring_forces, stiffened
+from finger3d.history import Frame, measure
+from finger3d.model import Gauge, Leg, Material, MeshOptions, Model
+from finger3d.objects import Plane, Sphere
+from finger3d.scene import parse
+from finger3d.solve import Problem, build, march, symmetry
+
+FOIL = Effect(3000.0, 0.02, 1.0)
+LEGS = (Leg(0.3, steps=3, duration_s=1.0), Leg(0.3, slide_x_mm=0.1, steps=2, duration_s=1.0))
+MIDDLE = Gauge("g", 0.0, 1.6, 0.0, 0.0, 2.0)
+ASIDE = Gauge("a", 1.3, 1.7, 0.4, 0.5, 1.5)
+
+
+def block(**changes: object) -> Model:
+    body = designs()["block"](half_length_mm=4.0, height_mm=3.0, width_mm=4.0)
+    model = Model(
+        body, Material(1.0, 0.3), MeshOptions(0.8, 1.2, "swept"), LEGS[:1], object=Sphere(radius_mm=4.0),
+        friction=Coulomb(0.25), gauges=(MIDDLE,),
+    )  # fmt: skip
+    return replace(model, **changes)
+
+
+def run(problem: Problem) -> list[Frame]:
+    frames = list(march(problem))
+    assert all(f.outcome.ok and f.residual <= 1e-8 for f in frames)
+    return frames
+
+
+def test_springs_on_rows_are_those_of_the_stiffer_body() -> None:
+    rng = np.random.default_rng(0)
+    rows = rng.normal(size=(5, 9))
+    stiff = rng.normal(size=(9, 9))
+    stiff = stiff @ stiff.T + np.eye(9)
+    springs = np.array([2.0, 0.0, 1e6])
+    soft = rows @ np.linalg.solve(stiff, rows.T)
+    soft = 0.5 * (soft + soft.T)
+    hard = rows @ np.linalg.solve(stiff + rows[2:].T @ (springs[:, None] * rows[2:]), rows.T)
+    assert stiffened(soft, springs) == pytest.approx(hard, abs=1e-9)
+    force = np.array([1.0, -2.0, 0.0, 0.0, 0.0])
+    assert spring_forces(soft, springs, soft @ force) == pytest.approx(-springs * (hard @ force)[2:], abs=1e-9)
+    assert np.array_equal(stiffened(soft, np.zeros(3)), soft)
+    assert stiffened(soft, np.zeros(0)) is soft
+
+
+@pytest.mark.parametrize("nu", [0.3, 0.49])
+@pytest.mark.parametrize("domain", ["plane-strain", "plane-stress", "solid"])
+def test_condensed_foils_are_foils_in_the_stiffness(domain: str, nu: float) -> None:
+    model = FOIL.apply(block(domain=domain, material=Material(1.0, nu), gauges=(MIDDLE, ASIDE)))
+    problem = build(model)
+    assert problem.factorizations == 1
+    strips, springs = model.inclusions.rows(model, problem.mesh, problem.axes)
+    added = sp.csr_matrix(strips.T @ sp.diags_array(springs) @ strips)
+    added.resize(problem.stiffness.upper.shape)
+    stiffer = Stiffness(
+        sp.csr_matrix(problem.stiffness.upper + sp.triu(added)), problem.stiffness.pressure_vertices,
+        problem.stiffness.pressure_scale,
+    )  # fmt: skip
+    rows = problem.condensed._rows[: len(problem.kept) + 2, : problem.mesh.points.size]
+    direct = condense(stiffer, problem.held, rows)
+    r = len(problem.kept)
+    own = problem.compliance.reshape(-1, problem.compliance[..., 0, 0].size)[np.ix_(problem.kept, problem.kept)]
+    assert own == pytest.approx(direct.compliance[:r, :r], abs=1e-9 * own.max())
+    assert problem.gauge_rows[:, problem.kept] == pytest.approx(direct.compliance[r:, :r], rel=1e-6, abs=1e-9)
+    force = np.zeros(problem.compliance.shape[:2])
+    force.ravel()[problem.kept] = np.random.default_rng(1).normal(size=r)
+    wanted = direct.unknowns(np.concatenate([force.ravel()[problem.kept], np.zeros(2)]))
+    assert problem.unknowns(force) == pytest.approx(wanted, abs=1e-8 * np.abs(wanted).max())
+
+
+def test_a_foil_across_a_bar_shares_its_load() -> None:
+    # nu = 0 between plates: strain is uniform, so a foil along the height only adds to the stiffness if it spans it;
+    # one of half the height reads between 0 and the free strain, and the less the stiffer it is
+    model = block(
+        object=Plane(), material=Material(1.0, 0.0), friction=Coulomb(0.0), domain="plane-strain",
+        gauges=(Gauge("v", 0.0, 1.5, 0.0, np.pi / 2, 1.5),),
+    )  # fmt: skip
+    reads = []
+    for modulus in (0.1, 10.0, 100.0, 1e4):
+        last = run(build(replace(FOIL, E_MPa=modulus).apply(model)))[-1]
+        assert last.gauges["v_free"] == pytest.approx(-0.1, rel=1e-9)
+        reads.append(last.gauges["v"] / last.gauges["v_free"])
+    assert 1.0 > reads[0] > reads[1] > reads[2] > reads[3] > 0.0
+    assert reads[0] > 0.99
+    assert reads[3] < 0.05
+
+
+def test_free_strain_is_that_of_the_scene_without_the_effect() -> None:
+    for domain, close in (("plane-strain", 1e-11), ("solid", 0.05)):  # a solid's foil has a width, a line has none
+        plain, foiled = (run(build(m)) for m in (block(domain=domain), FOIL.apply(block(domain=domain))))
+        for a, b in zip(plain, foiled, strict=True):
+            assert set(b.gauges) == {"g", "g_free"}
+            assert b.gauges["g_free"] == pytest.approx(a.gauges["g"], rel=close)
+            assert 0.0 < b.gauges["g"] < 0.5 * b.gauges["g_free"]
+
+
+def test_a_foil_as_soft_as_nothing_reads_the_free_strain() -> None:
+    for frame in run(build(replace(FOIL, E_MPa=1e-12).apply(block(gauges=(MIDDLE, ASIDE))))):
+        for name in ("g", "a"):
+            assert frame.gauges[name] == pytest.approx(frame.gauges[f"{name}_free"], rel=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("gauges", "axes"),
+    [
+        ((MIDDLE,), ("x", "z")),
+        ((ASIDE,), ()),
+        ((replace(ASIDE, z_mm=0.0),), ("z",)),
+        ((replace(ASIDE, x_mm=0.0, angle=0.0),), ("x",)),
+        ((replace(ASIDE, x_mm=0.0, angle=np.pi / 2, z_mm=0.0),), ("x", "z")),
+        ((replace(MIDDLE, angle=0.1),), ("z",)),
+        ((replace(ASIDE, z_mm=0.0), Gauge("b", -1.3, 1.7, 0.0, np.pi - 0.5, 1.5)), ("x", "z")),
+        ((replace(ASIDE, z_mm=0.0), Gauge("b", -1.3, 1.7, 0.0, -0.5, 1.5)), ("x", "z")),
+        ((replace(ASIDE, z_mm=0.0), Gauge("b", -1.3, 1.7, 0.0, np.pi - 0.5, 1.4)), ("z",)),
+    ],
+)
+def test_foils_keep_the_planes_they_are_mirrored_in(gauges: tuple[Gauge, ...], axes: tuple[str, ...]) -> None:
+    assert symmetry(FOIL.apply(block(gauges=gauges))) == axes
+    assert symmetry(block(gauges=gauges)) == ("x", "z")
+
+
+def test_quarter_and_whole_agree() -> None:
+    pair = (replace(ASIDE, z_mm=0.0), Gauge("b", -1.3, 1.7, 0.0, np.pi - 0.5, 1.5), MIDDLE)
+    model = FOIL.apply(block(gauges=pair))
+    quarter, whole = build(model), build(replace(model, symmetry=()))
+    assert (quarter.axes, whole.axes) == (("x", "z"), ())
+    a, b = run(quarter)[-1], run(whole)[-1]
+    for name in ("a", "b", "g", "a_free", "g_free"):
+        assert a.gauges[name] == pytest.approx(b.gauges[name], rel=1e-8)
+    assert a.gauges["a"] == pytest.approx(a.gauges["b"], rel=1e-12)
+    force = [measure(p.points, f)["normal_force_N"] for p, f in ((quarter, a), (whole, b))]
+    assert force[0] == pytest.approx(force[1], rel=1e-9)
+
+
+def test_a_foil_off_the_middle_breaks_the_balance_of_friction() -> None:
+    problem = build(FOIL.apply(block(gauges=(ASIDE,), domain="plane-strain")))
+    assert problem.axes == ()
+    assert abs(measure(problem.points, run(problem)[-1])["tangential_force_x_N"]) > 1e-5
+
+
+def test_more_bars_change_little(monkeypatch: pytest.MonkeyPatch) -> None:
+    import finger3d.effects.embedded_gauge as file
+
+    model = FOIL.apply(block(gauges=(MIDDLE,)))
+    few = run(build(model))
+    monkeypatch.setattr(file, "_BARS_PER_CELL", 8.0)
+    many = run(build(model))
+    assert many[-1].gauges["g"] == pytest.approx(few[-1].gauges["g"], rel=0.03)
+
+
+@pytest.mark.parametrize("bulk", [True, False])
+def test_a_foil_in_a_relaxing_body_does_not_relax(bulk: bool) -> None:
+    prony = ((0.9, 0.01),)
+    model = block(gauges=(MIDDLE,), friction=Coulomb(0.0), legs=(Leg(0.3, steps=1, duration_s=1e6),))
+    slow = run(build(Viscosity(prony, bulk).apply(FOIL.apply(model))))[-1]
+    # at last: the body of a tenth of the shear modulus, around the same foil
+    soft = Material(0.1, 0.3)
+    if not bulk:
+        low, volume = 0.1 / 2.6, 1.0 / 1.2
+        soft = Material(9.0 * volume * low / (3.0 * volume + low), (1.5 * volume - low) / (3.0 * volume + low))
+    mixed = soft.nu >= 0.48
+    wanted = run(build(FOIL.apply(replace(model, material=soft))))[-1]
+    close = 0.02 if mixed else 1e-6
+    assert slow.gauges["g"] == pytest.approx(wanted.gauges["g"], rel=close)
+    assert slow.gauges["g_free"] == pytest.approx(wanted.gauges["g_free"], rel=close)
+    assert slow.part.force == pytest.approx(wanted.part.force, abs=close * wanted.part.force.max())
+
+
+def test_viscosity_with_and_without_bulk_agree_around_a_foil_in_an_incompressible_body() -> None:
+    model = FOIL.apply(block(gauges=(MIDDLE,), material=Material(1.0, 0.5), legs=LEGS))
+    problem = build(model)
+    prony = ((0.5, 1.0), (0.2, 0.1))
+    a, b = (run(replace(problem, model=Viscosity(prony, bulk).apply(model)))[-1] for bulk in (True, False))
+    assert a.part.force == pytest.approx(b.part.force, abs=1e-6 * a.part.force.max())
+    for name in ("g", "g_free"):
+        assert a.gauges[name] == pytest.approx(b.gauges[name], rel=1e-5)
+
+
+def test_the_field_carries_the_foil() -> None:
+    problem = build(FOIL.apply(block(gauges=(MIDDLE,))))
+    last = run(problem)[-1]
+    u = problem.model.kinematics.fields(problem, last.part)[0]
+    read = problem.condensed.read(np.concatenate([u.ravel(), np.zeros(problem.stiffness.upper.shape[0] - u.size)]))
+    assert read[len(problem.kept)] == pytest.approx(last.gauges["g"], rel=1e-9)
+
+
+def scene_of(effect: dict, *gauges: dict, **more: object) -> dict:
+    return {
+        "finger": {"geometry": "half_cylinder", "radius_mm": 5.0, "width_mm": 4.0},
+        "material": {"E_MPa": 1.0, "nu": 0.3}, "press": {"depth_mm": 0.5}, "gauge": gauges,
+        "effects": {"embedded_gauge": effect}, **more,
+    }  # fmt: skip
+
+
+FOIL_TABLE = {"E_MPa": 3000.0, "thickness_mm": 0.02, "width_mm": 3.0}
+GOOD = {"name": "g", "x_mm": 0.0, "y_mm": 3.0, "length_mm": 2.0}
+
+
+@pytest.mark.parametrize(
+    ("effect", "gauges", "says"),
+    [
+        (FOIL_TABLE, (), r"effects\.embedded_gauge: the scene has no \[\[gauge\]\]"),
+        (FOIL_TABLE, ({**GOOD, "length_mm": 0.0},), r"gauge\.0\.length_mm = 0\.0: must be above 0 with effects"),
+        (FOIL_TABLE, ({**GOOD, "y_mm": 6.0},), r"gauge\.0\.y_mm = 6\.0: gauge \"g\" is outside the finger"),
+        (FOIL_TABLE, ({**GOOD, "length_mm": 9.0},), r"gauge\.0\.length_mm = 9\.0: an end .* leaves the finger"),
+        ({**FOIL_TABLE, "thickness_mm": 1.0}, (GOOD,), r"thickness_mm = 1\.0: thicker than an element; must be"),
+        ({**FOIL_TABLE, "width_mm": 4.5}, (GOOD,), r"width_mm = 4\.5: gauge \"g\" would stick out .* at most 4 there"),
+        (FOIL_TABLE, ({**GOOD, "z_mm": 1.0},), r"width_mm = 3\.0: gauge \"g\" would stick out .* at most 2 there"),
+        ({**FOIL_TABLE, "E_MPa": 0.0}, (GOOD,), r"effects\.embedded_gauge\.E_MPa = 0\.0: must be a number above 0"),
+        ({"E_MPa": 1.0, "width_mm": 1.0}, (GOOD,), r"effects\.embedded_gauge\.thickness_mm is missing"),
+        (FOIL_TABLE, (GOOD, {**GOOD, "name": "g_free"}), r"gauge\.name = \"g_free\": effects\.embedded_gauge gives"),
+    ],
+)
+def test_mistakes_are_one_line(effect: dict, gauges: tuple, says: str) -> None:
+    with pytest.raises(Finger3dError, match=says) as caught:
+        parse(scene_of(effect, *gauges))
+    assert "\n" not in str(caught.value)
+
+
+def test_python_users_are_told_too_that_a_gauge_lies_outside() -> None:
+    with pytest.raises(Finger3dError, match="outside the body"):
+        build(FOIL.apply(block(gauges=(replace(MIDDLE, y_mm=3.5),))))
+    assert Strips(1.0, 2.0, 3.0) == Strips(1.0, 2.0, 3.0)
+
+
+def test_press_writes_both_strains(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(
+        '[finger]\ngeometry = "half_cylinder"\nradius_mm = 5.0\nwidth_mm = 4.0\n[material]\nE_MPa = 1.0\nnu = 0.3\n'
+        '[press]\ndepth_mm = 0.5\nsteps = 3\n[model]\ndomain = "plane-strain"\n[mesh]\nsize_mm = 0.3\n'
+        'base_size_mm = 1.0\n[[gauge]]\nname = "g"\nx_mm = 1.0\ny_mm = 3.5\nangle_deg = 20.0\nlength_mm = 1.5\n'
+        "[effects.embedded_gauge]\nE_MPa = 3000.0\nthickness_mm = 0.02\nwidth_mm = 3.0\n",
+        encoding="utf-8",
+    )
+    out = tmp_path / "out"
+    assert main(["press", str(scene), "--out", str(out), "--no-figures"]) == 0
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    assert summary["cost"]["factorizations"] == 1
+    assert summary["mesh"]["symmetry"] == []
+    for step in summary["steps"]:
+        assert set(step["gauges"]) == {"g", "g_free"}
+        assert abs(step["gauges"]["g"]) < 0.5 * abs(step["gauges"]["g_free"])
+    assert "gauge_g_free" in (out / "history.csv").read_text(encoding="utf-8").splitlines()[0]
