@@ -1,0 +1,139 @@
+"""What does each effect change on the Fig. 9 finger, and what does it cost?
+
+Source: the scene geometries/fig9.toml as a section in plane strain and as a 20 mm wide solid, nu = 0.45, mu = 0.25,
+10 mm in 10 steps, each effect switched on alone.  The force in plane strain with and without large deformation is known
+from CalculiX 2.20: 28.5 and 22.35 N per mm width (design.md).  The gauge is 5 mm long at x = 36 mm, under 30 degrees.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+
+from finger3d.history import measure
+from finger3d.scene import parse
+from finger3d.scene.lookup import effect_names
+from finger3d.solve import build, march
+from finger3d.study import Result, Row
+
+SETTINGS: dict[str, dict[str, Any]] = {
+    "large_deformation": {},
+    "kinetic_friction": {"ratio": 0.7},
+    "viscosity": {"prony": [[0.3, 0.5]]},
+    "elastic_object": {"E_MPa": 10.0, "nu": 0.4},
+    "embedded_gauge": {"E_MPa": 3000.0, "thickness_mm": 0.02, "width_mm": 3.0},
+}
+LABELS = {
+    "large_deformation": "large deformation",
+    "kinetic_friction": "kinetic friction, ratio 0.7",
+    "viscosity": "viscosity, 30 % in 0.5 s, 1 s ramp",
+    "elastic_object": "elastic object, E = 10 MPa",
+    "embedded_gauge": "embedded foil gauge",
+}
+QUANTITIES = ("force", "contact_length", "stick_length", "friction_sum", "gauge_strain")
+DOMAINS = ("plane-strain", "solid")
+
+
+def run(quick: bool) -> Result:
+    """Each effect alone, in the section and in the solid; the quick version leaves the solid out."""
+    known = [name for name in SETTINGS if name in effect_names()]
+    found: dict[tuple[str, str], dict[str, float]] = {}
+    for domain in DOMAINS[:1] if quick else DOMAINS:
+        for name in ("none", *known):
+            found[domain, name] = _pressed(domain, name, quick)
+    table: dict[str, list[Any]] = {"domain": [], "effect": []}
+    for (domain, name), numbers in found.items():
+        table["domain"].append(domain)
+        table["effect"].append(name)
+        for key, value in numbers.items():
+            table.setdefault(key, []).append(value)
+    return Result(_rows(found, quick), table, lambda figure: _draw(figure, found))
+
+
+def _pressed(domain: str, effect: str, quick: bool) -> dict[str, float]:
+    size, base = {"plane-strain": (2.0, 8.0) if quick else (1.0, 4.0), "solid": (2.0, 8.0)}[domain]
+    scene = parse(
+        {
+            "finger": {"geometry": "clipped_cylinder", "radius_mm": 100.0, "half_length_mm": 50.0,
+                       "edge_height_mm": 36.6, "width_mm": 20.0},
+            "material": {"E_MPa": 1.0, "nu": 0.45},
+            "friction": {"mu": 0.25},
+            "press": {"depth_mm": 10.0, "steps": 10, "duration_s": 1.0},
+            "model": {"domain": domain},
+            "mesh": {"size_mm": size, "base_size_mm": base, "mesher": "swept"},
+            "gauge": [{"name": f"g{side}", "x_mm": side * 36.0, "y_mm": 40.0, "angle_deg": 90.0 - side * 60.0,
+                       "length_mm": 5.0} for side in (1, -1)],
+            "effects": {} if effect == "none" else {effect: SETTINGS[effect]},
+        }
+    )  # fmt: skip
+    begin = time.process_time()
+    problem = build(scene.model())
+    *_, end = march(problem)
+    seconds = time.process_time() - begin
+    numbers = measure(problem.points, end)
+    return {
+        "force": numbers["normal_force_N"] / 20.0,
+        "contact_length": 2.0 * numbers["contact_half_length_mm"],
+        "stick_length": 2.0 * numbers["stick_half_length_mm"],
+        "friction_sum": numbers["friction_sum_N"] / 20.0,
+        "gauge_strain": numbers["gauges"]["g1"],
+        "cpu_seconds": seconds,
+        "factorizations": problem.factorizations,
+    }
+
+
+def _rows(found: dict[tuple[str, str], dict[str, float]], quick: bool) -> tuple[Row, ...]:
+    section = "plane-strain"
+    none, large = found[section, "none"], found[section, "large_deformation"]
+    mesh = 0.01 if quick else 0.005
+    rows = [
+        Row("force per mm, plane strain, small strain, N/mm", "CalculiX 2.20, design.md", 22.35, none["force"], mesh,
+            "mesh of 1 mm (quick: 2 mm)", "validation"),
+        Row("force per mm, plane strain, large deformation, N/mm", "CalculiX 2.20, design.md", 28.5, large["force"],
+            0.02, "two codes, two contact formulations", "validation"),
+    ]  # fmt: skip
+    for domain in sorted({d for d, _ in found}):
+        base = found[domain, "none"]
+        viscous = found[domain, "viscosity"]["force"] / base["force"]
+        # a ramp of T = 2 tau: the mean of the relaxation function over the ramp, if the force grew linearly
+        mean = 0.7 + 0.3 * 0.5 * (1.0 - np.exp(-2.0))
+        rows.append(
+            Row(f"viscous over elastic force, {domain}", "mean of the relaxation function over the ramp", mean, viscous,
+                0.08, "the force grows faster than linearly, so it relaxes less", "sensitivity")
+        )  # fmt: skip
+        rows.append(
+            Row(f"factorisations without large deformation, {domain}", "one body, one factorisation", 1.0,
+                max(found[domain, n]["factorizations"] for n in ("none", "kinetic_friction", "viscosity")), 0.0,
+                "a count", measure="absolute")
+        )  # fmt: skip
+    return tuple(rows)
+
+
+def _draw(figure: Any, found: dict[tuple[str, str], dict[str, float]]) -> None:
+    domains = [d for d in DOMAINS if (d, "none") in found]
+    effects = [n for n in SETTINGS if (domains[0], n) in found]
+    names = ("force", "contact length", "stick length", "sum of |friction|", "gauge strain")
+    figure.set_size_inches(5.2 * len(domains) + 1.6, 5.6)
+    for k, domain in enumerate(domains):
+        axes = figure.add_subplot(1, len(domains), k + 1)
+        base = found[domain, "none"]
+        height = 0.8 / len(effects)
+        for i, effect in enumerate(effects):
+            change = [100.0 * (found[domain, effect][q] / base[q] - 1.0) for q in QUANTITIES]
+            at = np.arange(len(QUANTITIES)) + (i - (len(effects) - 1) / 2.0) * height
+            axes.barh(at, np.clip(change, -100.0, 200.0), height, label=LABELS[effect])
+            for y, c in zip(at, change, strict=True):
+                if abs(c) >= 0.5:
+                    axes.text(min(max(c, -100.0), 200.0) + (2.0 if c > 0 else -2.0), y, f"{c:+.0f}", va="center",
+                              ha="left" if c > 0 else "right", fontsize=7)  # fmt: skip
+        axes.axvline(0.0, color="black", linewidth=0.8)
+        axes.set_yticks(np.arange(len(QUANTITIES)), names if k == 0 else [""] * len(names))
+        axes.invert_yaxis()
+        axes.set_xlim(-125.0, 225.0)
+        axes.set_xlabel("change by the effect (%)")
+        axes.set_title({"plane-strain": "section, plane strain", "solid": "solid, 20 mm wide"}[domain])
+        axes.spines[["top", "right"]].set_visible(False)
+    handles = figure.axes[0].get_legend_handles_labels()
+    figure.legend(*handles, loc="outside lower center", fontsize=8, frameon=False, ncols=3)
