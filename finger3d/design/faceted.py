@@ -135,7 +135,7 @@ def body(surface: Triangles) -> Body:
 
 
 def _looks_up(surface: Triangles, base: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Mask (m,) of contact triangles: those that look up, less the few that differ from the smooth patch they are in."""
+    """Mask (m,) of contact triangles: those that look up, less the few that differ from the smooth patch around."""
     up = (surface.normals[:, 1] > _UP) & ~base
     smooth = _joined(surface, base.astype(np.int64))
     area = np.linalg.norm(surface.area_vectors, axis=1)

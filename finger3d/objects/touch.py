@@ -111,16 +111,17 @@ def approach(
             f"object: no part of it is above the finger (|x| <= {half_length:g}, |z| <= {half_width:g} mm), so that it "
             "never touches; change x_mm, z_mm"
         )
+    if isinstance(obj, Plane):  # it has no end that could hang down, and its gap is measured along its own normal
+        return touch
     deepest = float(path[:, 0].max())
-    if not isinstance(obj, Plane) and touch <= deepest:
+    if touch <= deepest:
         raise Finger3dError(
             f"object: at depth {deepest:g} mm its lowest point, beside the finger, is {deepest - touch:.4g} mm below "
             "the finger's base: it touches the base first; press less deep, or change x_mm, z_mm"
         )
     _box(top, obj, half_length, half_width, touch, place, path)
     _not_a_wall(obj, place, half_length, half_width)
-    if not isinstance(obj, Plane):
-        _no_side(top, obj, touch, path, half_length, half_width)
+    _no_side(top, obj, touch, path, half_length, half_width)
     return touch
 
 

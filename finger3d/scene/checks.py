@@ -8,12 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.model import MeshOptions
+from finger3d.model import MeshOptions, Model
+from finger3d.objects import Plane, Wave, contact_box
 from finger3d.scene.mistakes import dotted, shown
 from finger3d.scene.tables import GaugeTable, LegTable, MeshTable, SceneTable
 
 SIZE_SHARE, BASE_SHARE = 1 / 25, 1 / 6.25
 """Default edge lengths in a solid as shares of the finger's height; sections take half of them."""
+
+_ACROSS = 12.0  # elements across the overlap of a curved object, which is some 1.4 times as wide as the contact
+_FINEST = 0.2  # of the default: finer is left to those who ask for it
 
 
 def check(tables: SceneTable, legs: tuple[LegTable, ...], design: Any) -> list[str]:
@@ -84,16 +88,28 @@ def _sizes(mesh: MeshTable, design: Any, solid: bool) -> list[str]:
     return []
 
 
-def chosen(mesh: MeshTable, design: Any, solid: bool) -> MeshOptions:
-    """Return the mesh options, with sizes chosen where they are absent."""
+def chosen(mesh: MeshTable, model: Model) -> MeshOptions:
+    """Return the mesh options, with sizes chosen where they are absent; of `model` everything else is read."""
+    design, solid = model.design, model.domain == "solid"
     share = design.height_mm * (1.0 if solid else 0.5)
     size, base = mesh.size_mm, mesh.base_size_mm
     if size is None:
         # A thin finger gets two elements across its width; four significant digits keep scene.toml readable.
-        size = _rounded(min(share * SIZE_SHARE, smallest_mm(design, solid) / 2.0, base or math.inf))
+        coarse = min(share * SIZE_SHARE, smallest_mm(design, solid) / 2.0, base or math.inf)
+        size = _rounded(max(min(coarse, _detail(model)), coarse * _FINEST))
     if base is None:
         base = max(_rounded(min(share * BASE_SHARE, smallest_mm(design, solid=False))), size)
     return MeshOptions(size, base, mesh.mesher)
+
+
+def _detail(model: Model) -> float:
+    """Edge length, mm, at which an object that is not flat has some elements across its contact, or a crest."""
+    if isinstance(model.object, Plane):
+        return math.inf
+    x0, x1, z0, z1 = contact_box(*model.approach)
+    across = min(x1 - x0, z1 - z0) if model.domain == "solid" else x1 - x0
+    wave = model.object.wavelength_mm if isinstance(model.object, Wave) else math.inf
+    return min(across, wave) / _ACROSS
 
 
 def _rounded(value: float) -> float:

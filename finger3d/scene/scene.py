@@ -13,13 +13,24 @@ from pydantic import ValidationError
 
 from finger3d.contact.law import Coulomb
 from finger3d.design import designs
+from finger3d.design.files import SUFFIXES
 from finger3d.errors import Finger3dError
 from finger3d.model import Domain, Gauge, Leg, Material, MeshOptions, Model
-from finger3d.objects import RigidObject
-from finger3d.scene import checks, tree
+from finger3d.objects import RigidObject, approach
+from finger3d.scene import bodies, checks, tree
 from finger3d.scene.lookup import effect_names, effect_type
 from finger3d.scene.mistakes import Place, choose, dotted, listed, nearest, shown, unknown, worded
-from finger3d.scene.tables import SHAPES, LegsTable, LegTable, ObjectTable, PressTable, SceneTable, Table, table_of
+from finger3d.scene.tables import (
+    SHAPES,
+    FileTable,
+    LegsTable,
+    LegTable,
+    ObjectTable,
+    PressTable,
+    SceneTable,
+    Table,
+    table_of,
+)
 
 AnyTable = TypeVar("AnyTable", bound=Table)
 LATER = "not yet available in this version"
@@ -120,38 +131,54 @@ def parse(given: Mapping[str, Any], path: Path | None = None, set_keys: Iterable
     path : the file it came from, for messages
     set_keys : keys that came from the command line, for messages
     """
-    given = tree.frozen(given)
+    given = tree.frozen(bodies.absolute(given, path))
     found: dict[Place, str] = {}
     tables = _checked(SceneTable, given, (), found)
     geometry, dimensions = _named(given, "finger", "geometry", designs(), found)
-    design = _built(designs()[geometry], dimensions, ("finger",), found) if dimensions else None
+    design = _design(geometry, dimensions, found)
     shape, placed = _named({"object": {"shape": "plane"}, **given}, "object", "shape", SHAPES, found)
+    rigid = _object(placed, found)
     press = _press(given, found)
     effects = _effects(given, found)
     for key in ("tolerance", "max_seconds"):
         if tables and getattr(tables.mesh, key) is not None:
             found["mesh", key] = f"mesh.{key} = {shown(getattr(tables.mesh, key))}: {LATER}; give mesh.size_mm instead"
-    if found or tables is None or dimensions is None or press is None or not isinstance(placed, ObjectTable):
+    if found or tables is None or dimensions is None or press is None or rigid is None:
         order = [*given]
         places = sorted(found, key=lambda p: order.index(p[0]) if p[0] in order else len(order))
         raise _refusal([found[p] for p in places], path, set_keys)
     legs = press.leg if isinstance(press, LegsTable) else (press,)
-    if lines := checks.check(tables, legs, design):
+    lines = checks.check(tables, legs, design)
+    lines += [line for line in [bodies.unit_mistake(design, rigid)] if line]
+    if lines:
         raise _refusal(lines, path, set_keys)
-    mesh = checks.chosen(tables.mesh, design, tables.model.domain == "solid")
+    try:
+        # How the object comes near is told before any work; so is what effects ask of the rest of the scene, below.
+        way = Model(
+            design,
+            Material(1.0, 0.3),
+            MeshOptions(1.0, 1.0),
+            tuple(Leg(**dict(leg)) for leg in legs),
+            rigid,
+            domain=tables.model.domain,
+        )
+        approach(*way.approach)
+        mesh = checks.chosen(tables.mesh, way)
+    except Finger3dError as error:
+        raise _refusal([str(error)], path, set_keys) from None
     tables = tables.model_copy(
         update={
             "finger": {"geometry": geometry, **dimensions.model_dump()},
-            "object": {"shape": shape, **placed.model_dump()},
+            "object": {"shape": shape, **dict(placed or {})},
             "press": press.model_dump(),
             "mesh": tables.mesh.model_copy(update=asdict(mesh)),
             "effects": {name: settings.model_dump() for name, (settings, _) in effects.items()},
         }
     )
     on = {name: effect for name, (_, effect) in effects.items()}
-    scene = Scene(tables, design, placed.build(), mesh, on, given, path)
+    scene = Scene(tables, design, rigid, mesh, on, given, path)
     try:
-        scene.model()  # what effects ask of the rest of the scene is told before any work
+        scene.model()
     except Finger3dError as error:
         raise _refusal([str(error)], path, set_keys) from None
     return scene
@@ -186,6 +213,30 @@ def _built(record: Any, settings: Table, place: Place, found: dict[Place, str]) 
         return None
 
 
+def _design(geometry: str, dimensions: Table | None, found: dict[Place, str]) -> Any:
+    """Build the finger from a design, or read it from a file."""
+    if dimensions is None:
+        return None
+    if not bodies.is_file(geometry):
+        return _built(designs()[geometry], dimensions, ("finger",), found)
+    try:
+        return bodies.finger(geometry)
+    except Finger3dError as error:
+        found["finger", "geometry"] = f"finger.geometry: {error}"
+        return None
+
+
+def _object(placed: Table | None, found: dict[Place, str]) -> RigidObject | None:
+    """Build the object; what is wrong with its file is a mistake like any other."""
+    if not isinstance(placed, ObjectTable):
+        return None
+    try:
+        return placed.build()
+    except Finger3dError as error:
+        found["object", "path"] = f"object.path: {error}"
+        return None
+
+
 def _named(
     given: Mapping[str, Any], name: str, key: str, known: Mapping[str, type], found: dict[Place, str]
 ) -> tuple[str, Table | None]:
@@ -203,9 +254,13 @@ def _named(
         found[name, misspelt or key] = line
         return "", None
     value = given_table[key]
-    later = (".step", ".stp", ".stl") if name == "finger" else ("mesh",)
-    if isinstance(value, str) and value.lower().endswith(later):
-        found[name, key] = f"{name}.{key} = {shown(value)}: {LATER}; must be {listed(known)}"
+    if name == "finger" and bodies.is_file(value):
+        rest = {k: v for k, v in given_table.items() if k != key}
+        return value, _checked(FileTable, rest, (name,), found, also=(key,))
+    if name == "finger" and isinstance(value, str) and "." in value:
+        found[name, key] = f"{name}.{key} = {shown(value)}: a file must be named {listed(SUFFIXES)}"
+    elif name == "object" and isinstance(value, str) and value.lower().endswith(SUFFIXES):
+        found[name, key] = f'{name}.{key} = {shown(value)}: must be "mesh", and the file its path'
     elif not isinstance(value, str) or value not in known:
         found[name, key] = choose((name, key), value, list(known))
     else:

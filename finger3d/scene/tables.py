@@ -12,7 +12,7 @@ from annotated_types import Ge, Gt, Le, Lt, MinLen
 from pydantic import BaseModel, ConfigDict, create_model
 
 from finger3d.model import Domain
-from finger3d.objects import Axis, Cylinder, Plane, RigidObject, Sphere, Wave, Wedge
+from finger3d.objects import Axis, Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
 
 Positive = Annotated[float, Gt(0)]
 NotNegative = Annotated[float, Ge(0)]
@@ -178,12 +178,30 @@ class WaveTable(ObjectTable):
         )
 
 
+class MeshObjectTable(ObjectTable):
+    """shape = "mesh"."""
+
+    path: Annotated[str, MinLen(1)]
+    scale: Positive = 1.0
+
+    def build(self) -> RigidObject:
+        """Return the object; reads and checks its file."""
+        from finger3d.design.files import read_surface
+
+        return MeshObject(self.x_mm, self.z_mm, surface=read_surface(self.path, self.scale))
+
+
+class FileTable(Table):
+    """[finger] with a file as its geometry: all dimensions are the file's."""
+
+
 SHAPES: dict[str, type[ObjectTable]] = {
     "plane": PlaneTable,
     "cylinder": CylinderTable,
     "sphere": SphereTable,
     "wedge": WedgeTable,
     "wave": WaveTable,
+    "mesh": MeshObjectTable,
 }
 
 
