@@ -341,6 +341,8 @@ def summary_rows(summary: Mapping[str, Any], out: Path) -> list[tuple[str, str]]
         rows += [(f"strain {name}", f"{strain:.5g}") for name, strain in last["gauges"].items()]
     if summary.get("cost"):
         rows.append(("time", f"{summary['cost']['seconds']['total']:.1f} s"))
+    rows += [("warning", text) for text in summary.get("warnings", ())]
+    rows += [("advice", text) for text in summary.get("advice", ())]
     rows.append(("results", str(out)))
     rows += [("", p.name) for p in sorted(out.iterdir()) if p.is_file()]
     return rows

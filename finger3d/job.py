@@ -57,6 +57,7 @@ class _Output:
         self.frames: list[Frame] = []
         self.estimate: StepEstimate | None = None
         self.coupling = problem.coupling()
+        self.advice: list[str] = []
         self.warnings = [*problem.model.warnings, *_coupling_warning(self.coupling), *_depth_warning(problem)]
         self.seconds = {"cad": 0.0, "mesh": 0.0, **problem.seconds, "contact": 0.0, "output": 0.0}
         self._written = -math.inf
@@ -88,6 +89,7 @@ class _Output:
             "effects": list(self.scene.effects),
             "outcome": outcome,
             "warnings": self.warnings,
+            "advice": self.advice,
             "steps": steps,
             "step_estimate": self.estimate.as_dict() if self.estimate else None,
             "uniqueness": {"largest_coupling": self.coupling},
@@ -270,6 +272,7 @@ def _covers(problem: Problem, frame: Frame) -> bool:
 
 def _fields(problem: Problem, output: _Output, folder: Path, figures: bool) -> None:
     """fields.vtu and the pictures, from the last good step; the field is recovered with the factor at hand."""
+    from finger3d.advice import advise
     from finger3d.mesh import unfold
 
     good = [f for f in output.frames if f.outcome.ok]
@@ -277,6 +280,7 @@ def _fields(problem: Problem, output: _Output, folder: Path, figures: bool) -> N
         return
     frame, points = good[-1], problem.points
     u, strain, sigma = problem.model.kinematics.fields(problem, frame.part)
+    output.advice = advise(problem, frame, strain, output.estimate is not None)
     mesh, parent, sign = unfold(problem.mesh, tuple("xyz".index(a) for a in problem.axes))
     flip = np.ones((len(parent), 3))
     flip[:, : problem.dim] = sign

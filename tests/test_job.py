@@ -120,6 +120,24 @@ def test_fields_open_in_pyvista_and_agree_with_the_contact_table(tmp_path: Path)
     assert (grid.points + grid["displacement"])[:, 1].max() <= 4.5 + 2 * 0.4**2 / (8 * 5.0)
 
 
+def test_advice_comes_with_numbers_and_goes_when_it_is_followed(tmp_path: Path) -> None:
+    said = {}
+    for name, keys in {
+        "small": ["press.depth_mm=1.0"],
+        "large": ["press.depth_mm=1.0", "effects.large_deformation={}", "press.steps=60"],
+        "auto": ["press.steps=auto", "press.depth_mm=0.05"],
+    }.items():
+        out = tmp_path / name
+        settings = [word for key in keys for word in ("--set", key)]
+        assert main(["press", str(written(tmp_path)), "--out", str(out), "--no-figures", *settings]) == 0
+        said[name] = " ".join(json.loads((out / "summary.json").read_text(encoding="utf-8"))["advice"])
+    assert "large_deformation would change the force by about +20 %" in said["small"]
+    assert "5 equal increments leave the dissipation about 140 % high" in said["small"]
+    assert "large_deformation" not in said["large"]
+    assert "increments" not in said["large"] + said["auto"]
+    assert "finger3d compare" in said["large"]
+
+
 def test_effects_and_warnings_are_told(tmp_path: Path) -> None:
     text = SECTION + '[effects.kinetic_friction]\nratio = 0.5\nbranch = "paper"\n'
     out = tmp_path / "out"
