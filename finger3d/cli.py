@@ -76,6 +76,9 @@ def press(
         _complain(f"interrupted; {_kept(out, report.steps_total)}")
         return 130
     _print_rows(loaded.title, summary_rows(result.summary, out))
+    for kind in ("warnings", "advice"):
+        for text in result.summary.get(kind, ()):
+            print(f"{kind.removesuffix('s')}: {text}")
     if result.outcome.ok:
         return 0
     _complain(f"{scene}: {result.outcome} ({_kept(out, report.steps_total)})")
@@ -341,8 +344,6 @@ def summary_rows(summary: Mapping[str, Any], out: Path) -> list[tuple[str, str]]
         rows += [(f"strain {name}", f"{strain:.5g}") for name, strain in last["gauges"].items()]
     if summary.get("cost"):
         rows.append(("time", f"{summary['cost']['seconds']['total']:.1f} s"))
-    rows += [("warning", text) for text in summary.get("warnings", ())]
-    rows += [("advice", text) for text in summary.get("advice", ())]
     rows.append(("results", str(out)))
     rows += [("", p.name) for p in sorted(out.iterdir()) if p.is_file()]
     return rows
