@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -95,7 +95,6 @@ class History:
 
     points: ContactPoints
     frames: tuple[Frame, ...]
-    details: dict[str, Any] = field(default_factory=dict)
 
     @property
     def outcome(self) -> Outcome:
