@@ -135,7 +135,7 @@ def wave(count: int, dim: int) -> Errors:
     order = np.argsort(place)
     x = np.linspace(0.0, 0.5, 8001)
     found = []
-    for depth in np.linspace(depth_for(half, gap, 0.25), depth_for(half, gap, 0.75), 12):
+    for depth in np.linspace(depth_for(half, gap, 0.25), depth_for(half, gap, 0.75), 30):
         f = _forces(half, gap, depth)
         share = f.sum() / (PEAK * half.surface.area.sum())
         s = 4.0 * (f @ square) / f.sum()
