@@ -1,0 +1,138 @@
+"""Is a solid with held ends the plane-strain section, is half of it half, and do two meshers agree?
+
+Three ways to the same number, on the paper's Fig. 9 finger (R = 100, 20 mm wide) pressed 10 mm with mu = 0.25: a solid
+whose end faces may not move along z is in plane strain (3D against 2D); a scene that is its own mirror image may be
+solved whole, half or by a quarter; and the structured and the unstructured mesher fill the same body.  Source: issue 2
+and 4 (0.5 %, 1 %).
+
+Theory of the rate: at the edge of the bonded base the displacement goes as r^e (Williams 1952), so the force converges
+as h^(2e), 1.2 at nu = 0.49; contact adds h^2.  Errors are against the section's force extrapolated with that rate, root
+of the mean square over 5 depths.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.contact.law import Coulomb
+from finger3d.design import designs
+from finger3d.history import measure
+from finger3d.model import Leg, Material, MeshOptions, Model
+from finger3d.solve import build, march
+from finger3d.study import Result, Row
+
+from ._common import convergence, rate
+from ._corner import clamped_free, extrapolated
+
+Float = NDArray[np.float64]
+STEPS = 5
+_HALF = "issue 4: 3D with held ends against the section within 0.5 %"
+
+
+def press(size: float, nu: float, mesher: str = "swept", **changes: Any) -> list[dict[str, Any]]:
+    """Numbers of every increment."""
+    finger = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
+    mesh, legs = MeshOptions(size, 2.0 * size, mesher), (Leg(10.0, steps=STEPS),)
+    problem = build(Model(finger, Material(1.0, nu), mesh, legs, friction=Coulomb(0.25), **changes))
+    frames = list(march(problem))
+    if len(frames) < STEPS or not frames[-1].outcome.ok:
+        return [{"normal_force_N": np.nan, "friction_sum_N": np.nan}] * STEPS
+    return [measure(problem.points, frame) for frame in frames]
+
+
+def forces(size: float, nu: float, **changes: Any) -> Float:
+    """Normal forces (N) of every increment."""
+    return np.array([step["normal_force_N"] for step in press(size, nu, **changes)])
+
+
+def run(quick: bool) -> Result:
+    """Sections and held solids of three sizes and more, mirror images, two meshers."""
+    flat = (4.0, 2.0, 1.0) if quick else (4.0, 2.0, 1.0, 0.5, 0.25)
+    deep = (8.0, 6.0, 4.0) if quick else (8.0, 4.0, 2.0)
+    rows: list[Row] = []
+    table: list[tuple[Any, ...]] = []
+    curves: dict[float, dict[str, tuple[Float, Float]]] = {}
+    for nu in (0.3, 0.49):
+        theory = 2.0 * clamped_free(np.pi / 2, nu)
+        sections = [forces(s, nu, domain="plane-strain") for s in flat]
+        limit = np.array([extrapolated(c, f, theory) for c, f in zip(sections[-2], sections[-1], strict=True)])
+        solids = [forces(s, nu, held_ends=True) for s in deep]
+        same = forces(deep[-1], nu, domain="plane-strain")
+        what = f"force of a solid with held ends, nu = {nu:g}, {deep[-1]:g} mm cells: over the section's"
+        rows.append(Row(f"{what} on the same cells", "2D", 1.0, float(solids[-1][-1] / same[-1]), 0.005, _HALF))
+        rows.append(Row(f"{what} extrapolated", "2D", 1.0, float(solids[-1][-1] / limit[-1]), 0.005, _HALF))
+        curves[nu] = {}
+        for dim, sizes, found in (("section", flat, sections), ("held solid", deep, solids)):
+            errors = np.array([np.sqrt(np.mean((f / limit - 1.0) ** 2)) for f in found])
+            curves[nu][dim] = np.array(sizes), errors
+            table += [(dim, nu, s, f[-1], e) for s, f, e in zip(sizes, found, errors, strict=True)]
+            if dim == "section" and quick:
+                continue  # two of its three sizes make the limit
+            last = slice(-5, -2) if dim == "section" else slice(None)
+            why = "what the limit is extrapolated from is left out; the edge of contact swings, and adds its h^2"
+            got = rate(sizes[last], errors[last])
+            rows.append(
+                Row(
+                    f"rate of the force, {dim}, nu = {nu:g}",
+                    "Williams 1952: 2 e",
+                    theory,
+                    got,
+                    0.25,
+                    why,
+                    measure="at least",
+                )
+            )
+    rows += _mirrors(6.0)
+    if not quick:
+        both = [press(2.0, 0.49, mesher)[-1]["normal_force_N"] for mesher in ("swept", "ftetwild")]
+        what = "force of the solid with free ends, nu = 0.49, 2 mm cells, ftetwild over swept"
+        rows.append(
+            Row(what, "the other mesher", 1.0, both[1] / both[0], 0.01, "issue 2: within 1 % of each other at 2 mm")
+        )
+    names = ("body", "nu", "size_mm", "force_N", "rms_error")
+    columns = dict(zip(names, map(list, zip(*table, strict=True)), strict=True))
+    return Result(tuple(rows), columns, lambda figure: draw(figure, curves))
+
+
+def _mirrors(size: float) -> list[Row]:
+    """Whole and both halves against the quarter, which is the mirror image of nothing."""
+    quarter = press(size, 0.49, symmetry=("x", "z"))[-1]
+    rows = []
+    for name, planes in (("half by x", ("x",)), ("half by z", ("z",)), ("whole", ())):
+        other = press(size, 0.49, symmetry=planes)[-1]
+        away = max(abs(other[k] / quarter[k] - 1.0) for k in ("normal_force_N", "friction_sum_N", "dissipation_mJ"))
+        what = f"{name} against quarter: force, friction sum, dissipation, largest relative difference"
+        rows.append(
+            Row(
+                what,
+                "mirror image",
+                0.0,
+                away,
+                1e-9,
+                "mirrored cells: the same up to how far contact is settled",
+                measure="absolute",
+            )
+        )
+    return rows
+
+
+def draw(figure: Any, curves: dict[float, dict[str, tuple[Float, Float]]]) -> None:
+    """Errors over the cell size."""
+    for (nu, both), axes in zip(curves.items(), figure.subplots(1, 2), strict=True):
+        theory = 2.0 * clamped_free(np.pi / 2, nu)
+        for name, (sizes, errors) in both.items():
+            slope = {name: errors}
+            convergence(
+                axes,
+                sizes,
+                slope,
+                theory,
+                "cell size at the contact, mm",
+                "force, relative to the limit, rms over depths",
+            )
+        ticks = sorted({s for sizes, _ in both.values() for s in sizes})
+        axes.set_xticks(ticks, [f"{t:g}" for t in ticks])
+        axes.set_title(f"Fig. 9 finger, plane strain, nu = {nu:g}")
