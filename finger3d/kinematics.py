@@ -61,6 +61,7 @@ class SmallStrain:
     """Linear elasticity over the condensed compliance: the paper's baseline."""
 
     inclusions: ClassVar[bool] = True
+    object_compliance: ClassVar[bool] = True
 
     def start(self, problem: Any) -> ContactState:
         """No force, gaps at rest."""

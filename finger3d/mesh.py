@@ -116,6 +116,13 @@ def _mirrored(simplices: Int) -> Int:
     return simplices[:, _MIRROR[simplices.shape[1]]]
 
 
+def reflected(mesh: Mesh, axis: int) -> Mesh:
+    """The mirror image of a mesh about ``x[axis] = 0``, its cells kept positive."""
+    points = mesh.points.copy()
+    points[:, axis] *= -1.0
+    return Mesh(points, _mirrored(mesh.cells), {label: _mirrored(f) for label, f in mesh.facets.items()})
+
+
 def unfold(mesh: Mesh, axes: tuple[int, ...]) -> tuple[Mesh, Int, Float]:
     """Mirror a half or quarter mesh about the planes ``x[axis] = 0``.
 

@@ -88,6 +88,14 @@ class Inclusions(Protocol):
         ...
 
 
+class ObjectCompliance(Protocol):
+    """An object that yields."""
+
+    def at_points(self, problem: Any, zone: tuple[float, float, float, float], say: Any) -> Float:
+        """Compliance (c, d, c, d) mm/N of the object at the contact points of a problem; 0 in directions left out."""
+        ...
+
+
 @dataclass(frozen=True)
 class Model:
     """Everything that determines the numbers.
@@ -111,6 +119,7 @@ class Model:
     kinematics: Kinematics = field(default_factory=SmallStrain)
     gauges: tuple[Gauge, ...] = ()
     inclusions: Inclusions | None = None
+    object_compliance: ObjectCompliance | None = None
     domain: Domain = "solid"
     rule: Literal["projection", "paper"] = "projection"
     held_ends: bool = False

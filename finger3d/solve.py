@@ -80,11 +80,15 @@ def build(model: Model, say: Callable[[str], None] = lambda text: None, margin: 
         gauge_rows, kept, held, thickness, touch, axes, points, parent, sign, share,
         {**report.seconds, "assembly": assembly, "condensation": condensed.seconds},
     )  # fmt: skip
+    yields: Float | float = 0.0
+    if model.object_compliance:
+        yields = model.object_compliance.at_points(bare, zone, say)
+        bare = replace(bare, compliance=bare.compliance + yields)
     if not len(springs):
         return bare
     held_by = stiffened(condensed.compliance, springs)
     compliance, gauge_rows = _read(held_by, kept, len(face.nodes), mesh.dim, len(gauges))
-    return replace(bare, compliance=compliance, gauge_rows=gauge_rows, springs=springs, bare=bare)
+    return replace(bare, compliance=compliance + yields, gauge_rows=gauge_rows, springs=springs, bare=bare)
 
 
 def _read(rows: Float, kept: NDArray[np.int64], count: int, dim: int, gauges: int) -> tuple[Float, Float]:

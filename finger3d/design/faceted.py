@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.design.tessellate import Body, CadFace
-from finger3d.triangles import Triangles
+from finger3d.triangles import Triangles, mistake
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -20,6 +20,7 @@ _MOST = 150  # patches; beyond, a texture's patches are taken together by label
 _UP = 1e-3
 _FLAT = 1e-6
 _BENT = math.radians(0.3)  # below, neighbours lie in one plane but for round-off
+_MANY = 2000  # triangles; fTetWild took 3 minutes over 34 000 of them
 _RARE = 0.1  # of a smooth patch's area
 
 
@@ -163,3 +164,37 @@ def _neighbours(surface: Triangles) -> tuple[Int, Int, Int]:
     edges, owner = edges[order], np.repeat(np.arange(len(surface.faces)), 3)[order]
     pair = np.flatnonzero((edges[1:] == edges[:-1]).all(axis=1))
     return owner[pair], owner[pair + 1], edges[pair]
+
+
+def coarser(body: Body, tolerance: float) -> Body:
+    """The body with fewer triangles for the mesher, which is slow on many; its patches, for snapping, stay as fine.
+
+    `tolerance` (mm) is what one removal may move the surface; removals add up to some twenty times that. A surface
+    that does not come out closed is made again with less, and left as it was in the end.
+    """
+    if len(body.triangles) <= _MANY:
+        return body
+    for share in (1.0, 0.5, 0.2, 0.1):
+        found = _decimated(body, share * tolerance)
+        if not mistake(found):
+            nearest = Triangles(body.points, body.triangles).closest(found.corners.mean(axis=1))[1]
+            return replace(body, points=found.points, triangles=found.faces, face=body.face[nearest])
+    return body
+
+
+def _decimated(body: Body, tolerance: float) -> Triangles:
+    from pyvista import PolyData, wrap
+    from vtkmodules.vtkFiltersCore import vtkDecimatePro
+
+    decimate = vtkDecimatePro()
+    decimate.SetInputData(PolyData(body.points, np.insert(body.triangles, 0, 3, axis=1).ravel()))
+    decimate.SetTargetReduction(1.0 - 0.25 * _MANY / len(body.triangles))
+    decimate.PreserveTopologyOn()
+    decimate.SplittingOff()
+    decimate.AccumulateErrorOn()
+    decimate.SetFeatureAngle(20.0)
+    decimate.SetErrorIsAbsolute(1)
+    decimate.SetAbsoluteError(tolerance)
+    decimate.Update()
+    made = wrap(decimate.GetOutput())
+    return Triangles(np.asarray(made.points, dtype=float), np.asarray(made.regular_faces, dtype=np.int64))

@@ -38,6 +38,7 @@ class Imported:
     content : SHA-256 of the file; equal files are equal bodies
     scale : what an STL file's numbers were multiplied with
     upside_down : turned about z by half a turn, so that its highest plane is the base
+    middle : (3,) mm, the middle of the base as it was drawn (and turned)
     surface : closed triangles, mm, in place
     cad : the build123d solid in place; None for STL
     """
@@ -46,6 +47,7 @@ class Imported:
     content: str
     scale: float
     upside_down: bool
+    middle: Float = field(compare=False, repr=False)
     surface: Triangles = field(compare=False, repr=False)
     cad: Any = field(compare=False, repr=False)
 
@@ -151,6 +153,17 @@ def imported(path: str | Path, upside_down: bool = False, scale: float = 1.0) ->
         _stl_only(path, surface)
         if upside_down:
             surface = Triangles(surface.points * [-1.0, -1.0, 1.0], surface.faces)
+    return _on_its_base(str(path), content(path), scale, upside_down, surface, solid)
+
+
+def of_surface(surface: Triangles, name: str, upside_down: bool = False) -> Imported:
+    """A closed surface as a body, like :func:`imported`."""
+    if upside_down:
+        surface = Triangles(surface.points * [-1.0, -1.0, 1.0], surface.faces)
+    return _on_its_base(name, surface.digest, 1.0, upside_down, surface, None)
+
+
+def _on_its_base(path: str, told_by: str, scale: float, upside_down: bool, surface: Triangles, solid: Any) -> Imported:
     _check_size(path, surface)
     base = _base(path, surface, "highest" if upside_down else "lowest")
     corners = surface.corners[base].reshape(-1, 3)
@@ -163,12 +176,12 @@ def imported(path: str | Path, upside_down: bool = False, scale: float = 1.0) ->
 
         solid = solid.moved(Location(tuple(float(-m) for m in middle)))
     moved = Triangles(points, surface.faces)
-    if not (np.delete(moved.normals, np.flatnonzero(base), axis=0)[:, 1] > 1e-3).any():
+    if not (moved.normals[~base, 1] > 1e-3).any():
         raise Finger3dError(f"{path}: nothing of the body looks up; is it drawn with y up?")
-    return Imported(str(path), content(path), scale, upside_down, moved, solid)
+    return Imported(path, told_by, scale, upside_down, middle, moved, solid)
 
 
-def _check_size(path: Path, surface: Triangles) -> None:
+def _check_size(path: str, surface: Triangles) -> None:
     if not SMALLEST_MM <= surface.size <= LARGEST_MM:
         extent = " x ".join(f"{e:.4g}" for e in surface.high - surface.low)
         raise Finger3dError(
@@ -177,7 +190,7 @@ def _check_size(path: Path, surface: Triangles) -> None:
         )
 
 
-def _base(path: Path, surface: Triangles, which: str) -> NDArray[np.bool_]:
+def _base(path: str, surface: Triangles, which: str) -> NDArray[np.bool_]:
     """Mask (m,) of the triangles of the lowest plane."""
     near = surface.corners[:, :, 1].max(axis=1) <= surface.low[1] + _LEVEL * surface.size
     base = near & (surface.normals[:, 1] < -_DOWN)

@@ -39,6 +39,7 @@ ATTEMPTS = 3
 
 _EPSILON = (2e-4, 1e-3, 3e-3)  # envelope per diagonal: least, usual, most; tighter costs steeply, nodes are snapped
 _FINE = 0.2  # the envelope is at most this share of the contact edge length, and holds chords this much finer
+_COARSER = 0.02  # of the envelope, each triangle left out of an STL body may move the surface
 _VOLUME = 0.01
 
 
@@ -92,9 +93,10 @@ def _made(
         )
     say(f"meshing, about {cells:.0f} tetrahedra")
     reasons = []
+    limit = _limit_seconds(cells, len(body.triangles))
     for _ in range(ATTEMPTS):
         try:
-            points, tets = _child(body.points, body.triangles, field, epsilon, _limit_seconds(cells))
+            points, tets = _child(body.points, body.triangles, field, epsilon, limit)
             check_tets(points, tets, body.volume_mm3)
             mesh = snap(points, tets, body)
             return mesh, whole, cad_seconds
@@ -116,6 +118,7 @@ def box(design: Any, symmetry: tuple[str, ...]) -> tuple[Float, Float]:
 def _body(design: Any, symmetry: tuple[str, ...], field: Sizing) -> tuple[Body, float]:
     """The tessellated part, and the envelope fTetWild shall keep, per diagonal."""
     from finger3d.design.cad import cut, labelled_faces
+    from finger3d.design.faceted import coarser
     from finger3d.design.surfaces import surface_of
     from finger3d.design.tessellate import tessellate
 
@@ -129,7 +132,7 @@ def _body(design: Any, symmetry: tuple[str, ...], field: Sizing) -> tuple[Body, 
     epsilon = min(max(usual, field.base_mm**2 / (8.0 * radius * diagonal)), most, _FINE * field.size_mm / diagonal)
     epsilon = max(epsilon, least)
     if faceted:
-        return faceted, epsilon
+        return coarser(faceted, _COARSER * epsilon * diagonal), epsilon
     half_width, half_length = 0.5 * design.width_mm, design.half_length_mm
     exact = (0.0, half_width, -half_width, half_length, -half_length, design.height_mm)
     return tessellate(solid, _FINE * epsilon * diagonal, exact=exact), epsilon
@@ -168,9 +171,10 @@ def _mistake(points: Float, triangles: Int) -> str:
     return ""
 
 
-def _limit_seconds(cells: float) -> float:
-    """Five times what meshing took on a busy 2-core machine: 6 s at 4 700 tets, 149 s at 219 000."""
-    return 5.0 * (10.0 + 8e-4 * cells)
+def _limit_seconds(cells: float, triangles: int) -> float:
+    """Five times what meshing took on a busy 2-core machine: 6 s at 4 700 tets, 149 s at 219 000, the surface being
+    coarse; 27 s over 5 500 triangles, 197 s over 34 000, the tets being few."""
+    return 5.0 * (10.0 + 8e-4 * cells + 5e-3 * triangles)
 
 
 def _child(points: Float, triangles: Int, field: Sizing, epsilon: float, limit: float) -> tuple[Float, Int]:

@@ -16,10 +16,11 @@ def fill(model: Model, slot: str, value: Any, effect: str) -> Model:
         raise Finger3dError(f"effects: {taken} and {effect} both set the {slot}; keep one of them")
     filled = tuple(sorted((*model.filled, (slot, effect))))
     made = replace(model, **{slot: value}, filled=filled)
-    if made.inclusions is not None and not getattr(made.kinematics, "inclusions", False):
-        others = {"inclusions", "kinematics"} - {slot}
-        other = next((name for s, name in model.filled if s in others), "the model's own slots")
-        raise Finger3dError(f"effects: {other} and {effect} do not go together; keep one of them")
+    for wish in ("inclusions", "object_compliance"):
+        if getattr(made, wish) is not None and not getattr(made.kinematics, wish, False):
+            others = {wish, "kinematics"} - {slot}
+            other = next((name for s, name in model.filled if s in others), "the model's own slots")
+            raise Finger3dError(f"effects: {other} and {effect} do not go together; keep one of them")
     return made
 
 

@@ -26,10 +26,13 @@ class MeshObject(Placed):
 
     Attributes
     ----------
-    surface : the body as it was drawn, mm; :func:`finger3d.design.imported.read_surface` reads and checks a file
+    surface : the body as it was drawn, mm; :func:`finger3d.design.files.read_surface` reads and checks a file
+    path, scale : the file it came from, and what its numbers were multiplied with
     """
 
     surface: Triangles = field(kw_only=True)
+    path: str | None = field(default=None, kw_only=True, compare=False)
+    scale: float = field(default=1.0, kw_only=True, compare=False)
 
     @cached_property
     def origin(self) -> Float:

@@ -188,7 +188,8 @@ class MeshObjectTable(ObjectTable):
         """Return the object; reads and checks its file."""
         from finger3d.design.files import read_surface
 
-        return MeshObject(self.x_mm, self.z_mm, surface=read_surface(self.path, self.scale))
+        surface = read_surface(self.path, self.scale)
+        return MeshObject(self.x_mm, self.z_mm, surface=surface, path=self.path, scale=self.scale)
 
 
 class FileTable(Table):

@@ -1,0 +1,256 @@
+"""An object that yields: its compliance is added to the finger's at the contact points.
+
+The object is meshed and condensed like the finger, in small strain, and held where it is gripped: the lower half of a
+cylinder or ball on its cut; behind a plane, wedge or wave a block as long and wide as the finger, on its far face; a
+body from a file on its highest plane.  Its surface is read at the finger's own contact points, as the same weighted
+means (`finger3d.fem.opposite`), so the two meshes need not match and each force acts on both bodies undiminished.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Annotated, Any
+
+import numpy as np
+import scipy.sparse as sp
+from annotated_types import Ge, Gt, Le
+from numpy.typing import NDArray
+
+from finger3d.design import designs, mesh_section, mesh_solid
+from finger3d.effects.base import fill, warn
+from finger3d.errors import Finger3dError
+from finger3d.fem.assembly import Elasticity, stiffness
+from finger3d.fem.condense import condense
+from finger3d.fem.opposite import facing_trace
+from finger3d.mesh import Mesh, reflected
+from finger3d.model import MeshOptions, Model
+from finger3d.objects import Cylinder, MeshObject, Plane, Sphere
+from finger3d.problem import Problem
+
+Float = NDArray[np.float64]
+Zone = tuple[float, float, float, float]
+Say = Callable[[str], None]
+
+_SURFACE = 401  # places along x and z where the highest point of a wedge or wave is looked for
+_TURNED = {"symmetry_x": "symmetry_z", "symmetry_z": "symmetry_x", "ends": "walls", "walls": "ends"}
+
+
+@dataclass(frozen=True)
+class SoftObject:
+    """Material of the object: Young's modulus (MPa), Poisson's ratio; height (mm) of a block, None: the finger's."""
+
+    E_MPa: float
+    nu: float
+    height_mm: float | None = None
+
+    def at_points(self, problem: Problem, zone: Zone, say: Say) -> Float:
+        """Compliance (c, d, c, d) mm/N of the object at the contact points; 0 in directions left out by symmetry."""
+        model, axes, d = problem.model, problem.axes, problem.dim
+        start = time.perf_counter()
+        body = _Body(model, self.height_mm or model.design.height_mm, zone, axes, say)
+        mesh, whole = body.mesh()
+        problem.seconds["object_mesh"] = time.perf_counter() - start
+        trace = facing_trace(problem.surface, mesh, "contact")
+        frame = model.object.frame(d)
+        rows = sp.kron(trace, frame, format="csr")
+        images = 1
+        if whole and axes:  # the body is meshed whole: all images of a point are pressed alike
+            rows, images = _all_images(problem, mesh, frame), 2 ** len(axes)
+        elastic = Elasticity.of(self.E_MPa, self.nu, model.domain == "plane-stress")
+        say(f"condensing the object's {mesh.points.size} unknowns")
+        matrix = stiffness(mesh, elastic, problem.thickness)
+        held = _held(mesh, () if whole else axes, model.held_ends)
+        condensed = condense(matrix, held, rows[problem.kept])
+        problem.later.factorizations += condensed.factorizations
+        problem.seconds["object_condensation"] = condensed.seconds
+        c = len(problem.surface.nodes)
+        out = np.zeros((c * d, c * d))
+        out[np.ix_(problem.kept, problem.kept)] = condensed.compliance / images
+        return out.reshape(c, d, c, d)
+
+
+def _all_images(problem: Problem, mesh: Mesh, frame: Float) -> sp.csr_matrix:
+    """Rows that sum a displacement over all mirror images of every point, each seen in its own mirror."""
+    d = problem.dim
+    total: Any = 0.0
+    signs = [np.ones(d)]
+    for axis in problem.axes:
+        flip = np.where(np.arange(d) == "xyz".index(axis), -1.0, 1.0)
+        signs += [s * flip for s in signs]
+    for sign in signs:
+        image = replace(problem.surface, samples=problem.surface.samples * sign)
+        total = total + sp.kron(facing_trace(image, mesh, "contact"), frame * sign, format="csr")
+    return sp.csr_matrix(total)
+
+
+def _held(mesh: Mesh, axes: tuple[str, ...], held_ends: bool) -> NDArray[np.int64]:
+    d = mesh.dim
+    grip = np.unique(mesh.facets["base"])
+    held = [(grip[:, None] * d + np.arange(d)).ravel()]
+    held += [np.unique(mesh.facets["symmetry_" + a]) * d + "xyz".index(a) for a in axes]
+    if held_ends and d == 3:
+        held.append(np.unique(mesh.facets["ends"]) * d + 2)
+    return np.unique(np.concatenate(held))
+
+
+@dataclass(frozen=True)
+class _Body:
+    """How the object is meshed: with the finger's edge lengths, contact facing down, in place along x and z."""
+
+    model: Model
+    height_mm: float
+    zone: Zone
+    axes: tuple[str, ...]
+    say: Say
+
+    def mesh(self) -> tuple[Mesh, bool]:
+        """The mesh, and whether it is whole although the finger is not."""
+        obj = self.model.object
+        if isinstance(obj, MeshObject):
+            return self._file(obj), True
+        solid = self.model.domain == "solid"
+        if isinstance(obj, Cylinder) and (obj.axis == "z" or not solid):
+            return self._bar(obj), False
+        if isinstance(obj, Cylinder):
+            return self._crosswise(obj), False
+        if isinstance(obj, Sphere):
+            return self._ball(obj, solid), False
+        return self._block(), False
+
+    def _made(self, design: Any, zone: Zone, mesher: str = "swept", axes: tuple[str, ...] | None = None) -> Mesh:
+        """A design's mesh, as fine as the finger's, contact up."""
+        extents = [design.height_mm, design.half_length_mm]
+        solid = self.model.domain == "solid"
+        size = min([self.model.mesh.size_mm, *(0.5 * e for e in extents), *([0.5 * design.width_mm] if solid else [])])
+        options = MeshOptions(size, max(size, min(self.model.mesh.base_size_mm, *extents)), mesher)  # type: ignore[arg-type]
+        axes = self.axes if axes is None else axes
+        self.say("meshing the object")
+        return (
+            mesh_solid(design, options, zone, axes, self.say)[0]
+            if solid
+            else mesh_section(design, options, zone, axes)[0]
+        )
+
+    def _moved(self, zone: Zone, x: float, z: float) -> Zone:
+        return zone[0] - x, zone[1] - x, zone[2] - z, zone[3] - z
+
+    def _bar(self, obj: Cylinder) -> Mesh:
+        """Half a cylinder along z, as long as the finger is wide; in a section, of one along x, a rectangle."""
+        width = self.model.design.width_mm
+        if obj.axis == "z":
+            design = designs()["half_cylinder"](radius_mm=obj.radius_mm, width_mm=width)
+            return _placed(self._made(design, self._moved(self.zone, obj.x_mm, 0.0)), obj.x_mm, 0.0)
+        half = self.model.design.half_length_mm
+        return _placed(
+            self._made(designs()["block"](half_length_mm=half, height_mm=obj.radius_mm, width_mm=width), self.zone),
+            0,
+            0,
+        )
+
+    def _crosswise(self, obj: Cylinder) -> Mesh:
+        """Half a cylinder along x, as long as the finger: meshed along z, then x and z change places."""
+        design = designs()["half_cylinder"](radius_mm=obj.radius_mm, width_mm=2.0 * self.model.design.half_length_mm)
+        x0, x1, z0, z1 = self._moved(self.zone, 0.0, obj.z_mm)
+        axes = tuple({"x": "z", "z": "x"}[a] for a in self.axes)
+        mesh = self._made(design, (z0, z1, x0, x1), axes=axes)
+        # With y turned down too this is a proper rotation: the cells stay positive.
+        points = mesh.points[:, [2, 1, 0]] * [1.0, -1.0, 1.0] + [0.0, 0.0, obj.z_mm]
+        return Mesh(points, mesh.cells, {_TURNED.get(label, label): f for label, f in mesh.facets.items()})
+
+    def _ball(self, obj: Sphere, solid: bool) -> Mesh:
+        """Half a ball; in a section, half a disc."""
+        zone = self._moved(self.zone, obj.x_mm, obj.z_mm)
+        if solid:
+            return _placed(
+                self._made(designs()["hemisphere"](radius_mm=obj.radius_mm), zone, "ftetwild"), obj.x_mm, obj.z_mm
+            )
+        design = designs()["half_cylinder"](radius_mm=obj.radius_mm, width_mm=self.model.design.width_mm)
+        return _placed(self._made(design, zone), obj.x_mm, 0.0)
+
+    def _block(self) -> Mesh:
+        """A block behind the surface, as long and wide as the finger; its far face is flat."""
+        finger, obj = self.model.design, self.model.object
+        tilt = obj.tilt if isinstance(obj, Plane) else 0.0
+        reach = finger.half_length_mm / np.cos(tilt)
+        if isinstance(obj, Plane):
+            low = high = 0.0
+        else:
+            x, z = np.meshgrid(
+                np.linspace(-reach, reach, _SURFACE), np.linspace(-0.5 * finger.width_mm, 0.5 * finger.width_mm, 41)
+            )
+            rises = obj.height(x.ravel(), z.ravel() if self.model.domain == "solid" else 0.0 * z.ravel())
+            low, high = float(rises.min()), float(rises.max())
+        height = self.height_mm + high - low
+        design = designs()["block"](half_length_mm=reach, height_mm=height, width_mm=finger.width_mm)
+        stretch = np.array([1.0, 1.0, 1.0, 1.0]) / [np.cos(tilt), np.cos(tilt), 1.0, 1.0]
+        x0, x1, z0, z1 = np.array(self.zone) * stretch
+        mesh = reflected(self._made(design, (x0, x1, z0, z1)), 1)
+        points = mesh.points.copy()
+        if isinstance(obj, Plane):
+            c, s = np.cos(tilt), np.sin(tilt)
+            points[:, 0], points[:, 1] = (
+                c * mesh.points[:, 0] - s * (mesh.points[:, 1] + height),
+                (s * mesh.points[:, 0] + c * (mesh.points[:, 1] + height)),
+            )
+            return Mesh(points, mesh.cells, mesh.facets)
+        behind = 1.0 + points[:, 1] / height  # 0 on the surface, 1 on the far face
+        z_at = points[:, 2] if mesh.dim == 3 else 0.0 * points[:, 0]
+        points[:, 1] = obj.height(points[:, 0], z_at) * (1.0 - behind) + (high + self.height_mm) * behind
+        return Mesh(points, mesh.cells, mesh.facets)
+
+    def _file(self, obj: MeshObject) -> Mesh:
+        """A body from a file, held on its highest plane."""
+        from finger3d.design.imported import imported, of_surface
+
+        body = imported(obj.path, True, obj.scale) if obj.path else of_surface(obj.surface, "object", True)
+        # Turned about z by half a turn, measured from the middle of the plane it is held on.
+        lowest = np.array([-obj.origin[0], -obj.origin[1], obj.origin[2]]) - body.middle
+        zone = (
+            lowest[0] - (self.zone[1] - obj.x_mm), lowest[0] - (self.zone[0] - obj.x_mm),
+            lowest[2] + self.zone[2] - obj.z_mm, lowest[2] + self.zone[3] - obj.z_mm,
+        )  # fmt: skip
+        mesh = self._made(body, zone, "ftetwild", ())
+        points = (mesh.points - lowest) * [-1.0, -1.0, 1.0] + [obj.x_mm, 0.0, obj.z_mm]
+        return Mesh(points, mesh.cells, mesh.facets)
+
+
+def _placed(mesh: Mesh, x: float, z: float) -> Mesh:
+    """A mesh with its contact turned down and its middle over (x, z)."""
+    down = reflected(mesh, 1)
+    return Mesh(down.points + np.array([x, 0.0, z])[: mesh.dim], down.cells, down.facets)
+
+
+@dataclass(frozen=True)
+class Effect:
+    """Settings of [effects.elastic_object].
+
+    Attributes
+    ----------
+    E_MPa, nu : the object's material
+    height_mm : thickness of the block behind a plane, wedge or wave; the finger's height unless given
+    """
+
+    E_MPa: Annotated[float, Gt(0.0)]
+    nu: Annotated[float, Ge(0.0), Le(0.5)]
+    height_mm: Annotated[float, Gt(0.0)] | None = None
+
+    def apply(self, model: Model) -> Model:
+        """Fill the slot of the object's compliance."""
+        obj = model.object
+        if self.height_mm is not None and isinstance(obj, Cylinder | Sphere | MeshObject):
+            raise Finger3dError(
+                "effects.elastic_object.height_mm: only for a plane, wedge or wave, which are the face of a block; a "
+                "cylinder, a sphere and a mesh are held where they are cut, or on top; take it out"
+            )
+        if isinstance(obj, MeshObject) and model.domain != "solid":
+            raise Finger3dError('effects.elastic_object: a mesh as object has no section; set model.domain = "solid"')
+        soft = SoftObject(self.E_MPa, self.nu, self.height_mm)
+        model = fill(model, "object_compliance", soft, "elastic_object")
+        if any(leg.slide_x_mm or leg.slide_z_mm for leg in model.legs):
+            model = warn(
+                model,
+                "elastic_object: the object's shape slides, its compliance stays that of where it was touched first",
+            )
+        return model
