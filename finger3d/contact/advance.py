@@ -13,6 +13,7 @@ from finger3d.contact.law import FrictionLaw
 from finger3d.contact.lemke import friction_start
 from finger3d.contact.newton import Iterate, force_of_sets, newton, sweeps
 from finger3d.contact.state import ContactState, Increment, next_state, refusal
+from finger3d.contact.threads import threads_for
 from finger3d.errors import Outcome
 
 Float = NDArray[np.float64]
@@ -62,7 +63,8 @@ def advance(
     total = 0
     while True:
         problem = Increments(change, matrix, mu, rho, length_scale)
-        method, found, error, spent = _settle(problem, start)
+        with threads_for(c * d):
+            method, found, error, spent = _settle(problem, start)
         total += spent
         if found is None:
             return Increment(previous, Outcome.NO_CONVERGENCE, error, total, method)
