@@ -1,0 +1,149 @@
+"""Does the base push back as hard as the object pushes, and is all the work stored or lost?
+
+What is always true (references.md sec. 7), on the paper's Fig. 9 finger, whole, pressed 10 mm with mu = 0.25 and then
+slid 15 mm: contact forces and the reactions of the base, taken from K u, balance in force and in moment; friction takes
+energy at every point in every increment; a mirror-symmetric press has no net friction; and the object's work is what is
+stored, u K u / 2, and what is dissipated.
+
+Theory of the rates: without friction, work is the trapezoid's sum, and what is missing falls as the step squared
+(points join within a step); dissipation is end force times slip, and leaves an error of the first order in the step.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from finger3d.contact.law import Coulomb
+from finger3d.design import designs
+from finger3d.history import Frame
+from finger3d.model import Leg, Material, MeshOptions, Model
+from finger3d.solve import Problem, build, march
+from finger3d.study import Result, Row
+
+from ._common import convergence, rate
+
+Float = NDArray[np.float64]
+_ALWAYS = "references.md sec. 7"
+_ROUND = "references.md sec. 7: round-off, 1e-10"
+SIZES = {"plane-strain": 2.0, "solid": 8.0}
+
+
+def finger(domain: Any, nu: float) -> Problem:
+    """The whole finger, ready for any path that presses 10 mm at first."""
+    body = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
+    mesh = MeshOptions(SIZES[domain], 2.0 * SIZES[domain], "swept")
+    return build(Model(body, Material(1.0, nu), mesh, (Leg(10.0),), domain=domain, symmetry=()))
+
+
+def along(problem: Problem, steps: int, mu: float, slide: float) -> list[Frame]:
+    """Frames of a press, and a slide if there is one, of `steps` increments each."""
+    legs = (Leg(10.0, steps=steps),) + ((Leg(10.0, slide_x_mm=slide, steps=steps),) if slide else ())
+    return list(march(replace(problem, model=replace(problem.model, legs=legs, friction=Coulomb(mu)))))
+
+
+@dataclass(frozen=True)
+class Balance:
+    """Relative imbalances of a frame: of force, of moment about the origin, and of work."""
+
+    force: float
+    moment: float
+    work: float
+
+
+def balance(problem: Problem, frame: Frame) -> Balance:
+    """Compare contact forces with K u, and work with what is stored and lost."""
+    upper, n, d = problem.stiffness.upper, problem.mesh.points.size, problem.dim
+    unknowns = problem.unknowns(frame.part.force)
+    inner = (upper + sparse.triu(upper, 1).T) @ unknowns
+    nodal = inner[:n].reshape(-1, d)
+    base = np.unique(problem.mesh.facets["base"])
+    reaction, arm = np.zeros((len(base), 3)), np.zeros((len(base), 3))
+    reaction[:, :d], arm[:, :d] = nodal[base], problem.mesh.points[base]
+    push = problem.points.world(frame.state.force)
+    # a contact force acts where its hat's mean is, which for a moment is the hat's mean place
+    place = np.zeros_like(push)
+    place[:, :d] = problem.surface.trace @ problem.mesh.points
+    scale = np.linalg.norm(push.sum(axis=0))
+    turning = np.cross(arm, reaction).sum(axis=0) + np.cross(place, push).sum(axis=0)
+    stored = 0.5 * float(unknowns @ inner)
+    return Balance(
+        float(np.linalg.norm(reaction.sum(axis=0) + push.sum(axis=0)) / scale),
+        float(np.linalg.norm(turning) / (scale * problem.model.design.half_length_mm)),
+        (frame.external_work_mJ - stored - frame.dissipation_mJ) / frame.external_work_mJ,
+    )
+
+
+def least_loss(frames: list[Frame]) -> float:
+    """Smallest energy lost by friction at any point in any increment, over the largest."""
+    lost = [
+        -np.sum(b.part.force[:, 1:] * (b.part.slip - a.part.slip), axis=1)
+        for a, b in zip(frames, frames[1:], strict=False)
+    ]
+    return float(np.min(lost) / np.max(lost))
+
+
+def run(quick: bool) -> Result:
+    """Section and solid, compressible and not; ever more increments."""
+    rows: list[Row] = []
+    table: list[tuple[Any, ...]] = []
+    curves: dict[str, dict[str, tuple[Float, Float]]] = {"mu = 0.25": {}, "mu = 0": {}}
+    for domain in ("plane-strain", "solid"):
+        worst = dict.fromkeys(("force", "moment", "loss", "net"), 0.0)
+        for nu in (0.3, 0.5) if quick else (0.3, 0.49, 0.5):
+            problem = finger(domain, nu)
+            frames = along(problem, 5, 0.25, 15.0)
+            found = [balance(problem, frame) for frame in frames]
+            pressed = frames[4].state.force
+            net = np.linalg.norm(problem.points.friction(pressed).sum(axis=0)) / pressed[:, 0].sum()
+            here = max(b.force for b in found), max(b.moment for b in found), -least_loss(frames), float(net)
+            worst = {k: max(v, new) for (k, v), new in zip(worst.items(), here, strict=True)}
+        name = domain.replace("-", " ")
+        for key, what in (
+            ("force", "forces of contact and base together, over the force"),
+            ("moment", "moments of contact and base together, over force times half length"),
+            ("loss", "energy that friction gives back at a point in an increment, over the most it takes"),
+            ("net", "net friction of the press before the slide, over its force"),
+        ):
+            rows.append(Row(f"{what}, {name}, largest", _ALWAYS, 0.0, worst[key], 1e-10, _ROUND, measure="absolute"))
+        rows += _energy(problem, f"{name}, nu = {nu:g}", quick, curves, table)
+    names = ("case", "mu", "increments_per_leg", "work_less_stored_and_lost")
+    columns = dict(zip(names, map(list, zip(*table, strict=True)), strict=True))
+    return Result(tuple(rows), columns, lambda figure: draw(figure, curves))
+
+
+def _energy(problem: Problem, name: str, quick: bool, curves: Any, table: list[tuple[Any, ...]]) -> list[Row]:
+    """Rows of the work's balance and its rate, with and without friction."""
+    rows = []
+    with_friction = (20, 40, 80) if quick or problem.dim == 3 else (20, 40, 80, 160)
+    for mu, counts, slide, theory in ((0.25, with_friction, 15.0, 1.0), (0.0, (5, 10, 20, 40), 0.0, 2.0)):
+        found = [balance(problem, along(problem, n, mu, slide)[-1]).work for n in counts]
+        steps = 1.0 / np.array(counts)
+        curves[f"mu = {mu:g}"][name] = steps, np.abs(found)
+        table += [(name, mu, n, e) for n, e in zip(counts, found, strict=True)]
+        kind = f"{name}, mu = {mu:g}"
+        why = "first order in the step" if mu else "second order in the step"
+        what = f"work over stored and lost, {kind}, {counts[-1]} increments a leg"
+        rows.append(Row(what, _ALWAYS, 1.0, 1.0 / (1.0 - found[-1]), 1e-3, f"{why}, 1e-3 of the work at this many"))
+        why = "points join within a step; the second order is still seen" if mu else "points join within a step"
+        got = rate(steps[-3:], found[-3:])
+        source = "end force times slip" if mu else "trapezoid"
+        rows.append(Row(f"rate of the work's balance, {kind}", source, theory, got, 0.25, why, measure="at least"))
+    return rows
+
+
+def draw(figure: Any, curves: dict[str, dict[str, tuple[Float, Float]]]) -> None:
+    """What is missing from the work over the step."""
+    for (mu, both), axes in zip(curves.items(), figure.subplots(1, 2), strict=True):
+        for name, (steps, errors) in both.items():
+            slope = 2.0 if mu == "mu = 0" else 1.0
+            convergence(
+                axes, steps, {name: errors}, slope, "1 / increments a leg", "work less stored and lost, over the work"
+            )
+        ticks = sorted({float(s) for steps, _ in both.values() for s in steps})
+        axes.set_xticks(ticks, [f"1/{round(1 / t)}" for t in ticks])
+        axes.set_title(f"press{'' if mu == 'mu = 0' else ' and slide'}, {mu}")
