@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 _WRITE_EVERY_S = 0.5
 _DEEP = 0.3  # the Fig. 9 finger is pressed by a fifth, the half cylinder too
-_FEW_POINTS = 6  # per direction
+_FEW_POINTS = {2: 6, 3: 100}  # six along a line; ten by ten on a face
 _INCOMPLETE = "incomplete: the press was still running, or was interrupted; the steps written are good"
 
 
@@ -182,7 +182,7 @@ def _coarse_warning(problem: Problem, frames: list[Frame]) -> list[str]:
     """Whether the contact is wide enough in points to be called resolved, where it was widest."""
     touching = max((f.state.status != OPEN for f in frames), key=np.count_nonzero, default=np.zeros(0, dtype=bool))
     count = int(np.count_nonzero(touching))
-    if not count or count >= _FEW_POINTS ** (problem.dim - 1):
+    if not count or count >= _FEW_POINTS[problem.dim]:
         return []
     return [f"only {count} points touch: too few for contact and stick lengths; lower mesh.size_mm"]
 
