@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Any, Protocol
+from typing import Annotated, Any, ClassVar, Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -282,6 +282,8 @@ class ViscousState(ContactState):
 @dataclass(frozen=True)
 class Viscoelastic(SmallStrain):
     """Small strain, with moduli that relax."""
+
+    object_compliance: ClassVar[bool] = False  # the object's would relax with the finger's, and it is elastic
 
     prony: Prony
     bulk: bool
