@@ -31,7 +31,8 @@ _ROUND = "references.md sec. 5: 1e-12, round-off of some thousand unknowns"
 _NEAR = "round-off, grown by lam/G = 5000"
 _PRESS = "references.md sec. 5: 1e-10"
 _FLOOR = (
-    "PARDISO does not pivot beyond its blocks: round-off grows by lam/G = 1e7, and 1e-7 is where nu = 1/2 is cut off"
+    "not the 1e-10 of references.md: with PARDISO round-off was seen to grow with lam/G (here 1e7) on few cells, with "
+    "SuperLU not (the row above); 1e-7 is what cutting lam off at nu = 1/2 costs anyway"
 )
 SHEAR_AND_STRETCH = np.array([[0.7, -0.3, 0.2], [0.5, 0.4, -0.6], [-0.1, 0.8, -0.9]])
 
