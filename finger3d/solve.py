@@ -19,7 +19,7 @@ from finger3d.fem.surface import Surface, displacement_row, local_rows, restrict
 from finger3d.history import ContactPoints, Frame, Target
 from finger3d.mesh import Mesh, unfold
 from finger3d.model import Gauge, Leg, Model
-from finger3d.objects import approach, contact_box
+from finger3d.objects import approach
 from finger3d.problem import AUTO_START, Problem, at_points, between, folded, rigid_gap, targets, values_of
 
 Float = NDArray[np.float64]
@@ -44,15 +44,14 @@ def symmetry(model: Model) -> tuple[str, ...]:
 
 def contact_zone(model: Model) -> tuple[float, float, float, float]:
     """Box (x_min, x_max, z_min, z_max) mm over which the rigid object would overlap the finger at rest."""
-    return contact_box(*model.approach)
+    return approach(*model.approach).zone
 
 
 def build(model: Model, say: Callable[[str], None] = lambda text: None, margin: float = _MARGIN) -> Problem:
     """Mesh, assemble and condense a model."""
     design = model.design
-    touch = approach(*model.approach)
-    axes = symmetry(model)
-    zone = contact_zone(model)
+    way = approach(*model.approach)
+    touch, zone, axes = way.touch_mm, way.zone, symmetry(model)
     if model.domain == "solid":
         mesh, report = mesh_solid(design, model.mesh, zone, axes, say)
     else:

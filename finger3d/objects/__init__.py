@@ -3,9 +3,10 @@
 from finger3d.objects.mesh import MeshObject
 from finger3d.objects.shapes import Axis, Cylinder, Plane, RigidObject, Sphere, Wave, Wedge, vertical_frame
 from finger3d.objects.slope import Slopes, slope_of
-from finger3d.objects.touch import approach, contact_box, first_touch
+from finger3d.objects.touch import Approach, approach, first_touch
 
 __all__ = [
+    "Approach",
     "Axis",
     "Cylinder",
     "MeshObject",
@@ -16,7 +17,6 @@ __all__ = [
     "Wave",
     "Wedge",
     "approach",
-    "contact_box",
     "first_touch",
     "slope_of",
     "vertical_frame",

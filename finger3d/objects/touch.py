@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,16 +17,31 @@ Float = NDArray[np.float64]
 Top = Callable[[Float, Float], Float]
 
 _GRID = (401, 41)
+_COARSE = (201, 31)  # for the extent of a contact, which the mesh rounds to its edges
 _ZOOM = 11
 _ZOOMS = 8
 _PLACES = 8  # best places that are searched further: bumps and teeth may be equally high
 _STEEP = math.tan(math.radians(80.0))  # a flank that runs into the finger faster than this is a wall
 _STRIDES = 60
+_NOTHING = 1e-9  # of the finger's extent: a contact as narrow as this has no area
 
 
-def _grid(half_length: float, half_width: float) -> Float:
+@dataclass(frozen=True)
+class Approach:
+    """How an object comes near: height (mm) of its lowest point at first touch, and the box that it will overlap.
+
+    Attributes
+    ----------
+    zone : (x_min, x_max, z_min, z_max) mm over which the rigid object would overlap the finger at rest on its way
+    """
+
+    touch_mm: float
+    zone: tuple[float, float, float, float]
+
+
+def _grid(half_length: float, half_width: float, count: tuple[int, int] = _GRID) -> Float:
     x, z = np.meshgrid(
-        np.linspace(-half_length, half_length, _GRID[0]), np.linspace(-half_width, half_width, _GRID[1]), indexing="ij"
+        np.linspace(-half_length, half_length, count[0]), np.linspace(-half_width, half_width, count[1]), indexing="ij"
     )
     return np.stack([x.ravel(), z.ravel()], axis=1)
 
@@ -93,7 +109,7 @@ def approach(
     half_width: float,
     path: Float,
     marks: Float | None = None,
-) -> float:
+) -> Approach:
     """First touch, as in :func:`first_touch`, of an object that then goes a way which the vertical gap can describe.
 
     Parameters
@@ -112,25 +128,17 @@ def approach(
             "never touches; change x_mm, z_mm"
         )
     if isinstance(obj, Plane):  # it has no end that could hang down, and its gap is measured along its own normal
-        return touch
+        return Approach(touch, _box(top, obj, half_length, half_width, touch, place, path))
     deepest = float(path[:, 0].max())
     if touch <= deepest:
         raise Finger3dError(
             f"object: at depth {deepest:g} mm its lowest point, beside the finger, is {deepest - touch:.4g} mm below "
             "the finger's base: it touches the base first; press less deep, or change x_mm, z_mm"
         )
-    _box(top, obj, half_length, half_width, touch, place, path)
+    zone = _box(top, obj, half_length, half_width, touch, place, path)
     _not_a_wall(obj, place, half_length, half_width)
     _no_side(top, obj, touch, path, half_length, half_width)
-    return touch
-
-
-def contact_box(
-    top: Top, obj: RigidObject, half_length: float, half_width: float, path: Float, marks: Float | None = None
-) -> tuple[float, float, float, float]:
-    """Box (x_min, x_max, z_min, z_max) mm over which the rigid object would overlap the finger at rest on its way."""
-    touch, place = _touching(top, obj, half_length, half_width, marks)
-    return _box(top, obj, half_length, half_width, touch, place, path)
+    return Approach(touch, zone)
 
 
 def _box(
@@ -138,8 +146,8 @@ def _box(
 ) -> tuple[float, float, float, float]:
     limit = np.array([half_length, half_width])
     t = np.linspace(-1.0, 1.0, _ZOOM)
-    window = np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1).reshape(-1, 2) * 2.0 * limit / (np.array(_GRID) - 1)
-    at = [_grid(half_length, half_width)]
+    window = np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1).reshape(-1, 2) * 2.0 * limit / (np.array(_COARSE) - 1)
+    at = [_grid(half_length, half_width, _COARSE)]
     for k in range(_ZOOMS):  # a tip may lie between the points of the grid
         near = window * 10.0**-k
         at += [np.clip(place + [sx, sz] + near, -limit, limit) for sx, sz in {(p[1], p[2]) for p in path}]
@@ -148,12 +156,12 @@ def _box(
     for slide in np.unique(path[:, 1:], axis=0):  # deeper at the same place covers what was touched before
         depth = path[np.all(path[:, 1:] == slide, axis=1), 0].max()
         inside |= _overlap(top, obj, points, touch, (depth, *slide)) > 0.0
-    if not inside.any():
+    (x0, z0), (x1, z1) = (f(points[inside], axis=0) if inside.any() else place for f in (np.min, np.max))
+    if x1 - x0 <= _NOTHING * half_length or z1 - z0 < _NOTHING * half_width:
         raise Finger3dError(
             f"object: it touches the finger only at x = {place[0]:.4g}, z = {place[1]:.4g} mm, over no area: an edge "
             "or a wall touches first; change x_mm, z_mm, or press deeper"
         )
-    (x0, z0), (x1, z1) = points[inside].min(axis=0), points[inside].max(axis=0)
     return float(x0), float(x1), float(z0), float(z1)
 
 

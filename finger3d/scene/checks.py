@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from finger3d.model import MeshOptions, Model
-from finger3d.objects import Plane, Wave, contact_box
+from finger3d.objects import Plane, Wave
 from finger3d.scene.mistakes import dotted, shown
 from finger3d.scene.tables import GaugeTable, LegTable, MeshTable, SceneTable
 
@@ -88,25 +88,25 @@ def _sizes(mesh: MeshTable, design: Any, solid: bool) -> list[str]:
     return []
 
 
-def chosen(mesh: MeshTable, model: Model) -> MeshOptions:
-    """Return the mesh options, with sizes chosen where they are absent; of `model` everything else is read."""
+def chosen(mesh: MeshTable, model: Model, zone: tuple[float, float, float, float]) -> MeshOptions:
+    """Return the mesh options, with sizes chosen where they are absent, from all else and the zone of contact."""
     design, solid = model.design, model.domain == "solid"
     share = design.height_mm * (1.0 if solid else 0.5)
     size, base = mesh.size_mm, mesh.base_size_mm
     if size is None:
         # A thin finger gets two elements across its width; four significant digits keep scene.toml readable.
         coarse = min(share * SIZE_SHARE, smallest_mm(design, solid) / 2.0, base or math.inf)
-        size = _rounded(max(min(coarse, _detail(model)), coarse * _FINEST))
+        size = _rounded(max(min(coarse, _detail(model, zone)), coarse * _FINEST))
     if base is None:
         base = max(_rounded(min(share * BASE_SHARE, smallest_mm(design, solid=False))), size)
     return MeshOptions(size, base, mesh.mesher)
 
 
-def _detail(model: Model) -> float:
+def _detail(model: Model, zone: tuple[float, float, float, float]) -> float:
     """Edge length, mm, at which an object that is not flat has some elements across its contact, or a crest."""
     if isinstance(model.object, Plane):
         return math.inf
-    x0, x1, z0, z1 = contact_box(*model.approach)
+    x0, x1, z0, z1 = zone
     across = min(x1 - x0, z1 - z0) if model.domain == "solid" else x1 - x0
     wave = model.object.wavelength_mm if isinstance(model.object, Wave) else math.inf
     return min(across, wave) / _ACROSS

@@ -162,8 +162,8 @@ def parse(given: Mapping[str, Any], path: Path | None = None, set_keys: Iterable
             rigid,
             domain=tables.model.domain,
         )
-        approach(*way.approach)
-        mesh = checks.chosen(tables.mesh, way)
+        zone = approach(*way.approach).zone
+        mesh = checks.chosen(tables.mesh, way, zone)
     except Finger3dError as error:
         raise _refusal([str(error)], path, set_keys) from None
     tables = tables.model_copy(

@@ -88,6 +88,17 @@ class Triangles:
         return Tree.over(self.corners)
 
     @cached_property
+    def _facing_down(self) -> tuple[Int, Tree]:
+        """Triangles that look down, the only ones that a line from below meets first, and a tree over them."""
+        facing = np.flatnonzero(self.area_vectors[:, 1] < 0.0)
+        return facing, Tree.over(self.corners[facing])
+
+    @cached_property
+    def _facing_up(self) -> tuple[Int, Tree]:
+        facing = np.flatnonzero(self.area_vectors[:, 1] > 0.0)
+        return facing, Tree.over(self.corners[facing])
+
+    @cached_property
     def _pucks(self) -> tuple[Float, ...]:
         return self.tree.pucks(self.corners, self.area_vectors)
 
@@ -122,7 +133,7 @@ class Triangles:
         return _unit(edge)[number], _unit(vertex)[self.faces]
 
     def hits(self, x: Float, z: Float, lowest: bool = True) -> tuple[Int, Float]:
-        """Where vertical lines meet the surface first, from below or from above.
+        """Where vertical lines meet a surface with outward triangles first, from below or from above.
 
         Returns
         -------
@@ -132,7 +143,8 @@ class Triangles:
         at = np.stack([x, z], axis=1).astype(float)
         slack = _SLACK * self.size
 
-        boxes = [b[:, [0, 2, 3, 5]] + np.array([-slack, -slack, slack, slack]) for b in self.tree.boxes]
+        facing, tree = self._facing_down if lowest else self._facing_up
+        boxes = [b[:, [0, 2, 3, 5]] + np.array([-slack, -slack, slack, slack]) for b in tree.boxes]
 
         def inside(query: Int, level: int, node: Int) -> NDArray[np.bool_]:
             p, box = at[query], boxes[level][node]
@@ -142,7 +154,8 @@ class Triangles:
         bary = np.zeros((len(at), 3))
         best = np.full(len(at), np.inf)
         flat = self.corners[:, :, ::2]
-        for query, item in self.tree.pairs(len(at), inside):
+        for query, number in tree.pairs(len(at), inside):
+            item = facing[number]
             weight, met = _in_triangle(at[query], flat[item], slack)
             query, item, weight = query[met], item[met], weight[met]
             y = np.einsum("ij,ij->i", weight, self.corners[item, :, 1]) * (1.0 if lowest else -1.0)
