@@ -32,8 +32,8 @@ class Outcome(Enum):
         "use [contact] rule = 'projection'"
     )
     INVERTED = (
-        "a cell was turned inside out; the steps before are good; try more steps, a coarser mesh at the contact's edge, "
-        "or a shallower press"
+        "a cell was turned inside out; the steps before are good; try more steps, a coarser mesh at the contact's "
+        "edge, or a shallower press"
     )
     NEWTON = "large deformation did not settle; the steps before are good; try more steps or a shallower press"
     INDEFINITE = "the compliance is not positive: the body is not held; fix its base, or check the mesh"

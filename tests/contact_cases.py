@@ -54,7 +54,7 @@ def violation(before: ContactState, after: ContactState, free: np.ndarray, compl
 
 
 def half_space(x: np.ndarray, z: np.ndarray, spacing: float, nu: float, modulus: float = 1.0) -> np.ndarray:
-    """Compliance (c, 3, c, 3) of points on an elastic half-space: Boussinesq's and Cerruti's kernels (Johnson 1985, 3.2).
+    """Compliance (c, 3, c, 3) of points on an elastic half-space: Boussinesq's and Cerruti's kernels (Johnson, 3.2).
 
     A point's own entry is that of a disc of the point's area under uniform traction, at its centre.
     """
