@@ -329,7 +329,7 @@ def _section(
     figure, panels = _two_panels(span[1] / span[0], title, ticks=True)
     by_status = _palette()[state[arc[:, :2]].ravel()]
     for axes, colours in zip(panels, (_pressure_colours(of_half, highest), by_status), strict=True):
-        axes.add_collection(PolyCollection(moved[mesh.cells[:, ring]], facecolor=BODY, edgecolor=LINE, lw=0.25))
+        axes.add_collection(PolyCollection(list(moved[mesh.cells[:, ring]]), facecolor=BODY, edgecolor=LINE, lw=0.25))
         if profile is not None:
             axes.plot(*profile.T, color=OBJECT, lw=1.5, zorder=2)
         axes.add_collection(LineCollection(list(halves), colors=colours, lw=5, capstyle="butt", zorder=3))
