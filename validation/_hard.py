@@ -1,0 +1,302 @@
+"""The rows of references.md sec. 8, one function each: what a robust code does there, and whether it did."""
+
+from __future__ import annotations
+
+import itertools
+import tempfile
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from finger3d.contact.advance import advance
+from finger3d.contact.law import OPEN, Coulomb
+from finger3d.contact.newton import uniqueness
+from finger3d.contact.state import ContactState
+from finger3d.design import designs
+from finger3d.effects.kinetic_friction import TwoCoefficients
+from finger3d.errors import Finger3dError, Outcome
+from finger3d.history import measure
+from finger3d.job import press
+from finger3d.model import Leg, Material, MeshOptions, Model
+from finger3d.objects import Plane
+from finger3d.scene import load
+from finger3d.solve import Problem, build, march, targets
+from finger3d.study import Row
+
+SEC8 = "references.md sec. 8"
+SCENE = """
+[finger]
+geometry = "block"
+half_length_mm = 10.0
+height_mm = 10.0
+width_mm = 10.0
+[material]
+E_MPa = 1.0
+nu = 0.3
+[friction]
+mu = 0.25
+[model]
+domain = "plane-strain"
+[mesh]
+size_mm = 1.0
+base_size_mm = 3.0
+mesher = "swept"
+[press]
+depth_mm = 0.5
+steps = 2
+"""
+
+
+def rows(quick: bool) -> list[Row]:
+    """All of them."""
+    cases = (one_point, touch, corner, again, coarse_and_deep, surfaces, turned, refusals)
+    return [row for case in cases for row in case(quick)]
+
+
+def _is(what: str, wanted: float, got: float, tolerance: float = 0.0, reason: str = "exactly") -> Row:
+    return Row(what, SEC8, float(wanted), float(got), tolerance, reason, measure="absolute")
+
+
+def _least(what: str, wanted: float, got: float, reason: str) -> Row:
+    return Row(what, SEC8, float(wanted), float(got), 0.0, reason, measure="at least")
+
+
+def one_point(quick: bool) -> Iterator[Row]:
+    """Coulomb at one point, K = [[1, .8], [.8, 2]] in (t, n): every admissible state by trying all of them."""
+    compliance = np.linalg.inv(np.array([[2.0, 0.8], [0.8, 1.0]]))  # normal first
+    loads = np.random.default_rng(0).normal(size=(150 if quick else 2000, 2))
+    for mu, name in ((1.2, "below"), (2.0, "above")):
+        several, unlisted = 0, 0
+        for free in loads:
+            answers = _admissible(compliance, free, mu)
+            rest = ContactState.at_rest(np.zeros(1), 2)
+            found = advance(rest, free[None], compliance.reshape(1, 2, 1, 2), Coulomb(mu), 1.0)
+            several += len(answers) > 1
+            near = [np.abs(found.state.force[0] - a).max() < 1e-8 for a in answers]
+            unlisted += not (found.outcome.ok and any(near))
+        what = f"one-point Coulomb, mu = {mu:g}, {name} the limit 1.25: of {len(loads)} random loads"
+        yield _is(f"{what}, states returned that are not admissible", 0, unlisted)
+        more = f"{what}, those with several answers"
+        yield _is(more, 0, several) if name == "below" else _least(more, 1, several, "so there it must warn")
+    at_limit = uniqueness(np.array([1.25]), compliance, 2)
+    yield _is("one-point Coulomb: mu |K_tt^-1 K_tn| at mu = 1.25", 1, at_limit, 1e-12, "round-off")
+
+
+def _admissible(compliance: np.ndarray, load: np.ndarray, mu: float) -> list[np.ndarray]:
+    """Forces (n, t) of all states that meet Eqs. (1)-(4) and oppose slip, by enumeration."""
+    found = [np.zeros(2)] if load[0] >= 0.0 else []
+    force = np.linalg.solve(compliance, -load)
+    if force[0] > 0.0 and abs(force[1]) <= mu * force[0]:
+        found.append(force)
+    for sign in (1.0, -1.0):
+        along = np.array([1.0, sign * mu])
+        pull = compliance[0] @ along
+        normal = -load[0] / pull if pull else -1.0
+        if normal > 0.0 and sign * (load[1] + compliance[1] @ along * normal) < 0.0:
+            found.append(normal * along)
+    return found
+
+
+def _block(nu: float, legs: tuple[Leg, ...], design: Any = None, mu: float = 0.25, **more: Any) -> Problem:
+    body = design or designs()["block"](half_length_mm=10.0, height_mm=10.0, width_mm=1.0)
+    mesh = MeshOptions(1.0, 3.0, "swept")
+    return build(Model(body, Material(1.0, nu), mesh, legs, friction=Coulomb(mu), domain="plane-strain", **more))
+
+
+def touch(quick: bool) -> Iterator[Row]:
+    """No point, one point, and all points at once."""
+    arch = designs()["clipped_cylinder"](radius_mm=20.0, half_length_mm=10.0, edge_height_mm=5.0, width_mm=1.0)
+    problem = _block(0.3, (Leg(1.0, steps=1),), arch)
+    apart = advance(
+        ContactState.at_rest(problem.gap(problem.origin), 2), problem.free(problem.origin) + [1e-6, 0.0],
+        problem.compliance, Coulomb(0.25), 1.0,
+    )  # fmt: skip
+    yield _is("no point touches: settled, without force", 0, np.abs(apart.state.force).max() + (not apart.outcome.ok))
+    tiny = list(march(_block(0.3, (Leg(0.05, steps=40 if quick else 100), Leg(1.0, steps=2)), arch)))
+    counts = [int((f.part.status != OPEN).sum()) for f in tiny]
+    before = sum(float(np.abs(f.part.force).sum()) for f, n in zip(tiny, counts, strict=True) if not n)
+    yield _is("approach in small steps: force before the first point touches, N", 0, before)
+    yield _is("approach in small steps: points that touch first", 1, next(n for n in counts if n))
+    yield _is("approach in small steps, then 1 mm: unsettled", 0, sum(not f.outcome.ok for f in tiny))
+    for nu, mu in itertools.product(
+        (0.0, 0.5) if quick else (0.0, 0.3, 0.5), (0.25, 1e6) if quick else (0.0, 0.25, 1e6)
+    ):
+        flat = list(march(_block(nu, (Leg(0.5, steps=2),), mu=mu)))
+        opened = sum(int((f.state.status == OPEN).sum()) + (not f.outcome.ok) for f in flat)
+        yield _is(f"flat on flat, nu = {nu:g}, mu = {mu:g}: points left open", 0, opened)
+
+
+def corner(quick: bool) -> Iterator[Row]:
+    """The contact grows to the finger's edge, and the press goes on."""
+    arch = designs()["clipped_cylinder"](radius_mm=20.0, half_length_mm=10.0, edge_height_mm=10.0, width_mm=1.0)
+    depths = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+    for nu, mu in ((0.5, 0.25),) if quick else ((0.3, 0.25), (0.5, 0.25), (0.3, 1e6)):
+        problem = _block(nu, tuple(Leg(d, steps=2) for d in depths), arch, mu)
+        frames = list(march(problem))
+        half = [measure(problem.points, f)["contact_half_length_mm"] for f in frames]
+        last = int(np.argmax(problem.points.points[:, 0]))
+        edge = [float(f.state.force[last, 0] / problem.points.area[last]) for f in frames]
+        here = f"contact reaches the corner, nu = {nu:g}, mu = {mu:g}"
+        yield _is(f"{here}: unsettled", 0, sum(not f.outcome.ok for f in frames))
+        yield _is(f"{here}: half-length at last, mm", 10.0, min(half[-2:]), 1e-9, "the corner is at 10 mm")
+        yield _least(f"{here}: growth of the edge pressure in the last increment", 0.0, edge[-1] - edge[-2], "it grows")
+
+
+def again(quick: bool) -> Iterator[Row]:
+    """Press, release, press again; and a kinetic ratio of .1 through press, slide, release."""
+    arch = designs()["clipped_cylinder"](radius_mm=20.0, half_length_mm=10.0, edge_height_mm=5.0, width_mm=1.0)
+    for nu in (0.3, 0.5):
+        problem = _block(nu, (Leg(1.0, steps=5), Leg(0.0, steps=5), Leg(1.0, steps=5)), arch)
+        frames = list(march(problem))
+        first, rest, second = (frames[k].state.force for k in (4, 9, 14))
+        yield _is(f"press, release, press again, nu = {nu:g}: force at rest, N", 0, np.abs(rest).max())
+        apart = np.abs(second - first).max() / np.abs(first).max()
+        yield _is(f"press, release, press again, nu = {nu:g}: change of forces", 0, apart, 1e-9, "round-off")
+    for branch in ("keep", "paper"):
+        legs = (Leg(1.0, steps=10), Leg(1.0, 1.5, steps=10), Leg(0.0, 1.5, steps=10))
+        problem = _block(0.3, legs, arch)
+        law = TwoCoefficients(0.25, 0.1, branch)  # type: ignore[arg-type]
+        frames = list(march(_with(problem, friction=law)))
+        yield _is(f"kinetic ratio .1, branch {branch}: unsettled of 30", 0, 30 - sum(f.outcome.ok for f in frames))
+
+
+def _with(problem: Problem, **changes: Any) -> Problem:
+    return replace(problem, model=replace(problem.model, **changes))
+
+
+def coarse_and_deep(quick: bool) -> Iterator[Row]:
+    """A mesh of a hundred tets, a press of most of the height, cells that are flat: a warning or a refusal."""
+    with tempfile.TemporaryDirectory() as folder:
+        deep = _pressed(folder, "press.depth_mm=8.0", "press.steps=4")
+        yield _is("depth of 80 % of the height: settled", 1, deep.outcome.ok)
+        yield _is("depth of 80 % of the height: warned of", 1, _warned(deep, "of the finger's height"))
+        tets = _pressed(folder, 'model.domain="solid"', "mesh.size_mm=3.0", "mesh.base_size_mm=5.0")
+        cells = tets.summary["mesh"]["cells"]
+        yield Row("coarse solid: tets", SEC8, 150, cells, 0, "about a hundred", measure="at most")
+        yield _is(f"solid of {cells} tets: settled", 1, tets.outcome.ok)
+        yield _is(f"solid of {cells} tets: warned of", 1, _warned(tets, "too few"))
+        fine = _pressed(folder, 'model.domain="solid"', "mesh.size_mm=1.5", "mesh.base_size_mm=3.0")
+        ratio = tets.summary["steps"][-1]["normal_force_N"] / fine.summary["steps"][-1]["normal_force_N"]
+        what = f"solid of {cells} tets: force over that of {fine.summary['mesh']['cells']}"
+        yield Row(what, SEC8, 1, ratio, 0.1, "no garbage")
+        refused = _refused(folder, "press.depth_mm=10.0")
+        yield _is("depth of the whole height: refused in one line that names the key", 1, "press.depth_mm" in refused)
+    thin = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=0.01, width_mm=20.0)
+    try:
+        _block(0.3, (Leg(1.0, steps=1),), thin)
+        told = ""
+    except Finger3dError as error:
+        told = str(error)
+    yield _is("sliver cells: refused, with what to choose", 1, "flatter" in told and "choose" in told)
+
+
+def _pressed(folder: str, *changes: str) -> Any:
+    path = Path(folder, "scene.toml")
+    path.write_text(SCENE, encoding="utf-8")
+    return press(load(path, changes), Path(folder, "out"), figures=False)
+
+
+def _warned(result: Any, words: str) -> bool:
+    return any(words in warning for warning in result.summary["warnings"])
+
+
+def _refused(folder: str, *changes: str, text: str = SCENE) -> str:
+    """The one line that a scene is refused with; empty if it is not, or in more lines."""
+    path = Path(folder, "scene.toml")
+    path.write_text(text, encoding="utf-8")
+    try:
+        load(path, changes).model()
+    except Finger3dError as error:
+        return str(error) if "\n" not in str(error) else ""
+    return ""
+
+
+# a prism with its edge down: 45 degrees on either side of the line x = 0, y = 0
+_PRISM = np.array([[0, 0, -9], [6, 6, -9], [-6, 6, -9], [0, 0, 9], [6, 6, 9], [-6, 6, 9]], dtype=float)
+_FACES = [(0, 2, 1), (3, 4, 5), (0, 1, 4), (0, 4, 3), (1, 2, 5), (1, 5, 4), (2, 0, 3), (2, 3, 5)]
+
+
+def surfaces(quick: bool) -> Iterator[Row]:
+    """STL objects: whole, with a flipped face, with a missing face; touching at an edge."""
+    wedge = SCENE + '[object]\nshape = "wedge"\nangle_deg = 45.0\n'
+    with tempfile.TemporaryDirectory() as folder:
+        for name, faces, word in (
+            ("a flipped face", [_FACES[0][::-1], *_FACES[1:]], "flipped"),
+            ("a missing face", _FACES[1:], "not closed"),
+        ):
+            _write_stl(Path(folder, "object.stl"), faces)
+            told = _refused(folder, text=SCENE + '[object]\nshape = "mesh"\npath = "object.stl"\n')
+            yield _is(f"STL with {name}: refused in one line that says so", 1, word in told)
+        _write_stl(Path(folder, "object.stl"), _FACES)
+        forces = []
+        for text in (wedge, SCENE + '[object]\nshape = "mesh"\npath = "object.stl"\n'):
+            path = Path(folder, "scene.toml")
+            path.write_text(text, encoding="utf-8")
+            result = press(load(path), Path(folder, "out"), figures=False)
+            forces.append(result.summary["steps"][-1]["normal_force_N"] if result.outcome.ok else np.nan)
+        yield Row("STL prism touching at its edge: force over that of the wedge", SEC8, 1, forces[1] / forces[0], 1e-9,
+                  "the same surface")  # fmt: skip
+
+
+def _write_stl(path: Path, faces: list[Any]) -> None:
+    lines = ["solid prism"]
+    for face in faces:
+        corners = ["vertex {} {} {}".format(*_PRISM[i]) for i in face]
+        lines += ["facet normal 0 0 0", "outer loop", *corners, "endloop", "endfacet"]
+    path.write_text("\n".join([*lines, "endsolid prism", ""]), encoding="ascii")
+
+
+def turned(quick: bool) -> Iterator[Row]:
+    """A solid whose tangents are turned by 30 degrees about the normal; and a plane tilted by 30 degrees."""
+    block = designs()["block"](half_length_mm=5.0, height_mm=5.0, width_mm=10.0)
+    size = 5.0 if quick else 2.5
+    legs = (Leg(0.3, steps=3), Leg(0.3, 0.1, 0.05, steps=4))
+    model = Model(block, Material(1.0, 0.3), MeshOptions(size, 5.0, "swept"), legs, friction=Coulomb(0.25))
+    problem = build(model)
+    states = []
+    for angle in (0.0, np.pi / 6.0):
+        turn = np.eye(3)
+        turn[1:, 1:] = [[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]
+        compliance = np.einsum("ab,ibjc,dc->iajd", turn, problem.compliance, turn)
+        state = ContactState.at_rest(problem.gap(problem.origin), 3)
+        for frame in march(problem):
+            state = advance(state, problem.free(frame.target) @ turn.T, compliance, Coulomb(0.25), 0.3).state
+        states.append(state.force @ turn)
+    apart = np.abs(states[1] - states[0]).max() / np.abs(states[0]).max()
+    yield _is("solid turned by 30 degrees about the normal: change of forces", 0, apart, 1e-8, "the residual")
+    tilted = list(march(_block(0.3, (Leg(2.0, steps=4),), object=Plane(tilt=np.pi / 6.0))))
+    touching = min(int((f.state.status != OPEN).sum()) for f in tilted)
+    yield _is("plane tilted by 30 degrees on a block's edge: unsettled", 0, sum(not f.outcome.ok for f in tilted))
+    yield _least("plane tilted by 30 degrees on a block's edge: points that touch", 1, touching, "found")
+
+
+def refusals(quick: bool) -> Iterator[Row]:
+    """Bad input: a clear outcome or one line, nothing lost."""
+    problem = _block(0.3, (Leg(0.5, steps=1),))
+    state = ContactState.at_rest(problem.gap(problem.origin), 2)
+    free = problem.free(targets(problem.model.legs)[-1])
+    hole = free.copy()
+    hole[0, 0] = np.nan
+    c = len(free)
+    floating = problem.compliance.reshape(2 * c, 2 * c) - 1e3 * np.eye(2 * c)
+    spoilt = problem.compliance.copy()
+    spoilt[0, 0, 0, 0] = np.nan
+    for what, gap, compliance, wanted in (
+        ("gap with NaN", hole, problem.compliance, Outcome.NOT_FINITE),
+        ("compliance with NaN", free, spoilt, Outcome.NOT_FINITE),
+        ("floating body", free, floating.reshape(problem.compliance.shape), Outcome.INDEFINITE),
+    ):
+        found = advance(state, gap, compliance, Coulomb(0.25), 0.5)
+        told = found.outcome is wanted and found.state is state
+        yield _is(f"{what}: outcome says so, and the state before is handed back", 1, told)
+    legs = "[[press.leg]]\ndepth_mm = {}\nslide_x_mm = {}\n[[press.leg]]\ndepth_mm = 0.5\nslide_x_mm = 1.0\n"
+    with tempfile.TemporaryDirectory() as folder:
+        for what, first, word in (
+            ("slide before first touch", (0.0, 1.0), "slides before first touch"),
+            ("leg that goes nowhere", (0.5, 1.0), "goes nowhere"),
+        ):
+            text = SCENE.split("[press]")[0] + legs.format(*first)
+            yield _is(f"{what}: refused in one line that says so", 1, word in _refused(folder, text=text))
