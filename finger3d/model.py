@@ -72,6 +72,31 @@ class MeshOptions:
     mesher: Literal["ftetwild", "swept"] = "ftetwild"
 
 
+@dataclass(frozen=True)
+class Inlay:
+    """Stiff things laid into a meshed part, cut into bars.
+
+    Attributes
+    ----------
+    rows : (s, n d) sparse
+        Strain of every bar from displacements.
+    springs : (s,) N mm, their stiffness in the part
+    reads : (g, s) what each of the model's gauges reads of them
+    alone : (s, s) 1/(N mm)
+        How the bars unload themselves and each other, in a body without end; in place of what the mesh says.
+    """
+
+    rows: Any
+    springs: Float
+    reads: Float
+    alone: Float
+
+    def beyond(self, compliance: Float) -> Float:
+        """What rows of gauges and bars yield (g + s, g + s) beyond the mesh, from its compliance (s, s) of bars."""
+        both = np.vstack([self.reads, np.eye(len(self.springs))])
+        return both @ (self.alone - compliance) @ both.T
+
+
 class Inclusions(Protocol):
     """Stiff things in the body that need no mesh of their own."""
 
@@ -79,12 +104,8 @@ class Inclusions(Protocol):
         """Planes, "x" and "z", about which they are mirror images."""
         ...
 
-    def rows(self, model: Any, mesh: Any, axes: tuple[str, ...]) -> tuple[Any, Float]:
-        """Sparse rows (s, n d) that read how far each is strained, and their stiffness (s,) N mm in the meshed part."""
-        ...
-
-    def reads(self, model: Any, mesh: Any, axes: tuple[str, ...]) -> list[Any]:
-        """Sparse row (1, n d) of what each of the model's gauges reads, in their order."""
+    def lay(self, model: Any, mesh: Any, axes: tuple[str, ...]) -> Inlay:
+        """Cut them into bars."""
         ...
 
 

@@ -67,6 +67,8 @@ class Problem:
         Whole point -> part point, its mirror signs in the frame, and how often the part's force and area count there.
     springs : (s,) N mm
         Stiffness of the last s condensed rows, which inclusions add to the body; `condensed` is the body without.
+    beyond : (g + s, g + s)
+        What the last rows of `condensed`, gauges and inclusions, yield more than the mesh says.
     bare : the same without inclusions, if there are any
     later : what is made of the problem after its build
     """
@@ -91,6 +93,7 @@ class Problem:
     share: Float
     seconds: dict[str, float]
     springs: Float = field(default_factory=lambda: np.zeros(0))
+    beyond: Float = field(default_factory=lambda: np.zeros((0, 0)))
     bare: Problem | None = None
     later: Later = field(default_factory=Later, compare=False)
 

@@ -18,7 +18,7 @@ from finger3d.fem.condense import condense, stiffened
 from finger3d.fem.surface import Surface, displacement_row, local_rows, restrict, strain_row, surface
 from finger3d.history import ContactPoints, Frame, Target
 from finger3d.mesh import Mesh, unfold
-from finger3d.model import Gauge, Leg, Model
+from finger3d.model import Gauge, Inlay, Leg, Model
 from finger3d.objects import approach
 from finger3d.problem import AUTO_START, Problem, at_points, between, folded, rigid_gap, targets, values_of
 
@@ -64,15 +64,13 @@ def build(model: Model, say: Callable[[str], None] = lambda text: None, margin: 
     face = _candidates(model, surface(mesh, "contact", thickness), touch, margin)
     kept = _kept_rows(face, axes)
     rows = local_rows(face, model.object.frame(mesh.dim))[kept]
-    gauges, strips, springs = [_gauge_row(mesh, g, axes) for g in model.gauges], rows[:0], np.zeros(0)
-    if model.inclusions:
-        gauges = model.inclusions.reads(model, mesh, axes)
-        strips, springs = model.inclusions.rows(model, mesh, axes)
+    inlay = model.inclusions.lay(model, mesh, axes) if model.inclusions else None
+    read = [inlay.reads @ inlay.rows, inlay.rows] if inlay else [_gauge_row(mesh, g, axes) for g in model.gauges]
     assembly = time.perf_counter() - start
     say(f"condensing {matrix.upper.shape[0]} unknowns to {len(face.nodes)} contact points")
     held = _held(model, mesh, axes)
-    condensed = condense(matrix, held, sp.vstack([rows, *gauges, strips], format="csr"))
-    compliance, gauge_rows = _read(condensed.compliance, kept, len(face.nodes), mesh.dim, len(gauges))
+    condensed = condense(matrix, held, sp.vstack([rows, *read], format="csr"))
+    compliance, gauge_rows = _read(condensed.compliance, kept, len(face.nodes), mesh.dim, len(model.gauges))
     parent, sign, share, points = _unfolded(model, mesh, face, axes)
     bare = Problem(
         model, mesh, report, elastic, matrix, face, condensed, compliance,
@@ -83,11 +81,20 @@ def build(model: Model, say: Callable[[str], None] = lambda text: None, margin: 
     if model.object_compliance:
         yields = model.object_compliance.at_points(bare, zone, say)
         bare = replace(bare, compliance=bare.compliance + yields)
-    if not len(springs):
-        return bare
-    held_by = stiffened(condensed.compliance, springs)
-    compliance, gauge_rows = _read(held_by, kept, len(face.nodes), mesh.dim, len(gauges))
-    return replace(bare, compliance=compliance + yields, gauge_rows=gauge_rows, springs=springs, bare=bare)
+    return replace(_laid(bare, inlay, yields), bare=bare) if inlay else bare
+
+
+def _laid(bare: Problem, inlay: Inlay, yields: Float | float) -> Problem:
+    """The problem with its inclusions in place; the object's own compliance `yields` is none of theirs."""
+    rows, kept, count = bare.condensed.compliance.copy(), bare.kept, len(inlay.springs)
+    beyond = inlay.beyond(rows[-count:, -count:])
+    rows[len(kept) :, len(kept) :] += beyond
+    held_by = stiffened(rows, inlay.springs)
+    compliance, gauge_rows = _read(held_by, kept, len(bare.surface.nodes), bare.dim, len(inlay.reads))
+    return replace(
+        bare, condensed=replace(bare.condensed, compliance=rows), compliance=compliance + yields,
+        gauge_rows=gauge_rows, springs=inlay.springs, beyond=beyond,
+    )  # fmt: skip
 
 
 def _read(rows: Float, kept: NDArray[np.int64], count: int, dim: int, gauges: int) -> tuple[Float, Float]:

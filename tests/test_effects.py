@@ -37,7 +37,6 @@ NEUTRAL: dict[str, dict[str, Any]] = {
 
 # foils and soft objects answer to small strain only
 APART = {frozenset((name, "large_deformation")) for name in ("embedded_gauge", "elastic_object")}
-APART |= {frozenset(("viscosity", "elastic_object"))}  # the object would relax with the finger
 # depth (mm), relative difference allowed; an object 1e12 times as stiff still gives by 1e-12
 LIGHT = {"large_deformation": (2e-3, 2e-3), "elastic_object": (0.5, 1e-11)}
 

@@ -355,3 +355,14 @@ def test_what_is_elastic_beside_the_body_stays_elastic() -> None:
 def test_settings_are_kept_as_the_model_compares_them() -> None:
     assert Effect(((0.3, 0.5),)).apply(block()) == Effect(((0.3, 0.5),)).apply(block())
     assert Viscoelastic(((0.3, 0.5),), True) != Viscoelastic(((0.3, 0.5),), False)
+
+
+def test_an_elastic_object_does_not_relax_with_the_finger() -> None:
+    from finger3d.effects.elastic_object import Effect as ElasticObject
+
+    slow = (Leg(0.3, steps=2, duration_s=1e9),)
+    model = ElasticObject(0.5, 0.3).apply(block(friction=Coulomb(0.0), legs=slow, object=Plane()))
+    problem = build(model)
+    relaxed = viscous(problem, ((0.7, 1.0),))
+    wanted = build(replace(model, material=Material(0.3, 0.3)))
+    assert forces(problem, run(relaxed))[-1] == pytest.approx(forces(wanted, run(wanted))[-1], rel=1e-7)

@@ -1,11 +1,14 @@
 """The gauges' own stiffness: every gauge is a thin foil in the body, stiff along its length.
 
 A foil of section thickness x width adds ``int E A eps(u) eps(v) ds`` to the body's stiffness, eps the strain along it.
-It is a chain of bars whose ends follow the mesh's own displacements; each bar's strain is one more condensed row, and
-its stiffness a spring on that row, so the body keeps its one factorisation (Woodbury).  In a solid the chain is laid
-several times side by side over the foil's width along z (a line would sink into the body without end as the mesh is
-refined); in a section the foil is spread over the finger's width.  The foil carries no bending and no shear, and takes
-no room.
+It is cut into bars whose ends follow the mesh's displacements; each bar's strain is one more condensed row, and its
+stiffness a spring on that row, so the body keeps its one factorisation (Woodbury).  In a solid the bars lie side by
+side over the foil's width along z; in a section the foil is spread over the finger's width.
+
+How a foil's own force unloads it is not read from the mesh, which would need cells of a hundredth of the foil: it is
+that of a foil in a body without end (`finger3d.fem.kelvin`).  This leaves out what the body's surface gives back, which
+dies out within the foil's length (see validation/embedded_gauge_study.py).  The foil carries no bending and no shear,
+and takes no room.
 """
 
 from __future__ import annotations
@@ -21,17 +24,17 @@ from numpy.typing import NDArray
 
 from finger3d.effects.base import fill
 from finger3d.errors import Finger3dError
-from finger3d.fem.surface import displacement_row, locate
-from finger3d.mesh import EDGES, Mesh
-from finger3d.model import Gauge, Model
+from finger3d.fem.kelvin import Endless, Foil
+from finger3d.fem.surface import displacement_row
+from finger3d.mesh import Mesh
+from finger3d.model import Gauge, Inlay, Model
 from finger3d.problem import folded
 
 Float = NDArray[np.float64]
+Int = NDArray[np.int64]
 Positive = Annotated[float, Gt(0)]
 
-_BARS_PER_CELL = 2.0
-_BARS = (4, 60)  # least and most along a foil
-_LINES = (3, 15)  # and side by side
+_PATCHES = {2: (16, 1), 3: (12, 8)}  # along and across, by dimension: within half a percent of any number
 _SAME = 1e-9  # mm, and radians
 
 
@@ -54,52 +57,57 @@ class Strips:
             axis for axis, seen in images.items() if all(any(_same(_place(g), p) for p in places) for g in seen)
         )
 
-    def rows(self, model: Model, mesh: Mesh, axes: tuple[str, ...]) -> tuple[sp.csr_matrix, Float]:
-        """Rows (s, n d) that read the bars' strains, and their stiffness (s,) N mm in the meshed part.
+    def lay(self, model: Model, mesh: Mesh, axes: tuple[str, ...]) -> Inlay:
+        """The bars of all foils, those that are images of each other as one row.
 
         The part has its share of the foils' energy: all of them count, read from the part where they lie in an image.
         """
-        bars: dict[tuple[float, ...], tuple[sp.csr_matrix, float]] = {}
-        for gauge in model.gauges:
-            along, lines = self._counts(gauge, mesh, axes)
-            cuts = np.linspace(0.0, 1.0, along + 1)[:, None]
-            stiff = self.E_MPa * self.thickness_mm * self.width_mm / lines * gauge.length_mm / along / 2 ** len(axes)
-            for start, end in self._lines(gauge, lines):
-                nodes = start + cuts * (end - start)
-                for a, b in zip(nodes[:-1], nodes[1:], strict=True):
-                    images = sorted((folded(p, gauge.direction, axes, mesh.dim)[0] for p in (a, b)), key=tuple)
-                    key = tuple(np.round(np.concatenate(images), 9) + 0.0)
-                    row, before = bars[key] if key in bars else (_strain_between(mesh, a, b, axes), 0.0)
-                    bars[key] = (row, before + stiff)
-        return sp.vstack([row for row, _ in bars.values()], format="csr"), np.array([s for _, s in bars.values()])
-
-    def reads(self, model: Model, mesh: Mesh, axes: tuple[str, ...]) -> list[sp.csr_matrix]:
-        """Mean strain over every foil, its width included."""
-        out = []
-        for gauge in model.gauges:
-            ends = self._lines(gauge, self._counts(gauge, mesh, axes)[1])
-            out.append(sp.csr_matrix(sum(_strain_between(mesh, a, b, axes) for a, b in ends) / len(ends)))
-        return out
-
-    def _counts(self, gauge: Gauge, mesh: Mesh, axes: tuple[str, ...]) -> tuple[int, int]:
-        """Bars along a foil, and side by side."""
-        size = _cell_size(mesh, gauge, axes)
-        along = int(np.clip(math.ceil(_BARS_PER_CELL * gauge.length_mm / size), *_BARS))
-        lines = int(np.clip(math.ceil(_BARS_PER_CELL * self.width_mm / size), *_LINES)) if mesh.dim == 3 else 1
-        return along, lines
-
-    def _lines(self, gauge: Gauge, count: int) -> list[tuple[Float, Float]]:
-        """Ends (3,) mm of the lines side by side that stand for a foil."""
-        aside = (np.arange(count) - 0.5 * (count - 1)) * self.width_mm / count
-        start, end = gauge.ends
-        return [(start + [0.0, 0.0, z], end + [0.0, 0.0, z]) for z in aside]
+        copies = 2 ** len(axes)
+        foils = [Foil.of(g.middle, g.direction, g.length_mm, self.width_mm, *_PATCHES[mesh.dim]) for g in model.gauges]
+        rows: dict[tuple[float, ...], sp.csr_matrix] = {}
+        numbers = np.concatenate([_enter(rows, foil, mesh, axes) for foil in foils])
+        stiff = self.E_MPa * self.thickness_mm * np.concatenate([foil.area for foil in foils])
+        springs = np.bincount(numbers, stiff, len(rows)) / copies
+        gauge = np.repeat(np.arange(len(foils)), [len(foil.area) for foil in foils])
+        reads = np.zeros((len(foils), len(rows)))
+        np.add.at(reads, (gauge, numbers), stiff / np.bincount(gauge, stiff)[gauge])
+        share = np.zeros((len(rows), len(numbers)))
+        share[numbers, np.arange(len(numbers))] = stiff / (copies * springs[numbers])
+        alone = copies * share @ _alone(model, foils) @ share.T
+        return Inlay(sp.vstack(list(rows.values()), format="csr"), springs, reads, alone)
 
 
-def _strain_between(mesh: Mesh, start: Float, end: Float, axes: tuple[str, ...]) -> sp.csr_matrix:
-    """Row (1, n d) of the mean strain along the line between two places (3,) of the whole finger."""
-    length = float(np.linalg.norm(end - start))
-    near, far = (displacement_row(mesh, *folded(p, (end - start) / length, axes, mesh.dim)) for p in (start, end))
-    return sp.csr_matrix((far - near) / length)
+def _alone(model: Model, foils: list[Foil]) -> Float:
+    """Compliance of all bars in a body without end."""
+    section = None if model.domain == "solid" else model.design.width_mm
+    body = Endless(model.material.E_MPa, model.material.nu, model.domain == "plane-stress", section)
+    whole = np.block([[a.strained_by(b, body) for b in foils] for a in foils])
+    return 0.5 * (whole + whole.T)
+
+
+def _enter(rows: dict[tuple[float, ...], sp.csr_matrix], foil: Foil, mesh: Mesh, axes: tuple[str, ...]) -> Int:
+    """Numbers (bars,) of the rows of a foil's bars; those that are not there yet are added."""
+    at, known, numbers = foil.places, {}, []
+    order = {key: i for i, key in enumerate(rows)}
+
+    def moved(place: Float) -> sp.csr_matrix:
+        if tuple(place) not in known:
+            known[tuple(place)] = displacement_row(mesh, *folded(place, foil.direction, axes, mesh.dim))
+        return known[tuple(place)]
+
+    for a, b in zip(at[:-1].reshape(-1, 3), at[1:].reshape(-1, 3), strict=True):
+        key = _key(a, b, axes, mesh.dim)
+        if key not in rows:
+            order[key] = len(rows)
+            rows[key] = sp.csr_matrix((moved(b) - moved(a)) / np.linalg.norm(b - a))
+        numbers.append(order[key])
+    return np.array(numbers)
+
+
+def _key(a: Float, b: Float, axes: tuple[str, ...], dim: int) -> tuple[float, ...]:
+    """The same for all bars that are images of one."""
+    images = sorted((folded(p, p, axes, dim)[0] for p in (a, b)), key=tuple)
+    return tuple(np.round(np.concatenate(images), 9) + 0.0)
 
 
 def _place(gauge: Gauge) -> Float:
@@ -111,15 +119,6 @@ def _same(a: Float, b: Float) -> bool:
     apart = np.abs(a - b)
     apart[3] = min(apart[3], math.pi - apart[3])
     return bool((apart <= _SAME).all())
-
-
-def _cell_size(mesh: Mesh, gauge: Gauge, axes: tuple[str, ...]) -> float:
-    """Mean edge length (mm) of the cell that holds a gauge's middle, or the image of it."""
-    found = locate(mesh, folded(gauge.middle, gauge.direction, axes, mesh.dim)[0])
-    if not found:
-        raise Finger3dError(f"gauge {gauge.name!r} lies outside the body; move it inward")
-    ends = mesh.points[mesh.cells[found[0][0]]][EDGES[mesh.dim]]
-    return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).mean())
 
 
 @dataclass(frozen=True)

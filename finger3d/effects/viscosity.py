@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Protocol
+from typing import Annotated, Any, Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -176,14 +176,21 @@ class AllRelaxes:
 
 @dataclass(frozen=True)
 class ShearRelaxes:
-    """The bulk modulus is constant: a shape is told by displacements and, in the mixed form, vertex dilatations."""
+    """The bulk modulus is constant: a shape is told by displacements and, in the mixed form, vertex dilatations.
+
+    What inclusions yield beyond the mesh is told by their row forces; it relaxes as if nu were constant.
+    """
 
     problem: Any
 
     @property
+    def _own(self) -> int:
+        return int(self.problem.stiffness.upper.shape[0])
+
+    @property
     def size(self) -> int:
-        """Number of unknowns."""
-        return self.problem.stiffness.upper.shape[0]
+        """Number of unknowns, and of rows that yield beyond the mesh."""
+        return self._own + len(self.problem.beyond)
 
     @property
     def _bulk(self) -> float:
@@ -200,14 +207,18 @@ class ShearRelaxes:
         body: Condensed = problem.later.once(
             ("viscosity", alpha), lambda: problem.condensed.again(self._stiffness(alpha))
         )
-        settled = body.solve(self._shear_force(step.past(memory)))
+        past, first = step.past(memory), len(body.compliance) - len(problem.beyond)
+        settled = body.solve(self._shear_force(past[: self._own]))
+        compliance, moved = body.compliance.copy(), body.read(settled)
+        compliance[first:, first:] += problem.beyond / alpha
+        moved[first:] += problem.beyond @ past[self._own :] / alpha
 
         def shape(rows: Float) -> Float:
             found = settled + body.unknowns(rows)
             found[problem.mesh.points.size :] *= problem.stiffness.pressure_scale / self._lame(alpha)
-            return found
+            return np.concatenate([found, (rows[first:] + past[self._own :]) / alpha])
 
-        return Response(body.compliance, body.read(settled), shape)
+        return Response(compliance, moved, shape)
 
     def _shear_part(self) -> sp.csr_matrix:
         """K_s (displacement form): the deviatoric stiffness, in the plane of a section too."""
@@ -241,19 +252,21 @@ class ShearRelaxes:
     def unknowns(self, now: Float) -> Float:
         """The displacements as they are."""
         n = self.problem.mesh.points.size
-        out = now.copy()
+        out = now[: self._own].copy()
         out[n:] *= self.problem.elastic.lame / self.problem.stiffness.pressure_scale
         return out
 
     def read(self, now: Float) -> Float:
-        """From the displacements."""
-        return self.problem.condensed.read(now)
+        """From the displacements, and what the mesh does not see."""
+        rows, beyond = self.problem.condensed.read(now[: self._own]), self.problem.beyond
+        rows[len(rows) - len(beyond) :] += beyond @ now[self._own :]
+        return rows
 
     def stress(self, prony: Prony, memory: Memory) -> Float:
         """2 G dev(eps) of what has not relaxed, and the bulk modulus times the dilatation as it is; (n, 3, 3)."""
         shear, left = self.problem.elastic.shear, relaxed(prony, memory)
-        strain, swelling = self._strain(left)
-        spherical = self._bulk * self._strain(memory.now)[1] - 2.0 / 3.0 * shear * swelling
+        strain, swelling = self._strain(left[: self._own])
+        spherical = self._bulk * self._strain(memory.now[: self._own])[1] - 2.0 / 3.0 * shear * swelling
         d = self.problem.dim
         whole = np.zeros((len(strain), 3, 3))
         whole[:, :d, :d] = 2.0 * shear * strain
@@ -282,8 +295,6 @@ class ViscousState(ContactState):
 @dataclass(frozen=True)
 class Viscoelastic(SmallStrain):
     """Small strain, with moduli that relax."""
-
-    object_compliance: ClassVar[bool] = False  # the object's would relax with the finger's, and it is elastic
 
     prony: Prony
     bulk: bool
