@@ -1,0 +1,114 @@
+"""By how much does an object's curvature move the gauge strain, and so the friction coefficient read from it?
+
+No published reference: a sensitivity study, as the paper leaves non-flat objects to future work.  The Fig. 9 finger in
+plane strain (nu = 0.49, E = 1 MPa) is pressed to the same *force* on a plane and on bars of radius 400 to 50 mm; gauge
+g36 of geometries/fig9.toml is read.  The strain against mu on the plane is the calibration; the strain found on a
+curved object of mu = 0.25 is put into it, as a sensor that knows the force and not the shape would.
+
+Checked: a bar of radius 1e5 mm is the plane; the calibration is monotonic, since it is inverted; and what is read
+hardly changes when the edge length is halved.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+
+from finger3d.contact.law import Coulomb
+from finger3d.design import designs
+from finger3d.history import measure
+from finger3d.model import Gauge, Leg, Material, MeshOptions, Model
+from finger3d.objects import Cylinder, Plane, RigidObject
+from finger3d.solve import Problem, build, march
+from finger3d.study import Result, Row
+
+FORCE = 200.0  # N over 20 mm: some 5 mm deep on the plane
+TRUE = 0.25
+GAUGE = Gauge("g36", 36.0, 40.0, 0.0, np.deg2rad(30.0))
+HALVED = "the same with edges twice as long"
+
+
+def finger(obj: RigidObject, size: float) -> Problem:
+    """The Fig. 9 finger under an object, deep enough for the force on any of them."""
+    body = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
+    model = Model(
+        body, Material(1.0, 0.49), MeshOptions(size, 4.0 * size, "swept"), (Leg(14.0, steps=1),), object=obj,
+        gauges=(GAUGE,), domain="plane-strain",
+    )  # fmt: skip
+    return build(model)
+
+
+def at_force(problem: Problem, mu: float, steps: int) -> tuple[float, float, float]:
+    """Depth (mm), strain of the gauge and half the contact length (mm) where the force reaches FORCE."""
+
+    def pressed(depth: float) -> dict[str, Any]:
+        model = replace(problem.model, friction=Coulomb(mu), legs=(Leg(depth, steps=steps),))
+        *_, frame = march(replace(problem, model=model))
+        assert frame.outcome.ok
+        return measure(problem.points, frame)
+
+    depth = brentq(lambda d: pressed(d)["normal_force_N"] - FORCE, 2.0, 14.0, rtol=1e-6)
+    found = pressed(depth)
+    return depth, found["gauges"]["g36"], found["contact_half_length_mm"]
+
+
+def run(quick: bool) -> Result:
+    """Strains over mu on the plane, one mu on every other object; all twice, on two meshes."""
+    sizes, steps = ((3.0, 1.5), 4) if quick else ((1.0, 0.5), 20)
+    mus = np.array([0.0, 0.25, 0.5, 1.0]) if quick else np.array([0.0, 0.06, 0.125, 0.25, 0.375, 0.5, 0.75, 1.0])
+    radii = (100.0, 1e5) if quick else (50.0, 70.0, 100.0, 140.0, 200.0, 400.0, 1e5)
+    (_, _, rough), (calibration, found, read) = (_measured(size, steps, mus, radii) for size in sizes)
+    curve = calibration[:, 1]
+    true = float(np.interp(TRUE, mus, curve))
+    rising = bool(np.all(np.diff(curve) > 0.0) or np.all(np.diff(curve) < 0.0))
+    what = "mu read on a bar of radius 100 mm with the plane's calibration, true 0.25"
+    rows = [
+        Row(
+            "strain on a bar of radius 1e5 mm, by that on the plane", "the limit", 1.0, found[1e5][1] / true, 3e-3,
+            "curvatures add: 1e-3 of the finger's",
+        ),
+        Row("calibration on the plane is monotonic (1: yes)", "it is inverted", 1.0, float(rising), 0.0, "a statement"),
+        Row(what, HALVED, rough[100.0], read[100.0], 0.02, "a tenth of what is found", "sensitivity", "absolute"),
+    ]  # fmt: skip
+    table = {
+        "radius_mm": [np.inf] * len(mus) + list(radii),
+        "mu": [*mus, *[TRUE] * len(radii)],
+        "depth_mm": [*calibration[:, 0], *[f[0] for f in found.values()]],
+        "strain": [*curve, *[f[1] for f in found.values()]],
+        "contact_half_length_mm": [*calibration[:, 2], *[f[2] for f in found.values()]],
+        "mu_read": [*mus, *read.values()],
+    }
+    return Result(tuple(rows), table, lambda figure: _draw(figure, mus, curve, found, read))
+
+
+def _measured(
+    size: float, steps: int, mus: np.ndarray, radii: tuple[float, ...]
+) -> tuple[np.ndarray, dict[float, tuple[float, float, float]], dict[float, float]]:
+    """Calibration (m, 3) on the plane, what is found on the bars, and the coefficients read."""
+    plane = finger(Plane(), size)
+    calibration = np.array([at_force(plane, float(mu), steps) for mu in mus])
+    found = {radius: at_force(finger(Cylinder(radius_mm=radius), size), TRUE, steps) for radius in radii}
+    return calibration, found, {r: _read(calibration[:, 1], mus, strain) for r, (_, strain, _) in found.items()}
+
+
+def _read(curve: np.ndarray, mus: np.ndarray, strain: float) -> float:
+    """Coefficient that the calibration gives for a strain; nan out of its range."""
+    order = np.argsort(curve)
+    return float(np.interp(strain, curve[order], mus[order], left=np.nan, right=np.nan))
+
+
+def _draw(figure: Any, mus: np.ndarray, curve: np.ndarray, found: dict[float, Any], read: dict[float, float]) -> None:
+    left, right = figure.subplots(1, 2)
+    left.plot(mus, 1e3 * curve, "o-", label="plane: the calibration")
+    for radius, (_, strain, _) in found.items():
+        left.plot([TRUE], [1e3 * strain], "s", label=f"bar, R = {radius:g} mm")
+    left.set(xlabel="mu", ylabel="strain of g36, 1e-3", title=f"{FORCE:g} N over 20 mm, plane strain")
+    left.legend(fontsize=7)
+    kept = [r for r in found if r < 1e4]
+    right.semilogx(kept, [read[r] for r in kept], "s-", label="read with the plane's calibration")
+    right.axhline(TRUE, color="k", ls="--", lw=1.0, label="true")
+    right.set(xlabel="radius of the bar, mm", ylabel="mu", title="a sensor that knows the force, not the shape")
+    right.legend(fontsize=8)

@@ -1,0 +1,174 @@
+"""Does a triangulated ball or bar press like the exact one, and are distances right at its edges and corners?
+
+Exact: the height of a ball and a bar in closed form; the distance from a box, sqrt(sum max(|x| - b, 0)^2) outside and
+the largest |x| - b inside.  Facets of a curved body lie inside of it by the sagitta s^2/8R of their edges s, so gaps,
+first touch and force err by O(s^2): the rate is gated at 2.  A sign at edges and corners is right only with
+angle-weighted normals (Baerentzen and Aanaes 2005); the nearest triangle's own normal is counted beside.
+
+Finger: a block, 3D, swept, the same mesh for all.  Bodies are made here, as STL would hold them, moved off the origin.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.contact.law import Coulomb
+from finger3d.design import designs
+from finger3d.history import measure
+from finger3d.model import Leg, Material, MeshOptions, Model
+from finger3d.objects import Cylinder, MeshObject, RigidObject, Sphere, first_touch
+from finger3d.solve import build, march
+from finger3d.study import Result, Row
+from finger3d.triangles import Triangles
+
+from ._common import convergence, rate
+
+Float = NDArray[np.float64]
+RADIUS = 6.0
+CLOSED = "closed form"
+
+
+def sewn(rings: Float) -> NDArray[np.int64]:
+    """Outward triangles between rings (k, n, 3) that rise along y and run from x to z."""
+    k, n, _ = rings.shape
+    here = np.arange(k * n).reshape(k, n)
+    a, b, c, d = here[:-1], np.roll(here, -1, axis=1)[:-1], here[1:], np.roll(here, -1, axis=1)[1:]
+    return np.vstack([np.stack([a, c, b], axis=-1).reshape(-1, 3), np.stack([b, c, d], axis=-1).reshape(-1, 3)])
+
+
+def ball(sectors: int) -> Triangles:
+    """A ball of `sectors` around and half as many rings."""
+    polar = np.linspace(0.0, np.pi, sectors // 2 + 1)[1:-1, None]
+    turn = 2.0 * np.pi * np.arange(sectors) / sectors
+    r = np.sin(polar)
+    rings = RADIUS * np.stack([r * np.cos(turn), -np.cos(polar) + 0.0 * turn, r * np.sin(turn)], axis=2)
+    points = np.vstack([rings.reshape(-1, 3), [[0.0, -RADIUS, 0.0], [0.0, RADIUS, 0.0]]])
+    here, last = np.arange(sectors), len(points) - 2 - sectors + np.arange(sectors)
+    south, north = np.full(sectors, len(points) - 2), np.full(sectors, len(points) - 1)
+    caps = [np.stack([south, here, np.roll(here, -1)], axis=1), np.stack([north, np.roll(last, -1), last], axis=1)]
+    return Triangles(points + [3.0, -2.0, 1.0], np.vstack([sewn(rings), *caps]))
+
+
+def bar(sectors: int) -> Triangles:
+    """A bar along z, 20 mm long, `sectors` around, a corner of its polygon straight down."""
+    turn = 2.0 * np.pi * np.arange(sectors) / sectors
+    round_ = np.stack([RADIUS * np.sin(turn), -RADIUS * np.cos(turn)], axis=1)
+    ends = [np.insert(round_, 2, z, axis=1) for z in (-10.0, 10.0)]
+    here, after = np.arange(sectors), np.roll(np.arange(sectors), -1)
+    sides = [np.stack([here, after, here + sectors], 1), np.stack([after, after + sectors, here + sectors], 1)]
+    middle = np.full(sectors, 2 * sectors)
+    caps = [np.stack([middle, after, here], axis=1), np.stack([middle + 1, here + sectors, after + sectors], axis=1)]
+    points = np.vstack([*ends, [[0.0, 0.0, -10.0], [0.0, 0.0, 10.0]]])
+    return Triangles(points + [3.0, -2.0, 1.0], np.vstack([*sides, *caps]))
+
+
+def box() -> Triangles:
+    """A box with half edges 1, 2, 3."""
+    points = np.array(list(itertools.product((-1.0, 1.0), repeat=3))) * [1.0, 2.0, 3.0]
+    sides = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    return Triangles(points, np.array([t for a, b, c, d in sides for t in ([a, b, c], [a, c, d])]))
+
+
+def pressed(obj: RigidObject, size: float) -> dict[str, Any]:
+    """Numbers of a press off the middle of a block."""
+    pad = designs()["block"](half_length_mm=5.0, height_mm=4.0, width_mm=8.0)
+    model = Model(
+        pad, Material(1.0, 0.3), MeshOptions(size, 2.0, "swept"), (Leg(0.4, steps=2),), object=obj,
+        friction=Coulomb(0.3),
+    )  # fmt: skip
+    problem = build(model)
+    *_, frame = march(problem)
+    assert frame.outcome.ok
+    return measure(problem.points, frame)
+
+
+def run(quick: bool) -> Result:
+    """Two shapes on three fineness levels; distances from a box."""
+    levels = (24, 48, 96) if quick else (32, 64, 128, 256)
+    size = 0.8 if quick else 0.4
+    rows: list[Row] = []
+    table: list[tuple[Any, ...]] = []
+    curves: dict[str, list[float]] = {}
+    dome = designs()["clipped_cylinder"](20.0, 12.0, 3.0, 8.0)
+    for name, make, exact in (
+        ("ball", ball, Sphere(0.7, 0.4, radius_mm=RADIUS)),
+        ("bar", bar, Cylinder(0.7, radius_mm=RADIUS)),
+    ):
+        true = pressed(exact, size)
+        touch = first_touch(dome.top, replace(exact, x_mm=4.0), 12.0, 4.0)
+        x, z = 0.7 + np.linspace(-3.0, 3.0, 101), 0.4 + np.linspace(-2.0, 2.0, 101)
+        errors: dict[str, list[float]] = {"height": [], "first touch": [], "force": []}
+        for sectors in levels:
+            obj = MeshObject(0.7, 0.4 if name == "ball" else 0.0, surface=make(sectors))
+            got = pressed(obj, size)
+            errors["height"].append(float(np.sqrt(np.mean((obj.height(x, z) - exact.height(x, z)) ** 2))))
+            errors["first touch"].append(abs(first_touch(dome.top, replace(obj, x_mm=4.0), 12.0, 4.0) - touch))
+            errors["force"].append(abs(got["normal_force_N"] / true["normal_force_N"] - 1.0))
+            table.append((name, sectors, len(obj.surface.faces), *(e[-1] for e in errors.values())))
+        edges = [2.0 * np.pi * RADIUS / n for n in levels]
+        curves |= {f"{name}: {what}": e for what, e in errors.items()}
+        sagitta = edges[-1] ** 2 / (8.0 * RADIUS)
+        rows += [
+            Row(
+                f"{name}: rate of the height's error (rms) with the edge length", "sagitta s^2/8R", 2.0,
+                rate(edges, errors["height"]), 0.1, "over two or three halvings", measure="at least",
+            ),
+            Row(
+                f"{name}: force with {levels[-1]} sectors, by the exact shape's", CLOSED, 1.0,
+                1.0 + errors["force"][-1], 3.0 * sagitta / 0.4, "three sagittas over the depth; P ~ depth^1.5",
+            ),
+            Row(
+                f"{name}: first touch on the side of a dome, error, mm", CLOSED, 0.0, errors["first touch"][-1],
+                sagitta, "the sagitta", measure="absolute",
+            ),
+        ]  # fmt: skip
+    rows += _distance_rows()
+    columns = "shape sectors triangles height_error_mm first_touch_error_mm force_error".split()
+    kept = dict(zip(columns, map(list, zip(*table, strict=True)), strict=True))
+    return Result(tuple(rows), kept, lambda figure: _draw(figure, edges, curves))
+
+
+def _distance_rows() -> list[Row]:
+    rng = np.random.default_rng(0)
+    p = rng.uniform(-4.0, 4.0, (4000, 3))
+    body = box()
+    distance, normal = body.signed_distance(p)
+    q = np.abs(p) - [1.0, 2.0, 3.0]
+    exact = np.linalg.norm(np.maximum(q, 0.0), axis=1) + np.minimum(q.max(axis=1), 0.0)
+    step = 1e-6
+    slope = np.stack(
+        [(body.signed_distance(p + e)[0] - body.signed_distance(p - e)[0]) / (2 * step) for e in step * np.eye(3)],
+        axis=1,
+    )
+    smooth = np.abs(np.linalg.norm(slope, axis=1) - 1.0) < 1e-3  # not on the box's own medial surfaces
+    needle = Triangles(
+        np.array([[0.0, 0, 0], [1.0, 10, 0], [-0.5, 10, 0.8], [-0.5, 10, -0.8]]),
+        np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]),
+    )
+    direction = rng.normal(size=(4000, 3))
+    near = 0.05 * direction / np.linalg.norm(direction, axis=1, keepdims=True)
+    near = near[near[:, 1] < -0.01]
+    wrong = float((needle.signed_distance(near)[0] <= 0.0).mean())
+    closest, face, _ = needle.closest(near)
+    naive = float((np.einsum("ij,ij->i", near - closest, needle.normals[face]) <= 0.0).mean())
+    off, turned = float(np.abs(distance - exact).max()), float(np.abs(normal - slope)[smooth].max())
+    paper = "Baerentzen and Aanaes 2005"
+    tip = "share of points around a needle's tip taken for inside"
+    return [
+        Row("signed distance from a box, largest error, mm", CLOSED, 0.0, off, 1e-12, "round-off", measure="absolute"),
+        Row("its normal against the distance's slope", "differences", 0.0, turned, 1e-6, "theirs", measure="absolute"),
+        Row(tip, "all lie outside", 0.0, wrong, 0.0, "none", measure="absolute"),
+        Row("the same by the nearest triangle's normal", paper, 0.1, naive, 0.0, "so it can fail", measure="at least"),
+    ]
+
+
+def _draw(figure: Any, edges: list[float], curves: dict[str, list[float]]) -> None:
+    axes = figure.subplots(1, 1)
+    convergence(
+        axes, edges, curves, 2.0, "edge of the object's triangles, mm", "error: height, first touch (mm), force"
+    )

@@ -1,0 +1,117 @@
+"""Does turning the object, its place and its slide by any angle about the press axis turn the result?
+
+Exactly, if the mesh turns too: the same tetrahedra of a half ball, turned by 17, 45 and other degrees, under a
+triangulated oval body, pressed off the middle and dragged.  Coulomb's cone is round, so nothing may prefer x or z.  To
+the mesh's own error, if the mesh stays: the same scene on the finger that a user has, turned against its tetrahedra.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.contact.advance import advance
+from finger3d.contact.law import Coulomb
+from finger3d.contact.state import ContactState
+from finger3d.design import designs, mesh_solid
+from finger3d.fem.assembly import Elasticity
+from finger3d.mesh import Mesh
+from finger3d.model import MeshOptions
+from finger3d.objects import MeshObject, first_touch
+from finger3d.study import Result, Row
+from finger3d.triangles import Triangles
+
+from ._common import Body, body
+from .triangulated_objects import ball
+
+Float = NDArray[np.float64]
+DEPTH, SLIDE, PLACE, MU = 0.3, 0.15, np.array([0.6, 0.0, 0.2]), 0.3
+FINGER = 4.0
+
+
+def turn(degrees: float) -> Float:
+    """Matrix (3, 3) that turns about y."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+
+
+def finger(size: float) -> Mesh:
+    """A half ball as tetrahedra."""
+    design = designs()["hemisphere"](radius_mm=FINGER)
+    return mesh_solid(design, MeshOptions(size, 1.5, "ftetwild"), (-2.0, 2.0, -2.0, 2.0))[0]
+
+
+def condensed(mesh: Mesh) -> Body:
+    """Contact points within 2 mm of the pole."""
+    held = np.zeros(mesh.points.shape, dtype=bool)
+    held[np.unique(mesh.facets["base"])] = True
+    return body(mesh, Elasticity.of(1.0, 0.45), held, "contact", lambda p: np.hypot(p[:, 0], p[:, 2]) < 2.0)
+
+
+def oval(degrees: float, sectors: int) -> tuple[MeshObject, float]:
+    """The object at its place, turned, and the height of its lowest point at first touch."""
+    q = turn(degrees)
+    round_ = ball(sectors)
+    points = (round_.points - round_.points.mean(axis=0)) * [1.6, 1.0, 0.8] @ q.T
+    obj = MeshObject(*(q @ PLACE)[[0, 2]], surface=Triangles(points, round_.faces))
+    return obj, first_touch(designs()["hemisphere"](radius_mm=FINGER).top, obj, FINGER, FINGER)
+
+
+def dragged(soft: Body, degrees: float, steps: int, obj: MeshObject, touch: float) -> Float:
+    """Force (2 steps, 3) on the finger, turned back: while it is pressed, and on the way of the slide."""
+    q = turn(degrees)
+    samples, out = soft.surface.samples, []
+    state = None
+    for depth, slide in [(DEPTH * k / steps, 0.0) for k in range(1, steps + 1)] + [
+        (DEPTH, SLIDE * k / steps) for k in range(1, steps + 1)
+    ]:
+        moved = q @ np.array([slide, -depth, 0.0])
+        near = np.hypot(samples[:, 0], samples[:, 2]) < 3.0
+        gap = np.full(len(samples), 10.0)
+        x, y, z = samples[near].T
+        gap[near] = obj.height(x - moved[0], z - moved[2]) + touch - depth - y
+        free = np.empty((len(soft.surface.nodes), 3))
+        free[:, 0] = soft.surface.average @ gap
+        free[:, 1:] = -moved[[0, 2]]
+        state = state or ContactState.at_rest(np.maximum(free[:, 0], 0.0), 3)
+        found = advance(state, free, soft.compliance, Coulomb(MU), DEPTH)
+        assert found.outcome.ok, found.outcome
+        state = found.state
+        total = state.force.sum(axis=0)
+        out.append(q.T @ [total[1], -total[0], total[2]])
+    return np.array(out)
+
+
+def run(quick: bool) -> Result:
+    """One mesh turned with the scene, and the scene alone."""
+    size, steps = (0.6, 2) if quick else (0.25, 4)
+    angles = (0.0, 17.0) if quick else (0.0, 17.0, 45.0, 90.0, 137.0)
+    mesh = finger(size)
+    rest = condensed(mesh)
+    with_mesh, alone = [], []
+    for angle in angles:
+        obj, touch = oval(angle, 32 if quick else 96)
+        turned = condensed(replace(mesh, points=mesh.points @ turn(angle).T))
+        with_mesh.append(dragged(turned, angle, steps, obj, touch))
+        alone.append(dragged(rest, angle, steps, obj, touch))
+    scale = np.linalg.norm(with_mesh[0][-1])
+    exact = max(float(np.abs(f - with_mesh[0]).max()) / scale for f in with_mesh)
+    meshed = max(float(np.abs(f - alone[0]).max()) / scale for f in alone)
+    sideways = abs(with_mesh[0][-1, 0]) / abs(with_mesh[0][-1, 1])
+    allowed = 0.03 if quick else 0.01
+    one = f"the same on one mesh of size {size:g} mm"
+    rows = [
+        Row(
+            "largest change of the force, turned back, mesh turned too", "symmetry", 0.0, exact, 1e-5,
+            "first touch is searched to 1e-6 mm", measure="absolute",
+        ),
+        Row(one, "symmetry", 0.0, meshed, allowed, "the mesh is not its own image", measure="absolute"),
+        Row("friction over force at the end", "mu = 0.3", 0.05, sideways, 0.0, "the slide is felt", measure="at least"),
+    ]  # fmt: skip
+    table: dict[str, Any] = {"angle_deg": list(angles)}
+    for name, forces in (("turned", with_mesh), ("one", alone)):
+        table |= {f"{name}_mesh_F{axis}_N": [f[-1, i] for f in forces] for i, axis in enumerate("xyz")}
+    return Result(tuple(rows), table)

@@ -1,0 +1,203 @@
+"""Do two elastic bodies with friction behave as Hertz, Dundurs and Spence say, and does it matter which is the finger?
+
+Two half-planes in contact act on each other only through A = A1 + A2, A_i = 2 (1 - nu_i^2) / E_i, and Dundurs' beta
+(Johnson 1985 sec. 5.1 and ch. 4).  So a finger of nu = 0 on an object of nu = 0 that is r times stiffer must stick and
+slip like a finger of nu' on a rigid object when (r - 1) / (2 (r + 1)) = (1 - 2 nu') / (2 (1 - nu')): the pair r = 11/3
+has the numbers of nu' = 0.3 (Spence 1975; references.md sec. 2).  Equal bodies do not rub at all.
+
+Finger: a block on its base; object: [effects.elastic_object], the lower half of a cylinder held on its cut, its own
+mesh, 1.3 times coarser than the finger's, whose nodes do not meet the finger's.  Both are 100 and 200 a thick, and the
+gated values are extrapolated linearly in a/h to 0, as in press_line.  NAFEMS CGS-1 (references.md sec. 6) is pressed
+through the same command that users run.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+
+from finger3d.contact.law import Coulomb
+from finger3d.design import designs
+from finger3d.effects.elastic_object import Effect
+from finger3d.history import measure
+from finger3d.model import Leg, Material, MeshOptions, Model
+from finger3d.objects import Cylinder, Plane
+from finger3d.solve import Problem, build, march
+from finger3d.study import Result, Row
+
+from ._halfplane import Profile, under
+
+SPENCE = "Spence 1975 with Dundurs' beta; references.md sec. 2"
+HERTZ = "Johnson 1985 ch. 4"
+NAFEMS = "NAFEMS CGS-1; references.md sec. 6"
+ONE = "issue 4: Hertz rows within 1 %"
+P_OVER_HERTZ, Q_OVER_P, C_OVER_A, D_OVER_AP2 = 1.04269, 0.09348, 0.54321, 4.3e-4  # nu' = .3, mu = .25, N = 200
+RATIO = 11.0 / 3.0
+PAIRS = {"unlike": ((1.0, 0.3), (2.0, 0.2)), "beta of nu = .3": ((1.0, 0.0), (RATIO, 0.0)), "alike": ((1.0, 0.3),) * 2}
+
+
+def both(pair: Any) -> float:
+    """A of a pair of (E, nu), 1/MPa."""
+    return sum(2.0 * (1.0 - nu**2) / modulus for modulus, nu in pair)
+
+
+def legs(steps: int, size: float) -> tuple[Leg, ...]:
+    """Equal steps of a^2 up to about a = 1 mm, bodies `size` mm thick."""
+    a = np.sqrt(np.arange(1, steps + 1) / steps)
+    return tuple(Leg(float(d), steps=1) for d in a**2 / (2.0 * size) * np.log(2.0 * size / a))
+
+
+def line(pair: Any, points: float, size: float, steps: int) -> Problem:
+    """A cylinder of radius `size` (mm) on a block as high, plane strain, `points` to a."""
+    block = designs()["block"](half_length_mm=size, height_mm=size, width_mm=1.0)
+    mesh = MeshOptions(1.0 / points, size / 8.0, "swept")
+    model = Model(
+        block, Material(*pair[0]), mesh, legs(steps, size), object=Cylinder(radius_mm=size), domain="plane-strain",
+    )  # fmt: skip
+    return build(Effect(*pair[1]).apply(model), margin=-0.2)
+
+
+def numbers(profiles: list[Profile], pair: Any, size: float) -> np.ndarray:
+    """P/P_Hertz(a), int_0^a q/P, c/a as means over the second half of the increments, and D/(A P^2) at their end."""
+    half = [p for p in profiles[len(profiles) // 2 :] if p.touching >= 6] or profiles[-1:]
+    force = sum(p.force for p in half)
+    hertz = sum(np.pi * p.a**2 / (2.0 * size * both(pair)) for p in half)
+    last = profiles[-1]
+    lost = last.frame.dissipation_mJ / (both(pair) * last.force**2)
+    return np.array([force / hertz, sum(p.outward for p in half) / force, np.mean([p.c / p.a for p in half]), lost])
+
+
+def run(quick: bool) -> Result:
+    """Pairs at two thicknesses; who is the finger; NAFEMS CGS-1."""
+    points, steps = (10, 20) if quick else (30, 200)
+    rows: list[Row] = []
+    found: dict[str, np.ndarray] = {}
+    table: list[tuple[Any, ...]] = []
+    curves: dict[str, Profile] = {}
+    for name, pair in PAIRS.items():
+        mu = 0.0 if name == "unlike" else 0.25
+        at = []
+        for size in (100.0, 200.0):
+            profiles = under(line(pair, points, size, steps), mu)
+            at.append(numbers(profiles, pair, size))
+            table.append((name, mu, size, *at[-1]))
+        found[name] = 2.0 * at[1] - at[0]
+        curves[name] = profiles[-1]
+    pair = found["beta of nu = .3"]
+    rows += [
+        Row("P/P_Hertz(a), E = 1 and 2, nu = .3 and .2, mu = 0", HERTZ, 1.0, found["unlike"][0], 0.01, ONE),
+        Row("P/P_Hertz(a), nu = 0 on nu = 0, r = 11/3, mu = .25", SPENCE, P_OVER_HERTZ, pair[0], 0.01, ONE),
+        Row("int_0^a q/P, the same pair", SPENCE, Q_OVER_P, pair[1], 0.03, "issue 4: Spence integrals within 3 %"),
+        Row(
+            "c/a, the same pair", SPENCE, C_OVER_A, pair[2], 0.5 / points + 0.3 / steps,
+            "half a point, and the increments' 0.3/N", measure="absolute",
+        ),
+        Row(
+            "int_0^a q/P, bodies alike, mu = .25", "Johnson 1985 sec. 5.1: beta = 0", 0.0, found["alike"][1], 1e-3,
+            "bodies of finite size rub by a/h", measure="absolute",
+        ),
+    ]  # fmt: skip
+    if not quick:
+        rows.append(
+            Row("D/(A P^2), the same pair, N = 200", SPENCE, D_OVER_AP2, pair[3], 0.03, "references.md: 4.3e-4")
+        )
+    rows += _mirror_rows()
+    rows += _swapped_rows(quick)
+    rows += _nafems_rows(quick)
+    columns = "pair mu thickness_mm P_over_Hertz q_over_P c_over_a D_over_AP2".split()
+    kept = dict(zip(columns, map(list, zip(*table, strict=True)), strict=True))
+    return Result(tuple(rows), kept, lambda figure: _draw(figure, curves))
+
+
+def _half(modulus: float, nu: float, size: float, obj: Any, depth: float, mu: float = 0.3, **body: float) -> Model:
+    design = designs()["half_cylinder"](radius_mm=5.0, width_mm=2.0) if not body else designs()["block"](**body)
+    mesh = MeshOptions(size, 4.0 * size, "swept")
+    return Model(
+        design, Material(modulus, nu), mesh, (Leg(depth, steps=5),), object=obj, friction=Coulomb(mu),
+        domain="plane-strain",
+    )  # fmt: skip
+
+
+def _last(model: Model) -> dict[str, Any]:
+    problem = build(model)
+    *_, frame = march(problem)
+    assert frame.outcome.ok
+    return measure(problem.points, frame)
+
+
+def _mirror_rows() -> list[Row]:
+    """Two equal half cylinders are mirror images: no friction, and the plane between them stays flat."""
+    alike = _last(Effect(1.0, 0.3).apply(_half(1.0, 0.3, 0.15, Cylinder(radius_mm=5.0), 1.0)))
+    smooth = _last(_half(1.0, 0.3, 0.15, Plane(), 0.5, mu=0.0))
+    hard = _last(Effect(1e12, 0.3).apply(_half(1.0, 0.3, 0.15, Cylinder(radius_mm=5.0), 0.5)))
+    rigid = _last(_half(1.0, 0.3, 0.15, Cylinder(radius_mm=5.0), 0.5))
+    share = alike["friction_sum_N"] / alike["normal_force_N"]
+    plane, limit = (a["normal_force_N"] / b["normal_force_N"] for a, b in ((alike, smooth), (hard, rigid)))
+    what = "friction over force of two equal half cylinders"
+    return [
+        Row(what, "symmetry", 0.0, share, 1e-8, "round-off", measure="absolute"),
+        Row(
+            "their force, by that on a smooth plane at half the depth",
+            "symmetry",
+            1.0,
+            plane,
+            1e-7,
+            "their arcs' chords",
+        ),
+        Row("force with E2 = 1e12 E1, by the rigid object's", "issue 5: the limit", 1.0, limit, 1e-9, "1e-12 is left"),
+    ]
+
+
+def _swapped_rows(quick: bool) -> list[Row]:
+    """A block under a half cylinder, and the same half cylinder under the block: force and dissipation are shared."""
+    size = 0.12 if quick else 0.06
+    block = {"half_length_mm": 5.0, "height_mm": 5.0, "width_mm": 2.0}
+    one = _last(Effect(2.0, 0.45).apply(_half(1.0, 0.3, size, Cylinder(radius_mm=5.0), 0.8, **block)))
+    other = _last(Effect(1.0, 0.3, 5.0).apply(_half(2.0, 0.45, size, Plane(), 0.8)))
+    force, friction = (other[key] / one[key] for key in ("normal_force_N", "friction_sum_N"))
+    third = "Newton's third law"
+    return [
+        Row("force with finger and object in each other's place", third, 1.0, force, 0.005, "the meshes differ"),
+        Row("friction, likewise", third, 1.0, friction, 0.05, "small, and it hangs on the contact's edge"),
+    ]
+
+
+def _nafems_rows(quick: bool) -> list[Row]:
+    """A cylinder of steel on a block of aluminium, 35 kN per mm, plane strain."""
+    size = 0.6 if quick else 0.25
+    block = designs()["block"](half_length_mm=100.0, height_mm=200.0, width_mm=1.0)
+    model = Model(
+        block, Material(70e3, 0.3), MeshOptions(size, 25.0, "swept"), (Leg(2.0, steps=1),),
+        object=Cylinder(radius_mm=50.0), domain="plane-strain",
+    )  # fmt: skip
+    problem = build(Effect(210e3, 0.3).apply(model))
+
+    def at(depth: float) -> Profile:
+        return under(problem, 0.0, (Leg(depth, steps=1),))[-1]
+
+    depth = brentq(lambda d: at(d).force - 35e3, 0.5, 2.0, rtol=1e-6)
+    found = at(depth)
+    inner = np.abs(found.x) < 5.6
+    slope, top = np.polyfit(found.x[inner] ** 2, found.p[inner] ** 2, 1)
+    a, peak = float(np.sqrt(-top / slope)), float(np.sqrt(top))
+    allowed, why = (0.03, "ten points to a") if quick else (0.01, ONE)
+    return [
+        Row("contact half-width at 35 kN/mm, mm, from the line of p^2", NAFEMS, 6.21, a, allowed, why),
+        Row("peak pressure at 35 kN/mm, MPa, from the same line", NAFEMS, 3585.37, peak, allowed, why),
+    ]
+
+
+def _draw(figure: Any, curves: dict[str, Profile]) -> None:
+    left, right = figure.subplots(1, 2)
+    for name, profile in curves.items():
+        here = np.abs(profile.x) <= profile.a
+        left.plot(profile.x[here] / profile.a, profile.p[here] / profile.p.max(), label=name)
+        right.plot(profile.x[here] / profile.a, profile.q[here] / profile.p.max(), label=name)
+    x = np.linspace(-1.0, 1.0, 201)
+    left.plot(x, np.sqrt(1.0 - x**2), "k--", lw=1.0, label="Hertz")
+    left.set(xlabel="x/a", ylabel="p/p0")
+    right.set(xlabel="x/a", ylabel="friction on the finger q/p0", title="mu = .25 but for the unlike pair, mu = 0")
+    left.legend(fontsize=8)
+    right.legend(fontsize=8)
