@@ -25,7 +25,7 @@ demo: install
 	@echo "pictures:"; ls out/demo/*.png
 
 test: install
-	$(BIN)/python -m pytest -q -m "not slow"
+	$(BIN)/python -m pytest -q -m "not slow and not browser"
 
 test-all: install
 	$(BIN)/python -m pytest -q

@@ -1,0 +1,26 @@
+"""The command line. Each command imports what it needs, so that ``finger3d --help`` is quick."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from cyclopts import CycloptsError
+
+from finger3d.cli import press, project  # noqa: F401  importing registers the commands
+from finger3d.cli.common import app, complain
+from finger3d.errors import Finger3dError
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code; a user's mistake is one line on standard error."""
+    try:
+        return app(arguments, exit_on_error=False, print_error=False) or 0
+    except CycloptsError as error:
+        complain(f"{error} (finger3d --help lists the commands and options)")
+        return Finger3dError.exit_code
+    except Finger3dError as error:
+        complain(str(error))
+        return error.exit_code
+    except KeyboardInterrupt:
+        complain("interrupted; nothing was written")
+        return 130

@@ -1,0 +1,107 @@
+"""validate, new, info: the commands about finger3d itself."""
+
+from __future__ import annotations
+
+import tempfile
+from importlib import resources
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from finger3d.cli.common import app, check_folder, complain, print_columns, print_rows
+from finger3d.errors import Finger3dError, MissingError
+from finger3d.report import reporter
+
+
+@app.command
+def validate(
+    studies: Annotated[list[str] | None, Parameter(negative=())] = None,
+    /,
+    *,
+    quick: Annotated[bool, Parameter(negative=())] = False,
+    out: Annotated[Path | None, Parameter(help="Folder for the results instead of validation/.")] = None,
+) -> int:
+    """Run studies of validation/: does the code reproduce closed forms, other codes, and the paper?
+
+    Without names all studies run, less those whose results are from the sources as they are.
+
+    Example: finger3d validate press_line --quick
+
+    Parameters
+    ----------
+    studies
+        Names of studies.
+    quick
+        Small meshes and few steps; the committed results are left alone.
+    """
+    from finger3d import study
+
+    known = study.studies()
+    selected = study.chosen(studies or [], known)
+    home = next(iter(known.values())).path.parent
+    if quick and out is not None and out.resolve() == home:
+        raise Finger3dError(f"--out {out}: quick results would overwrite the full ones there; name another folder")
+    folder = out or (Path(tempfile.mkdtemp(prefix="finger3d-validate-")) if quick else home)
+    check_folder(folder)
+    report = reporter()
+    try:
+        with report:
+            found = study.validate(selected, quick, folder, report, resume=not studies and not quick, known=known)
+    except KeyboardInterrupt:
+        complain(f"interrupted; {report.steps_done} of {len(selected)} studies are kept in {folder}")
+        return 130
+    print_columns("study what kind reference wanted got error tolerance verdict".split(), study.table(found))
+    print(f"results: {folder}")
+    failed = [name for name, rows in found.items() if not all(row.passed for row in rows)]
+    if not failed:
+        return 0
+    complain(f"validate: outside the tolerance: {', '.join(failed)} (see the rows marked FAIL)")
+    return MissingError.exit_code
+
+
+@app.command
+def new(file: Path = Path("scene.toml"), /) -> int:
+    """Write a commented scene to start from: the paper's Fig. 9 finger.
+
+    Example: finger3d new my_scene.toml
+
+    Parameters
+    ----------
+    file
+        Where to write; a file that is there already is left alone.
+    """
+    text = resources.files("finger3d").joinpath("new_scene.toml").read_text(encoding="utf-8")
+    try:
+        with file.open("x", encoding="utf-8") as stream:
+            stream.write(text.replace("scene.toml", str(file)))
+    except FileExistsError:
+        raise Finger3dError(f"{file}: there already; give another name") from None
+    except OSError as error:
+        raise Finger3dError(f"{file}: cannot be written: {error.strerror}") from None
+    print(f"{file} written; next: finger3d press {file} --out out")
+    return 0
+
+
+@app.command
+def info() -> int:
+    """Print versions, machine and folders: what a bug report needs."""
+    import platform
+
+    from finger3d.design.cache import folder
+    from finger3d.fem import pardiso
+    from finger3d.versions import cores, memory_bytes, versions
+
+    memory = memory_bytes()
+    print_rows("versions", versions().items())
+    print_rows(
+        "machine",
+        [
+            ("platform", platform.platform()),
+            ("cores", cores()),
+            ("memory", f"{memory[0] / 1e9:.1f} GB" if memory else "unknown"),
+            ("mesh cache", folder()),
+            ("PARDISO", "available" if pardiso.available() else "not available; SuperLU is used, which is slower"),
+        ],
+    )
+    return 0
