@@ -22,6 +22,7 @@ from finger3d.render import BODY, COLOURS, LINE, OBJECT, REST, Skin, draw_solid,
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.path import Path as Curve
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -29,6 +30,7 @@ Int = NDArray[np.int64]
 _CMAP = "viridis"
 _SHADES = {STICK: "#c9d9ee", SLIP: "#fde3c4"}
 _DPI = 120
+_MANY_CELLS = 4000
 
 
 def finger_picture(
@@ -312,10 +314,10 @@ def _contact_line(axes: Axes, x: Float, fn: Float, fx: Float, fz: Float, status:
 def _section(
     mesh: Mesh, u: Float, pressure: Float, status: Int, nodes: Int, profile: Float | None, title: str
 ) -> Figure:
-    from matplotlib.collections import LineCollection, PolyCollection
+    from matplotlib.collections import LineCollection
+    from matplotlib.patches import PathPatch
 
     moved = mesh.points + u
-    ring = [0, 3, 1, 4, 2, 5] if mesh.is_quadratic else [0, 1, 2]
     value, state = np.zeros(len(moved)), np.full(len(moved), OPEN)
     value[nodes], state[nodes] = pressure, status
     arc = mesh.facets["contact"]
@@ -328,8 +330,10 @@ def _section(
     limits = low - 0.04 * span, low + 1.08 * span
     figure, panels = _two_panels(span[1] / span[0], title, ticks=True)
     by_status = _palette()[state[arc[:, :2]].ravel()]
+    outline, edges = _outline(mesh, moved), _edges(mesh, moved)
     for axes, colours in zip(panels, (_pressure_colours(of_half, highest), by_status), strict=True):
-        axes.add_collection(PolyCollection(list(moved[mesh.cells[:, ring]]), facecolor=BODY, edgecolor=LINE, lw=0.25))
+        axes.add_patch(PathPatch(outline, facecolor=BODY, edgecolor=LINE, lw=0.5))
+        axes.add_patch(PathPatch(edges, facecolor="none", edgecolor=LINE, lw=0.25))
         if profile is not None:
             axes.plot(*profile.T, color=OBJECT, lw=1.5, zorder=2)
         axes.add_collection(LineCollection(list(halves), colors=colours, lw=5, capstyle="butt", zorder=3))
@@ -339,6 +343,38 @@ def _section(
     panels[0].set_ylabel("y (mm)")
     _keys(figure, highest, {} if profile is None else {"object": OBJECT})
     return figure
+
+
+def _runs(lines: Float) -> Curve:
+    """One path of separate polylines (k, p, 2): a thousand artists would take as long as the solution."""
+    from matplotlib.path import Path
+
+    codes = np.full(lines.shape[:2], Path.LINETO)
+    codes[:, 0] = Path.MOVETO
+    return Path(lines.reshape(-1, 2), codes.ravel())
+
+
+def _edges(mesh: Mesh, moved: Float) -> Curve:
+    """The cells' edges, each once; of a fine mesh none, which would be a grey area and no picture of it."""
+    if len(mesh.cells) > _MANY_CELLS:
+        return _runs(np.zeros((0, 2, 2)))
+    sides = [(0, 1), (1, 2), (2, 0)] if not mesh.is_quadratic else [(0, 3, 1), (1, 4, 2), (2, 5, 0)]
+    edges = mesh.cells[:, sides].reshape(-1, len(sides[0]))
+    ends = np.sort(edges[:, [0, -1]], axis=1)
+    return _runs(moved[edges[np.unique(ends, axis=0, return_index=True)[1]]])
+
+
+def _outline(mesh: Mesh, moved: Float) -> Curve:
+    """The boundary of a section as a closed path."""
+    from matplotlib.path import Path
+
+    facets = np.concatenate([f for f in mesh.facets.values() if len(f)])
+    facets = facets[:, [0, 2, 1]] if mesh.is_quadratic else facets
+    following = {int(a): i for i, a in enumerate(facets[:, 0])}
+    ring = [0]
+    while (after := following[int(facets[ring[-1], -1])]) != 0:
+        ring.append(after)
+    return Path(np.concatenate([moved[facets[ring, :-1]].reshape(-1, 2), moved[facets[:1, 0]]]), closed=True)
 
 
 # --- a solid ------------------------------------------------------------------------------------------------------

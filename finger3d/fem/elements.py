@@ -37,11 +37,14 @@ def gradient(bary: Float, quadratic: bool) -> Float:
 def quadrature(dim: int, degree: int) -> tuple[Float, Float]:
     """Barycentric points (q, dim + 1) and weights (q,) that sum to the reference simplex's volume 1/dim!.
 
-    Degree 2 in 2D and 3D are the symmetric 3- and 4-point rules (Strang and Fix 1973), degree 5 in 2D is Radon's
-    symmetric 7-point rule (1948); anything else is a Gauss-Jacobi product on the collapsed square or cube (Stroud
-    1971), positive and of any degree, but not symmetric.
+    In 1D it is Gauss and Legendre's rule. Degree 2 in 2D and 3D are the symmetric 3- and 4-point rules (Strang and Fix
+    1973), degree 5 in 2D is Radon's symmetric 7-point rule (1948); anything else is a Gauss-Jacobi product on the
+    collapsed square or cube (Stroud 1971), positive and of any degree, but not symmetric.
     """
-    if degree == 2 and dim > 1:
+    if dim == 1:
+        x, w = np.polynomial.legendre.leggauss(degree // 2 + 1)
+        return np.stack([(1.0 - x) / 2.0, (1.0 + x) / 2.0], axis=1), w / 2.0
+    if degree == 2:
         a = 2.0 / 3.0 if dim == 2 else (5.0 + 3.0 * math.sqrt(5.0)) / 20.0
         b = (1.0 - a) / dim
         return np.full((dim + 1, dim + 1), b) + (a - b) * np.eye(dim + 1), np.full(
