@@ -17,11 +17,13 @@ if TYPE_CHECKING:
     from finger3d.mesh import Mesh
     from finger3d.model import Gauge, Leg, Material, MeshOptions, Model
     from finger3d.objects import Cylinder, Plane, Sphere, Wave, Wedge
+    from finger3d.reduced import Condensed
     from finger3d.scene import Scene, load, parse
 
     __version__: str
 
 _HOME = {
+    "Condensed": "reduced",
     "Coulomb": "contact.law",
     "Cylinder": "objects",
     "Finger3dError": "errors",
@@ -45,6 +47,7 @@ _HOME = {
 }
 
 __all__ = [
+    "Condensed",
     "Coulomb",
     "Cylinder",
     "Finger3dError",

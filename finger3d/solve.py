@@ -26,7 +26,7 @@ Float = NDArray[np.float64]
 
 __all__ = ["AUTO_START", "Problem", "build", "contact_zone", "march", "symmetry", "targets"]
 
-_MARGIN = 0.3  # candidate points reach to a rigid gap of this share of the depth; checked after the solution
+MARGIN = 0.3  # candidate points reach to a rigid gap of this share of the depth; checked after the solution
 _CUTS = 6
 _LOOKS = 20  # and where rigid gaps are, for the candidate points
 
@@ -47,7 +47,7 @@ def contact_zone(model: Model) -> tuple[float, float, float, float]:
     return approach(*model.approach).zone
 
 
-def build(model: Model, say: Callable[[str], None] = lambda text: None, margin: float = _MARGIN) -> Problem:
+def build(model: Model, say: Callable[[str], None] = lambda text: None, margin: float = MARGIN) -> Problem:
     """Mesh, assemble and condense a model."""
     design = model.design
     way = approach(*model.approach)
