@@ -23,6 +23,9 @@ HEAVY = {
     "trimesh",
     "dask",
     "distributed",
+    "pyarrow",
+    "pandas",
+    "plotly",
 }
 TOP_LEVEL = {
     "pyproject.toml", "finger3d", "geometries", "tests", "validation", "README.md", "LICENSE", "CITATION.cff",

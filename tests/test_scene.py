@@ -319,3 +319,24 @@ def test_loading_a_scene_needs_no_cad_and_no_solver(tmp_path):
     code = f"import sys, finger3d; finger3d.load({str(path)!r}).model(); print({heavy} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert re.fullmatch(r"set\(\)\n", done.stdout)
+
+
+def test_the_reference_names_every_key_with_its_meaning() -> None:
+    from finger3d.scene.reference import reference
+
+    rows = [line.strip("| ").split(" | ") for line in reference().splitlines()[2:] if "**" not in line]
+    assert len(rows) > 50
+    assert all(row[-1].strip() for row in rows)
+    keys = {row[0].strip("`") for row in rows}
+    assert {
+        "geometry",
+        "edge_height_mm",
+        "nu",
+        "shape",
+        "tilt_deg",
+        "mu",
+        "rule",
+        "domain",
+        "angle_deg",
+        "prony",
+    } <= keys

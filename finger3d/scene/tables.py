@@ -26,20 +26,39 @@ class Table(BaseModel):
 
 
 class MaterialTable(Table):
-    """[material]: nu has no default because the paper gives none."""
+    """[material]: nu has no default because the paper gives none.
+
+    Attributes
+    ----------
+    E_MPa : Young's modulus
+    nu : Poisson's ratio, 0.5 included; the paper gives none
+    """
 
     E_MPa: Positive
     nu: Annotated[float, Ge(0), Le(0.5)]
 
 
 class FrictionTable(Table):
-    """[friction]."""
+    """[friction]; without it: none.
+
+    Attributes
+    ----------
+    mu : friction coefficient; with kinetic_friction the static one
+    """
 
     mu: NotNegative
 
 
 class LegTable(Table):
-    """[[press.leg]]; depth 0 releases the finger."""
+    """[[press.leg]]: a target that is reached from the one before; depth 0 releases the finger.
+
+    Attributes
+    ----------
+    depth_mm : of the object below the first touch, less than the finger's height
+    slide_x_mm, slide_z_mm : where the object then is, from where it was at first
+    steps : equal increments; "auto": halved until friction sum and dissipation stay
+    duration_s : read only with viscosity
+    """
 
     depth_mm: NotNegative
     slide_x_mm: float = 0.0
@@ -61,19 +80,38 @@ class LegsTable(Table):
 
 
 class ContactTable(Table):
-    """[contact]."""
+    """[contact].
+
+    Attributes
+    ----------
+    rule : how stick and slip are settled; "paper": its literal swap, which may cycle
+    """
 
     rule: Literal["projection", "paper"] = "projection"
 
 
 class DomainTable(Table):
-    """[model]."""
+    """[model].
+
+    Attributes
+    ----------
+    domain : the body in 3D, or its section; all use width_mm, so forces are always N
+    """
 
     domain: Domain = "solid"
 
 
 class MeshTable(Table):
-    """[mesh]: absent sizes are chosen from the finger (see `finger3d.scene.checks`)."""
+    """[mesh]: absent sizes are chosen from the finger (see `finger3d.scene.checks`).
+
+    Attributes
+    ----------
+    size_mm : edge length at the contact
+    base_size_mm : edge length far from it
+    mesher : fTetWild, or structured and the same on every run, for extruded designs
+    tolerance : instead of sizes: refine until the estimated error is below it
+    max_seconds : with tolerance: stop refining then, with the best so far
+    """
 
     size_mm: Positive | None = None
     base_size_mm: Positive | None = None
@@ -83,7 +121,15 @@ class MeshTable(Table):
 
 
 class GaugeTable(Table):
-    """[[gauge]]."""
+    """[[gauge]]: the strain along a direction in the x-y plane; any number of them.
+
+    Attributes
+    ----------
+    name : by which results call it
+    x_mm, y_mm, z_mm : its middle, on the finger at rest
+    angle_deg : from +x towards +y
+    length_mm : above 0: the mean over that length
+    """
 
     name: Annotated[str, MinLen(1)]
     x_mm: float
@@ -110,7 +156,12 @@ class SceneTable(Table):
 
 
 class ObjectTable(Table):
-    """What every object has: the place of its lowest point."""
+    """What every object has: the place of its lowest point.
+
+    Attributes
+    ----------
+    x_mm, z_mm : where the object's lowest point is
+    """
 
     x_mm: float = 0.0
     z_mm: float = 0.0
@@ -121,7 +172,12 @@ class ObjectTable(Table):
 
 
 class PlaneTable(ObjectTable):
-    """shape = "plane"."""
+    """shape = "plane".
+
+    Attributes
+    ----------
+    tilt_deg : about z
+    """
 
     tilt_deg: Annotated[float, Gt(-90), Lt(90)] = 0.0
 
@@ -131,7 +187,13 @@ class PlaneTable(ObjectTable):
 
 
 class CylinderTable(ObjectTable):
-    """shape = "cylinder"."""
+    """shape = "cylinder".
+
+    Attributes
+    ----------
+    radius_mm : radius
+    axis : direction of the cylinder's line
+    """
 
     radius_mm: Positive
     axis: Axis = "z"
@@ -142,7 +204,12 @@ class CylinderTable(ObjectTable):
 
 
 class SphereTable(ObjectTable):
-    """shape = "sphere"."""
+    """shape = "sphere".
+
+    Attributes
+    ----------
+    radius_mm : radius
+    """
 
     radius_mm: Positive
 
@@ -152,7 +219,14 @@ class SphereTable(ObjectTable):
 
 
 class WedgeTable(ObjectTable):
-    """shape = "wedge"."""
+    """shape = "wedge".
+
+    Attributes
+    ----------
+    angle_deg : between a face and the horizontal
+    tip_radius_mm : of the rounded edge
+    axis : direction of the edge
+    """
 
     angle_deg: Annotated[float, Gt(0), Lt(90)]
     tip_radius_mm: NotNegative = 0.0
@@ -165,7 +239,14 @@ class WedgeTable(ObjectTable):
 
 
 class WaveTable(ObjectTable):
-    """shape = "wave"."""
+    """shape = "wave".
+
+    Attributes
+    ----------
+    wavelength_mm : from crest to crest
+    amplitude_mm : half of crest to valley
+    axis : direction of the crests
+    """
 
     wavelength_mm: Positive
     amplitude_mm: NotNegative
@@ -179,7 +260,13 @@ class WaveTable(ObjectTable):
 
 
 class MeshObjectTable(ObjectTable):
-    """shape = "mesh"."""
+    """shape = "mesh": any closed surface.
+
+    Attributes
+    ----------
+    path : .stl, .step and the like, relative to the scene
+    scale : what its lengths are multiplied with, to be mm
+    """
 
     path: Annotated[str, MinLen(1)]
     scale: Positive = 1.0

@@ -1,0 +1,87 @@
+"""Every key of a scene in Markdown, from the tables that check them: for the README, and for who reads it."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import typing
+from collections.abc import Iterator
+
+from finger3d.design import designs
+from finger3d.scene.lookup import effect_names, effect_type
+from finger3d.scene.mistakes import described, listed, shown
+from finger3d.scene.tables import (
+    SHAPES,
+    ContactTable,
+    DomainTable,
+    FrictionTable,
+    GaugeTable,
+    LegTable,
+    MaterialTable,
+    MeshTable,
+    ObjectTable,
+    Table,
+    table_of,
+)
+
+_SAID = re.compile(r"^    (\w+(?:, \w+)*) : (.+(?:\n     +\S.*)*)", flags=re.MULTILINE)
+
+
+def reference() -> str:
+    """Return a Markdown table: key, what is allowed, default, meaning."""
+    lines = ["| key | allowed | default | meaning |", "|---|---|---|---|"]
+    for title, rows in _tables():
+        lines.append(f"| **`{title}`** | | | |")
+        lines += [
+            f"| {key and f'`{key}`'} | {allowed} | {default} | {meaning} |" for key, allowed, default, meaning in rows
+        ]
+    return "\n".join(lines) + "\n"
+
+
+_Row = tuple[str, str, str, str]
+
+
+def _tables() -> Iterator[tuple[str, list[_Row]]]:
+    yield "[finger]", [("geometry", "a design's name, or the path of a .step or .stl file", "", "what is pressed")]
+    for name, design in designs().items():
+        yield f'[finger] geometry = "{name}"', _rows(table_of(design), design)
+    yield "[material]", _rows(MaterialTable)
+    common = _rows(ObjectTable)
+    yield "[object]", [("shape", listed(SHAPES), '`"plane"`', "what the finger is pressed on"), *common]
+    for shape, table in SHAPES.items():
+        yield f'[object] shape = "{shape}"', [row for row in _rows(table) if row not in common]
+    yield "[friction]", _rows(FrictionTable)
+    yield "[press] or [[press.leg]]", _rows(LegTable)
+    yield "[contact]", _rows(ContactTable)
+    yield "[model]", _rows(DomainTable)
+    yield "[mesh]", _rows(MeshTable)
+    yield "[[gauge]]", _rows(GaugeTable)
+    for name in effect_names():
+        effect = effect_type(name)
+        rows = _rows(table_of(effect), effect)
+        yield f"[effects.{name}]", rows or [("", "no keys", "", (effect.__doc__ or "").split(": none. ")[-1])]
+
+
+def _rows(table: type[Table], documented: type | None = None) -> list[_Row]:
+    hints = typing.get_type_hints(table, include_extras=True)
+    said = _said(documented or table)
+    return [
+        (name, described(hints[name]).replace("|", "\\|"), _default(field), said[name])
+        for name, field in table.model_fields.items()
+    ]
+
+
+def _default(field: typing.Any) -> str:
+    if field.is_required():
+        return "required"
+    return "" if field.default is None else f"`{shown(field.default)}`"
+
+
+def _said(documented: type) -> dict[str, str]:
+    """What the docstrings of a class and of those it comes from say of each key."""
+    found: dict[str, str] = {}
+    for base in reversed(documented.__mro__):
+        for names, text in _SAID.findall(base.__doc__ or ""):
+            found |= dict.fromkeys(names.split(", "), " ".join(text.split()))
+    missing = [f.name for f in dataclasses.fields(documented)] if dataclasses.is_dataclass(documented) else []
+    return dict.fromkeys(missing, "") | found
