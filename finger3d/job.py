@@ -18,6 +18,7 @@ from finger3d.report import Report
 from finger3d.versions import versions
 
 if TYPE_CHECKING:
+    from finger3d.accuracy import ErrorEstimate
     from finger3d.increments import StepEstimate
     from finger3d.scene import Scene
     from finger3d.solve import Problem
@@ -56,6 +57,7 @@ class _Output:
         self.factorizations_before = before
         self.frames: list[Frame] = []
         self.estimate: StepEstimate | None = None
+        self.error: ErrorEstimate | None = None
         self.coupling = problem.coupling()
         self.advice: list[str] = []
         self.warnings = [*problem.model.warnings, *_coupling_warning(self.coupling), *_depth_warning(problem)]
@@ -92,6 +94,7 @@ class _Output:
             "advice": self.advice,
             "steps": steps,
             "step_estimate": self.estimate.as_dict() if self.estimate else None,
+            "error_estimate": self.error.as_dict() if self.error else None,
             "uniqueness": {"largest_coupling": self.coupling},
             "mesh": {
                 "points": report.points,
@@ -119,7 +122,7 @@ class _Output:
 
 
 def press(
-    scene: Scene | str | Path, out: str | Path, report: Report | None = None, figures: bool = True
+    scene: Scene | str | Path, out: str | Path, report: Report | None = None, figures: bool = True, error: bool = True
 ) -> PressResult:
     """Press a scene and write its results into a folder.
 
@@ -129,12 +132,14 @@ def press(
     out : folder, made if it is not there
     report : told about stages and steps
     figures : whether to draw PNG files
+    error : whether to estimate the errors by mesh and increments, from a coarser run
 
     Returns
     -------
     PressResult
         With the outcome of the last step; steps up to a failure or an interruption are kept and written.
     """
+    from finger3d.accuracy import estimate
     from finger3d.scene import load
 
     started = time.perf_counter()
@@ -155,7 +160,12 @@ def press(
     output.seconds["output"] += time.perf_counter() - begin
     output.warnings += _coarse_warning(problem, output.frames)
     history = History(problem.points, tuple(output.frames))
-    return PressResult(history, output.write(str(history.outcome)), folder)
+    summary = output.write(str(history.outcome))
+    if error:
+        report.stage("estimating the error")
+        output.error = estimate(problem, output.frames, output.seconds)
+        summary = output.write(str(history.outcome))
+    return PressResult(history, summary, folder)
 
 
 def _coupling_warning(coupling: float) -> list[str]:

@@ -22,6 +22,7 @@ HEAVY = ("OCP", "build123d", "vtk", "vtkmodules", "pyvista", "pytetwild", "trime
 STEP = {
     "depth_mm": 10.0,
     "normal_force_N": 304.5,
+    "friction_sum_N": 72.0,
     "contact_half_length_mm": 36.0,
     "stick_half_length_mm": 8.5,
     "residual": 3e-11,
@@ -46,7 +47,7 @@ def fake_press(monkeypatch):
     """Replace the driver: writes two steps, then ends as told."""
     calls = SimpleNamespace(end=Outcome.CONVERGED, scene=None, figures=None)
 
-    def press(scene, out, report, figures=True):
+    def press(scene, out, report, figures=True, error=True):
         calls.scene, calls.figures = scene, figures
         steps = [{**STEP, "depth_mm": 5.0}, STEP]
         if isinstance(calls.end, Outcome) and not calls.end.ok:
@@ -146,7 +147,7 @@ def test_an_interrupted_press_ends_with_130_and_says_what_is_kept(scene, tmp_pat
 
 
 def test_an_interruption_before_the_first_step(scene, tmp_path, monkeypatch, capsys):
-    def press(scene, out, report, figures=True):
+    def press(scene, out, report, figures=True, error=True):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(finger3d.job, "press", press)
