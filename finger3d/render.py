@@ -32,7 +32,9 @@ ARROWS = {STICK: "#ffffff", SLIP: "#000000"}
 """Colour of a friction arrow, by the status of its point."""
 
 _VIEW = np.array([-0.45, 1.05, 1.0])  # From where the finger is looked at: above, in front, a little from the left.
-_ARROW = 0.045  # Length of the longest arrow, as a share of the finger's.
+_ARROW = 0.045  # Length of the longest arrow, as a share of the finger's,
+_ARROW_STEPS = 1.6  # and at most so many distances between arrows.
+_WINDOW, _MARGIN = (1600, 1200), 1.04
 
 _TIME_LIMIT_S = 180.0
 # A quadratic facet in six triangles around its centre (node 6): two for each corner, so that a corner's status
@@ -65,7 +67,7 @@ class Skin:
     contact : (t, 3, 3) triangles of the contact surface
     pressure : (t, 3) MPa at their corners
     status : (t,) of the contact point each belongs to
-    lines : (k, 3, 3) edges of all facets: end, middle, end
+    lines : (k, 3, 3) edges of the body's facets: end, middle, end
     features : (k, 3, 3) edges between faces of the body
     rest : (k, 3, 3) edges of the contact surface, at rest
     outline : (o, 3) closed line around the object's surface, or none
@@ -95,8 +97,23 @@ class Skin:
     @property
     def aspect(self) -> float:
         """Height over width as the viewer sees it."""
-        width, height = np.ptp(_flat(self._points), axis=0)
+        width, height = self.frame[1]
         return float(height / width)
+
+    @property
+    def arrow_length(self) -> float:
+        """Length of the longest arrow, mm: shorter where they stand close together."""
+        across = np.ptp(self.arrow_at[:, [0, 2]], axis=0) if len(self.arrow_at) else np.zeros(2)
+        apart = max(np.sqrt(across.prod() / max(len(self.arrow_at), 1)), across.max() / max(len(self.arrow_at), 1))
+        return min(_ARROW * self.size, _ARROW_STEPS * float(apart) or np.inf)
+
+    @property
+    def frame(self) -> tuple[Float, Float]:
+        """Middle (3,) of what the viewer sees, and its width and height (2,), mm."""
+        flat = _flat(self._points)
+        low, high = flat.min(axis=0), flat.max(axis=0)
+        deep = self._points.mean(axis=0) @ _AXES[2]
+        return np.append(0.5 * (low + high), deep) @ _AXES, high - low
 
     @property
     def _points(self) -> Float:
@@ -130,7 +147,7 @@ def skin_of(
         contact=points[:, _SIX].reshape(-1, 3, 3),
         pressure=seven[:, _SIX].reshape(-1, 3),
         status=state[arc[:, _OWNER]].ravel(),
-        lines=np.concatenate([rings, body])[:, _SIDES].reshape(-1, 3, 3),
+        lines=body[:, _SIDES].reshape(-1, 3, 3),
         features=features,
         rest=_edge_points(_rim(arc), mesh.points),
         outline=_outline(profile, moved),
@@ -215,7 +232,7 @@ def draw_solid(axes: Axes, skin: Skin, colours: Float, arrows: bool) -> None:
     if arrows and len(skin.arrow):
         for state, colour in ARROWS.items():
             on = skin.arrow_status == state
-            at, by = _flat(skin.arrow_at[on]), _flat(_ARROW * skin.size * skin.arrow[on])
+            at, by = _flat(skin.arrow_at[on]), _flat(skin.arrow_length * skin.arrow[on])
             axes.quiver(*at.T, *by.T, color=colour, pivot="mid", angles="xy", scale_units="xy", scale=1.0,
                         width=0.002, zorder=4)  # fmt: skip
     axes.autoscale_view()
@@ -289,13 +306,14 @@ def _child(source: str, target: str) -> None:
 
     data = np.load(source)
     skin = Skin(**{f.name: data[f.name] for f in fields(Skin)})
-    plotter = pv.Plotter(off_screen=True, window_size=[1600, 1200], lighting="three lights")
+    plotter = pv.Plotter(off_screen=True, window_size=list(_WINDOW), lighting="three lights")
     plotter.set_background("white")
     contact = _add_body(plotter, skin)
     plotter.enable_parallel_projection()
-    plotter.camera_position = [tuple(_VIEW), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0)]
-    plotter.reset_camera()
-    plotter.camera.zoom(1.3)
+    middle, (width, height) = skin.frame
+    plotter.camera_position = [tuple(middle + 3.0 * skin.size * _AXES[2]), tuple(middle), (0.0, 1.0, 0.0)]
+    plotter.camera.parallel_scale = 0.5 * _MARGIN * max(height, width * _WINDOW[1] / _WINDOW[0])
+    plotter.reset_camera_clipping_range()
     images = []
     for number, colours in enumerate(data["colours"]):
         contact["colour"] = np.round(255.0 * colours.reshape(-1, 3)).astype(np.uint8)
@@ -346,7 +364,7 @@ def _add_arrows(plotter: Any, skin: Skin) -> None:
         if on.any():
             points = pv.PolyData(skin.arrow_at[on] + [0.0, 0.004 * skin.size, 0.0])
             points["arrow"] = skin.arrow[on]
-            glyphs = points.glyph(orient="arrow", scale="arrow", factor=_ARROW * skin.size, geom=shape)
+            glyphs = points.glyph(orient="arrow", scale="arrow", factor=skin.arrow_length, geom=shape)
             plotter.add_mesh(glyphs, color=colour, lighting=False)
 
 

@@ -113,6 +113,8 @@ def contact_figure(
 def force_figure(path: str | Path, steps: Sequence[Mapping[str, Any]], title: str = "") -> None:
     """Draw forces (N) and the half lengths of contact and stick zone (mm) against depth (mm), a point a step.
 
+    Where the object slides, its way from first touch (mm) takes the place of the depth, which stands still then.
+
     Parameters
     ----------
     steps : entries of summary.json's ``steps``
@@ -123,6 +125,10 @@ def force_figure(path: str | Path, steps: Sequence[Mapping[str, Any]], title: st
             "depth_mm", "normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm",
         )
     )  # fmt: skip
+    at = np.array([[step["depth_mm"], step.get("slide_x_mm", 0.0), step.get("slide_z_mm", 0.0)] for step in steps])
+    slides = bool(np.any(at[:, 1:] != 0.0))
+    if slides:
+        depth = list(np.cumsum(np.linalg.norm(np.diff(at, axis=0, prepend=0.0), axis=1)))
     figure = _figure(10.0, 4.2)
     left, right = figure.subplots(1, 2)
     left.plot(depth, normal, "o-", color="#222222", ms=4, label="normal force")
@@ -132,9 +138,9 @@ def force_figure(path: str | Path, steps: Sequence[Mapping[str, Any]], title: st
     right.plot(depth, stick, "s-", color=COLOURS[STICK], ms=4, label="stick")
     right.set_ylabel("half length along x, z = 0 (mm)")
     for axes in (left, right):
-        axes.set_xlabel("depth (mm)")
+        axes.set_xlabel("way of the object, pressed and slid (mm)" if slides else "depth (mm)")
         axes.set_xlim(left=min(0.0, *depth))
-        axes.set_ylim(bottom=0.0)
+        axes.set_ylim(bottom=0.0, top=1.15 * axes.get_ylim()[1])  # room for the legend
         _plain(axes)
         axes.legend(frameon=False, loc="upper left")
     _frame(figure, (0.7, 0.15, 0.55, 0.15), title)

@@ -43,22 +43,23 @@ def coin() -> tuple[Float, NDArray[np.int64]]:
 
 
 def gear() -> tuple[Float, NDArray[np.int64]]:
-    """A gear wheel of 16 teeth, module 1.5 mm, 8 mm thick, its axis along z, with a tooth straight down."""
-    teeth, module = 16, 1.5
+    """A gear wheel of 24 teeth, module 1 mm, 16 mm thick, its axis along z, with a tooth straight down."""
+    teeth, module = 24, 1.0
     pitch = 0.5 * teeth * module
     tip, root = pitch + module, pitch - 1.25 * module
-    # Straight flanks of 20 degrees, a quarter pitch wide at the pitch circle, slightly rounded at the tip.
+    # Straight flanks of 20 degrees, a quarter pitch wide at the pitch circle, the tips' edges broken by a fifth.
     half = 0.25 * math.pi * module
     flank = math.tan(math.radians(20.0))
-    shape = [(-half - flank * 1.25 * module, root), (-half + flank * 0.8 * module, tip - 0.2 * module)]
-    shape += [(-half + flank * module + 0.1 * module, tip)]
+    broken = 0.2 * module
+    shape = [(-half - flank * 1.25 * module, root), (-half + flank * (module - broken), tip - broken)]
+    shape += [(-half + flank * module + broken, tip)]
     one = np.array([*shape, *[(-x, r) for x, r in reversed(shape)]])
     angle = -0.5 * math.pi + 2.0 * math.pi * np.arange(teeth) / teeth
     outline = []
     for turn in angle:
         along = np.array([math.cos(turn), math.sin(turn)])
         outline += [r * along + x * np.array([-along[1], along[0]]) for x, r in one]
-    return extruded(np.array(outline), 8.0)
+    return extruded(np.array(outline), 16.0)
 
 
 def write_stl(path: Path, points: Float, faces: NDArray[np.int64]) -> None:

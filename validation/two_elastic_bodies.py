@@ -3,7 +3,9 @@
 Two half-planes in contact act on each other only through A = A1 + A2, A_i = 2 (1 - nu_i^2) / E_i, and Dundurs' beta
 (Johnson 1985 sec. 5.1 and ch. 4).  So a finger of nu = 0 on an object of nu = 0 that is r times stiffer must stick and
 slip like a finger of nu' on a rigid object when (r - 1) / (2 (r + 1)) = (1 - 2 nu') / (2 (1 - nu')): the pair r = 11/3
-has the numbers of nu' = 0.3 (Spence 1975; references.md sec. 2).  Equal bodies do not rub at all.
+has the numbers of nu' = 0.3 (Spence 1975; references.md sec. 2).  Equal half-planes do
+not rub at all (beta = 0; how unlike ones do: Goodman 1962, Spence 1975); equal bodies of finite size do, a little, and
+the less the smaller a/h, unless they are mirror images.
 
 Finger: a block on its base; object: [effects.elastic_object], the lower half of a cylinder held on its cut, its own
 mesh, 1.3 times coarser than the finger's, whose nodes do not meet the finger's.  Both are 100 and 200 a thick, and the
@@ -13,20 +15,26 @@ through the same command that users run.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy import sparse
 from scipy.optimize import brentq
 
 from finger3d.contact.law import Coulomb
 from finger3d.design import designs
-from finger3d.effects.elastic_object import Effect
+from finger3d.effects.elastic_object import Effect, ObjectBody
+from finger3d.fem.assembly import Elasticity
+from finger3d.fem.opposite import facing_trace
+from finger3d.fem.surface import local_rows
 from finger3d.history import measure
 from finger3d.model import Leg, Material, MeshOptions, Model
 from finger3d.objects import Cylinder, Plane
-from finger3d.solve import Problem, build, march
+from finger3d.solve import Problem, build, contact_zone, march
 from finger3d.study import Result, Row
 
+from ._common import held_at, solve
 from ._halfplane import Profile, under
 
 SPENCE = "Spence 1975 with Dundurs' beta; references.md sec. 2"
@@ -34,6 +42,7 @@ HERTZ = "Johnson 1985 ch. 4"
 NAFEMS = "NAFEMS CGS-1; references.md sec. 6"
 ONE = "issue 4: Hertz rows within 1 %"
 P_OVER_HERTZ, Q_OVER_P, C_OVER_A, D_OVER_AP2 = 1.04269, 0.09348, 0.54321, 4.3e-4  # nu' = .3, mu = .25, N = 200
+SPENCE_Q = (0.0, 0.0955, 0.1500, 0.1872, 0.2103, 0.2184, 0.2031, 0.1788, 0.1480, 0.1054, 0.0)  # at x/a = 0, .1, ...
 RATIO = 11.0 / 3.0
 PAIRS = {"unlike": ((1.0, 0.3), (2.0, 0.2)), "beta of nu = .3": ((1.0, 0.0), (RATIO, 0.0)), "alike": ((1.0, 0.3),) * 2}
 
@@ -71,7 +80,7 @@ def numbers(profiles: list[Profile], pair: Any, size: float) -> np.ndarray:
 
 def run(quick: bool) -> Result:
     """Pairs at two thicknesses; who is the finger; NAFEMS CGS-1."""
-    points, steps = (10, 20) if quick else (30, 200)
+    points, steps = (8, 14) if quick else (30, 200)
     rows: list[Row] = []
     found: dict[str, np.ndarray] = {}
     table: list[tuple[Any, ...]] = []
@@ -104,6 +113,7 @@ def run(quick: bool) -> Result:
             Row("D/(A P^2), the same pair, N = 200", SPENCE, D_OVER_AP2, pair[3], 0.03, "references.md: 4.3e-4")
         )
     rows += _mirror_rows()
+    rows += _third_law_rows()
     rows += _swapped_rows(quick)
     rows += _nafems_rows(quick)
     columns = "pair mu thickness_mm P_over_Hertz q_over_P c_over_a D_over_AP2".split()
@@ -164,6 +174,42 @@ def _swapped_rows(quick: bool) -> list[Row]:
     ]
 
 
+def _third_law_rows() -> list[Row]:
+    """Both bodies solved whole under the forces found: their bases feel opposite forces, their surfaces keep touch."""
+    pair = (1.0, 0.3), (2.0, 0.45)
+    block = {"half_length_mm": 5.0, "height_mm": 5.0, "width_mm": 2.0}
+    model = Effect(*pair[1]).apply(_half(*pair[0], 0.15, Cylinder(0.4, radius_mm=5.0), 0.8, **block))
+    model = replace(model, legs=(Leg(0.8, steps=3), Leg(0.8, slide_x_mm=0.1, steps=2)))
+    problem = build(model)
+    *_, frame = march(problem)
+    assert frame.outcome.ok
+    force = frame.state.force.ravel()
+    other, _ = ObjectBody(model, 5.0, contact_zone(model), (), lambda text: None).mesh()
+    axes = model.object.frame(2)
+    ends, moved = [], np.zeros_like(force)
+    for mesh, rows, (modulus, nu) in (
+        (problem.mesh, local_rows(problem.surface, axes), pair[0]),
+        (other, sparse.kron(facing_trace(problem.surface, other, "contact"), axes, format="csr"), pair[1]),
+    ):
+        load = (rows.T @ force).reshape(-1, 2)
+        found = solve(mesh, Elasticity.of(modulus, nu), held_at(mesh, {"base": (0, 1)}), load=load)
+        ends.append(found.reaction.sum(axis=0))
+        moved += rows @ found.u.ravel() / problem.thickness
+    total = np.abs(ends[0]).max()
+    c = len(problem.surface.nodes)
+    condensed = np.einsum("idje,je->id", problem.compliance, frame.state.force).ravel()
+    third = "Newton's third law"
+    what = f"bases' forces, finger's less object's over finger's, {c} points, dragged"
+    return [
+        Row(what, third, 0.0, np.abs(ends[0] - ends[1]).max() / total, 1e-10, "issue 5", measure="absolute"),
+        Row(
+            "the surfaces' approach by two whole solutions, over the condensed one, less 1",
+            "the sum of both compliances", 0.0, np.abs(moved - condensed).max() / np.abs(condensed).max(), 1e-10,
+            "round-off of two factorisations", measure="absolute",
+        ),
+    ]  # fmt: skip
+
+
 def _nafems_rows(quick: bool) -> list[Row]:
     """A cylinder of steel on a block of aluminium, 35 kN per mm, plane strain."""
     size = 0.6 if quick else 0.25
@@ -190,14 +236,22 @@ def _nafems_rows(quick: bool) -> list[Row]:
 
 
 def _draw(figure: Any, curves: dict[str, Profile]) -> None:
+    """Tractions over those of Hertz's peak, a/(A R); Spence's friction from references.md."""
     left, right = figure.subplots(1, 2)
-    for name, profile in curves.items():
+    names = {"unlike": "E 1 on 2, nu .3 on .2, mu = 0", "alike": "E 1 on 1, nu .3 on .3, mu = .25"}
+    names["beta of nu = .3"] = "E 1 on 11/3, nu 0 on 0, mu = .25"
+    for (name, profile), style in zip(curves.items(), ("-", "-", ":"), strict=True):
         here = np.abs(profile.x) <= profile.a
-        left.plot(profile.x[here] / profile.a, profile.p[here] / profile.p.max(), label=name)
-        right.plot(profile.x[here] / profile.a, profile.q[here] / profile.p.max(), label=name)
+        peak = profile.a / (both(PAIRS[name]) * 200.0)
+        left.plot(profile.x[here] / profile.a, profile.p[here] / peak, style, label=names[name])
+        right.plot(profile.x[here] / profile.a, profile.q[here] / peak, style, label=names[name])
     x = np.linspace(-1.0, 1.0, 201)
     left.plot(x, np.sqrt(1.0 - x**2), "k--", lw=1.0, label="Hertz")
-    left.set(xlabel="x/a", ylabel="p/p0")
-    right.set(xlabel="x/a", ylabel="friction on the finger q/p0", title="mu = .25 but for the unlike pair, mu = 0")
-    left.legend(fontsize=8)
-    right.legend(fontsize=8)
+    tenths, friction = np.linspace(0.0, 1.0, 11), np.array(SPENCE_Q)
+    right.plot([*-tenths, *tenths], [*-friction, *friction], "k+", ms=5, label="Spence, nu' = .3 on rigid")
+    left.set(ylabel="pressure / Hertz's peak", ylim=(0.0, 1.4))
+    right.set(ylabel="friction on the finger / Hertz's peak", ylim=(-0.25, 0.42))
+    for axes in (left, right):
+        axes.set(xlabel="x/a", xticks=[-1.0, -0.5, 0.0, 0.5, 1.0])
+        axes.legend(fontsize=8, loc="upper left")
+        axes.grid(alpha=0.3)

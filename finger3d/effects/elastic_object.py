@@ -49,7 +49,7 @@ class SoftObject:
         """Compliance (c, d, c, d) mm/N of the object at the contact points; 0 in directions left out by symmetry."""
         model, axes, d = problem.model, problem.axes, problem.dim
         start = time.perf_counter()
-        body = _Body(model, self.height_mm or model.design.height_mm, zone, axes, say)
+        body = ObjectBody(model, self.height_mm or model.design.height_mm, zone, axes, say)
         mesh, whole = body.mesh()
         problem.seconds["object_mesh"] = time.perf_counter() - start
         trace = facing_trace(problem.surface, mesh, "contact")
@@ -96,7 +96,7 @@ def _held(mesh: Mesh, axes: tuple[str, ...], held_ends: bool) -> NDArray[np.int6
 
 
 @dataclass(frozen=True)
-class _Body:
+class ObjectBody:
     """How the object is meshed: with the finger's edge lengths, contact facing down, in place along x and z."""
 
     model: Model
