@@ -4,7 +4,7 @@ PYTHON ?= $(shell for p in python3.11 python3 python3.12 python3.13; do \
 	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet install --constraint constraints.txt
 
-.PHONY: install demo test test-all lint clean
+.PHONY: install demo test test-all test-browser lint clean
 
 install: .venv/.installed
 
@@ -29,6 +29,10 @@ test: install
 
 test-all: install
 	$(BIN)/python -m pytest -q
+
+# Needs /usr/bin/chromium: apt install chromium.
+test-browser: install
+	$(BIN)/python -m pytest -q -m browser
 
 lint: install
 	$(BIN)/ruff check .

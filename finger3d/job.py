@@ -140,6 +140,7 @@ def press(
         With the outcome of the last step; steps up to a failure or an interruption are kept and written.
     """
     from finger3d.accuracy import estimate
+    from finger3d.page import press_page
     from finger3d.scene import load
 
     started = time.perf_counter()
@@ -165,6 +166,8 @@ def press(
         report.stage("estimating the error")
         output.error = estimate(problem, output.frames, output.seconds)
         summary = output.write(str(history.outcome))
+    if figures:
+        press_page(folder)
     return PressResult(history, summary, folder)
 
 
@@ -199,7 +202,8 @@ def _coarse_warning(problem: Problem, frames: list[Frame]) -> list[str]:
 
 def _clear(folder: Path) -> None:
     """Remove results of an earlier run, so that no old number stands beside a new one."""
-    for name in ("summary.json", "history.csv", "contact.csv", "fields.vtu", "finger.png", "contact.png", "force.png"):
+    pictures = ("finger.png", "contact.png", "force.png", "report.html")
+    for name in ("summary.json", "history.csv", "contact.csv", "fields.vtu", "steps.npz", *pictures):
         (folder / name).unlink(missing_ok=True)
 
 
@@ -284,6 +288,7 @@ def _fields(problem: Problem, output: _Output, folder: Path, figures: bool) -> N
     """fields.vtu and the pictures, from the last good step; the field is recovered with the factor at hand."""
     from finger3d.advice import advise
     from finger3d.mesh import unfold
+    from finger3d.page.states import states_of, write_states
 
     good = [f for f in output.frames if f.outcome.ok]
     if not good:
@@ -301,6 +306,7 @@ def _fields(problem: Problem, output: _Output, folder: Path, figures: bool) -> N
         on_surface[name][points.nodes] = table[f"{name}_MPa"]
     on_surface["status"][points.nodes] = frame.state.status
     whole_u = u[parent] * sign
+    write_states(folder / "steps.npz", states_of(problem, good, mesh, parent, sign, whole_u))
     write_vtu(
         folder / "fields.vtu",
         mesh,

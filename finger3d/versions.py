@@ -19,6 +19,7 @@ PACKAGES = (
     "pyvista",
     "vtk",
     "matplotlib",
+    "plotly",
     "pydantic",
 )
 """finger3d and every package that shapes numbers or pictures, by its name on PyPI."""

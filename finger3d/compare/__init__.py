@@ -50,7 +50,7 @@ def compare(
     Parameters
     ----------
     scene : a loaded scene, or the path of a TOML file; its own domain does not matter
-    out : folder for compare.csv, compare.json, lines.csv, compare.png and scene.toml
+    out : folder for compare.csv, compare.json, lines.csv, compare.png, report.html and scene.toml
     widths : further widths (mm) of the solid; None chooses some from the finger's height, () leaves them out
     report : told about every case
 
@@ -68,7 +68,7 @@ def compare(
     _check(model, asked)
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
-    for name in ("compare.csv", "compare.json", "lines.csv", "compare.png"):
+    for name in ("compare.csv", "compare.json", "lines.csv", "compare.png", "report.html"):
         (folder / name).unlink(missing_ok=True)
     with atomic(folder / "scene.toml") as path:
         path.write_text(solid.to_toml(), encoding="utf-8")
@@ -82,8 +82,10 @@ def compare(
         report.step(done, len(plan), _remark(cases[-1]))
         _write(folder, solid, model, cases, _INCOMPLETE if done < len(plan) else None)
     from finger3d.compare.picture import draw
+    from finger3d.page import compare_page
 
     draw(folder / "compare.png", cases, model.design.width_mm, solid.title)
+    compare_page(folder)
     return Comparison(tuple(cases), tuple(_verdict(model, cases)), folder)
 
 

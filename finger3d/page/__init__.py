@@ -1,0 +1,32 @@
+"""report.html: one file that tells a result, with nothing fetched from anywhere; and steps.npz behind its 3D view.
+
+`write_page` builds a page from rows, sections and pictures; `press_page` and `compare_page` fill it from a results
+folder, so that a page can be made again at any time::
+
+    write_page(folder, "mu from strain", command="calibrate", headline=[Row("resolution of mu", 0.012, "", 0.002)],
+               sections=[Section("Fit", ["second order", Table(head, rows)])], figures=[Figure("fit.png", "...")])
+"""
+
+from __future__ import annotations
+
+from finger3d.page.build import Code, Figure, Row, Section, Table, write_page
+from finger3d.page.press import press_page
+from finger3d.page.results import compare_page
+from finger3d.page.states import States, load_states, write_states
+from finger3d.page.view3d import View3D, view_of
+
+__all__ = [
+    "Code",
+    "Figure",
+    "Row",
+    "Section",
+    "States",
+    "Table",
+    "View3D",
+    "compare_page",
+    "load_states",
+    "press_page",
+    "view_of",
+    "write_page",
+    "write_states",
+]

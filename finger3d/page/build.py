@@ -1,0 +1,224 @@
+"""A self-contained HTML page from rows, tables, text and pictures; all text is escaped."""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from finger3d.export import atomic
+from finger3d.versions import versions as installed
+
+if TYPE_CHECKING:
+    from finger3d.page.view3d import View3D
+
+# The page may run its own script and show its own pictures, and may not ask any machine for anything.
+_POLICY = "default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
+
+# What is folded away on a screen is printed all the same.
+_UNFOLD = (
+    'addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((d) => { d.open = true; }));'
+)
+
+CITE = (
+    "The finger3d authors. finger3d: frictional contact of an elastic finger-shaped tactile sensor in three dimensions"
+)
+PAPER = (
+    "Takashi Maeno, Tomoyuki Kawamura, Sen-Chieh Cheng. Friction Estimation by Pressing an Elastic Finger-Shaped "
+    "Sensor Against a Surface. IEEE Transactions on Robotics and Automation 20(2), 2004"
+)
+"""How to cite the program and the paper it grew from, as in CITATION.cff."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """A number (or text) of the headline: what it is, its unit, and its error in the same unit, if one is known."""
+
+    name: str
+    value: float | str
+    unit: str = ""
+    error: float | None = None
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table; a cell that is a number is written with five digits and set flush right."""
+
+    head: Sequence[str]
+    rows: Sequence[Sequence[object]]
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A PNG file, in the page's folder unless its path says otherwise; one that is not there is left out."""
+
+    path: str | Path
+    caption: str = ""
+
+
+@dataclass(frozen=True)
+class Code:
+    """Text to be shown as it is; with a `summary` it is folded away behind that."""
+
+    text: str
+    summary: str = ""
+
+
+Part = str | Table | Figure | Code
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading and what stands under it: paragraphs, tables, pictures, code; `folded` hides it behind the heading."""
+
+    title: str
+    parts: Sequence[Part]
+    folded: bool = False
+
+
+def write_page(
+    folder: str | Path,
+    title: str,
+    headline: Sequence[Row] = (),
+    sections: Sequence[Section] = (),
+    figures: Sequence[Figure] = (),
+    view: View3D | None = None,
+    *,
+    command: str = "",
+    outcome: str = "converged",
+    good: bool = True,
+    notes: Sequence[str] = (),
+    versions: Mapping[str, str] | None = None,
+    file: str = "report.html",
+) -> Path:
+    """Write a page into a folder, whole or not at all; versions and how to cite are added below the sections.
+
+    Parameters
+    ----------
+    folder : where the page goes, and where figures without a folder are
+    headline : the numbers a reader came for
+    view : a body to turn, in 3D
+    command : what made the results, for instance ``press``
+    outcome, good : one line on how it went, and whether that is well
+    notes : warnings and advice, shown under the headline
+    versions : name -> version of what made the numbers; default: what is installed
+
+    Returns
+    -------
+    Path
+        Of the page.
+
+    Raises
+    ------
+    Finger3dError
+        If it cannot be written.
+    """
+    folder = Path(folder)
+    body = [
+        f'<header><p class="kicker">finger3d {escape(command)}</p><h1>{escape(title)}</h1>'
+        f'<p class="{"good" if good else "bad"}">{escape(outcome)}</p></header>'
+    ]
+    if headline:
+        body.append(f'<dl class="headline">{"".join(map(_card, headline))}</dl>')
+    if notes:
+        body.append(f'<ul class="notes">{"".join(f"<li>{escape(note)}</li>" for note in notes)}</ul>')
+    if view is not None:
+        body.append(view.html())
+    body += [_figure(folder, f) for f in figures]
+    found = installed() if versions is None else versions
+    closing = [
+        Section("Versions", [", ".join(f"{k} {v}" for k, v in found.items())]),
+        Section("How to cite", [f"{CITE}, version {found.get('finger3d', 'unknown')}.", f"{PAPER}."]),
+    ]
+    body += [_section(folder, s) for s in (*sections, *closing)]
+    script = view.script() if view is not None else ""
+    target = folder / file
+    with atomic(target) as temporary:
+        temporary.write_text(_document(title, "\n".join(body), script), encoding="utf-8")
+    return target
+
+
+def number(value: object, error: float | None = None) -> str:
+    """A number with five digits, or with as many as its error leaves; text as it is.
+
+    >>> number(304.36368, 1.9)
+    '304.4 ± 1.9'
+    >>> number(0.034024128)
+    '0.034024'
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return str(value)
+    if error is None or not (math.isfinite(error) and error > 0.0 and math.isfinite(value)):
+        return f"{value:.5g}"
+    digits = 1 - math.floor(math.log10(error))
+    if digits > 6:
+        power = math.floor(math.log10(max(abs(value), error)))
+        return f"({number(value / 10.0**power, error / 10.0**power)}) 1e{power}"
+    if digits < 0:
+        return f"{round(value, digits):.0f} ± {round(error, digits):.0f}"
+    return f"{value:.{digits}f} ± {error:.{digits}f}"
+
+
+def asset(name: str) -> str:
+    """Text of a file that travels with this package."""
+    return resources.files("finger3d.page").joinpath(name).read_text(encoding="utf-8")
+
+
+def _card(row: Row) -> str:
+    unit = f' <span class="unit">{escape(row.unit)}</span>' if row.unit else ""
+    return f"<div><dt>{escape(row.name)}</dt><dd>{escape(number(row.value, row.error))}{unit}</dd></div>"
+
+
+def _section(folder: Path, section: Section) -> str:
+    inside = "".join(_part(folder, part) for part in section.parts)
+    title = f"<h2>{escape(section.title)}</h2>"
+    if section.folded:
+        return f"<section><details><summary>{title}</summary>{inside}</details></section>"
+    return f"<section>{title}{inside}</section>"
+
+
+def _part(folder: Path, part: Part) -> str:
+    if isinstance(part, Table):
+        return _table(part)
+    if isinstance(part, Figure):
+        return _figure(folder, part)
+    if isinstance(part, Code):
+        code = f"<pre>{escape(part.text)}</pre>"
+        return f"<details><summary>{escape(part.summary)}</summary>{code}</details>" if part.summary else code
+    return f"<p>{escape(part)}</p>"
+
+
+def _table(table: Table) -> str:
+    head = "".join(f'<th scope="col">{escape(name)}</th>' for name in table.head)
+    rows = "".join(f"<tr>{''.join(map(_cell, row))}</tr>" for row in table.rows)
+    # A wide table scrolls in its own box, which the keyboard can reach too.
+    return f'<div class="wide" tabindex="0"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
+
+
+def _cell(value: object) -> str:
+    kind = ' class="number"' if isinstance(value, int | float) and not isinstance(value, bool) else ""
+    return f"<td{kind}>{escape(number(value))}</td>"
+
+
+def _figure(folder: Path, figure: Figure) -> str:
+    path = folder / figure.path
+    if not path.exists():
+        return ""
+    data = base64.b64encode(path.read_bytes()).decode("ascii")
+    text = escape(figure.caption, quote=True)
+    return f'<figure><img alt="{text}" src="data:image/png;base64,{data}"><figcaption>{text}</figcaption></figure>'
+
+
+def _document(title: str, body: str, script: str) -> str:
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n<link rel="icon" href="data:,">\n'
+        f"<title>{escape(title)} - finger3d</title>\n<style>\n{asset('style.css')}</style>\n</head>\n"
+        f"<body>\n<main>\n{body}\n</main>\n<script>{_UNFOLD}</script>\n{script}</body>\n</html>\n"
+    )

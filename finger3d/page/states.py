@@ -1,0 +1,136 @@
+"""steps.npz: the displacement and the contact of chosen increments, for the 3D view, `finger3d show` and Python."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.errors import Finger3dError
+from finger3d.export import atomic
+from finger3d.history import Frame, contact_table
+from finger3d.mesh import Mesh
+from finger3d.problem import Problem
+
+Array = NDArray[Any]
+
+MOST = 10
+"""Increments kept: each costs a solution with the factor at hand, and a displacement of every node on disk."""
+
+
+@dataclass(frozen=True)
+class States:
+    """Chosen increments of a press on the whole finger; numbers in single precision, the exact ones are in the CSVs.
+
+    Attributes
+    ----------
+    points : (n, d) mm at rest, in the order of fields.vtu
+    facets : (t, d) corners of the boundary's facets, oriented outward
+    on_contact : (t,) whether a facet belongs to the contact surface
+    nodes : (m,) numbers of the contact points among `points`, in the order of contact.csv
+    step : (s,) number of each increment, from 1
+    target : (s, 3) depth_mm, slide_x_mm, slide_z_mm
+    displacement : (s, n, d) mm
+    pressure, shear_x, shear_z : (s, m) MPa, traction on the finger
+    gap : (s, m) mm
+    status : (s, m) 0 open, 1 stick, 2 slip
+    """
+
+    points: Array
+    facets: Array
+    on_contact: Array
+    nodes: Array
+    step: Array
+    target: Array
+    displacement: Array
+    pressure: Array
+    shear_x: Array
+    shear_z: Array
+    gap: Array
+    status: Array
+
+    @property
+    def dim(self) -> int:
+        """2 for a section, 3 for a solid."""
+        return int(self.points.shape[1])
+
+    def on_points(self, name: str, k: int) -> Array:
+        """A contact field of the k-th kept increment at all points (n,): 0 where there is no contact point."""
+        values = getattr(self, name)[k]
+        out = np.zeros(len(self.points), dtype=values.dtype)
+        out[self.nodes] = values
+        return out
+
+
+def chosen(count: int, most: int = MOST) -> list[int]:
+    """Numbers of at most `most` of `count` increments, spread evenly, the last among them.
+
+    >>> chosen(3), chosen(21, 5)
+    ([0, 1, 2], [0, 5, 10, 15, 20])
+    """
+    return np.unique(np.round(np.linspace(count - 1, 0, min(count, most))).astype(int)).tolist() if count else []
+
+
+def states_of(problem: Problem, frames: Sequence[Frame], mesh: Mesh, parent: Array, sign: Array, last: Array) -> States:
+    """Recover chosen increments.
+
+    Parameters
+    ----------
+    frames : those that converged, in turn
+    mesh, parent, sign : the whole finger, and where each node comes from (`finger3d.mesh.unfold`)
+    last : (n, d) mm, displacement of the whole finger at the end, which is known already
+    """
+    from finger3d.fem.recover import displacement
+
+    kept = chosen(len(frames))
+    u = np.empty((len(kept), *mesh.points.shape), dtype=np.float32)
+    for k, number in enumerate(kept[:-1]):
+        unknowns = problem.model.kinematics.unknowns(problem, frames[number].part)
+        u[k] = displacement(problem.mesh, unknowns)[parent] * sign
+    u[-1] = last
+    tables = [contact_table(problem.points, frames[i].state) for i in kept]
+    facets = {label: f[:, : mesh.dim] for label, f in mesh.facets.items() if len(f)}
+    at = [frames[i].target for i in kept]
+
+    def columns(name: str) -> Array:
+        return np.array([t[name] for t in tables], dtype=np.float32)
+
+    return States(
+        points=mesh.points.astype(np.float32),
+        facets=np.concatenate(list(facets.values())).astype(np.int32),
+        on_contact=np.concatenate([np.full(len(f), label == "contact") for label, f in facets.items()]),
+        nodes=problem.points.nodes.astype(np.int32),
+        step=np.array(kept) + 1,
+        target=np.array([(t.depth_mm, t.slide_x_mm, t.slide_z_mm) for t in at]),
+        displacement=u,
+        pressure=columns("pressure_MPa"),
+        shear_x=columns("shear_x_MPa"),
+        shear_z=columns("shear_z_MPa"),
+        gap=columns("gap_mm"),
+        status=np.array([frames[i].state.status for i in kept], dtype=np.int8),
+    )
+
+
+def write_states(path: str | Path, states: States) -> None:
+    """Write steps.npz."""
+    with atomic(path) as temporary, temporary.open("wb") as file:
+        np.savez(file, allow_pickle=False, **{f.name: getattr(states, f.name) for f in fields(States)})
+
+
+def load_states(path: str | Path) -> States:
+    """Read steps.npz.
+
+    Raises
+    ------
+    Finger3dError
+        If it cannot be read, or is of another version.
+    """
+    try:
+        with np.load(path) as data:
+            return States(**{f.name: data[f.name] for f in fields(States)})
+    except (OSError, ValueError, KeyError) as error:
+        raise Finger3dError(f"{path}: cannot be read as steps of a press ({error}); press the scene again") from None

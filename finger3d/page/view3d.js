@@ -1,0 +1,103 @@
+"use strict";
+(function () {
+  const data = JSON.parse(document.getElementById("view-data").textContent);
+  const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
+  const rest = new Float32Array(bytes(data.rest)), moved = new Float32Array(bytes(data.moved));
+  const pressure = new Float32Array(bytes(data.pressure)), status = new Uint8Array(bytes(data.status));
+  const body = new Uint32Array(bytes(data.body)), contact = new Uint32Array(bytes(data.contact));
+  const n = data.vertices, names = ["open", "stick", "slip"];
+  const stage = document.getElementById("view-stage"), field = document.getElementById("view-field");
+  const slider = document.getElementById("view-step"), label = document.getElementById("view-label");
+  const key = document.getElementById("view-key");
+
+  // Each contact triangle in six around its centre, two for each corner: a corner's status covers what is nearest to it.
+  const edges = new Map(), parents = [], six = { i: [], j: [], k: [] }, owner = [];
+  for (let v = 0; v < n; v++) parents.push([v]);
+  const middle = (a, b) => {
+    const name = Math.min(a, b) * n + Math.max(a, b);
+    if (!edges.has(name)) { edges.set(name, parents.length); parents.push([a, b]); }
+    return edges.get(name);
+  };
+  for (let t = 0; t < contact.length; t += 3) {
+    const [a, b, c] = contact.slice(t, t + 3);
+    const ab = middle(a, b), bc = middle(b, c), ca = middle(c, a), centre = parents.length;
+    parents.push([a, b, c]);
+    for (const [p, q, own] of [[a, ab, a], [ab, b, b], [b, bc, b], [bc, c, c], [c, ca, c], [ca, a, a]]) {
+      six.i.push(p); six.j.push(q); six.k.push(centre); owner.push(own);
+    }
+  }
+  const sides = { i: [], j: [], k: [] };
+  for (let t = 0; t < body.length; t += 3) {
+    sides.i.push(body[t]); sides.j.push(body[t + 1]); sides.k.push(body[t + 2]);
+  }
+  const shift = (s, v) => Math.hypot(...[0, 1, 2].map((a) => moved[3 * (s * n + v) + a] - rest[3 * v + a]));
+  const mean = (vs, of) => vs.reduce((sum, v) => sum + of(v), 0) / vs.length;
+  const steps = data.labels.length;
+  let highest = 0, farthest = 0;
+  for (let s = 0; s < steps; s++) for (let v = 0; v < n; v++) {
+    highest = Math.max(highest, pressure[s * n + v]); farthest = Math.max(farthest, shift(s, v));
+  }
+  // On a narrow screen the scale lies below the body, and the camera steps back.
+  const narrow = () => stage.clientWidth < 600;
+  const scale = (title, top) => ({ cmin: 0, cmax: top || 1, colorscale: "Viridis", showscale: true,
+    colorbar: narrow() ? { title: { text: title, side: "top" }, thickness: 12, len: 0.9, orientation: "h", y: -0.02 }
+      : { title: { text: title, side: "right" }, thickness: 14, len: 0.8 } });
+  const light = { ambient: 0.85, diffuse: 0.35, specular: 0.02, roughness: 0.9, fresnel: 0.0 };
+
+  function traces(s, what) {
+    const at = (a) => (vs) => mean(vs, (v) => moved[3 * (s * n + v) + a]);
+    const place = (list) => ({ x: list.map(at(0)), y: list.map(at(1)), z: list.map(at(2)) });
+    const corners = parents.slice(0, n);
+    const far = (list) => list.map((vs) => mean(vs, (v) => shift(s, v)));
+    const base = { type: "mesh3d", flatshading: false, lighting: light, lightposition: { x: -2e4, y: 8e4, z: 5e4 } };
+    const side = { ...base, ...place(corners), ...sides, hoverinfo: "skip", color: "#d9d6cf", name: "body" };
+    const press = parents.map((vs) => mean(vs, (v) => pressure[s * n + v]));
+    const said = parents.map((vs) => [...new Set(vs.map((v) => names[status[s * n + v]]))].join(" / "));
+    const text = parents.map((vs, p) => `${said[p]}<br>pressure ${press[p].toPrecision(3)} MPa`
+      + `<br>moved ${mean(vs, (v) => shift(s, v)).toPrecision(3)} mm`);
+    const face = { ...base, ...place(parents), ...six, text, name: "contact surface",
+      hovertemplate: "x %{x:.2f}, y %{y:.2f}, z %{z:.2f} mm<br>%{text}<extra></extra>" };
+    if (what === "status") Object.assign(face, { intensitymode: "cell", intensity: owner.map((v) => status[s * n + v]),
+      cmin: -0.5, cmax: 2.5, showscale: false, colorscale: [[0, "#c4c4c4"], [1 / 3, "#c4c4c4"], [1 / 3, "#1f3f77"],
+        [2 / 3, "#1f3f77"], [2 / 3, "#f28e2b"], [1, "#f28e2b"]] });
+    if (what === "pressure") Object.assign(face, { intensity: press, ...scale("contact pressure (MPa)", highest) });
+    if (what === "moved") {
+      Object.assign(face, { intensity: far(parents), ...scale("displacement (mm)", farthest) });
+      Object.assign(side, { intensity: far(corners), ...scale("", farthest), showscale: false });
+    }
+    return [side, face];
+  }
+
+  // The axes stay as they are from step to step, so that the finger is seen to move.
+  const range = [0, 1, 2].map((a) => {
+    let low = Infinity, high = -Infinity;
+    for (const list of [rest, moved]) for (let p = a; p < list.length; p += 3) {
+      low = Math.min(low, list[p]); high = Math.max(high, list[p]);
+    }
+    return [low - 0.02 * (high - low), high + 0.02 * (high - low)];
+  });
+  // As far away as a body needs whose longest extent has to fit into the width of the stage.
+  const size = range.map(([low, high]) => high - low), cube = Math.cbrt(size[0] * size[1] * size[2]);
+  const back = 1.1 * Math.max(...size) / cube * Math.max(1, 1.5 * stage.clientHeight / stage.clientWidth);
+  const eye = { x: -0.35 * back, y: 0.6 * back, z: 0.85 * back };
+  function layout() {
+    const style = getComputedStyle(document.body), ink = style.color, line = style.getPropertyValue("--line").trim();
+    const axis = (a) => ({ title: { text: "xyz"[a] + " (mm)" }, range: range[a], gridcolor: line, zerolinecolor: line,
+      showbackground: false, nticks: 6, showspikes: false });
+    return { margin: { l: 0, r: 0, t: 0, b: 0 }, paper_bgcolor: "rgba(0,0,0,0)", font: { color: ink, size: 12 },
+      uirevision: "keep", showlegend: false,
+      scene: { xaxis: axis(0), yaxis: axis(1), zaxis: axis(2), aspectmode: "data", dragmode: "orbit",
+        camera: { up: { x: 0, y: 1, z: 0 }, center: { x: 0, y: 0, z: 0 }, eye: eye } } };
+  }
+  const config = { responsive: true, displaylogo: false, displayModeBar: false };
+  function draw() {
+    const s = Number(slider.value);
+    label.textContent = data.labels[s];
+    key.hidden = field.value !== "status";
+    return Plotly.react(stage, traces(s, field.value), layout(), config);
+  }
+  field.addEventListener("change", draw);
+  slider.addEventListener("input", draw);
+  window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
+  draw().then(() => { stage.dataset.drawn = "yes"; });
+})();

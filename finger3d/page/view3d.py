@@ -1,0 +1,122 @@
+"""The 3D view of a page: the deformed surface, drawn by plotly in the reader's browser from data in the page."""
+
+from __future__ import annotations
+
+import base64
+import json
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.page.build import asset
+from finger3d.page.states import States, chosen
+
+Array = NDArray[Any]
+
+_BUDGET = 1_500_000  # bytes of numbers in a page, beside plotly's 5 MB and the pictures
+
+
+@dataclass(frozen=True)
+class View3D:
+    """A surface at several increments, corners of its facets only.
+
+    Attributes
+    ----------
+    rest : (v, 3) mm
+    body, contact : (t, 3) triangles off and on the contact surface
+    moved : (s, v, 3) mm, where the corners are at each increment
+    pressure : (s, v) MPa
+    status : (s, v) 0 open, 1 stick, 2 slip
+    labels : (s,) what each increment is called
+    """
+
+    rest: Array
+    body: Array
+    contact: Array
+    moved: Array
+    pressure: Array
+    status: Array
+    labels: tuple[str, ...]
+
+    def html(self) -> str:
+        """The box it stands in, with its controls."""
+        last = len(self.labels) - 1
+        hidden = " hidden" if last == 0 else ""
+        return (
+            '<div class="view"><div class="controls">'
+            '<label>colour <select id="view-field"><option value="pressure">contact pressure</option>'
+            '<option value="status">stick and slip</option><option value="moved">displacement</option></select></label>'
+            f'<label{hidden}>step <input id="view-step" type="range" min="0" max="{last}" value="{last}"></label>'
+            '<output id="view-label"></output>'
+            '<span class="key" id="view-key" hidden><span><i style="background:#1f3f77"></i>stick</span>'
+            '<span><i style="background:#f28e2b"></i>slip</span>'
+            '<span><i style="background:#c4c4c4"></i>open</span></span>'
+            '</div><div class="stage" id="view-stage"></div>'
+            "<p>True scale, deformed. Drag to turn, scroll or pinch to zoom; point at the contact surface to read it."
+            "<noscript> The 3D view needs JavaScript; the pictures below show the last step.</noscript></p></div>"
+        )
+
+    def script(self) -> str:
+        """Plotly, the numbers, and what joins them."""
+        data = {
+            "labels": self.labels,
+            "vertices": len(self.rest),
+            "rest": _packed(self.rest, "<f4"),
+            "moved": _packed(self.moved, "<f4"),
+            "pressure": _packed(self.pressure, "<f4"),
+            "status": _packed(self.status, "u1"),
+            "body": _packed(self.body, "<u4"),
+            "contact": _packed(self.contact, "<u4"),
+        }
+        text = json.dumps(data).replace("</", "<\\/")
+        return (
+            f"<script>{_plotly()}</script>\n"
+            f'<script type="application/json" id="view-data">{text}</script>\n<script>{asset("view3d.js")}</script>\n'
+        )
+
+
+def view_of(states: States, budget: int = _BUDGET) -> View3D | None:
+    """A view of a solid; as many increments as the budget (bytes) holds, None for a section or if not one fits."""
+    if states.dim != 3:
+        return None
+    corners, index = np.unique(states.facets, return_inverse=True)
+    triangles = index.reshape(states.facets.shape)
+    each = len(corners) * (3 * 4 + 4 + 1) * 4 // 3
+    most = (budget - triangles.size * 16 // 3) // each
+    if most < 1:
+        return None
+    kept = chosen(len(states.step), most)
+    rest = states.points[corners]
+    return View3D(
+        rest=rest,
+        body=triangles[~states.on_contact],
+        contact=triangles[states.on_contact],
+        moved=rest + states.displacement[kept][:, corners],
+        pressure=np.array([states.on_points("pressure", k)[corners] for k in kept]),
+        status=np.array([states.on_points("status", k)[corners] for k in kept]),
+        labels=tuple(_label(int(states.step[k]), states.target[k]) for k in kept),
+    )
+
+
+def _label(step: int, target: Array) -> str:
+    depth, x, z = (float(v) for v in target)
+    slid = "".join(f", slid {v:.4g} mm along {axis}" for v, axis in ((x, "x"), (z, "z")) if v)
+    return f"step {step}: {depth:.4g} mm deep{slid}"
+
+
+def _packed(values: Array, kind: str) -> str:
+    return base64.b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")
+
+
+def _plotly() -> str:
+    """plotly.js from plotly's wheel, read as text: importing plotly would take as long as the rest of the page."""
+    from importlib.util import find_spec
+    from pathlib import Path
+
+    found = find_spec("plotly")
+    assert found is not None
+    assert found.origin is not None
+    library = Path(found.origin).with_name("package_data") / "plotly.min.js"
+    return library.read_text(encoding="utf-8").replace("</script", "<\\/script")
