@@ -11,7 +11,7 @@ import numpy as np
 from finger3d.contact.conditions import TOLERANCE
 from finger3d.contact.law import OPEN, STATUS_NAMES
 from finger3d.page.build import Figure, Row, Section, Table, write_page
-from finger3d.page.results import how_modelled, read_json
+from finger3d.page.results import how_modelled, read_json, title_of
 from finger3d.page.states import States, load_states
 from finger3d.page.view3d import view_of
 
@@ -61,7 +61,7 @@ def press_page(folder: str | Path) -> Path:
     ]
     return write_page(
         folder,
-        summary["scene"]["title"] or "A press",
+        title_of(summary["scene"]),
         headline(good[-1], _errors(summary)) if good else (),
         sections,
         [Figure(name, text) for name, text in _PICTURES.items()],

@@ -31,6 +31,12 @@ def read_json(path: Path) -> dict[str, Any]:
     return found
 
 
+def title_of(scene: Mapping[str, Any]) -> str:
+    """The scene's title, or what is pressed onto what."""
+    object_ = (scene.get("object") or {}).get("shape", "plane")
+    return scene.get("title") or f"{scene['finger']['geometry']} on a {object_}"
+
+
 def how_modelled(summary: Mapping[str, Any], folder: Path) -> list[Part]:
     """The scene as a table, the effects that were on, and the file itself."""
     scene = summary["scene"]
@@ -93,7 +99,7 @@ def compare_page(folder: str | Path) -> Path:
     )
     return write_page(
         folder,
-        f"{data['scene']['title'] or 'A scene'}: 2D against 3D",
+        f"{title_of(data['scene'])}: 2D against 3D",
         headline,
         [
             Section("Verdict", list(data["verdict"])),
