@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,9 +32,13 @@ _KEPT = 5  # a factor is what takes the memory; a path rarely has more than four
 
 @dataclass
 class Later:
-    """What is made of a problem after its build, once for each key; the last few are kept, factorisations counted."""
+    """What is made of a problem after its build, once for each key; the last few are kept, factorisations counted.
+
+    `last` is what an increment may leave for the one that goes on from it.
+    """
 
     factorizations: int = 0
+    last: Any = None
     _kept: dict[Hashable, object] = field(default_factory=dict)
 
     def once(self, key: Hashable, make: Callable[[], Made]) -> Made:

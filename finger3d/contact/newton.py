@@ -16,6 +16,8 @@ _EXACT = 1e-11
 """Residual of the conditions themselves at which an iterate is a solution; the projection's own residual would not do,
 since a gap's round-off enters its bound times mu."""
 
+_DIVERGED = 1e9
+
 
 @dataclass(frozen=True)
 class Iterate:
@@ -124,7 +126,12 @@ def sweeps(problem: Increments, start: Float, count: int) -> Float:
     force = start.copy()
     moved = problem.moved(force)
     columns = problem.compliance.reshape(c, d, c, d)
+    far = _DIVERGED * (
+        float(np.abs(problem.rho * problem.free).max(initial=0.0)) + float(np.abs(start).max(initial=0.0))
+    )
     for _ in range(count):
+        if not float(np.abs(force).max(initial=0.0)) <= far:  # the compliance has a direction that is not held
+            return start
         for i in np.flatnonzero((force[:, 0] > 0.0) | (moved[:, 0] < 0.0)):
             trial = force[i] - problem.rho[i] * moved[i]
             trial[0] = max(trial[0], 0.0)

@@ -7,23 +7,24 @@ let the contact rule solve contact exactly, repeat.  The multipliers are total: 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from finger3d.contact.conditions import stiffness_weights
-from finger3d.contact.state import ContactState, Increment
+from finger3d.contact.conditions import TOLERANCE, residual, stiffness_weights
+from finger3d.contact.state import ContactState, Increment, next_state
 from finger3d.effects.base import fill
 from finger3d.errors import Outcome
-from finger3d.fem.assembly import Pattern
-from finger3d.fem.condense import condense
+from finger3d.fem.assembly import Pattern, Stiffness, pressure_scale
+from finger3d.fem.condense import Condensed, condense
+from finger3d.fem.deformed import DeformedContact, deformed_contact
 from finger3d.fem.hyperelastic import InvertedError, NeoHooke, assemble, nodal_fields, stretch
 from finger3d.fem.recover import displacement
 from finger3d.fem.surface import Surface
-from finger3d.kinematics import RULES
+from finger3d.kinematics import RULES, length_scale
 from finger3d.mesh import Mesh
 from finger3d.model import Model
 from finger3d.problem import at_points, folded
@@ -31,8 +32,8 @@ from finger3d.problem import at_points, folded
 Float = NDArray[np.float64]
 
 _ITERATIONS = 20
-_SETTLED = 1e-9
-"""Largest last correction of a displacement, in depths; Newton's next one would be its square."""
+_SETTLED = 1e-9  # largest violation; round-off may leave as much as TOLERANCE
+_SHARES = (1.0, 0.5, 0.25, 0.125)  # of a step that would turn a cell inside out
 
 _SLOPE_STEP = 1e-5  # of the depth: central differences of the object's height, exact for planes
 _BESIDE = 2.0  # gap beside an object, in heights of the finger
@@ -62,57 +63,57 @@ class FiniteStrain:
         return DeformedState(**(vars(rest) | {"frames": frames}), unknowns=unknowns)
 
     def increment(self, problem: Any, state: ContactState, a: Any, b: Any, guess: Float | None) -> Increment:
-        """Newton until the correction is below 1e-9 depths; a cell turned inside out ends it."""
+        """Newton until all conditions hold where it has come to.
+
+        It begins with the factor that the increment before ended with, which is that of the same place.
+        """
         assert isinstance(state, DeformedState)
         assert state.unknowns is not None
-        mesh, law, scale = problem.mesh, self._law(problem), max(a.depth_mm, b.depth_mm)
+        law, scale = self._law(problem), length_scale(problem, a, b)
         c, d = problem.compliance.shape[:2]
         rule, weights = RULES[problem.model.rule], stiffness_weights(problem.compliance.reshape(c * d, c * d), d)
-        pattern, before = Pattern.of(mesh), displacement(mesh, state.unknowns)
-        x, force, spent = state.unknowns, state.force if guess is None else guess, 0
-        error = np.inf
+        place, body = self._begin(problem, law, state.unknowns)
+        force, spent, found = state.force if guess is None else guess, 0, None
+        error = size = np.inf
         for _ in range(_ITERATIONS):
-            try:
-                tangent, inner = assemble(mesh, law, x, pattern, problem.thickness)
-            except InvertedError:
-                return Increment(state, Outcome.INVERTED, error, spent, "none")
-            geometry = _contact(problem, problem.surface, displacement(mesh, x), b)
-            body = condense(tangent, problem.held, geometry[1][problem.kept])
-            problem.later.factorizations += body.factorizations
+            contact = _contact(problem, problem.surface, displacement(problem.mesh, place.x), b)
+            if found is not None:
+                moved = _moved_by(problem, state, contact, (state.unknowns, place.x, None), (a, b))
+                last, error = error, _violation(problem, place, contact, found.state, moved, (scale, law.shear))
+                if error <= _SETTLED or 0.3 * last < error <= TOLERANCE:
+                    problem.later.last = replace(place, tangent=None), body
+                    after = vars(next_state(state, found.state.force, moved, found.state.status))
+                    settled = DeformedState(**(after | {"frames": contact.frames}), unknowns=place.x)
+                    return Increment(settled, Outcome.CONVERGED, max(found.residual, error), spent, found.method)
+            if place.tangent is not None:
+                tangent = place.tangent.less(contact.softening(problem.surface, force[:, 0]))
+                body = condense(tangent, problem.held, contact.rows[problem.kept], spent=body)
+                problem.later.factorizations += body.factorizations
+            assert body is not None
+            relaxed = body.solve(-place.inner)
+            free = _moved_by(problem, state, contact, (state.unknowns, place.x, relaxed), (a, b))
+            free[:, 1:] += state.position
             compliance = at_points(body.compliance, problem.kept, c, d)
-            relaxed = body.solve(-inner)
-            free = self._free(problem, state, geometry, (before, x, relaxed), (a, b))
             found = rule(state, free, compliance, problem.model.friction, scale, force, weights)
             spent += found.iterations
             if not found.outcome.ok:
                 return replace(found, state=state, iterations=spent)
             force = found.state.force
             step = relaxed + body.unknowns(force.ravel()[problem.kept])
-            x = x + step
-            last, error = error, float(np.abs(step[: mesh.points.size]).max()) / scale
-            if error <= _SETTLED:
-                after = DeformedState(**(vars(found.state) | {"frames": geometry[2]}), unknowns=x)
-                return Increment(after, Outcome.CONVERGED, max(found.residual, error), spent, found.method)
-            if not np.isfinite(error) or error > max(10.0, 1e3 * last):
+            last, size = size, float(np.abs(step[: problem.mesh.points.size]).max()) / scale
+            if not np.isfinite(size) or size > max(10.0, 1e3 * last):
                 break
+            onward = _onward(problem, law, place, step)
+            if onward is None:
+                return Increment(state, Outcome.INVERTED, error, spent, "none")
+            place = onward
         return Increment(state, Outcome.NEWTON, error, spent, "none")
 
-    def _free(
-        self, problem: Any, state: ContactState, geometry: tuple[Float, sp.csr_matrix, Float],
-        motion: tuple[Float, Float, Float], path: tuple[Any, Any],
-    ) -> Float:  # fmt: skip
-        """Gap and tangential position (c, d) if the body moved from x by `relaxed`, under no contact force."""
-        (gap, rows, frames), (before, x, relaxed), (a, b) = geometry, motion, path
-        n, d = before.size, problem.dim
-        moved = np.array([b.slide_x_mm - a.slide_x_mm, a.depth_mm - b.depth_mm, b.slide_z_mm - a.slide_z_mm])[:d]
-        free = np.empty((len(gap), d))
-        free[:, 0] = gap + (rows @ relaxed[:n]).reshape(-1, d)[:, 0]
-        since = problem.surface.trace @ ((x + relaxed)[:n].reshape(-1, d) - before) - moved
-        free[:, 1:] = state.position + np.einsum("ctk,ck->ct", frames[:, 1:], since)
-        # the tangent across a symmetry plane does not move, whatever the half hat's mean says
-        across = np.setdiff1d(np.arange(free.size), problem.kept)
-        free.ravel()[across] = np.hstack([gap[:, None], state.position]).ravel()[across]
-        return free
+    def _begin(self, problem: Any, law: NeoHooke, x: Float) -> tuple[_Place, Condensed | None]:
+        """The place of unknowns x without a tangent if its body is at hand; otherwise a body to overwrite."""
+        kept, problem.later.last = problem.later.last, None
+        place, body = kept or (None, None)
+        return (place if place is not None and place.x is x else _Place.at(problem, law, x)), body
 
     def unknowns(self, problem: Any, state: ContactState) -> Float:
         """Kept with the state."""
@@ -135,13 +136,78 @@ class FiniteStrain:
 
     def gap(self, problem: Any, state: ContactState, target: Any, face: Surface) -> Float:
         """Gap of the moved points."""
-        return _contact(problem, face, displacement(problem.mesh, self.unknowns(problem, state)), target)[0]
+        return _contact(problem, face, displacement(problem.mesh, self.unknowns(problem, state)), target).gap
 
     def fields(self, problem: Any, state: ContactState) -> tuple[Float, Float, Float]:
         """Displacement, Green-Lagrange strain and Cauchy stress."""
         unknowns, law = self.unknowns(problem, state), self._law(problem)
         strain, cauchy = nodal_fields(problem.mesh, law, unknowns)
         return displacement(problem.mesh, unknowns), strain, cauchy
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Unknowns x (N,), the internal forces (N,) and the tangent there; no tangent if it was factored before."""
+
+    x: Float
+    inner: Float
+    tangent: Stiffness | None
+
+    @classmethod
+    def at(cls, problem: Any, law: NeoHooke, x: Float) -> _Place:
+        """Assemble; raises InvertedError."""
+        pattern = problem.later.once("pattern", lambda: Pattern.of(problem.mesh))
+        tangent, inner = assemble(problem.mesh, law, x, pattern, problem.thickness)
+        return cls(x, inner, tangent)
+
+
+def _onward(problem: Any, law: NeoHooke, place: _Place, step: Float) -> _Place | None:
+    """The place a step further on, or as much of it as turns no cell inside out."""
+    for share in _SHARES:
+        try:
+            return _Place.at(problem, law, place.x + share * step)
+        except InvertedError:
+            continue
+    return None
+
+
+def _moved_by(
+    problem: Any, state: ContactState, contact: DeformedContact,
+    motion: tuple[Float, Float, Float | None], path: tuple[Any, Any],
+) -> Float:  # fmt: skip
+    """Gap and change of tangential position (c, d) of a body that moved from `before` to x, and on by `relaxed`."""
+    (before, x, relaxed), (a, b) = motion, path
+    n, d = problem.mesh.points.size, problem.dim
+    travel = np.array([b.slide_x_mm - a.slide_x_mm, a.depth_mm - b.depth_mm, b.slide_z_mm - a.slide_z_mm])[:d]
+    there = x if relaxed is None else x + relaxed
+    out = np.empty((len(contact.gap), d))
+    out[:, 0] = contact.gap + (0.0 if relaxed is None else (contact.rows @ relaxed[:n])[::d])
+    since = problem.surface.trace @ (there - before)[:n].reshape(-1, d) - travel
+    out[:, 1:] = np.einsum("ctk,ck->ct", contact.frames[:, 1:], since)
+    # the tangent across a symmetry plane does not move, whatever the half hat's mean says
+    out.ravel()[np.setdiff1d(np.arange(out.size), problem.kept)] = 0.0
+    return out
+
+
+def _violation(
+    problem: Any, place: _Place, contact: DeformedContact, found: ContactState, moved: Float,
+    scales: tuple[float, float],
+) -> float:  # fmt: skip
+    """Largest violation at a place: of contact (lengths by a scale), equilibrium (by the largest nodal force), and
+    p = K (J - 1) (in J; p by the shear modulus).  The forces' own friction law holds as the rule left it."""
+    n, force = problem.mesh.points.size, found.force
+    normal, length = force[:, 0], np.linalg.norm(force[:, 1:], axis=1)
+    mu = length / np.where(normal > 0.0, normal, 1.0)
+    astray = place.inner.copy()
+    astray[:n] -= contact.rows[problem.kept].T @ force.ravel()[problem.kept]
+    astray[problem.held] = 0.0
+    largest = float(np.linalg.norm(force, axis=1).max()) or float(np.abs(place.inner[:n]).max()) or 1.0
+    unbalanced = float(np.abs(astray[:n]).max()) / largest
+    mesh = problem.mesh
+    volume = np.abs(np.linalg.det(np.diff(mesh.points[mesh.cells[:, : mesh.dim + 1]], axis=1))).mean()
+    volume *= problem.thickness / math.factorial(mesh.dim) * pressure_scale(mesh, scales[1])
+    swollen = float(np.abs(astray[n:]).max(initial=0.0)) / volume
+    return max(residual(force, moved, found.status, mu, scales[0]), unbalanced, swollen)
 
 
 def _moved(mesh: Mesh, u: Float, place: Float, axes: tuple[str, ...]) -> Float:
@@ -155,8 +221,8 @@ def _moved(mesh: Mesh, u: Float, place: Float, axes: tuple[str, ...]) -> Float:
     return place[:d] + ones * (shape(bary[None], mesh.is_quadratic)[0] @ u[mesh.cells[cell]])
 
 
-def _contact(problem: Any, face: Surface, u: Float, target: Any) -> tuple[Float, sp.csr_matrix, Float]:
-    """Gap (c,), rows (c d, n d) and directions (c, d, d) of points of a face displaced by u (n, d)."""
+def _contact(problem: Any, face: Surface, u: Float, target: Any) -> DeformedContact:
+    """Contact of a face displaced by u (n, d): gaps are means over the deformed area."""
     model, d = problem.model, problem.dim
     at = face.samples + face.interpolate @ u
     z = at[:, 2] - target.slide_z_mm if d == 3 else np.zeros(len(at))
@@ -171,30 +237,9 @@ def _contact(problem: Any, face: Surface, u: Float, target: Any) -> tuple[Float,
     length = np.linalg.norm(normal, axis=1)
     normal = normal / length[:, None]
     vertical = level + problem.touch_mm - target.depth_mm - at[:, 1]
-    gap = face.average @ np.where(there, vertical / length, _BESIDE * model.design.height_mm)
-    mean = face.average @ normal
-    for axis in problem.axes:
-        k = "xyz".index(axis)
-        mean[face.points[:, k] == 0.0, k] = 0.0
-    frames = _frames(mean)
-    parts = [face.average @ sp.diags_array(normal[:, k]) @ face.interpolate for k in range(d)]
-    blocks = [sp.hstack(parts, format="csr")]
-    blocks += [
-        sp.hstack([sp.diags_array(frames[:, t, k]) @ face.trace for k in range(d)], format="csr") for t in range(1, d)
-    ]
-    c, n = len(face.nodes), len(u)
-    rows = sp.vstack(blocks, format="csr")[np.arange(c * d).reshape(d, c).T.ravel()]
-    return gap, sp.csr_matrix(rows[:, np.arange(n * d).reshape(d, n).T.ravel()]), frames
-
-
-def _frames(normal: Float) -> Float:
-    """Directions (c, d, d) with the given normals (c, d): the first tangent is +x laid into the plane."""
-    d = normal.shape[1]
-    n = normal / np.linalg.norm(normal, axis=1)[:, None]
-    along = np.eye(d)[0] - n[:, :1] * n
-    along /= np.linalg.norm(along, axis=1)[:, None]
-    rows = [n, along] if d == 2 else [n, along, np.cross(n, along)]
-    return np.stack(rows, axis=1)
+    sampled = np.where(there, vertical / length, _BESIDE * model.design.height_mm)
+    axes = problem.axes
+    return deformed_contact(face, (problem.mesh.points, u), (sampled, normal), axes)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ Displacement form: ``lam div(u) div(v) + 2 G eps(u):eps(v)``.  Mixed form (Taylo
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -64,6 +64,12 @@ class Stiffness:
     upper: sp.csr_matrix
     pressure_vertices: Int
     pressure_scale: float
+
+    def less(self, part: sp.csr_matrix) -> Stiffness:
+        """The stiffness less a symmetric matrix (m, m) on its first unknowns, on entries that it has."""
+        upper = sp.triu(part, format="coo")
+        wide = sp.csr_matrix((upper.data, (upper.row, upper.col)), shape=self.upper.shape)
+        return replace(self, upper=sp.csr_matrix(self.upper - wide))
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,16 @@ import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from finger3d.fem.assembly import Stiffness
+
+if TYPE_CHECKING:
+    from finger3d.fem.pardiso import SchurFactor
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -43,6 +47,7 @@ class Condensed:
     _rows: sp.csr_matrix = field(repr=False)
     _free: Int = field(repr=False)
     _solve: Callable[[Float], Float] = field(repr=False)
+    _series: _Series | None = field(default=None, repr=False)
 
     def unknowns(self, force: Float) -> Float:
         """All unknowns (N,) under row forces (r,) N, with the factor at hand: displacements mm, then pressures."""
@@ -64,7 +69,9 @@ class Condensed:
         return condense(stiffness, fixed, self._rows, self.solver)
 
 
-def condense(stiffness: Stiffness, fixed: Int, rows: sp.csr_matrix, solver: str | None = None) -> Condensed:
+def condense(
+    stiffness: Stiffness, fixed: Int, rows: sp.csr_matrix, solver: str | None = None, spent: Condensed | None = None
+) -> Condensed:
     """Condense a stiffness to rows.
 
     Parameters
@@ -74,21 +81,26 @@ def condense(stiffness: Stiffness, fixed: Int, rows: sp.csr_matrix, solver: str 
     rows : (r, n d) sparse
         What is read: row displacement = rows @ u; row forces act through the transpose.
     solver : "pardiso" or "superlu"; default FINGER3D_SOLVER, else PARDISO where it is installed
+    spent : a body that is not needed any more
+        PARDISO overwrites its factor, and keeps its ordering if the entries stand in the same places.
     """
     start = time.perf_counter()
-    size = stiffness.upper.shape[0]
+    upper, size = stiffness.upper, stiffness.upper.shape[0]
+    solver = solver or os.environ.get("FINGER3D_SOLVER") or _default_solver()
     keep = np.ones(size, dtype=bool)
     keep[fixed] = False
     free = np.flatnonzero(keep)
-    upper = stiffness.upper[free][:, free]
     padded = sp.csr_matrix((rows.data, rows.indices, rows.indptr), shape=(rows.shape[0], size))
-    reduced = padded[:, free].tocsr()
-    solver = solver or os.environ.get("FINGER3D_SOLVER") or _default_solver()
-    build = {"pardiso": _pardiso, "superlu": _superlu}[solver]
-    compliance, perturbed, solve = build(upper, reduced)
+    series: _Series | None = None
+    solve: Callable[[Float], Float]
+    if solver == "pardiso":
+        series = _Series.of(upper, free, padded, spent._series if spent else None)
+        compliance, perturbed, solve = -series.factor.schur, series.factor.perturbed, series.factor.solve
+    else:
+        compliance, perturbed, solve = _superlu(upper[free][:, free], padded[:, free].tocsr())
     compliance = 0.5 * (compliance + compliance.T)
     seconds = time.perf_counter() - start
-    return Condensed(compliance, perturbed, 1, seconds, solver, padded, free, solve)
+    return Condensed(compliance, perturbed, 1, seconds, solver, padded, free, solve, series)
 
 
 def spring_forces(compliance: Float, springs: Float, moved: Float) -> Float:
@@ -118,17 +130,41 @@ def _default_solver() -> str:
     return "pardiso" if available() else "superlu"
 
 
-def _pardiso(upper: sp.csr_matrix, rows: sp.csr_matrix) -> tuple[Float, int, Callable[[Float], Float]]:
-    from finger3d.fem.pardiso import SchurFactor
+@dataclass(frozen=True)
+class _Series:
+    """PARDISO's factor, and where the entries of stiffness and rows stand in its matrix: for the next such matrix.
 
-    n, r = upper.shape[0], rows.shape[0]
-    k, b = upper.tocoo(), rows.tocoo()
-    last = n + np.arange(r)
-    data = np.concatenate([k.data, b.data, np.zeros(r)])
-    i = np.concatenate([k.row, b.col, last])
-    j = np.concatenate([k.col, n + b.row, last])
-    factor = SchurFactor(sp.csr_matrix((data, (i, j)), shape=(n + r, n + r)), r)
-    return -factor.schur, factor.perturbed, factor.solve
+    Attributes
+    ----------
+    places : what must be the same to use it again
+    take : number of every entry in (0, stiffness, rows)
+    """
+
+    places: tuple[Int, ...]
+    take: Int
+    factor: SchurFactor
+
+    @classmethod
+    def of(cls, upper: sp.csr_matrix, free: Int, rows: sp.csr_matrix, spent: _Series | None) -> _Series:
+        """Factor ``[[K, R^T], [R, 0]]`` of the free unknowns, in the places of an earlier one where it fits."""
+        from finger3d.fem.pardiso import SchurFactor
+
+        places = (upper.indptr, upper.indices, free, rows.indptr, rows.indices)
+        values = np.concatenate([[0.0], upper.data, rows.data])
+        if spent and all(map(np.array_equal, places, spent.places)):
+            spent.factor.renew(values[spent.take])
+            return spent
+        count = len(upper.data)
+        numbers = np.arange(1.0, len(values))
+        k = sp.csr_matrix((numbers[:count], upper.indices, upper.indptr), upper.shape)[free][:, free].tocoo()
+        b = sp.csr_matrix((numbers[count:], rows.indices, rows.indptr), rows.shape)[:, free].tocoo()
+        (r, n), last = b.shape, len(free) + np.arange(rows.shape[0])
+        i, j = np.concatenate([k.row, b.col, last]), np.concatenate([k.col, n + b.row, last])
+        whole = sp.csr_matrix((np.concatenate([k.data, b.data, np.zeros(r)]), (i, j)), shape=(n + r, n + r))
+        whole.sort_indices()
+        take = whole.data.astype(np.int64)
+        whole.data = values[take]
+        return cls(places, take, SchurFactor(whole, r))
 
 
 def _superlu(upper: sp.csr_matrix, rows: sp.csr_matrix) -> tuple[Float, int, Callable[[Float], Float]]:

@@ -79,8 +79,16 @@ class SchurFactor:
         self._iparm[[0, 1, 9, 20]] = 1, 3, 13, 1  # own settings, parallel METIS, pivot threshold 1e-13, Bunch-Kaufman
         self._iparm[35] = 2  # Schur complement, and keep the factor for solves
         self._finalizer = weakref.finalize(self, _release, self._call, self._pt, self._n, self._iparm)
-        schur = np.zeros((rows, rows), order="F")
         self._phase(11, np.zeros(1), np.zeros(1), 1)
+        self._factorize()
+
+    def renew(self, data: Float) -> None:
+        """Factor another matrix with entries of its upper triangle in the same places, in the order given first."""
+        self._a = np.ascontiguousarray(data, dtype=np.float64)
+        self._factorize()
+
+    def _factorize(self) -> None:
+        schur = np.zeros((self._rows, self._rows), order="F")
         self._phase(22, np.zeros(1), schur, 1)
         self.schur = np.asarray(schur)
         self.perturbed = int(self._iparm[13])

@@ -40,6 +40,8 @@ class Surface:
         Weighted mean at a point of anything sampled at `samples`.
     interpolate : (q, n)
         Value of a nodal field at `samples`.
+    along : d - 1 times (q, n)
+        Its derivatives along the axes of the facets' reference simplex at `samples`.
     """
 
     nodes: Int
@@ -49,6 +51,7 @@ class Surface:
     samples: Float
     average: sp.csr_matrix
     interpolate: sp.csr_matrix
+    along: tuple[sp.csr_matrix, ...] = ()
 
 
 def surface(mesh: Mesh, label: str, thickness: float = 1.0) -> Surface:
@@ -70,11 +73,15 @@ def surface(mesh: Mesh, label: str, thickness: float = 1.0) -> Surface:
     at = np.broadcast_to(np.arange(m * q).reshape(m, q, 1), hat.shape)
     average = sp.csr_matrix(((hat / area[which]).ravel(), (which.ravel(), at.ravel())), shape=(len(nodes), m * q))
     spread = np.broadcast_to(facets[:, None, :], (m, q, facets.shape[1]))
-    values = sp.csr_matrix(
-        (np.broadcast_to(psi, spread.shape).ravel(), (np.repeat(np.arange(m * q), psi.shape[1]), spread.ravel())),
-        shape=(m * q, len(mesh.points)),
-    )
-    return Surface(nodes, mesh.points[nodes], area, (average @ values).tocsr(), samples, average, values)
+    sample = np.repeat(np.arange(m * q), facets.shape[1])
+
+    def sampled(nodal: Float) -> sp.csr_matrix:
+        data = np.broadcast_to(nodal, spread.shape).ravel()
+        return sp.csr_matrix((data, (sample, spread.ravel())), shape=(m * q, len(mesh.points)))
+
+    values, slopes = sampled(psi), gradient(bary, mesh.is_quadratic)
+    along = tuple(sampled(slopes[:, :, k]) for k in range(d - 1))
+    return Surface(nodes, mesh.points[nodes], area, (average @ values).tocsr(), samples, average, values, along)
 
 
 def restrict(surface: Surface, keep: NDArray[np.bool_]) -> Surface:
