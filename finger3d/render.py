@@ -274,7 +274,7 @@ def render_solid(skin: Skin, colours: list[Float], must: bool = False) -> list[N
             source, target = Path(folder) / "skin.npz", Path(folder) / "image.npy"
             arrays = {f.name: getattr(skin, f.name) for f in fields(skin)}
             np.savez(source, colours=np.array(colours), **arrays)
-            why = _run([sys.executable, "-P", "-m", "finger3d.render", str(source), str(target)])
+            why = run_child([sys.executable, "-P", "-m", "finger3d.render", str(source), str(target)])
             if why is None and target.exists():
                 return list(np.load(target))
             _failure.append(why or "it wrote no picture")
@@ -283,8 +283,8 @@ def render_solid(skin: Skin, colours: list[Float], must: bool = False) -> list[N
     return None
 
 
-def _run(command: list[str]) -> str | None:
-    """Run the child; why it failed, in one line, or None."""
+def run_child(command: list[str]) -> str | None:
+    """Run a command that renders, where a crash does no harm; why it failed, in one line, or None."""
     here = str(Path(__file__).resolve().parent.parent)
     path = os.pathsep.join(p for p in (here, os.environ.get("PYTHONPATH")) if p)
     # EGL needs no display; asking for it first spares VTK's warning about a missing X server.

@@ -137,7 +137,7 @@ def test_pyvista_draws_a_solid_or_tells_that_opengl_is_missing(
     monkeypatch.setenv("FINGER3D_RENDERER", "pyvista")
     mesh, result = solid
     tiny = "import pyvista as pv; p = pv.Plotter(off_screen=True); p.add_mesh(pv.Sphere()); p.screenshot()"
-    if render._run([sys.executable, "-c", tiny]) is None:
+    if render.run_child([sys.executable, "-c", tiny]) is None:
         assert finger_picture(tmp_path / "f.png", mesh, **result, title="Fig. 9", profile=PROFILE) == "pyvista"
         assert_shows_the_zones(tmp_path / "f.png")
     else:

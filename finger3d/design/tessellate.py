@@ -65,12 +65,25 @@ def tessellate(solid: Any, tolerance_mm: float, angle: float = 0.5, exact: tuple
     build123d's own `tessellate` and `export_stl` take a relative tolerance and reuse what was tessellated before.
     `exact` lists numbers (mm) that a plane's constant coordinate may stand for to the last bit.
     """
+    faces = labelled_faces(solid)
+    points, triangles, face = triangulated(solid, faces, tolerance_mm, angle)
+    known = tuple(_cad_face(f, points, triangles[face == i], surface_of(f, exact)) for i, f in enumerate(faces))
+    touching = np.unique(np.stack([triangles.ravel(), np.repeat(face, 3)], axis=1), axis=0)
+    many = np.flatnonzero(np.bincount(touching[:, 0], minlength=len(points)) >= 3)
+    sets = tuple(tuple(int(i) for i in touching[touching[:, 0] == v, 1]) for v in many)
+    return Body(points, triangles, face, known, points[many], sets)
+
+
+def triangulated(solid: Any, faces: list[Any], tolerance_mm: float, angle: float) -> tuple[Float, Int, Int]:
+    """Points (n, 3) mm and outward triangles (m, 3) of a solid, welded, and the number (m,) of each one's face.
+
+    Absolute tolerances: mm, and radians between facets; nothing cached is used.
+    """
     from OCP.BRepMesh import BRepMesh_IncrementalMesh
     from OCP.BRepTools import BRepTools
 
     BRepTools.Clean_s(solid.wrapped)
     BRepMesh_IncrementalMesh(solid.wrapped, tolerance_mm, False, angle, False)
-    faces = labelled_faces(solid)
     pieces = [_triangulation(face) for face in faces]
     sizes = [len(p) for p, _ in pieces]
     offset = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64)
@@ -83,12 +96,7 @@ def tessellate(solid: Any, tolerance_mm: float, angle: float = 0.5, exact: tuple
     points, triangles = points[first], weld.reshape(-1)[triangles]
     a, b, c = triangles.T
     good = (a != b) & (b != c) & (c != a)  # a sphere's pole is an edge without length
-    triangles, face = triangles[good], face[good]
-    known = tuple(_cad_face(f, points, triangles[face == i], surface_of(f, exact)) for i, f in enumerate(faces))
-    touching = np.unique(np.stack([triangles.ravel(), np.repeat(face, 3)], axis=1), axis=0)
-    many = np.flatnonzero(np.bincount(touching[:, 0], minlength=len(points)) >= 3)
-    sets = tuple(tuple(int(i) for i in touching[touching[:, 0] == v, 1]) for v in many)
-    return Body(points, triangles, face, known, points[many], sets)
+    return points, triangles[good], face[good]
 
 
 def _triangulation(face: Any) -> tuple[Float, Int]:
