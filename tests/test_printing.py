@@ -16,7 +16,8 @@ from finger3d.design.imported import imported
 from finger3d.errors import Finger3dError
 from finger3d.model import Gauge
 from finger3d.printing import MoldOptions, export
-from finger3d.printing.mold import THIN, Mold, foils, mold, overlaps, undercuts
+from finger3d.printing.demould import undercuts
+from finger3d.printing.mold import THIN, Mold, foils, mold, overlaps
 from finger3d.printing.output import as_printed, plate
 from finger3d.printing.sheet import oversize
 from finger3d.printing.shell import shell

@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from finger3d.design.tessellate import triangulated
 from finger3d.errors import Finger3dError
 from finger3d.model import Gauge
+from finger3d.printing.demould import box, is_base, undercuts
 from finger3d.printing.options import RIM_MM, MoldOptions
 from finger3d.triangles import Triangles
 
@@ -40,8 +41,6 @@ THIN = 0.7
 """Diameter of the odd peg of a pattern over that of the others."""
 
 _TOUCH = 1e-6  # relative volume: what booleans leave of faces that touch
-_LEVEL = 1e-6  # mm
-_BEHIND = 1e-6  # of a unit normal
 _PROBE = 0.01  # mm
 
 
@@ -143,7 +142,7 @@ def mold(solid: Any, gauges: Sequence[Foil], options: MoldOptions) -> Mold:
 
 
 def _assemble(body: Any, foils: tuple[Foil, ...], options: MoldOptions) -> Mold:
-    low, high = _box(body)
+    low, high = box(body)
     w, split = options.wall_mm, options.split_mm * options.scale
     places, top = _peg_places(low, high, options)
     outer_low, outer_high = np.array([low[0] - w, 0.0, low[2] - w]), np.array([high[0] + w, top, high[2] + w])
@@ -170,11 +169,6 @@ def _assemble(body: Any, foils: tuple[Foil, ...], options: MoldOptions) -> Mold:
     lid = plate + list(lid_pegs) - _openings(ports, options)
     parts = {name: _one(name, part) for name, part in (("half_a", front), ("half_b", back), ("lid", lid))}
     return Mold(options, body, parts, slots, foils, ports, pegs, holes, lid_pegs, lid_holes, (outer_low, outer_high))
-
-
-def _box(body: Any) -> tuple[Float, Float]:
-    box = body.bounding_box(optimal=True)
-    return np.array([*box.min]), np.array([*box.max])
 
 
 def _between(low: Float, high: Float) -> Any:
@@ -225,7 +219,7 @@ def _strip(foil: Foil, scale: float, length: float, thickness: float, z_low: flo
 
 def _ports(body: Any, options: MoldOptions) -> Ports:
     """Openings as large as the base allows, or as asked for."""
-    base = [f for f in body.faces() if _is_base(f)]
+    base = [f for f in body.faces() if is_base(f)]
     corners = np.array([[*getattr(f.bounding_box(optimal=True), end)] for f in base for end in ("min", "max")])
     low, high = corners.min(axis=0)[::2], corners.max(axis=0)[::2]
     along = int(np.argmax(high - low))
@@ -252,10 +246,6 @@ def _ports(body: Any, options: MoldOptions) -> Ports:
                 "must be smaller"
             )
     return ports
-
-
-def _is_base(face: Any) -> bool:
-    return bool(face.is_planar) and abs(face.center().Y) < _LEVEL and face.normal_at(face.center()).Y < -0.5
 
 
 def _openings(ports: Ports, options: MoldOptions) -> list[Any]:
@@ -289,66 +279,13 @@ def _common(a: Any, b: Any) -> float:
 
 
 def _check_split(solid: Any, options: MoldOptions) -> None:
-    low, high = _box(solid)
+    low, high = box(solid)
     axis = 0 if options.split == "x" else 2
     if not low[axis] < options.split_mm < high[axis]:
         raise Finger3dError(
             f"--split-mm {options.split_mm:g}: the split plane misses the finger; must be between {low[axis]:.6g} and "
             f"{high[axis]:.6g} mm along {options.split}"
         )
-
-
-def undercuts(solid: Any, split: str, at_mm: float) -> str:
-    """Where a body reaches behind a half that opens along an axis, in words; empty if it does not.
-
-    A half can be drawn off along +d if the normal n of the body it encloses has n . d >= 0 everywhere, the lid's side
-    left out: a straight line along d then leaves the body once and never enters it again. Normals are CAD's own, at
-    the points of a tessellation.
-    """
-    from build123d import Axis, Box, Pos
-
-    low, high = _box(solid)
-    axis = 0 if split == "x" else 2
-    direction = Axis.X if split == "x" else Axis.Z
-    reach = 4.0 * float(np.linalg.norm(high - low))
-    for sign in (1.0, -1.0):
-        middle = np.zeros(3)
-        middle[axis] = at_mm + sign * reach / 2.0
-        for piece in (solid & Pos(*map(float, middle)) * Box(reach, reach, reach)).solids():
-            for face in piece.faces():
-                centre = np.array([*face.center()])
-                on_split = bool(face.is_planar) and abs(centre[axis] - at_mm) < _LEVEL
-                if _is_base(face) or (on_split and abs(face.normal_at(face.center()).dot(direction.direction)) > 0.5):
-                    continue
-                points, normals = _normals(face)
-                depth = sign * normals[:, axis]
-                if depth.min() < -_BEHIND:
-                    where = ", ".join(f"{c:.4g}" for c in points[int(np.argmin(depth))])
-                    side = f"{'+' if sign > 0 else '-'}{split}"
-                    return f"the half on the {side} side is locked by the body near ({where}) mm"
-    return ""
-
-
-def _normals(face: Any) -> tuple[Float, Float]:
-    """Points (n, 3) mm of a face, and outward unit normals (n, 3)."""
-    from OCP.BRep import BRep_Tool
-    from OCP.BRepGProp import BRepGProp_Face
-    from OCP.BRepMesh import BRepMesh_IncrementalMesh
-    from OCP.gp import gp_Pnt, gp_Vec
-    from OCP.TopLoc import TopLoc_Location
-
-    BRepMesh_IncrementalMesh(face.wrapped, 0.05, False, 0.2, False)
-    mesh = BRep_Tool.Triangulation_s(face.wrapped, TopLoc_Location())
-    surface, point, normal = BRepGProp_Face(face.wrapped), gp_Pnt(), gp_Vec()
-    points, normals = [], []
-    for i in range(1, mesh.NbNodes() + 1):
-        uv = mesh.UVNode(i)
-        surface.Normal(uv.X(), uv.Y(), point, normal)
-        if normal.Magnitude() > 1e-9:  # a sphere's pole has none
-            points.append([point.X(), point.Y(), point.Z()])
-            normals.append([normal.X(), normal.Y(), normal.Z()])
-    n = np.array(normals)
-    return np.array(points), n / np.linalg.norm(n, axis=1, keepdims=True)
 
 
 def foils(gauges: Sequence[Gauge], options: MoldOptions, section_mm: tuple[float, float] | None) -> tuple[Foil, ...]:
@@ -374,7 +311,7 @@ def foils(gauges: Sequence[Gauge], options: MoldOptions, section_mm: tuple[float
 
 def _check_foils(body: Any, foils: tuple[Foil, ...], options: MoldOptions) -> None:
     gap = 2.0 * options.slot_gap_mm
-    low, high = _box(body)
+    low, high = box(body)
     slots = []
     for foil in foils:
         name = f'gauge "{foil.names[0]}"'
@@ -422,8 +359,8 @@ def strips(made: Mold) -> Triangles | None:
             _strip(f, made.options.scale, f.length_mm, f.thickness_mm, float(low[2]) - out, float(high[2]) + out)
         )
     points, faces, at = [], [], 0
-    for box in boxes:
-        p, t, _ = triangulated(box, list(box.faces()), 1.0, 0.5)
+    for strip in boxes:
+        p, t, _ = triangulated(strip, list(strip.faces()), 1.0, 0.5)
         points.append(p)
         faces.append(t + at)
         at += len(p)

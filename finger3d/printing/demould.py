@@ -1,0 +1,77 @@
+"""Whether the halves of a mold come off the body that was cast in them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+
+_LEVEL = 1e-6  # mm
+_BEHIND = 1e-6  # of a unit normal
+
+
+def box(body: Any) -> tuple[Float, Float]:
+    """Low and high corner (3,), mm, of a build123d shape."""
+    found = body.bounding_box(optimal=True)
+    return np.array([*found.min]), np.array([*found.max])
+
+
+def is_base(face: Any) -> bool:
+    """Whether a face is the finger's base, which the lid covers."""
+    return bool(face.is_planar) and abs(face.center().Y) < _LEVEL and face.normal_at(face.center()).Y < -0.5
+
+
+def undercuts(solid: Any, split: str, at_mm: float) -> str:
+    """Where a body reaches behind a half that opens along an axis, in words; empty if it does not.
+
+    A half can be drawn off along +d if the normal n of the body it encloses has n . d >= 0 everywhere, the lid's side
+    left out: a straight line along d then leaves the body once and never enters it again. Normals are CAD's own, at
+    the points of a tessellation.
+    """
+    from build123d import Axis, Box, Pos
+
+    low, high = box(solid)
+    axis = 0 if split == "x" else 2
+    direction = Axis.X if split == "x" else Axis.Z
+    reach = 4.0 * float(np.linalg.norm(high - low))
+    for sign in (1.0, -1.0):
+        middle = np.zeros(3)
+        middle[axis] = at_mm + sign * reach / 2.0
+        for piece in (solid & Pos(*map(float, middle)) * Box(reach, reach, reach)).solids():
+            for face in piece.faces():
+                centre = np.array([*face.center()])
+                on_split = bool(face.is_planar) and abs(centre[axis] - at_mm) < _LEVEL
+                if is_base(face) or (on_split and abs(face.normal_at(face.center()).dot(direction.direction)) > 0.5):
+                    continue
+                points, normals = _normals(face)
+                depth = sign * normals[:, axis]
+                if depth.min() < -_BEHIND:
+                    where = ", ".join(f"{c:.4g}" for c in points[int(np.argmin(depth))])
+                    side = f"{'+' if sign > 0 else '-'}{split}"
+                    return f"the half on the {side} side is locked by the body near ({where}) mm"
+    return ""
+
+
+def _normals(face: Any) -> tuple[Float, Float]:
+    """Points (n, 3) mm of a face, and outward unit normals (n, 3)."""
+    from OCP.BRep import BRep_Tool
+    from OCP.BRepGProp import BRepGProp_Face
+    from OCP.BRepMesh import BRepMesh_IncrementalMesh
+    from OCP.gp import gp_Pnt, gp_Vec
+    from OCP.TopLoc import TopLoc_Location
+
+    BRepMesh_IncrementalMesh(face.wrapped, 0.05, False, 0.2, False)
+    mesh = BRep_Tool.Triangulation_s(face.wrapped, TopLoc_Location())
+    surface, point, normal = BRepGProp_Face(face.wrapped), gp_Pnt(), gp_Vec()
+    points, normals = [], []
+    for i in range(1, mesh.NbNodes() + 1):
+        uv = mesh.UVNode(i)
+        surface.Normal(uv.X(), uv.Y(), point, normal)
+        if normal.Magnitude() > 1e-9:  # a sphere's pole has none
+            points.append([point.X(), point.Y(), point.Z()])
+            normals.append([normal.X(), normal.Y(), normal.Z()])
+    n = np.array(normals)
+    return np.array(points), n / np.linalg.norm(n, axis=1, keepdims=True)
