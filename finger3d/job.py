@@ -152,7 +152,7 @@ def press(
     with atomic(folder / "scene.toml") as path:
         path.write_text(scene.to_toml(), encoding="utf-8")
     problem, output = _solve(scene, folder, report, started)
-    if output.frames and output.frames[-1].outcome.ok and not _covers(problem, output.frames[-1]):
+    if output.frames and output.frames[-1].outcome.ok and not covers(problem, output.frames[-1]):
         report.say("contact reached beyond the candidate points; solving again with all of the contact face")
         problem, output = _solve(scene, folder, report, started, margin=math.inf, before=output)
     begin = time.perf_counter()
@@ -272,7 +272,7 @@ def _remark(problem: Problem, frame: Frame) -> str:
     return f"depth {frame.target.depth_mm:.4g} mm, force {force:.5g} N, residual {frame.residual:.1e}"
 
 
-def _covers(problem: Problem, frame: Frame) -> bool:
+def covers(problem: Problem, frame: Frame) -> bool:
     """Whether no point of the contact face outside the candidates went through the object."""
     from finger3d.fem.surface import surface
 

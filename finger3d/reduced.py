@@ -41,6 +41,7 @@ Float = NDArray[np.float64]
 FORMAT, VERSION = "finger3d condensed body", 1
 _SHAPES: dict[str, type] = {kind.__name__: kind for kind in (Plane, Cylinder, Sphere, Wedge, Wave, MeshObject)}
 _PATH = ("depth_mm", "slide_x_mm", "slide_z_mm")
+_ENOUGH = 0.5 * MARGIN  # of the depth: candidates reach to a rigid gap of MARGIN; half of that must be left
 
 
 @dataclass(frozen=True)
@@ -140,7 +141,7 @@ class Condensed:
         return History(problem.points, tuple(march(problem)))
 
     def _check(self, problem: Problem) -> None:
-        """Refuse a path over points that were not condensed, by the rule that chose them (`finger3d.solve.build`)."""
+        """Refuse a path that comes near points that were not condensed (`finger3d.solve.build` chose them)."""
         legs = problem.model.legs
         for leg in legs:
             if not all(math.isfinite(getattr(leg, k)) for k in _PATH) or leg.depth_mm < 0.0:
@@ -159,7 +160,7 @@ class Condensed:
         path = targets(legs)
         deepest = max(t.depth_mm for t in path)
         nearest = min(float(rigid_gap(problem.model, self.others, problem.touch_mm, t).min()) for t in path)
-        if nearest < MARGIN * deepest:
+        if nearest < _ENOUGH * deepest:
             raise Finger3dError(
                 f"press: at depth {deepest:g} mm contact may leave the {self.contact_points} points that were "
                 "condensed; press less, or condense a scene that goes as far"

@@ -36,8 +36,6 @@ def force_of_sets(problem: Increments, status: NDArray[np.int8], trial: Float) -
     point has d unknowns; a slipping one its f_n, with f_t = mu f_n e, and in 3D the force across e, which follows the
     slip's turning (the derivative of the projection).
     """
-    import scipy.sparse as sp  # here, so that a scene is read and checked without it
-
     c, d = trial.shape
     slip, stick = np.flatnonzero(status == SLIP), np.flatnonzero(status == STICK)
     if not len(slip) + len(stick):
@@ -49,38 +47,36 @@ def force_of_sets(problem: Increments, status: NDArray[np.int8], trial: Float) -
     mu = problem.mu[slip]
     turn = np.minimum(mu * trial[slip, 0] / length, 1.0) if d > 2 else np.zeros(0)
     across = np.stack([-direction[:, 1], direction[:, 0]], axis=1) if d > 2 else np.zeros((0, 0))
-    # columns: force of the unknowns; rows: which displacement must vanish, weighted to a force
+    # unknowns: forces of sticking points, f_n of slipping ones, force across; equations: which displacement vanishes,
+    # weighted to a force.  Rows of the compliance are gathered, which is several times quicker than sparse products.
     n, k, w = len(stick) * d, len(slip), len(turn)
     free_dofs, normal = (stick[:, None] * d + np.arange(d)).ravel(), slip * d
-    sideways = (slip[:, None] * d + np.arange(1, d)).ravel()
-    at_n, at_w = n + np.arange(k), n + k + np.arange(w)
-    expand = sp.csr_matrix(
-        (
-            np.concatenate([np.ones(n + k), (mu[:, None] * direction).ravel(), across.ravel()]),
-            (
-                np.concatenate([np.arange(n), at_n, np.repeat(at_n, d - 1), np.repeat(at_w, d - 1)]),
-                np.concatenate([free_dofs, normal, sideways, sideways[: w * (d - 1)]]),
-            ),
-        ),
-        shape=(n + k + w, c * d),
-    )
-    rho = problem.rho.ravel()
-    test = sp.csr_matrix(
-        (
-            np.concatenate(
-                [rho[free_dofs], rho[normal], (turn[:, None] * across).ravel() * rho[sideways[: w * (d - 1)]]]
-            ),
-            (
-                np.concatenate([np.arange(n), at_n, np.repeat(at_w, d - 1)]),
-                np.concatenate([free_dofs, normal, sideways[: w * (d - 1)]]),
-            ),
-        ),
-        shape=(n + k + w, c * d),
-    )
-    matrix = test @ (expand @ problem.compliance).T  # the compliance is symmetric
-    matrix[at_w, at_w] += 1.0 - turn
-    unknowns = np.linalg.solve(matrix, -(test @ problem.free.ravel()))
-    return (expand.T @ unknowns).reshape(c, d)
+    pull, rho, compliance = mu[:, None] * direction, problem.rho.ravel(), problem.compliance
+    side = [normal + i for i in range(1, d)]
+    moved = np.empty((n + k + w, c * d))  # displacements per unit of every unknown; the compliance is symmetric
+    moved[:n] = compliance[free_dofs]
+    moved[n : n + k] = compliance[normal] + sum(pull[:, i, None] * compliance[s] for i, s in enumerate(side))
+    weigh = (turn[:, None] * across) * np.stack([rho[s] for s in side], axis=1) if w else np.zeros((0, d - 1))
+    if w:
+        moved[n + k :] = sum(across[:, i, None] * compliance[s] for i, s in enumerate(side))
+    tested = np.empty((n + k + w, n + k + w))
+    right = np.empty(n + k + w)
+    free = problem.free.ravel()
+    for rows, values in ((tested, moved.T), (right, free)):
+        rows[:n] = (rho[free_dofs] * values[free_dofs].T).T
+        rows[n : n + k] = (rho[normal] * values[normal].T).T
+        if w:
+            rows[n + k :] = sum((weigh[:, i] * values[s].T).T for i, s in enumerate(side))
+    at_w = n + k + np.arange(w)
+    tested[at_w, at_w] += 1.0 - turn
+    unknowns = np.linalg.solve(tested, -right)
+    force = np.zeros((c, d))
+    force.ravel()[free_dofs] = unknowns[:n]
+    force[slip, 0] = unknowns[n : n + k]
+    force[slip, 1:] = pull * unknowns[n : n + k, None]
+    if w:
+        force[slip, 1:] += across * unknowns[n + k :, None]
+    return force
 
 
 def newton(problem: Increments, start: Float, limit: int, damped: bool) -> Iterate:

@@ -1,0 +1,199 @@
+"""calibrate, estimate: from a scene to strain against mu, and from strains to mu."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from cyclopts import Parameter
+
+from finger3d.cli.common import Set, app, check_writable, complain, load, print_rows
+from finger3d.errors import Finger3dError, MissingError
+from finger3d.report import reporter
+
+if TYPE_CHECKING:
+    from finger3d.sensor import Estimate
+
+Tolerances = Annotated[
+    list[str] | None,
+    Parameter(
+        name="--tolerance",
+        negative=(),
+        help="Standard deviation of something not known exactly, for instance depth_mm=0.05; 0 leaves it out; may be "
+        "repeated. Of depth_mm, E_percent, nu, tilt_deg, gauge_x_mm, gauge_y_mm, gauge_angle_deg.",
+    ),
+]
+
+
+@app.command
+def calibrate(
+    scene: Path,
+    /,
+    *,
+    gauge: Annotated[str, Parameter(help="Name of a [[gauge]] of the scene.")],
+    out: Annotated[Path, Parameter(help="Folder for the results.")],
+    mu: Annotated[str, Parameter(help="first:last:count, or numbers with commas.")] = "0.02:1.2:25",
+    noise: Annotated[float, Parameter(help="Standard deviation of a strain reading; the paper's.")] = 1.5e-4,
+    resolution: Annotated[float, Parameter(help="Resolution of mu beyond which the gauge is called blind.")] = 0.1,
+    tolerance: Tolerances = None,
+    map_: Annotated[
+        bool, Parameter(name="--map", negative=(), help="Also map how far strains follow mu over the section.")
+    ] = False,
+    set_: Set = None,
+) -> int:
+    """Strain of a gauge against mu: curve, second-order fit, resolution, usable range, and what else moves it.
+
+    Example: finger3d calibrate scene.toml --gauge g36 --out cal
+
+    Parameters
+    ----------
+    scene
+        The scene file (TOML); its own friction.mu does not matter.
+    """
+    loaded = load(scene, set_)
+    check_writable(out, scene)
+    from finger3d.sensor import calibrate as run
+    from finger3d.sensor.run import parsed_mus, summary
+
+    report = reporter()
+    try:
+        with report:
+            found = run(
+                loaded, gauge, out, parsed_mus(mu), noise, resolution, _tolerances(tolerance), report, maps=map_
+            )  # fmt: skip
+    except KeyboardInterrupt:
+        complain(f"interrupted; {report.steps_done} of {report.steps_total} values of mu are kept in {out}")
+        return 130
+    print_rows(loaded.title, [*summary(found), ("results", str(out))])
+    print(found.verdict())
+    if not found.failed:
+        return 0
+    first = found.failed[0]
+    complain(
+        f"{scene}: {len(found.failed)} of {report.steps_total} values of mu gave no strain, the first mu = "
+        f"{first[0]:.4g} {first[1]}"
+    )
+    return MissingError.exit_code
+
+
+def _tolerances(texts: Sequence[str] | None) -> dict[str, float]:
+    found = {}
+    for text in texts or ():
+        name, _, value = text.partition("=")
+        try:
+            found[name.strip()] = float(value)
+        except ValueError:
+            raise Finger3dError(f"--tolerance {text}: must be NAME=NUMBER, for instance depth_mm=0.05") from None
+    return found
+
+
+@app.command
+def estimate(
+    calibration: Path,
+    /,
+    *,
+    strain: Annotated[float | None, Parameter(help="One strain reading.")] = None,
+    std: Annotated[float | None, Parameter(help="Its standard deviation; default the calibration's noise.")] = None,
+    csv_: Annotated[
+        Path | None, Parameter(name="--csv", help="Many readings: a column strain, and std if it is there.")
+    ] = None,
+    out: Annotated[Path | None, Parameter(help="CSV file for the answers to --csv; else they are printed.")] = None,
+    json_: Annotated[bool, Parameter(name="--json", negative=(), help="Print JSON.")] = False,
+    curve: Annotated[
+        Literal["interpolation", "fit"], Parameter(help="Invert the monotone interpolation or the second-order fit.")
+    ] = "interpolation",
+) -> int:
+    """Mu with its standard deviation from a strain reading, or why the strain does not tell it.
+
+    Example: finger3d estimate cal/calibration.json --strain 0.052
+
+    Parameters
+    ----------
+    calibration
+        The calibration.json of `finger3d calibrate`.
+    """
+    from finger3d.sensor import estimate as run
+    from finger3d.sensor import load as read
+
+    if (strain is None) == (csv_ is None):
+        raise Finger3dError("estimate: give either --strain NUMBER or --csv FILE")
+    if out is not None and csv_ is None:
+        raise Finger3dError("estimate: --out goes with --csv")
+    known = read(calibration)
+    if strain is not None:
+        found = run(known, strain, std, curve)
+        print(_json(found[:1])[1:-1].strip() if json_ else found[0].verdict)
+        return 0
+    assert csv_ is not None
+    strains, stds = _readings(csv_, std)
+    try:
+        found = run(known, strains, stds, curve)
+    except Finger3dError as error:
+        raise Finger3dError(f"{csv_}: {error}") from None
+    if json_:
+        print(_json(found))
+    elif out is None:
+        print("\n".join([",".join(_COLUMNS), *(",".join(map(_cell, _line(e))) for e in found)]))
+    else:
+        from finger3d.export import write_csv
+
+        write_csv(out, {name: [_line(e)[i] for e in found] for i, name in enumerate(_COLUMNS)})
+        told = sum(e.status in ("ok", "coarse") for e in found)
+        print(f"{told} of {len(found)} readings tell mu; results: {out}")
+    return 0
+
+
+_COLUMNS = ("strain", "reading_std", "mu", "std", "low", "high", "status", "verdict")
+
+
+def _line(found: Estimate) -> list[Any]:
+    return [getattr(found, name) for name in _COLUMNS]
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, float):
+        return repr(value)
+    return f'"{value}"' if "," in value else str(value)
+
+
+def _json(found: Sequence[Estimate]) -> str:
+    def plain(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {k: plain(v) for k, v in value.items()}
+        if isinstance(value, list | tuple):
+            return [plain(v) for v in value]
+        return None if isinstance(value, float) and not math.isfinite(value) else value
+
+    return json.dumps([plain(asdict(e)) for e in found], indent=2, ensure_ascii=False)
+
+
+def _readings(path: Path, std: float | None) -> tuple[list[float], list[float] | float | None]:
+    """Strains and their standard deviations from a CSV file."""
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as stream:
+            rows = list(csv.DictReader(stream))
+    except FileNotFoundError:
+        raise Finger3dError(f"{path}: there is no such file") from None
+    except OSError as error:
+        raise Finger3dError(f"{path}: cannot be read: {error.strerror}") from None
+    except (UnicodeDecodeError, csv.Error):
+        raise Finger3dError(f"{path}: not a CSV file; a line of names, then a reading a line") from None
+    if not rows or "strain" not in rows[0]:
+        names = ", ".join(str(k) for k in rows[0]) if rows else "nothing"
+        raise Finger3dError(f"{path}: must have a column named strain and at least one reading; it has {names}")
+    strains = [_number(path, i, "strain", row) for i, row in enumerate(rows, start=2)]
+    if "std" not in rows[0]:
+        return strains, std
+    return strains, [_number(path, i, "std", row) for i, row in enumerate(rows, start=2)]
+
+
+def _number(path: Path, line: int, name: str, row: dict[str, Any]) -> float:
+    try:
+        return float(row[name])
+    except (TypeError, ValueError):
+        raise Finger3dError(f"{path}: line {line}: {name} = {row[name]!r}: must be a number") from None

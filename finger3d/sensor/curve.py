@@ -1,0 +1,213 @@
+"""A calibration: strain of one gauge against mu, how well it tells mu, and what else moves it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from finger3d.errors import MissingError
+
+Float = NDArray[np.float64]
+Shape = Literal["interpolation", "fit"]
+
+NOISE = 1.5e-4
+"""Largest standard deviation of a strain in Maeno 2004, Sec. IV."""
+
+RESOLUTION = 0.1
+"""The paper's error of mu, and the limit beyond which a gauge is called blind here."""
+
+FEWEST = 4  # points: three make the second-order fit, one more its residual
+_CUTS = 32  # grid points between two calibrated mu
+_SHARPER = 4.0  # halving the spacing divides the error of an interpolation of second order, where PCHIP is at extrema
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Second-order fit as in the paper's Fig. 14: strain = c0 + c1 mu + c2 mu^2, and its residual (strain)."""
+
+    coefficients: tuple[float, float, float]
+    rms: float
+    largest: float
+
+
+@dataclass(frozen=True)
+class Range:
+    """A stretch of mu over which the curve is monotone and the resolution within the limit.
+
+    `elsewhere` are the stretches outside where the same strains occur: there a reading has two answers.
+    """
+
+    low: float
+    high: float
+    elsewhere: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """Something that is not known exactly: its standard deviation, and what it does to the strain.
+
+    Attributes
+    ----------
+    sd : in `unit`
+    slope : (n,) strain per unit at the calibration's mu
+    spread : (n,) strain error: root mean square of what plus and minus one sd do, which need not be the same
+    """
+
+    name: str
+    unit: str
+    sd: float
+    slope: Float
+    spread: Float
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Strain (n,) of a gauge at ascending mu (n,), of the points that converged.
+
+    Attributes
+    ----------
+    noise : standard deviation of a strain reading
+    limit : resolution of mu beyond which the gauge is called blind
+    failed : (mu, why) of the points that did not converge
+    scene, hash : what was pressed, and 16 digits that tell it from another scene
+    about : domain, effects, dofs, seconds, versions
+    """
+
+    gauge: str
+    mu: Float
+    strain: Float
+    noise: float
+    limit: float
+    tolerances: tuple[Tolerance, ...] = ()
+    failed: tuple[tuple[float, str], ...] = ()
+    scene: Mapping[str, Any] = field(default_factory=dict)
+    hash: str = ""
+    about: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Refuse too few points."""
+        if len(self.mu) < FEWEST:
+            raise MissingError(
+                f"calibrate: only {len(self.mu)} of {len(self.mu) + len(self.failed)} values of mu converged, {FEWEST} "
+                f"are needed; first failure: {self.failed[0][1] if self.failed else 'none'}"
+            )
+
+    @cached_property
+    def fit(self) -> Fit:
+        """Least squares of second order."""
+        c2, c1, c0 = np.polyfit(self.mu, self.strain, 2)
+        left = self.strain - np.polyval([c2, c1, c0], self.mu)
+        return Fit((float(c0), float(c1), float(c2)), float(np.sqrt(np.mean(left**2))), float(np.abs(left).max()))
+
+    @cached_property
+    def _pchip(self) -> Any:
+        from scipy.interpolate import PchipInterpolator
+
+        return PchipInterpolator(self.mu, self.strain)
+
+    def at(self, mu: ArrayLike, shape: Shape = "interpolation") -> Float:
+        """Strain at mu within the calibrated range: by monotone cubic interpolation (PCHIP), or by the fit."""
+        if shape == "fit":
+            c0, c1, c2 = self.fit.coefficients
+            return np.asarray(c0 + c1 * np.asarray(mu) + c2 * np.asarray(mu) ** 2)
+        return np.asarray(self._pchip(mu))
+
+    def slope(self, mu: ArrayLike, shape: Shape = "interpolation") -> Float:
+        """d strain / d mu."""
+        if shape == "fit":
+            _, c1, c2 = self.fit.coefficients
+            return np.asarray(c1 + 2.0 * c2 * np.asarray(mu))
+        return np.asarray(self._pchip(mu, 1))
+
+    def resolution(self, mu: ArrayLike, shape: Shape = "interpolation") -> Float:
+        """Standard deviation of mu from the reading's noise alone: noise / |d strain / d mu|; infinite where flat."""
+        with np.errstate(divide="ignore"):
+            return np.asarray(self.noise / np.abs(self.slope(mu, shape)))
+
+    @cached_property
+    def interpolation_error(self) -> float:
+        """Strain error of the interpolation: what leaving out every second point changes at these, rms, over 4."""
+        from scipy.interpolate import PchipInterpolator
+
+        kept = np.unique([*range(0, len(self.mu), 2), len(self.mu) - 1])
+        out = np.setdiff1d(np.arange(len(self.mu)), kept)
+        left = self.strain[out] - PchipInterpolator(self.mu[kept], self.strain[kept])(self.mu[out])
+        return float(np.sqrt(np.mean(left**2))) / _SHARPER
+
+    def curve_error(self, shape: Shape = "interpolation") -> float:
+        """Strain error of the curve used: of the interpolation, or the residual of the fit."""
+        return self.fit.rms if shape == "fit" else self.interpolation_error
+
+    @cached_property
+    def grid(self) -> Float:
+        """Mu (m,) on which the curve is inverted: the calibrated ones and 31 between any two."""
+        share = np.arange(_CUTS) / _CUTS
+        inner = self.mu[:-1, None] + np.diff(self.mu)[:, None] * share
+        return np.append(inner.ravel(), self.mu[-1])
+
+    def tolerance_sd(self, mu: ArrayLike) -> Float:
+        """Strain error (k, m) of every tolerance at mu (m,)."""
+        at = np.atleast_1d(np.asarray(mu, dtype=float))
+        rows = [np.interp(at, self.mu, t.spread) for t in self.tolerances]
+        return np.array(rows).reshape(len(rows), len(at))
+
+    def strain_sd(self, mu: ArrayLike, std: ArrayLike | None = None, shape: Shape = "interpolation") -> Float:
+        """Standard deviation of a reading about the curve: noise (or `std`), error of the curve, tolerances."""
+        noise = np.asarray(self.noise if std is None else std, dtype=float)
+        squares = noise**2 + self.curve_error(shape) ** 2 + np.sum(self.tolerance_sd(mu) ** 2, axis=0)
+        return np.asarray(np.sqrt(squares))
+
+    def shares(self, mu: float) -> dict[str, float]:
+        """Share of every cause in the variance of mu at one mu: noise, curve, and each tolerance; they sum to 1."""
+        squares = {"noise": self.noise**2, "curve": self.curve_error() ** 2}
+        squares |= {
+            t.name: float(s) ** 2 for t, s in zip(self.tolerances, self.tolerance_sd(mu)[:, 0], strict=True)
+        }  # fmt: skip
+        total = sum(squares.values())
+        return {name: value / total if total else 0.0 for name, value in squares.items()}
+
+    @cached_property
+    def usable(self) -> tuple[Range, ...]:
+        """Stretches where the curve is monotone and the resolution within the limit, the widest first."""
+        slope = self.slope(self.grid)
+        seen = np.where(np.abs(slope) * self.limit >= self.noise, np.sign(slope), 0.0)
+        cuts = np.flatnonzero(np.diff(seen)) + 1
+        found = []
+        for first, last in zip([0, *cuts], [*cuts, len(seen)], strict=True):
+            if seen[first] and last - first > 1:
+                low, high = float(self.grid[first]), float(self.grid[last - 1])
+                found.append(Range(low, high, self._elsewhere(first, last)))
+        return tuple(sorted(found, key=lambda r: r.low - r.high))
+
+    def _elsewhere(self, first: int, last: int) -> tuple[tuple[float, float], ...]:
+        """Stretches outside grid[first:last] whose strain is that of a place inside, by more than the noise."""
+        strain = self.at(self.grid)
+        low, high = strain[first:last].min() + self.noise, strain[first:last].max() - self.noise
+        same = (strain > low) & (strain < high)
+        same[first:last] = False
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(int), [0]])))
+        return tuple((float(self.grid[a]), float(self.grid[b - 1])) for a, b in edges.reshape(-1, 2))
+
+    def verdict(self) -> str:
+        """What the gauge is good for, in one or two sentences."""
+        ends = f"{self.mu[0]:g} to {self.mu[-1]:g}"
+        if not self.usable:
+            return (
+                f"gauge {self.gauge}: no usable range: nowhere from mu = {ends} does a strain noise of {self.noise:g} "
+                f"leave a resolution of {self.limit:g} or better; best {self.resolution(self.grid).min():.3g}"
+            )
+        best = self.usable[0]
+        sign = "rises" if self.slope(0.5 * (best.low + best.high)) > 0.0 else "falls"
+        text = (
+            f"gauge {self.gauge}: usable from mu = {best.low:.3g} to {best.high:.3g}: there the strain {sign} with mu "
+            f"and a noise of {self.noise:g} leaves a resolution of {self.limit:g} or better"
+        )
+        if best.elsewhere:
+            places = ", ".join(f"{a:.3g} to {b:.3g}" for a, b in best.elsewhere)
+            text += f"; but the same strains occur at mu = {places}"
+        return text

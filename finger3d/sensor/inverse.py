@@ -1,0 +1,220 @@
+"""From a strain to mu: the set of mu that a reading does not contradict, in words where it is not one interval.
+
+With a standard deviation s(mu) of a reading about the curve e(mu), the 68 % set of a strain is ``|strain - e(mu)| <=
+s(mu)``: it holds the true mu as often as a normal error stays within one standard deviation, whatever the curve looks
+like (the inversion of a test, Neyman 1937).  Where the curve turns, it is two intervals, and both are named.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from finger3d.errors import Finger3dError
+from finger3d.sensor.curve import Calibration, Shape
+
+Float = NDArray[np.float64]
+Status = Literal["ok", "coarse", "ambiguous", "above", "below", "outside", "blind"]
+
+_CHUNK = 256  # readings at a time: each asks the whole grid
+_JOINED = 1e-9
+_TINY = 1e-12  # of strain, where nothing is uncertain
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One answer: mu with its standard deviation, and the ends of its 68 % interval."""
+
+    mu: float
+    std: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What a reading says about mu.
+
+    Attributes
+    ----------
+    strain, reading_std : the reading
+    mu, std : nan unless the status is "ok" or "coarse"
+    low, high : ends of the 68 % set; infinite or 0 where the calibration does not reach, nan where it is empty
+    status : ok; coarse: worse than the calibration's limit; ambiguous: several answers; above, below: beyond the end of
+        what can be told apart; blind: nothing can; outside: no mu has this strain
+    verdict : the same in words
+    candidates : every answer
+    """
+
+    strain: float
+    reading_std: float
+    mu: float
+    std: float
+    low: float
+    high: float
+    status: Status
+    verdict: str
+    candidates: tuple[Candidate, ...]
+
+
+def estimate(
+    calibration: Calibration, strain: ArrayLike, std: ArrayLike | None = None, shape: Shape = "interpolation"
+) -> list[Estimate]:
+    """Estimate mu from readings.
+
+    Parameters
+    ----------
+    strain : one reading or (m,) of them
+    std : standard deviation of each, 0 allowed; None: the calibration's noise
+    shape : invert the monotone interpolation, or the second-order fit
+
+    Returns
+    -------
+    list
+        An Estimate for each reading.
+
+    Raises
+    ------
+    Finger3dError
+        For a strain that is no finite number, or a std that is not from 0 up.
+    """
+    readings = np.atleast_1d(np.asarray(strain, dtype=float)).ravel()
+    given = np.asarray(calibration.noise if std is None else std, dtype=float)
+    try:
+        noise = np.broadcast_to(given, readings.shape)
+    except ValueError:
+        raise Finger3dError(
+            f"std: {given.size} of them for {readings.size} strains; give one for all, or each"
+        ) from None
+    for name, values, bad in (("strain", readings, ~np.isfinite(readings)),
+                              ("std", noise, ~(np.isfinite(noise) & (noise >= 0.0)))):  # fmt: skip
+        if bad.any():
+            i = int(np.argmax(bad))
+            wanted = "a finite number" if name == "strain" else "a finite number from 0 up"
+            where = f" (reading {i + 1} of {len(readings)})" if len(readings) > 1 else ""
+            raise Finger3dError(f"{name} = {values[i]}{where}: must be {wanted}")
+    found: list[Estimate] = []
+    for start in range(0, len(readings), _CHUNK):
+        part = slice(start, start + _CHUNK)
+        found += _estimates(calibration, readings[part], noise[part], shape)
+    return found
+
+
+def _estimates(calibration: Calibration, strain: Float, noise: Float, shape: Shape) -> list[Estimate]:
+    grid, curve = calibration.grid, calibration.at(calibration.grid, shape)
+    spread = calibration.strain_sd(grid, 0.0, shape)
+    sd = np.hypot(noise[:, None], spread)
+    away = strain[:, None] - curve
+    low, high = _inside(away, sd)
+    return [
+        _worded(calibration, strain[i], noise[i], _joined(grid, low[i], high[i]), away[i], sd[i], shape)
+        for i in range(len(strain))
+    ]
+
+
+def _inside(away: Float, sd: Float) -> tuple[Float, Float]:
+    """Ends (m, cells), as shares of each cell of the grid, of the part where |away| <= sd; low > high where empty.
+
+    Both are taken as straight within a cell, so each of away <= sd and -away <= sd holds on one side of a point.
+    """
+    low, high = np.zeros(away[:, 1:].shape), np.ones(away[:, 1:].shape)
+    for over in (away - sd, -away - sd):
+        a, b = over[:, :-1], over[:, 1:]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            root = np.where(a == b, 0.0, a / (a - b))
+        low = np.where((a > 0.0) & (b <= 0.0), np.maximum(low, root), low)
+        high = np.where((a <= 0.0) & (b > 0.0), np.minimum(high, root), high)
+        low = np.where((a > 0.0) & (b > 0.0), 2.0, low)
+    return low, high
+
+
+def _joined(grid: Float, low: Float, high: Float) -> list[tuple[float, float]]:
+    """Intervals of mu, those of neighbouring cells as one."""
+    found: list[tuple[float, float]] = []
+    step = np.diff(grid)
+    for i in np.flatnonzero(low <= high):
+        a, b = float(grid[i] + low[i] * step[i]), float(grid[i] + high[i] * step[i])
+        if found and a - found[-1][1] <= _JOINED * step[i]:
+            found[-1] = (found[-1][0], b)
+        else:
+            found.append((a, b))
+    return found
+
+
+def _candidate(calibration: Calibration, ends: tuple[float, float], away: Float, sd: Float, shape: Shape) -> Candidate:
+    """The best mu of an interval: where the curve has the strain, else where it is nearest in standard deviations."""
+    low, high = ends
+    grid = calibration.grid
+    first, last = np.searchsorted(grid, [low, high])
+    at = np.concatenate([[low], grid[first:last], [high]])
+    left = np.interp(at, grid, away)
+    cross = np.flatnonzero(np.sign(left[:-1]) * np.sign(left[1:]) <= 0.0)
+    if len(cross):
+        roots = [_root(at[i], at[i + 1], left[i], left[i + 1]) for i in cross]
+        mu = float(np.mean([roots[0], roots[-1]]))
+    else:
+        mu = float(at[np.argmin(np.abs(left) / np.maximum(np.interp(at, grid, sd), _TINY))])
+    slope = abs(float(calibration.slope(mu, shape)))
+    std = float(np.interp(mu, grid, sd)) / slope if slope else math.inf
+    return Candidate(mu, std, low, high)
+
+
+def _root(a: float, b: float, at_a: float, at_b: float) -> float:
+    return a if at_a == at_b else a + (b - a) * at_a / (at_a - at_b)
+
+
+def _worded(
+    calibration: Calibration, strain: float, noise: float, found: list[tuple[float, float]], away: Float, sd: Float,
+    shape: Shape,
+) -> Estimate:  # fmt: skip
+    """Name the case and say it."""
+    first, last = float(calibration.mu[0]), float(calibration.mu[-1])
+    answers = tuple(_candidate(calibration, ends, away, sd, shape) for ends in found)
+
+    def told(status: Status, verdict: str, low: float, high: float, best: Candidate | None = None) -> Estimate:
+        mu, std = (best.mu, best.std) if best else (math.nan, math.nan)
+        return Estimate(float(strain), float(noise), mu, std, low, high, status, verdict, answers)
+
+    if not answers:
+        times_all = np.abs(away) / np.maximum(sd, _TINY)
+        i = int(np.argmin(times_all))
+        times = float(times_all[i])
+        side = "above" if away[i] > 0.0 else "below"
+        return told(
+            "outside", f"out of range: no mu from {first:g} to {last:g} has this strain; it lies {times:.2g} standard "
+            f"deviations {side} the nearest, at mu = {calibration.grid[i]:.3g}", math.nan, math.nan,
+        )  # fmt: skip
+    low = 0.0 if found[0][0] <= first else found[0][0]
+    high = math.inf if found[-1][1] >= last else found[-1][1]
+    if len(answers) > 1:
+        names = " or ".join(_named(a, first, last) for a in answers)
+        return told("ambiguous", f"ambiguous: {names}; the curve is not monotone", low, high)
+    best = answers[0]
+    if low == 0.0 and high == math.inf:
+        return told(
+            "blind", f"out of range: no mu from {first:g} to {last:g} can be told apart by this strain", low, high
+        )
+    half = 0.5 * (best.high - best.low)
+    if low == 0.0 or high == math.inf:
+        side, edge, end = (">", best.low, last) if high == math.inf else ("<", best.high, first)
+        why = f"the strain at mu {side} {edge:.3g} cannot be told apart"
+        if half <= calibration.limit:
+            why = f"mu {side} {edge:.3g}, and the calibration ends at {end:g}"
+        return told("above" if side == ">" else "below", f"out of range: {why}", low, high)
+    best = best if math.isfinite(best.std) else Candidate(best.mu, half, best.low, best.high)
+    text = f"mu = {best.mu:.3g} +- {best.std:.2g}"
+    if half > calibration.limit:
+        return told("coarse", f"{text}: coarser than the limit of {calibration.limit:g}", low, high, best)
+    return told("ok", text, low, high, best)
+
+
+def _named(answer: Candidate, first: float, last: float) -> str:
+    if answer.high >= last:
+        return f"mu > {answer.low:.3g}"
+    if answer.low <= first:
+        return f"mu < {answer.high:.3g}"
+    return f"mu = {answer.mu:.3g} +- {0.5 * (answer.high - answer.low):.2g}"

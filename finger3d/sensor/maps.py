@@ -1,0 +1,285 @@
+"""Strain over a section for a whole sweep of mu, from one condensation: where, and which way, a gauge would tell mu.
+
+The displacement is linear in the contact forces, so the kept factor gives the field of every mu for one solve.  It is
+read at the middle of every square of a grid, inside the cell that holds it, as a point gauge there would be.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.errors import Finger3dError
+from finger3d.export import atomic, write_csv
+from finger3d.fem.elements import gradient, shape
+from finger3d.fem.recover import displacement
+from finger3d.history import Frame
+from finger3d.mesh import Mesh
+from finger3d.model import Gauge, Model
+from finger3d.problem import Problem
+from finger3d.sensor.curve import Calibration
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+PIXEL_MM = 1.0
+ANGLES = np.radians(np.arange(0.0, 180.0, 5.0))
+"""Gauge directions that are compared for the best one."""
+
+_NEAR = {2: 12, 3: 40}  # cells whose middle is near a point, among which the one that holds it is looked for
+_INSIDE = -1e-6
+_NEWTON = 6
+
+
+def check(model: Model) -> None:
+    """Refuse a body whose gauges do not read the small strain of a displacement field."""
+    kinematics = dict(model.filled).get("kinematics")
+    if kinematics == "large_deformation":
+        raise Finger3dError("--map: not with effects.large_deformation; take the effect out, or the map")
+
+
+@dataclass(frozen=True)
+class Reader:
+    """Reads the strain of a displacement field at points of a mesh, those in mirror images included.
+
+    Attributes
+    ----------
+    inside : (p,) whether a point lies in the body
+    cells : (m,) the cells that hold the points inside
+    gradients : (m, k, d) of the shape functions there, 1/mm
+    turn : (m, d) signs of the mirror image
+    """
+
+    mesh: Mesh
+    inside: NDArray[np.bool_]
+    cells: Int
+    gradients: Float
+    turn: Float
+
+    @classmethod
+    def at(cls, mesh: Mesh, points: Float, axes: tuple[str, ...]) -> Reader:
+        """Find the cells of points (p, d)."""
+        d = mesh.dim
+        turn = np.ones_like(points)
+        for axis in axes:
+            i = "xyz".index(axis)
+            turn[:, i] = np.where(points[:, i] < 0.0, -1.0, 1.0)
+        cells, bary = _located(mesh, points * turn)
+        inside = cells >= 0
+        reference = gradient(bary[inside], mesh.is_quadratic)
+        nodes = mesh.points[mesh.cells[cells[inside]]]
+        jacobian = np.einsum("ekD,ekd->eDd", nodes, reference)
+        return cls(mesh, inside, cells[inside], reference @ np.linalg.inv(jacobian), turn[inside][:, :d])
+
+    def strain(self, u: Float) -> Float:
+        """In-plane strain (p, 3), xx yy xy (tensor component), of displacements (n, d); nan outside the body."""
+        slope = np.einsum("ekj,eki->eji", u[self.mesh.cells[self.cells]], self.gradients)
+        slope = slope * self.turn[:, :, None] * self.turn[:, None, :]
+        out = np.full((len(self.inside), 3), np.nan)
+        out[self.inside] = np.stack(
+            [slope[:, 0, 0], slope[:, 1, 1], 0.5 * (slope[:, 0, 1] + slope[:, 1, 0])], axis=1
+        )  # fmt: skip
+        return out
+
+
+def _located(mesh: Mesh, points: Float) -> tuple[Int, Float]:
+    """Cell (p,), -1 outside, and barycentric coordinates (p, d + 1), by Newton in the cells whose middles are near."""
+    from scipy.spatial import cKDTree
+
+    d = mesh.dim
+    corners = mesh.points[mesh.cells]
+    count = min(_NEAR[d], len(mesh.cells))
+    _, near = cKDTree(corners[:, : d + 1].mean(axis=1)).query(points, k=count)
+    near = near.reshape(len(points), count)
+    best, where = np.full(len(points), -np.inf), np.full((len(points), d + 1), 1.0 / (d + 1))
+    cell = np.full(len(points), -1)
+    for k in range(count):
+        left = np.flatnonzero(best < _INSIDE)
+        if not len(left):
+            break
+        bary = _barycentric(corners[near[left, k]], points[left], mesh.is_quadratic)
+        least = bary.min(axis=1)
+        better = left[least > best[left]]
+        where[better], cell[better] = bary[least > best[left]], near[better, k]
+        best[better] = least[least > best[left]]
+    cell[best < _INSIDE] = -1
+    return cell, where
+
+
+def _barycentric(nodes: Float, points: Float, quadratic: bool) -> Float:
+    """Barycentric coordinates (p, d + 1) of points (p, d) in cells with nodes (p, k, d)."""
+    d = points.shape[1]
+    bary = np.full((len(points), d + 1), 1.0 / (d + 1))
+    for _ in range(_NEWTON if quadratic else 1):
+        miss = points - np.einsum("ek,ekd->ed", shape(bary, quadratic), nodes)
+        jacobian = np.einsum("ekD,ekd->eDd", nodes, gradient(bary, quadratic))
+        step = np.clip(np.linalg.solve(jacobian, miss[:, :, None])[:, :, 0], -1.0, 1.0)
+        bary = bary + np.hstack([-step.sum(axis=1, keepdims=True), step])
+    return bary
+
+
+@dataclass(frozen=True)
+class StrainMap:
+    """Strain over a plane z = const for ascending mu (m,).
+
+    Attributes
+    ----------
+    x, y : (nx,), (ny,) mm, the middles of the squares
+    strain : (m, ny, nx, 3) xx, yy, xy (tensor component); nan outside the body
+    """
+
+    mu: Float
+    x: Float
+    y: Float
+    z_mm: float
+    strain: Float
+
+    @classmethod
+    def of(
+        cls, problem: Problem, frames: Mapping[float, Frame], pixel_mm: float = PIXEL_MM, z_mm: float = 0.0
+    ) -> StrainMap:
+        """Recover the field of every frame with the factor at hand, and read it at every square of the plane z_mm."""
+        check(problem.model)
+        design = problem.model.design
+        half, top = design.half_length_mm, design.height_mm
+        nx, ny = math.ceil(half / pixel_mm), math.ceil(top / pixel_mm)
+        x = (np.arange(-nx, nx) + 0.5) * pixel_mm
+        y = (np.arange(ny) + 0.5) * pixel_mm
+        grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+        points = np.insert(grid, 2, z_mm, axis=1)[:, : problem.dim]
+        reader = Reader.at(problem.mesh, points, problem.axes)
+        mus = np.array(sorted(frames))
+        fields = []
+        for mu in mus:
+            unknowns = problem.model.kinematics.unknowns(problem, frames[float(mu)].part)
+            fields.append(reader.strain(displacement(problem.mesh, unknowns)).reshape(len(y), len(x), 3))
+        return cls(mus, x, y, z_mm, np.array(fields))
+
+    def along(self, angle: float) -> Float:
+        """Normal strain (m, ny, nx) along a direction (radians)."""
+        c, s = math.cos(angle), math.sin(angle)
+        return np.asarray(self.strain @ np.array([c * c, s * s, 2.0 * s * c]))
+
+    def slope(self, angle: float) -> Float:
+        """d strain / d mu (m - 1, ny, nx) along a direction, between neighbouring mu."""
+        return np.diff(self.along(angle), axis=0) / np.diff(self.mu)[:, None, None]
+
+    def slope_at(self, angle: float, mu: float) -> Float:
+        """d strain / d mu (ny, nx) along a direction in the interval that holds mu."""
+        return np.asarray(self.slope(angle)[self._interval(mu)])
+
+    def _interval(self, mu: float) -> int:
+        return int(np.clip(np.searchsorted(self.mu, mu, side="right") - 1, 0, len(self.mu) - 2))
+
+    def worst_slope(self, angle: float, low: float = -math.inf, high: float = math.inf) -> Float:
+        """Least |d strain / d mu| (ny, nx) over mu from `low` to `high`; 0 where it changes its sign."""
+        middle = 0.5 * (self.mu[1:] + self.mu[:-1])
+        part = self.slope(angle)[(middle >= low) & (middle <= high)]
+        least, most = part.min(axis=0), part.max(axis=0)
+        return np.where(
+            least * most > 0.0, np.minimum(np.abs(least), np.abs(most)), np.where(np.isnan(least), least, 0.0)
+        )
+
+    @cached_property
+    def best(self) -> tuple[Float, Float]:
+        """Largest worst slope (ny, nx) over the whole range of mu, and its direction (radians)."""
+        every = np.array([self.worst_slope(float(a)) for a in ANGLES])
+        known = np.nan_to_num(every, nan=-1.0)
+        pick = known.argmax(axis=0)
+        value = np.take_along_axis(every, pick[None], axis=0)[0]
+        return value, np.where(np.isnan(value), np.nan, ANGLES[pick])
+
+    def write(self, path: Path, angle: float, noise: float, mu: float = 0.5) -> None:
+        """Write a line for each square in the body: slope at one mu, worst over all mu, and the best direction's."""
+        inside = np.isfinite(self.strain[0, :, :, 0])
+        x, y = np.meshgrid(self.x, self.y)
+        best, direction = self.best
+        columns = {
+            "x_mm": x, "y_mm": y, "strain_per_mu": self.slope_at(angle, mu), "worst_strain_per_mu":
+            self.worst_slope(angle), "best_worst_strain_per_mu": best, "best_angle_deg": np.degrees(direction),
+        }  # fmt: skip
+        table = {name: values[inside] for name, values in columns.items()}
+        with np.errstate(divide="ignore"):
+            table["best_worst_resolution"] = noise / table["best_worst_strain_per_mu"]
+        write_csv(path, table)
+
+
+def draw_map(path: Path, found: StrainMap, gauge: Gauge, calibration: Calibration, mu: float = 0.5) -> None:
+    """Draw slope along the gauge at one mu, the worst resolution over all mu along it, and along the best direction."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(16.0, 4.2), layout="constrained", dpi=110)
+    FigureCanvasAgg(figure)
+    panels = figure.subplots(1, 3, sharey=True)
+    mu = float(np.clip(mu, found.mu[0], found.mu[-1]))
+    degrees = math.degrees(gauge.angle)
+    slope_panel(figure, panels[0], found, gauge.angle, mu)
+    panels[0].set_title(f"d strain / d mu along {degrees:.4g}° at mu = {mu:.3g}")
+    noise = calibration.noise
+    resolution_panel(figure, panels[1], found, noise / _positive(found.worst_slope(gauge.angle)), calibration.limit)
+    panels[1].set_title(f"worst resolution along {degrees:.4g}°")
+    best, direction = found.best
+    resolution_panel(figure, panels[2], found, noise / _positive(best), calibration.limit)
+    panels[2].set_title("worst resolution along the best direction")
+    _directions(panels[2], found, best, direction)
+    for axes in panels:
+        axes.plot(gauge.x_mm, gauge.y_mm, "o", ms=8, mfc="none", mec="#000000", mew=1.4)
+        axes.set_xlabel("x (mm)")
+    panels[0].set_ylabel("y (mm)")
+    ends = f"mu = {found.mu[0]:g} to {found.mu[-1]:g}"
+    figure.suptitle(f"z = {found.z_mm:g} mm, {ends}, noise {noise:g}; circle: gauge {gauge.name}")
+    with atomic(path) as temporary:
+        figure.savefig(temporary, format="png")
+
+
+def _positive(slope: Float) -> Float:
+    return np.maximum(slope, 1e-12)
+
+
+def _edges(at: Float) -> Float:
+    half = 0.5 * (at[1] - at[0])
+    return np.append(at - half, at[-1] + half)
+
+
+def slope_panel(figure: Any, axes: Any, found: StrainMap, angle: float, mu: float) -> None:
+    """Signed slope; the colours end where 1 % of the squares lie beyond."""
+    value = found.slope_at(angle, mu)
+    most = float(np.nanquantile(np.abs(value), 0.99)) or 1.0
+    drawn = axes.pcolormesh(_edges(found.x), _edges(found.y), value, cmap="RdBu_r", vmin=-most, vmax=most)
+    axes.set_aspect("equal")
+    figure.colorbar(drawn, ax=axes, label="strain per unit of mu", shrink=0.9, extend="both")
+
+
+def resolution_panel(figure: Any, axes: Any, found: StrainMap, value: Float, limit: float) -> None:
+    """Resolution on a logarithmic scale about the limit; what is worse than ten limits is grey."""
+    from matplotlib.colors import LogNorm
+
+    norm = LogNorm(0.05 * limit, 10.0 * limit)
+    shown = np.ma.masked_invalid(value)
+    axes.pcolormesh(
+        _edges(found.x), _edges(found.y), np.where(np.isnan(value), np.nan, 1.0), cmap="Greys", vmin=0, vmax=4
+    )
+    drawn = axes.pcolormesh(
+        _edges(found.x), _edges(found.y), np.ma.masked_greater(shown, 10.0 * limit), cmap="viridis_r", norm=norm
+    )
+    axes.set_aspect("equal")
+    figure.colorbar(drawn, ax=axes, label="standard deviation of mu", shrink=0.9, extend="min")
+
+
+def _directions(axes: Any, found: StrainMap, best: Float, direction: Float, every: int = 6) -> None:
+    """Short lines along the best direction, where it tells anything."""
+    rows, columns = (slice(every // 2, None, every) for _ in range(2))
+    x, y = np.meshgrid(found.x[columns], found.y[rows])
+    turn, seen = direction[rows, columns], best[rows, columns] > 0.0
+    axes.quiver(
+        x[seen], y[seen], np.cos(turn[seen]), np.sin(turn[seen]), pivot="mid", headwidth=0, headlength=0,
+        headaxislength=0, scale=28.0, width=0.0025, color="#222222",
+    )  # fmt: skip

@@ -1,0 +1,224 @@
+"""What else moves the strain: depth, material, tilt, and where the gauge really lies, by finite differences.
+
+Depth and E ask nothing of the mesh: one is another path, the other another scale of the same compliance.  Gauges that
+are a little off are read beside the true one from the same presses; only a foil with its own stiffness, nu and tilt
+need bodies of their own.  Differences are over one tolerance, for depth, nu and tilt at a few mu.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.errors import Finger3dError
+from finger3d.fem.assembly import MIXED_FROM
+from finger3d.fem.condense import stiffened
+from finger3d.kinematics import SmallStrain
+from finger3d.model import Gauge, Model
+from finger3d.objects import Plane
+from finger3d.problem import Problem, at_points
+from finger3d.sensor.curve import Tolerance
+from finger3d.solve import build
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+TOLERANCES: dict[str, tuple[float, str]] = {
+    "depth_mm": (0.1, "mm"),
+    "E_percent": (5.0, "%"),
+    "nu": (0.003, "1"),
+    "tilt_deg": (0.5, "degree"),
+    "gauge_x_mm": (0.3, "mm"),
+    "gauge_y_mm": (0.3, "mm"),
+    "gauge_angle_deg": (2.0, "degree"),
+}
+"""Standard deviations assumed unless others are given: a careful laboratory set-up and a hand-laid gauge."""
+
+_PLACES = ("gauge_x_mm", "gauge_y_mm", "gauge_angle_deg")
+Read = Callable[[Problem, tuple[str, ...], Float], Float]
+"""Strain (g, m) of some gauges of a problem at mu (m,)."""
+
+
+def chosen(given: Mapping[str, float] | None) -> dict[str, float]:
+    """The tolerances (standard deviations) by name: the defaults, changed by what is given; 0 leaves one out."""
+    from difflib import get_close_matches
+
+    found = {name: sd for name, (sd, _) in TOLERANCES.items()}
+    for name, sd in (given or {}).items():
+        if name not in TOLERANCES:
+            near = get_close_matches(name, TOLERANCES, n=1, cutoff=0.0)[0]
+            raise Finger3dError(f'tolerance {name}: there is none; did you mean "{near}"? ({", ".join(TOLERANCES)})')
+        if not (math.isfinite(sd) and sd >= 0.0):
+            raise Finger3dError(f"tolerance {name} = {sd}: must be a finite number from 0 up")
+        found[name] = float(sd)
+    return {name: sd for name, sd in found.items() if sd > 0.0}
+
+
+@dataclass(frozen=True)
+class Moved:
+    """The same gauge laid a little off, by `step` of one tolerance's unit, under another name."""
+
+    tolerance: str
+    step: float
+    gauge: Gauge
+
+
+def moved_gauges(model: Model, gauge: Gauge, tolerances: Mapping[str, float]) -> list[Moved]:
+    """The gauge off by plus and minus each tolerance of place; sides that leave the body are left out."""
+    found = []
+    for name in (n for n in _PLACES if n in tolerances):
+        for sign in (1.0, -1.0):
+            step = sign * tolerances[name]
+            off = replace(_off(gauge, name, step), name=f"{gauge.name} {name} {sign:+g}")
+            if _inside(model, off):
+                found.append(Moved(name, step, off))
+    return found
+
+
+def _off(gauge: Gauge, name: str, step: float) -> Gauge:
+    if name == "gauge_x_mm":
+        return replace(gauge, x_mm=gauge.x_mm + step)
+    if name == "gauge_y_mm":
+        return replace(gauge, y_mm=gauge.y_mm + step)
+    return replace(gauge, angle=gauge.angle + math.radians(step))
+
+
+def _inside(model: Model, gauge: Gauge) -> bool:
+    at = np.array([gauge.middle, *gauge.ends])
+    top = model.design.top(at[:, 0], at[:, 2])
+    return bool(np.isfinite(top).all() and (at[:, 1] > 0.0).all() and (at[:, 1] < top - 1e-6).all())
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """What was found of the body as it should be: strain (n,) of every gauge by name at mu (n,)."""
+
+    mu: Float
+    strain: Mapping[str, Float]
+
+
+def slopes(
+    problem: Problem, gauge: Gauge, tolerances: Mapping[str, float], base: Pressed, few: Int, read: Read,
+    say: Callable[[str], None],
+) -> Iterator[Tolerance]:  # fmt: skip
+    """Every tolerance with its slope at all mu of `base`.
+
+    Parameters
+    ----------
+    problem : the condensed body
+    base : strains of its gauges, those a little off among them unless it has inclusions
+    few : numbers of the mu at which other bodies and paths are pressed; slopes in between are interpolated
+    read : presses; a press that failed gives nan, and is passed over
+    say : told which tolerance is being tried
+    """
+    for name, sd in tolerances.items():
+        say(f"tolerance {name}")
+        beside = _beside(problem.model, gauge, name, sd, base)
+        at = np.arange(len(base.mu)) if beside else few
+        mine = base.strain[gauge.name][at]
+        pairs = beside or list(_steps(problem, gauge, name, sd, base.mu[at], mine, read))
+        if not pairs:
+            continue
+        (a, at_a), (b, at_b) = [*pairs, (0.0, mine)][:2]
+        # a step may be cut short, for instance at the body's edge: its effect is scaled to one sd
+        effects = np.array([(strain - mine) * sd / step for step, strain in pairs])
+        slope, spread = (at_a - at_b) / (a - b), np.sqrt(np.mean(effects**2, axis=0))
+        good = np.isfinite(slope)
+        if good.any():
+            known = [np.interp(base.mu, base.mu[at][good], values[good]) for values in (slope, spread)]
+            yield Tolerance(name, TOLERANCES[name][1], sd, *known)
+
+
+def _beside(model: Model, gauge: Gauge, name: str, sd: float, base: Pressed) -> list[tuple[float, Float]]:
+    """Steps of a gauge's place, and strains read from the same presses."""
+    if model.inclusions:
+        return []
+    off = [m for m in moved_gauges(model, gauge, {name: sd}) if m.gauge.name in base.strain]
+    return [(m.step, base.strain[m.gauge.name]) for m in off]
+
+
+def _steps(
+    problem: Problem, gauge: Gauge, name: str, sd: float, mu: Float, mine: Float, read: Read
+) -> Iterator[tuple[float, Float]]:
+    """One or two steps of a tolerance, and strain (m,) after them; one is compared with no step at all."""
+    model = problem.model
+    if name == "depth_mm":
+        shallowest = min(leg.depth_mm for leg in model.legs if leg.depth_mm > 0.0)
+        for step in (sd, -min(sd, 0.5 * shallowest)):
+            legs = tuple(replace(leg, depth_mm=leg.depth_mm + step * (leg.depth_mm > 0.0)) for leg in model.legs)
+            yield step, read(replace(problem, model=replace(model, legs=legs)), (gauge.name,), mu)[0]
+    elif name == "E_percent":
+        alone = model.inclusions is None and model.object_compliance is None
+        # strains do not know the modulus unless something else in the scene has a stiffness too
+        yield sd, mine if alone else read(with_modulus(problem, 1.0 + 0.01 * sd), (gauge.name,), mu)[0]
+    elif name == "nu":
+        step = _step_of_nu(model.material.nu, sd)
+        changed = replace(_alone(model, gauge), material=replace(model.material, nu=model.material.nu + step))
+        yield step, read(build(changed), (gauge.name,), mu)[0]
+    elif name == "tilt_deg":
+        yield from _tilted(problem, gauge, sd, mu, mine, read)
+    elif name in _PLACES and model.inclusions:  # a foil stiffens the body where it lies
+        off = _off(gauge, name, sd)
+        if _inside(model, off):
+            gauges = tuple(off if g.name == gauge.name else g for g in model.gauges)
+            yield sd, read(build(replace(model, gauges=gauges)), (gauge.name,), mu)[0]
+
+
+def _step_of_nu(nu: float, sd: float) -> float:
+    """Down, unless that leaves the range or the element that the body is made of."""
+    other_side = nu - sd < MIXED_FROM <= nu
+    return sd if nu - sd < 0.0 or (other_side and nu + sd <= 0.5) else -sd
+
+
+def _alone(model: Model, gauge: Gauge) -> Model:
+    """The model without the gauges that nobody reads; all of them where they stiffen the body."""
+    return model if model.inclusions else replace(model, gauges=(gauge,))
+
+
+def with_modulus(problem: Problem, times: float) -> Problem:
+    """The problem with its Young's modulus multiplied, in small strain from the same condensation."""
+    if type(problem.model.kinematics) is not SmallStrain:
+        material = replace(problem.model.material, E_MPa=problem.model.material.E_MPa * times)
+        return build(replace(problem.model, material=material))
+    c, d = problem.compliance.shape[:2]
+
+    def soft(one: Problem) -> Problem:
+        own = stiffened(one.condensed.compliance, one.springs)
+        rest = one.compliance - at_points(own, one.kept, c, d)  # of the object
+        changed = stiffened(one.condensed.compliance / times, one.springs)
+        rows = np.zeros_like(one.gauge_rows)
+        rows[:, one.kept] = changed[len(one.kept) : len(one.kept) + len(rows), : len(one.kept)]
+        return replace(one, compliance=at_points(changed, one.kept, c, d) + rest, gauge_rows=rows)
+
+    changed = soft(problem)
+    return replace(changed, bare=soft(problem.bare)) if problem.bare else changed
+
+
+def _tilted(
+    problem: Problem, gauge: Gauge, sd: float, mu: Float, mine: Float, read: Read
+) -> Iterator[tuple[float, Float]]:
+    """A plane that is not level; of a scene that is its own mirror image one tilt gives both, by the mirrored gauge."""
+    model = problem.model
+    thing: Any = model.object
+    if not isinstance(thing, Plane):
+        return
+    step = math.radians(sd)
+    if "x" in problem.axes and not model.inclusions:
+        image = replace(gauge, name=f"{gauge.name} mirrored", x_mm=-gauge.x_mm, angle=math.pi - gauge.angle)
+        other = build(replace(model, object=replace(thing, tilt=step), gauges=(gauge, image), symmetry=None))
+        there, back = read(other, (gauge.name, image.name), mu)
+    else:
+        tilted = [
+            replace(_alone(model, gauge), object=replace(thing, tilt=thing.tilt + sign * step), symmetry=None)
+            for sign in (1.0, -1.0)
+        ]
+        there, back = (read(build(one), (gauge.name,), mu)[0] for one in tilted)
+    # the body's mesh is another one, whole: it is compared with itself
+    half = 0.5 * (there - back)
+    yield sd, mine + half
+    yield -sd, mine - half
