@@ -72,9 +72,14 @@ def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> None:
 
 def write_json(path: str | Path, data: Any) -> None:
     """Write nested dicts, lists, arrays and numbers; NaN and infinity, which JSON lacks, become null."""
-    text = json.dumps(_plain(data), indent=2, ensure_ascii=False, allow_nan=False)
+    text = json_text(data)
     with atomic(path) as temporary:
         temporary.write_text(text + "\n", encoding="utf-8")
+
+
+def json_text(data: Any) -> str:
+    """JSON of nested dicts, lists, arrays and numbers; NaN and infinity become null."""
+    return json.dumps(_plain(data), indent=2, ensure_ascii=False, allow_nan=False)
 
 
 def _plain(value: Any) -> Any:

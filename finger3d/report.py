@@ -66,11 +66,11 @@ class PlainReport(Report):
 class BarReport(Report):
     """A rich progress bar: the stage, a bar over the steps, the elapsed time and the last remark."""
 
-    def __init__(self) -> None:
+    def __init__(self, stream: TextIO | None = None) -> None:
         from rich.console import Console
         from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-        self.console = Console(highlight=False)
+        self.console = Console(highlight=False, file=stream)
         self.progress = Progress(
             SpinnerColumn(),
             TextColumn("{task.description}", markup=False),
@@ -108,7 +108,13 @@ class BarReport(Report):
         self.console.print(text, markup=False)
 
 
-def reporter() -> Report:
-    """Return a bar on an interactive terminal, plain lines in a pipe, a dumb terminal or CI."""
-    interactive = sys.stdout.isatty() and os.environ.get("TERM") != "dumb" and not os.environ.get("CI")
-    return BarReport() if interactive else PlainReport()
+def reporter(stream: TextIO | None = None) -> Report:
+    """Return a bar on an interactive terminal, plain lines in a pipe, a dumb terminal or CI.
+
+    Parameters
+    ----------
+    stream : where to; standard output if it is not given
+    """
+    terminal = (stream or sys.stdout).isatty()
+    interactive = terminal and os.environ.get("TERM") != "dumb" and not os.environ.get("CI")
+    return BarReport(stream) if interactive else PlainReport(stream)

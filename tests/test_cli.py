@@ -13,7 +13,7 @@ import pytest
 
 import finger3d
 import finger3d.job
-from finger3d.cli import main
+from finger3d.cli import app, main
 from finger3d.errors import MissingError, Outcome
 from finger3d.model import MeshOptions
 from finger3d.scene import load
@@ -255,3 +255,157 @@ def test_every_public_name_is_there():
 def test_an_unknown_public_name_is_an_attribute_error():
     with pytest.raises(AttributeError, match="has no attribute 'pres'"):
         _ = finger3d.pres
+
+
+# --- for scripts ------------------------------------------------------------------------------------------------------
+
+
+def test_press_as_json_prints_the_summary_alone(scene, tmp_path, fake_press, capsys):
+    assert run("press", scene, "--out", tmp_path / "out", "--json") == 0
+    out, err = capsys.readouterr()
+    assert json.loads(out) == json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert "step 2 of 2: remark 1" in err
+
+
+def test_press_as_json_that_does_not_converge(scene, tmp_path, fake_press, capsys):
+    fake_press.end = Outcome.NO_CONVERGENCE
+    assert run("press", scene, "--out", tmp_path / "out", "--json") == 3
+    out, err = capsys.readouterr()
+    assert json.loads(out)["outcome"] == str(Outcome.NO_CONVERGENCE)
+    assert "1 of 2 steps are kept" in err
+
+
+def test_what_a_job_prints_does_not_spoil_the_json(scene, tmp_path, monkeypatch, capsys):
+    def press(scene, out, report, **options):
+        print("a stray remark")
+        return SimpleNamespace(summary={"outcome": "converged", "warnings": ["Wärme"]}, outcome=Outcome.CONVERGED)
+
+    monkeypatch.setattr(finger3d.job, "press", press)
+    assert run("press", scene, "--out", tmp_path / "out", "--json") == 0
+    out, err = capsys.readouterr()
+    assert json.loads(out)["warnings"] == ["Wärme"]
+    assert "a stray remark" in err
+    assert "warning: Wärme" in err
+
+
+def test_plan_info_and_validate_as_json(scene, tmp_path, capsys):
+    override = "effects.kinetic_friction={ratio = 0.7}"
+    assert run("plan", scene, "--json", "--set", override, "--set", "friction.mu=0.3") == 0
+    planned = json.loads(capsys.readouterr().out)
+    assert planned["effects"] == {"kinetic_friction": {"ratio": 0.7, "branch": "keep"}}
+    assert planned["forecast"]["dofs"] > 1000
+    assert run("info", "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["versions"]["finger3d"] == finger3d.__version__
+    assert told["machine"]["cores"] >= 1
+    assert run("validate", "patch_test", "--quick", "--json", "--out", tmp_path / "studies") == 0
+    out, err = capsys.readouterr()
+    rows = json.loads(out)["studies"]["patch_test"]
+    assert rows
+    assert all(row["passed"] and row["error"] >= 0.0 for row in rows)
+    assert "patch_test" in err
+
+
+def test_compare_as_json_prints_its_file(scene, tmp_path, monkeypatch, capsys):
+    import finger3d.compare
+
+    def compare(scene, out, widths, report):
+        report.stage("plane strain")
+        (out / "compare.json").write_text(json.dumps({"verdict": ["2D would do"], "outcome": "converged"}))
+        return SimpleNamespace(verdict=("2D would do",), outcome=Outcome.CONVERGED, cases=())
+
+    monkeypatch.setattr(finger3d.compare, "compare", compare)
+    assert run("compare", scene, "--out", tmp_path / "out", "--json") == 0
+    out, err = capsys.readouterr()
+    assert json.loads(out) == {"verdict": ["2D would do"], "outcome": "converged"}
+    assert "plane strain" in err
+
+
+@pytest.mark.parametrize("command", ["press", "compare", "plan"])
+def test_a_mistake_with_json_leaves_standard_output_empty(command, tmp_path, capsys):
+    out = [] if command == "plan" else ["--out", tmp_path / "out"]
+    assert run(command, tmp_path / "nothing.toml", *out, "--json") == 2
+    printed, err = capsys.readouterr()
+    assert printed == ""
+    assert len(err.splitlines()) == 1
+
+
+# --- help, completion, colours ----------------------------------------------------------------------------------------
+
+COMMANDS = [name for name in app if not name.startswith("-")]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_an_example_and_a_text_for_every_option(command, capsys):
+    assert run(command, "--help") == 0
+    shown = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    assert re.search(rf"Example: .*finger3d {command}\b", shown)
+    bare = [
+        argument.names[0]
+        for argument in app[command].assemble_argument_collection(parse_docstring=True)
+        if argument.show and not argument.parameter.help
+    ]
+    assert bare == []
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_prints_a_script(shell, capsys):
+    assert run("completion", shell) == 0
+    script = capsys.readouterr().out
+    for command in COMMANDS:
+        assert command in script
+
+
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [(["pre"], "press"), (["press", "scene.toml", "--no"], "--no-figures"), (["completion", "b"], "bash")],
+)
+def test_bash_completes_commands_options_and_choices(typed, offered, tmp_path, capsys):
+    """bash reads the script, and is asked what it offers after what was typed."""
+    run("completion", "bash")
+    script = tmp_path / "completion.bash"
+    script.write_text(capsys.readouterr().out)
+    words = " ".join(["finger3d", *typed])
+    ask = (
+        f"source '{script}'; COMP_WORDS=({words}); COMP_CWORD={len(typed)}; COMP_LINE='{words}'; "
+        'COMP_POINT=${#COMP_LINE}; f=$(complete -p finger3d | sed "s/.*-F \\([^ ]*\\).*/\\1/"); $f finger3d; '
+        'printf "%s\\n" "${COMPREPLY[@]}"'
+    )
+    done = subprocess.run(["bash", "--norc", "-c", ask], capture_output=True, text=True, check=False)
+    assert done.stderr == ""
+    assert offered in done.stdout.split()
+
+
+def on_a_terminal(arguments: list[str], **environment: str) -> str:
+    """What a command prints on a terminal of its own."""
+    import os
+    import pty
+
+    main_end, terminal = pty.openpty()
+    env = {k: v for k, v in os.environ.items() if k not in ("NO_COLOR", "FORCE_COLOR", "CI", "COLORTERM")}
+    env |= {"TERM": "xterm-256color", **environment}
+    command = [sys.executable, "-m", "finger3d", *arguments]
+    process = subprocess.Popen(command, stdout=terminal, stderr=terminal, stdin=terminal, env=env)
+    os.close(terminal)
+    pieces = []
+    try:
+        while piece := os.read(main_end, 65536):
+            pieces.append(piece)
+    except OSError:  # Linux: the other end was closed
+        pass
+    os.close(main_end)
+    assert process.wait() == 0
+    return b"".join(pieces).decode()
+
+
+COLOUR = re.compile(r"\x1b\[(?:[\d;]*;)?(?:3[0-8]|4[0-8]|9\d|10[0-7])(?:;[\d;]*)?m")
+
+
+def test_colours_only_on_a_terminal_that_wants_them():
+    """A table's title is bold on a terminal; a pipe gets text alone, and NO_COLOR no colours."""
+    done = subprocess.run([sys.executable, "-m", "finger3d", "info"], capture_output=True, text=True, check=True)
+    assert "\x1b" not in done.stdout + done.stderr
+    assert "\x1b[" in on_a_terminal(["info"])
+    assert not COLOUR.search(on_a_terminal(["info"], NO_COLOR="1"))
+    assert not COLOUR.search(on_a_terminal(["press", "--help"], NO_COLOR="1"))
+    assert "\x1b" not in on_a_terminal(["info"], TERM="dumb")

@@ -6,6 +6,7 @@ import json
 import sys
 import tempfile
 from collections.abc import Iterable, Sequence
+from contextlib import AbstractContextManager, nullcontext, redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,6 +14,7 @@ from cyclopts import App, Parameter
 
 import finger3d
 from finger3d.errors import Finger3dError
+from finger3d.report import Report, reporter
 
 if TYPE_CHECKING:
     from finger3d.scene import Scene
@@ -23,6 +25,7 @@ EPILOGUE = """Examples:
     finger3d plan scene.toml
     finger3d press scene.toml --out out
     finger3d press scene.toml --out out2 --set friction.mu=0.5
+    finger3d export scene.toml --out print --mold
 
 Exit codes: 0 done, 2 bad input, 3 a step did not converge or something is
 missing, 130 interrupted.
@@ -42,6 +45,32 @@ Set = Annotated[
     list[str] | None,
     Parameter(name="--set", negative=(), help="Override a key, for instance friction.mu=0.5; may be repeated."),
 ]
+
+Json = Annotated[
+    bool,
+    Parameter(
+        name="--json", negative=(), help="JSON alone on standard output, for scripts; all else on standard error."
+    ),
+]
+
+
+def reporting(json_: bool) -> tuple[Report, AbstractContextManager[Any]]:
+    """A report for a job, and what to run the job in: with --json all it prints goes to standard error."""
+    if json_:
+        return reporter(sys.stderr), redirect_stdout(sys.stderr)
+    return reporter(), nullcontext()
+
+
+def print_json(data: Any) -> None:
+    """Print for a script; what the terminal cannot encode is escaped."""
+    from finger3d.export import json_text
+
+    text = json_text(data)
+    try:
+        text.encode(sys.stdout.encoding or "ascii")
+    except UnicodeEncodeError:
+        text = json.dumps(json.loads(text), indent=2)
+    print(text)
 
 
 def load(path: Path, overrides: list[str] | None) -> Scene:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import math
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from finger3d.cli.common import Set, app, check_writable, complain, kept, load, print_rows
+from finger3d.cli.common import Json, Set, app, check_writable, complain, kept, load, print_json, print_rows, reporting
 from finger3d.errors import Finger3dError, MissingError
-from finger3d.report import reporter
 
 if TYPE_CHECKING:
     from finger3d.scene import Scene
@@ -26,6 +27,7 @@ def press(
     set_: Set = None,
     figures: Annotated[bool, Parameter(negative="--no-figures", help="Draw the pictures.")] = True,
     error: Annotated[bool, Parameter(negative="--no-error", help="Estimate the errors, from a coarser run.")] = True,
+    json_: Json = False,
 ) -> int:
     """Solve a scene: CAD, mesh, contact, results.
 
@@ -40,17 +42,20 @@ def press(
     check_writable(out, scene)
     from finger3d.job import press as run
 
-    report = reporter()
+    report, aside = reporting(json_)
     try:
-        with report:
+        with aside, report:
             result = run(loaded, out, report, figures=figures, error=error)
     except KeyboardInterrupt:
         complain(f"interrupted; {kept(out, report.steps_total)}")
         return 130
-    print_rows(loaded.title, summary_rows(result.summary, out))
+    if json_:
+        print_json(result.summary)
+    else:
+        print_rows(loaded.title, summary_rows(result.summary, out))
     for kind in ("warnings", "advice"):
         for text in result.summary.get(kind, ()):
-            print(f"{kind.removesuffix('s')}: {text}")
+            print(f"{kind.removesuffix('s')}: {text}", file=sys.stderr if json_ else sys.stdout)
     if result.outcome.ok:
         return 0
     complain(f"{scene}: {result.outcome} ({kept(out, report.steps_total)})")
@@ -58,7 +63,7 @@ def press(
 
 
 @app.command
-def plan(scene: Path, /, *, set_: Set = None) -> int:
+def plan(scene: Path, /, *, set_: Set = None, json_: Json = False) -> int:
     """Tell which effects are on, how large the model is, and what time and memory it will take; solve nothing.
 
     Example: finger3d plan scene.toml --set mesh.size_mm=1
@@ -72,6 +77,9 @@ def plan(scene: Path, /, *, set_: Set = None) -> int:
     from finger3d.forecast import forecast
 
     expected = forecast(loaded.model())
+    if json_:
+        print_json({"title": loaded.title, "effects": loaded.as_dict()["effects"], "forecast": expected})
+        return 0
     print_rows("effects", effect_rows(loaded))
     print_rows(loaded.title, [(key.replace("_", " "), value) for key, value in expected.items()])
     return 0
@@ -87,6 +95,7 @@ def compare(
         str | None, Parameter(help="Further widths in mm, separated by commas; default 1, 4, 12 and 24 finger heights.")
     ] = None,
     set_: Set = None,
+    json_: Json = False,
 ) -> int:
     """Solve a scene as plane stress, plane strain and solid: would 2D have done, and by how much not?
 
@@ -102,15 +111,18 @@ def compare(
     check_writable(out, scene)
     from finger3d.compare import compare as run
 
-    report = reporter()
+    report, aside = reporting(json_)
     try:
-        with report:
+        with aside, report:
             result = run(loaded, out, chosen, report)
     except KeyboardInterrupt:
         complain(f"interrupted; {report.steps_done} of {report.steps_total} cases are kept in {out}")
         return 130
-    print("\n".join(result.verdict))
-    print(f"results: {out}")
+    if json_:
+        print_json(json.loads((out / "compare.json").read_text(encoding="utf-8")))
+    else:
+        print("\n".join(result.verdict))
+        print(f"results: {out}")
     if result.outcome.ok:
         return 0
     failed = sum(not case.ok for case in result.cases)

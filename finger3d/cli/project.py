@@ -1,17 +1,17 @@
-"""validate, new, info: the commands about finger3d itself."""
+"""validate, new, info, completion: the commands about finger3d itself."""
 
 from __future__ import annotations
 
 import tempfile
+from dataclasses import asdict
 from importlib import resources
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from finger3d.cli.common import app, check_folder, complain, print_columns, print_rows
+from finger3d.cli.common import Json, app, check_folder, complain, print_columns, print_json, print_rows, reporting
 from finger3d.errors import Finger3dError, MissingError
-from finger3d.report import reporter
 
 
 @app.command
@@ -21,6 +21,7 @@ def validate(
     *,
     quick: Annotated[bool, Parameter(negative=())] = False,
     out: Annotated[Path | None, Parameter(help="Folder for the results instead of validation/.")] = None,
+    json_: Json = False,
 ) -> int:
     """Run studies of validation/: does the code reproduce closed forms, other codes, and the paper?
 
@@ -44,15 +45,22 @@ def validate(
         raise Finger3dError(f"--out {out}: quick results would overwrite the full ones there; name another folder")
     folder = out or (Path(tempfile.mkdtemp(prefix="finger3d-validate-")) if quick else home)
     check_folder(folder)
-    report = reporter()
+    report, aside = reporting(json_)
     try:
-        with report:
+        with aside, report:
             found = study.validate(selected, quick, folder, report, resume=not studies and not quick, known=known)
     except KeyboardInterrupt:
         complain(f"interrupted; {report.steps_done} of {len(selected)} studies are kept in {folder}")
         return 130
-    print_columns("study what kind reference wanted got error tolerance verdict".split(), study.table(found))
-    print(f"results: {folder}")
+    if json_:
+        rows = {
+            name: [{**asdict(row), "error": row.error, "passed": row.passed} for row in rows]
+            for name, rows in found.items()
+        }
+        print_json({"results": folder, "studies": rows})
+    else:
+        print_columns("study what kind reference wanted got error tolerance verdict".split(), study.table(found))
+        print(f"results: {folder}")
     failed = [name for name, rows in found.items() if not all(row.passed for row in rows)]
     if not failed:
         return 0
@@ -84,8 +92,11 @@ def new(file: Path = Path("scene.toml"), /) -> int:
 
 
 @app.command
-def info() -> int:
-    """Print versions, machine and folders: what a bug report needs."""
+def info(*, json_: Json = False) -> int:
+    """Print versions, machine and folders: what a bug report needs.
+
+    Example: finger3d info --json
+    """
     import platform
 
     from finger3d.design.cache import folder
@@ -93,6 +104,16 @@ def info() -> int:
     from finger3d.versions import cores, memory_bytes, versions
 
     memory = memory_bytes()
+    if json_:
+        machine = {
+            "platform": platform.platform(),
+            "cores": cores(),
+            "memory_bytes": memory[0] if memory else None,
+            "mesh_cache": folder(),
+            "pardiso": pardiso.available(),
+        }
+        print_json({"versions": versions(), "machine": machine})
+        return 0
     print_rows("versions", versions().items())
     print_rows(
         "machine",
@@ -104,4 +125,22 @@ def info() -> int:
             ("PARDISO", "available" if pardiso.available() else "not available; SuperLU is used, which is slower"),
         ],
     )
+    return 0
+
+
+@app.command
+def completion(shell: Literal["bash", "zsh", "fish"], /) -> int:
+    """Print a script that lets a shell complete commands and options.
+
+    For bash, add the line of the example to ~/.bashrc. For zsh, write the script to a file _finger3d in a folder of
+    $fpath; for fish, to ~/.config/fish/completions/finger3d.fish.
+
+    Example: source <(finger3d completion bash)
+
+    Parameters
+    ----------
+    shell
+        The shell.
+    """
+    print(app.generate_completion(shell=shell), end="")
     return 0
