@@ -20,6 +20,7 @@ from finger3d.versions import versions
 if TYPE_CHECKING:
     from finger3d.accuracy import ErrorEstimate
     from finger3d.increments import StepEstimate
+    from finger3d.refine import Refined
     from finger3d.scene import Scene
     from finger3d.solve import Problem
 
@@ -58,6 +59,7 @@ class _Output:
         self.frames: list[Frame] = []
         self.estimate: StepEstimate | None = None
         self.error: ErrorEstimate | None = None
+        self.refinement: dict[str, Any] | None = None
         self.coupling = problem.coupling()
         self.advice: list[str] = []
         self.warnings = [*problem.model.warnings, *_coupling_warning(self.coupling), *_depth_warning(problem)]
@@ -95,6 +97,7 @@ class _Output:
             "steps": steps,
             "step_estimate": self.estimate.as_dict() if self.estimate else None,
             "error_estimate": self.error.as_dict() if self.error else None,
+            "refinement": self.refinement,
             "uniqueness": {"largest_coupling": self.coupling},
             "mesh": {
                 "points": report.points,
@@ -149,12 +152,15 @@ def press(
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     _clear(folder)
+    refinement = _refined(scene, report)
+    if refinement:
+        scene = scene.with_mesh(refinement.mesh)
     with atomic(folder / "scene.toml") as path:
         path.write_text(scene.to_toml(), encoding="utf-8")
-    problem, output = _solve(scene, folder, report, started)
+    problem, output = _solve(scene, folder, report, started, refinement=refinement)
     if output.frames and output.frames[-1].outcome.ok and not covers(problem, output.frames[-1]):
         report.say("contact reached beyond the candidate points; solving again with all of the contact face")
-        problem, output = _solve(scene, folder, report, started, margin=math.inf, before=output)
+        problem, output = _solve(scene, folder, report, started, math.inf, output, refinement)
     begin = time.perf_counter()
     report.stage("writing fields")
     _fields(problem, output, folder, figures)
@@ -169,6 +175,17 @@ def press(
     if figures:
         press_page(folder)
     return PressResult(history, summary, folder)
+
+
+def _refined(scene: Scene, report: Report) -> Refined | None:
+    """Edge lengths for mesh.tolerance, if the scene asks for one."""
+    mesh = scene.tables.mesh
+    if mesh.tolerance is None:
+        return None
+    from finger3d.refine import refined
+
+    report.stage(f"refining to an error of {mesh.tolerance:g}")
+    return refined(scene.model(), mesh.tolerance, mesh.max_seconds, report.say)
 
 
 def _coupling_warning(coupling: float) -> list[str]:
@@ -214,15 +231,21 @@ def _solve(
     started: float,
     margin: float | None = None,
     before: _Output | None = None,
+    refinement: Refined | None = None,
 ) -> tuple[Problem, _Output]:
     from finger3d.increments import automatic
     from finger3d.solve import build
 
     model = scene.model()
     report.stage("meshing")
-    problem = build(model, report.say) if margin is None else build(model, report.say, margin)
+    problem = refinement.problem if refinement and margin is None else None
+    if problem is None:
+        problem = build(model, report.say) if margin is None else build(model, report.say, margin)
     spent = before.factorizations_before + before.problem.factorizations if before else 0
     output = _Output(scene, problem, folder, started, spent)
+    if refinement:
+        output.refinement = refinement.as_dict()
+        output.warnings += [refinement.warning] if refinement.warning else []
     for warning in output.warnings:
         report.say(f"warning: {warning}")
     output.write("incomplete: no step was finished")

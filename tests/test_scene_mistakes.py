@@ -116,12 +116,13 @@ MISTAKES = {
         ["mesh.base_size_mm = 1.0", "at least"],
     ),
     "mesh size 0": ("size_mm = 2.0", "size_mm = 0.0", ["mesh.size_mm = 0.0", "above 0"]),
-    "mesh tolerance": (
+    "tolerance beside a size": (
         "size_mm = 2.0",
-        "tolerance = 0.01",
-        ["mesh.tolerance = 0.01", "not yet available in this version"],
+        "size_mm = 2.0\ntolerance = 0.01",
+        ["mesh.tolerance = 0.01", "mesh.size_mm = 2.0", "either sizes or a tolerance"],
     ),
-    "mesh time": ("size_mm = 2.0", "max_seconds = 9", ["mesh.max_seconds = 9", "not yet available in this version"]),
+    "tolerance of 100 %": ("size_mm = 2.0", "tolerance = 1.0", ["mesh.tolerance = 1.0", "below 1"]),
+    "mesh time": ("size_mm = 2.0", "max_seconds = 9", ["mesh.max_seconds = 9", "only with mesh.tolerance"]),
     "mesher": ("size_mm = 2.0", 'mesher = "gmsh"', ['mesh.mesher = "gmsh"', '"ftetwild" or "swept"']),
     "domain": ("[mesh]", '[model]\ndomain = "planestrain"\n[mesh]', ['model.domain = "planestrain"', '"plane-strain"']),
     "rule": ("[mesh]", '[contact]\nrule = "papr"\n[mesh]', ['contact.rule = "papr"', '"projection" or "paper"']),

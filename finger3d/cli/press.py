@@ -77,6 +77,8 @@ def plan(scene: Path, /, *, set_: Set = None, json_: Json = False) -> int:
     from finger3d.forecast import forecast
 
     expected = forecast(loaded.model())
+    if loaded.tables.mesh.tolerance is not None:
+        expected = {"mesh": f"the first of those refined to tolerance = {loaded.tables.mesh.tolerance:g}"} | expected
     if json_:
         print_json({"title": loaded.title, "effects": loaded.as_dict()["effects"], "forecast": expected})
         return 0
@@ -108,6 +110,11 @@ def compare(
     """
     chosen = None if widths is None else [_width(text) for text in widths.split(",")]
     loaded = load(scene, set_)
+    if loaded.tables.mesh.tolerance is not None:
+        raise Finger3dError(
+            f"{scene}: mesh.tolerance = {loaded.tables.mesh.tolerance:g}: compare solves on equal sizes; press finds "
+            "them and writes them to its scene.toml, take that one"
+        )
     check_writable(out, scene)
     from finger3d.compare import compare as run
 

@@ -68,6 +68,16 @@ def smallest_mm(design: Any, solid: bool) -> float:
 
 
 def _sizes(mesh: MeshTable, design: Any, solid: bool) -> list[str]:
+    for key in ("size_mm", "base_size_mm"):
+        if mesh.tolerance is not None and (size := getattr(mesh, key)) is not None:
+            return [
+                f"mesh.tolerance = {shown(mesh.tolerance)}: must not stand beside mesh.{key} = {shown(size)}; "
+                "give either sizes or a tolerance"
+            ]
+    if mesh.max_seconds is not None and mesh.tolerance is None:
+        return [f"mesh.max_seconds = {shown(mesh.max_seconds)}: only with mesh.tolerance, whose refining it ends"]
+    if mesh.tolerance is not None and mesh.tolerance >= 1.0:
+        return [f"mesh.tolerance = {shown(mesh.tolerance)}: must be a number above 0 and below 1 (0.01 is 1 %)"]
     extent = smallest_mm(design, solid)
     section = smallest_mm(design, solid=False)
     if mesh.size_mm is not None and mesh.size_mm > extent:

@@ -33,7 +33,6 @@ from finger3d.scene.tables import (
 )
 
 AnyTable = TypeVar("AnyTable", bound=Table)
-LATER = "not yet available in this version"
 
 
 @dataclass(frozen=True)
@@ -74,6 +73,10 @@ class Scene:
         """Targets of the press; the shorthand is one leg."""
         press = self.tables.press
         return tuple(Leg(**leg) for leg in (press["leg"] if "leg" in press else (press,)))
+
+    def with_mesh(self, mesh: MeshOptions) -> Scene:
+        """The scene with edge lengths in place of a tolerance."""
+        return parse({**self.given, "mesh": asdict(mesh)}, self.path)
 
     def model(self) -> Model:
         """Return the model: the baseline, and then every effect that is on. Angles are in radians."""
@@ -140,9 +143,6 @@ def parse(given: Mapping[str, Any], path: Path | None = None, set_keys: Iterable
     rigid = _object(placed, found)
     press = _press(given, found)
     effects = _effects(given, found)
-    for key in ("tolerance", "max_seconds"):
-        if tables and getattr(tables.mesh, key) is not None:
-            found["mesh", key] = f"mesh.{key} = {shown(getattr(tables.mesh, key))}: {LATER}; give mesh.size_mm instead"
     if found or tables is None or dimensions is None or press is None or rigid is None:
         order = [*given]
         places = sorted(found, key=lambda p: order.index(p[0]) if p[0] in order else len(order))
@@ -171,7 +171,8 @@ def parse(given: Mapping[str, Any], path: Path | None = None, set_keys: Iterable
             "finger": {"geometry": geometry, **dimensions.model_dump()},
             "object": {"shape": shape, **dict(placed or {})},
             "press": press.model_dump(),
-            "mesh": tables.mesh.model_copy(update=asdict(mesh)),
+            # with a tolerance the sizes are found by the press
+            "mesh": tables.mesh if tables.mesh.tolerance else tables.mesh.model_copy(update=asdict(mesh)),
             "effects": {name: settings.model_dump() for name, (settings, _) in effects.items()},
         }
     )

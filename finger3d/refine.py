@@ -1,0 +1,224 @@
+"""Edge lengths for a tolerance: refined where it pays, until the estimated error of every main number is met.
+
+Two lengths are free, that of the contact (its edge, the border of stick and slip, what a gauge below it reads) and that
+of the body far from it (the corners of the base).  A second coarse run, coarse at the contact only, tells which of them
+the error comes from.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+from finger3d.accuracy import FACTOR, ORDER, companion, compared, last_frame, main_numbers, worst
+from finger3d.errors import Finger3dError
+from finger3d.model import MeshOptions, Model
+from finger3d.solve import Problem, build
+
+MOST_ROUNDS = 8
+_PART = 0.3  # of the change: a length that makes less of it is left alone
+_STEP = (0.4, 0.85)  # a round changes an edge length at least and at most by these factors
+_AIM = 0.9  # of the tolerance, so that the last round does not just miss it
+_AFTER = 1.3  # a press takes so many times its last round, whose contact it marches again and draws
+_GROWTH = {2: 1.2, 3: 1.6}  # seconds grow with this power of the unknowns (design.md sec. 1: 161 k against 523 k dofs)
+
+
+@dataclass(frozen=True)
+class Round:
+    """One mesh of the refinement.
+
+    Attributes
+    ----------
+    error, number : largest estimated error, relative (see `accuracy.relative`), and the number that has it
+    seconds : of this round, estimate included
+    """
+
+    size_mm: float
+    base_size_mm: float
+    dofs: int
+    error: float
+    number: str
+    seconds: float
+
+    def line(self, count: int) -> str:
+        """For people."""
+        return (
+            f"round {count}: size {self.size_mm:.4g} mm, base {self.base_size_mm:.4g} mm, {self.dofs} dofs, "
+            f"error {100 * self.error:.2g} % ({self.number}), {self.seconds:.1f} s"
+        )
+
+
+@dataclass(frozen=True)
+class Refined:
+    """What the refinement came to.
+
+    Attributes
+    ----------
+    mesh : edge lengths of the best round
+    problem : condensed on them, if that was the last round; memory is not kept for others
+    stopped : why it ended: the tolerance is met, or the time, the memory, the rounds are used up
+    """
+
+    tolerance: float
+    mesh: MeshOptions
+    rounds: tuple[Round, ...]
+    stopped: str
+    problem: Problem | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def best(self) -> Round:
+        """The round with the smallest error."""
+        return min(self.rounds, key=lambda r: r.error)
+
+    @property
+    def met(self) -> bool:
+        """Whether the estimate is below the tolerance."""
+        return self.best.error <= self.tolerance
+
+    @property
+    def warning(self) -> str:
+        """One line where the tolerance was not met, else empty."""
+        if self.met:
+            return ""
+        return (
+            f"mesh.tolerance = {self.tolerance:g} was not met ({self.stopped}): the best mesh leaves an estimated "
+            f"error of {self.best.error:.2g} in {self.best.number}"
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """For summary.json."""
+        return {
+            "tolerance": self.tolerance,
+            "met": self.met,
+            "stopped": self.stopped,
+            "rounds": [asdict(r) for r in self.rounds],
+        }
+
+
+def refined(
+    model: Model,
+    tolerance: float,
+    max_seconds: float | None = None,
+    say: Callable[[str], None] = lambda text: None,
+) -> Refined:
+    """Refine a model's edge lengths, from those it has, until its estimated errors are below a tolerance.
+
+    Parameters
+    ----------
+    model : with the edge lengths of the first round
+    tolerance : relative, see `accuracy.relative`
+    max_seconds : no round is begun that is forecast to end later, output included
+    say : told one line a round
+
+    Raises
+    ------
+    Finger3dError
+        Where not even the first mesh can be made or pressed.
+    """
+    start, rounds = time.perf_counter(), list[Round]()
+    options, problem = model.mesh, None
+    stopped = f"{MOST_ROUNDS} rounds"
+    while len(rounds) < MOST_ROUNDS:
+        problem = None  # two factors at once would halve the mesh that memory allows
+        try:
+            problem, done, wanted = _round(replace(model, mesh=options), tolerance)
+        except (Finger3dError, MemoryError) as error:
+            if not rounds:
+                raise
+            stopped = f"no finer mesh: {error or 'out of memory'}"
+            break
+        rounds.append(done)
+        say(done.line(len(rounds)))
+        if done.error <= tolerance:
+            stopped = "met"
+            break
+        left = math.inf if max_seconds is None else max_seconds - (time.perf_counter() - start)
+        found = _affordable(options, wanted, done.seconds, left, 3 if model.domain == "solid" else 2)
+        if found is None:
+            stopped = f"max_seconds = {max_seconds:g}"
+            break
+        options = found
+    best = min(rounds, key=lambda r: r.error)
+    mesh = replace(model.mesh, size_mm=best.size_mm, base_size_mm=best.base_size_mm)
+    return Refined(tolerance, mesh, tuple(rounds), stopped, problem if best is rounds[-1] else None)
+
+
+def _round(model: Model, tolerance: float) -> tuple[Problem, Round, MeshOptions]:
+    """Press on one mesh; the edge lengths to try next."""
+    start = time.perf_counter()
+    problem = build(model)
+    frame = last_frame(problem)
+    numbers = main_numbers(problem, frame)
+    beside = companion(problem)
+    last = last_frame(beside)
+    number, error = worst(numbers, compared(problem, frame, beside, last))
+    sizes = _next(problem, number, error, tolerance, numbers, main_numbers(beside, last))
+    seconds = time.perf_counter() - start
+    options = model.mesh
+    dofs = int(problem.stiffness.upper.shape[0])
+    return problem, Round(options.size_mm, options.base_size_mm, dofs, error, number, seconds), sizes
+
+
+def _next(
+    problem: Problem,
+    number: str,
+    error: float,
+    tolerance: float,
+    fine: Mapping[str, float],
+    coarse: Mapping[str, float],
+) -> MeshOptions:
+    """Smaller edge lengths, of the contact, of the base, or both, as the worst number asks for."""
+    options = problem.model.mesh
+    if error <= tolerance:
+        return options
+    shares = (1.0, 0.0) if number.endswith("_length_mm") else _shares(problem, number, fine, coarse)
+    power = 1.0 if number.endswith("_length_mm") else ORDER
+    factor = min(max((_AIM * tolerance / error) ** (1.0 / power), _STEP[0]), _STEP[1])
+    size = options.size_mm * (factor if shares[0] >= _PART else 1.0)
+    base = options.base_size_mm * (factor if shares[1] >= _PART else 1.0)
+    return replace(options, size_mm=_rounded(size), base_size_mm=_rounded(max(size, base)))
+
+
+def _shares(
+    problem: Problem, number: str, fine: Mapping[str, float], coarse: Mapping[str, float]
+) -> tuple[float, float]:
+    """What part of the change to the companion comes from the contact's edge length, and from the base's."""
+    options = problem.model.mesh
+    size = min(FACTOR * options.size_mm, options.base_size_mm)
+    if size < 1.1 * options.size_mm:
+        return 1.0, 1.0
+    third = build(replace(problem.model, mesh=replace(_swept(problem, options), size_mm=size)))
+    middle = main_numbers(third, last_frame(third))[number]
+    contact, base = abs(fine[number] - middle), abs(middle - coarse[number])
+    total = contact + base
+    return (contact / total, base / total) if total > 0.0 else (1.0, 0.0)
+
+
+def _swept(problem: Problem, options: MeshOptions) -> MeshOptions:
+    return replace(options, mesher="swept") if hasattr(problem.model.design, "section") else options
+
+
+def _affordable(now: MeshOptions, wanted: MeshOptions, seconds: float, left: float, dim: int) -> MeshOptions | None:
+    """The edge lengths wanted, or less of a step where time asks for it; None where not even the least step fits."""
+    left /= _AFTER
+    factor = min(wanted.size_mm / now.size_mm, wanted.base_size_mm / now.base_size_mm)
+    power = dim * _GROWTH[dim]
+    if seconds * factor**-power <= left:
+        return wanted
+    least = (seconds / left) ** (1.0 / power) if left > 0.0 else 1.0
+    if least > _STEP[1]:
+        return None
+    # as far as the time allows, each length in proportion
+    part = math.log(least) / math.log(factor)
+    size, base = (
+        b * (w / b) ** part
+        for b, w in ((now.size_mm, wanted.size_mm), (now.base_size_mm, wanted.base_size_mm))
+    )  # fmt: skip
+    return replace(now, size_mm=_rounded(size), base_size_mm=_rounded(max(size, base)))
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.4g}")

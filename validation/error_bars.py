@@ -1,0 +1,251 @@
+"""Does the true error of a press lie within twice its error bar in nine cases of ten, and is the bar no wild guess?
+
+Source: issue 8; Richardson 1911 for the estimate, Williams 1952 for its order.  Truth is the finest mesh, or, for a
+cylinder on a half-plane, Hertz' length under the force found (Johnson 1985, sec. 4.2).  nu = .4 and mu = .125 and .5
+were not among the cases that the floor and the order were chosen by.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from finger3d.accuracy import MAIN, Grain, companion, compared, main_numbers, step_error
+from finger3d.contact.law import Coulomb
+from finger3d.design import designs
+from finger3d.history import Frame
+from finger3d.model import Domain, Gauge, Leg, Material, MeshOptions, Model
+from finger3d.objects import Cylinder, Plane, Sphere
+from finger3d.solve import Problem, build, march
+from finger3d.study import Result, Row
+
+from ._paper import columns
+
+MUS, DEPTHS = (0.125, 0.5), (1.0, 0.6)
+KINDS = (*MAIN, "gauge")
+SHARE = "issue 8: 90 % of cases within 2 times the estimate"
+COLUMNS = "scene part dofs mu depth_mm number value estimate true_error"
+TRUE_STEPS = 320
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scene at some edge lengths (mm), and at the finest, which is its truth."""
+
+    name: str
+    model: Model
+    sizes: tuple[float, ...]
+    truth: float
+    grading: float
+
+    def at(self, size: float) -> Model:
+        """The model at an edge length."""
+        options = replace(self.model.mesh, size_mm=size, base_size_mm=self.grading * size)
+        # the truth is structured, so that it is the same on every run
+        return replace(self.model, mesh=replace(options, mesher="swept") if size == self.truth else options)
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One number of one press: its estimate beside its true error."""
+
+    scene: str
+    part: str
+    dofs: int
+    mu: float
+    depth_mm: float
+    number: str
+    value: float
+    estimate: float
+    error: float
+
+    @property
+    def kind(self) -> str:
+        """Number's kind: all gauges are one."""
+        return "gauge" if self.number.startswith("gauge") else self.number
+
+
+def _model(
+    design: Any, nu: float, domain: Domain, depth: float, gauges: tuple[Gauge, ...], rigid: Any = None,
+    mesher: Any = "swept",
+) -> Model:  # fmt: skip
+    return Model(
+        design, Material(1.0, nu), MeshOptions(1.0, 1.0, mesher), (Leg(depth, steps=10),),
+        object=rigid or Plane(), gauges=gauges, domain=domain,
+    )  # fmt: skip
+
+
+def cases(quick: bool) -> list[Case]:
+    """Sections and solids; quick: one of each, coarse."""
+    near = (Gauge("a", 1.5, 4.0, angle=0.5), Gauge("b", 3.0, 3.0, angle=0.7), Gauge("c", 0.0, 3.5))
+    far = (Gauge("a", 36.0, 40.0, angle=0.5), Gauge("b", 20.0, 44.0, angle=0.2), Gauge("c", 5.0, 40.0))
+    half = designs()["half_cylinder"](radius_mm=5.0, width_mm=1.0)
+    fig9 = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
+    if quick:
+        return [
+            Case("half cylinder", _model(half, 0.4, "plane-strain", 1.0, near), (0.4, 0.2), 0.08, 5.0),
+            Case("Fig. 9 solid", _model(fig9, 0.4, "solid", 10.0, far), (4.0,), 2.4, 4.0),
+        ]
+    out = []
+    planes: tuple[Domain, ...] = ("plane-stress", "plane-strain")
+    for nu in (0.3, 0.4, 0.49):
+        for plane in planes:
+            model = _model(half, nu, plane, 1.0, near)
+            out.append(
+                Case(f"half cylinder, {plane}, nu = {nu:g}", model, (0.56, 0.4, 0.28, 0.2, 0.14, 0.1), 0.025, 5.0)
+            )
+            model = _model(fig9, nu, plane, 10.0, far)
+            out.append(Case(f"Fig. 9, {plane}, nu = {nu:g}", model, (5.6, 4.0, 2.8, 2.0, 1.4, 1.0), 0.3, 4.0))
+    for nu in (0.4, 0.49):
+        model = _model(fig9, nu, "solid", 10.0, far)
+        out.append(Case(f"Fig. 9, solid swept, nu = {nu:g}", model, (4.0, 2.8, 2.0), 1.1, 4.0))
+        wild = replace(model, mesh=replace(model.mesh, mesher="ftetwild"))
+        out.append(Case(f"Fig. 9, solid pytetwild, nu = {nu:g}", wild, (4.0, 2.8), 1.1, 4.0))
+    under = (Gauge("a", 0.5, 7.5, angle=0.5), Gauge("b", 0.0, 7.0))
+    block = designs()["block"](half_length_mm=8.0, height_mm=8.0, width_mm=16.0)
+    model = _model(block, 0.4, "solid", 0.5, under, Sphere(radius_mm=10.0))
+    return [*out, Case("sphere on a block", model, (1.0, 0.7, 0.5), 0.3, 4.0), _line(block)]
+
+
+def _line(block: Any) -> Case:
+    """A cylinder on a half-plane, as Hertz has it: far smaller a contact than the block."""
+    wide = replace(block, half_length_mm=40.0, height_mm=40.0, width_mm=1.0)
+    model = _model(wide, 0.4, "plane-strain", 0.2, (), Cylinder(radius_mm=10.0, axis="z"))
+    return Case("Hertz, a line", model, (0.2, 0.14, 0.1, 0.07), 0.02, 100.0)
+
+
+def _runs(problem: Problem) -> Iterator[tuple[float, float, Problem]]:
+    for mu in MUS:
+        for share in DEPTHS:
+            legs = tuple(replace(leg, depth_mm=share * leg.depth_mm) for leg in problem.model.legs)
+            model = replace(problem.model, friction=Coulomb(mu), legs=legs)
+            yield mu, legs[0].depth_mm, replace(problem, model=model)
+
+
+def _end(problem: Problem) -> Frame:
+    return list(march(problem))[-1]
+
+
+def _by_mesh(case: Case) -> list[Judged]:
+    truth = [main_numbers(p, _end(p)) for _, _, p in _runs(build(case.at(case.truth)))]
+    found = []
+    for size in case.sizes:
+        problem = build(case.at(size))
+        beside = companion(problem)
+        for (mu, depth, p), (_, _, coarse), exact in zip(_runs(problem), _runs(beside), truth, strict=True):
+            frame, dofs = _end(p), problem.stiffness.upper.shape[0]
+            told, bars = main_numbers(p, frame), compared(p, frame, coarse, _end(coarse))
+            right = {**exact, **_hertz(case, exact)}
+            found += [
+                Judged(case.name, "mesh", dofs, mu, depth, k, told[k], bars[k], abs(told[k] - right[k])) for k in told
+            ]
+    return found
+
+
+def _hertz(case: Case, exact: dict[str, float]) -> dict[str, float]:
+    """Hertz' half-width under the force of the finest mesh, where it holds."""
+    if not case.name.startswith("Hertz"):
+        return {}
+    radius = case.model.object.radius_mm  # type: ignore[attr-defined]
+    compliance = (1.0 - case.model.material.nu**2) / case.model.material.E_MPa
+    force = exact["normal_force_N"] / case.model.design.width_mm
+    return {"contact_half_length_mm": math.sqrt(4.0 * force * radius * compliance / math.pi)}
+
+
+def _by_steps(case: Case) -> list[Judged]:
+    problem = build(case.at(case.sizes[-1]))
+    found = []
+    for mu, depth, p in _runs(problem):
+        runs = {
+            n: replace(p, model=replace(p.model, legs=tuple(replace(leg, steps=n) for leg in p.model.legs)))
+            for n in (5, 10, 20, TRUE_STEPS)
+        }
+        ends = {n: _end(r) for n, r in runs.items()}
+        told = {n: main_numbers(runs[n], frame) for n, frame in ends.items()}
+        half = 0.5 * Grain.of(p, ends[TRUE_STEPS]).spacing_mm
+        exact = told.pop(TRUE_STEPS)
+        for n, numbers in told.items():
+            bars = step_error(runs[n], numbers)
+            # a length is printed with half the distance of points beside, below which no increment can be judged
+            bars = {k: bar + (half if k.endswith("_length_mm") else 0.0) for k, bar in bars.items()}
+            found += [
+                Judged(
+                    case.name,
+                    f"{n} steps",
+                    problem.stiffness.upper.shape[0],
+                    mu,
+                    depth,
+                    k,
+                    v,
+                    bars[k],
+                    abs(v - exact[k]),
+                )
+                for k, v in numbers.items()
+            ]
+    return found
+
+
+def run(quick: bool) -> Result:
+    """All scenes, sizes, coefficients and depths; then increments on one mesh of each section."""
+    chosen = cases(quick)
+    found = [j for case in chosen for j in _by_mesh(case)]
+    flat = [case for case in chosen if case.model.domain != "solid"]
+    steps = [j for case in flat[: 1 if quick else 4] for j in _by_steps(case)]
+    rows = [row for kind in KINDS for row in _rows(kind, found, "by mesh")]
+    rows += [
+        row for kind in ("friction_sum_N", "stick_half_length_mm", "gauge") for row in _rows(kind, steps, "by steps")
+    ]
+    lines = [(j.scene, j.part, j.dofs, j.mu, j.depth_mm, j.number, j.value, j.estimate, j.error) for j in found + steps]
+    return Result(tuple(rows), columns(COLUMNS, lines), lambda figure: _draw(figure, found, steps))
+
+
+def _rows(kind: str, found: list[Judged], what: str) -> list[Row]:
+    here = [j for j in found if j.kind == kind]
+    inside = float(np.mean([j.error <= 2.0 * j.estimate + 1e-9 * abs(j.value) for j in here]))
+    told = [j.estimate / j.error for j in here if j.error > 1e-6 * abs(j.value)]
+    text = f"{kind}, {what}, {len(here)} cases"
+    return [
+        Row(
+            f"share of cases within 2 times the estimate: {text}", "issue 8", 0.9, inside, 0.0, SHARE,
+            measure="at least",
+        ),
+        Row(
+            f"estimate over true error, median: {text}", "a bar that is never wrong tells nothing", 10.0,
+            float(np.median(told)), 0.0, "one decade", "sensitivity", "at most",
+        ),
+    ]  # fmt: skip
+
+
+def _draw(figure: Any, found: list[Judged], steps: list[Judged]) -> None:
+    figure.set_size_inches(13.5, 8.6)
+    panels = figure.subplots(2, 3).ravel()
+    figure.suptitle("Error bar against true error: below the upper line the true error is within 2 times the bar")
+    parts = [(kind, found, "mesh") for kind in KINDS] + [("friction_sum_N", steps, "steps")]
+    for axes, (kind, judged, part) in zip(panels, parts, strict=True):
+        here = [j for j in judged if j.kind == kind]
+        for group, colour in (("section", "#2c5d8f"), ("solid", "#c0392b")):
+            some = [j for j in here if ("solid" in j.scene or "sphere" in j.scene) == (group == "solid")]
+            if not some:
+                continue
+            scale = np.array([_scale(j, here) for j in some])
+            bar = np.array([j.estimate for j in some]) / scale
+            true = np.array([j.error for j in some]) / scale
+            axes.loglog(np.maximum(bar, 1e-6), np.maximum(true, 1e-6), "o", ms=3, alpha=0.5, color=colour, label=group)
+        line = np.array([1e-6, 10.0])
+        axes.loglog(line, line, color="#222222", lw=1.0, label="true error = bar")
+        axes.loglog(line, 2.0 * line, color="#222222", lw=1.0, ls="--", label="2 bars")
+        axes.set(title=f"{kind.replace('_', ' ')}, {part}", xlim=(1e-5, 2.0), ylim=(1e-6, 2.0))
+        axes.set(xlabel="bar, relative", ylabel="true error, relative")
+    panels[0].legend(fontsize=8, loc="upper left")
+
+
+def _scale(judged: Judged, group: list[Judged]) -> float:
+    """What an error is told relative to: the number, for gauges the largest of the press."""
+    if judged.kind != "gauge":
+        return max(abs(judged.value), 1e-12)
+    key = (judged.scene, judged.part, judged.dofs, judged.mu, judged.depth_mm)
+    return max(abs(j.value) for j in group if (j.scene, j.part, j.dofs, j.mu, j.depth_mm) == key)
