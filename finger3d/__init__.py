@@ -1,7 +1,22 @@
 """Frictional contact of an elastic, finger-shaped tactile sensor in 3D.
 
 Names are loaded when they are first used, so that ``import finger3d`` stays light. The main job is
-``finger3d.press("scene.toml", "out")``.
+``finger3d.press("scene.toml", "out")``; without a folder the files go with what it returns:
+
+>>> import finger3d
+>>> result = finger3d.press("scene.toml")
+>>> result.summary()["outcome"]
+'converged'
+
+The designs make plain build123d solids, which any viewer shows and any CAD program takes:
+
+>>> finger = finger3d.designs()["half_cylinder"](radius_mm=5.0, width_mm=2.0)
+>>> solid = finger.solid()
+>>> round(solid.volume, 2), type(solid).__name__
+(78.54, 'Solid')
+>>> import build123d
+>>> build123d.export_step(solid, "finger.step")
+True
 """
 
 from __future__ import annotations
@@ -18,6 +33,7 @@ if TYPE_CHECKING:
     from finger3d.model import Gauge, Leg, Material, MeshOptions, Model
     from finger3d.objects import Cylinder, Plane, Sphere, Wave, Wedge
     from finger3d.reduced import Condensed
+    from finger3d.result import PressResult
     from finger3d.scene import Scene, load, parse
 
     __version__: str
@@ -36,6 +52,7 @@ _HOME = {
     "Model": "model",
     "Outcome": "errors",
     "Plane": "objects",
+    "PressResult": "result",
     "Scene": "scene",
     "Sphere": "objects",
     "Wave": "objects",
@@ -60,6 +77,7 @@ __all__ = [
     "Model",
     "Outcome",
     "Plane",
+    "PressResult",
     "Scene",
     "Sphere",
     "Wave",

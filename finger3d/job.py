@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from finger3d.contact.law import OPEN
-from finger3d.errors import Outcome
 from finger3d.export import atomic, write_csv, write_json, write_vtu
 from finger3d.history import Frame, History, contact_table, measure
 from finger3d.report import Report
+from finger3d.result import PressResult
 from finger3d.versions import versions
 
 if TYPE_CHECKING:
@@ -28,20 +28,6 @@ _WRITE_EVERY_S = 0.5
 _DEEP = 0.3  # the Fig. 9 finger is pressed by a fifth, the half cylinder too
 _FEW_POINTS = {2: 6, 3: 100}  # six along a line; ten by ten on a face
 _INCOMPLETE = "incomplete: the press was still running, or was interrupted; the steps written are good"
-
-
-@dataclass(frozen=True)
-class PressResult:
-    """A finished (or interrupted) press: its history, its summary.json as a dict, and where everything was written."""
-
-    history: History
-    summary: dict[str, Any]
-    out: Path
-
-    @property
-    def outcome(self) -> Outcome:
-        """CONVERGED if every increment is."""
-        return self.history.outcome
 
 
 def _peak_memory_mb() -> float:
@@ -125,22 +111,35 @@ class _Output:
 
 
 def press(
-    scene: Scene | str | Path, out: str | Path, report: Report | None = None, figures: bool = True, error: bool = True
+    scene: Scene | str | Path,
+    out: str | Path | None = None,
+    report: Report | None = None,
+    figures: bool | None = None,
+    error: bool = True,
 ) -> PressResult:
-    """Press a scene and write its results into a folder.
+    """Press a scene, and write its results into a folder.
 
     Parameters
     ----------
     scene : a loaded scene, or the path of a TOML file
-    out : folder, made if it is not there
+    out : folder, made if it is not there; None: a temporary one, which is removed together with what is returned
     report : told about stages and steps
-    figures : whether to draw PNG files
+    figures : whether to draw PNG files and to write report.html; None: if a folder is given
     error : whether to estimate the errors by mesh and increments, from a coarser run
 
     Returns
     -------
     PressResult
         With the outcome of the last step; steps up to a failure or an interruption are kept and written.
+
+    Examples
+    --------
+    >>> import finger3d
+    >>> finger3d.press("scene.toml", "out").summary()["outcome"]
+    'converged'
+    >>> stiff = finger3d.load("scene.toml", ["material.E_MPa=2.0"])
+    >>> len(finger3d.press(stiff).history.frames)
+    4
     """
     from finger3d.accuracy import estimate
     from finger3d.page import press_page
@@ -149,7 +148,9 @@ def press(
     started = time.perf_counter()
     report = report or Report()
     scene = load(scene) if isinstance(scene, str | Path) else scene
-    folder = Path(out)
+    temporary = TemporaryDirectory(prefix="finger3d-") if out is None else None
+    figures = temporary is None if figures is None else figures
+    folder = Path(temporary.name) if temporary else Path(str(out))
     folder.mkdir(parents=True, exist_ok=True)
     _clear(folder)
     refinement = _refined(scene, report)
@@ -174,7 +175,7 @@ def press(
         summary = output.write(str(history.outcome))
     if figures:
         press_page(folder)
-    return PressResult(history, summary, folder)
+    return PressResult(history, folder, summary, temporary)
 
 
 def _refined(scene: Scene, report: Report) -> Refined | None:

@@ -60,7 +60,7 @@ def fake_press(monkeypatch):
             report.step(i + 1, 2, f"remark {i}")
         if isinstance(calls.end, BaseException):
             raise calls.end
-        return SimpleNamespace(summary=summary, outcome=calls.end, out=out)
+        return SimpleNamespace(summary=lambda: summary, outcome=calls.end, out=out)
 
     monkeypatch.setattr(finger3d.job, "press", press)
     return calls

@@ -224,7 +224,7 @@ def test_contact_beyond_the_candidate_points_is_solved_again(tmp_path: Path, mon
     result = job.press(scene, tmp_path / "narrow", figures=False)
     monkeypatch.undo()
     plain = job.press(scene, tmp_path / "plain", figures=False)
-    assert result.summary["cost"]["factorizations"] == 2
-    assert result.summary["steps"][-1]["normal_force_N"] == pytest.approx(
-        plain.summary["steps"][-1]["normal_force_N"], rel=1e-10
+    assert result.summary()["cost"]["factorizations"] == 2
+    assert result.summary()["steps"][-1]["normal_force_N"] == pytest.approx(
+        plain.summary()["steps"][-1]["normal_force_N"], rel=1e-10
     )

@@ -50,11 +50,11 @@ def press(
         complain(f"interrupted; {kept(out, report.steps_total)}")
         return 130
     if json_:
-        print_json(result.summary)
+        print_json(result.summary())
     else:
-        print_rows(loaded.title, summary_rows(result.summary, out))
+        print_rows(loaded.title, summary_rows(result.summary(), out))
     for kind in ("warnings", "advice"):
-        for text in result.summary.get(kind, ()):
+        for text in result.summary().get(kind, ()):
             print(f"{kind.removesuffix('s')}: {text}", file=sys.stderr if json_ else sys.stdout)
     if result.outcome.ok:
         return 0

@@ -62,7 +62,7 @@ def press_page(folder: str | Path) -> Path:
     return write_page(
         folder,
         title_of(summary["scene"]),
-        headline(good[-1], _errors(summary)) if good else (),
+        headline(good[-1], errors_of(summary)) if good else (),
         sections,
         [Figure(name, text) for name, text in _PICTURES.items()],
         view_of(states) if states else None,
@@ -88,8 +88,8 @@ def headline(step: Mapping[str, Any], errors: Mapping[str, float]) -> list[Row]:
     ]
 
 
-def _errors(summary: Mapping[str, Any]) -> dict[str, float]:
-    """Errors by name, in the unit of each number: what the mesh and the increments leave unsaid, added."""
+def errors_of(summary: Mapping[str, Any]) -> dict[str, float]:
+    """Errors of a summary by name, in the unit of each number: what the mesh and the increments leave unsaid, added."""
     estimate = summary.get("error_estimate") or {}
     mesh, steps = estimate.get("discretisation") or {}, estimate.get("steps") or {}
     return {name: value + (steps.get(name) or 0.0) for name, value in mesh.items() if value is not None}
