@@ -144,6 +144,7 @@ def press(
     from finger3d.accuracy import estimate
     from finger3d.page import press_page
     from finger3d.scene import load
+    from finger3d.solve import covers
 
     started = time.perf_counter()
     report = report or Report()
@@ -294,18 +295,6 @@ def _press_automatically(problem: Problem, output: _Output, report: Report) -> N
 def _remark(problem: Problem, frame: Frame) -> str:
     force = measure(problem.points, frame)["normal_force_N"]
     return f"depth {frame.target.depth_mm:.4g} mm, force {force:.5g} N, residual {frame.residual:.1e}"
-
-
-def covers(problem: Problem, frame: Frame) -> bool:
-    """Whether no point of the contact face outside the candidates went through the object."""
-    from finger3d.fem.surface import surface
-
-    face = surface(problem.mesh, "contact", problem.thickness)
-    others = ~np.isin(face.nodes, problem.surface.nodes)
-    if not others.any():
-        return True
-    gap = problem.model.kinematics.gap(problem, frame.part, frame.target, face)
-    return bool(gap[others].min() > -1e-9 * frame.target.depth_mm)
 
 
 def _fields(problem: Problem, output: _Output, folder: Path, figures: bool) -> None:

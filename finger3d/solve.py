@@ -24,7 +24,7 @@ from finger3d.problem import AUTO_START, Problem, at_points, between, folded, ri
 
 Float = NDArray[np.float64]
 
-__all__ = ["AUTO_START", "Problem", "build", "contact_zone", "march", "symmetry", "targets"]
+__all__ = ["AUTO_START", "Problem", "build", "contact_zone", "covers", "march", "symmetry", "targets"]
 
 MARGIN = 0.3  # candidate points reach to a rigid gap of this share of the depth; checked after the solution
 _CUTS = 6
@@ -102,6 +102,16 @@ def _read(rows: Float, kept: NDArray[np.int64], count: int, dim: int, gauges: in
     strain = np.zeros((gauges, count * dim))
     strain[:, kept] = rows[len(kept) : len(kept) + gauges, : len(kept)]
     return at_points(rows, kept, count, dim), strain
+
+
+def covers(problem: Problem, frame: Frame) -> bool:
+    """Whether no point of the contact face outside the candidates went through the object."""
+    face = surface(problem.mesh, "contact", problem.thickness)
+    others = ~np.isin(face.nodes, problem.surface.nodes)
+    if not others.any():
+        return True
+    gap = problem.model.kinematics.gap(problem, frame.part, frame.target, face)
+    return bool(gap[others].min() > -1e-9 * frame.target.depth_mm)
 
 
 def _candidates(model: Model, face: Surface, touch: float, margin: float) -> Surface:

@@ -126,13 +126,15 @@ def load(path: str | Path, overrides: Iterable[str] = ()) -> Scene:
     return parse(given, path=path, set_keys=[o.partition("=")[0].strip() for o in overrides])
 
 
-def parse(given: Mapping[str, Any], path: Path | None = None, set_keys: Iterable[str] = ()) -> Scene:
+def parse(
+    given: Mapping[str, Any], path: Path | None = None, set_keys: Iterable[str] | Mapping[str, str] = ()
+) -> Scene:
     """Check a tree of tables (lists or tuples for arrays) and return it as a Scene.
 
     Parameters
     ----------
     path : the file it came from, for messages
-    set_keys : keys that came from the command line, for messages
+    set_keys : keys that came from the command line, for messages; with the option that gave them if not ``--set``
     """
     given = tree.frozen(bodies.absolute(given, path))
     found: dict[Place, str] = {}
@@ -185,12 +187,13 @@ def parse(given: Mapping[str, Any], path: Path | None = None, set_keys: Iterable
     return scene
 
 
-def _refusal(lines: list[str], path: Path | None, set_keys: Iterable[str]) -> Finger3dError:
+def _refusal(lines: list[str], path: Path | None, set_keys: Iterable[str] | Mapping[str, str]) -> Finger3dError:
     first, more = lines[0], len(lines) - 1
     source = str(path) if path else "scene"
     place = re.split(r"[: ]", first, maxsplit=1)[0] + "."
     if key := next((k for k in set_keys if place.startswith(f"{k}.") or f"{k}.".startswith(place)), None):
-        source += f" with --set {key}"
+        option = set_keys[key] if isinstance(set_keys, Mapping) else "--set"
+        source += f" with {option} {key}"
     rest = f" (and {more} more mistake{'s' if more > 1 else ''})" if more else ""
     return Finger3dError(f"{source}: {first}{rest}")
 

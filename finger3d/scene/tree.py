@@ -55,24 +55,28 @@ def plain(value: Any) -> Any:
     return [plain(v) for v in value] if isinstance(value, list | tuple) else value
 
 
-def override(tree: Tree, overrides: Iterable[str]) -> Tree:
-    """Return `tree` with keys set from texts such as ``friction.mu=0.5`` or ``press.leg.0.depth_mm=3``."""
+def override(tree: Tree, overrides: Iterable[str], option: str = "--set") -> Tree:
+    """Return `tree` with keys set from texts such as ``friction.mu=0.5`` or ``press.leg.0.depth_mm=3``.
+
+    `option` is where the texts come from, for messages.
+    """
     changed = copy.deepcopy(plain(tree))
     for text in overrides:
         key, equals, value = text.partition("=")
         parts = [p.strip() for p in key.split(".")]
         if not equals or not all(parts):
-            raise Finger3dError(f"--set {shown(text)}: must be KEY=VALUE, for instance --set friction.mu=0.5")
-        _set(changed, parts, _parsed(value.strip()), key.strip())
+            raise Finger3dError(f"{option} {shown(text)}: must be KEY=VALUE, for instance {option} friction.mu=0.5")
+        _set(changed, parts, parsed(value.strip()), f"{option} {key.strip()}")
     return frozen(changed)
 
 
-def _parsed(text: str) -> Any:
+def parsed(text: str) -> Any:
+    """The value that a text means in TOML; a text that is no TOML stands for itself."""
     try:
-        parsed = tomllib.loads(f"value = {text}")
+        found = tomllib.loads(f"value = {text}")
     except (ValueError, RecursionError):
         return text
-    return parsed["value"] if parsed.keys() == {"value"} else text
+    return found["value"] if found.keys() == {"value"} else text
 
 
 def _set(node: Any, parts: list[str], value: Any, key: str) -> None:
@@ -81,14 +85,14 @@ def _set(node: Any, parts: list[str], value: Any, key: str) -> None:
         if isinstance(node, list):
             if not part.isdecimal() or int(part) >= len(node):
                 allowed = f"0 to {len(node) - 1}" if node else "none, the list is empty"
-                raise Finger3dError(f"--set {key}: no item {shown(part)} in {'.'.join(parts[:depth])} ({allowed})")
+                raise Finger3dError(f"{key}: no item {shown(part)} in {'.'.join(parts[:depth])} ({allowed})")
             index: Any = int(part)
         elif isinstance(node, dict):
             index = part
             if not last:
                 node.setdefault(part, {})
         else:
-            raise Finger3dError(f"--set {key}: {'.'.join(parts[:depth])} = {shown(node)} is not a table")
+            raise Finger3dError(f"{key}: {'.'.join(parts[:depth])} = {shown(node)} is not a table")
         if last:
             node[index] = value
         else:

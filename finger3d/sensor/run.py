@@ -18,7 +18,6 @@ from finger3d.errors import Finger3dError
 from finger3d.export import atomic, write_csv
 from finger3d.history import Frame
 from finger3d.increments import automatic, refine, with_steps
-from finger3d.job import covers
 from finger3d.kinematics import SmallStrain
 from finger3d.model import Gauge, Model
 from finger3d.problem import Problem
@@ -27,7 +26,7 @@ from finger3d.report import Report
 from finger3d.sensor.curve import FEWEST, NOISE, RESOLUTION, Calibration, Tolerance
 from finger3d.sensor.files import save, write_table
 from finger3d.sensor.tolerances import Pressed, chosen, moved_gauges, slopes
-from finger3d.solve import MARGIN, build, march
+from finger3d.solve import MARGIN, build, covers, march
 from finger3d.versions import versions
 
 if TYPE_CHECKING:

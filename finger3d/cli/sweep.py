@@ -1,0 +1,83 @@
+"""sweep: every combination of some values of a scene's keys."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from finger3d.cli.common import Set, app, check_writable, complain, print_rows
+from finger3d.errors import Finger3dError, MissingError
+from finger3d.report import reporter
+
+if TYPE_CHECKING:
+    from finger3d.sweep import Kept
+
+
+@app.command
+def sweep(
+    scene: Path,
+    /,
+    *,
+    vary: Annotated[
+        list[str],
+        Parameter(negative=(), help="A key and its values, for instance friction.mu=0.06,0.25,1; may be repeated."),
+    ],
+    out: Annotated[Path, Parameter(help="Folder for the results; that of the same sweep is gone on with.")],
+    set_: Set = None,
+    scheduler: Annotated[str | None, Parameter(help="Address of a Dask scheduler, instead of processes here.")] = None,
+    workers: Annotated[int | None, Parameter(help="Processes on this machine; default one for each core.")] = None,
+) -> int:
+    """Press every combination of some values, in parallel; the same command goes on after an interruption.
+
+    Friction, depths, slides, steps and gauges share one condensation; every other key needs one for each value.
+
+    Example: finger3d sweep scene.toml --vary friction.mu=0.06,0.25,1 --vary gauge.g36.angle_deg=15,30,45 --out out
+
+    Parameters
+    ----------
+    scene
+        The scene file (TOML).
+    """
+    if workers is not None and workers < 1:
+        raise Finger3dError(f"--workers {workers}: must be at least 1")
+    if workers is not None and scheduler is not None:
+        raise Finger3dError("--workers and --scheduler: give one of them; a cluster has its own workers")
+    from finger3d.sweep import combinations
+    from finger3d.sweep import sweep as run
+
+    report = reporter()
+    try:
+        with report:
+            report.stage("checking every point")
+            points = combinations(scene, set_ or [], vary)
+            check_writable(out, scene)
+            kept = run(points, out, scheduler, workers, report)
+    except KeyboardInterrupt:
+        complain(f"interrupted; {_said(report.steps_done, report.steps_total, out)}")
+        return 130
+    print_rows(points.title, _rows(kept, out))
+    failed = [row for row in (kept.rows | kept.lost).values() if row["outcome"] != "converged"]
+    if not failed:
+        return 0
+    complain(
+        f"{scene}: {len(failed)} of {len(points.points)} points gave no numbers, the first: {failed[0]['outcome']}"
+    )
+    return MissingError.exit_code
+
+
+def _said(done: int, total: int, out: Path) -> str:
+    return f"{done} of {total} points are kept in {out}; the same command goes on" if done else "no point was finished"
+
+
+def _rows(kept: Kept, out: Path) -> list[tuple[str, str]]:
+    seconds = sum(row.get("seconds") or 0.0 for row in kept.rows.values())
+    built = {row["body"]: row.get("build_seconds") or 0.0 for row in kept.rows.values()}
+    return [
+        ("points", f"{len(kept.sweep.points)}, of them {len(kept.rows)} kept"),
+        ("bodies", f"{len(kept.sweep.bodies)}, each condensed once"),
+        ("time of workers", f"{sum(built.values()):.1f} s meshing and condensing, {seconds:.1f} s contact"),
+        ("results", str(out / "results.csv")),
+        ("", str(out / "results.parquet")),
+    ]

@@ -1,0 +1,202 @@
+"""Which scenes share a body, and one condensation for all of them.
+
+Friction, path, contact rule and gauges do not change a body's compliance: scenes that differ in nothing else are a
+family.  Its body is meshed for the union of all paths, so scenes of other depths or slides are pressed on a mesh graded
+for the widest contact among them, and not each on its own.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import dropwhile
+from pathlib import Path
+from typing import Any
+
+from finger3d.contact.law import FrictionLaw
+from finger3d.errors import Outcome
+from finger3d.history import Frame, measure
+from finger3d.increments import automatic, refine
+from finger3d.model import Gauge, Leg, MeshOptions, Model
+from finger3d.scene import Scene
+from finger3d.solve import Problem, build, covers, march
+
+_FREE = ("title", "friction", "press", "contact", "gauge")
+_SIZES = ("size_mm", "base_size_mm")
+
+
+@dataclass(frozen=True)
+class Variant:
+    """What may differ between presses of one body."""
+
+    friction: FrictionLaw
+    legs: tuple[Leg, ...]
+    rule: Any
+    gauges: tuple[Gauge, ...]
+
+    @classmethod
+    def of(cls, model: Model) -> Variant:
+        """The variant that a model is of its body."""
+        return cls(model.friction, model.legs, model.rule, model.gauges)
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """The end of a press.
+
+    Attributes
+    ----------
+    outcome : the text of summary.json; where a step failed, which one
+    residual : the largest of all steps
+    numbers : the contract's numbers of the last step, without gauges; empty unless converged
+    gauges : name -> strain; likewise
+    seconds : of this press; 0 if another variant, different in its gauges only, has paid for it
+    """
+
+    outcome: str
+    residual: float
+    numbers: dict[str, float]
+    gauges: dict[str, float]
+    seconds: float
+
+
+def body_key(scene: Scene) -> str:
+    """Hash of all that shapes the condensation: equal for scenes that share a body."""
+    tree = scene.as_dict()
+    effects = {k: v for k, v in tree["effects"].items() if k != "kinetic_friction"}
+    kept = {k: v for k, v in tree.items() if k not in _FREE} | {"effects": effects}
+    if "embedded_gauge" in effects:
+        kept["gauge"] = tree["gauge"]
+    given = scene.given.get("mesh", {})
+    # sizes that were chosen, not given, may follow the depth: the finest of a family is taken
+    kept["mesh"] = {k: v for k, v in tree["mesh"].items() if k not in _SIZES or k in given}
+    files = [tree["finger"]["geometry"], tree["object"].get("path")]
+    kept["files"] = [_digest(Path(name)) for name in files if name and Path(name).is_file()]
+    return hashlib.sha256(json.dumps(kept, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def families(scenes: Sequence[Scene]) -> dict[str, list[int]]:
+    """Numbers of the scenes that share a body, by the key of the body, in the order in which they come."""
+    found: dict[str, list[int]] = {}
+    for number, scene in enumerate(scenes):
+        found.setdefault(body_key(scene), []).append(number)
+    return found
+
+
+def finest(models: Sequence[Model]) -> MeshOptions:
+    """The mesh options with the smallest sizes of the models."""
+    sizes, bases = [m.mesh.size_mm for m in models], [m.mesh.base_size_mm for m in models]
+    return replace(models[0].mesh, size_mm=min(sizes), base_size_mm=min(bases))
+
+
+class Body:
+    """A body built once for some variants, and pressed as each of them.
+
+    Parameters
+    ----------
+    model : any of the family, with the mesh that all share
+    variants : all that it will be pressed as
+    say : told about meshing and condensation
+    """
+
+    def __init__(
+        self, model: Model, variants: Sequence[Variant], say: Callable[[str], None] = lambda text: None
+    ) -> None:
+        start = time.perf_counter()
+        self._say = say
+        gauges = model.gauges
+        if model.inclusions is None:
+            # every place once, under names that cannot clash
+            places = dict.fromkeys(replace(g, name="") for v in variants for g in v.gauges)
+            gauges = tuple(replace(place, name=str(i)) for i, place in enumerate(places))
+        self._names = {replace(g, name=""): g.name for g in gauges}
+        self._free = model.inclusions is not None
+        self.problem = build(replace(model, legs=shared_legs(variants), gauges=gauges), say)
+        self.seconds = time.perf_counter() - start
+        self._done: dict[Any, Pressed] = {}
+
+    def problem_of(self, variant: Variant) -> Problem:
+        """The condensed body under the friction, path and rule of a variant, with all gauges of all variants."""
+        own = replace(self.problem.model, friction=variant.friction, legs=variant.legs, rule=variant.rule)
+        return replace(self.problem, model=own)
+
+    def frames(self, variant: Variant) -> tuple[Frame, ...]:
+        """Frames of a variant; if contact reached beyond the candidate points, on all of the contact face."""
+        found = _frames(self.problem_of(variant))
+        if found[-1].outcome.ok and not covers(self.problem, found[-1]):
+            start = time.perf_counter()
+            self._say("contact reached beyond the candidate points; condensing all of the contact face")
+            self.problem = build(self.problem.model, self._say, math.inf)
+            self.seconds += time.perf_counter() - start
+            return _frames(self.problem_of(variant))
+        return found
+
+    def press(self, variant: Variant) -> Pressed:
+        """The last step's numbers of a variant."""
+        key = variant.friction, variant.legs, variant.rule
+        known = key in self._done
+        if not known:
+            self._done[key] = self._pressed(variant)
+        pressed = self._done[key]
+        gauges = self._own(variant, pressed.gauges) if pressed.gauges else {}
+        return replace(pressed, gauges=gauges, seconds=0.0 if known else pressed.seconds)
+
+    def _pressed(self, variant: Variant) -> Pressed:
+        start = time.perf_counter()
+        frames = self.frames(variant)
+        seconds = time.perf_counter() - start
+        residual = max(f.residual for f in frames)
+        for number, frame in enumerate(frames, start=1):
+            if not frame.outcome.ok:
+                at = f"step {number} (depth {frame.target.depth_mm:.4g} mm)"
+                return Pressed(f"{at}: {frame.outcome}", residual, {}, {}, seconds)
+        numbers = measure(self.problem.points, frames[-1])
+        gauges = numbers.pop("gauges")
+        for key in ("iterations", "residual", "method", "outcome"):
+            numbers.pop(key)
+        return Pressed(str(Outcome.CONVERGED), residual, numbers, gauges, seconds)
+
+    def _own(self, variant: Variant, gauges: dict[str, float]) -> dict[str, float]:
+        if self._free:
+            return gauges
+        return {g.name: gauges[self._names[replace(g, name="")]] for g in variant.gauges}
+
+
+def _frames(problem: Problem) -> tuple[Frame, ...]:
+    if not automatic(problem):
+        return tuple(march(problem))
+    frames: tuple[Frame, ...] = ()
+    for finer, _ in refine(problem):
+        frames = finer
+    return frames
+
+
+def shared_legs(variants: Sequence[Variant]) -> tuple[Leg, ...]:
+    """A path that goes wherever one of the variants goes, and nowhere else.
+
+    One path is left as it is; among paths without slides it is the deepest; else all in turn, each traced back to
+    first touch before the next.
+    """
+    paths = list(dict.fromkeys(v.legs for v in variants))
+    if not any(leg.slide_x_mm or leg.slide_z_mm for legs in paths for leg in legs):
+        return max(paths, key=lambda legs: max(leg.depth_mm for leg in legs))
+    whole: list[Leg] = []
+    for number, legs in enumerate(paths):
+        whole += legs
+        if number + 1 < len(paths):
+            back = [*reversed(legs[:-1]), Leg(0.0)]
+            here = legs[-1]
+            whole += dropwhile(lambda leg, here=here: _end(leg) == _end(here), back)  # type: ignore[misc]
+    return tuple(whole)
+
+
+def _end(leg: Leg) -> tuple[float, float, float]:
+    return leg.depth_mm, leg.slide_x_mm, leg.slide_z_mm

@@ -1,0 +1,114 @@
+"""Where a sweep runs: worker processes of this machine, or a Dask cluster that is there already."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from finger3d.errors import Finger3dError, MissingError
+from finger3d.versions import cores
+
+CONNECT_S = 10.0
+"""Time limit to reach a scheduler, and for the first worker to be there."""
+
+_MEMORY_SHARE = 0.9
+
+
+@contextmanager
+def local(workers: int) -> Iterator[Any]:
+    """Client of `workers` processes on this machine, one thread each, with their share of its memory as the limit."""
+    import dask
+    from distributed import Client, LocalCluster
+    from distributed.system import MEMORY_LIMIT
+
+    # what Dask logs of a lost worker is told by the sweep in its own words
+    quiet = {"logging.distributed": "critical", "distributed.admin.system-monitor.gil.enabled": False}
+    with dask.config.set(quiet):
+        try:
+            with _for_us_alone():
+                cluster = LocalCluster(
+                    n_workers=workers, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address=None,
+                    memory_limit=int(_MEMORY_SHARE * MEMORY_LIMIT / workers), silence_logs=logging.CRITICAL,
+                )  # fmt: skip
+        except (OSError, RuntimeError, TimeoutError) as error:
+            raise MissingError(f"sweep: no worker could be started on this machine: {error}") from None
+        with cluster, Client(cluster) as client:
+            yield client
+
+
+@contextmanager
+def _for_us_alone() -> Iterator[None]:
+    """Workers started here, or by threads started here, never see Ctrl-C: who started them ends them."""
+    from multiprocessing import resource_tracker
+
+    # it lifts the block where it is started, so it goes first
+    resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def remote(address: str) -> Iterator[Any]:
+    """Client of the cluster whose scheduler is at `address`, which has workers with this version of finger3d."""
+    from distributed import Client
+
+    if ":" not in address.removeprefix("tcp://").removeprefix("tls://"):
+        raise Finger3dError(f"--scheduler {address}: must be HOST:PORT, for instance tcp://127.0.0.1:8786")
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    silent = MissingError(
+        f"--scheduler {address}: no Dask scheduler answered within {CONNECT_S:g} s; start one with `dask scheduler`, "
+        "or look at the address"
+    )
+    try:
+        asyncio.run(asyncio.wait_for(_greet(address), CONNECT_S))
+        client = Client(address, timeout=CONNECT_S, set_as_default=False)
+    except ValueError as error:
+        raise Finger3dError(f"--scheduler {address}: no address: {error}") from None
+    except (OSError, TimeoutError, ImportError):
+        raise silent from None
+    with client:
+        _ready(client, address)
+        yield client
+
+
+async def _greet(address: str) -> None:
+    """Reach a scheduler and leave: a Client waits without end for one that accepts and says nothing."""
+    from distributed.comm import connect
+
+    comm = await connect(address, timeout=CONNECT_S)
+    comm.abort()
+
+
+def _ready(client: Any, address: str) -> None:
+    from finger3d import __version__
+
+    try:
+        client.wait_for_workers(1, timeout=CONNECT_S)
+    except TimeoutError:
+        raise MissingError(
+            f"--scheduler {address}: has no worker; start some with `dask worker {address} --nthreads 1`"
+        ) from None
+    for worker, version in client.run(version_here).items():
+        if version != __version__:
+            raise MissingError(
+                f"--scheduler {address}: the worker {worker} has finger3d {version}; install {__version__} there"
+            )
+
+
+def version_here() -> str:
+    """Version of finger3d where this is called; that it can be called there says that it is installed."""
+    from finger3d import __version__
+
+    return __version__
+
+
+def default_workers(bodies: int) -> int:
+    """As many as there are cores, and no more than bodies."""
+    return max(1, min(cores(), bodies))
