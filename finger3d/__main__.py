@@ -1,8 +1,18 @@
-"""``python -m finger3d``: the same as the command ``finger3d``."""
+"""``python -m finger3d``, and the console command: as little as can stand between Ctrl-C and its one line."""
 
 import sys
 
-from finger3d.cli import main
+
+def main() -> int:
+    """Load the command line and run it."""
+    try:
+        from finger3d.cli import main as run
+
+        return run()
+    except KeyboardInterrupt:
+        print("finger3d: interrupted; nothing was written", file=sys.stderr)
+        return 130
+
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -53,6 +53,34 @@ def atomic(path: str | Path) -> Iterator[Path]:
             temporary.unlink()
 
 
+@contextmanager
+def claimed(folder: str | Path) -> Iterator[Path]:
+    """Make a folder and keep every other finger3d from writing there while the block runs.
+
+    Raises
+    ------
+    Finger3dError
+        If another run holds it, or it cannot be written.
+    """
+    from filelock import FileLock, Timeout
+
+    path = Path(folder)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        lock = FileLock(path / ".finger3d.lock", blocking=False)
+        lock.acquire()
+    except Timeout:
+        raise Finger3dError(
+            f"{path}: another finger3d is writing there; wait for it, or name another folder with --out"
+        ) from None
+    except OSError as error:
+        raise Finger3dError(f"--out {path}: cannot be written: {error.strerror or error}") from None
+    try:
+        yield path
+    finally:
+        lock.release()
+
+
 def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> None:
     """Write one line of names and a line for each entry; numbers keep every digit (``repr``).
 

@@ -24,3 +24,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         complain("interrupted; nothing was written")
         return 130
+    except ImportError as error:
+        # Ctrl-C while OCP or VTK initialise: their loaders turn it into an ImportError.
+        if not isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
+            raise
+        complain("interrupted while a package was loading; steps that were finished are kept")
+        return 130

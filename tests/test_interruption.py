@@ -1,0 +1,134 @@
+"""Ctrl-C, a full disk and a second run: nothing half-written is taken for a result, and nothing ends in a traceback."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import finger3d.job
+from finger3d.cli import main
+from finger3d.export import claimed
+
+SECTION = ["--set", "model.domain=plane-strain", "--set", "mesh.size_mm=2.0", "--set", "mesh.base_size_mm=8.0"]
+
+
+def press(root: Path, out: Path, *options: str) -> list[str]:
+    scene = root / "geometries" / "fig9.toml"
+    return [sys.executable, "-m", "finger3d", "press", str(scene), "--out", str(out), *options]
+
+
+def judge(done: subprocess.CompletedProcess, out: Path) -> None:
+    """What must hold whenever the interruption came."""
+    # Python ends by the signal itself if it came while exec() ran; a shell shows 130 for either.
+    assert done.returncode in (0, 130, -signal.SIGINT), done.stderr
+    assert "Traceback" not in done.stderr
+    if "results " not in done.stdout:
+        assert done.stderr.strip().splitlines()[-1].startswith("finger3d: interrupted")
+    left = [p.name for p in out.iterdir()] if out.is_dir() else []
+    assert not [name for name in left if name.startswith(".") and not name.endswith(".lock")]
+    if "summary.json" in left:
+        summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+        # After the last file is written there is nothing left to interrupt but the closing table.
+        whole = {"fields.vtu", "history.csv", "contact.csv", "scene.toml"} <= set(left)
+        assert summary["outcome"].startswith("incomplete") or (summary["outcome"] == "converged" and whole)
+
+
+def interrupted(command: list[str], seconds: float, cwd: Path) -> subprocess.CompletedProcess:
+    running = subprocess.Popen(
+        command, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    time.sleep(seconds)
+    os.killpg(running.pid, signal.SIGINT)
+    stdout, stderr = running.communicate(timeout=60)
+    return subprocess.CompletedProcess(command, running.returncode, stdout, stderr)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize(
+    ("domain", "shares"), [("plane-strain", (0.15, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)), ("solid", (0.2, 0.5, 0.8, 0.95))]
+)
+def test_ctrl_c_at_any_moment(root: Path, tmp_path: Path, domain: str, shares: tuple[float, ...]) -> None:
+    out = tmp_path / "ein Ordner mit Umläuten"
+    start = time.perf_counter()
+    subprocess.run(press(root, out, "--set", f"model.domain={domain}"), check=True, capture_output=True, cwd=root)
+    whole = time.perf_counter() - start
+    # Python itself, before a line of ours runs, answers with a traceback: hence not from the very start.
+    for share in shares:
+        shutil.rmtree(out)
+        out.mkdir()
+        done = interrupted(press(root, out, "--set", f"model.domain={domain}"), share * whole, root)
+        judge(done, out)
+
+
+def test_ctrl_c_while_the_steps_are_written(root: Path, tmp_path: Path) -> None:
+    out = tmp_path / "ein Ordner mit Umläuten"
+    running = subprocess.Popen(
+        press(root, out, *SECTION, "--set", "press.steps=3000", "--no-figures"),
+        cwd=root, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert running.stderr is not None
+    seen = ""
+    while "step 40 of 3000" not in seen:
+        seen = running.stderr.readline()
+        assert running.poll() is None
+    running.send_signal(signal.SIGINT)
+    _, stderr = running.communicate(timeout=60)
+    judge(subprocess.CompletedProcess([], running.returncode, "", stderr), out)
+    assert "of 3000 steps are kept in" in stderr
+    assert len(json.loads((out / "summary.json").read_text(encoding="utf-8"))["steps"]) >= 40
+
+
+def test_an_import_that_ctrl_c_broke_off_is_an_interruption(root: Path, tmp_path, monkeypatch, capsys) -> None:
+    def broken(*args: object, **kwargs: object) -> None:
+        raise ImportError("initialization failed") from KeyboardInterrupt()
+
+    monkeypatch.setattr(finger3d.job, "press", broken)
+    assert main(press(root, tmp_path / "out")[3:]) == 130
+    assert capsys.readouterr().err.startswith("finger3d: interrupted")
+
+
+def test_an_import_that_fails_otherwise_is_not_hidden(root: Path, tmp_path, monkeypatch) -> None:
+    def broken(*args: object, **kwargs: object) -> None:
+        raise ImportError("no module")
+
+    monkeypatch.setattr(finger3d.job, "press", broken)
+    with pytest.raises(ImportError, match="no module"):
+        main(press(root, tmp_path / "out")[3:])
+
+
+def test_two_runs_into_one_folder(root: Path, tmp_path: Path, capsys) -> None:
+    out = tmp_path / "out"
+    with claimed(out):
+        assert main(press(root, out, *SECTION)[3:]) == 2
+    assert capsys.readouterr().err.strip().splitlines()[-1] == (
+        f"finger3d: {out}: another finger3d is writing there; wait for it, or name another folder with --out"
+    )
+    assert main(press(root, out, *SECTION, "--no-figures")[3:]) == 0
+
+
+def test_a_disk_that_fills(root: Path, tmp_path: Path, monkeypatch, capsys) -> None:
+    done = []
+
+    def full(source: str | Path, target: str | Path) -> None:
+        if Path(target).name == "history.csv" and len(done) > 1:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        done.append(target)
+        replace(source, target)
+
+    replace = os.replace
+    monkeypatch.setattr(os, "replace", full)
+    assert main(press(root, tmp_path, *SECTION, "--no-figures")[3:]) == 2
+    error = capsys.readouterr().err.strip().splitlines()[-1]
+    assert error.startswith(f"finger3d: cannot write {tmp_path / 'history.csv'}: No space left on device")
+    assert not [p.name for p in tmp_path.iterdir() if p.name.startswith(".") and p.suffix != ".lock"]
+    assert json.loads((tmp_path / "summary.json").read_text())["outcome"].startswith("incomplete")
