@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from finger3d.contact.law import OPEN
-from finger3d.export import atomic, write_csv, write_json, write_vtu
+from finger3d.export import atomic, claimed, write_csv, write_json, write_vtu
 from finger3d.history import Frame, History, contact_table, measure
 from finger3d.report import Report
 from finger3d.result import PressResult
@@ -141,18 +141,24 @@ def press(
     >>> len(finger3d.press(stiff).history.frames)
     4
     """
-    from finger3d.accuracy import estimate
-    from finger3d.page import press_page
     from finger3d.scene import load
     from finger3d.solve import covers
 
     started = time.perf_counter()
-    report = report or Report()
     scene = load(scene) if isinstance(scene, str | Path) else scene
     temporary = TemporaryDirectory(prefix="finger3d-") if out is None else None
     figures = temporary is None if figures is None else figures
-    folder = Path(temporary.name) if temporary else Path(str(out))
-    folder.mkdir(parents=True, exist_ok=True)
+    with claimed(temporary.name if temporary else str(out)) as folder:
+        history, summary = _pressed(scene, folder, report or Report(), started, figures, error)
+    return PressResult(history, folder, summary, temporary)
+
+
+def _pressed(
+    scene: Scene, folder: Path, report: Report, started: float, figures: bool, error: bool
+) -> tuple[History, dict[str, Any]]:
+    from finger3d.accuracy import estimate
+    from finger3d.page import press_page
+
     _clear(folder)
     refinement = _refined(scene, report)
     if refinement:
@@ -176,7 +182,7 @@ def press(
         summary = output.write(str(history.outcome))
     if figures:
         press_page(folder)
-    return PressResult(history, folder, summary, temporary)
+    return history, summary
 
 
 def _refined(scene: Scene, report: Report) -> Refined | None:

@@ -12,7 +12,7 @@ import numpy as np
 from finger3d.compare.cases import Case, resized, solved, widened
 from finger3d.compare.verdict import WITHIN, passage, reached, sentences
 from finger3d.errors import Finger3dError, Outcome
-from finger3d.export import atomic, write_csv, write_json
+from finger3d.export import atomic, claimed, write_csv, write_json
 from finger3d.model import Model
 from finger3d.report import Report
 from finger3d.versions import versions
@@ -66,8 +66,11 @@ def compare(
     model = solid.model()
     asked = _widths(model, widths)
     _check(model, asked)
-    folder = Path(out)
-    folder.mkdir(parents=True, exist_ok=True)
+    with claimed(out) as folder:
+        return _compared(solid, model, asked, folder, report)
+
+
+def _compared(solid: Scene, model: Model, asked: list[float], folder: Path, report: Report) -> Comparison:
     for name in ("compare.csv", "compare.json", "lines.csv", "compare.png", "report.html"):
         (folder / name).unlink(missing_ok=True)
     with atomic(folder / "scene.toml") as path:
