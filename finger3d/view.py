@@ -17,12 +17,12 @@ from numpy.typing import ArrayLike, NDArray
 from finger3d.contact.law import OPEN, SLIP, STATUS_NAMES, STICK
 from finger3d.export import atomic
 from finger3d.mesh import Mesh
+from finger3d.outlines import edges_of, outline_of
 from finger3d.render import BODY, COLOURS, LINE, OBJECT, REST, Skin, draw_solid, render_solid, skin_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.path import Path as Curve
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -30,7 +30,6 @@ Int = NDArray[np.int64]
 _CMAP = "viridis"
 _SHADES = {STICK: "#c9d9ee", SLIP: "#fde3c4"}
 _DPI = 120
-_MANY_CELLS = 4000
 
 
 def finger_picture(
@@ -336,7 +335,7 @@ def _section(
     limits = low - 0.04 * span, low + 1.08 * span
     figure, panels = _two_panels(span[1] / span[0], title, ticks=True)
     by_status = _palette()[state[arc[:, :2]].ravel()]
-    outline, edges = _outline(mesh, moved), _edges(mesh, moved)
+    outline, edges = outline_of(mesh, moved), edges_of(mesh, moved)
     for axes, colours in zip(panels, (_pressure_colours(of_half, highest), by_status), strict=True):
         axes.add_patch(PathPatch(outline, facecolor=BODY, edgecolor=LINE, lw=0.5))
         axes.add_patch(PathPatch(edges, facecolor="none", edgecolor=LINE, lw=0.25))
@@ -349,38 +348,6 @@ def _section(
     panels[0].set_ylabel("y (mm)")
     _keys(figure, highest, {} if profile is None else {"object": OBJECT})
     return figure
-
-
-def _runs(lines: Float) -> Curve:
-    """One path of separate polylines (k, p, 2): a thousand artists would take as long as the solution."""
-    from matplotlib.path import Path
-
-    codes = np.full(lines.shape[:2], Path.LINETO)
-    codes[:, 0] = Path.MOVETO
-    return Path(lines.reshape(-1, 2), codes.ravel())
-
-
-def _edges(mesh: Mesh, moved: Float) -> Curve:
-    """The cells' edges, each once; of a fine mesh none, which would be a grey area and no picture of it."""
-    if len(mesh.cells) > _MANY_CELLS:
-        return _runs(np.zeros((0, 2, 2)))
-    sides = [(0, 1), (1, 2), (2, 0)] if not mesh.is_quadratic else [(0, 3, 1), (1, 4, 2), (2, 5, 0)]
-    edges = mesh.cells[:, sides].reshape(-1, len(sides[0]))
-    ends = np.sort(edges[:, [0, -1]], axis=1)
-    return _runs(moved[edges[np.unique(ends, axis=0, return_index=True)[1]]])
-
-
-def _outline(mesh: Mesh, moved: Float) -> Curve:
-    """The boundary of a section as a closed path."""
-    from matplotlib.path import Path
-
-    facets = np.concatenate([f for f in mesh.facets.values() if len(f)])
-    facets = facets[:, [0, 2, 1]] if mesh.is_quadratic else facets
-    following = {int(a): i for i, a in enumerate(facets[:, 0])}
-    ring = [0]
-    while (after := following[int(facets[ring[-1], -1])]) != 0:
-        ring.append(after)
-    return Path(np.concatenate([moved[facets[ring, :-1]].reshape(-1, 2), moved[facets[:1, 0]]]), closed=True)
 
 
 # --- a solid ------------------------------------------------------------------------------------------------------
