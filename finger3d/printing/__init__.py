@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 __all__ = ["Exported", "MoldOptions", "export"]
 
 _SMALLEST_MM, _LARGEST = 1e-4, 0.2
-_GAP_MM = 8.0
 
 
 @dataclass(frozen=True)
@@ -99,7 +98,7 @@ def export(
     if mold is not None:
         report.stage("mold")
         made = _mold(scene, solid, mold)
-    out.mkdir(parents=True, exist_ok=True)
+    _clear(out)
     files, remarks = [], []
     if solid is None:
         remarks.append(f"no finger.step: {design.name} holds triangles, no CAD; they are written as they are")
@@ -119,6 +118,18 @@ def export(
     )
 
 
+def _clear(out: Path) -> None:
+    """Make the folder, and take away what an earlier export left: it may be another finger's."""
+    from finger3d.printing.output import FILES
+
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        for name in ("finger.step", "finger.stl", *FILES):
+            (out / name).unlink(missing_ok=True)
+    except OSError as error:
+        raise Finger3dError(f"--out {out}: cannot be written: {error.strerror}") from None
+
+
 def _mold(scene: Scene, solid: Any, options: MoldOptions) -> Any:
     from finger3d.printing.mold import foils, mold
 
@@ -128,10 +139,9 @@ def _mold(scene: Scene, solid: Any, options: MoldOptions) -> Any:
 
 
 def _volume(design: Any, solid: Any, body: Shell) -> float:
-    """The finger's volume: closed form, or CAD's where that is exact, or that of its triangles."""
-    from finger3d.printing.shell import known_volume
+    """The finger's volume: closed form, or CAD's, or that of its triangles."""
+    from finger3d.printing.shell import volume
 
     if not hasattr(design, "cad"):
         return float(design.volume_mm3)
-    exact = None if solid is None else known_volume(solid)
-    return body.surface.volume if exact is None else exact
+    return body.surface.volume if solid is None else volume(solid)

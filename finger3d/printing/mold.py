@@ -30,6 +30,7 @@ from finger3d.errors import Finger3dError
 from finger3d.model import Gauge
 from finger3d.printing.demould import box, is_base, undercuts
 from finger3d.printing.options import RIM_MM, MoldOptions
+from finger3d.printing.shell import volume
 from finger3d.triangles import Triangles
 
 Float = NDArray[np.float64]
@@ -105,7 +106,7 @@ class Mold:
     @property
     def silicone_mm3(self) -> float:
         """Volume of the cavity."""
-        return float(self.body.volume)
+        return volume(self.body)
 
 
 def mold(solid: Any, gauges: Sequence[Foil], options: MoldOptions) -> Mold:
@@ -341,7 +342,7 @@ def overlaps(made: Mold) -> dict[str, float]:
 
 
 def _check_parts(made: Mold) -> None:
-    bad = {pair: v for pair, v in overlaps(made).items() if v > _TOUCH * made.body.volume}
+    bad = {pair: v for pair, v in overlaps(made).items() if v > _TOUCH * made.silicone_mm3}
     if bad:
         pair = max(bad, key=lambda p: bad[p])
         raise Finger3dError(f"mold: {pair} would overlap by {bad[pair]:.3g} mm3; choose other sizes of wall or pegs")

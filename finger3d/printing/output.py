@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,11 @@ Float = NDArray[np.float64]
 
 GAP_MM = 8.0
 """Between parts on the plate."""
+
+FILES = (
+    "mold_half_a.stl", "mold_half_b.stl", "mold_lid.stl", "mold.3mf", "mold.step", "sheet.txt", "mold.png",
+)  # fmt: skip
+"""What a mold writes."""
 
 _LYING = {
     "half_a": np.diag([-1.0, 1.0, -1.0]),
@@ -55,26 +61,31 @@ def write_mold(
     """
     from build123d import Compound
 
-    report.stage("parts")
+    report.stage("parts and picture")
     shells = {name: shell(part, body.tolerance_mm, name, body.angle) for name, part in made.parts.items()}
     printed = as_printed(shells)
     placed, size = plate(printed)
-    files = [out / f"mold_{name}.stl" for name in printed]
-    for file, part in zip(files, printed.values(), strict=True):
-        write_stl(file, part.surface, text)
-    write_3mf(out / "mold.3mf", placed)
-    write_step(out / "mold.step", Compound(label="mold", children=list(made.parts.values())))
-    with atomic(out / "sheet.txt") as temporary:
-        temporary.write_text(sheet(title, made, printed, size), encoding="utf-8")
-    report.stage("picture")
-    assembled = {name: part.surface for name, part in shells.items()}
-    assembled["sensor"] = shell(made.body, body.tolerance_mm, "sensor", body.angle).surface
-    sizes = {name: " x ".join(f"{e:.1f}" for e in part.extent) + " mm" for name, part in printed.items()}
-    sizes["sensor"] = f"{made.silicone_mm3 / 1e3:.1f} ml"
-    if (laid := strips(made)) is not None:
-        assembled["strips"] = laid
-        sizes["strips"] = ", ".join(name for foil in made.foils for name in foil.names)
-    picture(out / "mold.png", assembled, f"Mold of {title}: as it is poured, taken apart", sizes)
-    files += [out / name for name in ("mold.3mf", "mold.step", "sheet.txt", "mold.png")]
+    with ThreadPoolExecutor(1) as pool:  # PyVista needs some seconds, in a process of its own
+        drawn = pool.submit(_picture, out / "mold.png", title, made, body, shells, printed)
+        for name, part in printed.items():
+            write_stl(out / f"mold_{name}.stl", part.surface, text)
+        write_3mf(out / "mold.3mf", placed)
+        write_step(out / "mold.step", Compound(label="mold", children=list(made.parts.values())))
+        with atomic(out / "sheet.txt") as temporary:
+            temporary.write_text(sheet(title, made, printed, size), encoding="utf-8")
+        drawn.result()
     remarks = [f"mold_{n}: {why}" for n, part in printed.items() if (why := oversize(part, made.options.bed_mm))]
-    return files, remarks
+    return [out / name for name in FILES], remarks
+
+
+def _picture(
+    path: Path, title: str, made: Mold, body: Shell, shells: dict[str, Shell], printed: dict[str, Shell]
+) -> None:
+    parts = {name: part.surface for name, part in shells.items()}
+    parts["sensor"] = shell(made.body, body.tolerance_mm, "sensor", body.angle).surface
+    sizes = {name: " x ".join(f"{e:.1f}" for e in part.extent) + " mm" for name, part in printed.items()}
+    sizes["sensor"] = f"{made.silicone_mm3 / 1e3:.3g} ml"
+    if (laid := strips(made)) is not None:
+        parts["strips"] = laid
+        sizes["strips"] = "\n".join(name for foil in made.foils for name in foil.names)
+    picture(path, parts, f"Mold of {title}: as it is poured, taken apart", sizes)

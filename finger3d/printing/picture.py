@@ -32,8 +32,10 @@ LABELS = {"half_a": "half A", "half_b": "half B", "lid": "lid", "sensor": "senso
 _VIEW = np.array([0.55, 0.5, 1.0])
 _POUR = np.diag([1.0, -1.0, -1.0])  # dome down, lid on top, as it is poured
 _APART = 0.45  # of the largest size
-_PIXELS = 1600
 _MARGIN = 1.08
+_WIDE, _TITLE, _DPI = 10.0, 0.5, 130  # inches
+_SIDES = 1.6  # of the parts' width, for the labels
+_PIXELS = round(_WIDE * _DPI / _SIDES)
 
 
 @dataclass(frozen=True)
@@ -88,21 +90,22 @@ def picture(path: Path, assembled: Mapping[str, Triangles], title: str, sizes: M
     scenery = exploded(assembled)
     image = _rendered(scenery)
     width, height = scenery.half
-    figure = Figure(figsize=(10.0, max(10.0 * height / width, 4.0)), dpi=130, layout="constrained")
+    high = _WIDE * height / (_SIDES * width) + _TITLE
+    figure = Figure(figsize=(_WIDE, high), dpi=_DPI)
     FigureCanvasAgg(figure)
-    axes = figure.add_subplot()
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0 - _TITLE / high))
     if image is None:
         _draw(axes, scenery)
     else:
-        axes.imshow(image, extent=(-width, width, -height, height), interpolation="lanczos")
+        axes.imshow(image, extent=(-width, width, -height, height), interpolation="nearest")
     for name, part in scenery.parts.items():
         if name in sizes:
             _label(axes, scenery, name, part, sizes[name])
-    axes.set(xlim=(-1.25 * width, 1.25 * width), ylim=(-height, height), aspect="equal")
+    axes.set(xlim=(-_SIDES * width, _SIDES * width), ylim=(-height, height), aspect="equal")
     axes.set_axis_off()
-    axes.set_title(title, fontsize=11)
+    figure.text(0.5, 1.0 - 0.5 * _TITLE / high, title, fontsize=11, ha="center", va="center")
     with atomic(path) as temporary:
-        figure.savefig(temporary, bbox_inches="tight", pad_inches=0.15)
+        figure.savefig(temporary)
     return "matplotlib" if image is None else "pyvista"
 
 
@@ -134,16 +137,12 @@ def _draw(axes: Any, scenery: Scenery) -> None:
         far = np.argsort(corners.mean(axis=1) @ scenery.axes[2], kind="stable")
         shade = 0.6 + 0.4 * np.clip(normals @ light, 0.0, 1.0)
         fill = np.clip(np.array(to_rgb(COLOURS[name])) * shade[:, None], 0.0, 1.0)[far]
-        axes.add_collection(
-            PolyCollection(
-                list(scenery.flat(corners)[far]),
-                facecolors=fill,
-                edgecolors=fill,
-                lw=0.3,
-                zorder=2 + layer,
-                alpha=OPACITY.get(name),
-            )
-        )
+        alpha = OPACITY.get(name)
+        # An edge in the face's colour closes fine seams; through a transparent face it would show.
+        edge = fill if alpha is None else "none"
+        faces = PolyCollection(list(scenery.flat(corners)[far]), facecolors=fill, edgecolors=edge, lw=0.3, alpha=alpha)
+        faces.set(zorder=2 + layer, antialiased=alpha is None)
+        axes.add_collection(faces)
 
 
 def _rendered(scenery: Scenery) -> NDArray[np.uint8] | None:

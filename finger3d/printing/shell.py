@@ -22,6 +22,7 @@ ANGLE = 0.2
 
 _VOLUME = 8e-4  # relative; promised is 1e-3
 _TRIES = 14
+_QUADRATURE = 1e-4
 _EXACT = ("PLANE", "CYLINDER", "CONE", "SPHERE")
 
 
@@ -72,6 +73,22 @@ def known_volume(solid: Any) -> float | None:
     """CAD's volume (mm3) of a build123d solid, if its faces are such that CAD integrates it exactly."""
     exact = all(face.geom_type.name in _EXACT for face in solid.faces())
     return float(solid.volume) if exact else None
+
+
+def volume(solid: Any) -> float:
+    """Volume (mm3) of a build123d solid, by Gauss-Kronrod integration where CAD's own is not exact.
+
+    It agrees with the tessellated volume and the closed form on the splines of the tests.
+    """
+    exact = known_volume(solid)
+    if exact is not None:
+        return exact
+    from OCP.BRepGProp import BRepGProp
+    from OCP.GProp import GProp_GProps
+
+    found = GProp_GProps()
+    BRepGProp.VolumePropertiesGK_s(solid.wrapped, found, _QUADRATURE)
+    return float(found.Mass())
 
 
 def _triangles(solid: Any, tolerance_mm: float, angle: float, name: str) -> Triangles:
