@@ -24,7 +24,7 @@ from finger3d.problem import AUTO_START, Problem, at_points, between, folded, ri
 
 Float = NDArray[np.float64]
 
-__all__ = ["AUTO_START", "Problem", "build", "contact_zone", "covers", "march", "symmetry", "targets"]
+__all__ = ["AUTO_START", "Problem", "build", "contact_zone", "covers", "gauge_row", "march", "symmetry", "targets"]
 
 MARGIN = 0.3  # candidate points reach to a rigid gap of this share of the depth; checked after the solution
 _CUTS = 6
@@ -65,7 +65,7 @@ def build(model: Model, say: Callable[[str], None] = lambda text: None, margin: 
     kept = _kept_rows(face, axes)
     rows = local_rows(face, model.object.frame(mesh.dim))[kept]
     inlay = model.inclusions.lay(model, mesh, axes) if model.inclusions else None
-    read = [inlay.reads @ inlay.rows, inlay.rows] if inlay else [_gauge_row(mesh, g, axes) for g in model.gauges]
+    read = [inlay.reads @ inlay.rows, inlay.rows] if inlay else [gauge_row(mesh, g, axes) for g in model.gauges]
     assembly = time.perf_counter() - start
     say(f"condensing {matrix.upper.shape[0]} unknowns to {len(face.nodes)} contact points")
     held = _held(model, mesh, axes)
@@ -133,7 +133,7 @@ def _kept_rows(face: Surface, axes: tuple[str, ...]) -> NDArray[np.int64]:
     return np.flatnonzero(keep.ravel())
 
 
-def _gauge_row(mesh: Mesh, gauge: Gauge, axes: tuple[str, ...]) -> sp.csr_matrix:
+def gauge_row(mesh: Mesh, gauge: Gauge, axes: tuple[str, ...]) -> sp.csr_matrix:
     """Row of one gauge, read from the mirrored part where the gauge lies in an image."""
     along = gauge.direction
     if gauge.length_mm == 0.0:

@@ -6,13 +6,8 @@ import csv
 import errno
 import json
 import os
-import signal
 import socket
-import subprocess
-import sys
 import time
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -259,144 +254,6 @@ def test_a_body_that_cannot_be_built_and_a_point_that_fails_are_rows(scene, monk
 
     monkeypatch.setattr("finger3d.sweep.work._built", lambda *a: Weak())
     assert [row["outcome"] for row in pressed_here(sweep)] == ["MemoryError: no further words"] * 2
-
-
-# --- real processes ---
-
-
-def environment(root: Path, cache: str) -> dict[str, str]:
-    # PYTHONPATH stands for an installation; the folder they run in does not matter
-    return {**os.environ, "PYTHONPATH": str(root), "FINGER3D_CACHE": cache, "OMP_NUM_THREADS": "1"}
-
-
-@contextmanager
-def started(command: list[str], env: dict[str, str], where: Path, log: Path) -> Iterator[subprocess.Popen]:
-    with log.open("w") as file:
-        process = subprocess.Popen(command, env=env, cwd=where, stdout=file, stderr=file, start_new_session=True)
-        try:
-            yield process
-        finally:
-            if process.poll() is None:
-                process.kill()
-            process.wait()
-
-
-def until(true, what: str, seconds: float = 60.0) -> None:
-    end = time.monotonic() + seconds
-    while not true():
-        assert time.monotonic() < end, f"{what}: not within {seconds} s"
-        time.sleep(0.02)
-
-
-def free_port() -> int:
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        return one.getsockname()[1]
-
-
-def sweeping(scene: Path, out: Path, mus: int, nus: int, *more: str) -> list[str]:
-    mu = ",".join(f"{0.02 + 1.0 * i / mus:.4f}" for i in range(mus))
-    nu = ",".join(f"{0.3 + 0.19 * i / nus:.4f}" for i in range(nus))
-    command = [sys.executable, "-m", "finger3d", "sweep", str(scene), *COARSE, "--out", str(out)]
-    return [*command, "--vary", f"friction.mu={mu}", "--vary", f"material.nu={nu}", *more]
-
-
-def nothing_repeated_or_lost(out: Path, total: int) -> None:
-    assert sorted(row["point"] for row in lines(out)) == list(range(total))
-    found = table(out)
-    assert [int(row["point"]) for row in found] == list(range(total))
-    assert {row["outcome"] for row in found} == {"converged"}
-    assert pq.read_table(out / "results.parquet").num_rows == total
-
-
-def children(pid: int) -> list[int]:
-    """Worker processes of a parent, by Linux's process table."""
-    mine = [int(n) for n in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
-    for task in Path(f"/proc/{pid}/task").iterdir():
-        mine += [int(n) for n in (task / "children").read_text().split()]
-    return [n for n in dict.fromkeys(mine) if "spawn_main" in Path(f"/proc/{n}/cmdline").read_text()]
-
-
-def killed_and_resumed(command: list[str], out: Path, total: int, env: dict[str, str], where: Path) -> None:
-    """Kill -9 a worker, then the parent, then go on; the journal's lines are counted over both runs."""
-    log = where / "sweep.log"
-    with started(command, env, where, log) as parent:
-        until(lambda: len(lines(out)) >= total // 10, "a tenth of the points")
-        workers = children(parent.pid)
-        os.kill(workers[0], signal.SIGKILL)
-        count = len(lines(out))
-        until(lambda: len(lines(out)) >= count + total // 5 or parent.poll() is not None, "points after the kill")
-        parent.kill()
-        parent.wait()
-    before = lines(out)
-    assert total // 10 <= len(before) < total, log.read_text()
-    until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in workers), "workers end with their parent")
-    with started(command, env, where, log) as parent:
-        assert parent.wait(timeout=250) == 0, log.read_text()
-    # what was kept is the beginning of what is there: none was pressed again
-    assert lines(out)[: len(before)] == before
-    nothing_repeated_or_lost(out, total)
-
-
-def test_a_sweep_survives_kill_9_of_a_worker_and_of_the_parent(root, scene, tmp_path):
-    out = tmp_path / "out"
-    env = environment(root, str(tmp_path))
-    killed_and_resumed(sweeping(scene, out, 20, 3, "--workers", "2"), out, 60, env, tmp_path)
-
-
-@pytest.mark.slow
-def test_a_thousand_points_survive_kill_9(root, scene, tmp_path):
-    out = tmp_path / "out"
-    env = environment(root, str(tmp_path))
-    killed_and_resumed(sweeping(scene, out, 50, 20, "--workers", "2"), out, 1000, env, tmp_path)
-
-
-def test_a_scheduler_and_two_workers_of_their_own(root, scene, tmp_path):
-    port, env, out = free_port(), environment(root, str(tmp_path)), tmp_path / "out"
-    address = f"tcp://127.0.0.1:{port}"
-    here = [sys.executable, "-m"]
-    with ExitStack() as running_:
-        command = [
-            *here,
-            "distributed.cli.dask_scheduler",
-            "--host",
-            "127.0.0.1",
-            "--port",
-            str(port),
-            "--no-dashboard",
-        ]
-        running_.enter_context(started(command, env, tmp_path, tmp_path / "scheduler.log"))
-        for i in range(2):
-            command = [*here, "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard"]
-            running_.enter_context(started(command, env, tmp_path, tmp_path / f"worker{i}.log"))
-        command = sweeping(scene, out, 3, 4, "--scheduler", address)
-        # the scheduler may still be on its way: the time limit is there for that, too
-        done = subprocess.run(command, env=env, cwd=tmp_path, capture_output=True, text=True, timeout=120)
-        assert done.returncode == 0, done.stderr
-        assert done.stderr == ""
-    nothing_repeated_or_lost(out, 12)
-    assert {row["body"] for row in lines(out)} == {p.body for p in load_points(scene)}
-
-
-def load_points(scene: Path) -> list:
-    nu = ",".join(f"{0.3 + 0.19 * i / 4:.4f}" for i in range(4))
-    return list(points_of(scene, "friction.mu=0.02", f"material.nu={nu}").points)
-
-
-def test_ctrl_c_ends_with_130_and_one_line(root, scene, tmp_path):
-    out = tmp_path / "out"
-    command = sweeping(scene, out, 100, 1, "--workers", "1")
-    with started(command, environment(root, str(tmp_path)), tmp_path, tmp_path / "log") as parent:
-        until(lambda: len(lines(out)) >= 5, "five points")
-        # a terminal sends it to the workers, too
-        os.killpg(parent.pid, signal.SIGINT)
-        assert parent.wait(timeout=60) == 130
-    said = (tmp_path / "log").read_text()
-    assert "Traceback" not in said
-    count = len(lines(out))
-    assert 5 <= count < 100
-    assert said.splitlines()[-1].startswith(f"finger3d: interrupted; {count} of 100 points are kept in {out}")
-    assert len(table(out)) == count
 
 
 def test_the_scene_of_these_tests_is_small(scene):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import re
 from collections.abc import Iterable, Mapping
@@ -164,7 +165,7 @@ def parse(
             rigid,
             domain=tables.model.domain,
         )
-        zone = approach(*way.approach).zone
+        zone = _zone(way)
         mesh = checks.chosen(tables.mesh, way, zone)
     except Finger3dError as error:
         raise _refusal([str(error)], path, set_keys) from None
@@ -185,6 +186,20 @@ def parse(
     except Finger3dError as error:
         raise _refusal([str(error)], path, set_keys) from None
     return scene
+
+
+def _zone(way: Model) -> tuple[float, float, float, float]:
+    """The box of contact; scenes of a sweep mostly share theirs."""
+    try:
+        return _kept_zone(way)
+    except TypeError:
+        # a surface from a file cannot be looked up
+        return approach(*way.approach).zone
+
+
+@functools.lru_cache(maxsize=64)
+def _kept_zone(way: Model) -> tuple[float, float, float, float]:
+    return approach(*way.approach).zone
 
 
 def _refusal(lines: list[str], path: Path | None, set_keys: Iterable[str] | Mapping[str, str]) -> Finger3dError:
