@@ -142,7 +142,6 @@ def press(
     4
     """
     from finger3d.scene import load
-    from finger3d.solve import covers
 
     started = time.perf_counter()
     scene = load(scene) if isinstance(scene, str | Path) else scene
@@ -158,6 +157,7 @@ def _pressed(
 ) -> tuple[History, dict[str, Any]]:
     from finger3d.accuracy import estimate
     from finger3d.page import press_page
+    from finger3d.solve import covers
 
     _clear(folder)
     refinement = _refined(scene, report)
