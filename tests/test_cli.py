@@ -278,7 +278,8 @@ def test_press_as_json_that_does_not_converge(scene, tmp_path, fake_press, capsy
 def test_what_a_job_prints_does_not_spoil_the_json(scene, tmp_path, monkeypatch, capsys):
     def press(scene, out, report, **options):
         print("a stray remark")
-        return SimpleNamespace(summary={"outcome": "converged", "warnings": ["Wärme"]}, outcome=Outcome.CONVERGED)
+        summary = {"outcome": "converged", "warnings": ["Wärme"]}
+        return SimpleNamespace(summary=lambda: summary, outcome=Outcome.CONVERGED)
 
     monkeypatch.setattr(finger3d.job, "press", press)
     assert run("press", scene, "--out", tmp_path / "out", "--json") == 0
