@@ -21,7 +21,9 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.surface import surface
 from finger3d.history import Frame, measure
 from finger3d.model import Leg, Model
-from finger3d.solve import AUTO_START, Problem, build, march
+from finger3d.objects import Sphere
+from finger3d.objects.mesh import MeshObject
+from finger3d.solve import AUTO_START, Problem, build, contact_zone, march, symmetry
 
 MAIN = ("normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm")
 """The numbers that get an error bar, beside every gauge."""
@@ -149,10 +151,29 @@ def companion(problem: Problem) -> Problem:
     """
     everything = len(surface(problem.mesh, "contact", problem.thickness).nodes) == len(problem.surface.nodes)
     model = coarser(problem.model)
+    _check_cost(problem, model)
     beside = build(model, margin=math.inf) if everything else build(model)
     if _ratio(problem, beside) < _LEAST_RATIO:
         raise Finger3dError("the mesh is so coarse that no coarser one tells anything; lower mesh.size_mm")
     return beside
+
+
+def _check_cost(problem: Problem, model: Model) -> None:
+    """Refuse a companion that pytetwild would have to mesh although the problem itself took its meshes from the cache,
+    and one whose object it would mesh: on a ball of 0.5 mm that took four times as long as the press.
+    """
+    unstructured = isinstance(model.object, Sphere | MeshObject) and model.domain == "solid"
+    if model.object_compliance is not None and unstructured:
+        raise Finger3dError("a coarser mesh of the elastic object would take longer than the press")
+    if model.domain != "solid" or model.mesh.mesher == "swept" or not problem.report.from_cache:
+        return
+    from finger3d.design.tetwild import cached
+
+    if not cached(model.design, model.mesh, contact_zone(model), symmetry(model)):
+        raise Finger3dError(
+            "a coarser mesh is not in the cache, and making one would take longer than the press; it is made together "
+            "with the mesh itself"
+        )
 
 
 def compared(problem: Problem, frame: Frame, beside: Problem, last: Frame) -> dict[str, float]:

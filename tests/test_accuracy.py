@@ -160,3 +160,15 @@ def test_a_mesh_too_coarse_to_judge_spoils_nothing(tmp_path: Path, capsys: pytes
 )
 def test_a_number_is_printed_to_its_bar(value: float, error: float | None, text: str) -> None:
     assert with_error(value, error, 5) == text
+
+
+def test_no_companion_is_meshed_where_the_mesh_came_from_the_cache() -> None:
+    # a hemisphere has no section to sweep; whether its mesh was read or made is all that counts here
+    problem, frames = pressed(half_cylinder(0.4))
+    ball = designs()["hemisphere"](radius_mm=7.31)
+    model = replace(problem.model, design=ball, domain="solid", mesh=MeshOptions(0.731, 3.0, "ftetwild"))
+    read = replace(problem, model=model, report=replace(problem.report, from_cache=True))
+    found = estimate(read, frames, FAST)
+    assert found.discretisation == {}
+    assert found.method.startswith("no estimate: a coarser mesh is not in the cache")
+    assert found.of("normal_force_N") is None
