@@ -15,6 +15,12 @@ from finger3d.solve import AUTO_START, contact_zone, symmetry
 _BASE_MB = 170.0
 _IMPORT_S = 0.4
 _FIGURES_S = {2: 1.0, 3: 4.5}
+_NEWTON = 3  # factorisations in a step at finite strain
+_NUMERIC = 0.8  # of a condensation, once the ordering is known; with two solutions
+_TANGENT = 0.8  # assemblies of the linear stiffness
+_NEWTON_S = {2: 0.05, 3: 0.2}  # besides, in each step
+_FOIL_ROWS = {2: 16, 3: 96}  # of a foil, mirror images together
+_FOIL_S = {2: 0.02, 3: 0.2}
 
 
 @dataclass(frozen=True)
@@ -40,6 +46,7 @@ def forecast(model: Model) -> dict[str, Any]:
     size = _size(model, zone, axes, mixed)
     count = sum(leg.steps if isinstance(leg.steps, int) else 8 * AUTO_START for leg in model.legs)
     seconds = _seconds(size, d, count, d == 3 and model.mesh.mesher == "ftetwild")
+    costs = {name: _costs(name, model, size, seconds, count) for _, name in model.filled}
     return {
         "domain": model.domain,
         "formulation": "mixed quadratic/linear" if mixed else "quadratic displacement",
@@ -49,9 +56,52 @@ def forecast(model: Model) -> dict[str, Any]:
         "contact_points": round(size.contact_points),
         "steps": count,
         **{f"{stage}_s": round(s, 2) for stage, s in seconds.items()},
-        "total_s": round(sum(seconds.values()), 1),
-        "memory_MB": round(_memory(size, d)),
+        **{name: f"costs {cost.why}" for name, cost in costs.items()},
+        "total_s": round(sum(seconds.values()) + sum(cost.seconds for cost in costs.values()), 1),
+        "memory_MB": round(_memory(size, d) + sum(cost.memory_mb for cost in costs.values())),
     }
+
+
+@dataclass(frozen=True)
+class _Cost:
+    """What an effect adds, and by what."""
+
+    seconds: float
+    memory_mb: float
+    reason: str
+
+    @property
+    def why(self) -> str:
+        """For a reader."""
+        return f"about {self.seconds:.2g} s and {self.memory_mb:.2g} MB: {self.reason}"
+
+
+def _costs(name: str, model: Model, size: _Size, seconds: dict[str, float], steps: int) -> _Cost:
+    d = 3 if model.domain == "solid" else 2
+    condensation, assembly = seconds["condensation"], seconds["assembly"]
+    factor_mb = _memory(size, d) - _BASE_MB
+    if name == "large_deformation":
+        each = _NEWTON * _NUMERIC * condensation + (_NEWTON + 1) * _TANGENT * assembly + _NEWTON_S[d]
+        pressed = (_NEWTON - 1) * seconds["contact"]
+        return _Cost(steps * each + pressed, factor_mb, f"about {_NEWTON} factorisations in each of {steps} steps")
+    if name == "viscosity" and not getattr(model.kinematics, "bulk", True):
+        lengths = {leg.duration_s / leg.steps for leg in model.legs if leg.duration_s and leg.steps != "auto"}
+        more = max(len(lengths), 1)
+        text = f"{more} more factorisation{'s' * (more > 1)}, one for each length of step"
+        return _Cost(more * condensation + assembly, more * factor_mb, text)
+    if name == "elastic_object":
+        return _Cost(
+            condensation + assembly + seconds["mesh"], 0.5 * factor_mb,
+            "the object is meshed and condensed like the finger; taken to be of its size",
+        )  # fmt: skip
+    if name == "embedded_gauge":
+        rows = _FOIL_ROWS[d] * len(model.gauges)
+        share = rows / max(d * size.contact_points, 1.0)
+        return _Cost(
+            min(share, 1.0) * condensation + seconds["contact"] + _FOIL_S[d] * len(model.gauges), 40e-6 * rows**2,
+            f"{rows} more rows, and every step once more without the foils",
+        )  # fmt: skip
+    return _Cost(0.0, 0.0, "no factorisation and no further step")
 
 
 def _size(model: Model, zone: tuple[float, float, float, float], axes: tuple[str, ...], mixed: bool) -> _Size:

@@ -125,3 +125,29 @@ def test_a_point_that_slips_keeps_the_kinetic_limit_until_it_sticks() -> None:
     # after it stuck the static limit counts again
     state = advance(state, np.array([[-1.0, 0.1]]), compliance, law, 1.0).state
     assert (state.status[0], state.force[0, 1]) == (STICK, pytest.approx(-0.5, abs=1e-9))
+
+
+@pytest.mark.parametrize("name", effect_names())
+def test_only_the_effects_a_scene_names_are_imported(name: str, tmp_path: Any) -> None:
+    settings = ", ".join(f"{k} = {[list(p) for p in v] if k == 'prony' else v}" for k, v in TYPICAL[name].items())
+    code = (
+        "import sys; from finger3d.scene import load; from pathlib import Path; load(Path(sys.argv[1]), "
+        "(f'effects.{sys.argv[2]}={sys.argv[3]}', 'press.duration_s=1.0', "
+        "'gauge=[{name=\"g\", x_mm=20.0, y_mm=40.0, length_mm=4.0}]')).model(); import finger3d.solve; "
+        "print([m for m in sorted(sys.modules) if m.startswith('finger3d.effects.')])"
+    )
+    scene, table = "geometries/fig9.toml", "{" + settings + "}"
+    done = subprocess.run([sys.executable, "-c", code, scene, name, table], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == f"['finger3d.effects.base', 'finger3d.effects.{name}']"
+
+
+def test_an_absent_effect_adds_no_factorisation() -> None:
+    problem = build(baseline())
+    list(march(problem))
+    assert problem.factorizations == 1
+    # those that are on need it, or do without
+    wanted = {"kinetic_friction": 1, "embedded_gauge": 1, "viscosity": 1, "elastic_object": 2}
+    for name, count in wanted.items():
+        problem = build(applied((name,)))
+        list(march(problem))
+        assert problem.factorizations == count, name

@@ -28,12 +28,12 @@ from finger3d.study import Result, Row
 from ._foil import alone, by_mesh, wing
 
 FOIL = Effect(3000.0, 0.02, 3.0)
-NU, SLOPE = 0.49, 1.5e-3
+NU, SLOPE, NOISE = 0.49, 1.5e-3, 1.5e-4
 MUS = (0.06, 0.125, 0.25, 0.4, 0.5, 0.6, 1.0)
-LENGTHS = (1.0, 2.0, 4.0, 7.0, 10.0)
+LENGTHS = (1.0, 2.0, 4.0, 10.0)
 DEPTHS = (1.0, 0.5, 0.25)  # of a foil under a free surface, in its lengths
 PAPER, WING = "Maeno 2004, Sec. IV", "Prandtl's equation, Glauert 1926"
-COLUMNS = "model length_mm mu free read share slope_free slope_read".split()
+COLUMNS = "model length_mm mu free read share slope_free slope_read resolution_free resolution_read".split()
 
 
 def finger(domain: Domain, length: float, size: float) -> Problem:
@@ -73,7 +73,7 @@ def run(quick: bool) -> Result:
             found[domain, length] = value
             slopes = np.gradient(value, np.array(mus), axis=0)
             for mu, (free, read), slope in zip(mus, value, slopes, strict=True):
-                table.append((domain, length, mu, free, read, read / free, slope[0], slope[1]))
+                table.append((domain, length, mu, free, read, read / free, *slope, *(NOISE / np.abs(slope))))
     rows += _finger_rows(found, mus)
     columns = dict(zip(COLUMNS, map(list, zip(*table, strict=True)), strict=True))
     return Result(tuple(rows), columns, lambda figure: _draw(figure, found, np.array(mus)))
@@ -146,6 +146,12 @@ def _finger_rows(found: dict[tuple[str, float], np.ndarray], mus: tuple[float, .
                     float(np.log10(abs(slope) / SLOPE)), 0.48, "within a factor 3", "statement", "absolute",
                 )
             )  # fmt: skip
+            rows.append(
+                Row(
+                    f"error of mu at mu = .5 for 1.5e-4 of strain, {what}, {name}: over 0.1, log10", PAPER, 0.0,
+                    float(np.log10(NOISE / abs(slope) / 0.1)), 0.48, "within a factor 3", "statement", "absolute",
+                )
+            )  # fmt: skip
         strain = found[domain, 4.0][:, 1]
         rising = np.maximum(np.diff(strain), 0.0).sum() / np.abs(np.diff(strain)).sum()
         rows.append(
@@ -178,9 +184,13 @@ def _draw(figure: Any, found: dict[tuple[str, float], np.ndarray], mus: np.ndarr
     left.set(xlabel="length of the foil, mm", ylabel="read over free, %", title="lines: in a body without end")
     middle.set(xlabel="mu", ylabel="strain", yscale="log", title="gauge of 4 mm")
     right.axhline(SLOPE, color="k", lw=0.8, label="implied by the paper")
-    right.set(xlabel="length of the foil, mm", ylabel="|d strain / d mu| at mu = 0.5")
-    for axes in (left, middle, right):
-        axes.legend(fontsize=7)
+    right.set(
+        xlabel="length of the foil, mm", ylabel="|d strain / d mu| at mu = 0.5", title="1.5e-4 over it: error of mu"
+    )
+    left.legend(fontsize=7)
+    middle.legend(fontsize=7, loc="center right")
+    right.set_ylim(1e-6, 0.3)
+    right.legend(fontsize=7, loc="lower right")
     for axes in (left, right):
         axes.set_xticks(lengths, [f"{n:g}" for n in lengths])
         axes.set_xticks([], minor=True)

@@ -68,6 +68,7 @@ class StandIn:
     stiffness: Stiffness | None = None
     thickness: float = 1.0
     springs: Float = field(default_factory=lambda: np.zeros(0))
+    beyond: Float = field(default_factory=lambda: np.zeros((0, 0)))
     origin: Target = Target(0.0)
     later: Later = field(default_factory=Later)
 

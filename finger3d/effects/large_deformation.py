@@ -12,13 +12,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from finger3d.contact.conditions import TOLERANCE, residual, stiffness_weights
 from finger3d.contact.state import ContactState, Increment, next_state
 from finger3d.effects.base import fill
 from finger3d.errors import Outcome
-from finger3d.fem.assembly import Pattern, Stiffness, pressure_scale
+from finger3d.fem.assembly import Pattern, Stiffness, on_places, pressure_scale
 from finger3d.fem.condense import Condensed, condense
 from finger3d.fem.deformed import DeformedContact, deformed_contact
 from finger3d.fem.hyperelastic import InvertedError, NeoHooke, assemble, nodal_fields, stretch
@@ -86,9 +87,7 @@ class FiniteStrain:
                     settled = DeformedState(**(after | {"frames": contact.frames}), unknowns=place.x)
                     return Increment(settled, Outcome.CONVERGED, max(found.residual, error), spent, found.method)
             if place.tangent is not None:
-                tangent = place.tangent.less(contact.softening(problem.surface, force[:, 0]))
-                body = condense(tangent, problem.held, contact.rows[problem.kept], spent=body)
-                problem.later.factorizations += body.factorizations
+                body = _factored(problem, place.tangent, contact, force[:, 0], body)
             assert body is not None
             relaxed = body.solve(-place.inner)
             free = _moved_by(problem, state, contact, (state.unknowns, place.x, relaxed), (a, b))
@@ -156,9 +155,34 @@ class _Place:
     @classmethod
     def at(cls, problem: Any, law: NeoHooke, x: Float) -> _Place:
         """Assemble; raises InvertedError."""
-        pattern = problem.later.once("pattern", lambda: Pattern.of(problem.mesh))
+        pattern, _ = _places(problem)
         tangent, inner = assemble(problem.mesh, law, x, pattern, problem.thickness)
         return cls(x, inner, tangent)
+
+
+def _places(problem: Any) -> tuple[Pattern, sp.csr_matrix]:
+    """Where entries of the tangent and of the contact rows (r, n d) may stand: the same in all iterations."""
+
+    def make() -> tuple[Pattern, sp.csr_matrix]:
+        face, d = problem.surface, problem.dim
+        beside = sp.csr_matrix((face.average != 0).astype(float) @ (face.interpolate != 0).astype(float))
+        pairs = (beside.T @ beside).tocoo()
+        rows = sp.kron(beside, np.ones((d, d)), format="csr")[problem.kept]
+        rows.sort_indices()
+        return Pattern.of(problem.mesh, (pairs.row.astype(np.int64), pairs.col.astype(np.int64))), rows
+
+    made: tuple[Pattern, sp.csr_matrix] = problem.later.once("places", make)
+    return made
+
+
+def _factored(problem: Any, tangent: Stiffness, contact: DeformedContact, force: Float, spent: Any) -> Condensed:
+    """The body condensed at a place, under normal forces (c,) N."""
+    _, places = _places(problem)
+    rows = sp.csr_matrix((on_places(contact.rows[problem.kept], places), places.indices, places.indptr), places.shape)
+    softened = tangent.less(contact.softening(problem.surface, force))
+    body = condense(softened, problem.held, rows, spent=spent)
+    problem.later.factorizations += body.factorizations
+    return body
 
 
 def _onward(problem: Any, law: NeoHooke, place: _Place, step: Float) -> _Place | None:

@@ -66,10 +66,21 @@ class Stiffness:
     pressure_scale: float
 
     def less(self, part: sp.csr_matrix) -> Stiffness:
-        """The stiffness less a symmetric matrix (m, m) on its first unknowns, on entries that it has."""
-        upper = sp.triu(part, format="coo")
-        wide = sp.csr_matrix((upper.data, (upper.row, upper.col)), shape=self.upper.shape)
-        return replace(self, upper=sp.csr_matrix(self.upper - wide))
+        """The stiffness less a symmetric matrix (m, m) on its first unknowns, whose entries it must have places for."""
+        upper = self.upper.copy()
+        upper.data = upper.data - on_places(sp.triu(part, format="csr"), upper)
+        return replace(self, upper=upper)
+
+
+def on_places(matrix: sp.csr_matrix, places: sp.csr_matrix) -> Float:
+    """Values (nnz,) of a matrix on the entries of another that has all of its, in sorted rows of the same width."""
+    wide = places.shape[1]
+    rows = np.repeat(np.arange(places.shape[0]), np.diff(places.indptr))
+    found = matrix.tocoo()
+    at = np.searchsorted(rows * wide + places.indices, found.row.astype(np.int64) * wide + found.col)
+    out = np.zeros(places.nnz)
+    np.add.at(out, at, found.data)
+    return out
 
 
 @dataclass(frozen=True)
@@ -91,14 +102,15 @@ class Pattern:
     swapped: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, mesh: Mesh) -> Pattern:
-        """Find the pattern of a mesh."""
+    def of(cls, mesh: Mesh, linked: tuple[Int, Int] | None = None) -> Pattern:
+        """Find the pattern of a mesh, with places for `linked` pairs of nodes that no cell joins."""
         count = len(mesh.points)
         a, b = np.triu_indices(mesh.cells.shape[1])
         first, second = mesh.cells[:, a], mesh.cells[:, b]
         key = np.minimum(first, second) * count + np.maximum(first, second)
-        unique, slot = np.unique(key, return_inverse=True)
-        return cls(slot.reshape(key.shape), unique // count, unique % count, (a, b), first > second)
+        also = np.minimum(*linked) * count + np.maximum(*linked) if linked else np.zeros(0, dtype=np.int64)
+        unique, slot = np.unique(np.concatenate([key.ravel(), also]), return_inverse=True)
+        return cls(slot[: key.size].reshape(key.shape), unique // count, unique % count, (a, b), first > second)
 
     def add(self, blocks: Float, part: slice, cell: Float) -> None:
         """Add the blocks (e, k, k, d, d) of some cells to `blocks` (blocks, d, d)."""

@@ -133,8 +133,12 @@ def assemble(
         slope = np.einsum("eai,eqaJ->eqiJ", u[cells], gradients, optimize=True)
         stress, tangent, cofactor, j = cell_response(law, slope, p)
         np.add.at(force, cells, np.einsum("eq,eqiJ,eqaJ->eai", weights, stress, gradients, optimize=True))
-        right = np.einsum("eqiJkL,eqbL->eqiJkb", tangent * weights[:, :, None, None, None, None], gradients)
-        pattern.add(blocks, part, np.einsum("eqaJ,eqiJkb->eabik", gradients, right, optimize=True))
+        e, q, k, _ = gradients.shape
+        weighted = (tangent * weights[:, :, None, None, None, None]).reshape(e, q, d * d * d, d)
+        right = np.matmul(weighted, np.swapaxes(gradients, 2, 3)).reshape(e, q, d, d, d, k)  # i J k b
+        right = np.ascontiguousarray(right.transpose(0, 1, 3, 2, 4, 5)).reshape(e, q * d, d * d * k)
+        left = np.ascontiguousarray(gradients.transpose(0, 2, 1, 3)).reshape(e, k, q * d)
+        pattern.add(blocks, part, np.matmul(left, right).reshape(e, k, d, d, k).transpose(0, 1, 4, 2, 3))
         if law.mixed and p is not None:
             flux = np.einsum("eqiJ,eqaJ->eqai", cofactor, gradients, optimize=True)
             couplings.append(scale * np.einsum("eq,qp,eqai->epai", weights, hats, flux, optimize=True))

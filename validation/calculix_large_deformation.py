@@ -1,0 +1,92 @@
+"""Does a press at large deformation agree with CalculiX, an independent code?
+
+The Fig. 9 finger in plane strain, nu = 0.45, mu = 0.25, pressed 10 mm by a flat plate: the same mesh of quadratic
+triangles and the same law, W = G/2 (J^(-2/3) I1 - 3) + K/2 (J - 1)^2 (*HYPERELASTIC, NEO HOOKE with D1 = 2/K), *STATIC
+with NLGEOM.  Each code uses its own contact: CalculiX its face to face penalty with friction (100 and 10 MPa/mm), this
+code multipliers at the vertices.  CalculiX runs only where it is installed (Debian: calculix-ccx); otherwise, and in the
+quick version, what CalculiX 2.20 gave here is compared with, and the rows say so.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from finger3d.contact.law import Coulomb
+from finger3d.design import designs
+from finger3d.effects.large_deformation import Effect
+from finger3d.history import measure
+from finger3d.model import Leg, Material, MeshOptions, Model
+from finger3d.solve import Problem, build, march
+from finger3d.study import Result, Row
+
+from ._calculix import deck, program, solve
+
+E, NU, MU, WIDTH = 1.0, 0.45, 0.25, 20.0
+DEPTHS = (5.0, 10.0)
+SIZES = (4.0, 2.0)
+KEPT = {
+    4.0: (8.81694, 28.5524),
+    2.0: (8.80263, 28.4931),
+}  # N per mm at DEPTHS by mesh, CalculiX 2.20: this study in full
+REASON = "issue 6: within 2 % of an independent code"
+_SECONDS = 900.0  # a busy machine: 100 s on a quiet one
+
+
+def problem(size: float) -> Problem:
+    """The finger as half a section."""
+    body = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=WIDTH)
+    model = Model(
+        body, Material(E, NU), MeshOptions(size, 4.0 * size, "swept"), (Leg(10.0, steps=10),), friction=Coulomb(MU),
+        domain="plane-strain",
+    )  # fmt: skip
+    return build(Effect().apply(model))
+
+
+def pressed(body: Problem) -> np.ndarray:
+    """Depth (mm) and force (N per mm width) (10, 2) of this code."""
+    frames = list(march(body))
+    if not frames[-1].outcome.ok:
+        raise AssertionError(f"{frames[-1].target.depth_mm:g} mm: {frames[-1].outcome}")
+    return np.array([(f.target.depth_mm, measure(body.points, f)["normal_force_N"] / WIDTH) for f in frames])
+
+
+def run(quick: bool) -> Result:
+    """Meshes of 4 and 2 mm; quick: of 4 mm, against the number kept."""
+    rows: list[Row] = []
+    table: dict[str, list[Any]] = {"size_mm": [], "depth_mm": [], "calculix": [], "finger3d": []}
+    curves = {}
+    for size in SIZES[:1] if quick else SIZES:
+        body = problem(size)
+        curves[size] = pressed(body)
+        other, source = np.array(KEPT[size]), "CalculiX 2.20, same mesh and law, numbers kept"
+        if not quick and program():
+            with tempfile.TemporaryDirectory() as folder:
+                other = solve(deck(body.mesh, E, NU, MU, list(DEPTHS), True), Path(folder), _SECONDS)
+            source = "CalculiX, same mesh and law, run for this"
+        for depth, theirs in zip(DEPTHS, other, strict=True):
+            ours = float(np.interp(depth, *curves[size].T))
+            for key, value in zip(table, (size, depth, float(theirs), ours), strict=True):
+                table[key].append(value)
+            what = f"force at {depth:g} mm, mesh of {size:g} mm, N per mm"
+            rows.append(Row(what, source, float(theirs), ours, 0.02, REASON, "validation"))
+    return Result(tuple(rows), table, lambda figure: _draw(figure, curves, table))
+
+
+def _draw(figure: Any, curves: dict[float, np.ndarray], table: dict[str, list[Any]]) -> None:
+    left, right = figure.subplots(1, 2)
+    size, depth, theirs, ours = (np.array(table[key]) for key in table)
+    for k, (h, curve) in enumerate(curves.items()):
+        here = size == h
+        left.plot(*curve.T, f"C{k}-", label=f"finger3d, mesh of {h:g} mm")
+        left.plot(depth[here], theirs[here], f"C{k}o", mfc="none", label=f"CalculiX, mesh of {h:g} mm")
+        right.plot(depth[here], 100.0 * (ours[here] / theirs[here] - 1.0), f"C{k}o-", label=f"mesh of {h:g} mm")
+    left.set(xlabel="depth, mm", ylabel="force, N per mm width")
+    right.set(xlabel="depth, mm", ylabel="finger3d over CalculiX - 1, %", ylim=(-2.5, 2.5))
+    right.axhspan(-2.0, 2.0, color="0.92", label="asked for: 2 %")
+    right.axhline(0.0, color="k", lw=0.6)
+    for axes in (left, right):
+        axes.legend(fontsize=8)
