@@ -3,8 +3,8 @@
 The Fig. 9 finger in plane strain, nu = 0.45, mu = 0.25, pressed 10 mm by a flat plate: the same mesh of quadratic
 triangles and the same law, W = G/2 (J^(-2/3) I1 - 3) + K/2 (J - 1)^2 (*HYPERELASTIC, NEO HOOKE with D1 = 2/K), *STATIC
 with NLGEOM.  Each code uses its own contact: CalculiX its face to face penalty with friction (100 and 10 MPa/mm), this
-code multipliers at the vertices.  CalculiX runs only where it is installed (Debian: calculix-ccx); otherwise, and in the
-quick version, what CalculiX 2.20 gave here is compared with, and the rows say so.
+code multipliers at the vertices.  CalculiX runs only where it is installed (Debian: calculix-ccx); otherwise, and in
+the quick version, the force is compared with what CalculiX 2.20 gave here, and the rows say so.
 """
 
 from __future__ import annotations
