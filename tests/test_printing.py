@@ -110,6 +110,10 @@ def test_an_imported_stl_is_written_as_it_is(tmp_path: Path) -> None:
     assert [f.name for f in done.files] == ["finger.stl"]
     assert any("no finger.step" in text for text in done.remarks)
     assert trimesh.load(tmp_path / "second" / "finger.stl").volume == pytest.approx(16000.0, rel=1e-6)
+    before = (tmp_path / "first" / "finger.stl").read_bytes()
+    with pytest.raises(Finger3dError, match="the finger's own file"):
+        export(scene, tmp_path / "first")
+    assert (tmp_path / "first" / "finger.stl").read_bytes() == before
     with pytest.raises(Finger3dError, match="give the finger as a STEP file"):
         export(scene, tmp_path / "third", MoldOptions())
     assert not (tmp_path / "third").exists()
@@ -144,7 +148,7 @@ def test_an_export_leaves_nothing_of_an_older_one(tmp_path: Path) -> None:
     for name in ("mold.3mf", "sheet.txt", "mine.txt"):
         (tmp_path / name).write_text("older")
     export(scene_of("block"), tmp_path)
-    assert {f.name for f in tmp_path.iterdir()} == {"finger.step", "finger.stl", "mine.txt"}
+    assert {f.name for f in tmp_path.glob("[!.]*")} == {"finger.step", "finger.stl", "mine.txt"}
 
 
 # --- the mold ---------------------------------------------------------------------------------------------------------
@@ -359,7 +363,7 @@ def test_the_command_writes_a_mold(scene_file, tmp_path, capsys, monkeypatch) ->
     assert err == ""
     names = {"finger.step", "finger.stl", "mold.3mf", "mold.step", "mold.png", "sheet.txt"}
     names |= {f"mold_{part}.stl" for part in ("half_a", "half_b", "lid")}
-    assert {f.name for f in out.iterdir()} == names
+    assert {f.name for f in out.glob("[!.]*")} == names
     text = (out / "sheet.txt").read_text(encoding="utf-8")
     volume = load(scene_file).design.volume_mm3 / 0.998**3 / 1e3
     assert f"cavity              {volume:.2f} ml" in text

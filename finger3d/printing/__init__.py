@@ -75,6 +75,7 @@ def export(
     >>> [file.name for file in done.files], round(done.stl_volume_mm3, 6)
     (['finger.step', 'finger.stl'], 960.0)
     """
+    from finger3d.export import claimed
     from finger3d.printing.shell import Shell, shell, write_step, write_stl
 
     out, report, design = Path(out), report or Report(), scene.design
@@ -88,6 +89,9 @@ def export(
         raise Finger3dError(
             f"--mold: {design.name} holds triangles, and a mold is cut from CAD; give the finger as a STEP file"
         )
+    source = Path(getattr(design, "path", "")).resolve()
+    if source in ((out / "finger.step").resolve(), (out / "finger.stl").resolve()):
+        raise Finger3dError(f"--out {out}: holds {source.name}, the finger's own file; name another folder")
     report.stage("finger")
     if triangles_only:
         body, solid = Shell(design.surface, 0.0, 0.0), None
@@ -98,36 +102,33 @@ def export(
     if mold is not None:
         report.stage("mold")
         made = _mold(scene, solid, mold)
-    _clear(out)
-    files, remarks = [], []
-    if solid is None:
-        remarks.append(f"no finger.step: {design.name} holds triangles, no CAD; they are written as they are")
-    else:
-        write_step(out / "finger.step", solid)
-        files.append(out / "finger.step")
-    write_stl(out / "finger.stl", body.surface, text)
-    files.append(out / "finger.stl")
-    silicone = None
-    if made is not None:
-        from finger3d.printing.output import write_mold
+    with claimed(out):
+        _clear(out)
+        files, remarks = [], []
+        if solid is None:
+            remarks.append(f"no finger.step: {design.name} holds triangles, no CAD; they are written as they are")
+        else:
+            write_step(out / "finger.step", solid)
+            files.append(out / "finger.step")
+        write_stl(out / "finger.stl", body.surface, text)
+        files.append(out / "finger.stl")
+        silicone = None
+        if made is not None:
+            from finger3d.printing.output import write_mold
 
-        written, told = write_mold(scene.title, made, body, out, text, report)
-        files, remarks, silicone = files + written, remarks + told, made.silicone_mm3 / 1e3
+            written, told = write_mold(scene.title, made, body, out, text, report)
+            files, remarks, silicone = files + written, remarks + told, made.silicone_mm3 / 1e3
     return Exported(
         tuple(files), _volume(design, solid, body), body.surface.volume, body.tolerance_mm, silicone, tuple(remarks)
     )
 
 
 def _clear(out: Path) -> None:
-    """Make the folder, and take away what an earlier export left: it may be another finger's."""
+    """Take away what an earlier export left: it may be another finger's."""
     from finger3d.printing.output import FILES
 
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        for name in ("finger.step", "finger.stl", *FILES):
-            (out / name).unlink(missing_ok=True)
-    except OSError as error:
-        raise Finger3dError(f"--out {out}: cannot be written: {error.strerror}") from None
+    for name in ("finger.step", "finger.stl", *FILES):
+        (out / name).unlink(missing_ok=True)
 
 
 def _mold(scene: Scene, solid: Any, options: MoldOptions) -> Any:
