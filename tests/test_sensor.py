@@ -248,6 +248,17 @@ def test_readings_that_are_none(strain: Any, std: Any, told: str) -> None:
         estimate(curve(straight), strain, std)
 
 
+def test_tolerances_widen_and_are_blamed() -> None:
+    tilt = Tolerance("tilt_deg", "degree", 0.5, np.full(25, 0.02), np.full(25, 0.01))
+    found = curve(straight, tolerances=(tilt,))
+    (blind,) = estimate(found, straight(0.5))
+    assert blind.status == "blind"
+    assert blind.verdict.endswith("; 100 % of the variance is from tilt_deg")
+    assert "mu is found to +- 6.7 at best" in found.verdict()  # 0.01 of strain over a slope of 0.0015
+    (clear,) = estimate(found, straight(0.5), tolerances=False)
+    assert clear.std == pytest.approx(0.1, rel=1e-6)
+
+
 # --- calibration of a scene ------------------------------------------------------------------------------------------
 
 
@@ -414,7 +425,7 @@ def test_the_map_of_a_mirror_image_is_a_mirror_image() -> None:
     problem = build(scene().model())
     found = StrainMap.of(problem, {mu: runs.last_frame(problem, mu) for mu in (0.2, 0.6)})
     assert np.allclose(found.along(0.5), found.along(math.pi - 0.5)[:, :, ::-1], atol=1e-12, equal_nan=True)
-    best, angle = found.best
+    best, angle = found.best()
     assert np.nanmax(found.worst_slope(0.5) - best) <= np.nanmax(best) * 0.05  # the best of 5 degree steps
     assert np.nanmin(angle) >= 0.0
 

@@ -107,6 +107,9 @@ def estimate(
     curve: Annotated[
         Literal["interpolation", "fit"], Parameter(help="Invert the monotone interpolation or the second-order fit.")
     ] = "interpolation",
+    tolerances: Annotated[
+        bool, Parameter(negative="--no-tolerances", help="Whether what the calibration does not know exactly counts.")
+    ] = True,
 ) -> int:
     """Mu with its standard deviation from a strain reading, or why the strain does not tell it.
 
@@ -126,13 +129,13 @@ def estimate(
         raise Finger3dError("estimate: --out goes with --csv")
     known = read(calibration)
     if strain is not None:
-        found = run(known, strain, std, curve)
+        found = run(known, strain, std, curve, tolerances)
         print(_json(found[:1])[1:-1].strip() if json_ else found[0].verdict)
         return 0
     assert csv_ is not None
     strains, stds = _readings(csv_, std)
     try:
-        found = run(known, strains, stds, curve)
+        found = run(known, strains, stds, curve, tolerances)
     except Finger3dError as error:
         raise Finger3dError(f"{csv_}: {error}") from None
     if json_:

@@ -156,6 +156,12 @@ class Calibration:
         rows = [np.interp(at, self.mu, t.spread) for t in self.tolerances]
         return np.array(rows).reshape(len(rows), len(at))
 
+    def mu_sd(self, mu: ArrayLike, strain_sd: ArrayLike | None = None) -> Float:
+        """Standard deviation of mu at mu (m,), from all of :meth:`strain_sd` or the one given; infinite where flat."""
+        whole = self.strain_sd(mu) if strain_sd is None else np.asarray(strain_sd)
+        slope = np.abs(self.slope(mu))
+        return np.where(slope > 0.0, whole / np.where(slope > 0.0, slope, 1.0), np.inf)
+
     def strain_sd(self, mu: ArrayLike, std: ArrayLike | None = None, shape: Shape = "interpolation") -> Float:
         """Standard deviation of a reading about the curve: noise (or `std`), error of the curve, tolerances."""
         noise = np.asarray(self.noise if std is None else std, dtype=float)
@@ -210,4 +216,16 @@ class Calibration:
         if best.elsewhere:
             places = ", ".join(f"{a:.3g} to {b:.3g}" for a, b in best.elsewhere)
             text += f"; but the same strains occur at mu = {places}"
-        return text
+        return text + self._with_tolerances(best)
+
+    def _with_tolerances(self, best: Range) -> str:
+        if not self.tolerances:
+            return ""
+        inside = self.grid[(self.grid >= best.low) & (self.grid <= best.high)]
+        spread = self.mu_sd(inside)
+        at = float(inside[np.argmin(spread)])
+        name, share = max(self.shares(at).items(), key=lambda item: item[1])
+        return (
+            f". With all that is not known exactly mu is found to +- {spread.min():.2g} at best (mu = {at:.2g}; "
+            f"{100.0 * share:.0f} % of the variance from {name})"
+        )

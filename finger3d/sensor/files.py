@@ -76,7 +76,7 @@ def save(calibration: Calibration, path: str | Path) -> Path:
             }
             for i, t in enumerate(c.tolerances)
         },
-        "mu_sd": c.strain_sd(c.mu) / np.maximum(np.abs(c.slope(c.mu)), 1e-300),
+        "mu_sd": c.mu_sd(c.mu),
         "failed": [{"mu": mu, "why": why} for mu, why in c.failed],
         "scene": c.scene,
         "hash": c.hash,
@@ -87,7 +87,7 @@ def save(calibration: Calibration, path: str | Path) -> Path:
 
 
 def _mu_sd(c: Calibration, number: int) -> np.ndarray[Any, Any]:
-    return c.tolerance_sd(c.mu)[number] / np.maximum(np.abs(c.slope(c.mu)), 1e-300)
+    return c.mu_sd(c.mu, c.tolerance_sd(c.mu)[number])
 
 
 def write_table(calibration: Calibration, path: Path) -> None:

@@ -8,7 +8,7 @@ like (the inversion of a test, Neyman 1937).  Where the curve turns, it is two i
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -62,7 +62,11 @@ class Estimate:
 
 
 def estimate(
-    calibration: Calibration, strain: ArrayLike, std: ArrayLike | None = None, shape: Shape = "interpolation"
+    calibration: Calibration,
+    strain: ArrayLike,
+    std: ArrayLike | None = None,
+    shape: Shape = "interpolation",
+    tolerances: bool = True,
 ) -> list[Estimate]:
     """Estimate mu from readings.
 
@@ -71,6 +75,7 @@ def estimate(
     strain : one reading or (m,) of them
     std : standard deviation of each, 0 allowed; None: the calibration's noise
     shape : invert the monotone interpolation, or the second-order fit
+    tolerances : whether what is not known exactly counts; not for a sensor whose own curve was measured
 
     Returns
     -------
@@ -97,6 +102,7 @@ def estimate(
             wanted = "a finite number" if name == "strain" else "a finite number from 0 up"
             where = f" (reading {i + 1} of {len(readings)})" if len(readings) > 1 else ""
             raise Finger3dError(f"{name} = {values[i]}{where}: must be {wanted}")
+    calibration = calibration if tolerances else replace(calibration, tolerances=())
     found: list[Estimate] = []
     for start in range(0, len(readings), _CHUNK):
         part = slice(start, start + _CHUNK)
@@ -195,9 +201,8 @@ def _worded(
         return told("ambiguous", f"ambiguous: {names}; the curve is not monotone", low, high)
     best = answers[0]
     if low == 0.0 and high == math.inf:
-        return told(
-            "blind", f"out of range: no mu from {first:g} to {last:g} can be told apart by this strain", low, high
-        )
+        text = f"out of range: no mu from {first:g} to {last:g} can be told apart by this strain"
+        return told("blind", text + _blame(calibration, best.mu), low, high)
     half = 0.5 * (best.high - best.low)
     if low == 0.0 or high == math.inf:
         side, edge, end = (">", best.low, last) if high == math.inf else ("<", best.high, first)
@@ -210,6 +215,12 @@ def _worded(
     if half > calibration.limit:
         return told("coarse", f"{text}: coarser than the limit of {calibration.limit:g}", low, high, best)
     return told("ok", text, low, high, best)
+
+
+def _blame(calibration: Calibration, mu: float) -> str:
+    """Which tolerance is most at fault, where the noise is not."""
+    name, share = max(calibration.shares(mu).items(), key=lambda item: item[1])
+    return f"; {100.0 * share:.0f} % of the variance is from {name}" if name not in ("noise", "curve") else ""
 
 
 def _named(answer: Candidate, first: float, last: float) -> str:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +34,8 @@ ANGLES = np.radians(np.arange(0.0, 180.0, 5.0))
 
 _NEAR = {2: 12, 3: 40}  # cells whose middle is near a point, among which the one that holds it is looked for
 _INSIDE = -1e-6
+_GREY = 10.0  # limits: where mu is resolved worse than that, nothing is drawn
+_BELOW: dict[str, Any] = {"location": "bottom", "shrink": 0.8, "aspect": 35}
 _NEWTON = 6
 
 
@@ -187,12 +188,10 @@ class StrainMap:
             least * most > 0.0, np.minimum(np.abs(least), np.abs(most)), np.where(np.isnan(least), least, 0.0)
         )
 
-    @cached_property
-    def best(self) -> tuple[Float, Float]:
-        """Largest worst slope (ny, nx) over the whole range of mu, and its direction (radians)."""
-        every = np.array([self.worst_slope(float(a)) for a in ANGLES])
-        known = np.nan_to_num(every, nan=-1.0)
-        pick = known.argmax(axis=0)
+    def best(self, low: float = -math.inf, high: float = math.inf) -> tuple[Float, Float]:
+        """Largest worst slope (ny, nx) over mu from `low` to `high`, and its direction (radians)."""
+        every = np.array([self.worst_slope(float(a), low, high) for a in ANGLES])
+        pick = np.nan_to_num(every, nan=-1.0).argmax(axis=0)
         value = np.take_along_axis(every, pick[None], axis=0)[0]
         return value, np.where(np.isnan(value), np.nan, ANGLES[pick])
 
@@ -200,7 +199,7 @@ class StrainMap:
         """Write a line for each square in the body: slope at one mu, worst over all mu, and the best direction's."""
         inside = np.isfinite(self.strain[0, :, :, 0])
         x, y = np.meshgrid(self.x, self.y)
-        best, direction = self.best
+        best, direction = self.best()
         columns = {
             "x_mm": x, "y_mm": y, "strain_per_mu": self.slope_at(angle, mu), "worst_strain_per_mu":
             self.worst_slope(angle), "best_worst_strain_per_mu": best, "best_angle_deg": np.degrees(direction),
@@ -216,7 +215,7 @@ def draw_map(path: Path, found: StrainMap, gauge: Gauge, calibration: Calibratio
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(16.0, 4.2), layout="constrained", dpi=110)
+    figure = Figure(figsize=(16.0, 4.4), layout="constrained", dpi=110)
     FigureCanvasAgg(figure)
     panels = figure.subplots(1, 3, sharey=True)
     mu = float(np.clip(mu, found.mu[0], found.mu[-1]))
@@ -226,10 +225,10 @@ def draw_map(path: Path, found: StrainMap, gauge: Gauge, calibration: Calibratio
     noise = calibration.noise
     resolution_panel(figure, panels[1], found, noise / _positive(found.worst_slope(gauge.angle)), calibration.limit)
     panels[1].set_title(f"worst resolution along {degrees:.4g}°")
-    best, direction = found.best
+    best, direction = found.best()
     resolution_panel(figure, panels[2], found, noise / _positive(best), calibration.limit)
     panels[2].set_title("worst resolution along the best direction")
-    _directions(panels[2], found, best, direction)
+    _directions(panels[2], found, noise / _positive(best) <= _GREY * calibration.limit, direction)
     for axes in panels:
         axes.plot(gauge.x_mm, gauge.y_mm, "o", ms=8, mfc="none", mec="#000000", mew=1.4)
         axes.set_xlabel("x (mm)")
@@ -255,31 +254,31 @@ def slope_panel(figure: Any, axes: Any, found: StrainMap, angle: float, mu: floa
     most = float(np.nanquantile(np.abs(value), 0.99)) or 1.0
     drawn = axes.pcolormesh(_edges(found.x), _edges(found.y), value, cmap="RdBu_r", vmin=-most, vmax=most)
     axes.set_aspect("equal")
-    figure.colorbar(drawn, ax=axes, label="strain per unit of mu", shrink=0.9, extend="both")
+    figure.colorbar(drawn, ax=axes, label="strain per unit of mu", extend="both", **_BELOW)
 
 
 def resolution_panel(figure: Any, axes: Any, found: StrainMap, value: Float, limit: float) -> None:
     """Resolution on a logarithmic scale about the limit; what is worse than ten limits is grey."""
     from matplotlib.colors import LogNorm
 
-    norm = LogNorm(0.05 * limit, 10.0 * limit)
+    norm = LogNorm(0.05 * limit, _GREY * limit)
     shown = np.ma.masked_invalid(value)
     axes.pcolormesh(
         _edges(found.x), _edges(found.y), np.where(np.isnan(value), np.nan, 1.0), cmap="Greys", vmin=0, vmax=4
     )
     drawn = axes.pcolormesh(
-        _edges(found.x), _edges(found.y), np.ma.masked_greater(shown, 10.0 * limit), cmap="viridis_r", norm=norm
+        _edges(found.x), _edges(found.y), np.ma.masked_greater(shown, _GREY * limit), cmap="viridis_r", norm=norm
     )
     axes.set_aspect("equal")
-    figure.colorbar(drawn, ax=axes, label="standard deviation of mu", shrink=0.9, extend="min")
+    figure.colorbar(drawn, ax=axes, label="standard deviation of mu", extend="min", **_BELOW)
 
 
-def _directions(axes: Any, found: StrainMap, best: Float, direction: Float, every: int = 6) -> None:
+def _directions(axes: Any, found: StrainMap, told: NDArray[np.bool_], direction: Float, every: int = 4) -> None:
     """Short lines along the best direction, where it tells anything."""
     rows, columns = (slice(every // 2, None, every) for _ in range(2))
     x, y = np.meshgrid(found.x[columns], found.y[rows])
-    turn, seen = direction[rows, columns], best[rows, columns] > 0.0
+    turn, seen = direction[rows, columns], told[rows, columns]
     axes.quiver(
         x[seen], y[seen], np.cos(turn[seen]), np.sin(turn[seen]), pivot="mid", headwidth=0, headlength=0,
-        headaxislength=0, scale=28.0, width=0.0025, color="#222222",
+        headaxislength=0, scale=40.0, width=0.002, color="#222222",
     )  # fmt: skip

@@ -54,14 +54,14 @@ def curve_panel(axes: Any, c: Calibration) -> None:
     for i, (at, _) in enumerate(c.failed):
         axes.axvline(at, color="#888888", ls=":", lw=1.0, label="did not converge" if i == 0 else None)
     axes.set_ylabel("strain along the gauge")
-    axes.legend(frameon=False, fontsize=8.5)
     _plain(axes)
+    axes.legend(frameon=False, fontsize=8.5, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2)
 
 
 def _resolution(axes: Any, c: Calibration) -> None:
     mu = c.grid
     _shaded(axes, c)
-    whole = c.strain_sd(mu) / np.maximum(np.abs(c.slope(mu)), 1e-12)
+    whole = np.minimum(c.mu_sd(mu), 1e3)
     axes.semilogy(mu, whole, color="#222222", lw=1.3, label="with all tolerances")
     axes.semilogy(mu, np.minimum(c.resolution(mu), 1e3), color="#2166ac", lw=1.6, label=f"noise of {c.noise:g} alone")
     axes.semilogy(

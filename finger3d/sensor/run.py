@@ -302,7 +302,7 @@ def summary(calibration: Calibration) -> list[tuple[str, Any]]:
     c = calibration
     at = float(c.mu[np.argmin(np.abs(c.mu - 0.5))]) if c.mu[0] <= 0.5 <= c.mu[-1] else float(c.mu[len(c.mu) // 2])
     shares = sorted(c.shares(at).items(), key=lambda item: -item[1])
-    sd = float(c.strain_sd(at)[0]) / max(abs(float(c.slope(at))), 1e-300)
+    sd = float(c.mu_sd([at])[0])
     rows = [
         ("strain", f"{c.strain[0]:.4g} at mu = {c.mu[0]:g} to {c.strain[-1]:.4g} at mu = {c.mu[-1]:g}"),
         ("usable", ", ".join(f"mu = {r.low:.3g} to {r.high:.3g}" for r in c.usable) or "nowhere"),
