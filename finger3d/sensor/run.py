@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.errors import Finger3dError
-from finger3d.export import atomic, write_csv
+from finger3d.export import atomic, claimed, write_csv
 from finger3d.history import Frame
 from finger3d.increments import automatic, refine, with_steps
 from finger3d.kinematics import SmallStrain
@@ -99,34 +99,42 @@ def calibrate(
         from finger3d.sensor.maps import check
 
         check(model)
-    folder = None if out is None else Path(out)
+    settings = (known, asked, wanted, noise, limit, report, maps)
+    if out is None:
+        return _whole(scene, model, None, *settings)
+    with claimed(out) as folder:
+        return _whole(scene, model, folder, *settings)
+
+
+def _whole(
+    scene: Scene, model: Model, folder: Path | None, gauge: Gauge, mus: tuple[float, ...], wanted: Mapping[str, float],
+    noise: float, limit: float, report: Report, maps: bool,
+) -> Calibration:  # fmt: skip
+    """Calibrate and write what is found; an interruption leaves the curve so far in calibration.csv."""
+    text = scene.to_toml()
     if folder:
-        folder.mkdir(parents=True, exist_ok=True)
         for name in _FILES:
             (folder / name).unlink(missing_ok=True)
         with atomic(folder / "scene.toml") as path:
-            path.write_text(scene.to_toml(), encoding="utf-8")
-    sweep = Sweep(asked)
-    start = time.perf_counter()
+            path.write_text(text, encoding="utf-8")
+    sweep, start = Sweep(mus), time.perf_counter()
     try:
-        problem = _condensed(model, known, wanted, sweep, report)
-        calibration = _calibrated(problem, known, wanted, sweep, noise, limit, report)
+        problem = _condensed(model, gauge, wanted, sweep, report)
+        calibration = _calibrated(problem, gauge, wanted, sweep, noise, limit, report)
     except (KeyboardInterrupt, Finger3dError):
         if folder and (sweep.frames or sweep.failed):
-            _keep(folder, sweep, gauge)
+            _keep(folder, sweep, gauge.name)
         raise
     sweep.seconds["total"] = time.perf_counter() - start
-    text = scene.to_toml()
     about = {
         "domain": model.domain, "effects": list(scene.effects), "dofs": int(problem.stiffness.upper.shape[0]),
         "contact_points": len(problem.surface.nodes), "mesh_hash": problem.report.hash, "seconds": sweep.seconds,
         "factorizations": problem.factorizations, "versions": versions(),
     }  # fmt: skip
-    calibration = replace(
-        calibration, scene=scene.as_dict(), hash=hashlib.sha256(text.encode()).hexdigest()[:16], about=about
-    )
+    digest = hashlib.sha256(text.encode()).hexdigest()[:16]
+    calibration = replace(calibration, scene=scene.as_dict(), hash=digest, about=about)
     if folder:
-        _write(folder, calibration, problem, model, known, sweep, report, maps)
+        _write(folder, calibration, problem, model, gauge, sweep, report, maps)
     return calibration
 
 
