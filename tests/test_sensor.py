@@ -15,6 +15,7 @@ import pytest
 from finger3d.cli import main
 from finger3d.contact.law import Coulomb
 from finger3d.errors import Finger3dError, MissingError
+from finger3d.export import claimed
 from finger3d.model import Leg
 from finger3d.reduced import Condensed
 from finger3d.report import Report
@@ -573,6 +574,18 @@ def test_estimate_of_nan_and_of_nothing(tmp_path: Path, capsys: Any) -> None:
     assert "strain = nan: must be a finite number" in capsys.readouterr().err
     assert run("estimate", kept) == 2
     assert run("estimate", kept, "--strain", "0.1", "--out", tmp_path / "x.csv") == 2
+
+
+def test_calibrate_prints_json_alone(tmp_path: Path, scene_file: Path, capsys: Any) -> None:
+    none = [word for name in TOLERANCES for word in ("--tolerance", f"{name}=0")]
+    options = ["--gauge", "g36", "--out", tmp_path / "cal", "--mu", ",".join(map(str, FEW)), "--json", *none]
+    assert run("calibrate", scene_file, *options) == 0
+    assert json.loads(capsys.readouterr().out)["curve"]["mu"] == list(FEW)
+
+
+def test_a_folder_takes_one_calibration_at_a_time(tmp_path: Path) -> None:
+    with claimed(tmp_path), pytest.raises(Finger3dError, match="another finger3d is writing there"):
+        calibrate(scene(), "g36", tmp_path)
 
 
 def test_values_of_mu_are_spread_evenly() -> None:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
-import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -12,9 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from finger3d.cli.common import Set, app, check_writable, complain, load, print_rows
+from finger3d.cli.common import Json, Set, app, check_writable, complain, load, print_json, print_rows, reporting
 from finger3d.errors import Finger3dError, MissingError
-from finger3d.report import reporter
 
 if TYPE_CHECKING:
     from finger3d.sensor import Estimate
@@ -45,6 +42,7 @@ def calibrate(
         bool, Parameter(name="--map", negative=(), help="Also map how far strains follow mu over the section.")
     ] = False,
     set_: Set = None,
+    json_: Json = False,
 ) -> int:
     """Strain of a gauge against mu: curve, second-order fit, resolution, usable range, and what else moves it.
 
@@ -58,19 +56,23 @@ def calibrate(
     loaded = load(scene, set_)
     check_writable(out, scene)
     from finger3d.sensor import calibrate as run
+    from finger3d.sensor.files import as_dict
     from finger3d.sensor.run import parsed_mus, summary
 
-    report = reporter()
+    report, aside = reporting(json_)
     try:
-        with report:
+        with aside, report:
             found = run(
                 loaded, gauge, out, parsed_mus(mu), noise, resolution, _tolerances(tolerance), report, maps=map_
             )  # fmt: skip
     except KeyboardInterrupt:
         complain(f"interrupted; {report.steps_done} of {report.steps_total} values of mu are kept in {out}")
         return 130
-    print_rows(loaded.title, [*summary(found), ("results", str(out))])
-    print(found.verdict())
+    if json_:
+        print_json(as_dict(found))
+    else:
+        print_rows(loaded.title, [*summary(found), ("results", str(out))])
+        print(found.verdict())
     if not found.failed:
         return 0
     first = found.failed[0]
@@ -103,7 +105,7 @@ def estimate(
         Path | None, Parameter(name="--csv", help="Many readings: a column strain, and std if it is there.")
     ] = None,
     out: Annotated[Path | None, Parameter(help="CSV file for the answers to --csv; else they are printed.")] = None,
-    json_: Annotated[bool, Parameter(name="--json", negative=(), help="Print JSON.")] = False,
+    json_: Json = False,
     curve: Annotated[
         Literal["interpolation", "fit"], Parameter(help="Invert the monotone interpolation or the second-order fit.")
     ] = "interpolation",
@@ -130,7 +132,10 @@ def estimate(
     known = read(calibration)
     if strain is not None:
         found = run(known, strain, std, curve, tolerances)
-        print(_json(found[:1])[1:-1].strip() if json_ else found[0].verdict)
+        if json_:
+            print_json(asdict(found[0]))
+        else:
+            print(found[0].verdict)
         return 0
     assert csv_ is not None
     strains, stds = _readings(csv_, std)
@@ -139,7 +144,7 @@ def estimate(
     except Finger3dError as error:
         raise Finger3dError(f"{csv_}: {error}") from None
     if json_:
-        print(_json(found))
+        print_json([asdict(e) for e in found])
     elif out is None:
         print("\n".join([",".join(_COLUMNS), *(",".join(map(_cell, _line(e))) for e in found)]))
     else:
@@ -162,17 +167,6 @@ def _cell(value: Any) -> str:
     if isinstance(value, float):
         return repr(value)
     return f'"{value}"' if "," in value else str(value)
-
-
-def _json(found: Sequence[Estimate]) -> str:
-    def plain(value: Any) -> Any:
-        if isinstance(value, dict):
-            return {k: plain(v) for k, v in value.items()}
-        if isinstance(value, list | tuple):
-            return [plain(v) for v in value]
-        return None if isinstance(value, float) and not math.isfinite(value) else value
-
-    return json.dumps([plain(asdict(e)) for e in found], indent=2, ensure_ascii=False)
 
 
 def _readings(path: Path, std: float | None) -> tuple[list[float], list[float] | float | None]:

@@ -51,10 +51,16 @@ class _File(_Part):
 
 
 def save(calibration: Calibration, path: str | Path) -> Path:
-    """Write calibration.json; everything that can be worked out from the curve stands in it too, for other readers."""
+    """Write calibration.json."""
+    write_json(path, as_dict(calibration))
+    return Path(path)
+
+
+def as_dict(calibration: Calibration) -> dict[str, Any]:
+    """What calibration.json holds; what can be worked out from the curve stands in it too, for other readers."""
     c = calibration
     fit = c.fit
-    data = {
+    return {
         "format": FORMAT,
         "version": VERSION,
         "gauge": c.gauge,
@@ -82,8 +88,6 @@ def save(calibration: Calibration, path: str | Path) -> Path:
         "hash": c.hash,
         "about": c.about,
     }
-    write_json(path, data)
-    return Path(path)
 
 
 def _mu_sd(c: Calibration, number: int) -> np.ndarray[Any, Any]:
