@@ -9,6 +9,7 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -54,7 +55,7 @@ def _viewer_axes() -> Float:
     return np.array([right, np.cross(towards, right), towards])
 
 
-_AXES = _viewer_axes()
+AXES = _viewer_axes()
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,7 @@ class Skin:
     @property
     def size(self) -> float:
         """Largest extent, mm."""
-        return float(np.ptp(self._points, axis=0).max())
+        return float(np.ptp(self.points, axis=0).max())
 
     @property
     def aspect(self) -> float:
@@ -110,13 +111,14 @@ class Skin:
     @property
     def frame(self) -> tuple[Float, Float]:
         """Middle (3,) of what the viewer sees, and its width and height (2,), mm."""
-        flat = _flat(self._points)
-        low, high = flat.min(axis=0), flat.max(axis=0)
-        deep = self._points.mean(axis=0) @ _AXES[2]
-        return np.append(0.5 * (low + high), deep) @ _AXES, high - low
+        seen = flat(self.points)
+        low, high = seen.min(axis=0), seen.max(axis=0)
+        deep = self.points.mean(axis=0) @ AXES[2]
+        return np.append(0.5 * (low + high), deep) @ AXES, high - low
 
     @property
-    def _points(self) -> Float:
+    def points(self) -> Float:
+        """All points (p, 3) that are drawn, mm."""
         parts = (self.body, self.contact, self.rest, self.outline)
         return np.concatenate([part.reshape(-1, 3) for part in parts])
 
@@ -217,30 +219,30 @@ def draw_solid(axes: Axes, skin: Skin, colours: Float, arrows: bool) -> None:
 
     body = _shaded(skin.body[:, _RING], np.tile(to_rgb(BODY), (len(skin.body), 1)))
     contact = _shaded(skin.contact, colours.mean(axis=1))
-    depth = np.concatenate([faces.mean(axis=1) @ _AXES[2] for faces, _ in (body, contact)])
-    polygons = [*_flat(body[0]), *_flat(contact[0])]
+    depth = np.concatenate([faces.mean(axis=1) @ AXES[2] for faces, _ in (body, contact)])
+    polygons = [*flat(body[0]), *flat(contact[0])]
     fill = np.concatenate([body[1], contact[1]])
     # The mesh is drawn on the body only; elsewhere an edge in the face's colour closes fine white seams.
     edge = np.concatenate([np.tile(to_rgb(LINE), (len(body[1]), 1)), contact[1]])
     order = np.argsort(depth, kind="stable")
-    axes.add_collection(LineCollection(list(_flat(skin.rest)), colors=REST, lw=0.8, linestyles="dotted", zorder=1))
+    axes.add_collection(LineCollection(list(flat(skin.rest)), colors=REST, lw=0.8, linestyles="dotted", zorder=1))
     axes.add_collection(
         PolyCollection([polygons[i] for i in order], facecolors=fill[order], edgecolors=edge[order], lw=0.25, zorder=2)
     )
     if len(skin.outline):
-        axes.plot(*_flat(skin.outline).T, color=OBJECT, lw=1.0, zorder=3)
+        axes.plot(*flat(skin.outline).T, color=OBJECT, lw=1.0, zorder=3)
     if arrows and len(skin.arrow):
         for state, colour in ARROWS.items():
             on = skin.arrow_status == state
-            at, by = _flat(skin.arrow_at[on]), _flat(skin.arrow_length * skin.arrow[on])
+            at, by = flat(skin.arrow_at[on]), flat(skin.arrow_length * skin.arrow[on])
             axes.quiver(*at.T, *by.T, color=colour, pivot="mid", angles="xy", scale_units="xy", scale=1.0,
                         width=0.002, zorder=4)  # fmt: skip
     axes.autoscale_view()
 
 
-def _flat(points: Float) -> Float:
+def flat(points: Float) -> Float:
     """Points (..., 3) as the viewer sees them, (..., 2)."""
-    return points @ _AXES[:2].T
+    return points @ AXES[:2].T
 
 
 def _shaded(faces: Float, colours: Float) -> tuple[Float, Float]:
@@ -248,7 +250,7 @@ def _shaded(faces: Float, colours: Float) -> tuple[Float, Float]:
     third = faces.shape[1] // 3
     normal = np.cross(faces[:, third] - faces[:, 0], faces[:, 2 * third] - faces[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-    seen = normal @ _AXES[2] > 0.0
+    seen = normal @ AXES[2] > 0.0
     light = np.array([-0.2, 0.9, 0.5])
     brightness = 0.62 + 0.38 * np.clip(normal[seen] @ (light / np.linalg.norm(light)), 0.0, 1.0)
     return faces[seen], np.clip(colours[seen] * brightness[:, None], 0.0, 1.0)
@@ -269,28 +271,39 @@ def render_solid(skin: Skin, colours: list[Float], must: bool = False) -> list[N
     MissingError
         If rendering does not work and `must` is set.
     """
+    arrays = {f.name: getattr(skin, f.name) for f in fields(skin)}
+    images = rendered("finger3d.render", {"colours": np.array(colours), **arrays}, must)
+    return None if images is None else list(images)
+
+
+def rendered(module: str, arrays: Mapping[str, Any], must: bool = False) -> NDArray[np.uint8] | None:
+    """What ``python -m MODULE IN.npz OUT.npy`` makes of arrays in a child, or None where rendering does not work."""
     if not _failure:
         with tempfile.TemporaryDirectory(prefix="finger3d-") as folder:
-            source, target = Path(folder) / "skin.npz", Path(folder) / "image.npy"
-            arrays = {f.name: getattr(skin, f.name) for f in fields(skin)}
-            np.savez(source, colours=np.array(colours), **arrays)
-            why = run_child([sys.executable, "-P", "-m", "finger3d.render", str(source), str(target)])
+            source, target = Path(folder) / "arrays.npz", Path(folder) / "image.npy"
+            np.savez(source, allow_pickle=False, **arrays)
+            why = run_child([sys.executable, "-P", "-m", module, str(source), str(target)])
             if why is None and target.exists():
-                return list(np.load(target))
+                return np.asarray(np.load(target))
             _failure.append(why or "it wrote no picture")
     if must:
         raise MissingError(f"PyVista cannot render here: {_failure[0]}; unset FINGER3D_RENDERER to use matplotlib")
     return None
 
 
-def run_child(command: list[str]) -> str | None:
-    """Run a command that renders, where a crash does no harm; why it failed, in one line, or None."""
+def run_child(command: list[str], window: bool = False) -> str | None:
+    """Run a command that renders, where a crash does no harm; why it failed, in one line, or None.
+
+    There is a time limit, unless it opens a window.
+    """
     here = str(Path(__file__).resolve().parent.parent)
     path = os.pathsep.join(p for p in (here, os.environ.get("PYTHONPATH")) if p)
     # EGL needs no display; asking for it first spares VTK's warning about a missing X server.
-    env = {"VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow", **os.environ, "PYTHONPATH": path}
+    hidden = {} if window else {"VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow"}
+    env = {**hidden, **os.environ, "PYTHONPATH": path}
+    limit = None if window else _TIME_LIMIT_S
     try:
-        done = subprocess.run(command, env=env, capture_output=True, text=True, timeout=_TIME_LIMIT_S, check=False)
+        done = subprocess.run(command, env=env, capture_output=True, text=True, timeout=limit, check=False)
     except (OSError, subprocess.TimeoutExpired) as error:
         return str(error)
     if done.returncode == 0:
@@ -307,23 +320,35 @@ def _child(source: str, target: str) -> None:
     data = np.load(source)
     skin = Skin(**{f.name: data[f.name] for f in fields(Skin)})
     plotter = pv.Plotter(off_screen=True, window_size=list(_WINDOW), lighting="three lights")
-    plotter.set_background("white")
-    contact = _add_body(plotter, skin)
-    plotter.enable_parallel_projection()
-    middle, (width, height) = skin.frame
-    plotter.camera_position = [tuple(middle + 3.0 * skin.size * _AXES[2]), tuple(middle), (0.0, 1.0, 0.0)]
-    plotter.camera.parallel_scale = 0.5 * _MARGIN * max(height, width * _WINDOW[1] / _WINDOW[0])
-    plotter.reset_camera_clipping_range()
+    contact = stage(plotter, skin, skin.frame)
     images = []
     for number, colours in enumerate(data["colours"]):
         contact["colour"] = np.round(255.0 * colours.reshape(-1, 3)).astype(np.uint8)
         if number == 1:
             _add_arrows(plotter, skin)
+        plotter.render()  # a screenshot alone repeats the picture before
         images.append(plotter.screenshot(return_img=True))
-    stack = np.array(images)[..., :3]
+    np.save(target, cropped(np.array(images)))
+
+
+def stage(plotter: Any, skin: Skin, frame: tuple[Float, Float]) -> Any:
+    """Set up the body, and a camera that sees a frame as `Skin.frame` gives it; returns the contact surface."""
+    plotter.set_background("white")
+    contact = _add_body(plotter, skin)
+    plotter.enable_parallel_projection()
+    middle, (width, height) = frame
+    plotter.camera_position = [tuple(middle + 3.0 * skin.size * AXES[2]), tuple(middle), (0.0, 1.0, 0.0)]
+    plotter.camera.parallel_scale = 0.5 * _MARGIN * max(height, width * _WINDOW[1] / _WINDOW[0])
+    plotter.reset_camera_clipping_range()
+    return contact
+
+
+def cropped(images: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Images (s, h, w, 3) without the margin that all of them leave white."""
+    stack = images[..., :3]
     inked = np.min(stack, axis=(0, 3)) < 250
     rows, columns = np.flatnonzero(inked.any(axis=1)), np.flatnonzero(inked.any(axis=0))
-    np.save(target, stack[:, rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1])
+    return stack[:, rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
 
 
 def _poly(points: Float, lines: bool) -> Any:

@@ -203,7 +203,7 @@ def _patches(colours: dict[int, str], states: Sequence[int]) -> list[Any]:
     return [Patch(facecolor=colours[s], edgecolor="#888888", lw=0.5, label=STATUS_NAMES[s]) for s in states]
 
 
-def _two_panels(aspect: float, title: str, ticks: bool = False) -> tuple[Figure, list[Axes]]:
+def two_panels(aspect: float, title: str, ticks: bool = False) -> tuple[Figure, list[Axes]]:
     """Two panels of this height over width, with room for a key below each, and for ticks."""
     width, panel, below = 14.0, 6.2 if ticks else 6.5, 1.4 if ticks else 0.95
     above = 0.85 if title else 0.45
@@ -221,7 +221,7 @@ def _two_panels(aspect: float, title: str, ticks: bool = False) -> tuple[Figure,
     return figure, panels
 
 
-def _keys(figure: Figure, highest: float, lines: dict[str, str]) -> None:
+def keys(figure: Figure, highest: float, lines: dict[str, str]) -> None:
     """The colour bar below the left panel, zones and lines (name -> colour) below the right one."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
@@ -243,14 +243,14 @@ def _keys(figure: Figure, highest: float, lines: dict[str, str]) -> None:
     )
 
 
-def _palette() -> Float:
+def palette() -> Float:
     """Colours (3, 3) of open, stick, slip."""
     from matplotlib.colors import to_rgb
 
     return np.array([to_rgb(COLOURS[s]) for s in (OPEN, STICK, SLIP)])
 
 
-def _pressure_colours(values: Float, highest: float) -> Float:
+def pressure_colours(values: Float, highest: float) -> Float:
     """Colours (..., 3) for pressures; the body's own where there is none."""
     import matplotlib
     from matplotlib.colors import to_rgb
@@ -333,10 +333,10 @@ def _section(
     highest = _highest(pressure)
     low, span = moved.min(axis=0), np.ptp(moved, axis=0)
     limits = low - 0.04 * span, low + 1.08 * span
-    figure, panels = _two_panels(span[1] / span[0], title, ticks=True)
-    by_status = _palette()[state[arc[:, :2]].ravel()]
+    figure, panels = two_panels(span[1] / span[0], title, ticks=True)
+    by_status = palette()[state[arc[:, :2]].ravel()]
     outline, edges = outline_of(mesh, moved), edges_of(mesh, moved)
-    for axes, colours in zip(panels, (_pressure_colours(of_half, highest), by_status), strict=True):
+    for axes, colours in zip(panels, (pressure_colours(of_half, highest), by_status), strict=True):
         axes.add_patch(PathPatch(outline, facecolor=BODY, edgecolor=LINE, lw=0.5))
         axes.add_patch(PathPatch(edges, facecolor="none", edgecolor=LINE, lw=0.25))
         if profile is not None:
@@ -346,7 +346,7 @@ def _section(
         axes.set_xlabel("x (mm)", labelpad=1)
         axes.spines[["top", "right"]].set_visible(False)
     panels[0].set_ylabel("y (mm)")
-    _keys(figure, highest, {} if profile is None else {"object": OBJECT})
+    keys(figure, highest, {} if profile is None else {"object": OBJECT})
     return figure
 
 
@@ -355,12 +355,12 @@ def _section(
 
 def _solid(skin: Skin, title: str) -> tuple[Figure, str]:
     highest = _highest(skin.pressure)
-    by_pressure = _pressure_colours(skin.pressure, highest)
-    by_status = np.repeat(_palette()[skin.status][:, None], 3, axis=1)
+    by_pressure = pressure_colours(skin.pressure, highest)
+    by_status = np.repeat(palette()[skin.status][:, None], 3, axis=1)
     wanted = os.environ.get("FINGER3D_RENDERER", "")
     images = None if wanted == "matplotlib" else render_solid(skin, [by_pressure, by_status], must=wanted == "pyvista")
     aspect = skin.aspect if images is None else images[0].shape[0] / images[0].shape[1]
-    figure, panels = _two_panels(aspect, title)
+    figure, panels = two_panels(aspect, title)
     for number, (axes, colours) in enumerate(zip(panels, (by_pressure, by_status), strict=True)):
         if images is not None:
             axes.imshow(images[number], interpolation="antialiased")
@@ -370,5 +370,5 @@ def _solid(skin: Skin, title: str) -> tuple[Figure, str]:
     if skin.largest_shear > 0.0:
         text = f"stick and slip; arrows: friction on the finger, at most {skin.largest_shear:.3g} MPa"
         panels[1].set_title(text, fontsize=11)
-    _keys(figure, highest, {"finger at rest": REST} | ({"object": OBJECT} if len(skin.outline) else {}))
+    keys(figure, highest, {"finger at rest": REST} | ({"object": OBJECT} if len(skin.outline) else {}))
     return figure, "matplotlib" if images is None else "pyvista"

@@ -233,11 +233,11 @@ def test_the_view_keeps_to_its_budget(solid: Path, section: Path) -> None:
     assert whole is not None
     assert len(whole.labels) == 4
     # every corner of every facet, once
-    assert len(whole.rest) == len(np.unique(states.facets))
+    assert len(whole.rest) == len(np.unique(states.corners))
     assert len(whole.body) + len(whole.contact) == len(states.facets)
     each = len(whole.rest) * 17 * 4 // 3
-    less = view_of(states, budget=states.facets.size * 16 // 3 + 2 * each)
-    one = view_of(states, budget=states.facets.size * 16 // 3 + each)
+    less = view_of(states, budget=states.corners.size * 16 // 3 + 2 * each)
+    one = view_of(states, budget=states.corners.size * 16 // 3 + each)
     assert less is not None
     assert one is not None
     assert (less.labels[-1], one.labels) == (whole.labels[-1], whole.labels[-1:])

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 from cyclopts import CycloptsError
 
-from finger3d.cli import design, output, press, project, sensor, sweep  # noqa: F401  importing registers the commands
+# importing registers the commands
+from finger3d.cli import design, output, press, project, sensor, show, sweep  # noqa: F401
 from finger3d.cli.common import app, complain
 from finger3d.errors import Finger3dError
 

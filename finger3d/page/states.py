@@ -29,7 +29,7 @@ class States:
     Attributes
     ----------
     points : (n, d) mm at rest, in the order of fields.vtu
-    facets : (t, d) corners of the boundary's facets, oriented outward
+    cells, facets : (e, k), (t, j) as in `finger3d.mesh.Mesh`; facets of all labels together
     on_contact : (t,) whether a facet belongs to the contact surface
     nodes : (m,) numbers of the contact points among `points`, in the order of contact.csv
     step : (s,) number of each increment, from 1
@@ -41,6 +41,7 @@ class States:
     """
 
     points: Array
+    cells: Array
     facets: Array
     on_contact: Array
     nodes: Array
@@ -57,6 +58,11 @@ class States:
     def dim(self) -> int:
         """2 for a section, 3 for a solid."""
         return int(self.points.shape[1])
+
+    @property
+    def corners(self) -> Array:
+        """Corners (t, d) of the boundary's facets, oriented outward."""
+        return self.facets[:, : self.dim]
 
     def on_points(self, name: str, k: int) -> Array:
         """A contact field of the k-th kept increment at all points (n,): 0 where there is no contact point."""
@@ -93,7 +99,7 @@ def states_of(problem: Problem, frames: Sequence[Frame], mesh: Mesh, parent: Arr
         u[k] = displacement(problem.mesh, unknowns)[parent] * sign
     u[-1] = last
     tables = [contact_table(problem.points, frames[i].state) for i in kept]
-    facets = {label: f[:, : mesh.dim] for label, f in mesh.facets.items() if len(f)}
+    facets = {label: f for label, f in mesh.facets.items() if len(f)}
     at = [frames[i].target for i in kept]
 
     def columns(name: str) -> Array:
@@ -101,6 +107,7 @@ def states_of(problem: Problem, frames: Sequence[Frame], mesh: Mesh, parent: Arr
 
     return States(
         points=mesh.points.astype(np.float32),
+        cells=mesh.cells.astype(np.int32),
         facets=np.concatenate(list(facets.values())).astype(np.int32),
         on_contact=np.concatenate([np.full(len(f), label == "contact") for label, f in facets.items()]),
         nodes=problem.points.nodes.astype(np.int32),

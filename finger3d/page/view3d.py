@@ -81,8 +81,8 @@ def view_of(states: States, budget: int = _BUDGET) -> View3D | None:
     """A view of a solid; as many increments as the budget (bytes) holds, None for a section or if not one fits."""
     if states.dim != 3:
         return None
-    corners, index = np.unique(states.facets, return_inverse=True)
-    triangles = index.reshape(states.facets.shape)
+    corners, index = np.unique(states.corners, return_inverse=True)
+    triangles = index.reshape(states.corners.shape)
     each = len(corners) * (3 * 4 + 4 + 1) * 4 // 3
     most = (budget - triangles.size * 16 // 3) // each
     if most < 1:
@@ -96,11 +96,12 @@ def view_of(states: States, budget: int = _BUDGET) -> View3D | None:
         moved=rest + states.displacement[kept][:, corners],
         pressure=np.array([states.on_points("pressure", k)[corners] for k in kept]),
         status=np.array([states.on_points("status", k)[corners] for k in kept]),
-        labels=tuple(_label(int(states.step[k]), states.target[k]) for k in kept),
+        labels=tuple(label(int(states.step[k]), states.target[k]) for k in kept),
     )
 
 
-def _label(step: int, target: Array) -> str:
+def label(step: int, target: Array) -> str:
+    """What a step is called, from its number and its depth and slides (3,) mm."""
     depth, x, z = (float(v) for v in target)
     slid = "".join(f", slid {v:.4g} mm along {axis}" for v, axis in ((x, "x"), (z, "z")) if v)
     return f"step {step}: {depth:.4g} mm deep{slid}"

@@ -1,0 +1,49 @@
+"""show: look at a result."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from finger3d.cli.common import app, check_folder
+from finger3d.errors import Finger3dError
+
+
+@app.command
+def show(
+    folder: Path,
+    /,
+    *,
+    png: Annotated[Path | None, Parameter(help="Write a picture of a step instead of opening a window.")] = None,
+    gif: Annotated[Path | None, Parameter(help="Write an animation of the steps instead.")] = None,
+    step: Annotated[int | None, Parameter(help="Number of the step in the picture; default the last.")] = None,
+) -> int:
+    """Look at a result: a window with fields, steps and a clip plane; --png and --gif need no display.
+
+    Example: finger3d show out --png finger.png --gif press.gif
+
+    Parameters
+    ----------
+    folder
+        What `finger3d press` wrote.
+    """
+    from finger3d import show as run
+
+    if png is None and gif is None:
+        if step is not None:
+            raise Finger3dError("show: --step goes with --png; the window has a slider")
+        run.show_window(folder)
+        return 0
+    run.found(folder)
+    for path, ending in ((png, ".png"), (gif, ".gif")):
+        if path is not None and path.suffix.lower() != ending:
+            raise Finger3dError(f"show: --{ending[1:]} {path}: must end in {ending}")
+        if path is not None:
+            check_folder(path.parent)
+    run.show(folder, png, gif, step)
+    for path in (png, gif):
+        if path is not None:
+            print(f"{path} written")
+    return 0

@@ -1,0 +1,147 @@
+"""finger3d show: pictures without a display, the window off-screen, and one line where there is nothing to show."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from finger3d import render
+from finger3d.cli import main
+from finger3d.page import load_states
+from finger3d.show.window import values
+from tests.test_page import SECTION, SOLID, pressed
+
+
+@pytest.fixture(scope="module")
+def section(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return pressed(tmp_path_factory.mktemp("section"), SECTION, "--no-figures")
+
+
+@pytest.fixture(scope="module")
+def solid(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return pressed(tmp_path_factory.mktemp("solid"), SOLID, "--no-figures")
+
+
+def pixels(path: Path) -> np.ndarray:
+    from PIL import Image
+
+    return np.asarray(Image.open(path).convert("RGB"), dtype=float)
+
+
+def orange(image: np.ndarray) -> float:
+    """Share of the right half, above the keys, in slip's colour, whatever the light."""
+    high, wide = image.shape[:2]
+    panel = image[: int(0.75 * high), wide // 2 :]
+    return float(((panel[..., 0] - panel[..., 2] > 90) & (panel[..., 0] > panel[..., 1] + 30)).mean())
+
+
+def frames(path: Path) -> list[np.ndarray]:
+    from PIL import Image
+
+    found = Image.open(path)
+    out = []
+    for k in range(found.n_frames):
+        found.seek(k)
+        out.append(np.asarray(found.convert("RGB"), dtype=float))
+    return out
+
+
+def test_a_section_as_picture_and_animation(section: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    png, gif = tmp_path / "with space" / "a.png", tmp_path / "a.gif"
+    assert main(["show", str(section), "--png", str(png), "--gif", str(gif)]) == 0
+    assert capsys.readouterr().out == f"{png} written\n{gif} written\n"
+    assert orange(pixels(png)) > 1e-3
+    first, *_, last = frames(gif)
+    assert len(frames(gif)) == 4
+    assert first.shape == last.shape
+    assert min(orange(last), orange(first)) > 0.0
+    assert np.abs(last - first).mean() > 0.5
+
+
+@pytest.mark.parametrize("renderer", [pytest.param("", marks=pytest.mark.slow), "matplotlib"])
+def test_a_solid_with_and_without_opengl(
+    renderer: str, solid: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FINGER3D_RENDERER", renderer)
+    monkeypatch.setattr(render, "_failure", [])
+    assert main(["show", str(solid), "--png", str(tmp_path / "a.png"), "--step", "2"]) == 0
+    image = pixels(tmp_path / "a.png")
+    assert orange(image) > 1e-3
+    # the left panel shows pressure, not status
+    assert orange(image[:, ::-1]) < 0.5 * orange(image)
+    assert main(["show", str(solid), "--png", str(tmp_path / "b.png")]) == 0
+    assert np.abs(pixels(tmp_path / "b.png").mean() - image.mean()) > 0.01
+
+
+@pytest.mark.slow
+def test_the_window_off_screen_answers_its_controls(solid: Path, section: Path, tmp_path: Path) -> None:
+    for folder in (solid, section):
+        picture = tmp_path / f"{folder.parent.name}.png"
+        command = [sys.executable, "-P", "-m", "finger3d.show.window", str(folder), str(picture)]
+        assert render.run_child(command) is None
+        assert pixels(picture).std() > 10.0
+
+
+def test_values_of_the_window(solid: Path) -> None:
+    import pyvista
+
+    states, end = load_states(solid / "steps.npz"), pyvista.read(solid / "fields.vtu")
+    assert values(states, end, "displacement", 0).max() == pytest.approx(0.125, rel=0.2)
+    assert np.array_equal(values(states, end, "status", 3), end["status"])
+    assert np.isnan(values(states, end, "stress", 0)).all()
+    # von Mises from its definition by the deviator
+    tensor = np.asarray(end["stress"])[:, [0, 3, 5, 3, 1, 4, 5, 4, 2]].reshape(-1, 3, 3)
+    deviator = tensor - np.trace(tensor, axis1=1, axis2=2)[:, None, None] / 3.0 * np.eye(3)
+    wanted = np.sqrt(1.5 * (deviator**2).sum(axis=(1, 2)))
+    assert np.allclose(values(states, end, "stress", 3), wanted, rtol=1e-6)
+    shear = values(states, end, "shear", 3)
+    # friction is limited by mu times the pressure, in single precision
+    assert (shear <= 0.25 * values(states, end, "pressure", 3) + 1e-6).all()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (["nothing", "--png", "a.png"], 2, "there is no such folder"),
+        (["empty", "--png", "a.png"], 2, "holds no results of a press"),
+        (["cut", "--png", "a.png"], 3, "incomplete: it was interrupted"),
+        (["whole"], 3, "add --png FILE"),
+        (["whole", "--step", "1"], 2, "--step goes with --png"),
+        (["whole", "--png", "a.jpg"], 2, "must end in .png"),
+        (["whole", "--png", "a.png", "--step", "9"], 2, "step 9 is not among those kept: 1, 2, 3, 4"),
+    ],
+)
+def test_nothing_to_show_is_one_line(
+    arguments: list[str], code: int, said: str, section: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "cut").mkdir()
+    cut = {"outcome": "incomplete: it was interrupted", "scene": {}}
+    (tmp_path / "cut" / "summary.json").write_text(json.dumps(cut))
+    (tmp_path / "whole").symlink_to(section)
+    assert main(["show", *arguments]) == code
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert said in err
+    assert len(err.splitlines()) == 1
+    assert not list(tmp_path.glob("a.*"))
+
+
+@pytest.mark.slow
+def test_a_display_that_cannot_be_opened_is_one_line(section: Path) -> None:
+    command = [sys.executable, "-m", "finger3d", "show", str(section)]
+    env = {**os.environ, "DISPLAY": ":4711"}
+    done = subprocess.run(command, env=env, capture_output=True, text=True, check=False, timeout=120)
+    assert done.returncode == 3
+    assert len(done.stderr.splitlines()) == 1
+    assert "add --png FILE" in done.stderr
