@@ -4,7 +4,7 @@ PYTHON ?= $(shell for p in python3.11 python3 python3.12 python3.13; do \
 	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet install --constraint constraints.txt
 
-.PHONY: install demo test test-all test-browser lint clean
+.PHONY: install demo bench test test-all test-browser lint clean
 
 install: .venv/.installed
 
@@ -33,6 +33,10 @@ test-all: install
 # Needs /usr/bin/chromium: apt install chromium.
 test-browser: install
 	$(BIN)/python -m pytest -q -m browser
+
+# Takes both cores and some minutes; the table says how busy the machine was.
+bench: install
+	$(BIN)/python validation/_bench.py
 
 lint: install
 	$(BIN)/ruff check .

@@ -1,0 +1,46 @@
+"""make bench: what it measures on a small mesh, and that a busy machine is named."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+PATH = Path(__file__).parents[1] / "validation" / "_bench.py"
+
+
+@pytest.fixture(scope="module")
+def bench() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("finger3d_bench", PATH)
+    assert spec
+    assert spec.loader
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_a_child_measures_every_stage(bench: ModuleType) -> None:
+    found = bench._child(6.0, (0.25, 1.0), True)
+    assert set(found) == {
+        "assembly", "condensation", "contact_0.25", "contact_1", "dofs", "rows", "peak_MB", "factorisation"
+    }  # fmt: skip
+    assert all(value > 0.0 for value in found.values())
+    assert found["dofs"] > 10 * found["rows"]
+
+
+def test_ratios_are_of_the_chain_to_the_plain_factorisation(bench: ModuleType) -> None:
+    best = {"assembly": 1.0, "condensation": 11.0, "contact_0.25": 2.0, "factorisation": 10.0, "dofs": 1e5, "rows": 9.0}
+    chain, assembly = bench._ratios(best, 0.5)
+    assert (chain.got, assembly.got) == pytest.approx((1.4, 0.1))
+    assert chain.verdict == "holds"
+    assert "BUSY" not in chain.reason
+
+
+def test_a_busy_machine_is_named_in_every_row(bench: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bench, "cores", lambda: 2)
+    row = bench._row("anything", 1.0, 3.0, 8.0)
+    assert "load 8.0 on 2 cores, BUSY" in row.reason
+    assert row.passed  # told, not failed: the others' work is no fault of the code
+    assert row.verdict == "does not hold"

@@ -1,0 +1,220 @@
+"""How much does a press cost beside the one factorisation it cannot do without, and what does Python add?
+
+Source: the ratios of issue 8, all taken in one run on the Fig. 9 finger, 20 mm wide, nu = .49, ten increments.  Solids
+are swept, so that every run has the same mesh; each is solved in a process of its own, twice, and the shorter time of
+each stage counts.  The plain factorisation is PARDISO's, called by pypardiso on the same matrix with the same settings
+(parallel METIS, Bunch-Kaufman).  A time says little where others compute beside: the load stands in every row, and
+none of them can fail.  Not a study: what it says is of one machine at one time, and nothing of it is kept.
+
+Run by ``make bench``; ``python validation/_bench.py --quick`` takes some seconds and means nothing.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from finger3d.contact.law import Coulomb
+from finger3d.design import designs, mesh_solid
+from finger3d.model import Domain, Leg, Material, MeshOptions, Model
+from finger3d.solve import build, contact_zone, march, symmetry
+from finger3d.study import Row
+from finger3d.versions import cores
+
+LARGE, MIDDLE, QUICK = 0.62, 1.0, 2.5  # mm: 153 000, 42 000 and 6 000 unknowns
+MUS = (0.06, 0.125, 0.25, 0.5, 1.0)
+GRADING = 4.0
+SECTION = """
+[finger]
+geometry = "clipped_cylinder"
+radius_mm = 100.0
+half_length_mm = 50.0
+edge_height_mm = 36.6
+width_mm = 20.0
+[material]
+E_MPa = 1.0
+nu = 0.49
+[friction]
+mu = 0.25
+[press]
+depth_mm = 10.0
+[model]
+domain = "plane-strain"
+[mesh]
+size_mm = 0.3
+base_size_mm = 1.0
+"""  # 26 000 unknowns
+
+
+def fig9(size: float, domain: Domain = "solid", mesher: Any = "swept") -> Model:
+    """The finger at an edge length."""
+    design = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
+    options = MeshOptions(size, GRADING * size, mesher)
+    return Model(design, Material(1.0, 0.49), options, (Leg(10.0, steps=10),), friction=Coulomb(0.25), domain=domain)
+
+
+def measured(size: float, mus: Sequence[float], plain: bool) -> dict[str, float]:
+    """One press in this process, seconds by stage, then the other coefficients; peak memory; then plain PARDISO."""
+    import resource
+
+    problem = build(fig9(size))
+    found = {k: problem.seconds[k] for k in ("assembly", "condensation")}
+    found["dofs"], found["rows"] = problem.stiffness.upper.shape[0], len(problem.kept)
+    for mu in mus:
+        begin = time.perf_counter()
+        frames = list(march(replace(problem, model=replace(problem.model, friction=Coulomb(mu)))))
+        found[f"contact_{mu:g}"] = time.perf_counter() - begin
+        if not frames[-1].outcome.ok:
+            raise AssertionError(f"mu = {mu:g}: {frames[-1].outcome}")
+    found["peak_MB"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    if plain:
+        free = np.setdiff1d(np.arange(problem.stiffness.upper.shape[0]), problem.held)
+        upper = problem.stiffness.upper[free][:, free]
+        del problem, frames  # its factor need not lie beside
+        found["factorisation"] = _plain(upper)
+    return found
+
+
+def _plain(upper: Any) -> float:
+    """Seconds of one factorisation, analysis included, as anyone may call it."""
+    from pypardiso import PyPardisoSolver
+
+    solver = PyPardisoSolver(mtype=-2)
+    for number, value in ((1, 1), (2, 3), (10, 13), (21, 1)):
+        solver.set_iparm(number, value)
+    upper.sort_indices()
+    begin = time.perf_counter()
+    solver.factorize(upper)
+    seconds = time.perf_counter() - begin
+    solver.free_memory(everything=True)
+    return seconds
+
+
+def _child(size: float, mus: Sequence[float], plain: bool) -> dict[str, float]:
+    """`measured` in a process of its own, which starts with a clean memory."""
+    command = [sys.executable, __file__, json.dumps([size, list(mus), plain])]
+    return dict(json.loads(_run(command).stdout.splitlines()[-1]))
+
+
+def _run(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
+    package = str(Path(__file__).resolve().parents[1])
+    paths = os.pathsep.join(filter(None, [package, os.environ.get("PYTHONPATH")]))
+    return subprocess.run(
+        command, capture_output=True, text=True, check=True, env={**os.environ, "PYTHONPATH": paths}
+    )  # fmt: skip
+
+
+def _least(runs: Sequence[dict[str, float]]) -> dict[str, float]:
+    return {key: min(run[key] for run in runs) for key in runs[0]}
+
+
+def _press_overhead(repeats: int) -> float:
+    """Seconds of `finger3d press` of a section that are neither the solve nor the estimate of its error."""
+    found = []
+    with tempfile.TemporaryDirectory(prefix="finger3d_bench_") as folder:
+        scene, out = Path(folder, "section.toml"), Path(folder, "out")
+        scene.write_text(SECTION, encoding="utf-8")
+        for _ in range(repeats):
+            begin = time.perf_counter()
+            _run([sys.executable, "-m", "finger3d", "press", str(scene), "--out", str(out)])
+            wall = time.perf_counter() - begin
+            summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+            solve = sum(summary["cost"]["seconds"][k] for k in ("mesh", "assembly", "condensation", "contact"))
+            found.append(wall - solve - summary["error_estimate"]["seconds"])
+    return min(found)
+
+
+def _warm_cache(size: float) -> tuple[float, float]:
+    """Seconds of a mesh by pytetwild, made and read again, in a cache of its own."""
+    model = fig9(size, mesher="ftetwild")
+    kept = os.environ.get("FINGER3D_CACHE")
+    with tempfile.TemporaryDirectory(prefix="finger3d_bench_") as folder:
+        os.environ["FINGER3D_CACHE"] = folder
+        try:
+            seconds = []
+            for _ in range(2):
+                begin = time.perf_counter()
+                mesh_solid(model.design, model.mesh, contact_zone(model), symmetry(model))
+                seconds.append(time.perf_counter() - begin)
+        finally:
+            os.environ.pop("FINGER3D_CACHE")
+            if kept is not None:
+                os.environ["FINGER3D_CACHE"] = kept
+    return seconds[0], seconds[1]
+
+
+def run(quick: bool) -> tuple[Row, ...]:
+    """Every ratio once; quick: on a small mesh, where they mean nothing, and without pytetwild."""
+    load = os.getloadavg()[0]
+    sizes = (QUICK,) if quick else (MIDDLE, LARGE)
+    runs = {size: [_child(size, MUS, True)] for size in sizes}
+    overhead = _press_overhead(1 if quick else 3)
+    made = None if quick else _warm_cache(2.0)
+    if not quick:
+        for size in sizes:
+            runs[size].append(_child(size, (0.25,), True))
+    load = max(load, os.getloadavg()[0])
+    best = {size: _least([_common(r, runs[size]) for r in runs[size]]) for size in sizes}
+    rows = _ratios(best[sizes[-1]], load)
+    first = runs[sizes[0]][0]
+    once = first["assembly"] + first["condensation"]
+    five = (once + sum(first[f"contact_{mu:g}"] for mu in MUS)) / (once + first["contact_0.25"])
+    rows.append(_row(f"5 values of mu against one, {first['dofs']:.0f} unknowns", 1.25, five, load))
+    rows.append(_row("press of a section over its solve and estimate, s", 1.5, overhead, load))
+    if made:
+        what = f"pytetwild on a warm cache against a cold one ({made[0]:.1f} s)"
+        rows.append(_row(what, 0.02, made[1] / made[0], load, "0: only reading the file is left"))
+    for size, most in zip(sizes, (2.0,) if quick else (2.0, 5.0), strict=True):
+        peak = max(r["peak_MB"] for r in runs[size]) / 1024.0
+        rows.append(_row(f"peak memory, GB, {best[size]['dofs']:.0f} unknowns", most, peak, load))
+    return tuple(rows)
+
+
+def _common(one: dict[str, float], all_runs: Sequence[dict[str, float]]) -> dict[str, float]:
+    """What every run of a size has."""
+    return {k: v for k, v in one.items() if all(k in run for run in all_runs)}
+
+
+def _ratios(best: dict[str, float], load: float) -> list[Row]:
+    chain = best["assembly"] + best["condensation"] + best["contact_0.25"]
+    factor = best["factorisation"]
+    here = f"against one plain factorisation ({factor:.1f} s) of {best['dofs']:.0f} unknowns, {best['rows']:.0f} rows"
+    return [
+        _row(f"assembly, condensation and 10 increments {here}", 1.8, chain / factor, load, "aim 1.4"),
+        _row(f"assembly {here}", 0.3, best["assembly"] / factor, load, "aim 0.15"),
+    ]
+
+
+def _row(what: str, most: float, got: float, load: float, reason: str = "the issue's") -> Row:
+    busy = "" if load <= 1.3 * cores() else ", BUSY"
+    reason = f"{reason}; load {load:.1f} on {cores()} cores{busy}"
+    return Row(what, "issue 8", most, got, 0.0, reason, "statement", "at most")
+
+
+def main(arguments: Sequence[str]) -> None:
+    """The table; or, in a child, one measurement as JSON."""
+    if arguments and not arguments[0].startswith("-"):
+        print(json.dumps(measured(*json.loads(arguments[0]))))
+        return
+    from finger3d.cli.common import print_columns
+    from finger3d.study import table
+
+    begin = time.perf_counter()
+    print_columns(
+        "bench what kind reference wanted got error tolerance verdict".split(), table({"": run("--quick" in arguments)})
+    )
+    print(f"{time.perf_counter() - begin:.0f} s")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
