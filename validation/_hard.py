@@ -174,13 +174,13 @@ def coarse_and_deep(quick: bool) -> Iterator[Row]:
         yield _is("depth of 80 % of the height: settled", 1, deep.outcome.ok)
         yield _is("depth of 80 % of the height: warned of", 1, _warned(deep, "of the finger's height"))
         tets = _pressed(folder, 'model.domain="solid"', "mesh.size_mm=3.0", "mesh.base_size_mm=5.0")
-        cells = tets.summary["mesh"]["cells"]
+        cells = tets.summary()["mesh"]["cells"]
         yield Row("coarse solid: tets", SEC8, 150, cells, 0, "about a hundred", measure="at most")
         yield _is(f"solid of {cells} tets: settled", 1, tets.outcome.ok)
         yield _is(f"solid of {cells} tets: warned of", 1, _warned(tets, "too few"))
         fine = _pressed(folder, 'model.domain="solid"', "mesh.size_mm=1.5", "mesh.base_size_mm=3.0")
-        ratio = tets.summary["steps"][-1]["normal_force_N"] / fine.summary["steps"][-1]["normal_force_N"]
-        what = f"solid of {cells} tets: force over that of {fine.summary['mesh']['cells']}"
+        ratio = tets.summary()["steps"][-1]["normal_force_N"] / fine.summary()["steps"][-1]["normal_force_N"]
+        what = f"solid of {cells} tets: force over that of {fine.summary()['mesh']['cells']}"
         yield Row(what, SEC8, 1, ratio, 0.1, "no garbage")
         refused = _refused(folder, "press.depth_mm=10.0")
         yield _is("depth of the whole height: refused in one line that names the key", 1, "press.depth_mm" in refused)
@@ -200,7 +200,7 @@ def _pressed(folder: str, *changes: str) -> Any:
 
 
 def _warned(result: Any, words: str) -> bool:
-    return any(words in warning for warning in result.summary["warnings"])
+    return any(words in warning for warning in result.summary()["warnings"])
 
 
 def _refused(folder: str, *changes: str, text: str = SCENE) -> str:
@@ -236,7 +236,7 @@ def surfaces(quick: bool) -> Iterator[Row]:
             path = Path(folder, "scene.toml")
             path.write_text(text, encoding="utf-8")
             result = press(load(path), Path(folder, "out"), figures=False)
-            forces.append(result.summary["steps"][-1]["normal_force_N"] if result.outcome.ok else np.nan)
+            forces.append(result.summary()["steps"][-1]["normal_force_N"] if result.outcome.ok else np.nan)
         yield Row("STL prism touching at its edge: force over that of the wedge", SEC8, 1, forces[1] / forces[0], 1e-9,
                   "the same surface")  # fmt: skip
 
