@@ -1,0 +1,151 @@
+"""Does the best finger for friction, by radius R, edge height H, gauge place x and angle, change in 20 mm of width?
+
+Source: Maeno 2004, Sec. III-B: R = 100, H = 36.6 mm, a gauge at x = 36 mm and 30 degrees, chosen in plane strain at
+10 mm to be sensitive to friction throughout a large range.  The criterion is that of `finger3d design`: the least
+change of strain per mu between neighbours of .06, .125, .25, .5, 1, negative where the strain turns back; and the same
+up to .5 only.  Every finger is judged at its best gauge, 4 to 48 mm from the middle along the line of _paper.py, 0 to
+90 degrees, at z = 0.  The table has the paper's finger on a finer and a coarser mesh as well.  geometry_search.py
+judges the same fingers by their shear strain, in plane strain.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from finger3d.design import designs
+from finger3d.study import Result, Row
+
+from ._paper import BELOW_FIG9, MUS, STRAIN, Float, Profile, columns, fig9, line, said, strains, under
+from .geometry_search import CHOSEN, EDGES, RADII
+
+NU = 0.49
+DOMAINS = {STRAIN: "plane strain", "solid": "20 mm wide"}
+GAUGE = (36.0, 30.0)
+ANGLES = np.arange(0.0, 91.0, 5.0)
+SIZES = {STRAIN: 1.0, "solid": 2.0}
+OTHERS = {STRAIN: (0.5, 2.0), "solid": (1.5, 3.0)}
+RANGES = {"mu = .06 to 1": len(MUS), "mu = .06 to .5": MUS.index(0.5) + 1}
+_HEIGHT = 49.9  # mm, the paper's finger is 50 mm high
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A finger in one domain: sensitivity (angles, x) by range, strain per mu; height and contact half length (mm)."""
+
+    value: dict[str, Float]
+    height: float
+    reach: float
+
+    def best(self, x: Float, over: str) -> tuple[float, float, float]:
+        """Largest sensitivity, and the gauge that has it: x (mm), angle (degrees)."""
+        value = self.value[over]
+        i, j = np.unravel_index(int(value.argmax()), value.shape)
+        return float(value[i, j]), float(x[j]), float(ANGLES[i])
+
+
+def judged(plane: str, radius: float, edge: float, x: Float, size: float) -> Judged:
+    """Condense a finger once, press it at every mu, read every gauge."""
+    design = designs()["clipped_cylinder"](radius_mm=radius, half_length_mm=50.0, edge_height_mm=edge, width_mm=1.0)
+    gauges = line(x, design, BELOW_FIG9)
+    problem = fig9(NU, plane, size, gauges, radius=radius, edge=edge)
+    ends = [under(problem, mu)[-1] for mu in MUS]
+    e = np.array([strains(end, len(x)) for end in ends])
+    t = np.deg2rad(ANGLES)[:, None]
+    along = (
+        e[:, 0, None] * np.cos(t) ** 2 + e[:, 1, None] * np.sin(t) ** 2 + e[:, 2, None] * np.sin(t) * np.cos(t)
+    )  # (mu, angle, x)
+    slope = np.diff(along, axis=0) / np.diff(MUS)[:, None, None]
+    value = {over: (slope[: n - 1] * np.sign(along[n - 1] - along[0])).min(axis=0) for over, n in RANGES.items()}
+    return Judged(value, design.height_mm, Profile.of(problem, ends[MUS.index(0.25)]).a)
+
+
+def run(quick: bool) -> Result:
+    """A condensation for each R and H, in plane strain and as a solid."""
+    x = np.linspace(4.0, 48.0, 12 if quick else 45)
+    radii, edges = ((80.0, 100.0), (25.0, 36.6)) if quick else (RADII, EDGES)
+    found: dict[tuple[str, float, float], Judged] = {}
+    lines = []
+    for plane, name in DOMAINS.items():
+        size = SIZES[plane] * (3.0 if quick else 1.0)
+        for radius in radii:
+            for edge in edges:
+                found[plane, radius, edge] = finger = judged(plane, radius, edge, x, size)
+                lines.append((name, size, radius, edge, *_numbers(finger, x)))
+        for other in () if quick else OTHERS[plane]:
+            lines.append((name, other, *CHOSEN, *_numbers(judged(plane, *CHOSEN, x, other), x)))
+    names = "domain mesh_mm R_mm H_mm height_mm contact_mm"
+    names += " per_mu_to_1 x_mm_to_1 angle_deg_to_1 per_mu_to_half x_mm_to_half angle_deg_to_half"
+    rows = [row for plane in DOMAINS for over in RANGES for row in _statements(plane, over, found, x)]
+    return Result(tuple(rows), columns(names, lines), lambda figure: _draw(figure, radii, edges, found, x))
+
+
+def _numbers(finger: Judged, x: Float) -> list[float]:
+    return [finger.height, 2.0 * finger.reach, *(v for over in RANGES for v in finger.best(x, over))]
+
+
+def _sound(plane: str, found: dict[Any, Judged]) -> dict[Any, Judged]:
+    """Fingers as high as the paper's that touch no farther than it: flat and low ones are merely strained more."""
+    reach = found[(plane, *CHOSEN)].reach
+    return {k[1:]: f for k, f in found.items() if k[0] == plane and f.height >= _HEIGHT and f.reach <= reach + 1.0}
+
+
+def _statements(plane: str, over: str, found: dict[Any, Judged], x: Float) -> list[Row]:
+    where, own = f"{DOMAINS[plane]}, {over}", found[(plane, *CHOSEN)]
+    rows = []
+    for among, here in (
+        ("", {k[1:]: f for k, f in found.items() if k[0] == plane}),
+        (" of those as high that touch no farther", _sound(plane, found)),
+    ):
+        best = max(here, key=lambda k: here[k].best(x, over)[0])
+        share = own.best(x, over)[0] / here[best].best(x, over)[0]
+        text = (
+            f"R = 100, H = 36.6 is the most sensitive, {where}: over the best{among}, R = {best[0]:g}, H = {best[1]:g}"
+        )
+        rows.append(said(text, "Sec. III-B", 1.0, share, "within a tenth of the best", 0.1, "at least"))
+    value, at, angle = own.best(x, over)
+    i, j = int(np.argmin(abs(ANGLES - GAUGE[1]))), int(np.argmin(abs(x - GAUGE[0])))
+    text = (
+        f"x = 36 mm, 30 degrees is the most sensitive gauge, {where}: over that at x = {at:.0f} mm, {angle:.0f} degrees"
+    )
+    share = own.value[over][i, j] / value
+    rows.append(said(text, "Sec. III-B", 1.0, share, "within a tenth of the best", 0.1, "at least"))
+    return rows
+
+
+def _draw(figure: Any, radii: Any, edges: Any, found: dict[Any, Judged], x: Float) -> None:
+    figure.set_size_inches(19.0, 9.0)
+    panels = figure.subplots(2, 3, squeeze=False)
+    whole, half = RANGES
+    for row, (plane, name) in enumerate(DOMAINS.items()):
+        axes = panels[row, 0]
+        values = np.array([[found[plane, r, h].best(x, half)[0] for r in radii] for h in edges])
+        picture = axes.imshow(values, origin="lower", aspect="auto", cmap="viridis")
+        for i, j in np.ndindex(values.shape):
+            _, at, angle = found[plane, radii[j], edges[i]].best(x, half)
+            colour = "w" if values[i, j] < 0.6 * values.max() else "k"
+            text = f"{values[i, j]:.3f}\n{at:.0f} mm, {angle:.0f}°"
+            axes.text(j, i, text, ha="center", va="center", fontsize=8, color=colour)
+        column, line_ = list(radii).index(CHOSEN[0]), list(edges).index(CHOSEN[1])
+        axes.plot(column, line_, "s", ms=42, mfc="none", mec="#e74c3c", mew=2.5)
+        axes.set_xticks(range(len(radii)), [f"{r:g}" for r in radii])
+        axes.set_yticks(range(len(edges)), [f"{h:g}" for h in edges])
+        axes.set(xlabel="R (mm)", ylabel="H (mm)", title=f"{name}, {half}: each finger's best gauge, x and angle")
+        figure.colorbar(picture, ax=axes, label="least |d strain / d mu|")
+        for k, over in enumerate((half, whole), start=1):
+            _gauge_map(figure, panels[row, k], found[(plane, *CHOSEN)], x, name, over)
+    figure.suptitle(f"Sensitivity to friction, nu = {NU:g}, 10 mm deep; red: the paper's choice")
+
+
+def _gauge_map(figure: Any, axes: Any, finger: Judged, x: Float, name: str, over: str) -> None:
+    value = finger.value[over]
+    largest = float(abs(value).max())
+    picture = axes.pcolormesh(x, ANGLES, value, cmap="RdBu", vmin=-largest, vmax=largest, shading="nearest")
+    _, at, angle = finger.best(x, over)
+    axes.plot(at, angle, "k*", ms=13, label=f"best, x = {at:.0f} mm, {angle:.0f}°")
+    axes.plot(*GAUGE, "s", ms=10, mfc="none", mec="#e74c3c", mew=2.5, label="the paper's, 36 mm, 30°")
+    axes.set(xlabel="x of the gauge (mm)", ylabel="angle (degrees)", title=f"{name}, {over}: R = 100, H = 36.6")
+    axes.legend(loc="lower left", fontsize=8)
+    figure.colorbar(picture, ax=axes, label="least d strain / d mu; < 0: turns back")
