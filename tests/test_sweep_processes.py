@@ -114,7 +114,7 @@ def killed_and_resumed(command: list[str], out: Path, total: int, env: dict[str,
 def test_a_sweep_survives_kill_9_of_a_worker_and_of_the_parent(root, scene, tmp_path):
     out = tmp_path / "out"
     env = environment(root, str(tmp_path))
-    killed_and_resumed(sweeping(scene, out, 20, 3, "--workers", "2"), out, 60, env, tmp_path)
+    killed_and_resumed(sweeping(scene, out, 60, 4, "--workers", "2"), out, 240, env, tmp_path)
 
 
 @pytest.mark.slow
