@@ -1,0 +1,93 @@
+"""The README: every command that it shows is run, every example of code too, and the reference is the code's own."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import shutil
+from pathlib import Path
+
+import pytest
+
+from finger3d.cli import main
+
+COARSE = {
+    "press": "mesh.mesher=swept mesh.size_mm=4.0 mesh.base_size_mm=12.0",
+    "compare": "mesh.mesher=swept mesh.size_mm=8.0 mesh.base_size_mm=20.0",
+    "calibrate": "mesh.size_mm=2.0 mesh.base_size_mm=8.0",
+    "sweep": "model.domain=plane-strain mesh.size_mm=3.0 mesh.base_size_mm=12.0",
+    "design": "model.domain=plane-strain mesh.size_mm=3.0 mesh.base_size_mm=12.0",
+}
+"""What a test adds to a command, so that it takes seconds; the commands are the README's otherwise."""
+
+
+def commands(root: Path) -> list[str]:
+    blocks = re.findall(r"```sh\n(.*?)```", (root / "README.md").read_text(encoding="utf-8"), flags=re.DOTALL)
+    lines = [line.split("  #")[0].strip() for block in blocks for line in block.splitlines()]
+    return [line for line in lines if line.startswith("finger3d ")]
+
+
+def python(root: Path, heading: str) -> list[str]:
+    text = (root / "README.md").read_text(encoding="utf-8")
+    part = text[text.index(f"\n## {heading}\n") :].split("\n## ", 2)[1]
+    return re.findall(r"```python\n(.*?)```", part, flags=re.DOTALL)
+
+
+@pytest.fixture
+def folder(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder to work in, with the scenes that the README names."""
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(root / "geometries", tmp_path / "geometries")
+    return tmp_path
+
+
+def test_every_command_is_run(root: Path, folder: Path, capsys: pytest.CaptureFixture) -> None:
+    shown = commands(root)
+    assert {c.split()[1] for c in shown} >= set("new plan press compare calibrate estimate sweep export show".split())
+    for command in shown:
+        words = shlex.split(command)[1:]
+        for key in COARSE.get(words[0], "").split() if "gear" not in command else ["mesh.size_mm=6.0"]:
+            words += ["--set", key]
+        assert main(words) == 0, f"{command}: {capsys.readouterr().err}"
+
+
+def test_the_python_example_runs(root: Path, folder: Path) -> None:
+    assert main(["new", "scene.toml"]) == 0
+    text = Path("scene.toml").read_text(encoding="utf-8")
+    Path("scene.toml").write_text(text.replace('mesher = "ftetwild"', 'mesher = "swept"').replace("= 2.0 ", "= 4.0 "))
+    (example,) = python(root, "From Python")
+    names: dict = {}
+    exec(example, names)
+    assert len(names["frame"]) == 10
+    assert names["grid"].n_cells > 0
+    assert Path("out/contact.png").is_file()
+
+
+def test_the_examples_of_adding_work_and_are_short(root: Path, folder: Path) -> None:
+    from finger3d.model import Leg, Material, MeshOptions, Model
+    from finger3d.objects import Plane
+    from finger3d.solve import build, march
+
+    geometry, effect, study = python(root, "How to add")
+    assert all(len(example.splitlines()) < 20 for example in (geometry, effect, study))
+    names: dict = {}
+    for example in (geometry, effect, study):
+        exec(example, names)
+    pad = names["Pad"](10.0, 5.0)
+    assert pad.solid().volume == pytest.approx(pad.volume_mm3, rel=1e-12)
+    mesh, legs = MeshOptions(1.0, 3.0, "swept"), (Leg(1.0, steps=1),)
+    model = Model(pad, Material(1.0, 0.3), Plane(), mesh=mesh, legs=legs, domain="plane-strain")
+    forces = [
+        next(iter(march(build(m)))).state.force[:, 0].sum() for m in (model, names["Effect"](kelvin=50.0).apply(model))
+    ]
+    assert forces[1] / forces[0] == pytest.approx(0.9, rel=1e-9)
+    assert names["run"](True).passed
+
+
+def test_the_reference_is_the_codes_own(root: Path) -> None:
+    from finger3d.scene.reference import reference
+
+    text = (root / "README.md").read_text(encoding="utf-8")
+    inside = re.search(r"<!-- from finger3d.scene.reference[^\n]*-->\n(.*?)<!-- end -->", text, flags=re.DOTALL)
+    assert inside is not None
+    assert inside[1] == reference()
