@@ -12,6 +12,7 @@ from __future__ import annotations
 from finger3d.page.build import Code, Figure, Row, Section, Table, write_page
 from finger3d.page.press import press_page
 from finger3d.page.results import compare_page
+from finger3d.page.sensor import calibrate_page, sweep_page
 from finger3d.page.states import States, load_states, write_states
 from finger3d.page.view3d import View3D, view_of
 
@@ -23,9 +24,11 @@ __all__ = [
     "States",
     "Table",
     "View3D",
+    "calibrate_page",
     "compare_page",
     "load_states",
     "press_page",
+    "sweep_page",
     "view_of",
     "write_page",
     "write_states",

@@ -1,0 +1,117 @@
+"""The pages of a calibration and of a sweep, from what is in their folders."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from finger3d.page.build import Code, Figure, Row, Section, Table, write_page
+from finger3d.page.results import how_modelled, read_json, title_of
+
+_MOST_ROWS = 500
+
+
+def calibrate_page(folder: str | Path) -> Path:
+    """Write report.html of a calibration.
+
+    Raises
+    ------
+    Finger3dError
+        If there is no calibration.json to read, or the page cannot be written.
+    """
+    folder = Path(folder)
+    data = read_json(folder / "calibration.json")
+    mu, strain, sd = data["curve"]["mu"], data["curve"]["strain"], data["mu_sd"]
+    stretches = ", ".join(f"{s['low']:.3g} to {s['high']:.3g}" for s in data["usable"]) or "none"
+    known = [(i, s) for i, s in enumerate(sd) if s is not None]
+    best = min(known, key=lambda pair: pair[1], default=None)
+    headline = [
+        Row("usable range of mu", stretches),
+        Row(f"strain at mu = {mu[0]:g}", strain[0]),
+        Row(f"strain at mu = {mu[-1]:g}", strain[-1]),
+        Row("residual of the second-order fit, rms", data["fit"]["residual_rms"]),
+    ]
+    if best:
+        headline.append(Row(f"mu \u00b1 at mu = {mu[best[0]]:.3g}, all tolerances", best[1]))
+    a, b, c = data["fit"]["coefficients"]
+    curve = Table(
+        ("mu", "strain", "resolution of mu", "sd of mu"), list(zip(mu, strain, data["resolution"], sd, strict=True))
+    )
+    causes = Table(
+        ("not known exactly", "standard deviation", "unit", "sd of mu at the best place"),
+        [(name, t["sd"], t["unit"], t["mu_sd"][best[0]] if best else "") for name, t in data["tolerances"].items()],
+    )
+    failed = [f"mu = {at:g}: {why}" for at, why in data["failed"]]
+    return write_page(
+        folder,
+        f"{title_of(data['scene'])}: gauge {data['gauge']} against friction",
+        headline,
+        [
+            Section("Verdict", [data["verdict"]]),
+            Section("Curve", [f"Second order: strain = {a:.5g} {b:+.5g} mu {c:+.5g} mu\u00b2", curve, causes]),
+            Section("Scene", how_modelled(data, folder)),
+            Section("Use it", [Code(f"finger3d estimate {folder}/calibration.json --strain {strain[len(strain) // 2]:.4g}")]),
+        ],
+        [Figure("calibration.png", "Strain and fit, resolution, and what the uncertainty of mu is made of"),
+         Figure("map.png", "Where strains follow friction")],
+        command="calibrate",
+        outcome="converged" if not failed else f"{len(failed)} values of mu gave no numbers",
+        good=not failed,
+        notes=failed,
+        versions=data["about"].get("versions"),
+    )  # fmt: skip
+
+
+def sweep_page(folder: str | Path) -> Path:
+    """Write report.html of a sweep; of a long table the first rows only.
+
+    Raises
+    ------
+    Finger3dError
+        If there is no sweep.json to read, or the page cannot be written.
+    """
+    folder = Path(folder)
+    data = read_json(folder / "sweep.json")
+    rows = _rows(folder / "results.csv")
+    failed = [row for row in rows if row["outcome"] != "converged"]
+    forces = [float(row["normal_force_N"]) for row in rows if row["outcome"] == "converged"]
+    names = [*data["vary"], "normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm"]
+    names += [name for name in (rows[0] if rows else {}) if name.startswith("gauge_")] + ["outcome"]
+    headline = [Row("points", f"{len(rows)} of {data['points']}"), Row("bodies", str(len(data["bodies"])))]
+    if forces:
+        headline.append(Row("normal force", f"{min(forces):.4g} to {max(forces):.4g}", "N"))
+    shown = [tuple(_number(row.get(name, "")) for name in names) for row in rows[:_MOST_ROWS]]
+    more = [f"The first {_MOST_ROWS} of {len(rows)} points; all are in results.csv."] if len(rows) > _MOST_ROWS else []
+    varied = [(key, ", ".join(values)) for key, values in data["vary"].items()]
+    return write_page(
+        folder,
+        f"{title_of(data['scene'])}: sweep over {', '.join(data['vary'])}",
+        headline,
+        [
+            Section("Points", [*more, Table(tuple(names), shown)]),
+            Section("Varied", [Table(("key", "values"), varied)]),
+            Section("Scene", [Code(json.dumps(data["scene"], indent=2), "the scene that was varied")]),
+        ],
+        [Figure("sweep.png", "Normal force and gauge strains against what was varied")],
+        command="sweep",
+        outcome=f"{len(rows) - len(failed)} of {data['points']} points converged",
+        good=len(rows) == data["points"] and not failed,
+        notes=[f"point {row['point']}: {row['outcome']}" for row in failed[:10]],
+    )
+
+
+def _rows(path: Path) -> list[dict[str, str]]:
+    if not path.is_file():
+        return []
+    with path.open(newline="", encoding="utf-8") as stream:
+        return list(csv.DictReader(stream))
+
+
+def _number(text: str) -> Any:
+    try:
+        return float(text)
+    except ValueError:
+        return text
