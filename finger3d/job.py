@@ -9,10 +9,12 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger3d.contact.law import OPEN
 from finger3d.export import atomic, claimed, write_csv, write_json, write_vtu
 from finger3d.history import Frame, History, contact_table, measure
+from finger3d.mesh import EDGES, Mesh
 from finger3d.report import Report
 from finger3d.result import PressResult
 from finger3d.versions import versions
@@ -175,11 +177,11 @@ def _pressed(
     output.seconds["output"] += time.perf_counter() - begin
     output.warnings += _coarse_warning(problem, output.frames)
     history = History(problem.points, tuple(output.frames))
-    summary = output.write(str(history.outcome))
+    summary = output.write(_told(history))
     if error:
         report.stage("estimating the error")
         output.error = estimate(problem, output.frames, output.seconds)
-        summary = output.write(str(history.outcome))
+        summary = output.write(_told(history))
     if figures:
         press_page(folder)
     return history, summary
@@ -321,9 +323,12 @@ def _fields(problem: Problem, output: _Output, folder: Path, figures: bool) -> N
     both = flip[:, :, None] * flip[:, None, :]
     table = contact_table(points, frame.state)
     on_surface = {name: np.zeros(len(parent)) for name in ("pressure", "shear_x", "shear_z", "status")}
+    ends, middles = _middles(mesh)
     for name in ("pressure", "shear_x", "shear_z"):
         on_surface[name][points.nodes] = table[f"{name}_MPa"]
+        on_surface[name][middles] = on_surface[name][ends].mean(axis=1)
     on_surface["status"][points.nodes] = frame.state.status
+    on_surface["status"][middles] = on_surface["status"][ends].min(axis=1)
     whole_u = u[parent] * sign
     write_states(folder / "steps.npz", states_of(problem, good, mesh, parent, sign, whole_u))
     write_vtu(
@@ -338,6 +343,23 @@ def _fields(problem: Problem, output: _Output, folder: Path, figures: bool) -> N
     )
     if figures:
         _figures(problem, output, frame, mesh, whole_u, folder)
+
+
+def _middles(mesh: Mesh) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Ends (k, 2) of the contact face's edges, and the nodes (k,) at their middles: contact knows only the ends."""
+    face = mesh.facets["contact"]
+    edges = EDGES[mesh.dim - 1]
+    if not mesh.is_quadratic:
+        return np.zeros((0, 2), dtype=np.int64), np.zeros(0, dtype=np.int64)
+    return face[:, edges].reshape(-1, 2), face[:, mesh.dim :].ravel()
+
+
+def _told(history: History) -> str:
+    """The outcome, with the depth where a step failed."""
+    failed = next((f for f in history.frames if not f.outcome.ok), None)
+    return (
+        str(history.outcome) if failed is None else f"at a depth of {failed.target.depth_mm:.4g} mm: {failed.outcome}"
+    )
 
 
 def _voigt(tensor: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:

@@ -107,8 +107,12 @@ def test_fields_open_in_pyvista_and_agree_with_the_contact_table(tmp_path: Path)
     assert set(grid.point_data) >= {"displacement", "strain", "stress", "pressure", "shear_x", "shear_z", "status"}
     assert grid["strain"].shape == grid["stress"].shape == (grid.n_points, 6)
     points = table(out / "contact.csv")
-    pressure = np.sort([float(p["pressure_MPa"]) for p in points if float(p["pressure_MPa"]) > 0])
-    assert np.allclose(np.sort(grid["pressure"][grid["pressure"] > 0]), pressure, rtol=1e-6)
+    pressure = np.array([float(p["pressure_MPa"]) for p in points])
+    where = [grid.find_closest_point([float(p[f"{axis}_mm"]) for axis in "xyz"]) for p in points]
+    assert np.allclose(grid["pressure"][where], pressure, rtol=1e-6)
+    # between them, at the middles of edges, no spots: as many again and more carry what their ends do
+    assert np.count_nonzero(grid["pressure"]) > 2 * np.count_nonzero(pressure)
+    assert grid["pressure"].max() <= 1.000001 * pressure.max()
     held = grid.points[:, 1] == 0.0
     assert not grid["displacement"][held].any()
     # the whole finger, mirrored from a quarter: normal displacement even, tangential odd

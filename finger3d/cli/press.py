@@ -58,7 +58,7 @@ def press(
             print(f"{kind.removesuffix('s')}: {text}", file=sys.stderr if json_ else sys.stdout)
     if result.outcome.ok:
         return 0
-    complain(f"{scene}: {result.outcome} ({kept(out, report.steps_total)})")
+    complain(f"{scene}: {result.summary()['outcome']} ({kept(out, report.steps_total)})")
     return MissingError.exit_code
 
 

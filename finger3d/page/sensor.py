@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +43,7 @@ def calibrate_page(folder: str | Path) -> Path:
         ("not known exactly", "standard deviation", "unit", "sd of mu at the best place"),
         [(name, t["sd"], t["unit"], t["mu_sd"][best[0]] if best else "") for name, t in data["tolerances"].items()],
     )
+    use = f"finger3d estimate {folder}/calibration.json --strain {strain[len(strain) // 2]:.4g}"
     failed = [f"mu = {at:g}: {why}" for at, why in data["failed"]]
     return write_page(
         folder,
@@ -53,7 +53,7 @@ def calibrate_page(folder: str | Path) -> Path:
             Section("Verdict", [data["verdict"]]),
             Section("Curve", [f"Second order: strain = {a:.5g} {b:+.5g} mu {c:+.5g} mu\u00b2", curve, causes]),
             Section("Scene", how_modelled(data, folder)),
-            Section("Use it", [Code(f"finger3d estimate {folder}/calibration.json --strain {strain[len(strain) // 2]:.4g}")]),
+            Section("Use it", [Code(use)]),
         ],
         [Figure("calibration.png", "Strain and fit, resolution, and what the uncertainty of mu is made of"),
          Figure("map.png", "Where strains follow friction")],

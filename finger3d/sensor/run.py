@@ -20,6 +20,7 @@ from finger3d.history import Frame
 from finger3d.increments import automatic, refine, with_steps
 from finger3d.kinematics import SmallStrain
 from finger3d.model import Gauge, Model
+from finger3d.page import calibrate_page
 from finger3d.problem import Problem
 from finger3d.reduced import Condensed, friction_at
 from finger3d.report import Report
@@ -37,7 +38,7 @@ Float = NDArray[np.float64]
 MUS = tuple(float(mu) for mu in np.linspace(0.02, 1.2, 25).round(10))
 """Values of mu that are pressed unless others are given."""
 
-_FILES = ("calibration.json", "calibration.csv", "calibration.png", "reduced.npz", "map.png", "map.csv")
+_FILES = ("calibration.json", "calibration.csv", "calibration.png", "reduced.npz", "map.png", "map.csv", "report.html")
 _SLOPES = {True: 7, False: 3}  # values of mu at which tolerances are tried: with one compliance for all, and without
 
 
@@ -283,6 +284,7 @@ def _write(
         found.write(folder / "map.csv", gauge.angle, calibration.noise)
         draw_map(folder / "map.png", found, gauge, calibration)
     save(calibration, folder / "calibration.json")
+    calibrate_page(folder)
 
 
 def parsed_mus(text: str) -> tuple[float, ...]:

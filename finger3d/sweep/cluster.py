@@ -31,7 +31,8 @@ def local(workers: int) -> Iterator[Any]:
         try:
             with _for_us_alone():
                 cluster = LocalCluster(
-                    n_workers=workers, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address=None,
+                    n_workers=workers, threads_per_worker=1, processes=True, host="127.0.0.1",
+                    dashboard_address="127.0.0.1:0",  # None would still ask for port 8787, and warn if it is taken
                     memory_limit=int(_MEMORY_SHARE * MEMORY_LIMIT / workers), silence_logs=logging.CRITICAL,
                 )  # fmt: skip
         except (OSError, RuntimeError, TimeoutError) as error:

@@ -11,9 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from finger3d.errors import Finger3dError, MissingError
+from finger3d.page import sweep_page
 from finger3d.report import Report
 from finger3d.sweep import cluster
 from finger3d.sweep.kept import Kept
+from finger3d.sweep.picture import draw
 from finger3d.sweep.points import Sweep
 from finger3d.sweep.work import Task, on_worker
 
@@ -76,6 +78,10 @@ def sweep(
                     kept.write()
                 raise
         kept.write()
+        columns = kept.columns()
+        if columns["point"]:
+            draw(folder / "sweep.png", columns, [v.key for v in points.vary])
+        sweep_page(folder)
         return kept
 
 
