@@ -9,12 +9,11 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finger3d.contact.law import OPEN
 from finger3d.export import atomic, claimed, write_csv, write_json, write_vtu
 from finger3d.history import Frame, History, contact_table, measure
-from finger3d.mesh import EDGES, Mesh
+from finger3d.mesh import middles
 from finger3d.report import Report
 from finger3d.result import PressResult
 from finger3d.versions import versions
@@ -323,12 +322,12 @@ def _fields(problem: Problem, output: _Output, folder: Path, figures: bool) -> N
     both = flip[:, :, None] * flip[:, None, :]
     table = contact_table(points, frame.state)
     on_surface = {name: np.zeros(len(parent)) for name in ("pressure", "shear_x", "shear_z", "status")}
-    ends, middles = _middles(mesh)
+    ends, between = middles(mesh.facets["contact"], mesh.dim)
     for name in ("pressure", "shear_x", "shear_z"):
         on_surface[name][points.nodes] = table[f"{name}_MPa"]
-        on_surface[name][middles] = on_surface[name][ends].mean(axis=1)
+        on_surface[name][between] = on_surface[name][ends].mean(axis=1)
     on_surface["status"][points.nodes] = frame.state.status
-    on_surface["status"][middles] = on_surface["status"][ends].min(axis=1)
+    on_surface["status"][between] = on_surface["status"][ends].min(axis=1)
     whole_u = u[parent] * sign
     write_states(folder / "steps.npz", states_of(problem, good, mesh, parent, sign, whole_u))
     write_vtu(
@@ -343,15 +342,6 @@ def _fields(problem: Problem, output: _Output, folder: Path, figures: bool) -> N
     )
     if figures:
         _figures(problem, output, frame, mesh, whole_u, folder)
-
-
-def _middles(mesh: Mesh) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Ends (k, 2) of the contact face's edges, and the nodes (k,) at their middles: contact knows only the ends."""
-    face = mesh.facets["contact"]
-    edges = EDGES[mesh.dim - 1]
-    if not mesh.is_quadratic:
-        return np.zeros((0, 2), dtype=np.int64), np.zeros(0, dtype=np.int64)
-    return face[:, edges].reshape(-1, 2), face[:, mesh.dim :].ravel()
 
 
 def _told(history: History) -> str:

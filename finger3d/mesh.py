@@ -149,3 +149,13 @@ def unfold(mesh: Mesh, axes: tuple[int, ...]) -> tuple[Mesh, Int, Float]:
         parent = np.concatenate([parent, parent[off]])
         sign = np.vstack([sign, flipped_sign])
     return mesh, parent, sign
+
+
+def middles(facets: Int, dim: int) -> tuple[Int, Int]:
+    """Ends (k, 2) of the edges of quadratic facets of a d-dimensional mesh, and the nodes (k,) at their middles.
+
+    What is known at vertices only, as contact is, is shown between them by what the ends have; linear facets have none.
+    """
+    quadratic = facets.shape[1] > dim
+    edges = EDGES[dim - 1] if quadratic else np.zeros((0, 2), dtype=np.int64)
+    return facets[:, edges].reshape(-1, 2), facets[:, dim:].ravel()

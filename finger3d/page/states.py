@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from finger3d.errors import Finger3dError
 from finger3d.export import atomic
 from finger3d.history import Frame, contact_table
-from finger3d.mesh import Mesh
+from finger3d.mesh import Mesh, middles
 from finger3d.problem import Problem
 
 Array = NDArray[Any]
@@ -65,10 +65,12 @@ class States:
         return self.facets[:, : self.dim]
 
     def on_points(self, name: str, k: int) -> Array:
-        """A contact field of the k-th kept increment at all points (n,): 0 where there is no contact point."""
+        """A contact field of the k-th kept increment at all points (n,), as in fields.vtu: 0 off the contact face."""
         values = getattr(self, name)[k]
         out = np.zeros(len(self.points), dtype=values.dtype)
         out[self.nodes] = values
+        ends, between = middles(self.facets[self.on_contact], self.dim)
+        out[between] = out[ends].min(axis=1) if name == "status" else out[ends].mean(axis=1)
         return out
 
 
