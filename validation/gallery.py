@@ -114,7 +114,7 @@ def _theory_rows(ball: Problem, soft_ball: Problem) -> list[Row]:
         ),
         Row(
             f"soft ball without friction: force over Hertz's at equal a = {b:.2f} mm", "Johnson 1985 sec. 4.2, spheres",
-            round_by_parabola(q), soft, 0.02, "half balls held on their cuts, 3 a and more away: theory has half-spaces",
+            round_by_parabola(q), soft, 0.02, "half balls held on their cuts, 3 a away: theory has half-spaces",
         ),
     ]  # fmt: skip
 
