@@ -451,8 +451,8 @@ def test_from_a_scene_to_mu_with_two_commands(tmp_path: Path, scene_file: Path, 
     for text in ("usable", "resolution at mu", "second-order fit", "tilt_deg", "gauge g36: usable from mu"):
         assert text in told
     names = {p.name for p in out.iterdir() if p.name != ".finger3d.lock"}
-    assert names == {"calibration.json", "calibration.csv", "calibration.png", "reduced.npz", "scene.toml", "map.png",
-                     "map.csv"}  # fmt: skip
+    assert names == {"calibration.json", "calibration.csv", "calibration.png", "reduced.npz", "report.html",
+                     "scene.toml", "map.png", "map.csv"}  # fmt: skip
     data = json.loads((out / "calibration.json").read_text())
     assert (data["format"], data["version"], len(data["hash"])) == ("finger3d calibration", 1, 16)
     assert data["about"]["factorizations"] == 1

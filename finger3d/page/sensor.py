@@ -44,7 +44,7 @@ def calibrate_page(folder: str | Path) -> Path:
         [(name, t["sd"], t["unit"], t["mu_sd"][best[0]] if best else "") for name, t in data["tolerances"].items()],
     )
     use = f"finger3d estimate {folder}/calibration.json --strain {strain[len(strain) // 2]:.4g}"
-    failed = [f"mu = {at:g}: {why}" for at, why in data["failed"]]
+    failed = [f"mu = {f['mu']:g}: {f['why']}" for f in data["failed"]]
     return write_page(
         folder,
         f"{title_of(data['scene'])}: gauge {data['gauge']} against friction",
