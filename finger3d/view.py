@@ -305,7 +305,7 @@ def _contact_line(axes: Axes, x: Float, fn: Float, fx: Float, fz: Float, status:
     axes.set_ylim(1.12 * low, 1.12 * high)
     touching = np.flatnonzero(status != OPEN)
     if len(touching):
-        reach = 1.15 * float(np.abs(x[touching]).max())
+        reach = 1.15 * float(np.abs(x[touching]).max()) or float(np.abs(x).max()) or 1.0
         axes.set_xlim(-reach, reach)
     handles += _patches(_SHADES, [s for s in (STICK, SLIP) if np.any(status == s)])
     axes.legend(handles=handles, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))

@@ -13,6 +13,7 @@ from finger3d.cli import main
 
 COARSE = {
     "press": "mesh.mesher=swept mesh.size_mm=4.0 mesh.base_size_mm=12.0",
+    "gear": "mesh.mesher=swept mesh.size_mm=1.0 mesh.base_size_mm=4.0",
     "compare": "mesh.mesher=swept mesh.size_mm=8.0 mesh.base_size_mm=20.0",
     "calibrate": "mesh.size_mm=2.0 mesh.base_size_mm=8.0",
     "sweep": "model.domain=plane-strain mesh.size_mm=3.0 mesh.base_size_mm=12.0",
@@ -33,10 +34,16 @@ def python(root: Path, heading: str) -> list[str]:
     return re.findall(r"```python\n(.*?)```", part, flags=re.DOTALL)
 
 
+def execute(example: str, names: dict) -> None:
+    """Run an example as a file of its own would run: this file's `from __future__` is not its."""
+    exec(compile(example, "README.md", "exec", dont_inherit=True), names)
+
+
 @pytest.fixture
 def folder(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty folder to work in, with the scenes that the README names."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("FINGER3D_RENDERER", "matplotlib")  # PyVista draws better, and takes seconds for each picture
     shutil.copytree(root / "geometries", tmp_path / "geometries")
     return tmp_path
 
@@ -46,7 +53,7 @@ def test_every_command_is_run(root: Path, folder: Path, capsys: pytest.CaptureFi
     assert {c.split()[1] for c in shown} >= set("new plan press compare calibrate estimate sweep export show".split())
     for command in shown:
         words = shlex.split(command)[1:]
-        for key in COARSE.get(words[0], "").split() if "gear" not in command else ["mesh.size_mm=6.0"]:
+        for key in COARSE["gear" if "gear" in command else words[0]].split() if words[0] in COARSE else ():
             words += ["--set", key]
         assert main(words) == 0, f"{command}: {capsys.readouterr().err}"
 
@@ -57,7 +64,7 @@ def test_the_python_example_runs(root: Path, folder: Path) -> None:
     Path("scene.toml").write_text(text.replace('mesher = "ftetwild"', 'mesher = "swept"').replace("= 2.0 ", "= 4.0 "))
     (example,) = python(root, "From Python")
     names: dict = {}
-    exec(example, names)
+    execute(example, names)
     assert len(names["frame"]) == 10
     assert names["grid"].n_cells > 0
     assert Path("out/contact.png").is_file()
@@ -65,18 +72,16 @@ def test_the_python_example_runs(root: Path, folder: Path) -> None:
 
 def test_the_examples_of_adding_work_and_are_short(root: Path, folder: Path) -> None:
     from finger3d.model import Leg, Material, MeshOptions, Model
-    from finger3d.objects import Plane
     from finger3d.solve import build, march
 
     geometry, effect, study = python(root, "How to add")
     assert all(len(example.splitlines()) < 20 for example in (geometry, effect, study))
     names: dict = {}
     for example in (geometry, effect, study):
-        exec(example, names)
+        execute(example, names)
     pad = names["Pad"](10.0, 5.0)
     assert pad.solid().volume == pytest.approx(pad.volume_mm3, rel=1e-12)
-    mesh, legs = MeshOptions(1.0, 3.0, "swept"), (Leg(1.0, steps=1),)
-    model = Model(pad, Material(1.0, 0.3), Plane(), mesh=mesh, legs=legs, domain="plane-strain")
+    model = Model(pad, Material(1.0, 0.3), MeshOptions(1.0, 3.0), (Leg(1.0, steps=1),), domain="plane-strain")
     forces = [
         next(iter(march(build(m)))).state.force[:, 0].sum() for m in (model, names["Effect"](kelvin=50.0).apply(model))
     ]

@@ -171,7 +171,7 @@ def summary_rows(summary: Mapping[str, Any], out: Path) -> list[tuple[str, str]]
     if summary.get("cost"):
         rows.append(("time", f"{summary['cost']['seconds']['total']:.1f} s"))
     rows.append(("results", str(out)))
-    rows += [("", p.name) for p in sorted(out.iterdir()) if p.is_file()]
+    rows += [("", p.name) for p in sorted(out.iterdir()) if p.is_file() and not p.name.startswith(".")]
     return rows
 
 
