@@ -23,7 +23,8 @@ RULES = {"projection": advance, "paper": swap}
 class Kinematics(Protocol):
     """What marching through a history asks of a body; `problem` is a `finger3d.problem.Problem`.
 
-    One that also answers for inclusions (`problem.springs`) says so by a class attribute ``inclusions = True``.
+    One that also answers for inclusions (`problem.springs`) says so by a class attribute ``inclusions = True``;
+    one whose presses keep nothing in the problem, so that several may run at once, by ``independent = True``.
     """
 
     def start(self, problem: Any) -> ContactState:
@@ -62,6 +63,7 @@ class SmallStrain:
 
     inclusions: ClassVar[bool] = True
     object_compliance: ClassVar[bool] = True
+    independent: ClassVar[bool] = True
 
     def start(self, problem: Any) -> ContactState:
         """No force, gaps at rest."""

@@ -24,14 +24,14 @@ def bench() -> ModuleType:
 def test_a_child_measures_every_stage(bench: ModuleType) -> None:
     found = bench._child(6.0, (0.25, 1.0), True)
     assert set(found) == {
-        "assembly", "condensation", "contact_0.25", "contact_1", "dofs", "rows", "peak_MB", "factorisation"
+        "assembly", "condensation", "contact", "contact_all", "dofs", "rows", "peak_MB", "factorisation"
     }  # fmt: skip
     assert all(value > 0.0 for value in found.values())
     assert found["dofs"] > 10 * found["rows"]
 
 
 def test_ratios_are_of_the_chain_to_the_plain_factorisation(bench: ModuleType) -> None:
-    best = {"assembly": 1.0, "condensation": 11.0, "contact_0.25": 2.0, "factorisation": 10.0, "dofs": 1e5, "rows": 9.0}
+    best = {"assembly": 1.0, "condensation": 11.0, "contact": 2.0, "factorisation": 10.0, "dofs": 1e5, "rows": 9.0}
     chain, assembly = bench._ratios(best, 0.5)
     assert (chain.got, assembly.got) == pytest.approx((1.4, 0.1))
     assert chain.verdict == "holds"

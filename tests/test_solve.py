@@ -221,3 +221,23 @@ def test_automatic_increments_end_within_their_estimate() -> None:
     # the error left is about the change by the last halving, since it falls as 1 / steps
     assert a["friction_sum_N"] == pytest.approx(b["friction_sum_N"], rel=2 * 0.01)
     assert a["dissipation_mJ"] == pytest.approx(b["dissipation_mJ"], rel=2 * 0.05)
+
+
+def test_presses_at_once_are_the_presses_in_turn() -> None:
+    from finger3d.contact.law import Coulomb
+    from finger3d.solve import each
+
+    design = designs()["half_cylinder"](radius_mm=5.0, width_mm=2.0)
+    legs = (Leg(0.5, steps=4), Leg(0.5, slide_x_mm=0.1, steps=3))
+    problem = build(Model(design, Material(1.0, 0.3), MeshOptions(0.3, 1.5), legs, domain="plane-stress"))
+    mus = (0.1, 0.3, 0.6, 1.2)
+
+    def press(mu: float) -> list[np.ndarray]:
+        return [f.state.force for f in march(replace(problem, model=replace(problem.model, friction=Coulomb(mu))))]
+
+    at_once = list(each(problem, press, mus))
+    assert all(
+        np.array_equal(a, b)
+        for mu, found in zip(mus, at_once, strict=True)
+        for a, b in zip(found, press(mu), strict=True)
+    )

@@ -17,6 +17,11 @@ def _controller() -> Any:
     return ThreadpoolController().select(user_api="blas")
 
 
+def one_thread() -> AbstractContextManager[Any]:
+    """Context in which dense algebra runs on one thread."""
+    return _controller().limit(limits=1)
+
+
 def threads_for(unknowns: int) -> AbstractContextManager[Any]:
     """Context in which dense algebra of this size runs on as many threads as help it."""
-    return _controller().limit(limits=1) if unknowns < SMALL else nullcontext()
+    return one_thread() if unknowns < SMALL else nullcontext()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -27,7 +27,7 @@ from finger3d.report import Report
 from finger3d.sensor.curve import FEWEST, NOISE, RESOLUTION, Calibration, Tolerance
 from finger3d.sensor.files import save, write_table
 from finger3d.sensor.tolerances import Pressed, chosen, moved_gauges, slopes
-from finger3d.solve import MARGIN, build, covers, march
+from finger3d.solve import MARGIN, build, covers, each, march
 from finger3d.versions import versions
 
 if TYPE_CHECKING:
@@ -214,8 +214,7 @@ def _press(problem: Problem, sweep: Sweep, report: Report) -> None:
     report.stage("pressing")
     sweep.frames.clear()
     sweep.failed.clear()
-    for done, mu in enumerate(sweep.mus, start=1):
-        frame = last_frame(problem, mu)
+    for done, (mu, frame) in enumerate(zip(sweep.mus, _last_frames(problem, sweep.mus), strict=True), start=1):
         if frame.outcome.ok:
             sweep.frames[mu] = frame
         else:
@@ -230,8 +229,12 @@ def last_frame(problem: Problem, mu: float) -> Frame:
     return frame
 
 
+def _last_frames(problem: Problem, mus: Sequence[float]) -> Iterator[Frame]:
+    return each(problem, lambda mu: last_frame(problem, mu), mus)
+
+
 def _read(problem: Problem, names: tuple[str, ...], mus: Float) -> Float:
-    frames = [last_frame(problem, float(mu)) for mu in mus]
+    frames = list(_last_frames(problem, mus.tolist()))
     return np.array([[f.gauges[n] if f.outcome.ok else math.nan for f in frames] for n in names])
 
 
