@@ -24,11 +24,14 @@ demo: install
 	$(BIN)/finger3d press geometries/fig9.toml --out out/demo
 	@echo "pictures:"; ls out/demo/*.png
 
+# Two workers, each on one thread: as many as the smallest machine has cores.
+PYTEST := OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 2 --dist worksteal
+
 test: install
-	$(BIN)/python -m pytest -q -m "not slow and not browser"
+	$(PYTEST) -m "not slow and not browser"
 
 test-all: install
-	$(BIN)/python -m pytest -q
+	$(PYTEST)
 
 # Needs /usr/bin/chromium: apt install chromium.
 test-browser: install

@@ -43,6 +43,7 @@ class _Output:
     def __init__(self, scene: Scene, problem: Problem, out: Path, started: float, before: int) -> None:
         self.scene, self.problem, self.out, self.started = scene, problem, out, started
         self.factorizations_before = before
+        self.factorizations: int | None = None  # of the press alone, once it is done: the estimate makes its own
         self.frames: list[Frame] = []
         self.estimate: StepEstimate | None = None
         self.error: ErrorEstimate | None = None
@@ -102,7 +103,8 @@ class _Output:
             },
             "cost": {
                 "seconds": {**self.seconds, "total": time.perf_counter() - self.started},
-                "factorizations": self.factorizations_before + problem.factorizations,
+                "factorizations": self.factorizations_before
+                + (problem.factorizations if self.factorizations is None else self.factorizations),
                 "peak_memory_MB": _peak_memory_mb(),
                 "solver": problem.condensed.solver,
                 "perturbed_pivots": problem.condensed.perturbed_pivots,
@@ -178,6 +180,7 @@ def _pressed(
     history = History(problem.points, tuple(output.frames))
     summary = output.write(_told(history))
     if error:
+        output.factorizations = problem.factorizations
         report.stage("estimating the error")
         output.error = estimate(problem, output.frames, output.seconds)
         summary = output.write(_told(history))
