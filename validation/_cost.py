@@ -1,0 +1,210 @@
+"""One press in one way, timed by stage: element, mesh, increments, solver; and the paper's way, as a reference solver.
+
+Linear elements, and quadratic ones where the product takes mixed ones, are no options of the product: they go through
+its own steps here, one by one, on another mesh or with another form.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from finger3d.contact.law import OPEN, STICK, Coulomb
+from finger3d.design import MeshReport, designs, mesh_section, mesh_solid
+from finger3d.fem.assembly import Elasticity, Stiffness, stiffness
+from finger3d.fem.condense import condense
+from finger3d.fem.surface import Surface, local_rows, surface
+from finger3d.history import ContactPoints, Frame, measure
+from finger3d.mesh import Mesh
+from finger3d.model import Gauge, Leg, Material, MeshOptions, Model
+from finger3d.objects import approach
+from finger3d.problem import Problem, at_points
+
+# The steps of `build`, not public, since the product has no other elements.
+from finger3d.solve import (
+    MARGIN,
+    _candidates,
+    _held,
+    _kept_rows,
+    _unfolded,
+    gauge_row,
+    march,
+    symmetry,
+)
+
+Float = NDArray[np.float64]
+
+MU = 0.25
+QUANTITIES = ("force", "contact_length", "stick_length", "friction_sum", "gauge_strain")
+SECTION, SOLID, HALF = "section", "solid", "half cylinder"
+
+
+@dataclass(frozen=True)
+class Case:
+    """A press, and how it is computed.
+
+    Attributes
+    ----------
+    body : SECTION and SOLID are the Fig. 9 finger at nu = .49 in plane strain and 20 mm wide, pressed 10 mm; HALF is
+        the paper's half cylinder of 5 mm in plane stress, nu = .3, pressed 1 mm
+    size, base : edge lengths (mm) at the contact and far from it
+    element : mixed, quadratic or linear
+    counts : increments; the one condensed body is pressed once for each
+    nu : another Poisson's ratio
+    way : condensed; or "each iteration": one factorisation of the whole body in every iteration, as in the paper
+    """
+
+    body: str
+    size: float
+    base: float
+    element: str = "mixed"
+    mesher: str = "swept"
+    counts: tuple[int, ...] = (10,)
+    solver: str = "pardiso"
+    way: str = "condensed"
+    nu: float | None = None
+
+
+def model_of(case: Case) -> Model:
+    """The model of a case with ten increments, and one gauge at a point."""
+    mesher: Any = case.mesher
+    mesh = MeshOptions(case.size, case.base, mesher)
+    usual = 0.3 if case.body == HALF else 0.49
+    nu = usual if case.nu is None else case.nu
+    if case.body == HALF:
+        design = designs()["half_cylinder"](radius_mm=5.0, width_mm=1.0)
+        gauge = Gauge("g", 1.5, 4.2, angle=math.pi / 4)
+        return Model(
+            design, Material(1.0, nu), mesh, (Leg(1.0),), friction=Coulomb(MU), gauges=(gauge,), domain="plane-stress"
+        )
+    design = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
+    gauge = Gauge("g", 36.0, 40.0, angle=math.pi / 6)
+    domain: Any = "solid" if case.body == SOLID else "plane-strain"
+    return Model(design, Material(1.0, nu), mesh, (Leg(10.0),), friction=Coulomb(MU), gauges=(gauge,), domain=domain)
+
+
+def straight(mesh: Mesh) -> Mesh:
+    """The linear mesh of a quadratic one's vertices."""
+    number = np.full(len(mesh.points), -1)
+    number[mesh.vertices] = np.arange(len(mesh.vertices))
+    d = mesh.dim
+    return Mesh(
+        mesh.points[mesh.vertices],
+        number[mesh.cells[:, : d + 1]],
+        {k: number[f[:, :d]] for k, f in mesh.facets.items()},
+    )
+
+
+@dataclass(frozen=True)
+class Parts:
+    """An assembled body, not yet condensed: what `build` has in hand before it condenses."""
+
+    model: Model
+    mesh: Mesh
+    report: MeshReport
+    elastic: Elasticity
+    stiffness: Stiffness
+    surface: Surface
+    kept: NDArray[np.int64]
+    rows: sp.csr_matrix
+    gauges: sp.csr_matrix
+    held: NDArray[np.int64]
+    touch_mm: float
+    axes: tuple[str, ...]
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def thickness(self) -> float:
+        """Of a section, mm; 1 for a solid."""
+        return 1.0 if self.mesh.dim == 3 else self.model.design.width_mm
+
+
+def assembled(model: Model, element: str) -> Parts:
+    """Mesh and assemble a model with elements of a kind."""
+    way, axes = approach(*model.approach), symmetry(model)
+    make = mesh_solid if model.domain == "solid" else mesh_section
+    mesh, report = make(model.design, model.mesh, way.zone, axes)
+    start = time.perf_counter()
+    if element == "linear":
+        mesh = straight(mesh)
+    constants = Elasticity.of(model.material.E_MPa, model.material.nu, model.domain == "plane-stress")
+    elastic = replace(constants, mixed=element == "mixed")
+    thickness = 1.0 if mesh.dim == 3 else model.design.width_mm
+    matrix = stiffness(mesh, elastic, thickness)
+    face = _candidates(model, surface(mesh, "contact", thickness), way.touch_mm, MARGIN)
+    kept = _kept_rows(face, axes)
+    rows = local_rows(face, model.object.frame(mesh.dim))[kept]
+    gauges = sp.vstack([gauge_row(mesh, g, axes) for g in model.gauges], format="csr")
+    seconds = {**report.seconds, "assembly": time.perf_counter() - start}
+    held = _held(model, mesh, axes)
+    return Parts(
+        model, mesh, report, elastic, matrix, face, kept, rows, gauges, held, way.touch_mm, axes, seconds
+    )  # fmt: skip
+
+
+def condensed(parts: Parts, solver: str | None = None) -> Problem:
+    """The problem, as `build` makes it."""
+    small = condense(parts.stiffness, parts.held, sp.vstack([parts.rows, parts.gauges], format="csr"), solver)
+    count, d = parts.surface.points.shape
+    strain = np.zeros((len(parts.model.gauges), count * d))
+    strain[:, parts.kept] = small.compliance[len(parts.kept) :, : len(parts.kept)]
+    parent, sign, share, points = _unfolded(parts.model, parts.mesh, parts.surface, parts.axes)
+    return Problem(
+        parts.model, parts.mesh, parts.report, parts.elastic, parts.stiffness, parts.surface, small,
+        at_points(small.compliance, parts.kept, count, d), strain, parts.kept, parts.held, parts.thickness,
+        parts.touch_mm, parts.axes, points, parent, sign, share, {**parts.seconds, "condensation": small.seconds},
+    )  # fmt: skip
+
+
+def in_steps(problem: Problem, count: int) -> list[Frame]:
+    """Frames of a press in so many increments."""
+    legs = tuple(replace(leg, steps=count) for leg in problem.model.legs)
+    frames = list(march(replace(problem, model=replace(problem.model, legs=legs))))
+    if not frames[-1].outcome.ok:
+        raise ArithmeticError(f"{count} increments, {frames[-1].target}: {frames[-1].outcome}")
+    return frames
+
+
+def numbers(points: ContactPoints, frame: Frame) -> dict[str, float]:
+    """The quantities as a press reports them, and the edges of contact and stick between the points."""
+    told = measure(points, frame)
+    contact, stick = edges(points, frame)
+    return {
+        "force": told["normal_force_N"],
+        "contact_length": told["contact_half_length_mm"],
+        "stick_length": told["stick_half_length_mm"],
+        "friction_sum": told["friction_sum_N"],
+        "gauge_strain": told["gauges"]["g"],
+        "outward_x": told["outward_friction_x_N"],
+        "outward_z": told["outward_friction_z_N"],
+        "contact_edge": contact,
+        "stick_edge": stick,
+    }
+
+
+def edges(points: ContactPoints, frame: Frame, fit: int = 6) -> tuple[float, float]:
+    """Half-lengths (mm) at z = 0 between the points: of the contact where p^2 goes through zero, and of the stick zone.
+
+    p^2 is linear in x at its edge (Johnson 1985, ch. 4): a line through `fit` points, the outermost left out, finds it
+    to a part of the distance of the points.  The stick zone ends half way between its last point and the next.
+    """
+    x, z = points.points[:, 0], points.points[:, 2]
+    line = np.flatnonzero((np.abs(z) <= 1e-9) & (x >= 0.0))
+    line = line[np.argsort(x[line])]
+    state = frame.state
+    p = state.force[line, 0] / points.area[line]
+    on = np.flatnonzero(state.status[line] != OPEN)[-fit - 1 : -1]
+    contact = stick = float("nan")
+    if len(on) >= 3:
+        slope, at_zero = np.polyfit(x[line][on], p[on] ** 2, 1)
+        contact = float(-at_zero / slope)
+    held = np.flatnonzero(state.status[line] == STICK)
+    if len(held):
+        stick = float(x[line][held[-1] : held[-1] + 2].mean())
+    return contact, stick

@@ -1,0 +1,107 @@
+"""What a process of its own does with a case of `_cost`: press it, factor its matrix, or round its compliance."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from finger3d.contact.law import OPEN
+from finger3d.design import designs
+
+from ._cost import Case, assembled, condensed, in_steps, model_of, numbers
+from ._each_iteration import EachIteration
+
+MODULE = __name__.rpartition(".")[2]
+
+
+def prepare() -> None:
+    """Load what every case needs, before the first fork; no factorisation, which would start threads."""
+    import scipy.special  # noqa: F401 - a quadrature rule of linear elements takes it, and half a second
+    from pypardiso import PyPardisoSolver
+
+    from finger3d.contact.threads import threads_for
+    from finger3d.fem.pardiso import available
+
+    if available():
+        PyPardisoSolver().libmkl.MKL_Get_Max_Threads()
+    threads_for(1)
+    designs()
+
+
+def measured(given: dict[str, Any]) -> dict[str, Any]:
+    """Sizes, seconds by stage and numbers by increments of a case, given as a dict."""
+    case = Case(**{**given, "counts": tuple(given["counts"])})
+    used = time.process_time()
+    parts = assembled(model_of(case), case.element)
+    answer: dict[str, Any] = {
+        "dofs": int(parts.stiffness.upper.shape[0]),
+        "contact_points": len(parts.surface.nodes),
+        "mesh_from_cache": parts.report.from_cache,
+    }
+    seconds = {"mesh": parts.seconds["cad"] + parts.seconds["mesh"], "assembly": parts.seconds["assembly"]}
+    if case.way == "each iteration":
+        press = EachIteration(parts)
+        begin = time.perf_counter()
+        told = press.run(case.counts[0])
+        seconds |= {"condensation": 0.0, f"contact {case.counts[0]}": time.perf_counter() - begin}
+        return {**answer, "seconds": seconds, "numbers": {str(case.counts[0]): told}, "factorizations": press.solves}
+    problem = condensed(parts, case.solver)
+    seconds["condensation"] = problem.condensed.seconds
+    answer |= {"rows": len(problem.condensed.compliance), "perturbed_pivots": problem.condensed.perturbed_pivots}
+    found, iterations = {}, {}
+    for count in case.counts:
+        begin = time.perf_counter()
+        frames = in_steps(problem, count)
+        seconds[f"contact {count}"] = time.perf_counter() - begin
+        found[str(count)] = numbers(problem.points, frames[-1])
+        iterations[str(count)] = sum(f.iterations for f in frames)
+    answer |= {"numbers": found, "iterations": iterations, "factorizations": 1, "cpu_s": time.process_time() - used}
+    return {**answer, "seconds": seconds}
+
+
+def factored(given: dict[str, Any]) -> dict[str, Any]:
+    """Seconds of one plain factorisation (PARDISO, symmetric indefinite) of a case's matrix, held unknowns left out."""
+    from pypardiso import PyPardisoSolver
+
+    parts = assembled(model_of(Case(**{**given, "counts": tuple(given["counts"])})), given["element"])
+    free = np.setdiff1d(np.arange(parts.stiffness.upper.shape[0]), parts.held)
+    upper = parts.stiffness.upper[free][:, free].tocsr()
+    solver = PyPardisoSolver(mtype=-2)
+    for k, value in zip((1, 2, 10, 21), (1, 3, 13, 1), strict=True):  # as in finger3d.fem.pardiso
+        solver.set_iparm(k, value)
+    solver.set_phase(12)
+    begin = time.perf_counter()
+    solver._call_pardiso(upper, np.zeros((upper.shape[0], 1)))
+    return {"seconds": {"factorisation": time.perf_counter() - begin}, "dofs": int(parts.stiffness.upper.shape[0])}
+
+
+def single(given: dict[str, Any]) -> dict[str, Any]:
+    """What a compliance kept in single precision changes, and what a solve in single precision would save."""
+    case = Case(**{**given, "counts": tuple(given["counts"])})
+    problem = condensed(assembled(model_of(case), case.element))
+    rounded = problem.compliance.astype(np.float32).astype(np.float64)
+    count = case.counts[0]
+    frames = [in_steps(p, count)[-1] for p in (problem, replace(problem, compliance=rounded))]
+    state = frames[1].part
+    c, d = state.force.shape
+    # the state found with the rounded compliance, held against the true one; position is the change from the start
+    moved = problem.free(frames[1].target) + np.einsum("aibj,bj->ai", problem.compliance, state.force)
+    gap = np.where(state.status == OPEN, np.maximum(-moved[:, 0], 0.0), np.abs(moved[:, 0]))
+    dense = problem.compliance.reshape(c * d, c * d)
+    seconds = {}
+    for name, kind in (("double", np.float64), ("single", np.float32)):
+        matrix, right = dense.astype(kind), np.ones(c * d, dtype=kind)
+        np.linalg.solve(matrix, right)
+        begin = time.perf_counter()
+        np.linalg.solve(matrix, right)
+        seconds[name] = time.perf_counter() - begin
+    told = [numbers(problem.points, f) for f in frames]
+    return {
+        "seconds": seconds,
+        "residual": float(gap.max() / frames[1].target.depth_mm),
+        "change": max(abs(told[1][k] / told[0][k] - 1.0) for k in ("force", "friction_sum", "gauge_strain")),
+        "rows": c * d,
+    }

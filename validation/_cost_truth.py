@@ -1,0 +1,143 @@
+"""From runs to errors: the truth by extrapolation in the mesh and in the increments, and the cheapest way to a target.
+
+The error of a run is taken as that of its mesh, at ten increments, plus that of its increments, on one mesh.  A target
+is met by a mesh if it and all finer ones of its series are within it: an error that happens to pass zero counts for
+nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ._corner import extrapolated, observed
+from ._cost import QUANTITIES, Case
+
+LENGTHS = {"contact_length": "contact_edge", "stick_length": "stick_edge"}
+Runs = Mapping[Case, dict[str, Any]]
+
+
+@dataclass(frozen=True)
+class Truth:
+    """Value at zero size under ten increments, how far it may be off (relative), and the rate it was taken with.
+
+    `check` is how far the finest run is from what was extrapolated without it, relative.
+    """
+
+    value: float
+    uncertainty: float
+    rate: float
+    check: float
+
+
+def value(run: Mapping[str, Any], quantity: str, count: int = 10) -> float:
+    """A number of a run."""
+    return float(run["numbers"][str(count)][quantity])
+
+
+def truth(cases: Sequence[Case], runs: Runs, quantity: str) -> Truth:
+    """From a series of meshes, coarse to fine.
+
+    Force, friction sum and strain are extrapolated at the rate that the last three show, if that is one (between .6 and
+    4); else the finest stands.  A length is the edge between the points on the finest mesh: of the contact from
+    p^2 = 0, of the stick zone half way between points.
+    """
+    sizes = [c.size for c in cases]
+    if quantity in LENGTHS:
+        found = [value(runs[c], LENGTHS[quantity]) for c in cases]
+        off = abs(found[-1] - found[-2]) + 0.5 * sizes[-1]
+        return Truth(found[-1], off / abs(found[-1]), float("nan"), abs(found[-2] / found[-1] - 1.0))
+    found = [value(runs[c], quantity) for c in cases]
+    with_finest, rate = _limit(sizes, found)
+    without, _ = _limit(sizes[:-1], found[:-1])
+    off = max(abs(with_finest - without), 0.25 * abs(found[-1] - with_finest))
+    return Truth(with_finest, off / abs(with_finest), rate, abs(found[-1] / without - 1.0))
+
+
+def _limit(sizes: Sequence[float], found: Sequence[float]) -> tuple[float, float]:
+    if len(found) < 3:
+        return found[-1], float("nan")
+    first, second = found[-2] - found[-3], found[-1] - found[-2]
+    if first * second <= 0.0 or abs(second) >= abs(first):
+        return found[-1], float("nan")
+    try:
+        rate = observed(sizes, found)
+    except ValueError:  # no rate between .05 and 12
+        return found[-1], float("nan")
+    if not 0.6 <= rate <= 4.0:
+        return found[-1], float("nan")
+    return extrapolated(found[-2], found[-1], rate, sizes[-2] / sizes[-1]), rate
+
+
+def step_errors(run: Mapping[str, Any], quantity: str, counts: Sequence[int]) -> dict[int, float]:
+    """Relative error by increments on one mesh; the limit is extrapolated in 1/N from the two finest, lengths apart."""
+    fine, finest = counts[-2], counts[-1]
+    last = value(run, quantity, finest)
+    if quantity not in LENGTHS:
+        last += (last - value(run, quantity, fine)) * fine / (finest - fine)
+    return {n: abs(value(run, quantity, n) / last - 1.0) for n in counts}
+
+
+def mesh_errors(cases: Sequence[Case], runs: Runs, truths: Mapping[str, Truth]) -> dict[Case, dict[str, float]]:
+    """Relative error of every quantity of every case, under ten increments."""
+    return {
+        c: {q: abs(v / truths[q].value - 1.0) for q in QUANTITIES if (v := runs[c]["numbers"]["10"].get(q)) is not None}
+        for c in cases
+    }
+
+
+def seconds(run: Mapping[str, Any], count: int = 10, pace: float = 1.0) -> float:
+    """Meshing to the last increment; `pace` times the ten increments, where `count` was not run."""
+    parts = run["seconds"]
+    before = sum(v for k, v in parts.items() if not k.startswith("contact"))
+    return float(before + (parts[f"contact {count}"] if pace == 1.0 else pace * parts["contact 10"]))
+
+
+@dataclass(frozen=True)
+class Advice:
+    """The cheapest of the runs, and increments, that meets a target for a quantity; no case if none does."""
+
+    quantity: str
+    target: float
+    case: Case | None
+    steps: int
+    seconds: float
+    mesh_seconds: float
+    peak_mb: float
+    dofs: int
+    uncertainty: float
+
+
+def advise(
+    quantity: str,
+    target: float,
+    groups: Sequence[Sequence[Case]],
+    runs: Runs,
+    errors: Mapping[Case, Mapping[str, float]],
+    truth: Truth,
+    ladder: Mapping[str, Any],
+    counts: Sequence[int],
+) -> Advice:
+    """Search series of meshes (coarse to fine) and increments for the cheapest way below a target."""
+    by_steps = step_errors(ladder, quantity, counts)
+    best = Advice(quantity, target, None, 0, float("nan"), float("nan"), float("nan"), 0, truth.uncertainty)
+    if truth.uncertainty > target:
+        return best
+    for cases in groups:
+        bound = np.maximum.accumulate([errors[c][quantity] for c in reversed(cases)])[::-1]
+        for case, mesh_error in zip(cases, bound, strict=True):
+            for k, count in enumerate(counts):
+                if mesh_error + max(by_steps[n] for n in counts[k:]) > target:
+                    continue
+                pace = ladder["seconds"][f"contact {count}"] / ladder["seconds"]["contact 10"]
+                cost = seconds(runs[case], pace=pace)
+                if best.case is None or cost < best.seconds:
+                    best = Advice(
+                        quantity, target, case, count, cost, runs[case]["seconds"]["mesh"], runs[case]["peak_MB"],
+                        runs[case]["dofs"], truth.uncertainty,
+                    )  # fmt: skip
+                break
+    return best

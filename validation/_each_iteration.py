@@ -1,0 +1,130 @@
+"""The paper's way as a reference solver: one factorisation of the whole body in every iteration of the contact."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from finger3d.contact.conditions import TOLERANCE, Increments, project, residual
+from finger3d.contact.law import SLIP, STICK
+from finger3d.contact.state import ContactState, next_state
+from finger3d.problem import Problem, targets
+
+from ._cost import MU, Parts
+
+Float = NDArray[np.float64]
+
+
+class EachIteration:
+    """The paper's way with the product's iteration: each one solves the whole body again, sets and all.
+
+    Unknowns are the body's and the forces of touching points: ``K u = R^T E x`` and ``T (free + R u) + D x = 0`` with E
+    and T as in `finger3d.contact.newton.force_of_sets`; friction makes the matrix unsymmetric.
+    """
+
+    def __init__(self, parts: Parts) -> None:
+        self.parts, self.solves = parts, 0
+        size = parts.stiffness.upper.shape[0]
+        self.free = np.setdiff1d(np.arange(size), parts.held)
+        upper = parts.stiffness.upper[self.free][:, self.free]
+        self.whole = (upper + sp.triu(upper, 1).T).tocsr()
+        c, d = parts.surface.points.shape
+        place = sp.csr_matrix(
+            (np.ones(len(parts.kept)), (parts.kept, np.arange(len(parts.kept)))), (c * d, len(parts.kept))
+        )
+        self.read = (place @ self._columns(parts.rows)).tocsr()
+        self.locked = np.setdiff1d(np.arange(c * d), parts.kept)
+        # any positive weight will do: a column of the finger below each point
+        spring = parts.model.material.E_MPa * parts.surface.area / parts.model.mesh.size_mm
+        self.rho = np.repeat(spring[:, None], d, axis=1)
+
+    def _columns(self, rows: sp.csr_matrix) -> sp.csr_matrix:
+        size = self.parts.stiffness.upper.shape[0]
+        return sp.csr_matrix((rows.data, rows.indices, rows.indptr), shape=(rows.shape[0], size))[:, self.free]
+
+    def run(self, count: int) -> dict[str, float]:
+        """Force, friction sum and gauge strain after a press in so many increments."""
+        parts = self.parts
+        c, d = parts.surface.points.shape
+        legs = tuple(replace(leg, steps=count) for leg in parts.model.legs)
+        # only for its gaps: nothing of it is condensed
+        shell: Any = Problem.__new__(Problem)
+        for name in ("model", "surface", "touch_mm", "mesh"):
+            object.__setattr__(shell, name, getattr(parts, name))
+        state = ContactState.at_rest(np.maximum(shell.gap(targets(legs)[0]), 0.0), d)
+        for target in targets(legs):
+            free = shell.free(target)
+            free[:, 1:] -= state.position
+            problem = Increments(free, np.zeros((0, 0)), np.full(c, MU), self.rho, target.depth_mm)
+            force, moved, status, u = self._settle(problem, state.force)
+            state = next_state(state, force, moved, status)
+        # a point on a symmetry plane carries its part's share of the force, like all others
+        copies = 2.0 ** len(parts.axes)
+        return {
+            "force": float(copies * state.force[:, 0].sum()),
+            "friction_sum": float(copies * np.linalg.norm(state.force[:, 1:], axis=1).sum()),
+            "gauge_strain": float((self._columns(parts.gauges) @ u)[0]),
+        }
+
+    def _settle(self, problem: Increments, start: Float) -> tuple[Float, Float, NDArray[np.int8], Float]:
+        force, moved = start, problem.free.copy()
+        if start.any():
+            moved[start[:, 0] > 0.0] = 0.0
+        for _ in range(60):
+            _, status, trial = project(problem, force, moved)
+            force, u = self._solve(problem, status, trial)
+            moved = problem.free + (self.read @ u).reshape(force.shape)
+            if residual(force, moved, status, problem.mu, problem.length_scale) <= TOLERANCE:
+                return force, moved, status, u
+        raise ArithmeticError(f"no convergence at {problem.length_scale} mm")
+
+    def _solve(self, problem: Increments, status: NDArray[np.int8], trial: Float) -> tuple[Float, Float]:
+        """Forces (c, d) and free unknowns (N,) that solve the equations of the sets: one factorisation."""
+        from pypardiso import PyPardisoSolver
+
+        expand, test, own = self._equations(status, trial)
+        matrix = sp.bmat([[self.whole, -(expand @ self.read).T], [test @ self.read, sp.diags(own)]], format="csr")
+        matrix.sort_indices()
+        right = np.concatenate([np.zeros(len(self.free)), -(test @ problem.free.ravel())])
+        solver = PyPardisoSolver()
+        x = solver.solve(matrix, right)
+        solver.free_memory(everything=True)
+        self.solves += 1
+        return (expand.T @ x[len(self.free) :]).reshape(trial.shape), x[: len(self.free)]
+
+    def _equations(self, status: NDArray[np.int8], trial: Float) -> tuple[sp.csr_matrix, sp.csr_matrix, Float]:
+        """E, T and the diagonal of D; a sticking point has d unknowns, a slipping one f_n and, in 3D, f across."""
+        c, d = trial.shape
+        stick, slip = np.flatnonzero(status == STICK), np.flatnonzero(status == SLIP)
+        length = np.linalg.norm(trial[slip, 1:], axis=1)
+        length = np.where(length > 0.0, length, 1.0)
+        e = trial[slip, 1:] / length[:, None]
+        turn = np.minimum(MU * trial[slip, 0] / length, 1.0) if d == 3 else np.zeros(0)
+        across = np.stack([-e[:, 1], e[:, 0]], axis=1) if d == 3 else np.zeros((0, 1))
+        held, normal = (stick[:, None] * d + np.arange(d)).ravel(), slip * d
+        side = (slip[:, None] * d + np.arange(1, d)).ravel()
+        n, k, w = len(held), len(slip), len(turn)
+        at_n, at_w = n + np.arange(k), np.repeat(n + k + np.arange(w), d - 1)
+        beside = side[: w * (d - 1)]
+        expand = _sparse(
+            [np.ones(n + k), MU * e, across], [np.arange(n), at_n, np.repeat(at_n, d - 1), at_w],
+            [held, normal, side, beside], (n + k + w, c * d),
+        )  # fmt: skip
+        test = _sparse(
+            [np.ones(n + k), turn[:, None] * across], [np.arange(n), at_n, at_w], [held, normal, beside],
+            (n + k + w, c * d),
+        )  # fmt: skip
+        own = np.zeros(n + k + w)
+        own[:n][np.isin(held, self.locked)] = 1.0
+        if w:
+            own[n + k :] = (1.0 - turn) / self.rho[slip, -1]
+        return expand, test, own
+
+
+def _sparse(values: list[Float], rows: list[Any], columns: list[Any], shape: tuple[int, int]) -> sp.csr_matrix:
+    data = np.concatenate([v.ravel() for v in values])
+    return sp.csr_matrix((data, (np.concatenate(rows), np.concatenate(columns))), shape=shape)

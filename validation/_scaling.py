@@ -1,0 +1,99 @@
+"""One whole press through the main job, timed by stage, with the peak memory of every stage."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from finger3d.job import press
+from finger3d.report import Report
+from finger3d.scene import parse
+
+from ._child import peak_mb, reset_peak
+
+STAGES = ("mesh", "assembly", "condensation", "contact", "output", "error bars and page")
+
+
+@dataclass(frozen=True)
+class Size:
+    """A press of the Fig. 9 finger, 20 mm wide: edge lengths (mm), swept mesh; and whether the job draws."""
+
+    size: float
+    base: float
+    figures: bool = True
+
+
+class Watch(Report):
+    """Tells by the job's own announcements which stage runs, and keeps the seconds and the largest memory of each."""
+
+    _STARTS: Mapping[str, str] = {
+        "meshing": "mesh", "assembling": "assembly", "condensing": "condensation", "pressing": "contact",
+        "writing": "output", "estimating": "error bars and page",
+    }  # fmt: skip
+
+    def __init__(self) -> None:
+        self.peaks = dict.fromkeys(STAGES, 0.0)
+        self.seconds = dict.fromkeys(STAGES, 0.0)
+        self.since = time.perf_counter()
+        self.now = "mesh"
+
+    def stage(self, text: str) -> None:
+        """A stage of the job."""
+        self._turn(text)
+
+    def say(self, text: str) -> None:
+        """A part of the build."""
+        self._turn(text)
+
+    def _turn(self, text: str) -> None:
+        following = self._STARTS.get(text.split(" ")[0].rstrip(","))
+        if following and following != self.now:
+            self.close()
+            self.now = following
+
+    def close(self) -> None:
+        """End of a stage: its peak is kept, and the next begins at what is in use."""
+        self.peaks[self.now] = max(self.peaks[self.now], peak_mb())
+        reset_peak()
+        now = time.perf_counter()
+        self.seconds[self.now] += now - self.since
+        self.since = now
+
+
+def prepare() -> None:
+    """Load what every press needs, before the first fork."""
+    from finger3d.fem.pardiso import available
+
+    available()
+
+
+def pressed(given: dict[str, Any]) -> dict[str, Any]:
+    """Seconds and peaks (MB) by stage, and sizes, of a press given as a dict."""
+    scene = parse(
+        {
+            "finger": {"geometry": "clipped_cylinder", "radius_mm": 100.0, "half_length_mm": 50.0,
+                       "edge_height_mm": 36.6, "width_mm": 20.0},
+            "material": {"E_MPa": 1.0, "nu": 0.49}, "friction": {"mu": 0.25}, "press": {"depth_mm": 10.0, "steps": 10},
+            "mesh": {"size_mm": given["size"], "base_size_mm": given["base"], "mesher": "swept"},
+        }
+    )  # fmt: skip
+    watch = Watch()
+    with tempfile.TemporaryDirectory(prefix="finger3d_scaling_") as folder:
+        result = press(scene, folder, watch, figures=given["figures"])
+        watch.close()
+    told = result.summary()
+    last = told["steps"][-1]
+    return {
+        "seconds": watch.seconds,
+        "peaks": watch.peaks,
+        "peak_MB": max(watch.peaks.values()),
+        "dofs": told["mesh"]["dofs"],
+        "rows": 3 * told["mesh"]["contact_points"],
+        "factorizations": told["cost"]["factorizations"],
+        "force": last["normal_force_N"],
+        "iterations": sum(s["iterations"] for s in told["steps"]),
+        "outcome": told["outcome"],
+    }

@@ -1,0 +1,149 @@
+"""How do time and memory of a press grow with the unknowns and with the contact rows, stage by stage?
+
+The Fig. 9 finger, 20 mm wide, nu = 0.49, mu = 0.25, 10 mm in ten increments on swept meshes, by the main job with all
+its output, pictures, error bars and page, each in a process of its own.  One series refines the body, to 500 000
+unknowns; the other the contact alone, to 5 000 rows.  Limits of memory: issue 8.  The theory of nested dissection
+(George 1973) gives O(n^2) operations and O(n^(4/3)) entries of the factor in 3D; a Newton step of the contact is a
+dense solve, O(rows^3) at worst.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from finger3d.study import Result, Row
+from finger3d.versions import memory_bytes
+
+from ._child import Bench, best_of
+from ._scaling import STAGES, Size
+
+Runs = Mapping[Size, dict[str, Any]]
+
+ISSUE = "issue 8: peak memory"
+LIMITS_MB = {40_000: 2_000.0, 160_000: 5_000.0, 500_000: 20_000.0}
+UNKNOWNS = (Size(2.0, 8.0), Size(1.0, 4.0), Size(0.75, 3.0), Size(0.58, 2.32), Size(0.75, 0.98))
+ROWS = (Size(2.0, 8.0), Size(1.0, 16.0), Size(0.6, 16.0), Size(0.4, 16.0))
+NEED_GB = 14.0  # of free memory, for the largest
+COLOURS = dict(zip(STAGES, ("C7", "C0", "C1", "C3", "C2", "#c5b0d5"), strict=True))
+
+
+def run(quick: bool) -> Result:
+    """All sizes; quick: a section and a small solid without limits that they could miss."""
+    unknowns, rows = _sizes(quick)
+    with Bench("_scaling") as bench:
+        wanted = lambda s: 1 if quick or s > 8.0 else 2  # noqa: E731
+        runs = best_of(bench, "pressed", dict.fromkeys([*unknowns, *rows]), wanted)
+    judged = _memory_rows(runs) + _growth_rows(runs, unknowns, quick) + _one_factorisation(runs)
+    return Result(tuple(judged), _table(runs, unknowns, rows), lambda figure: _draw(figure, runs, unknowns, rows))
+
+
+def _sizes(quick: bool) -> tuple[list[Size], list[Size]]:
+    if quick:
+        return [Size(8.0, 32.0, figures=False), Size(4.0, 16.0, figures=False)], [Size(4.0, 16.0, figures=False)]
+    memory = memory_bytes()
+    fits = not memory or memory[1] / 1e9 > NEED_GB
+    return [s for s in UNKNOWNS if fits or s != UNKNOWNS[-1]], list(ROWS)
+
+
+def _memory_rows(runs: Runs) -> list[Row]:
+    """The peak of the smallest run that has as many unknowns as a limit speaks of."""
+    rows = []
+    for dofs, limit in LIMITS_MB.items():
+        found = sorted((r["dofs"], r["peak_MB"]) for r in runs.values() if r["dofs"] >= dofs)
+        if found:
+            what = f"peak memory (MB), {found[0][0]} unknowns, all stages and output"
+            rows.append(Row(what, ISSUE, limit, found[0][1], 0.0, "issue 8", "validation", "at most"))
+    return rows
+
+
+def _growth_rows(runs: Runs, unknowns: Sequence[Size], quick: bool) -> list[Row]:
+    """Exponents over the larger sizes, at most those of theory."""
+    if quick:
+        force = [runs[s]["force"] for s in unknowns]
+        return [Row("force (N) on the two meshes", "each other", force[1], force[0], 0.03, "coarse", "verification")]
+    big = [s for s in unknowns if runs[s]["dofs"] > 30_000]
+    dofs = np.log([runs[s]["dofs"] for s in big])
+
+    def growth(values: Sequence[float]) -> float:
+        return float(np.polyfit(dofs, np.log(values), 1)[0])
+
+    assembly, factor = (growth([runs[s]["seconds"][k] for s in big]) for k in ("assembly", "condensation"))
+    memory = growth([runs[s]["peak_MB"] for s in big])
+    why = "timing of a shared machine"
+    return [
+        Row("assembly grows as unknowns to the power", "one visit to each cell", 1.0, assembly, 0.25, why, "validation",
+            "at most"),
+        Row("condensation grows as unknowns to the power", "George 1973: 2", 2.0, factor, 0.25, why, "validation",
+            "at most"),
+        Row("peak memory grows as unknowns to the power", "George 1973: 4/3", 4.0 / 3.0, memory, 0.1,
+            "rows of the Schur complement come on top", "validation", "at most"),
+    ]  # fmt: skip
+
+
+def _one_factorisation(runs: Runs) -> list[Row]:
+    worst = max(r["factorizations"] for r in runs.values())
+    what = "factorisations a press, whatever the size"
+    return [Row(what, "design.md sec. 1", 1.0, float(worst), 0.0, "the whole idea", measure="at most")]
+
+
+def _table(runs: Runs, unknowns: Sequence[Size], rows: Sequence[Size]) -> dict[str, Any]:
+    lines = []
+    for series, sizes in (("unknowns", unknowns), ("contact rows", rows)):
+        for s in sizes:
+            r = runs[s]
+            lines.append(
+                {"series": series, "size_mm": s.size, "base_size_mm": s.base, "dofs": r["dofs"], "rows": r["rows"],
+                 "iterations": r["iterations"], "force_N": r["force"], "load": round(r["load"], 2),
+                 **{f"{k}_s": round(v, 3) for k, v in r["seconds"].items()},
+                 "seconds": round(sum(r["seconds"].values()), 3),
+                 **{f"{k}_peak_MB": round(v, 1) for k, v in r["peaks"].items()}, "peak_MB": round(r["peak_MB"], 1)}
+            )  # fmt: skip
+    return {k: [line[k] for line in lines] for k in lines[0]}
+
+
+def _draw(figure: Any, runs: Runs, unknowns: Sequence[Size], rows: Sequence[Size]) -> None:
+    """Stacked seconds, and memory by stage, over both series."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    figure.set_size_inches(15.0, 9.5)
+    panels = figure.subplots(2, 2)
+    for column, (sizes, key, label) in enumerate(((unknowns, "dofs", "unknowns"), (rows, "rows", "contact rows"))):
+        top, low = panels[0][column], panels[1][column]
+        sizes = sorted(sizes, key=lambda s: runs[s][key])
+        other = "rows" if key == "dofs" else "dofs"
+        names = [f"{runs[s][key]:,}\n({runs[s][other]:,} {'rows' if other == 'rows' else 'unknowns'})" for s in sizes]
+        at = np.arange(len(sizes))
+        total = np.array([sum(runs[s]["seconds"].values()) for s in sizes])
+        bottom = np.zeros(len(sizes))
+        for stage, colour in COLOURS.items():
+            share = 100.0 * np.array([runs[s]["seconds"][stage] for s in sizes]) / total
+            top.bar(at, share, bottom=bottom, color=colour, label=stage, width=0.7)
+            bottom += share
+        for x, seconds in zip(at, total, strict=True):
+            top.annotate(f"{seconds:.3g} s", (x, 100.0), ha="center", va="bottom", fontsize=9)
+        top.set(ylabel="share of the time (%)", ylim=(0.0, 112.0))
+        width = 0.8 / len(STAGES)
+        for i, stage in enumerate(STAGES):
+            peak = [runs[s]["peaks"][stage] / 1000.0 for s in sizes]
+            low.bar(at + (i - 2.5) * width, peak, width, color=COLOURS[stage], label=stage)
+        low.set(ylabel="peak memory of the stage (GB)", yscale="log", xlabel=label)
+        if key == "dofs":
+            for dofs, limit in LIMITS_MB.items():
+                found = [i for i, s in enumerate(sizes) if runs[s]["dofs"] >= dofs]
+                if found:
+                    low.plot(found[0] + np.array([-0.45, 0.45]), [limit / 1000.0] * 2, "k--", lw=1.2,
+                             label="limit (issue 8)" if dofs == 40_000 else None)  # fmt: skip
+        for axes in (top, low):
+            axes.set_xticks(at, names, fontsize=8)
+            axes.grid(axis="y", alpha=0.3)
+        low.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        low.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        low.yaxis.set_minor_formatter(NullFormatter())
+    panels[0][0].set_title("contact and body refined")
+    panels[0][1].set_title("only the contact refined")
+    handles = dict(zip(*reversed(panels[1][0].get_legend_handles_labels()), strict=True))
+    handles |= dict(zip(*reversed(panels[0][0].get_legend_handles_labels()), strict=True))
+    figure.legend(handles.values(), handles.keys(), loc="outside upper center", ncols=7, frameon=False)
