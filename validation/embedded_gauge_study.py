@@ -188,7 +188,7 @@ def _draw(figure: Any, found: dict[tuple[str, float], np.ndarray], mus: np.ndarr
         xlabel="length of the foil, mm", ylabel="|d strain / d mu| at mu = 0.5", title="1.5e-4 over it: error of mu"
     )
     left.legend(fontsize=7)
-    middle.legend(fontsize=7, loc="center right")
+    middle.legend(fontsize=7, loc="lower left", bbox_to_anchor=(0.02, 0.1))
     right.set_ylim(1e-6, 0.3)
     right.legend(fontsize=7, loc="lower right")
     for axes in (left, right):

@@ -19,7 +19,7 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import MIXED_FROM
 from finger3d.fem.condense import stiffened
 from finger3d.kinematics import SmallStrain
-from finger3d.model import Gauge, Model
+from finger3d.model import Gauge, MeshOptions, Model
 from finger3d.objects import Plane
 from finger3d.problem import Problem, at_points
 from finger3d.sensor.curve import Tolerance
@@ -39,6 +39,7 @@ TOLERANCES: dict[str, tuple[float, str]] = {
 }
 """Standard deviations assumed unless others are given: a careful laboratory set-up and a hand-laid gauge."""
 
+_ENOUGH = 100  # contact points that a body compared with itself is left with
 _PLACES = ("gauge_x_mm", "gauge_y_mm", "gauge_angle_deg")
 Read = Callable[[Problem, tuple[str, ...], Float], Float]
 """Strain (g, m) of some gauges of a problem at mu (m,)."""
@@ -199,6 +200,13 @@ def with_modulus(problem: Problem, times: float) -> Problem:
     return replace(changed, bare=soft(problem.bare)) if problem.bare else changed
 
 
+def _coarser(problem: Problem) -> MeshOptions:
+    """Edge lengths of a body that is compared with itself: up to twice as long, with a hundred points left to touch."""
+    options, points = problem.model.mesh, len(problem.points.nodes)
+    times = min(2.0, max(1.0, points / _ENOUGH)) if problem.dim == 2 else 1.0
+    return replace(options, size_mm=times * options.size_mm, base_size_mm=times * options.base_size_mm)
+
+
 def _tilted(
     problem: Problem, gauge: Gauge, sd: float, mu: Float, mine: Float, read: Read
 ) -> Iterator[tuple[float, Float]]:
@@ -208,6 +216,7 @@ def _tilted(
     if not isinstance(thing, Plane):
         return
     step = math.radians(sd)
+    model = replace(model, mesh=_coarser(problem))
     if "x" in problem.axes and not model.inclusions:
         image = replace(gauge, name=f"{gauge.name} mirrored", x_mm=-gauge.x_mm, angle=math.pi - gauge.angle)
         other = build(replace(model, object=replace(thing, tilt=step), gauges=(gauge, image), symmetry=None))
