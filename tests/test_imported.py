@@ -85,6 +85,8 @@ def test_a_step_finger_is_meshed_on_its_cad_faces(drawn: Path) -> None:
 
 
 def test_fillets_are_contact_and_hold_their_nodes(drawn: Path) -> None:
+    from build123d import Compound, Vertex
+
     body = imported(drawn / "rounded.step")
     mesh, _ = mesh_solid(body, options(0.9, 2.0), (-5.0, 5.0, -3.0, 3.0), BOTH)
     assert set(mesh.facets) == {"contact", "base", "ends", "walls", "symmetry_x", "symmetry_z"}
@@ -92,7 +94,11 @@ def test_fillets_are_contact_and_hold_their_nodes(drawn: Path) -> None:
     off = [np.hypot(contact[:, i] - middle, contact[:, 1] - 3.5) - 1.5 for i, middle in ((0, 4.5), (2, 2.5))]
     off = np.abs(off).min(axis=0)[contact[:, 1] < 5.0 - 1e-9]
     assert np.quantile(off, 0.9) < 1e-9
-    assert off.max() < 1e-3 * 12.0  # along the seam with the flat top, which it runs into smoothly
+    # The rest are nodes of the same facets on the walls, which the fillets run into smoothly.
+    skin = Compound(body.solid().faces())
+    away = [skin.distance_to(Vertex(*map(float, p))) for p in contact]
+    assert np.quantile(away, 0.95) < 1e-9
+    assert max(away) < 1e-4
 
 
 def test_an_stl_finger_is_meshed_on_its_triangles(drawn: Path) -> None:

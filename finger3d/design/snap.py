@@ -1,7 +1,7 @@
 """Put the nodes of a tetrahedral mesh back onto the CAD faces that fTetWild left by up to its envelope.
 
 A boundary facet belongs to the CAD face it is nearest to and parallel with; a node belongs to the faces of its facets,
-and goes where these surfaces meet. Mid-edge nodes likewise.
+and goes where these surfaces meet; of faces that join smoothly there it goes onto the nearest. Mid-edge nodes likewise.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from finger3d.design.faceted import Faceted, moved_onto
 from finger3d.design.quality import cell_angles_deg, curved_jacobians
+from finger3d.design.seams import Seams
 from finger3d.design.surfaces import Plane
 from finger3d.design.tessellate import Body, CadFace
 from finger3d.mesh import EDGES, Mesh, boundary, quadratic
@@ -25,8 +26,9 @@ Bool = NDArray[np.bool_]
 MIN_DIHEDRAL_DEG = 3.0
 """Cells flatter than this are repaired, or the mesh is made anew. Good meshes were seen at 12 to 27 degrees."""
 
-_PARALLEL = 0.05  # singular values below this share stem from faces that touch smoothly: one condition, not two
-_SMOOTH = 1e-3  # share of the body by which a node near such a seam may miss one of the two
+_PARALLEL = 0.05  # singular values below this share stem from faces that are parallel: one condition, not two
+_REACH = 0.5  # of its edges' mean length: a node that would have to go farther to a crease stays beside it
+_FAR = 2.0  # of its longest edge: a facet that lies farther outside a face's box is not on it
 _REPAIRS = 100
 _FEW = 0.01  # of all cells: where a crease of the surface runs through them
 
@@ -43,20 +45,29 @@ def snap(points: Float, tets: Int, body: Body) -> Mesh:
     UnusableMeshError
         The boundary is open, a node finds no place, or cells stay flat or inverted.
     """
+    seams = Seams(body)
     faces = boundary(tets, 3)
     check_closed(faces)
     sets = _node_sets(points, faces, _cad_faces(points, faces, body), body)
-    points = project(points, sets, body.faces)
+    points, sets = placed(points, sets, seams, _REACH * _edge_lengths(points, faces))
     points, tets, sets = repair(points, tets, sets)
     faces = boundary(tets, 3)
     check_closed(faces)
     owner = _cad_faces(points, faces, body, sets)
-    labels = np.array([f.label for f in body.faces])
-    mesh = quadratic(Mesh(points, tets, {str(label): faces[labels[owner] == label] for label in np.unique(labels)}))
-    mesh = _straightened(_curve(mesh, body))
+    label = np.array([f.label for f in body.faces])[owner]
+    mesh = quadratic(Mesh(points, tets, {str(name): faces[label == name] for name in np.unique(label)}))
+    mesh = _straightened(_curve(mesh, owner[np.argsort(label, kind="stable")], sets, seams))
     if (bad := int(np.sum(curved_jacobians(mesh) <= 0.0))) > 0:
         raise UnusableMeshError(f"{bad} curved cells turned inside out at the surface")
     return mesh
+
+
+def _edge_lengths(points: Float, faces: Int) -> Float:
+    """Mean length (n,), mm, of the boundary edges at every node; 0 inside."""
+    edges = faces[:, EDGES[2]].reshape(-1, 2)
+    length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+    count = np.bincount(edges.ravel(), minlength=len(points))
+    return np.asarray(np.bincount(edges.ravel(), np.repeat(length, 2), len(points)) / np.maximum(count, 1))
 
 
 def _straightened(mesh: Mesh) -> Mesh:
@@ -87,10 +98,12 @@ def _cad_faces(points: Float, faces: Int, body: Body, sets: Bool | None = None) 
     longest = np.max([np.linalg.norm(q - p, axis=1) for p, q in pairwise((a, b, c, a))], axis=0)
     cost = np.empty((len(body.faces), len(faces)))
     for i, f in enumerate(body.faces):
-        distance, gradient = f.surface.distance(middle)
-        outside = np.linalg.norm(np.maximum(0.0, np.maximum(f.low - middle, middle - f.high)), axis=1)
-        away = (np.abs(distance) + outside) / longest
-        cost[i] = away + 1.0 - f.sign * np.einsum("ij,ij->i", normal, gradient)
+        outside = np.linalg.norm(np.maximum(0.0, np.maximum(f.low - middle, middle - f.high)), axis=1) / longest
+        near = outside < _FAR
+        cost[i] = outside + 2.0
+        distance, gradient = f.surface.distance(middle[near])
+        aligned = f.sign * np.einsum("ij,ij->i", normal[near], gradient)
+        cost[i, near] = np.abs(distance) / longest[near] + outside[near] + 1.0 - aligned
     if sets is not None:
         shared = np.logical_and.reduce(sets[faces], axis=1)
         none = np.logical_not(shared.any(axis=1))
@@ -109,10 +122,42 @@ def _node_sets(points: Float, faces: Int, owner: Int, body: Body) -> Bool:
     return sets
 
 
+def placed(points: Float, sets: Bool, seams: Seams, reach: Float, beside: Bool | None = None) -> tuple[Float, Bool]:
+    """Points (n, 3) moved onto the CAD faces of their sets (n, f), and the faces each is on.
+
+    A point that finds no place where its faces meet, or only beyond its reach (n,), mm, goes onto the nearest of them,
+    and does not leave the base and the planes of symmetry.
+
+    Raises
+    ------
+    UnusableMeshError
+        A point finds no place there either.
+    """
+    rows = seams.one_of_each(points, sets, beside)
+    moved, missed = _moved(points, rows, seams.faces)
+    for fewer in (seams.nearest_only, seams.pinned_only):
+        lost = missed | ((rows.sum(axis=1) > 1) & (np.linalg.norm(moved - points, axis=1) > reach))
+        if lost.any():
+            rows = rows.copy()
+            rows[lost] = fewer(points[lost], rows[lost])
+            moved[lost], missed[lost] = _moved(points[lost], rows[lost], seams.faces)
+    if missed.any():
+        raise UnusableMeshError("a surface node finds no place on its CAD faces")
+    return moved, rows
+
+
 def project(points: Float, sets: Bool, faces: tuple[CadFace, ...]) -> Float:
     """Move every point (n, 3) onto all surfaces of its set (n, f), by Newton steps of least length."""
-    points = points.copy()
-    scale = float(np.ptp(points, axis=0).max())
+    moved, missed = _moved(points, sets, faces)
+    if missed.any():
+        raise UnusableMeshError("a surface node finds no place on its CAD faces")
+    return moved
+
+
+def _moved(points: Float, sets: Bool, faces: tuple[CadFace, ...]) -> tuple[Float, Bool]:
+    """As :func:`project`, and a mask (n,) of the points that did not come onto all surfaces of their sets."""
+    points, missed = points.copy(), np.zeros(len(points), dtype=bool)
+    scale = max((float((f.high - f.low).max()) for f in faces), default=0.0)
     groups, member = np.unique(sets, axis=0, return_inverse=True)
     member = member.reshape(-1)
     for g, row in enumerate(groups):
@@ -122,9 +167,9 @@ def project(points: Float, sets: Bool, faces: tuple[CadFace, ...]) -> Float:
         at = np.flatnonzero(member == g)
         p = points[at]
         if faceted := [f.surface for f in chosen if isinstance(f.surface, Faceted)]:
-            if (found := moved_onto(faceted, p)) is None:
-                raise UnusableMeshError("a surface node lies between patches that do not meet")
-            points[at] = found
+            found = moved_onto(faceted, p)
+            missed[at] = found is None
+            points[at] = p if found is None else found
             continue
         for _ in range(20):
             pairs = [f.surface.distance(p) for f in chosen]
@@ -134,19 +179,12 @@ def project(points: Float, sets: Bool, faces: tuple[CadFace, ...]) -> Float:
                 break
             inverse = np.linalg.pinv(normals, rcond=_PARALLEL)
             p = p - np.einsum("nxk,nk->nx", inverse, distance)
-        if np.abs(distance).max() > scale * (_SMOOTH if _touching(normals) else 1e-7):
-            raise UnusableMeshError("a surface node finds no place on its CAD faces")
+        missed[at] = ~(np.abs(distance).max(axis=1) <= 1e-7 * scale)
         for f in chosen:
             if isinstance(f.surface, Plane) and f.surface.axis is not None:
                 p[:, f.surface.axis] = f.surface.origin[f.surface.axis]
         points[at] = p
-    return points
-
-
-def _touching(normals: Float) -> bool:
-    """Whether two of the surfaces (n, k, 3) run along each other, so that they meet in no sharp edge."""
-    along = np.abs(np.einsum("nix,njx->nij", normals, normals)) - np.eye(normals.shape[1])
-    return bool(along.max() > 0.9)
+    return points, missed
 
 
 def repair(points: Float, tets: Int, sets: Bool) -> tuple[Float, Int, Bool]:
@@ -191,14 +229,14 @@ def _collapsed(points: Float, tets: Int, sets: Bool, cell: Int) -> Int:
     raise UnusableMeshError("a flat cell at the surface could not be removed")
 
 
-def _curve(mesh: Mesh, body: Body) -> Mesh:
-    """Put the mid-edge nodes of boundary facets onto the CAD faces of the facets that hold the edge."""
+def _curve(mesh: Mesh, owner: Int, known: Bool, seams: Seams) -> Mesh:
+    """Put the mid-edge nodes of boundary facets onto CAD faces: those that own (m,) the facets that hold the edge, or
+    what these join smoothly if that is nearer and an end of the edge, known (n, f), is on it."""
     faces = np.vstack(list(mesh.facets.values()))
-    labels = np.repeat(list(mesh.facets), [len(f) for f in mesh.facets.values()])
-    corner = _cad_faces(mesh.points, faces[:, :3], body)
-    known = np.array([f.label for f in body.faces])
-    if not np.array_equal(known[corner], labels):
-        raise UnusableMeshError("a facet's label is not that of the CAD face next to it")
-    sets = np.zeros((len(mesh.points), len(body.faces)), dtype=bool)
-    sets[faces[:, 3:].ravel(), np.repeat(corner, 3)] = True
-    return replace(mesh, points=project(mesh.points, sets, body.faces))
+    sets = np.zeros((len(mesh.points), len(seams.faces)), dtype=bool)
+    sets[faces[:, 3:].ravel(), np.repeat(owner, 3)] = True
+    beside, reach = np.zeros_like(sets), np.zeros(len(sets))
+    for middle, (a, b) in zip(faces[:, 3:].T, faces[:, EDGES[2]].transpose(1, 2, 0), strict=True):
+        beside[middle] = known[a] | known[b]
+        reach[middle] = 0.5 * _REACH * np.linalg.norm(mesh.points[a] - mesh.points[b], axis=1)
+    return replace(mesh, points=placed(mesh.points, sets, seams, reach, beside)[0])

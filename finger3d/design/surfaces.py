@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 Float = NDArray[np.float64]
+
+_PRECISION = 1e-9  # mm
 
 
 class Surface(Protocol):
@@ -70,27 +73,29 @@ def _round(out: Float, radius: float) -> tuple[Float, Float]:
 
 @dataclass(frozen=True)
 class Freeform:
-    """Any other CAD surface, by projection: some 14 microseconds a point."""
+    """Any other CAD surface, by projection: some 0.1 to 0.5 ms a point. Past its border it goes on as its tangents."""
 
     geometry: Any
 
+    @cached_property
+    def _nearest(self) -> Any:
+        from OCP.ShapeAnalysis import ShapeAnalysis_Surface
+
+        return ShapeAnalysis_Surface(self.geometry)
+
     def distance(self, points: Float) -> tuple[Float, Float]:
         """See :class:`Surface`."""
-        from OCP.Geom import Geom_Surface
-        from OCP.GeomAPI import GeomAPI_ProjectPointOnSurf
         from OCP.GeomLProp import GeomLProp_SLProps
         from OCP.gp import gp_Pnt
 
-        assert isinstance(self.geometry, Geom_Surface)
         distance, normal = np.zeros(len(points)), np.zeros_like(points)
         for i, p in enumerate(points):
-            project = GeomAPI_ProjectPointOnSurf(gp_Pnt(*map(float, p)), self.geometry)
-            near = project.NearestPoint()
-            u, v = project.LowerDistanceParameters()
-            local = GeomLProp_SLProps(self.geometry, u, v, 1, 1e-9)
-            n = local.Normal()
-            normal[i] = n.X(), n.Y(), n.Z()
-            distance[i] = (p - [near.X(), near.Y(), near.Z()]) @ normal[i]
+            at = self._nearest.ValueOfUV(gp_Pnt(*map(float, p)), _PRECISION)
+            local = GeomLProp_SLProps(self.geometry, at.X(), at.Y(), 1, 1e-9)
+            near = local.Value()
+            if local.IsNormalDefined():  # not at the tip of a cone
+                normal[i] = _vector(local.Normal())
+            distance[i] = (p - _vector(near)) @ normal[i]
         return distance, normal
 
 
