@@ -104,6 +104,17 @@ def _proper(faces: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def read_solid(path: Path) -> Any:
     """The one build123d solid of a STEP file, mm."""
+    return read_named(path)[0]
+
+
+def read_named(path: Path) -> tuple[Any, dict[str, list[Any]]]:
+    """The one build123d solid of a STEP file, mm, and its faces by the names CAD gave them, in lower case.
+
+    Raises
+    ------
+    Finger3dError
+        If this is no STEP file, or has not exactly one valid solid.
+    """
     _bytes(path)
     from build123d import Compound
     from OCP.IFSelect import IFSelect_RetDone
@@ -127,7 +138,22 @@ def read_solid(path: Path) -> Any:
         raise Finger3dError(f"{path}: the file {what}; give one solid body")
     if not solids[0].is_valid:
         raise Finger3dError(f"{path}: CAD calls its solid invalid; mend it where it was drawn")
-    return solids[0]
+    return solids[0], _named_faces(solids[0], reader)
+
+
+def _named_faces(solid: Any, reader: Any) -> dict[str, list[Any]]:
+    """Faces by the name in their ADVANCED_FACE entity: XCAF and build123d keep names of parts, but not of faces."""
+    from OCP.StepRepr import StepRepr_RepresentationItem
+    from OCP.TopLoc import TopLoc_Location
+
+    transferred = reader.WS().TransferReader()
+    found: dict[str, list[Any]] = {}
+    for face in solid.faces():
+        drawn = face.wrapped.Located(TopLoc_Location())  # the entity knows nothing of where an assembly puts its part
+        entity = transferred.EntityFromShapeResult(drawn, 1)
+        if isinstance(entity, StepRepr_RepresentationItem) and entity.Name() is not None:
+            found.setdefault(entity.Name().ToCString().strip().lower(), []).append(face)
+    return found
 
 
 def tessellated(solid: Any) -> Triangles:

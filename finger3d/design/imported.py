@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.design.files import STEP, content, read_solid, read_surface, tessellated
+from finger3d.design.files import STEP, content, read_named, read_surface, tessellated
 from finger3d.errors import Finger3dError
 from finger3d.triangles import Triangles, crossings, mistake
 
@@ -21,6 +21,7 @@ Float = NDArray[np.float64]
 
 SMALLEST_MM, LARGEST_MM = 0.2, 5000.0
 
+_NAME = "base"
 _LEVEL = 1e-5  # of the size: the base is what lies this near to the lowest point and looks down
 _DOWN = 1.0 - 1e-6
 _BASE_SHARE = 0.02  # of the footprint, at least
@@ -30,7 +31,9 @@ _MOST = 2_000  # points that are compared with their mirror images
 
 @dataclass(frozen=True)
 class Imported:
-    """A body from a STEP or STL file, y up, with the middle of its base, the lowest plane, at the origin.
+    """A body from a STEP or STL file, y up, with the middle of its base at the origin.
+
+    The base is the lowest plane, or the plane of the face that a STEP file calls "base", turned down.
 
     Attributes
     ----------
@@ -38,6 +41,7 @@ class Imported:
     content : SHA-256 of the file; equal files are equal bodies
     scale : what an STL file's numbers were multiplied with
     upside_down : turned about z by half a turn, so that its highest plane is the base
+    named_base : turned so that the face named "base" looks down
     middle : (3,) mm, the middle of the base as it was drawn (and turned)
     surface : closed triangles, mm, in place
     cad : the build123d solid in place; None for STL
@@ -47,6 +51,7 @@ class Imported:
     content: str
     scale: float
     upside_down: bool
+    named_base: bool
     middle: Float = field(compare=False, repr=False)
     surface: Triangles = field(compare=False, repr=False)
     cad: Any = field(compare=False, repr=False)
@@ -59,7 +64,8 @@ class Imported:
     @property
     def cache_fields(self) -> dict[str, str]:
         """What tells its meshes from those of other bodies; the name of the file does not."""
-        return {"content": self.content, "scale": repr(self.scale), "upside_down": repr(self.upside_down)}
+        turned = {"named_base": "True"} if self.named_base else {}
+        return {"content": self.content, "scale": repr(self.scale), "upside_down": repr(self.upside_down), **turned}
 
     @property
     def height_mm(self) -> float:
@@ -126,7 +132,7 @@ def imported(path: str | Path, upside_down: bool = False, scale: float = 1.0) ->
 
     Parameters
     ----------
-    path : .stl (mm) or .step
+    path : .stl (mm) or .step; a plane face named "base" in a STEP file (the name of its ADVANCED_FACE) is turned down
     upside_down : turn it, so that its highest plane becomes the base
     scale : for STL only
 
@@ -137,11 +143,14 @@ def imported(path: str | Path, upside_down: bool = False, scale: float = 1.0) ->
     """
     path = Path(path)
     solid = None
+    base: list[Any] = []
     if path.suffix.lower() in STEP:
-        solid = read_solid(path)
+        solid, named = read_named(path)
+        if base := named.get(_NAME, []):
+            solid = _turned(path, solid, base)
         if scale != 1.0:
             solid = solid.scale(scale)
-        if upside_down:
+        if upside_down and not base:
             from build123d import Axis
 
             solid = solid.rotate(Axis.Z, 180.0)
@@ -153,7 +162,8 @@ def imported(path: str | Path, upside_down: bool = False, scale: float = 1.0) ->
         _stl_only(path, surface)
         if upside_down:
             surface = Triangles(surface.points * [-1.0, -1.0, 1.0], surface.faces)
-    return _on_its_base(str(path), content(path), scale, upside_down, surface, solid)
+    found = _on_its_base(str(path), content(path), scale, upside_down, surface, solid)
+    return replace(found, named_base=True) if base else found
 
 
 def of_surface(surface: Triangles, name: str, upside_down: bool = False) -> Imported:
@@ -178,7 +188,29 @@ def _on_its_base(path: str, told_by: str, scale: float, upside_down: bool, surfa
     moved = Triangles(points, surface.faces)
     if not (moved.normals[~base, 1] > 1e-3).any():
         raise Finger3dError(f"{path}: nothing of the body looks up; is it drawn with y up?")
-    return Imported(path, told_by, scale, upside_down, middle, moved, solid)
+    return Imported(path, told_by, scale, upside_down, False, middle, moved, solid)
+
+
+def _turned(path: Path, solid: Any, base: list[Any]) -> Any:
+    """The solid, turned the shortest way (about z, if by half a turn) so that the faces named base look down."""
+    normals = np.array([[*face.normal_at(face.center())] for face in base])
+    out = normals[0]
+    if not all(face.is_planar for face in base) or (normals @ out).min() < _DOWN:
+        raise Finger3dError(f"{path}: the {len(base)} faces named '{_NAME}' are not one plane; name one plane face so")
+    if out[1] > -_DOWN:
+        from build123d import Axis
+
+        around = np.cross(out, [0.0, -1.0, 0.0])
+        axis = around / np.linalg.norm(around) if out[1] < _DOWN else np.array([0.0, 0.0, 1.0])
+        solid = solid.rotate(Axis((0, 0, 0), tuple(axis)), float(np.degrees(np.arccos(np.clip(-out[1], -1.0, 1.0)))))
+    surface = tessellated(solid)
+    level = -out @ np.array([*base[0].center()])
+    if abs(surface.low[1] - level) > _LEVEL * surface.size:
+        raise Finger3dError(
+            f"{path}: the body reaches {level - surface.low[1]:.4g} mm beyond the face named '{_NAME}'; the base "
+            "must be its outermost plane"
+        )
+    return solid
 
 
 def _check_size(path: str, surface: Triangles) -> None:
