@@ -1,0 +1,99 @@
+"""Does a rigid punch with a flat end press a deep block as the closed form says, away from its corners?
+
+Frictionless, plane strain: p = P/(pi sqrt(a^2 - x^2)), infinite at the corners (Johnson 1985 sec. 2.8).  The
+share of the force within |x| <= x1 is (2/pi) arcsin(x1/a).  The block is 200 a deep, with contact points for |x| <= a.
+Nodal pressures are compared for |x| <= 0.9 a at the same total force.  The first element at the corner is h long, the
+next ones grow.  The point at the corner stands for half an element beyond it too, which makes the punch wider by some
+share of h: the error is of first order in h, and of one sign everywhere but in the last few elements.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.fem.assembly import Elasticity
+from finger3d.study import Result, Row
+
+from ._common import body, box, convergence, graded, held_at, mapped, rate
+
+Float = NDArray[np.float64]
+HEIGHT = 200.0  # a = 1 mm, E = 1 MPa
+AWAY = 0.9
+_SOURCE = "Johnson 1985 sec. 2.8"
+_TWO = "issue 5: flat punch away from the corner under 2 %"
+
+
+def pressures(h: float, nu: float, depth: float = 1e-3) -> tuple[Float, Float, Float]:
+    """Places x (n,) in mm, pressures (n,) in MPa and forces (n,) in N under half a punch; corner elements of `h` mm."""
+    inner, outer, down = graded(1.0, h, 1.2), graded(HEIGHT - 1.0, h, 1.5), graded(HEIGHT, h, 1.4)
+    x = np.concatenate([1.0 - inner[::-1], 1.0 + outer[1:]])
+    mesh = mapped(box([x, HEIGHT - down[::-1]]), lambda p: p)
+    held = held_at(mesh, {"x-": [0], "y-": [0, 1]})
+    block = body(mesh, Elasticity.of(1.0, nu), held, "y+", lambda p: p[:, 0] < 1.0 + 1e-9)
+    state = block.press(np.full(len(block.surface.points), -depth))
+    order = np.argsort(block.surface.points[:, 0])
+    force = state.state.force[order, 0] if state.outcome.ok else np.full(len(order), np.nan)
+    return block.surface.points[order, 0], force / block.surface.area[order], force
+
+
+def exact(x: Float, force: float) -> Float:
+    """Pressure (MPa) at |x| < 1 mm under a punch with the whole force in N per mm."""
+    return force / (np.pi * np.sqrt(1.0 - x**2))
+
+
+def errors(h: float, nu: float) -> tuple[float, float, float, float]:
+    """Length of the corner's element over a; relative errors of the pressure up to 0.9 a (largest, root mean square)
+    and of the force within a/2."""
+    x, p, force = pressures(h, nu)
+    whole = 2.0 * float(force.sum())
+    near = x <= AWAY
+    away = p[near] / exact(x[near], whole) - 1.0
+    fine = np.linspace(0.0, 0.5, 2001)
+    half = float(np.trapezoid(np.interp(fine, x, p), fine))
+    return float(x[-1] - x[-2]), float(np.abs(away).max()), float(np.sqrt(np.mean(away**2))), half / (whole / 6.0) - 1.0
+
+
+def run(quick: bool) -> Result:
+    """Two Poisson's ratios, three sizes or more."""
+    sizes = np.array([0.02, 0.01, 0.0025] if quick else [0.02, 0.01, 0.005, 0.0025, 0.00125])
+    rows: list[Row] = []
+    table: list[tuple[Any, ...]] = []
+    curves = {}
+    for nu in (0.3,) if quick else (0.3, 0.45):
+        found = np.array([errors(h, nu) for h in sizes])
+        _, worst, _, half = found[-1]
+        what = f"pressure up to 0.9 a over P/(pi sqrt(a^2 - x^2)), nu = {nu:g}, worst point, less 1"
+        rows.append(Row(what, _SOURCE, 0.0, float(worst), 0.02, _TWO, measure="absolute"))
+        why = "as the pressure, of which it is a mean"
+        rows.append(
+            Row(f"share of the force within a/2, nu = {nu:g}", "arcsin(1/2) 2/pi", 1 / 3, (1 + half) / 3, 0.02, why)
+        )
+        slope = rate(found[:, 0], found[:, 3])
+        why = "the elements farther in do not shrink with h, and have an error of their own"
+        rows.append(Row(f"rate of that in h, nu = {nu:g}", "h, see above", 1.0, slope, 0.15, why, measure="at least"))
+        curves[f"pressure up to 0.9 a, worst, nu = {nu:g}"] = found[:, 1]
+        curves[f"force within a/2, nu = {nu:g}"] = found[:, 3]
+        table += [(nu, *e) for e in found]
+    names = ("nu", "corner_element_over_a", "worst_error", "rms_error", "error_of_inner_force")
+    columns = dict(zip(names, map(list, zip(*table, strict=True)), strict=True))
+    return Result(tuple(rows), columns, lambda figure: draw(figure, found[:, 0], curves))
+
+
+def draw(figure: Any, sizes: Float, curves: dict[str, Float]) -> None:
+    """Errors over the size at the corner, and the pressure against the closed form."""
+    left, right = figure.subplots(1, 2)
+    convergence(left, sizes, curves, 1.0, "first element at the corner / a", "relative error")
+    x, p, force = pressures(0.01, 0.3)
+    mean = float(force.sum())
+    fine = np.linspace(0.0, 0.999, 1000)
+    right.plot(fine, exact(fine, 2.0), "k--", linewidth=1.0, label="P / (pi sqrt(a^2 - x^2))")
+    right.plot(x, p / mean, "o", markersize=4.5, label="nodes, h = 0.01 a")
+    right.axvline(AWAY, color="0.6", linewidth=0.8)
+    right.set_ylim(0.0, 4.0)
+    right.set_xlabel("x / a")
+    right.set_ylabel("pressure / mean pressure")
+    right.legend(fontsize=8)
+    right.grid(alpha=0.3)
