@@ -119,6 +119,7 @@ def test_an_imported_stl_is_written_as_it_is(tmp_path: Path) -> None:
     assert not (tmp_path / "third").exists()
 
 
+@pytest.mark.slow
 def test_a_step_file_with_splines_has_the_right_volume_and_a_mold(tmp_path: Path, monkeypatch) -> None:
     """CAD's own volume is more than 5 % wrong here; wanted is the integral of 8 + 2 sin 1.2 x over 54 mm, times 30."""
     from build123d import Polyline, Spline, export_step, extrude, make_face
