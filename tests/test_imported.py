@@ -418,7 +418,7 @@ BALL = 'shape = "sphere"\nradius_mm = 15.0'
 
 def test_a_finger_drawn_outside_can_be_pressed(strange: Path, tmp_path: Path) -> None:
     """Lofted sides, a crown and its rounded rim run into each other smoothly: such meshes were hard to snap."""
-    problem, frames = pressed(strange / "tip.step", tmp_path / "scene.toml", BALL, 0.8, (0.9, 2.4))
+    problem, frames = pressed(strange / "tip.step", tmp_path / "scene.toml", BALL, 0.8, (1.2, 3.0))
     force = [float(f.state.force[:, 0].sum()) for f in frames]
     assert (np.diff(force, prepend=0.0) > 0.0).all()
     body = imported(strange / "tip.step")

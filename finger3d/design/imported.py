@@ -140,6 +140,11 @@ def imported(path: str | Path, upside_down: bool = False, scale: float = 1.0) ->
     ------
     Finger3dError
         If the file is none, the body not closed, or there is no level base or nothing above it.
+
+    Notes
+    -----
+    A texture wants edges of less than half its radius: of five ridges of radius 0.7 mm, pressed by 0.25 mm, STEP and
+    STL gave forces 0.5 % apart with `mesh.size_mm` = 0.3, and up to 2 % with 0.45.
     """
     path = Path(path)
     solid = None
