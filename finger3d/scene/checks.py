@@ -14,8 +14,8 @@ from finger3d.scene.mistakes import dotted, shown
 from finger3d.scene.tables import GaugeTable, LegTable, MeshTable, SceneTable
 
 SIZE_SHARE, BASE_SHARE = 1 / 25, 1 / 6.25
-"""Default edge lengths in a solid as shares of the finger's height; sections take a quarter of them. What that leaves of
-the error tells validation/cost_of_accuracy.py: under 1 % of the force in both, 0.3 % of a gauge in a section."""
+"""Default edge lengths in a solid as shares of the finger's height; sections take a quarter of them. They leave less
+than 1 % of the force in both, and .3 % of a gauge in a section (validation/cost_of_accuracy.py)."""
 
 _ACROSS = 12.0  # elements across the overlap of a curved object, which is some 1.4 times as wide as the contact
 _FINEST = 0.2  # of the default: finer is left to those who ask for it
