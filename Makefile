@@ -14,7 +14,7 @@ install: .venv/.installed
 	@test -n "$(PYTHON)" || { echo "finger3d needs Python 3.11 or newer; none found (set PYTHON=/path/to/python3)"; exit 1; }
 	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { echo "$(PYTHON) has no venv module: apt install python3-venv"; exit 1; }
 	@test -x $(BIN)/python || $(PYTHON) -m venv .venv
-	@echo "installing finger3d and its packages into .venv (once)"
+	@echo "installing finger3d and its packages into .venv (once; some minutes, 3 GB)"
 	@$(PIP) hatchling editables
 	@$(PIP) --no-build-isolation --editable '.[dev]'
 	@$(BIN)/python -c 'import OCP.gp' 2>/dev/null || { echo "build123d cannot be loaded; it needs libGL and libX11: apt install libgl1"; exit 1; }
@@ -22,7 +22,7 @@ install: .venv/.installed
 
 demo: install
 	$(BIN)/finger3d press geometries/fig9.toml --out out/demo
-	@echo "pictures:"; ls out/demo/*.png
+	@echo "open out/demo/report.html; pictures:"; ls out/demo/*.png
 
 # Two workers, each on one thread: as many as the smallest machine has cores.
 PYTEST := OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 2 --dist worksteal

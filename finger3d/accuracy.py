@@ -16,6 +16,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger3d.errors import Finger3dError
 from finger3d.fem.surface import surface
@@ -24,6 +25,8 @@ from finger3d.model import Leg, Model
 from finger3d.objects import Sphere
 from finger3d.objects.mesh import MeshObject
 from finger3d.solve import AUTO_START, Problem, build, contact_zone, march, symmetry
+
+Float = NDArray[np.float64]
 
 MAIN = ("normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm")
 """The numbers that get an error bar, beside every gauge."""
@@ -185,6 +188,13 @@ def compared(problem: Problem, frame: Frame, beside: Problem, last: Frame) -> di
 def _ratio(problem: Problem, beside: Problem) -> float:
     """How many times longer the edges are, by the unknowns: those at the base are bounded by the finger."""
     return float((problem.stiffness.upper.shape[0] / beside.stiffness.upper.shape[0]) ** (1.0 / problem.dim))
+
+
+def strain_error(problem: Problem, beside: Problem, fine: Float, coarse: Float) -> Float:
+    """Discretisation error (m,) of a gauge's strain (m,) at several coefficients of friction, from its companion's."""
+    share = Grain.of(problem, last_frame(problem)).share
+    found = np.abs(fine - coarse) / (_ratio(problem, beside) ** ORDER - 1.0)
+    return np.maximum(found, _FLOOR * share * np.abs(fine).max(initial=0.0))
 
 
 def relative(numbers: Mapping[str, float], errors: Mapping[str, float]) -> dict[str, float]:

@@ -53,18 +53,31 @@ def atomic(path: str | Path) -> Iterator[Path]:
             temporary.unlink()
 
 
+_RESULTS = {
+    "press": "summary.json", "compare": "compare.json", "calibrate": "calibration.json", "sweep": "sweep.json"
+}  # fmt: skip
+"""By command, the file that tells its results."""
+
+
 @contextmanager
-def claimed(folder: str | Path) -> Iterator[Path]:
+def claimed(folder: str | Path, command: str = "") -> Iterator[Path]:
     """Make a folder and keep every other finger3d from writing there while the block runs.
+
+    Parameters
+    ----------
+    command : what is going to write there; its own older results may be replaced, those of another command may not
 
     Raises
     ------
     Finger3dError
-        If another run holds it, or it cannot be written.
+        If another run holds it, it holds what another command wrote, or it cannot be written.
     """
     from filelock import FileLock, Timeout
 
     path = Path(folder)
+    for other, file in _RESULTS.items():
+        if command not in ("", other) and (path / file).exists():
+            raise Finger3dError(f"--out {path}: holds the results of a {other}; name another folder, or remove it")
     try:
         path.mkdir(parents=True, exist_ok=True)
         lock = FileLock(path / ".finger3d.lock", blocking=False)

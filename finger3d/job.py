@@ -150,7 +150,7 @@ def press(
     scene = load(scene) if isinstance(scene, str | Path) else scene
     temporary = TemporaryDirectory(prefix="finger3d-") if out is None else None
     figures = temporary is None if figures is None else figures
-    with claimed(temporary.name if temporary else str(out)) as folder:
+    with claimed(temporary.name if temporary else str(out), "press") as folder:
         history, summary = _pressed(scene, folder, report or Report(), started, figures, error)
     return PressResult(history, folder, summary, temporary)
 

@@ -25,6 +25,8 @@ STEP = {
     "friction_sum_N": 72.0,
     "contact_half_length_mm": 36.0,
     "stick_half_length_mm": 8.5,
+    "contact_area_mm2": 1460.0,
+    "stick_area_mm2": 130.0,
     "residual": 3e-11,
     "gauges": {"g36": -0.0123},
     "outcome": "converged",

@@ -115,6 +115,14 @@ def test_two_runs_into_one_folder(root: Path, tmp_path: Path, capsys) -> None:
     assert main(press(root, out, *SECTION, "--no-figures")[3:]) == 0
 
 
+def test_results_of_another_command_are_not_replaced(root: Path, tmp_path: Path, capsys) -> None:
+    (tmp_path / "calibration.json").write_text("{}")
+    assert main(press(root, tmp_path, *SECTION)[3:]) == 2
+    said = capsys.readouterr().err.strip().splitlines()[-1]
+    assert said == f"finger3d: --out {tmp_path}: holds the results of a calibrate; name another folder, or remove it"
+    assert [p.name for p in tmp_path.iterdir()] == ["calibration.json"]
+
+
 def test_a_disk_that_fills(root: Path, tmp_path: Path, monkeypatch, capsys) -> None:
     done = []
 

@@ -118,6 +118,17 @@ def test_a_curve_that_turns_has_two_ranges_that_share_their_strains() -> None:
     assert "same strains occur" in found.verdict()
 
 
+def test_the_range_with_all_tolerances_is_where_their_error_leaves_mu_within_the_limit() -> None:
+    mu = np.linspace(0.0, 1.0, 21)
+    # strain falls by .1 a unit of mu; a tolerance of .02 in strain at mu = 0, none at 1: within .1 from mu = .5 on
+    tolerance = Tolerance("depth_mm", "mm", 1.0, np.zeros(21), 0.02 * (1.0 - mu))
+    found = Calibration("g", mu, 0.2 - 0.1 * mu, 1e-6, 0.1, (tolerance,))
+    (stretch,) = found.trusted
+    assert (stretch.low, stretch.high) == pytest.approx((0.5, 1.0), abs=0.01)
+    assert (found.usable[0].low, found.usable[0].high) == (0.0, 1.0)
+    assert "0.1 or better from mu = 0.5 to 1" in found.verdict()
+
+
 def test_a_flat_curve_has_no_usable_range() -> None:
     found = curve(lambda mu: 0.03 + 0.0 * mu)
     assert found.usable == ()
@@ -255,7 +266,7 @@ def test_tolerances_widen_and_are_blamed() -> None:
     (blind,) = estimate(found, straight(0.5))
     assert blind.status == "blind"
     assert blind.verdict.endswith("; 100 % of the variance is from tilt_deg")
-    assert "mu is found to +- 6.7 at best" in found.verdict()  # 0.01 of strain over a slope of 0.0015
+    assert "to +- 6.7 at best" in found.verdict()  # 0.01 of strain over a slope of 0.0015
     (clear,) = estimate(found, straight(0.5), tolerances=False)
     assert clear.std == pytest.approx(0.1, rel=1e-6)
 
@@ -444,7 +455,7 @@ def test_a_reader_of_a_linear_field_is_exact() -> None:
 
 def test_from_a_scene_to_mu_with_two_commands(tmp_path: Path, scene_file: Path, capsys: Any) -> None:
     out = tmp_path / "cal"
-    sure = "tilt_deg=0.01 gauge_angle_deg=0.1 gauge_x_mm=0.01 gauge_y_mm=0.01 depth_mm=0.01 nu=1e-4".split()
+    sure = "tilt_deg=0.01 gauge_angle_deg=0.1 gauge_x_mm=0.01 gauge_y_mm=0.01 depth_mm=0.01 nu=1e-4 mesh=0.01".split()
     options = [word for text in sure for word in ("--tolerance", text)]
     assert run("calibrate", scene_file, "--gauge", "g36", "--out", out, "--mu", "0:0.8:9", "--map", *options) == 0
     told = capsys.readouterr().out

@@ -161,13 +161,14 @@ def summary_rows(summary: Mapping[str, Any], out: Path) -> list[tuple[str, str]]
             ("friction sum", f"{told('friction_sum_N', 5)} N"),
             ("contact length", f"{told('contact_half_length_mm', 4, 2.0)} mm at z = 0"),
             ("stick length", f"{told('stick_half_length_mm', 4, 2.0)} mm at z = 0"),
+            ("stick area", f"{last['stick_area_mm2']:.4g} of {last['contact_area_mm2']:.4g} mm2 of contact"),
             ("residual", f"{max(s['residual'] for s in summary['steps']):.1e}, the largest of all steps"),
         ]
         rows += [(f"strain {name.removeprefix('gauge_')}", told(name, 5)) for name in gauges]
     if bars and not bars["discretisation"]:
         rows.append(("error", bars["method"]))
     elif bars:
-        rows.append(("+-", f"mesh and steps, estimated in {bars['seconds']:.1f} s; --no-error skips it"))
+        rows.append(("+-", f"mesh and steps, not the model; estimated in {bars['seconds']:.1f} s; --no-error skips it"))
     if summary.get("cost"):
         rows.append(("time", f"{summary['cost']['seconds']['total']:.1f} s"))
     rows.append(("results", str(out)))

@@ -66,7 +66,7 @@ def compare(
     model = solid.model()
     asked = _widths(model, widths)
     _check(model, asked)
-    with claimed(out) as folder:
+    with claimed(out, "compare") as folder:
         return _compared(solid, model, asked, folder, report)
 
 

@@ -69,7 +69,7 @@ def press_page(folder: str | Path) -> Path:
         command="press",
         outcome=f"{summary['outcome']}{last if summary['outcome'] == 'converged' else ''}",
         good=summary["outcome"] == "converged",
-        notes=[*summary["warnings"], *summary["advice"]],
+        notes=[*summary["warnings"], *summary["advice"], *_what_bars_leave_out(summary)],
         versions=summary["versions"],
     )
 
@@ -88,6 +88,11 @@ def headline(step: Mapping[str, Any], errors: Mapping[str, float]) -> list[Row]:
     ]
 
 
+def _what_bars_leave_out(summary: Mapping[str, Any]) -> list[str]:
+    known = (summary.get("error_estimate") or {}).get("discretisation")
+    return ["What follows ± is the error by mesh and increments, not by what the model leaves out."] if known else []
+
+
 def errors_of(summary: Mapping[str, Any]) -> dict[str, float]:
     """Errors of a summary by name, in the unit of each number: what the mesh and the increments leave unsaid, added."""
     estimate = summary.get("error_estimate") or {}
@@ -103,7 +108,7 @@ def _error_bars(summary: Mapping[str, Any]) -> list[Section]:
     mesh, steps = estimate.get("discretisation") or {}, estimate.get("steps") or {}
     rows = [(name, value, steps.get(name)) for name, value in mesh.items() if value is not None]
     table = [Table(("error, in the unit of the name", "of the mesh", "of the increments"), rows)] if rows else []
-    return [Section("Error bars", [f"What follows ± is both added. {estimate.get('method', '')}", *table])]
+    return [Section("Error bars", [f"What follows ± is both added. How: {estimate.get('method', '')}", *table])]
 
 
 def _proof(steps: Sequence[Mapping[str, Any]], states: States | None, good: Sequence[Mapping[str, Any]]) -> Section:

@@ -24,17 +24,21 @@ def calibrate_page(folder: str | Path) -> Path:
     folder = Path(folder)
     data = read_json(folder / "calibration.json")
     mu, strain, sd = data["curve"]["mu"], data["curve"]["strain"], data["mu_sd"]
-    stretches = ", ".join(f"{s['low']:.3g} to {s['high']:.3g}" for s in data["usable"]) or "none"
+    ranges = {
+        key: ", ".join(f"{s['low']:.3g} to {s['high']:.3g}" for s in data[key]) or "none"
+        for key in ("trusted", "usable")
+    }
     known = [(i, s) for i, s in enumerate(sd) if s is not None]
     best = min(known, key=lambda pair: pair[1], default=None)
     headline = [
-        Row("usable range of mu", stretches),
+        Row(f"mu within {data['resolution_limit']:g}, all tolerances", ranges["trusted"]),
+        Row("the same from strain noise alone", ranges["usable"]),
         Row(f"strain at mu = {mu[0]:g}", strain[0]),
         Row(f"strain at mu = {mu[-1]:g}", strain[-1]),
-        Row("residual of the second-order fit, rms", data["fit"]["residual_rms"]),
+        Row("residual of the second-order fit, rms", f"{data['fit']['residual_rms']:.2g}"),
     ]
     if best:
-        headline.append(Row(f"mu \u00b1 at mu = {mu[best[0]]:.3g}, all tolerances", best[1]))
+        headline.append(Row(f"mu \u00b1 at mu = {mu[best[0]]:.3g}, all tolerances", f"{best[1]:.2g}"))
     a, b, c = data["fit"]["coefficients"]
     curve = Table(
         ("mu", "strain", "resolution of mu", "sd of mu"), list(zip(mu, strain, data["resolution"], sd, strict=True))

@@ -180,8 +180,16 @@ class Calibration:
     @cached_property
     def usable(self) -> tuple[Range, ...]:
         """Stretches where the curve is monotone and the resolution within the limit, the widest first."""
+        return self._stretches(np.full(len(self.grid), self.noise))
+
+    @cached_property
+    def trusted(self) -> tuple[Range, ...]:
+        """The same with all tolerances: stretches where mu is found within the limit."""
+        return self._stretches(self.strain_sd(self.grid))
+
+    def _stretches(self, strain_sd: Float) -> tuple[Range, ...]:
         slope = self.slope(self.grid)
-        seen = np.where(np.abs(slope) * self.limit >= self.noise, np.sign(slope), 0.0)
+        seen = np.where(np.abs(slope) * self.limit >= strain_sd, np.sign(slope), 0.0)
         cuts = np.flatnonzero(np.diff(seen)) + 1
         found = []
         for first, last in zip([0, *cuts], [*cuts, len(seen)], strict=True):
@@ -225,7 +233,9 @@ class Calibration:
         spread = self.mu_sd(inside)
         at = float(inside[np.argmin(spread)])
         name, share = max(self.shares(at).items(), key=lambda item: item[1])
+        where = ", ".join(f"{r.low:.2g} to {r.high:.2g}" for r in self.trusted)
+        within = f"from mu = {where}" if where else "nowhere"
         return (
-            f". With all that is not known exactly mu is found to +- {spread.min():.2g} at best (mu = {at:.2g}; "
-            f"{100.0 * share:.0f} % of the variance from {name})"
+            f". With all that is not known exactly mu is found to {self.limit:g} or better {within}; to +- "
+            f"{spread.min():.2g} at best (mu = {at:.2g}; {100.0 * share:.0f} % of the variance from {name})"
         )

@@ -71,6 +71,7 @@ def as_dict(calibration: Calibration) -> dict[str, Any]:
         "noise": c.noise,
         "resolution_limit": c.limit,
         "resolution": c.resolution(c.mu),
+        "trusted": [{"low": r.low, "high": r.high} for r in c.trusted],
         "usable": [{"low": r.low, "high": r.high, "same_strain_at": r.elsewhere} for r in c.usable],
         "tolerances": {
             t.name: {

@@ -39,7 +39,7 @@ def _plain(axes: Any) -> None:
 
 
 def _shaded(axes: Any, c: Calibration) -> None:
-    for i, stretch in enumerate(c.usable):
+    for i, stretch in enumerate(c.trusted if c.tolerances else c.usable):
         axes.axvspan(stretch.low, stretch.high, color="#1b7837", alpha=0.10 if i == 0 else 0.05, lw=0)
 
 
@@ -66,9 +66,9 @@ def _resolution(axes: Any, c: Calibration) -> None:
     axes.semilogy(mu, whole, color="#222222", lw=1.3, label="with all tolerances")
     axes.semilogy(mu, np.minimum(c.resolution(mu), 1e3), color="#2166ac", lw=1.6, label=f"noise of {c.noise:g} alone")
     axes.semilogy(
-        mu, np.minimum(c.resolution(mu, "fit"), 1e3), "--", color="#b2182b", lw=1.1, label="the same by the fit"
+        mu, np.minimum(c.resolution(mu, "fit"), 1e3), "--", color="#b2182b", lw=1.1, label="noise alone, by the fit"
     )
-    axes.axhline(c.limit, color="#1b7837", lw=1.0, label=f"limit {c.limit:g}; shaded: usable")
+    axes.axhline(c.limit, color="#1b7837", lw=1.0, label=f"limit {c.limit:g}; shaded: kept")
     seen = c.resolution(mu)
     low = 0.5 * min(float(seen.min()), c.limit)
     axes.set_ylim(low, max(_MOST * c.limit, 2.0 * float(np.median(np.minimum(whole, 1e3)))))
@@ -84,7 +84,18 @@ def _causes(axes: Any, c: Calibration) -> None:
     names = [f"noise {c.noise:g}", "interpolation", *(f"{t.name} ± {t.sd:g}" for t in c.tolerances)]
     total = np.sum(rows, axis=0)
     keep = [i for i, row in enumerate(rows) if (row / total).max() >= 0.005]
-    colours = ["#2166ac", "#92c5de", "#b2182b", "#f4a582", "#5aae61", "#c2a5cf", "#762a83", "#e08214", "#8c510a"]
+    colours = [
+        "#2166ac",
+        "#92c5de",
+        "#b2182b",
+        "#f4a582",
+        "#5aae61",
+        "#c2a5cf",
+        "#762a83",
+        "#e08214",
+        "#8c510a",
+        "#777777",
+    ]
     axes.stackplot(
         mu, [rows[i] / total for i in keep], labels=[names[i] for i in keep], colors=[colours[i] for i in keep]
     )

@@ -24,7 +24,7 @@ from finger3d.page import calibrate_page
 from finger3d.problem import Problem
 from finger3d.reduced import Condensed, friction_at
 from finger3d.report import Report
-from finger3d.sensor.curve import FEWEST, NOISE, RESOLUTION, Calibration, Tolerance
+from finger3d.sensor.curve import FEWEST, NOISE, RESOLUTION, Calibration, Range, Tolerance
 from finger3d.sensor.files import save, write_table
 from finger3d.sensor.tolerances import Pressed, chosen, moved_gauges, slopes
 from finger3d.solve import MARGIN, build, covers, each, march
@@ -103,7 +103,7 @@ def calibrate(
     settings = (known, asked, wanted, noise, limit, report, maps)
     if out is None:
         return _whole(scene, model, None, *settings)
-    with claimed(out) as folder:
+    with claimed(out, "calibrate") as folder:
         return _whole(scene, model, folder, *settings)
 
 
@@ -310,6 +310,10 @@ def _count(text: str) -> int:
     return count
 
 
+def _ranges(stretches: Sequence[Range]) -> str:
+    return ", ".join(f"mu = {r.low:.3g} to {r.high:.3g}" for r in stretches) or "nowhere"
+
+
 def summary(calibration: Calibration) -> list[tuple[str, Any]]:
     """The closing table of a calibration."""
     c = calibration
@@ -318,7 +322,10 @@ def summary(calibration: Calibration) -> list[tuple[str, Any]]:
     sd = float(c.mu_sd([at])[0])
     rows = [
         ("strain", f"{c.strain[0]:.4g} at mu = {c.mu[0]:g} to {c.strain[-1]:.4g} at mu = {c.mu[-1]:g}"),
-        ("usable", ", ".join(f"mu = {r.low:.3g} to {r.high:.3g}" for r in c.usable) or "nowhere"),
+        (
+            f"mu within {c.limit:g}",
+            f"{_ranges(c.trusted)}, with all tolerances; {_ranges(c.usable)} from strain noise alone",
+        ),
         (f"resolution at mu = {at:.3g}", f"{float(c.resolution(at)):.2g} from a strain noise of {c.noise:g}"),
         ("second-order fit", f"residual {c.fit.rms:.2g} rms, {c.fit.largest:.2g} at most"),
         (f"mu +- at mu = {at:.3g}", f"{sd:.2g} with all tolerances; shares of the variance below"),

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d.accuracy import companion, strain_error
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import MIXED_FROM
 from finger3d.fem.condense import stiffened
@@ -36,8 +37,10 @@ TOLERANCES: dict[str, tuple[float, str]] = {
     "gauge_x_mm": (0.3, "mm"),
     "gauge_y_mm": (0.3, "mm"),
     "gauge_angle_deg": (2.0, "degree"),
+    "mesh": (1.0, "error bar"),
 }
-"""Standard deviations assumed unless others are given: a careful laboratory set-up and a hand-laid gauge."""
+"""Standard deviations assumed unless others are given: a careful laboratory set-up and a hand-laid gauge; of the mesh
+its error bar, from a coarser companion."""
 
 _ENOUGH = 100  # contact points that a body compared with itself is left with
 _PLACES = ("gauge_x_mm", "gauge_y_mm", "gauge_angle_deg")
@@ -161,6 +164,8 @@ def _steps(
         step = _step_of_nu(model.material.nu, sd)
         changed = replace(_alone(model, gauge), material=replace(model.material, nu=model.material.nu + step))
         yield step, read(build(changed), (gauge.name,), mu)[0]
+    elif name == "mesh":
+        yield from _meshed(problem, gauge, sd, mu, mine, read)
     elif name == "tilt_deg":
         yield from _tilted(problem, gauge, sd, mu, mine, read)
     elif name in _PLACES and model.inclusions:  # a foil stiffens the body where it lies
@@ -200,11 +205,25 @@ def with_modulus(problem: Problem, times: float) -> Problem:
     return replace(changed, bare=soft(problem.bare)) if problem.bare else changed
 
 
+def _meshed(
+    problem: Problem, gauge: Gauge, sd: float, mu: Float, mine: Float, read: Read
+) -> Iterator[tuple[float, Float]]:
+    """The strain off by its error bar; of a mesh that has no coarser companion none is known."""
+    try:
+        beside = companion(problem)
+    except Finger3dError:
+        return
+    yield sd, mine + sd * strain_error(problem, beside, mine, read(beside, (gauge.name,), mu)[0])
+
+
 def _coarser(problem: Problem) -> MeshOptions:
-    """Edge lengths of a body that is compared with itself: up to twice as long, with a hundred points left to touch."""
+    """Edge lengths of a body that is compared with itself: longer, with a hundred points left to touch in a section;
+    structured where the design allows, so that nothing is meshed for long.
+    """
     options, points = problem.model.mesh, len(problem.points.nodes)
-    times = min(2.0, max(1.0, points / _ENOUGH)) if problem.dim == 2 else 1.0
-    return replace(options, size_mm=times * options.size_mm, base_size_mm=times * options.base_size_mm)
+    times = min(2.0, max(1.0, points / _ENOUGH)) if problem.dim == 2 else 1.25
+    mesher: Any = "swept" if hasattr(problem.model.design, "section") else options.mesher
+    return replace(options, size_mm=times * options.size_mm, base_size_mm=times * options.base_size_mm, mesher=mesher)
 
 
 def _tilted(
