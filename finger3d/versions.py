@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+from functools import cache
 from importlib import metadata
 
 PACKAGES = (
@@ -27,6 +28,11 @@ PACKAGES = (
 
 def versions() -> dict[str, str]:
     """Return name -> installed version, without importing any of them; a package that is absent is left out."""
+    return dict(_installed())
+
+
+@cache
+def _installed() -> dict[str, str]:
     found = {"python": platform.python_version()}
     for name in PACKAGES:
         try:

@@ -119,14 +119,15 @@ class Pattern:
         upper[turn] = np.swapaxes(upper[turn], 1, 2)
         np.add.at(blocks, self.slot[part].ravel(), upper.reshape(-1, *blocks.shape[1:]))
 
-    def entries(self, blocks: Float) -> tuple[Float, Int, Int]:
-        """Values, rows and columns of the upper triangle."""
+    def upper(self, blocks: Float, nodes: int) -> sp.csr_matrix:
+        """Upper triangle (nodes d, nodes d) of the matrix that the blocks (blocks, d, d) make up, zeros kept."""
         d = blocks.shape[1]
-        i, j = np.meshgrid(np.arange(d), np.arange(d), indexing="ij")
-        keep = np.ones(blocks.shape, dtype=bool)
-        keep[self.row == self.col] = i <= j
-        rows, cols = self.row[:, None, None] * d + i, self.col[:, None, None] * d + j
-        return blocks[keep], rows[keep], cols[keep]
+        starts = np.searchsorted(self.row, np.arange(nodes + 1))
+        whole = sp.bsr_matrix((blocks, self.col, starts), shape=(nodes * d, nodes * d)).tocsr()
+        rows = np.repeat(np.arange(nodes * d, dtype=whole.indices.dtype), np.diff(whole.indptr))
+        keep = whole.indices >= rows  # a diagonal block has entries below the diagonal too
+        kept = np.concatenate([[0], np.cumsum(keep)])[whole.indptr]
+        return sp.csr_matrix((whole.data[keep], whole.indices[keep], kept), shape=whole.shape)
 
 
 def _cell_blocks(gradients: Float, weights: Float, elastic: Elasticity, lame: float) -> Float:
@@ -169,27 +170,39 @@ def stiffness(mesh: Mesh, elastic: Elasticity, thickness: float = 1.0) -> Stiffn
         if elastic.mixed:
             p_blocks.append(np.einsum("eq,qp,eqkd->epkd", weights, hats, gradients, optimize=True))
             masses.append(np.einsum("eq,qp,qr->epr", weights, hats, hats, optimize=True))
-    entries = [pattern.entries(blocks)]
+    matrix = pattern.upper(blocks, n)
     vertices = np.zeros(0, dtype=np.int64)
     scale = 1.0
-    size = n * d
     if elastic.mixed:
         vertices, scale = mesh.vertices, pressure_scale(mesh, elastic.shear)
         coupling, mass = scale * np.concatenate(p_blocks), -(scale**2) / elastic.lame * np.concatenate(masses)
-        entries += pressure_entries(mesh, coupling, mass, vertices)
-        size += len(vertices)
-    return Stiffness(upper_triangle(entries, size), vertices, scale)
-
-
-def upper_triangle(entries: list[tuple[Float, Int, Int]], size: int) -> sp.csr_matrix:
-    """Matrix (size, size) from lists of values, rows and columns; repeated entries add up."""
-    data, rows, cols = (np.concatenate(parts) for parts in zip(*entries, strict=True))
-    return sp.csr_matrix((data, (rows, cols)), shape=(size, size))
+        matrix = bordered(matrix, pressure_entries(mesh, coupling, mass, vertices), n * d + len(vertices))
+    return Stiffness(matrix, vertices, scale)
 
 
 def pressure_scale(mesh: Mesh, shear: float) -> float:
     """Unit (MPa) of the pressure unknowns in which their entries are of the size of the displacements'."""
     return float(shear * len(mesh.cells) ** (1.0 / mesh.dim) / np.ptp(mesh.points, axis=0).max())
+
+
+def bordered(matrix: sp.csr_matrix, entries: list[tuple[Float, Int, Int]], size: int) -> sp.csr_matrix:
+    """Matrix (size, size) with further columns and rows after those of a matrix (m, m).
+
+    Parameters
+    ----------
+    entries : values, rows and columns from m on; repeated ones add up, zeros are kept
+    """
+    data, rows, cols = (np.concatenate(parts) for parts in zip(*entries, strict=True))
+    beside = sp.csr_matrix((data, (rows, cols)), shape=(size, size))
+    starts = np.concatenate([matrix.indptr, np.full(size - matrix.shape[0], matrix.indptr[-1])])
+    own, more = np.diff(starts), np.diff(beside.indptr)
+    # every further column comes after the matrix's own, so that rows are joined end to end
+    at_own = np.arange(matrix.nnz) + np.repeat(beside.indptr[:-1], own)
+    at_more = np.arange(beside.nnz) + np.repeat(starts[1:], more)
+    values, indices = np.empty(matrix.nnz + beside.nnz), np.empty(matrix.nnz + beside.nnz, dtype=matrix.indices.dtype)
+    values[at_own], values[at_more] = matrix.data, beside.data
+    indices[at_own], indices[at_more] = matrix.indices, beside.indices
+    return sp.csr_matrix((values, indices, starts + beside.indptr), shape=(size, size))
 
 
 def pressure_entries(mesh: Mesh, coupling: Float, mass: Float, vertices: Int) -> list[tuple[Float, Int, Int]]:

@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from finger3d.fem.assembly import MIXED_FROM, Pattern, Stiffness, pressure_entries, pressure_scale, upper_triangle
+from finger3d.fem.assembly import MIXED_FROM, Pattern, Stiffness, bordered, pressure_entries, pressure_scale
 from finger3d.fem.elements import gradient, physical_gradients, quadrature, shape
 from finger3d.fem.surface import locate
 from finger3d.mesh import EDGES, Mesh
@@ -144,11 +144,10 @@ def assemble(
             couplings.append(scale * np.einsum("eq,qp,eqai->epai", weights, hats, flux, optimize=True))
             masses.append(-(scale**2) / law.bulk * np.einsum("eq,qp,qr->epr", weights, hats, hats, optimize=True))
             np.add.at(p_force, cells[:, : d + 1], scale * (weights * (j - 1.0 - p / law.bulk)) @ hats)
-    entries = [pattern.entries(blocks)]
+    matrix: sp.csr_matrix = pattern.upper(blocks, n)
     if law.mixed:
-        entries += pressure_entries(mesh, np.concatenate(couplings), np.concatenate(masses), vertices)
-    size = n * d + len(vertices)
-    matrix: sp.csr_matrix = upper_triangle(entries, size)
+        entries = pressure_entries(mesh, np.concatenate(couplings), np.concatenate(masses), vertices)
+        matrix = bordered(matrix, entries, n * d + len(vertices))
     return Stiffness(matrix, vertices, scale), np.concatenate([force.ravel(), p_force[vertices]])
 
 
