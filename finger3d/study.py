@@ -116,6 +116,11 @@ class Study:
         text = ast.get_docstring(ast.parse(self.path.read_text(encoding="utf-8"))) or ""
         return " ".join(text.split("\n\n")[0].split())
 
+    @property
+    def by_name(self) -> bool:
+        """Whether it runs only when it is named, in full: it times this machine, and says so by ``BY_NAME = True``."""
+        return bool(re.search(r"^BY_NAME = True$", self.path.read_text(encoding="utf-8"), flags=re.MULTILINE))
+
     def run(self, quick: bool) -> Result:
         """Import the file and answer its question."""
         package = types.ModuleType("finger3d_validation")
@@ -157,15 +162,23 @@ def studies(folder: Path | None = None) -> dict[str, Study]:
     return found
 
 
-def chosen(names: Sequence[str], known: Mapping[str, Study]) -> list[Study]:
-    """The studies of these names, all if there are none; a name that is unknown is refused with the nearest one."""
+def chosen(names: Sequence[str], known: Mapping[str, Study], quick: bool = False) -> list[Study]:
+    """The studies of these names; without names all, in full less those that run only by name.
+
+    Raises
+    ------
+    Finger3dError
+        For a name that is unknown, with the nearest one.
+    """
     from difflib import get_close_matches
 
     for name in names:
         if name not in known:
             near = get_close_matches(name, known, n=1, cutoff=0.0)
             raise Finger3dError(f"validate: no study {name!r}; did you mean {near[0]!r}? known: {', '.join(known)}")
-    return [known[name] for name in dict.fromkeys(names or known)]
+    if not names:
+        return [study for study in known.values() if quick or not study.by_name]
+    return [known[name] for name in dict.fromkeys(names)]
 
 
 def validate(
@@ -300,10 +313,13 @@ def write_index(out: Path, known: Mapping[str, Study]) -> None:
     """Write README.md from the results that are kept in `out`."""
     lines = [_HEAD]
     kept = {name: kept_rows(out, study) for name, study in known.items()}
-    seconds = sum(_about(out, study).get("seconds", 0.0) for study in known.values())
+    seconds = sum(_about(out, study).get("seconds", 0.0) for study in known.values() if not study.by_name)
+    timed = [name for name, study in known.items() if study.by_name]
     total = _score([row for rows in kept.values() for row in rows])
     missing = [name for name, rows in kept.items() if not rows]
     lines.append(f"{total}; {len(kept) - len(missing)} studies, {seconds / 60.0:.1f} minutes.")
+    if timed:
+        lines.append(f"Not in these minutes, as they time the machine and run only by name: {', '.join(timed)}.")
     if missing:
         lines.append(f"Not run yet: {', '.join(missing)}.")
     lines += ["", "| study | question | found | seconds |", "|---|---|---|---|"]

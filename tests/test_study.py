@@ -119,6 +119,14 @@ def test_an_interruption_keeps_the_studies_that_are_done(folder: Path) -> None:
     assert not kept_rows(folder, known["bad"])
 
 
+def test_a_study_that_times_the_machine_runs_in_full_only_by_name(folder: Path) -> None:
+    (folder / "timed.py").write_text((folder / "good.py").read_text() + "\nBY_NAME = True\n")
+    known = studies(folder)
+    assert [s.name for s in chosen([], known)] == ["bad", "good"]
+    assert [s.name for s in chosen([], known, quick=True)] == ["bad", "good", "timed"]
+    assert [s.name for s in chosen(["timed"], known)] == ["timed"]
+
+
 def test_an_unknown_name_is_answered_with_the_nearest(folder: Path) -> None:
     with pytest.raises(Finger3dError, match=r"no study 'godd'; did you mean 'good'\? known: bad, good$"):
         chosen(["godd"], studies(folder))

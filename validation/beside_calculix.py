@@ -34,6 +34,7 @@ from ._child import Bench, best_of
 from ._cost import SECTION, SOLID, Case, model_of
 from ._cost_runs import MODULE
 
+BY_NAME = True
 CALCULIX = "CalculiX 2.20, same mesh"
 WANTED = {SECTION: 20.0, SOLID: 60.0}  # issue 8: times faster
 NU = 0.45

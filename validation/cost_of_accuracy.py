@@ -33,6 +33,7 @@ from ._cost_figure import draw
 from ._cost_runs import MODULE
 from ._cost_truth import LENGTHS, Advice, Truth, advise, mesh_errors, seconds, step_errors, truth, value
 
+BY_NAME = True
 ALL = (1, 2, 5, 10, 20, 50, 100, 200)
 TARGETS = (0.05, 0.01, 0.001)
 BEST = {SECTION: "mixed", SOLID: "mixed", HALF: "quadratic"}

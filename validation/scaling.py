@@ -22,6 +22,7 @@ from ._scaling import STAGES, Size
 
 Runs = Mapping[Size, dict[str, Any]]
 
+BY_NAME = True
 ISSUE = "issue 8: peak memory"
 LIMITS_MB = {40_000: 2_000.0, 160_000: 5_000.0, 500_000: 20_000.0}
 UNKNOWNS = (Size(2.0, 8.0), Size(1.0, 4.0), Size(0.75, 3.0), Size(0.58, 2.32), Size(0.75, 0.98))

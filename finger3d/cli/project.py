@@ -25,7 +25,8 @@ def validate(
 ) -> int:
     """Run studies of validation/: does the code reproduce closed forms, other codes, and the paper?
 
-    Without names all studies run, less those whose results are from the sources as they are.
+    Without names all studies run whose results were made by other sources than those that are there now; but those
+    that time the machine (cost_of_accuracy, scaling, beside_calculix) run in full only by name.
 
     Example: finger3d validate press_line --quick
 
@@ -39,7 +40,7 @@ def validate(
     from finger3d import study
 
     known = study.studies()
-    selected = study.chosen(studies or [], known)
+    selected = study.chosen(studies or [], known, quick)
     home = next(iter(known.values())).path.parent
     if quick and out is not None and out.resolve() == home:
         raise Finger3dError(f"--out {out}: quick results would overwrite the full ones there; name another folder")
