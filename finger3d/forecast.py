@@ -18,7 +18,7 @@ _FIGURES_S = {2: 1.0, 3: 4.5}
 _NEWTON = 3  # factorisations in a step at finite strain
 _NUMERIC = 0.8  # of a condensation, once the ordering is known; with two solutions
 _TANGENT = 0.8  # assemblies of the linear stiffness
-_NEWTON_S = {2: 0.05, 3: 0.2}  # besides, in each step
+_NEWTON_S = {2: 0.02, 3: 0.2}  # besides, in each step
 _FOIL_ROWS = {2: 16, 3: 96}  # of a foil, mirror images together
 _FOIL_S = {2: 0.02, 3: 0.2}
 

@@ -45,6 +45,7 @@ __all__ = [
 
 MARGIN = 0.3  # candidate points reach to a rigid gap of this share of the depth; checked after the solution
 _CUTS = 6
+_WORTH = 500  # contact rows from which presses at once are quicker than in turn
 _LOOKS = 20  # and where rigid gaps are, for the candidate points
 
 
@@ -225,10 +226,11 @@ def march(problem: Problem) -> Iterator[Frame]:
 def each(problem: Problem, press: Callable[[Asked], Told], asked: Sequence[Asked]) -> Iterator[Told]:
     """What `press` tells of everything asked, in that order; for presses of one problem, under one law after another.
 
-    Where they share nothing that changes, as many run at once as there are cores, each on one thread: small dense
-    systems gain more by that than by threads of their own.
+    Where they share nothing that changes, as many run at once as there are cores, each on one thread: dense systems of
+    this size gain more by that than by threads of their own, and smaller ones spend their time in Python.
     """
-    if not getattr(problem.model.kinematics, "independent", False) or len(asked) < 2 or cores() < 2:
+    alone = len(problem.kept) < _WORTH or len(asked) < 2 or cores() < 2
+    if alone or not getattr(problem.model.kinematics, "independent", False):
         yield from map(press, asked)
         return
     # One limit around them all: those inside would each restore what another has set.

@@ -223,10 +223,12 @@ def test_automatic_increments_end_within_their_estimate() -> None:
     assert a["dissipation_mJ"] == pytest.approx(b["dissipation_mJ"], rel=2 * 0.05)
 
 
-def test_presses_at_once_are_the_presses_in_turn() -> None:
-    from finger3d.contact.law import Coulomb
+def test_presses_at_once_are_the_presses_in_turn(monkeypatch: pytest.MonkeyPatch) -> None:
+    from finger3d import solve
     from finger3d.solve import each
 
+    monkeypatch.setattr(solve, "_WORTH", 1)
+    monkeypatch.setattr(solve, "cores", lambda: 2)
     design = designs()["half_cylinder"](radius_mm=5.0, width_mm=2.0)
     legs = (Leg(0.5, steps=4), Leg(0.5, slide_x_mm=0.1, steps=3))
     problem = build(Model(design, Material(1.0, 0.3), MeshOptions(0.3, 1.5), legs, domain="plane-stress"))
