@@ -35,6 +35,9 @@ PAPER = (
 """How to cite the program and the paper it grew from, as in CITATION.cff."""
 
 
+_SHORT = 18  # letters of a cell that is not broken into lines
+
+
 @dataclass(frozen=True)
 class Row:
     """A number (or text) of the headline: what it is, its unit, and its error in the same unit, if one is known."""
@@ -194,15 +197,18 @@ def _part(folder: Path, part: Part) -> str:
 
 
 def _table(table: Table) -> str:
-    head = "".join(f'<th scope="col">{escape(name)}</th>' for name in table.head)
+    # Names of columns are long and of one word: they may break where an underscore is.
+    head = "".join(f'<th scope="col">{escape(name).replace("_", "_<wbr>")}</th>' for name in table.head)
     rows = "".join(f"<tr>{''.join(map(_cell, row))}</tr>" for row in table.rows)
     # A wide table scrolls in its own box, which the keyboard can reach too.
     return f'<div class="wide" tabindex="0"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
 
 
 def _cell(value: object) -> str:
-    kind = ' class="number"' if isinstance(value, int | float) and not isinstance(value, bool) else ""
-    return f"<td{kind}>{escape(number(value))}</td>"
+    text = number(value)
+    numeric = isinstance(value, int | float) and not isinstance(value, bool)
+    kind = "number" if numeric else "short" if len(text) <= _SHORT else ""
+    return f'<td class="{kind}">{escape(text)}</td>' if kind else f"<td>{escape(text)}</td>"
 
 
 def _figure(folder: Path, figure: Figure) -> str:
