@@ -76,7 +76,7 @@ def groups(body: str, quick: bool) -> Groups:
 def _sizes(body: str, quick: bool) -> dict[str, Any]:
     if quick:
         down = [4.0, 2.0, 1.0, 0.5]
-        return {BEST[body]: down, "linear": [1.0], "ladder": 0.5, "ratios": (16,), "slow": [4.0]}
+        return {BEST[body]: down, "linear": [1.0], "ladder": 1.0, "ratios": (8,), "slow": [4.0]}
     if body == SECTION:
         down = [4.0, 2.0, 1.0, 0.5, 0.25, 0.125, 0.0625]
         return {"mixed": down, "quadratic": down[:-1], "linear": down, "ladder": 0.25, "ratios": (1, 2, 4, 8, 16, 32),

@@ -87,8 +87,8 @@ def cases(quick: bool) -> list[Case]:
     fig9 = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     if quick:
         return [
-            Case("half cylinder", _model(half, 0.4, "plane-strain", 1.0, near), (0.4, 0.2), 0.08, 5.0),
-            Case("Fig. 9 solid", _model(fig9, 0.4, "solid", 10.0, far), (4.0,), 2.4, 4.0),
+            Case("half cylinder", _model(half, 0.4, "plane-strain", 1.0, near), (0.4, 0.2), 0.1, 5.0),
+            Case("Fig. 9 solid", _model(fig9, 0.4, "solid", 10.0, far), (5.0,), 3.4, 4.0),
         ]
     out = []
     planes: tuple[Domain, ...] = ("plane-stress", "plane-strain")
