@@ -54,7 +54,8 @@ def atomic(path: str | Path) -> Iterator[Path]:
 
 
 _RESULTS = {
-    "press": "summary.json", "compare": "compare.json", "calibrate": "calibration.json", "sweep": "sweep.json"
+    "press": "summary.json", "compare": "compare.json", "calibrate": "calibration.json", "sweep": "sweep.json",
+    "design": "search.json",
 }  # fmt: skip
 """By command, the file that tells its results."""
 

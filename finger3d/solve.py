@@ -235,11 +235,7 @@ def each(problem: Problem, press: Callable[[Asked], Told], asked: Sequence[Asked
         return
     # One limit around them all: those inside would each restore what another has set.
     with one_thread(), ThreadPoolExecutor(cores()) as pool:
-        try:
-            yield from pool.map(press, asked)
-        except BaseException:
-            pool.shutdown(wait=True, cancel_futures=True)
-            raise
+        yield from pool.map(press, asked)  # which cancels what has not begun, if this ends early
 
 
 def _free(problem: Problem, beside: Iterator[Frame] | None) -> dict[str, float]:

@@ -70,7 +70,8 @@ def test_in_two_dimensions_every_random_increment_settles(seed: int, points: int
     rng = np.random.default_rng(seed)
     compliance = random_compliance(rng, points, 2)
     gap = rng.uniform(0.0, 0.5, points)
-    press(compliance, gap, [tuple(rng.uniform([-0.2, -1], [1, 1])) for _ in range(4)], mu)
+    path = [tuple(rng.uniform([-0.2, -1], [1, 1])) for _ in range(4)]
+    assert len(press(compliance, gap, path, mu)) == len(path)  # each settled, and its conditions proved, on the way
 
 
 @pytest.mark.parametrize("mu", COEFFICIENTS)

@@ -123,6 +123,18 @@ def test_results_of_another_command_are_not_replaced(root: Path, tmp_path: Path,
     assert [p.name for p in tmp_path.iterdir()] == ["calibration.json"]
 
 
+@pytest.mark.parametrize(
+    "words", ["sweep --vary friction.mu=0.1,0.2", "design --free gauge.g36.angle_deg=0:90"], ids=["sweep", "design"]
+)
+def test_a_sweep_and_a_design_take_no_other_results_folder(root: Path, tmp_path: Path, capsys, words: str) -> None:
+    (tmp_path / "summary.json").write_text("{}")
+    command, *options = words.split()
+    scene = root / "geometries" / "fig9.toml"
+    assert main([command, str(scene), "--out", str(tmp_path), *options, *SECTION]) == 2
+    said = capsys.readouterr().err.strip().splitlines()[-1]
+    assert said == f"finger3d: --out {tmp_path}: holds the results of a press; name another folder, or remove it"
+
+
 def test_a_disk_that_fills(root: Path, tmp_path: Path, monkeypatch, capsys) -> None:
     done = []
 

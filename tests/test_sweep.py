@@ -200,7 +200,7 @@ def test_what_makes_it_another_sweep_is_named(vary, expected, scene, tmp_path):
 
 def test_a_folder_in_use_is_refused(scene, tmp_path):
     sweep = points_of(scene, "friction.mu=0.06")
-    with Kept(sweep, tmp_path).open(), pytest.raises(Finger3dError, match="a sweep is running there"):
+    with Kept(sweep, tmp_path).open(), pytest.raises(Finger3dError, match="another finger3d is writing there"):
         with Kept(sweep, tmp_path).open():
             pass
 

@@ -17,6 +17,7 @@ Float = NDArray[np.float64]
 _PENALTY = 100.0  # MPa/mm: under 1 MPa the surfaces overlap by 0.01 mm, 1e-3 of the depth
 _STICK = 10.0  # MPa/mm: friction of 0.1 MPa takes 0.01 mm; ten times as stiff, CalculiX does not settle
 _PLATE = 4.0  # mm
+_FACES = {2: ((0, 1), (1, 2), (2, 0)), 3: ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0))}  # S1, S2, ... of CPE6, C3D10
 
 
 def program() -> str | None:
@@ -41,7 +42,7 @@ def deck(mesh: Mesh, E: float, nu: float, mu: float, depths: list[float], finite
     lines += ["*NSET, NSET=BASE", *map(str, np.unique(mesh.facets["base"]) + 1)]
     lines += ["*NSET, NSET=MIDDLE", *map(str, np.unique(mesh.facets["symmetry_x"]) + 1)]
     lines += ["*NSET, NSET=PLATEN", *(str(n + k) for k in range(1, 5))]
-    lines += ["*SURFACE, NAME=DOME, TYPE=ELEMENT", *_faces(mesh)]
+    lines += ["*SURFACE, NAME=DOME, TYPE=ELEMENT", *faces(mesh)]
     lines += ["*SURFACE, NAME=FLAT, TYPE=ELEMENT", f"{count + 1}, S1"]
     shear, bulk = E / (2.0 * (1.0 + nu)), E / (3.0 * (1.0 - 2.0 * nu))
     law = (
@@ -60,15 +61,15 @@ def deck(mesh: Mesh, E: float, nu: float, mu: float, depths: list[float], finite
     return "\n".join(lines) + "\n"
 
 
-def _faces(mesh: Mesh) -> list[str]:
-    """Faces of cells on the contact boundary, as `element, Sk`: Sk joins the corners k and k + 1."""
-    wanted = {frozenset(f[:2].tolist()) for f in mesh.facets["contact"]}
-    return [
-        f"{e}, S{k + 1}"
-        for e, cell in enumerate(mesh.cells, 1)
-        for k in range(3)
-        if frozenset((int(cell[k]), int(cell[(k + 1) % 3]))) in wanted
-    ]
+def faces(mesh: Mesh) -> list[str]:
+    """Lines `element, S<k>` of the facets labelled contact."""
+    d = mesh.dim
+    key = {tuple(sorted(f[:d])) for f in mesh.facets["contact"].tolist()}
+    found = []
+    for k, corners in enumerate(_FACES[d], start=1):
+        faces = np.sort(mesh.cells[:, list(corners)], axis=1)
+        found += [f"{i}, S{k}" for i, f in enumerate(map(tuple, faces.tolist()), start=1) if f in key]
+    return found
 
 
 def solve(text: str, folder: Path, seconds: float) -> Float:

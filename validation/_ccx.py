@@ -18,14 +18,13 @@ from numpy.typing import NDArray
 
 from finger3d.mesh import Mesh
 
-from ._calculix import program
+from ._calculix import faces, program
 
 Int = NDArray[np.int64]
 
 # MPa/mm, under pressures of .2 MPa: of those tried on the coarsest solid (100 and 10, 20 and 5, 20 and 2) the quickest,
 # with the force nearest to ours.  At 2000 it diverged.
 PENALTY, STICK_SLOPE = 20.0, 5.0
-_FACES = {2: ((0, 1), (1, 2), (2, 0)), 3: ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0))}  # S1, S2, ... of CPE6, C3D10
 _BEYOND = 10.0  # mm by which the plate reaches beyond the finger
 
 
@@ -131,7 +130,7 @@ def deck(press: Pressed) -> str:
         "*MATERIAL, NAME=PLATE", "*ELASTIC", "1000., 0.",
         "*SOLID SECTION, ELSET=BODY, MATERIAL=RUBBER", *section,
         "*SOLID SECTION, ELSET=PLATE, MATERIAL=PLATE", *section,
-        "*SURFACE, NAME=FINGER, TYPE=ELEMENT", *_faces(mesh),
+        "*SURFACE, NAME=FINGER, TYPE=ELEMENT", *faces(mesh),
         "*SURFACE, NAME=UNDER, TYPE=ELEMENT", f"{e + 1}, S1",
         "*SURFACE INTERACTION, NAME=TOUCH",
         "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", f"{PENALTY:g}",
@@ -157,17 +156,6 @@ def _plate(press: Pressed, first: int) -> tuple[list[tuple[float, float, float]]
     # S1 is nodes 1-2-3-4; z to x to y is right-handed, so that nodes 5-8 are above them
     under = [(x0, y, z0), (x0, y, z1), (x1, y, z1), (x1, y, z0)]
     return [*under, *[(x, top, z) for x, _, z in under]], "C3D8"
-
-
-def _faces(mesh: Mesh) -> list[str]:
-    """Lines `element, S<k>` of the facets labelled contact."""
-    d = mesh.dim
-    key = {tuple(sorted(f[:d])) for f in mesh.facets["contact"].tolist()}
-    found = []
-    for k, corners in enumerate(_FACES[d], start=1):
-        faces = np.sort(mesh.cells[:, list(corners)], axis=1)
-        found += [f"{i}, S{k}" for i, f in enumerate(map(tuple, faces.tolist()), start=1) if f in key]
-    return found
 
 
 def _held(press: Pressed, n: int, plate: int) -> list[str]:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from finger3d.errors import Finger3dError
-from finger3d.export import atomic, write_json
+from finger3d.export import atomic, claimed, write_json
 from finger3d.family import Body, Variant, body_key
 from finger3d.history import measure
 from finger3d.kinematics import SmallStrain
@@ -238,8 +238,11 @@ def search(problem: Problem, out: str | Path, report: Report | None = None) -> F
     report = report or Report()
     judge = objective_of(problem.objective)
     start = checked_start(problem)
-    folder = Path(out)
-    folder.mkdir(parents=True, exist_ok=True)
+    with claimed(out, "design") as folder:
+        return _searched(problem, folder, report, judge, start)
+
+
+def _searched(problem: Problem, folder: Path, report: Report, judge: Objective, start: tuple[float, ...]) -> Found:
     _same(problem, folder)
     run = _Search(problem, folder, report, judge)
     run.load()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import fcntl
 import json
 import math
 import os
@@ -14,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from finger3d.errors import Finger3dError, MissingError
-from finger3d.export import atomic, write_csv, write_json
+from finger3d.export import atomic, claimed, write_csv, write_json
 from finger3d.sweep.points import Sweep
 
 JOURNAL, IDENTITY = "points.jsonl", "sweep.json"
@@ -40,7 +39,7 @@ class Kept:
     @contextmanager
     def open(self) -> Iterator[Kept]:
         """Take the folder: go on where the same sweep ended; another sweep, or a running one, is refused."""
-        with self._alone():
+        with claimed(self.folder, "sweep"):
             self._begin()
             try:
                 # unbuffered: what does not fit is told at once, and not again when the file is closed
@@ -51,23 +50,6 @@ class Kept:
                 yield self
             finally:
                 self._stream.close()
-
-    @contextmanager
-    def _alone(self) -> Iterator[None]:
-        try:
-            lock = (self.folder / ".lock").open("w")
-        except OSError as error:
-            raise self._full(".lock", error) from None
-        try:
-            # given back by the system however this process ends
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            lock.close()
-            raise Finger3dError(f"--out {self.folder}: a sweep is running there; name another folder") from None
-        try:
-            yield
-        finally:
-            lock.close()
 
     def _begin(self) -> None:
         wanted = self._identity()

@@ -56,7 +56,6 @@ def sweep(
     """
     report = report or Report()
     folder = Path(out)
-    folder.mkdir(parents=True, exist_ok=True)
     with Kept(points, folder).open() as kept:
         report.steps_done, report.steps_total = len(kept.rows), len(points.points)
         if before := len(kept.rows):
@@ -123,10 +122,10 @@ class _Run:
                 future.add_done_callback(self.arrived.put)
             while futures:
                 self._take(futures)
-        except BaseException:
-            with suppress(OSError, TimeoutError):
-                self.client.cancel(list(futures.values()), force=True)
-            raise
+        finally:
+            if futures:  # interrupted, or the cluster is gone: nobody waits for what is left
+                with suppress(OSError, TimeoutError):
+                    self.client.cancel(list(futures.values()), force=True)
 
     def _told(self, event: tuple[float, Any]) -> None:
         self.arrived.put(event[1]["row"])
