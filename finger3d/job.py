@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from finger3d.contact.law import OPEN
+from finger3d.drawing import Artist
 from finger3d.export import atomic, claimed, write_csv, write_json, write_vtu
 from finger3d.history import Frame, History, contact_table, measure
 from finger3d.mesh import middles
@@ -150,13 +151,13 @@ def press(
     scene = load(scene) if isinstance(scene, str | Path) else scene
     temporary = TemporaryDirectory(prefix="finger3d-") if out is None else None
     figures = temporary is None if figures is None else figures
-    with claimed(temporary.name if temporary else str(out), "press") as folder:
-        history, summary = _pressed(scene, folder, report or Report(), started, figures, error)
+    with claimed(temporary.name if temporary else str(out), "press") as folder, Artist(figures) as artist:
+        history, summary = _pressed(scene, folder, report or Report(), started, artist if figures else None, error)
     return PressResult(history, folder, summary, temporary)
 
 
 def _pressed(
-    scene: Scene, folder: Path, report: Report, started: float, figures: bool, error: bool
+    scene: Scene, folder: Path, report: Report, started: float, artist: Artist | None, error: bool
 ) -> tuple[History, dict[str, Any]]:
     from finger3d.accuracy import estimate
     from finger3d.page import press_page
@@ -174,7 +175,7 @@ def _pressed(
         problem, output = _solve(scene, folder, report, started, math.inf, output, refinement)
     begin = time.perf_counter()
     report.stage("writing fields")
-    _fields(problem, output, folder, figures)
+    _fields(problem, output, folder, artist)
     output.seconds["output"] += time.perf_counter() - begin
     output.warnings += _coarse_warning(problem, output.frames)
     history = History(problem.points, tuple(output.frames))
@@ -184,7 +185,9 @@ def _pressed(
         report.stage("estimating the error")
         output.error = estimate(problem, output.frames, output.seconds)
         summary = output.write(_told(history))
-    if figures:
+    if artist:
+        report.stage("drawing")
+        artist.finish()
         press_page(folder)
     return history, summary
 
@@ -307,7 +310,7 @@ def _remark(problem: Problem, frame: Frame) -> str:
     return f"depth {frame.target.depth_mm:.4g} mm, force {force:.5g} N, residual {frame.residual:.1e}"
 
 
-def _fields(problem: Problem, output: _Output, folder: Path, figures: bool) -> None:
+def _fields(problem: Problem, output: _Output, folder: Path, artist: Artist | None) -> None:
     """fields.vtu and the pictures, from the last good step; the field is recovered with the factor at hand."""
     from finger3d.advice import advise
     from finger3d.mesh import unfold
@@ -343,8 +346,8 @@ def _fields(problem: Problem, output: _Output, folder: Path, figures: bool) -> N
             **on_surface,
         },
     )
-    if figures:
-        _figures(problem, output, frame, mesh, whole_u, folder)
+    if artist:
+        _figures(problem, output, frame, mesh, whole_u, folder, artist)
 
 
 def _told(history: History) -> str:
@@ -360,17 +363,18 @@ def _voigt(tensor: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
     return np.stack([tensor[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))], axis=1)
 
 
-def _figures(problem: Problem, output: _Output, frame: Frame, mesh: Any, u: Any, folder: Path) -> None:
+def _figures(problem: Problem, output: _Output, frame: Frame, mesh: Any, u: Any, folder: Path, artist: Artist) -> None:
     from finger3d import view
 
     steps = [measure(problem.points, f) for f in output.frames if f.outcome.ok]
     table = contact_table(problem.points, frame.state)
-    view.contact_figure(
-        folder / "contact.png", table, problem.model.friction.static, problem.points.band_mm,
+    artist.draw(
+        view.contact_figure, folder / "contact.png", table, problem.model.friction.static, problem.points.band_mm,
         problem.points.half_width_mm if problem.dim == 3 else None,
     )  # fmt: skip
-    view.force_figure(folder / "force.png", steps)
-    view.finger_picture(
-        folder / "finger.png", mesh, u, table, problem.points.nodes,
+    artist.draw(view.force_figure, folder / "force.png", steps)
+    artist.draw(
+        view.finger_picture, folder / "finger.png", mesh, u, table, problem.points.nodes,
         f"{steps[-1]['normal_force_N']:.4g} N at {frame.target.depth_mm:g} mm",
     )  # fmt: skip
+    artist.begin()

@@ -291,16 +291,21 @@ def rendered(module: str, arrays: Mapping[str, Any], must: bool = False) -> NDAr
     return None
 
 
+def child_environment() -> dict[str, str]:
+    """This process's environment, in which a child imports this very package."""
+    here = str(Path(__file__).resolve().parent.parent)
+    path = os.pathsep.join(p for p in (here, os.environ.get("PYTHONPATH")) if p)
+    return {**os.environ, "PYTHONPATH": path}
+
+
 def run_child(command: list[str], window: bool = False) -> str | None:
     """Run a command that renders, where a crash does no harm; why it failed, in one line, or None.
 
     There is a time limit, unless it opens a window.
     """
-    here = str(Path(__file__).resolve().parent.parent)
-    path = os.pathsep.join(p for p in (here, os.environ.get("PYTHONPATH")) if p)
     # EGL needs no display; asking for it first spares VTK's warning about a missing X server.
     hidden = {} if window else {"VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow"}
-    env = {**hidden, **os.environ, "PYTHONPATH": path}
+    env = {**hidden, **child_environment()}
     limit = None if window else _TIME_LIMIT_S
     try:
         done = subprocess.run(command, env=env, capture_output=True, text=True, timeout=limit, check=False)

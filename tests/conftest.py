@@ -6,9 +6,14 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 # Before numpy or MKL is loaded: several test processes share few cores, and one thread is reproducible.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+# Machines here are shared: an example that takes long is no failure, and one that fails tells how to repeat it.
+settings.register_profile("shared machine", settings(), deadline=None, print_blob=True)
+settings.load_profile("shared machine")
 
 
 @pytest.fixture(scope="session", autouse=True)

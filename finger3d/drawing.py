@@ -1,0 +1,93 @@
+"""Pictures beside the computation: a child process loads matplotlib while the model is solved, and draws then.
+
+``python -m finger3d.drawing`` is the child: it calls what it is sent on its standard input; nothing else calls it.
+"""
+
+from __future__ import annotations
+
+import pickle
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
+from importlib import import_module
+from typing import Any, Self
+
+from finger3d.render import child_environment
+
+_PATIENCE_S = 20.0  # for pictures that were begun when the user interrupted
+
+
+class Artist:
+    """Calls functions that draw, in a child process unless matplotlib is loaded in this one already.
+
+    A child that fails costs time, but no picture: the calls are then made here, where an error says what is wrong.
+
+    Parameters
+    ----------
+    wanted : whether anything will be drawn
+    """
+
+    def __init__(self, wanted: bool = True) -> None:
+        self._wanted = wanted
+        self._calls: list[partial[Any]] = []
+        self._child: subprocess.Popen[bytes] | None = None
+        self._sent = False
+
+    def __enter__(self) -> Self:
+        if self._wanted and "matplotlib" not in sys.modules:
+            # a session of its own: Ctrl-C is for the parent, which lets begun pictures be finished
+            self._child = subprocess.Popen(
+                [sys.executable, "-P", "-m", __name__], env=child_environment(), start_new_session=True,
+                stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            )  # fmt: skip
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._child is None:
+            return
+        self._close()
+        try:
+            self._child.wait(_PATIENCE_S if self._sent else 0.0)
+        except subprocess.TimeoutExpired:
+            self._child.kill()
+
+    def draw(self, function: Callable[..., Any], *args: Any, **kwargs: Any) -> None:
+        """Note a call of a function of some module, with arguments that can be pickled."""
+        self._calls.append(partial(function, *args, **kwargs))
+
+    def begin(self) -> None:
+        """Let the child start on what was noted, while this process goes on."""
+        if self._child is None or not self._calls:
+            return
+        self._sent = True
+        self._close(pickle.dumps(self._calls, pickle.HIGHEST_PROTOCOL))
+
+    def finish(self) -> None:
+        """Wait until all is drawn."""
+        if self._child is None or not self._sent or self._child.wait() != 0:
+            for call in self._calls:
+                call()
+        self._calls = []
+
+    def _close(self, last: bytes = b"") -> None:
+        assert self._child is not None
+        stream = self._child.stdin
+        assert stream is not None
+        if not stream.closed:
+            with suppress(BrokenPipeError), stream:  # of a child that has died: `finish` sees it, and draws here
+                stream.write(last)
+
+
+def _main() -> None:
+    # All that takes time, while the parent computes; then the calls, or nothing if there are none.
+    for module in ("matplotlib.backends.backend_agg", "finger3d.view"):
+        import_module(module)
+    sent = sys.stdin.buffer.read()
+    for call in pickle.loads(sent) if sent else ():
+        call()
+
+
+if __name__ == "__main__":
+    _main()
