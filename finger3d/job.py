@@ -375,6 +375,6 @@ def _figures(problem: Problem, output: _Output, frame: Frame, mesh: Any, u: Any,
     artist.draw(view.force_figure, folder / "force.png", steps)
     artist.draw(
         view.finger_picture, folder / "finger.png", mesh, u, table, problem.points.nodes,
-        f"{steps[-1]['normal_force_N']:.4g} N at {frame.target.depth_mm:g} mm",
+        f"{steps[-1]['normal_force_N']:.4g} N at {frame.target.depth_mm:g} mm", gauges=problem.model.gauges,
     )  # fmt: skip
     artist.begin()

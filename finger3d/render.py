@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d.camera import AXES, WINDOW, cropped, flat, half_height
 from finger3d.contact.law import OPEN, SLIP, STICK
 from finger3d.errors import MissingError
 from finger3d.mesh import EDGES, Mesh
@@ -32,10 +33,8 @@ COLOURS = {OPEN: "#c4c4c4", STICK: "#1f3f77", SLIP: "#f28e2b"}
 ARROWS = {STICK: "#ffffff", SLIP: "#000000"}
 """Colour of a friction arrow, by the status of its point."""
 
-_VIEW = np.array([-0.45, 1.05, 1.0])  # From where the finger is looked at: above, in front, a little from the left.
 _ARROW = 0.045  # Length of the longest arrow, as a share of the finger's,
 _ARROW_STEPS = 1.6  # and at most so many distances between arrows.
-_WINDOW, _MARGIN = (1600, 1200), 1.04
 
 _TIME_LIMIT_S = 180.0
 # A quadratic facet in six triangles around its centre (node 6): two for each corner, so that a corner's status
@@ -45,17 +44,6 @@ _OWNER = np.array([0, 1, 1, 2, 2, 0])
 _RING = np.array([0, 3, 1, 4, 2, 5])
 _FOUR = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
 _SIDES = np.array([[0, 3, 1], [1, 4, 2], [2, 5, 0]])
-
-
-def _viewer_axes() -> Float:
-    """Rows: to the right, up, and towards the viewer."""
-    towards = _VIEW / np.linalg.norm(_VIEW)
-    right = np.cross([0.0, 1.0, 0.0], towards)
-    right /= np.linalg.norm(right)
-    return np.array([right, np.cross(towards, right), towards])
-
-
-AXES = _viewer_axes()
 
 
 @dataclass(frozen=True)
@@ -240,11 +228,6 @@ def draw_solid(axes: Axes, skin: Skin, colours: Float, arrows: bool) -> None:
     axes.autoscale_view()
 
 
-def flat(points: Float) -> Float:
-    """Points (..., 3) as the viewer sees them, (..., 2)."""
-    return points @ AXES[:2].T
-
-
 def _shaded(faces: Float, colours: Float) -> tuple[Float, Float]:
     """The faces that look at the viewer, and their colours under a light above the viewer's shoulder."""
     third = faces.shape[1] // 3
@@ -263,8 +246,15 @@ def _shaded(faces: Float, colours: Float) -> tuple[Float, Float]:
 _failure: list[str] = []
 
 
-def render_solid(skin: Skin, colours: list[Float], must: bool = False) -> list[NDArray[np.uint8]] | None:
+def render_solid(
+    skin: Skin, colours: list[Float], must: bool = False
+) -> tuple[list[NDArray[np.uint8]], tuple[float, float, float, float]] | None:
     """Render a picture for each set of colours (t, 3, 3), or None where rendering does not work.
+
+    Returns
+    -------
+    images : the pictures
+    extent : their left, right, lower and upper end, mm as `flat` gives them
 
     Raises
     ------
@@ -272,8 +262,14 @@ def render_solid(skin: Skin, colours: list[Float], must: bool = False) -> list[N
         If rendering does not work and `must` is set.
     """
     arrays = {f.name: getattr(skin, f.name) for f in fields(skin)}
-    images = rendered("finger3d.render", {"colours": np.array(colours), **arrays}, must)
-    return None if images is None else list(images)
+    found = rendered("finger3d.render", {"colours": np.array(colours), **arrays}, must)
+    if found is None:
+        return None
+    images, (top, left) = cropped(found)
+    middle, size = skin.frame
+    pixel = 2.0 * half_height(size) / found.shape[1]
+    x, y = flat(middle) + pixel * np.array([left - 0.5 * found.shape[2], 0.5 * found.shape[1] - top])
+    return list(images), (x, x + pixel * images.shape[2], y - pixel * images.shape[1], y)
 
 
 def rendered(module: str, arrays: Mapping[str, Any], must: bool = False) -> NDArray[np.uint8] | None:
@@ -319,12 +315,12 @@ def run_child(command: list[str], window: bool = False) -> str | None:
 
 
 def _child(source: str, target: str) -> None:
-    """Render the skin in `source` once for each set of colours, crop the margin, and save the images (s, h, w, 3)."""
+    """Render the skin in `source` once for each set of colours, and save the images (s, h, w, 3)."""
     import pyvista as pv
 
     data = np.load(source)
     skin = Skin(**{f.name: data[f.name] for f in fields(Skin)})
-    plotter = pv.Plotter(off_screen=True, window_size=list(_WINDOW), lighting="three lights")
+    plotter = pv.Plotter(off_screen=True, window_size=list(WINDOW), lighting="three lights")
     contact = stage(plotter, skin, skin.frame)
     images = []
     for number, colours in enumerate(data["colours"]):
@@ -333,7 +329,7 @@ def _child(source: str, target: str) -> None:
             _add_arrows(plotter, skin)
         plotter.render()  # a screenshot alone repeats the picture before
         images.append(plotter.screenshot(return_img=True))
-    np.save(target, cropped(np.array(images)))
+    np.save(target, np.array(images))
 
 
 def stage(plotter: Any, skin: Skin, frame: tuple[Float, Float]) -> Any:
@@ -341,19 +337,11 @@ def stage(plotter: Any, skin: Skin, frame: tuple[Float, Float]) -> Any:
     plotter.set_background("white")
     contact = _add_body(plotter, skin)
     plotter.enable_parallel_projection()
-    middle, (width, height) = frame
+    middle, size = frame
     plotter.camera_position = [tuple(middle + 3.0 * skin.size * AXES[2]), tuple(middle), (0.0, 1.0, 0.0)]
-    plotter.camera.parallel_scale = 0.5 * _MARGIN * max(height, width * _WINDOW[1] / _WINDOW[0])
+    plotter.camera.parallel_scale = half_height(size)
     plotter.reset_camera_clipping_range()
     return contact
-
-
-def cropped(images: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Images (s, h, w, 3) without the margin that all of them leave white."""
-    stack = images[..., :3]
-    inked = np.min(stack, axis=(0, 3)) < 250
-    rows, columns = np.flatnonzero(inked.any(axis=1)), np.flatnonzero(inked.any(axis=0))
-    return stack[:, rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
 
 
 def _poly(points: Float, lines: bool) -> Any:

@@ -16,9 +16,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from finger3d.contact.law import OPEN, SLIP, STATUS_NAMES, STICK
 from finger3d.export import atomic
+from finger3d.marks import draw_marks, marks_of
 from finger3d.mesh import Mesh
+from finger3d.model import Gauge
 from finger3d.outlines import edges_of, outline_of
-from finger3d.render import BODY, COLOURS, LINE, OBJECT, REST, Skin, draw_solid, render_solid, skin_of
+from finger3d.render import BODY, COLOURS, LINE, OBJECT, REST, Skin, draw_solid, flat, render_solid, skin_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,6 +28,8 @@ if TYPE_CHECKING:
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
+Marks = Sequence[tuple[str, Float]]
+"""Label of a gauge, and its start, middle and end (3, d) mm."""
 
 _CMAP = "viridis"
 _SHADES = {STICK: "#c9d9ee", SLIP: "#fde3c4"}
@@ -40,6 +44,7 @@ def finger_picture(
     contact_nodes: ArrayLike,
     title: str = "",
     profile: Float | None = None,
+    gauges: Sequence[Gauge] = (),
 ) -> str:
     """Draw the deformed finger at true scale: contact pressure on the left, stick and slip on the right.
 
@@ -50,6 +55,7 @@ def finger_picture(
     table : columns of contact.csv, of which pressure_MPa, shear_x_MPa, shear_z_MPa and status are read, each (c,)
     contact_nodes : (c,) numbers of the contact points in `mesh`
     profile : (k, 2) x and y in mm of the object's surface, drawn as a line (2D) or an outline (solid)
+    gauges : marked where they lie, with name and angle
 
     Returns
     -------
@@ -58,12 +64,13 @@ def finger_picture(
     """
     nodes, status = np.asarray(contact_nodes, dtype=np.int64), _status(table)
     pressure = _column(table, "pressure_MPa")
+    marks = [(mark.label, mark.of(mesh.points + displacement)) for mark in marks_of(mesh, gauges, near=mesh.dim == 3)]
     if mesh.dim == 2:
-        figure, renderer = _section(mesh, displacement, pressure, status, nodes, profile, title), "matplotlib"
+        figure, renderer = _section(mesh, displacement, pressure, status, nodes, profile, title, marks), "matplotlib"
     else:
         shear = np.column_stack([_column(table, "shear_x_MPa"), _column(table, "shear_z_MPa")])
         skin = skin_of(mesh, displacement, pressure, shear, status, nodes, profile)
-        figure, renderer = _solid(skin, title)
+        figure, renderer = _solid(skin, title, marks)
     _save(figure, path)
     return renderer
 
@@ -317,7 +324,14 @@ def _contact_line(axes: Axes, x: Float, fn: Float, fx: Float, fz: Float, status:
 
 
 def _section(
-    mesh: Mesh, u: Float, pressure: Float, status: Int, nodes: Int, profile: Float | None, title: str
+    mesh: Mesh,
+    u: Float,
+    pressure: Float,
+    status: Int,
+    nodes: Int,
+    profile: Float | None,
+    title: str,
+    marks: Marks,
 ) -> Figure:
     from matplotlib.collections import LineCollection
     from matplotlib.patches import PathPatch
@@ -346,6 +360,7 @@ def _section(
         axes.set_xlabel("x (mm)", labelpad=1)
         axes.spines[["top", "right"]].set_visible(False)
     panels[0].set_ylabel("y (mm)")
+    draw_marks(panels[0], marks)
     keys(figure, highest, {} if profile is None else {"object": OBJECT})
     return figure
 
@@ -353,20 +368,24 @@ def _section(
 # --- a solid ------------------------------------------------------------------------------------------------------
 
 
-def _solid(skin: Skin, title: str) -> tuple[Figure, str]:
+def _solid(skin: Skin, title: str, marks: Marks) -> tuple[Figure, str]:
     highest = _highest(skin.pressure)
     by_pressure = pressure_colours(skin.pressure, highest)
     by_status = np.repeat(palette()[skin.status][:, None], 3, axis=1)
     wanted = os.environ.get("FINGER3D_RENDERER", "")
-    images = None if wanted == "matplotlib" else render_solid(skin, [by_pressure, by_status], must=wanted == "pyvista")
+    found = None if wanted == "matplotlib" else render_solid(skin, [by_pressure, by_status], must=wanted == "pyvista")
+    images, extent = found or (None, None)
     aspect = skin.aspect if images is None else images[0].shape[0] / images[0].shape[1]
     figure, panels = two_panels(aspect, title)
     for number, (axes, colours) in enumerate(zip(panels, (by_pressure, by_status), strict=True)):
         if images is not None:
-            axes.imshow(images[number], interpolation="antialiased")
+            axes.imshow(images[number], interpolation="antialiased", extent=extent)
         else:
             draw_solid(axes, skin, colours, arrows=number == 1)
         axes.set_axis_off()
+    draw_marks(panels[0], [(label, flat(line)) for label, line in marks])
+    if marks:
+        panels[0].set_title("contact pressure; gauges inside are marked on the near face", fontsize=11)
     if skin.largest_shear > 0.0:
         text = f"stick and slip; arrows: friction on the finger, at most {skin.largest_shear:.3g} MPa"
         panels[1].set_title(text, fontsize=11)

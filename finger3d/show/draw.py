@@ -173,7 +173,7 @@ def _child(source: str, target: str) -> None:
             plotter.render()  # a screenshot alone repeats the picture before
             images.append(plotter.screenshot(return_img=True))
         plotter.close()
-    stack = render.cropped(np.array(images))
+    stack, _ = render.cropped(np.array(images))
     np.save(target, stack.reshape(count, 2, *stack.shape[1:]))
 
 
