@@ -39,7 +39,7 @@ test-browser: install
 
 # Takes both cores and some minutes; the table says how busy the machine was.
 bench: install
-	$(BIN)/python validation/_bench.py
+	$(BIN)/python -m validation._bench
 
 lint: install
 	$(BIN)/ruff check .

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 from importlib import import_module
+from io import BytesIO
 from typing import Any, Self
 
 from finger3d.render import child_environment
@@ -81,12 +82,22 @@ class Artist:
 
 
 def _main() -> None:
-    # All that takes time, while the parent computes; then the calls, or nothing if there are none.
-    for module in ("matplotlib.backends.backend_agg", "finger3d.view"):
-        import_module(module)
+    _warm_up()
     sent = sys.stdin.buffer.read()
     for call in pickle.loads(sent) if sent else ():
         call()
+
+
+def _warm_up() -> None:
+    """All that a first picture takes besides its own drawing, while the parent computes: modules, fonts."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    import_module("finger3d.view")
+    figure = Figure(figsize=(1.0, 1.0))
+    FigureCanvasAgg(figure)
+    figure.add_subplot().set_xlabel("x (mm)")
+    figure.savefig(BytesIO(), format="png")
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ each stage counts.  The plain factorisation is PARDISO's, called by pypardiso on
 (parallel METIS, Bunch-Kaufman).  A time says little where others compute beside: the load stands in every row, and
 none of them can fail.  Not a study: what it says is of one machine at one time, and nothing of it is kept.
 
-Run by ``make bench``; ``python validation/_bench.py --quick`` takes some seconds and means nothing.
+Run by ``make bench``; ``python -m validation._bench --quick`` takes some seconds and means nothing.
 """
 
 from __future__ import annotations
@@ -185,10 +185,25 @@ def run(quick: bool) -> tuple[Row, ...]:
     if made:
         what = f"pytetwild on a warm cache against a cold one ({made[0]:.1f} s)"
         rows.append(_row(what, 0.02, made[1] / made[0], load, "0: only reading the file is left"))
+    rows += _beside_calculix(quick, load)
     for size, most in zip(sizes, (2.0,) if quick else (2.0, 5.0), strict=True):
         peak = max(r["peak_MB"] for r in runs[size]) / 1024.0
         rows.append(_row(f"peak memory, GB, {best[size]['dofs']:.0f} unknowns", most, peak, load))
     return tuple(rows)
+
+
+def _beside_calculix(quick: bool, load: float) -> list[Row]:
+    """How many times faster than CalculiX on the finest meshes of beside_calculix.py; nothing where ccx is missing."""
+    from validation._calculix import program
+    from validation.beside_calculix import cases, measured, times
+
+    if program() is None:
+        print("ccx is not installed (apt install calculix-ccx): nothing is set beside CalculiX", file=sys.stderr)
+        return []
+    finest = list({case.body: case for case in cases(quick)}.values())
+    table = measured(finest)
+    told = [row for ours, theirs in zip(table[::2], table[1::2], strict=True) for row in times(ours, theirs)]
+    return [replace(row, reason=f"{row.reason}; load {load:.1f}", kind="statement") for row in told]
 
 
 def _common(one: dict[str, float], all_runs: Sequence[dict[str, float]]) -> dict[str, float]:

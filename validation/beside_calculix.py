@@ -56,9 +56,14 @@ def run(quick: bool) -> Result:
     """Each mesh once by CalculiX, and by finger3d as the best of three runs spread around it."""
     if program() is None:
         return _committed(quick)
+    return _judged(measured(cases(quick)), timed=not quick)
+
+
+def measured(meshes: Sequence[Case]) -> list[dict[str, Any]]:
+    """A line of the table for each program on each mesh, ours first; ccx must be installed."""
     table: list[dict[str, Any]] = []
     with Bench(MODULE) as bench, tempfile.TemporaryDirectory(prefix="finger3d_ccx_") as folder:
-        for case in cases(quick):
+        for case in meshes:
             load = os.getloadavg()[0]
             before = best_of(bench, "measured", [case], lambda _: 2)[case]
             place = Path(folder, f"{case.body}_{case.size:g}")
@@ -68,7 +73,7 @@ def run(quick: bool) -> Result:
             seconds = {k: min(v, after["seconds"][k]) for k, v in before["seconds"].items()}
             ours = {**before, "seconds": seconds}
             table += [_line_ours(case, ours, load), _line_theirs(case, ours["dofs"], theirs, load)]
-    return _judged(table, timed=not quick)
+    return table
 
 
 def _judged(table: Sequence[Mapping[str, Any]], timed: bool) -> Result:
@@ -77,7 +82,7 @@ def _judged(table: Sequence[Mapping[str, Any]], timed: bool) -> Result:
     rows = [row for ours, theirs in pairs for row in _rows(ours, theirs)]
     if timed:
         finest = {ours["body"]: (ours, theirs) for ours, theirs in pairs}
-        rows += [row for ours, theirs in finest.values() for row in _times(ours, theirs)]
+        rows += [row for ours, theirs in finest.values() for row in times(ours, theirs)]
     columns = {name: [line[name] for line in table] for name in COLUMNS}
     return Result(tuple(rows), columns, lambda figure: _draw(figure, columns))
 
@@ -146,7 +151,7 @@ def _rows(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> list[Row]:
     return rows
 
 
-def _times(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> list[Row]:
+def times(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> list[Row]:
     """Wall time, as a user waits, and processor time, in which the machine's other work counts less."""
     here = f"{ours['body']}, edges of {ours['size_mm']:g} mm, {ours['dofs']:.0f} unknowns"
     wanted, source = WANTED[ours["body"]], "issue 8"
