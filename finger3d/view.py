@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from finger3d.contact.law import OPEN, SLIP, STATUS_NAMES, STICK
-from finger3d.export import atomic
 from finger3d.marks import draw_marks, marks_of
 from finger3d.mesh import Mesh
 from finger3d.model import Gauge
 from finger3d.outlines import edges_of, outline_of
+from finger3d.panels import WIDEST, blank, cells, save, sheet
 from finger3d.render import BODY, COLOURS, LINE, OBJECT, REST, Skin, draw_solid, flat, render_solid, skin_of
 
 if TYPE_CHECKING:
@@ -33,7 +33,6 @@ Marks = Sequence[tuple[str, Float]]
 
 _CMAP = "viridis"
 _SHADES = {STICK: "#c9d9ee", SLIP: "#fde3c4"}
-_DPI = 120
 
 
 def finger_picture(
@@ -71,7 +70,9 @@ def finger_picture(
         shear = np.column_stack([_column(table, "shear_x_MPa"), _column(table, "shear_z_MPa")])
         skin = skin_of(mesh, displacement, pressure, shear, status, nodes, profile)
         figure, renderer = _solid(skin, title, marks)
-    _save(figure, path)
+    top = 0.4 / figure.get_figheight() if title else 0.0
+    names = ("Contact pressure on the deformed finger, at true scale", "The zones that stick and slip")
+    save(figure, path, dict(zip(names, cells(1, 2, top), strict=True)))
     return renderer
 
 
@@ -102,18 +103,19 @@ def contact_figure(
         lines = [("in the middle, z = 0", middle if len(middle) >= 5 else np.flatnonzero(np.abs(z) <= band))]
         lines += [(f"at the end, z = {half_width_mm:g} mm", end)] if len(end) else []
     fn, fx, fz = (_column(table, name) for name in ("pressure_MPa", "shear_x_MPa", "shear_z_MPa"))
-    figure = _figure(9.0, 4.2 * len(lines))
-    top: Axes | None = None
-    for row, (where, points) in enumerate(lines, start=1):
-        axes = figure.add_subplot(len(lines), 1, row, sharex=top)
-        top = top or axes
+    made = sheet(len(lines), 1, (WIDEST, 4.4), (0.95, 0.15, 1.25, 0.35), title)
+    for axes, (where, points) in zip(made.axes, lines, strict=True):
         on = points[np.argsort(x[points], kind="stable")]
         _contact_line(axes, x[on], fn[on], fx[on], fz[on], status[on], mu)
         axes.set_title(where, fontsize=10, loc="left")
         axes.set_ylabel("traction on the finger (MPa)")
-    axes.set_xlabel("x at rest (mm)")
-    _frame(figure, (0.9, 1.9, 0.55, 0.35), title)
-    _save(figure, path)
+        axes.set_xlabel("x at rest (mm)")
+    reach = max(axes.get_xlim()[1] for axes in made.axes)
+    for axes in made.axes:
+        axes.set_xlim(-reach, reach)
+    made.save(
+        path, [f"Traction along x{', ' if where else ''}{where}, with the limit of friction" for where, _ in lines]
+    )
 
 
 def force_figure(path: str | Path, steps: Sequence[Mapping[str, Any]], title: str = "") -> None:
@@ -135,8 +137,8 @@ def force_figure(path: str | Path, steps: Sequence[Mapping[str, Any]], title: st
     slides = bool(np.any(at[:, 1:] != 0.0))
     if slides:
         depth = list(np.cumsum(np.linalg.norm(np.diff(at, axis=0, prepend=0.0), axis=1)))
-    figure = _figure(10.0, 4.2)
-    left, right = figure.subplots(1, 2)
+    made = sheet(1, 2, (WIDEST, 4.4), (0.8, 0.15, 0.55, 0.15), title)
+    left, right = made.axes
     left.plot(depth, normal, "o-", color="#222222", ms=4, label="normal force")
     left.plot(depth, friction, "s-", color="#c0392b", ms=4, label="sum of |friction|")
     left.set_ylabel("force (N)")
@@ -149,8 +151,8 @@ def force_figure(path: str | Path, steps: Sequence[Mapping[str, Any]], title: st
         axes.set_ylim(bottom=0.0, top=1.15 * axes.get_ylim()[1])  # room for the legend
         _plain(axes)
         axes.legend(frameon=False, loc="upper left")
-    _frame(figure, (0.7, 0.15, 0.55, 0.15), title)
-    _save(figure, path)
+    way = "way of the object" if slides else "depth"
+    made.save(path, (f"Forces against {way}", f"Half lengths of contact and stick zone against {way}"))
 
 
 # --- shared -------------------------------------------------------------------------------------------------------
@@ -163,31 +165,6 @@ def _column(table: Mapping[str, ArrayLike], name: str) -> Float:
 def _status(table: Mapping[str, ArrayLike]) -> Int:
     """Status (c,) as numbers, from names."""
     return np.array([STATUS_NAMES.index(name) for name in np.asarray(table["status"]).tolist()], dtype=np.int64)
-
-
-def _figure(width: float, height: float) -> Figure:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    # No pyplot: it keeps state, and looks for a display.
-    figure = Figure(figsize=(width, height))
-    FigureCanvasAgg(figure)
-    return figure
-
-
-def _frame(figure: Figure, inches: tuple[float, float, float, float], title: str) -> None:
-    """Margins left, right, below, above, in inches; matplotlib's own layout engines take as long as the drawing."""
-    left, right, below, above = inches
-    width, height = figure.get_size_inches()
-    above += 0.3 if title else 0.0
-    figure.subplots_adjust(left / width, below / height, 1.0 - right / width, 1.0 - above / height)
-    if title:
-        figure.suptitle(title, fontsize=12, y=1.0 - 0.08 / height, va="top")
-
-
-def _save(figure: Figure, path: str | Path) -> None:
-    with atomic(path) as temporary:
-        figure.savefig(temporary, format="png", dpi=_DPI, pil_kwargs={"compress_level": 4})
 
 
 def _plain(axes: Axes) -> None:
@@ -212,10 +189,10 @@ def _patches(colours: dict[int, str], states: Sequence[int]) -> list[Any]:
 
 def two_panels(aspect: float, title: str, ticks: bool = False) -> tuple[Figure, list[Axes]]:
     """Two panels of this height over width, with room for a key below each, and for ticks."""
-    width, panel, below = 14.0, 6.2 if ticks else 6.5, 1.4 if ticks else 0.95
+    width, panel, below = 2.0 * WIDEST, WIDEST - (0.8 if ticks else 0.2), 1.4 if ticks else 0.95
     above = 0.85 if title else 0.45
     high = panel * aspect
-    figure = _figure(width, below + high + above)
+    figure = blank(width, below + high + above)
     total = below + high + above
     panels = []
     for left, name in ((width / 2 - panel - 0.1, "contact pressure"), (width - panel - 0.1, "stick and slip")):
@@ -315,7 +292,9 @@ def _contact_line(axes: Axes, x: Float, fn: Float, fx: Float, fz: Float, status:
         reach = 1.15 * float(np.abs(x[touching]).max()) or float(np.abs(x).max()) or 1.0
         axes.set_xlim(-reach, reach)
     handles += _patches(_SHADES, [s for s in (STICK, SLIP) if np.any(status == s)])
-    axes.legend(handles=handles, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    axes.legend(
+        handles=handles, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=3, columnspacing=1.4
+    )  # fmt: skip
     _plain(axes)
     axes.grid(False, axis="x")
 

@@ -30,6 +30,7 @@ from finger3d.page import (
 )
 from finger3d.page.build import CITE, PAPER, number
 from finger3d.page.states import chosen
+from finger3d.panels import panels_of, sheet
 
 SECTION = """
 title = "a <script>alert(1)</script> & ü"
@@ -101,7 +102,8 @@ def test_a_press_tells_its_numbers_proof_cost_versions_and_how_to_cite(section: 
     assert f"scipy {summary['versions']['scipy']}" in text
     assert CITE in text
     assert all(advice in text for advice in summary["advice"])
-    assert (section / "report.html").read_text(encoding="utf-8").count('src="data:image/png;base64,') == 3
+    assert (section / "report.html").read_text(encoding="utf-8").count('href="data:image/png;base64,') == 3
+    assert "Contact pressure on the deformed finger, at true scale" in text
 
 
 def test_a_users_text_is_never_markup(section: Path) -> None:
@@ -116,7 +118,7 @@ def test_a_page_asks_no_machine_for_anything(section: Path, solid: Path) -> None
         page = (folder / "report.html").read_text(encoding="utf-8")
         assert "default-src 'none'" in page
         own = re.sub(r"<script>.*?</script>", "", page, flags=re.DOTALL)
-        assert not re.search(r"(?:src|href)=\"(?!data:)", own)
+        assert not re.search(r"(?:src|href)=\"(?!data:|#)", own)
         assert not re.search("https?://", own)
 
 
@@ -155,7 +157,9 @@ def test_a_failed_or_empty_press_says_so(section: Path, tmp_path: Path) -> None:
 
 
 def test_the_builder_takes_what_calibrate_and_sweep_have(tmp_path: Path) -> None:
-    (tmp_path / "fit.png").write_bytes(b"\x89PNG")
+    from PIL import Image
+
+    Image.new("RGB", (30, 20)).save(tmp_path / "fit.png")
     page = write_page(
         tmp_path, "mu <from> strain", [Row("resolution & more", 0.0123, "1/N", 0.0011), Row("fit", "second order")],
         [Section("Fit", ["a < b", Table(["mu", "s"], [(0.25, 1e-3), ("x", None)]), Code("x = <1>", "code")], True)],
@@ -180,6 +184,20 @@ def test_the_builder_takes_what_calibrate_and_sweep_have(tmp_path: Path) -> None
 )  # fmt: skip
 def test_numbers_have_the_digits_their_error_leaves(value: object, error: float | None, text: str) -> None:
     assert number(value, error) == text
+
+
+def test_a_picture_stands_in_the_page_once_and_each_panel_is_a_window_on_it(tmp_path: Path) -> None:
+    sheet(1, 2, (3.0, 2.0), (0.5, 0.1, 0.5, 0.1), "title").save(tmp_path / "two.png", ('<left> & "l"', "right"))
+    page = write_page(tmp_path, "t", figures=[Figure("two.png", "not shown")]).read_text(encoding="utf-8")
+    (width, height), panels = panels_of(tmp_path / "two.png")
+    boxes = re.findall(r'<svg role="img" aria-label="([^"]*)" viewBox="([^"]*)">(<image|<use) ', page)
+    assert boxes == [
+        ("&lt;left&gt; &amp; &quot;l&quot;", f"0 {height - 240} 360 240", "<image"),
+        ("right", f"360 {height - 240} 360 240", "<use"),
+    ]
+    assert f'<image id="picture-two" width="{width}" height="{height}" href="data:image/png;base64,' in page
+    assert page.count("data:image/png") == 1
+    assert "not shown" not in page
 
 
 def test_the_citation_is_that_of_the_citation_file(root: Path) -> None:

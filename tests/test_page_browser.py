@@ -12,6 +12,7 @@ import pytest
 
 from finger3d.cli import main
 from finger3d.compare import compare
+from finger3d.panels import DPI
 from tests.test_page import SECTION, SOLID
 
 pytestmark = pytest.mark.browser
@@ -40,7 +41,25 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         found[name] = folder / name
         assert main(["press", str(scene), "--out", str(folder / name)]) == 0
     found["compare"] = compare(folder / "solid.toml", folder / "compare", []).out
+    found["sweep"], found["calibrate"] = folder / "sweep", folder / "calibrate"
+    scene = str(folder / "section.toml")
+    few = ["--vary", "friction.mu=0.1,0.3", "--vary", "press.depth_mm=0.3,0.5", "--workers", "1"]
+    assert main(["sweep", scene, *few, "--out", str(found["sweep"])]) == 0
+    assert main(["calibrate", scene, "--gauge", "<g>", "--mu", "0.1:0.7:4", "--out", str(found["calibrate"])]) == 0
     return found
+
+
+_PANELS = """[...document.querySelectorAll("figure svg")].map((svg) => {
+    const box = svg.getBoundingClientRect();
+    return [box.width, Math.round(box.left), svg.viewBox.baseVal.width, svg.viewBox.baseVal.height];
+})"""
+"""Of every panel: its width and left end in CSS pixels, and what it shows, in pixels of the picture."""
+
+
+def pixels(png: bytes) -> np.ndarray[Any, Any]:
+    from PIL import Image
+
+    return np.asarray(Image.open(io.BytesIO(png)).convert("RGB"), dtype=float)
 
 
 class Visit:
@@ -69,7 +88,7 @@ class Visit:
 
 
 @pytest.mark.parametrize("width", [1280, 400])
-@pytest.mark.parametrize("name", ["section", "solid", "compare"])
+@pytest.mark.parametrize("name", ["section", "solid", "compare", "sweep", "calibrate"])
 def test_a_page_opens_without_complaint_request_or_sideways_scrolling(
     browser: Any, results: dict[str, Path], name: str, width: int
 ) -> None:
@@ -79,12 +98,22 @@ def test_a_page_opens_without_complaint_request_or_sideways_scrolling(
     # folded parts must not widen it either
     visit.page.evaluate("document.querySelectorAll('details').forEach((d) => { d.open = true; })")
     assert visit.page.evaluate("document.documentElement.scrollWidth") <= width
-    assert all(visit.page.evaluate("[...document.images].map((i) => i.complete && i.naturalWidth > 100)"))
+    panels = visit.page.evaluate(_PANELS)
+    assert len(panels) >= 3
+    # 6.2 in wide at most, with letters of 9 pt at least: at 0.6 of their size (96 pixels an inch) these are 7.2 pixels
+    assert min(wide / (shown * 96.0 / DPI) for wide, _, shown, _ in panels) >= 0.6
+    # two beside each other on a desk, one below another on a telephone
+    beside = {left for _, left, _, _ in panels}
+    assert len(beside) == (2 if width == 1280 else 1)
+    # none is blank: the picture behind each window was decoded and is where the window looks
+    for figure in visit.page.locator("figure").all():
+        assert pixels(figure.locator("svg").screenshot()).std() > 10.0
     if name == "solid":
         # a blank canvas has no variance; the drawn one shows body, pressure and page
         assert visit.stage().std(axis=(0, 1)).max() > 15.0
     assert visit.complaints == []
-    assert visit.requests == [visit.url]
+    # an image in an SVG counts as a request, though it is in the page
+    assert [url for url in visit.requests if not url.startswith("data:")] == [visit.url]
     visit.page.close()
 
 

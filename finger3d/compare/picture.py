@@ -10,29 +10,23 @@ import numpy as np
 
 from finger3d.compare.cases import Case
 from finger3d.compare.verdict import FORCE
-from finger3d.export import atomic
+from finger3d.panels import WIDEST, sheet
 
 _COLOURS = {"plane strain": "#b2182b", "plane stress": "#2166ac", "solid": "#222222", "solid, ends held": "#e08214"}
 
 
 def draw(path: Path, cases: Sequence[Case], own_width_mm: float, title: str) -> None:
     """Draw the cases that converged."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     good = [c for c in cases if c.ok]
     own = [c for c in good if c.width_mm == own_width_mm]
-    # No pyplot: it keeps state, and looks for a display.
-    figure = Figure(figsize=(12.0, 8.4), layout="constrained", dpi=120)
-    FigureCanvasAgg(figure)
-    axes = figure.subplots(2, 2)
-    _forces(axes[0, 0], good, own)
-    _bars(axes[0, 1], own)
-    _along(axes[1, 0], own, "pressure_MPa", "pressure (MPa)")
-    _along(axes[1, 1], own, "shear_x_MPa", "shear along x on the finger (MPa)")
-    figure.suptitle(f"{title}: 2D against 3D")
-    with atomic(path) as temporary:
-        figure.savefig(temporary, format="png")
+    made = sheet(2, 2, (WIDEST, 4.2), (0.95, 0.15, 0.7, 0.2), f"{title}: 2D against 3D")
+    forces, bars, pressure, shear = made.axes
+    _forces(forces, good, own)
+    _bars(bars, own)
+    _along(pressure, own, "pressure_MPa", "pressure (MPa)")
+    _along(shear, own, "shear_x_MPa", "shear along x on the finger (MPa)")
+    made.save(path, ("Force for each mm of width", "Every quantity beside the solid's", "Pressure along x",
+                     "Friction along x on the finger"))  # fmt: skip
 
 
 def _plain(axes: Any) -> None:
@@ -96,7 +90,7 @@ def _bars(axes: Any, own: Sequence[Case]) -> None:
             color=_COLOURS[case.model], error_kw={"lw": 0.9}, label=case.model,
         )  # fmt: skip
     axes.axhline(1.0, color="#888888", lw=0.8)
-    axes.set_xticks(at, [names[k] for k in keys], fontsize=8.5)
+    axes.set_xticks(at, [names[k] for k in keys], fontsize=9)
     axes.set_ylabel("in parts of the solid's (at z = 0)")
     axes.margins(y=0.18)
     axes.legend(frameon=False, ncols=3, loc="upper center")

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from finger3d.export import atomic
+from finger3d.panels import panels_of
 from finger3d.versions import versions as installed
 
 if TYPE_CHECKING:
@@ -58,7 +59,10 @@ class Table:
 
 @dataclass(frozen=True)
 class Figure:
-    """A PNG file, in the page's folder unless its path says otherwise; one that is not there is left out."""
+    """A PNG file, in the page's folder unless its path says otherwise; one that is not there is left out.
+
+    A picture that knows its panels (`finger3d.panels`) is shown as these, under their own names.
+    """
 
     path: str | Path
     caption: str = ""
@@ -132,7 +136,7 @@ def write_page(
         body.append(f'<ul class="notes">{"".join(f"<li>{escape(note)}</li>" for note in notes)}</ul>')
     if view is not None:
         body.append(view.html())
-    body += [_figure(folder, f) for f in figures]
+    body.append(_figures(folder, figures))
     found = installed() if versions is None else versions
     closing = [
         Section("Versions", [", ".join(f"{k} {v}" for k, v in found.items())]),
@@ -189,7 +193,7 @@ def _part(folder: Path, part: Part) -> str:
     if isinstance(part, Table):
         return _table(part)
     if isinstance(part, Figure):
-        return _figure(folder, part)
+        return _figures(folder, [part])
     if isinstance(part, Code):
         code = f"<pre>{escape(part.text)}</pre>"
         return f"<details><summary>{escape(part.summary)}</summary>{code}</details>" if part.summary else code
@@ -211,13 +215,29 @@ def _cell(value: object) -> str:
     return f'<td class="{kind}">{escape(text)}</td>' if kind else f"<td>{escape(text)}</td>"
 
 
-def _figure(folder: Path, figure: Figure) -> str:
-    path = folder / figure.path
+def _figures(folder: Path, figures: Sequence[Figure]) -> str:
+    """Pictures in a grid, each panel of one in a place of its own; a picture's data stand in the page once."""
+    shown = "".join(_figure(folder / figure.path, figure.caption) for figure in figures)
+    return f'<div class="figures">{shown}</div>' if shown else ""
+
+
+def _figure(path: Path, caption: str) -> str:
     if not path.exists():
         return ""
-    data = base64.b64encode(path.read_bytes()).decode("ascii")
-    text = escape(figure.caption, quote=True)
-    return f'<figure><img alt="{text}" src="data:image/png;base64,{data}"><figcaption>{text}</figcaption></figure>'
+    data = f"data:image/png;base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"
+    (width, height), panels = panels_of(path)
+    if not panels:
+        text = escape(caption, quote=True)
+        return f'<figure><img alt="{text}" src="{data}"><figcaption>{text}</figcaption></figure>'
+    name = escape(f"picture-{path.stem}", quote=True)
+    whole = f'<image id="{name}" width="{width}" height="{height}" href="{data}"/>'
+    shown = []
+    for panel in panels:
+        text, box = escape(panel.name, quote=True), f"{panel.left} {panel.top} {panel.width} {panel.height}"
+        picture = f'<svg role="img" aria-label="{text}" viewBox="{box}">{whole}</svg>'
+        shown.append(f"<figure>{picture}<figcaption>{text}</figcaption></figure>")
+        whole = f'<use href="#{name}"/>'
+    return "".join(shown)
 
 
 def _document(title: str, body: str, script: str) -> str:

@@ -16,12 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.errors import Finger3dError
-from finger3d.export import atomic, write_csv
+from finger3d.export import write_csv
 from finger3d.fem.elements import gradient, shape
 from finger3d.fem.recover import displacement
 from finger3d.history import Frame
 from finger3d.mesh import Mesh
 from finger3d.model import Gauge, Model
+from finger3d.panels import sheet
 from finger3d.problem import Problem
 from finger3d.sensor.curve import Calibration
 
@@ -212,12 +213,10 @@ class StrainMap:
 
 def draw_map(path: Path, found: StrainMap, gauge: Gauge, calibration: Calibration, mu: float = 0.5) -> None:
     """Draw slope along the gauge at one mu, the worst resolution over all mu along it, and along the best direction."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(16.0, 4.4), layout="constrained", dpi=110)
-    FigureCanvasAgg(figure)
-    panels = figure.subplots(1, 3, sharey=True)
+    ends = f"mu = {found.mu[0]:g} to {found.mu[-1]:g}"
+    title = f"z = {found.z_mm:g} mm, {ends}, noise {calibration.noise:g}; circle: gauge {gauge.name}"
+    made = sheet(1, 3, (5.4, 3.9), (0.7, 0.15, 0.2, 0.35), title)
+    figure, panels = made.figure, made.axes
     mu = float(np.clip(mu, found.mu[0], found.mu[-1]))
     degrees = math.degrees(gauge.angle)
     slope_panel(figure, panels[0], found, gauge.angle, mu)
@@ -232,11 +231,9 @@ def draw_map(path: Path, found: StrainMap, gauge: Gauge, calibration: Calibratio
     for axes in panels:
         axes.plot(gauge.x_mm, gauge.y_mm, "o", ms=8, mfc="none", mec="#000000", mew=1.4)
         axes.set_xlabel("x (mm)")
-    panels[0].set_ylabel("y (mm)")
-    ends = f"mu = {found.mu[0]:g} to {found.mu[-1]:g}"
-    figure.suptitle(f"z = {found.z_mm:g} mm, {ends}, noise {noise:g}; circle: gauge {gauge.name}")
-    with atomic(path) as temporary:
-        figure.savefig(temporary, format="png")
+        axes.set_ylabel("y (mm)")
+    made.save(path, (f"How strongly a gauge along {degrees:.4g}° follows mu", "The worst resolution along the gauge",
+                     "The worst resolution along the best direction"))  # fmt: skip
 
 
 def _positive(slope: Float) -> Float:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.export import atomic
+from finger3d.panels import sheet
 from finger3d.sensor.curve import Calibration
 
 _MOST = 10.0  # times the limit: resolutions beyond are off the picture
@@ -15,20 +15,15 @@ _MOST = 10.0  # times the limit: resolutions beyond are off the picture
 
 def draw(path: Path, calibration: Calibration) -> None:
     """Draw three panels: strain, resolution, causes."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(15.0, 4.9), dpi=110)  # matplotlib's own layout takes as long as the drawing
-    figure.subplots_adjust(left=0.05, right=0.99, bottom=0.25, top=0.9, wspace=0.22)
-    FigureCanvasAgg(figure)
-    left, middle, right = figure.subplots(1, 3)
+    domain = calibration.about.get("domain", "")
+    title = f"Gauge {calibration.gauge}" + (f", {domain}" if domain else "")
+    made = sheet(1, 3, (5.4, 4.8), (0.8, 0.2, 1.2, 0.15), title)
+    left, middle, right = made.axes
     curve_panel(left, calibration)
     _resolution(middle, calibration)
     _causes(right, calibration)
-    domain = calibration.about.get("domain", "")
-    figure.suptitle(f"Gauge {calibration.gauge}" + (f", {domain}" if domain else ""))
-    with atomic(path) as temporary:
-        figure.savefig(temporary, format="png")
+    made.save(path, ("Strain against friction, and its fit", "How finely mu is told",
+                     "What the uncertainty of mu is made of"))  # fmt: skip
 
 
 def _plain(axes: Any) -> None:
