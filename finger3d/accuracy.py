@@ -156,14 +156,19 @@ def companion(problem: Problem) -> Problem:
     Finger3dError
         Where the mesh is so coarse that none is coarser.
     """
-    everything = len(surface(problem.mesh, "contact", problem.thickness).nodes) == len(problem.surface.nodes)
     costly = problem.dim == 2 and type(problem.model.kinematics) is not SmallStrain
     model = coarser(problem.model, _FACTOR_WHERE_STEPS_FACTOR if costly else FACTOR)
     _check_cost(problem, model)
-    beside = build(model, margin=math.inf) if everything else build(model)
+    beside = built_like(problem, model)
     if _ratio(problem, beside) < _LEAST_RATIO:
         raise Finger3dError("the mesh is so coarse that no coarser one tells anything; lower mesh.size_mm")
     return beside
+
+
+def built_like(problem: Problem, model: Model) -> Problem:
+    """Another model condensed, to all of its contact face where the problem keeps all of its own."""
+    everything = len(surface(problem.mesh, "contact", problem.thickness).nodes) == len(problem.surface.nodes)
+    return build(model, margin=math.inf) if everything else build(model)
 
 
 def _check_cost(problem: Problem, model: Model) -> None:
@@ -195,9 +200,11 @@ def _ratio(problem: Problem, beside: Problem) -> float:
     return float((problem.stiffness.upper.shape[0] / beside.stiffness.upper.shape[0]) ** (1.0 / problem.dim))
 
 
-def strain_error(problem: Problem, beside: Problem, fine: Float, coarse: Float) -> Float:
-    """Discretisation error (m,) of a gauge's strain (m,) at several coefficients of friction, from its companion's."""
-    share = Grain.of(problem, last_frame(problem)).share
+def strain_error(problem: Problem, frame: Frame, beside: Problem, fine: Float, coarse: Float) -> Float:
+    """Discretisation error (m,) of a gauge's strain (m,) at several coefficients of friction, from its companion's;
+    the grain is that of a last `frame` at any of them.
+    """
+    share = Grain.of(problem, frame).share
     found = np.abs(fine - coarse) / (_ratio(problem, beside) ** ORDER - 1.0)
     return np.maximum(found, _FLOOR * share * np.abs(fine).max(initial=0.0))
 

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from itertools import repeat
 from typing import TypeVar
 
 import numpy as np
@@ -194,10 +195,16 @@ def _unfolded(
     return parent, world_sign[:, [1, 0, 2][:d]], share, points
 
 
-def march(problem: Problem) -> Iterator[Frame]:
+def march(problem: Problem, near: Sequence[Float] = ()) -> Iterator[Frame]:
     """Frames of all legs in turn; stops after the first increment that did not settle.
 
     Under the paper's rule an increment that cycled is handed on as it is, and never cut: that is what the rule does.
+
+    Parameters
+    ----------
+    problem : the condensed body, its path and its law of friction
+    near : forces (c, d) N at the ends of the increments of a press much like this one, where these may start; they
+        save iterations and decide nothing
     """
     literal = problem.model.rule == "paper"
     at = problem.origin
@@ -207,8 +214,9 @@ def march(problem: Problem) -> Iterator[Frame]:
     work = dissipation = 0.0
     # what the gauges would read if nothing were embedded: the same path in the same body without
     beside = march(replace(problem.bare, model=problem.model)) if problem.bare else None
-    for target in targets(problem.model.legs):
-        found, done = _increment(problem, state, at, target, 0 if literal else _CUTS, _guess(state, at, target, pace))
+    for number, target in enumerate(targets(problem.model.legs)):
+        guess = near[number] if number < len(near) else _guess(state, at, target, pace)
+        found, done = _increment(problem, state, at, target, 0 if literal else _CUTS, guess)
         for before, after, a, b in done:
             work += _work(problem, before, after, a, b)
             dissipation += _dissipated(problem, before, after)
@@ -223,19 +231,27 @@ def march(problem: Problem) -> Iterator[Frame]:
             return
 
 
-def each(problem: Problem, press: Callable[[Asked], Told], asked: Sequence[Asked]) -> Iterator[Told]:
+def each(problem: Problem, press: Callable[[Asked, Sequence[Told]], Told], asked: Sequence[Asked]) -> Iterator[Told]:
     """What `press` tells of everything asked, in that order; for presses of one problem, under one law after another.
 
-    Where they share nothing that changes, as many run at once as there are cores, each on one thread: dense systems of
-    this size gain more by that than by threads of their own, and smaller ones spend their time in Python.
+    `press` is given what it told of the last two before, from which it may start.  Where presses share nothing that
+    changes, as many run at once as there are cores, each on one thread: dense systems of this size gain more by that
+    than by threads of their own, and smaller ones spend their time in Python.
     """
+    before: tuple[Told, ...] = ()
     alone = len(problem.kept) < _WORTH or len(asked) < 2 or cores() < 2
     if alone or not getattr(problem.model.kinematics, "independent", False):
-        yield from map(press, asked)
+        for one in asked:
+            before = (*before, press(one, before))[-2:]
+            yield before[-1]
         return
     # One limit around them all: those inside would each restore what another has set.
     with one_thread(), ThreadPoolExecutor(cores()) as pool:
-        yield from pool.map(press, asked)  # which cancels what has not begun, if this ends early
+        for first in range(0, len(asked), cores()):
+            found = pool.map(press, asked[first : first + cores()], repeat(before))  # cancels the rest, if this ends
+            for told in found:
+                before = (*before, told)[-2:]
+                yield told
 
 
 def _free(problem: Problem, beside: Iterator[Frame] | None) -> dict[str, float]:

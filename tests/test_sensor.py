@@ -14,7 +14,7 @@ import pytest
 
 from finger3d.cli import main
 from finger3d.contact.law import Coulomb
-from finger3d.errors import Finger3dError, MissingError
+from finger3d.errors import Finger3dError, MissingError, Outcome
 from finger3d.export import claimed
 from finger3d.model import Leg
 from finger3d.reduced import Condensed
@@ -22,6 +22,7 @@ from finger3d.report import Report
 from finger3d.scene import load as load_scene
 from finger3d.scene import parse
 from finger3d.sensor import TOLERANCES, Calibration, Tolerance, calibrate, estimate, load, save
+from finger3d.sensor import presses as pressing
 from finger3d.sensor import run as runs
 from finger3d.sensor.maps import Reader, StrainMap
 from finger3d.sensor.run import calibrated, parsed_mus
@@ -314,6 +315,38 @@ def test_every_tolerance_is_the_difference_of_two_scenes() -> None:
     assert slopes["depth_mm"][number] == pytest.approx((deep[0] - deep[1]) / 0.2, rel=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("domain", "mesh"), [("plane-strain", (1.0, 6.0)), ("solid", (6.0, 14.0))], ids=["section", "solid"]
+)
+def test_presses_started_from_their_neighbours_end_where_cold_ones_do(domain: str, mesh: tuple[float, float]) -> None:
+    sizes = {"size_mm": mesh[0], "base_size_mm": mesh[1], "mesher": "swept"}
+    problem = build(scene(model={"domain": domain}, mesh=sizes).model())
+    cold = {mu: pressing.press(problem, mu) for mu in runs.MUS}
+    chain = list(pressing.presses(problem, runs.MUS))
+    again = list(pressing.presses(problem, runs.MUS[::6], cold))  # each from the same press
+    for found in (*chain, *again):
+        assert found.frame.outcome.ok
+        assert found.frame.gauges["g36"] == pytest.approx(cold[found.mu].frame.gauges["g36"], rel=1e-9)
+    last = {k: sum(p.frame.iterations for p in found) for k, found in (("cold", cold.values()), ("chain", chain))}
+    assert last["chain"] < 0.7 * last["cold"]
+    assert [p.frame.iterations for p in again] == [1] * len(again)
+
+
+def test_slopes_between_the_few_mu_that_are_tried(monkeypatch: Any) -> None:
+    """Within a fifth of the largest, about what a tolerance is known to; where all of the contact begins to stick,
+    the effect of nu turns between two of them.
+    """
+    fine, mus = scene(mesh={"size_mm": 0.6, "base_size_mm": 4.0}), runs.MUS[::2]
+    told = {**NONE, "depth_mm": 0.1, "nu": 0.003, "tilt_deg": 0.5}
+    few = calibrate(fine, "g36", mus=mus, tolerances=told)
+    monkeypatch.setattr(runs, "_SLOPES", {True: len(mus)})
+    for a, b in zip(few.tolerances, calibrate(fine, "g36", mus=mus, tolerances=told).tolerances, strict=True):
+        assert a.name == b.name
+        assert a.slope[::2] == pytest.approx(b.slope[::2], rel=1e-6)
+        assert 0.0 < np.abs(a.slope - b.slope).max() <= 0.2 * np.abs(b.slope).max(), a.name
+        assert np.abs(a.spread - b.spread).max() <= 0.2 * b.spread.max(), a.name
+
+
 def test_modulus_from_the_same_condensation_is_that_of_another_scene() -> None:
     changes: dict[str, Any] = {
         "effects": {
@@ -365,15 +398,14 @@ def test_steps_that_are_chosen_automatically() -> None:
 
 
 def test_points_that_fail_are_kept_as_failures(tmp_path: Path, monkeypatch: Any, scene_file: Path, capsys: Any) -> None:
-    whole = runs.last_frame
+    whole = pressing.press
 
-    def some(problem: Any, mu: float) -> Any:
-        frame = whole(problem, mu)
-        from finger3d.errors import Outcome
+    def some(problem: Any, mu: float, near: Any = ()) -> Any:
+        found = whole(problem, mu, near)
+        failed = replace(found.frame, outcome=Outcome.NO_CONVERGENCE)
+        return replace(found, frame=failed) if mu in (0.4, 0.9) else found
 
-        return replace(frame, outcome=Outcome.NO_CONVERGENCE) if mu in (0.4, 0.9) else frame
-
-    monkeypatch.setattr(runs, "last_frame", some)
+    monkeypatch.setattr(pressing, "press", some)
     out = tmp_path / "cal"
     assert run("calibrate", scene_file, "--gauge", "g36", "--out", out, "--mu", ",".join(map(str, FEW)),
                "--tolerance", "nu=0", "--tolerance", "tilt_deg=0") == 3  # fmt: skip
@@ -385,7 +417,7 @@ def test_points_that_fail_are_kept_as_failures(tmp_path: Path, monkeypatch: Any,
     with (out / "calibration.csv").open() as stream:
         rows = list(csv.DictReader(stream))
     assert sum("did not settle" in row["outcome"] for row in rows) == 2
-    monkeypatch.setattr(runs, "last_frame", lambda p, mu: replace(some(p, 0.4), target=some(p, 0.4).target))
+    monkeypatch.setattr(pressing, "press", lambda p, mu, near: replace(some(p, 0.4), mu=mu))
     with pytest.raises(MissingError, match="only 0 of 6"):
         calibrate(scene(), "g36", out, FEW, tolerances=NONE)
     assert "did not settle" in (out / "calibration.csv").read_text()
@@ -394,14 +426,14 @@ def test_points_that_fail_are_kept_as_failures(tmp_path: Path, monkeypatch: Any,
 def test_an_interruption_keeps_the_points_so_far(
     tmp_path: Path, monkeypatch: Any, scene_file: Path, capsys: Any
 ) -> None:
-    whole = runs.last_frame
+    whole = pressing.press
 
-    def until(problem: Any, mu: float) -> Any:
+    def until(problem: Any, mu: float, near: Any) -> Any:
         if mu > 0.5:
             raise KeyboardInterrupt
-        return whole(problem, mu)
+        return whole(problem, mu, near)
 
-    monkeypatch.setattr(runs, "last_frame", until)
+    monkeypatch.setattr(pressing, "press", until)
     out = tmp_path / "cal"
     assert run("calibrate", scene_file, "--gauge", "g36", "--out", out, "--mu", ",".join(map(str, FEW))) == 130
     assert "3 of 6 values of mu are kept" in capsys.readouterr().err
@@ -420,7 +452,7 @@ def test_the_map_reads_what_a_gauge_there_reads(domain: str) -> None:
     size = {"size_mm": 8.0, "base_size_mm": 14.0, "mesher": "swept"} if domain == "solid" else SCENE["mesh"]
     model = scene(gauge=gauges, model={"domain": domain}, mesh=size).model()
     problem = build(model)
-    frames = {mu: runs.last_frame(problem, mu) for mu in (0.2, 0.4)}
+    frames = {mu: pressing.last_frame(problem, mu) for mu in (0.2, 0.4)}
     found = StrainMap.of(problem, frames)
     for x, y in places:
         i, j = int(np.argmin(np.abs(found.y - y))), int(np.argmin(np.abs(found.x - x)))
@@ -435,7 +467,7 @@ def test_the_map_reads_what_a_gauge_there_reads(domain: str) -> None:
 
 def test_the_map_of_a_mirror_image_is_a_mirror_image() -> None:
     problem = build(scene().model())
-    found = StrainMap.of(problem, {mu: runs.last_frame(problem, mu) for mu in (0.2, 0.6)})
+    found = StrainMap.of(problem, {mu: pressing.last_frame(problem, mu) for mu in (0.2, 0.6)})
     assert np.allclose(found.along(0.5), found.along(math.pi - 0.5)[:, :, ::-1], atol=1e-12, equal_nan=True)
     best, angle = found.best()
     assert np.nanmax(found.worst_slope(0.5) - best) <= np.nanmax(best) * 0.05  # the best of 5 degree steps

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -234,8 +236,9 @@ def test_presses_at_once_are_the_presses_in_turn(monkeypatch: pytest.MonkeyPatch
     problem = build(Model(design, Material(1.0, 0.3), MeshOptions(0.3, 1.5), legs, domain="plane-stress"))
     mus = (0.1, 0.3, 0.6, 1.2)
 
-    def press(mu: float) -> list[np.ndarray]:
-        return [f.state.force for f in march(replace(problem, model=replace(problem.model, friction=Coulomb(mu))))]
+    def press(mu: float, before: Sequence[Any] = ()) -> list[np.ndarray]:
+        own = replace(problem, model=replace(problem.model, friction=Coulomb(mu)))
+        return [f.part.force for f in march(own, before[-1] if before else ())]
 
     at_once = list(each(problem, press, mus))
     assert all(

@@ -16,6 +16,9 @@ _EXACT = 1e-11
 """Residual of the conditions themselves at which an iterate is a solution; the projection's own residual would not do,
 since a gap's round-off enters its bound times mu."""
 
+_NEAR = 1e-6
+"""Residual of the projection, as a share of the forces and times mu, below which the conditions are judged."""
+
 _DIVERGED = 1e9
 
 
@@ -48,28 +51,31 @@ def force_of_sets(problem: Increments, status: NDArray[np.int8], trial: Float) -
     turn = np.minimum(mu * trial[slip, 0] / length, 1.0) if d > 2 else np.zeros(0)
     across = np.stack([-direction[:, 1], direction[:, 0]], axis=1) if d > 2 else np.zeros((0, 0))
     # unknowns: forces of sticking points, f_n of slipping ones, force across; equations: which displacement vanishes,
-    # weighted to a force.  Rows of the compliance are gathered, which is several times quicker than sparse products.
+    # weighted to a force.  Rows of the compliance are taken whole: gathering is as dear as the solution.
     n, k, w = len(stick) * d, len(slip), len(turn)
-    free_dofs, normal = (stick[:, None] * d + np.arange(d)).ravel(), slip * d
-    pull, rho, compliance = mu[:, None] * direction, problem.rho.ravel(), problem.compliance
-    side = [normal + i for i in range(1, d)]
+    normal, rho, compliance = slip * d, problem.rho.ravel(), problem.compliance
+    free_dofs, side = (stick[:, None] * d + np.arange(d)).ravel(), [normal + i for i in range(1, d)]
+    own = np.concatenate([free_dofs, normal])
+    pull = mu[:, None] * direction
+    sides = [compliance.take(s, axis=0) for s in side]
     moved = np.empty((n + k + w, c * d))  # displacements per unit of every unknown; the compliance is symmetric
-    moved[:n] = compliance[free_dofs]
-    moved[n : n + k] = compliance[normal] + sum(pull[:, i, None] * compliance[s] for i, s in enumerate(side))
-    weigh = (turn[:, None] * across) * np.stack([rho[s] for s in side], axis=1) if w else np.zeros((0, d - 1))
-    if w:
-        moved[n + k :] = sum(across[:, i, None] * compliance[s] for i, s in enumerate(side))
-    tested = np.empty((n + k + w, n + k + w))
+    moved[: n + k] = compliance.take(own, axis=0)
+    for i, rows in enumerate(sides):
+        moved[n : n + k] += pull[:, i, None] * rows
+        if w:
+            moved[n + k :] = across[:, i, None] * rows + (moved[n + k :] if i else 0.0)
+    turned = np.empty((n + k + w, n + k + w))  # equations run along its columns
+    np.multiply(moved.take(own, axis=1), rho[own], out=turned[:, : n + k])
     right = np.empty(n + k + w)
     free = problem.free.ravel()
-    for rows, values in ((tested, moved.T), (right, free)):
-        rows[:n] = (rho[free_dofs] * values[free_dofs].T).T
-        rows[n : n + k] = (rho[normal] * values[normal].T).T
-        if w:
-            rows[n + k :] = sum((weigh[:, i] * values[s].T).T for i, s in enumerate(side))
+    right[: n + k] = rho[own] * free[own]
+    if w:
+        weigh = [turn * across[:, i] * rho[s] for i, s in enumerate(side)]
+        turned[:, n + k :] = sum(moved.take(s, axis=1) * weigh[i] for i, s in enumerate(side))
+        right[n + k :] = sum(weigh[i] * free[s] for i, s in enumerate(side))
     at_w = n + k + np.arange(w)
-    tested[at_w, at_w] += 1.0 - turn
-    unknowns = np.linalg.solve(tested, -right)
+    turned[at_w, at_w] += 1.0 - turn
+    unknowns = np.linalg.solve(turned.T, -right)
     force = np.zeros((c, d))
     force.ravel()[free_dofs] = unknowns[:n]
     force[slip, 0] = unknowns[n : n + k]
@@ -84,7 +90,7 @@ def newton(problem: Increments, start: Float, limit: int, damped: bool) -> Itera
 
     A set of states that comes back with the same residual ends the full-step variant: it would cycle from there.
     """
-    force = start
+    force, near = start, _NEAR * float(problem.mu.max(initial=1.0))
     projected, status, trial = project(problem, force, problem.moved(force))
     merit = float(np.linalg.norm(force - projected))
     seen: dict[bytes, float] = {}
@@ -97,14 +103,13 @@ def newton(problem: Increments, start: Float, limit: int, damped: bool) -> Itera
             target = force_of_sets(problem, status, trial)
         except np.linalg.LinAlgError:
             break
-        moved = problem.moved(target)
-        if residual(target, moved, status, problem.mu, problem.length_scale) <= _EXACT:
-            return Iterate(target, status, True, iteration)
-        share = 1.0
-        candidate = target
+        share, candidate, moved = 1.0, target, problem.moved(target)
         while True:
             projected, next_status, next_trial = project(problem, candidate, moved)
             next_merit = float(np.linalg.norm(candidate - projected))
+            if share == 1.0 and next_merit <= near * float(np.linalg.norm(target)):
+                if residual(target, moved, status, problem.mu, problem.length_scale) <= _EXACT:
+                    return Iterate(target, status, True, iteration)
             if not damped or next_merit <= (1.0 - 1e-4 * share) * merit or share < 1e-3:
                 break
             share *= 0.5

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -26,8 +26,9 @@ from finger3d.reduced import Condensed, friction_at
 from finger3d.report import Report
 from finger3d.sensor.curve import FEWEST, NOISE, RESOLUTION, Calibration, Range, Tolerance
 from finger3d.sensor.files import save, write_table
+from finger3d.sensor.presses import Press, presses
 from finger3d.sensor.tolerances import Pressed, chosen, moved_gauges, slopes
-from finger3d.solve import MARGIN, build, covers, each, march
+from finger3d.solve import MARGIN, build, covers
 from finger3d.versions import versions
 
 if TYPE_CHECKING:
@@ -44,11 +45,12 @@ _SLOPES = {True: 7, False: 3}  # values of mu at which tolerances are tried: wit
 
 @dataclass
 class Sweep:
-    """The presses of one calibration as they come: last frame by mu, or why there is none."""
+    """The presses of one calibration as they come: last frame by mu, or why there is none; a few with their paths."""
 
     mus: tuple[float, ...]
     frames: dict[float, Frame] = field(default_factory=dict)
     failed: dict[float, str] = field(default_factory=dict)
+    few: dict[float, Press] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
 
     def strains(self, name: str) -> tuple[Float, Float]:
@@ -212,30 +214,24 @@ def _press(problem: Problem, sweep: Sweep, report: Report) -> None:
         report.say(f"{name}: its compliance changes on the way, so that every one of {len(sweep.mus)} mu is a full "
                    "march, and so is every tolerance")  # fmt: skip
     report.stage("pressing")
-    sweep.frames.clear()
-    sweep.failed.clear()
-    for done, (mu, frame) in enumerate(zip(sweep.mus, _last_frames(problem, sweep.mus), strict=True), start=1):
+    for kept in (sweep.frames, sweep.failed, sweep.few):
+        kept.clear()
+    few = {sweep.mus[i] for i in _few(problem, len(sweep.mus))}
+    for done, found in enumerate(presses(problem, sweep.mus), start=1):
+        mu, frame = found.mu, found.frame
         if frame.outcome.ok:
             sweep.frames[mu] = frame
+            if mu in few:
+                sweep.few[mu] = found
         else:
             sweep.failed[mu] = f"at depth {frame.target.depth_mm:.4g} mm: {frame.outcome}"
         report.step(done, len(sweep.mus), f"mu = {mu:.4g}: {sweep.failed.get(mu, 'converged')}")
 
 
-def last_frame(problem: Problem, mu: float) -> Frame:
-    """The last increment of a press of the condensed body with this mu."""
-    law = friction_at(problem.model.friction, mu)
-    *_, frame = march(replace(problem, model=replace(problem.model, friction=law)))
-    return frame
-
-
-def _last_frames(problem: Problem, mus: Sequence[float]) -> Iterator[Frame]:
-    return each(problem, lambda mu: last_frame(problem, mu), mus)
-
-
-def _read(problem: Problem, names: tuple[str, ...], mus: Float) -> Float:
-    frames = list(_last_frames(problem, mus.tolist()))
-    return np.array([[f.gauges[n] if f.outcome.ok else math.nan for f in frames] for n in names])
+def _few(problem: Problem, count: int) -> NDArray[np.int64]:
+    """Numbers, among `count` values of mu, of those at which tolerances are tried."""
+    wanted = _SLOPES[type(problem.model.kinematics) is SmallStrain]
+    return np.unique(np.linspace(0, count - 1, wanted).round().astype(int))
 
 
 def _calibrated(
@@ -248,10 +244,9 @@ def _calibrated(
     bare = Calibration(gauge.name, mu, strain, noise, limit, (), failed)  # refuses too few points
     found: tuple[Tolerance, ...] = ()
     if wanted:
-        base = Pressed(mu, {g.name: sweep.strains(g.name)[1] for g in problem.model.gauges})
-        count = _SLOPES[type(problem.model.kinematics) is SmallStrain]
-        few = np.unique(np.linspace(0, len(mu) - 1, count).round().astype(int))
-        found = tuple(slopes(problem, gauge, wanted, base, few, _read, report.stage))
+        strains = {g.name: sweep.strains(g.name)[1] for g in problem.model.gauges}
+        base = Pressed(mu, strains, _few(problem, len(mu)), sweep.frames[float(mu[-1])], sweep.few)
+        found = tuple(slopes(problem, gauge, wanted, base, report.stage))
     sweep.seconds["tolerances"] = time.perf_counter() - start
     return replace(bare, tolerances=found)
 

@@ -2,7 +2,8 @@
 
 Depth and E ask nothing of the mesh: one is another path, the other another scale of the same compliance.  Gauges that
 are a little off are read beside the true one from the same presses; only a foil with its own stiffness, nu and tilt
-need bodies of their own.  Differences are over one tolerance, for depth, nu and tilt at a few mu.
+need bodies of their own.  Differences are over one tolerance, for depth, nu and tilt at a few mu; slopes in between are
+interpolated.
 """
 
 from __future__ import annotations
@@ -15,15 +16,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.accuracy import companion, strain_error
+from finger3d.accuracy import built_like, companion, strain_error
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import MIXED_FROM
 from finger3d.fem.condense import stiffened
+from finger3d.history import Frame
 from finger3d.kinematics import SmallStrain
 from finger3d.model import Gauge, MeshOptions, Model
 from finger3d.objects import Plane
 from finger3d.problem import Problem, at_points
 from finger3d.sensor.curve import Tolerance
+from finger3d.sensor.presses import Like, presses
 from finger3d.solve import build
 
 Float = NDArray[np.float64]
@@ -42,10 +45,8 @@ TOLERANCES: dict[str, tuple[float, str]] = {
 """Standard deviations assumed unless others are given: a careful laboratory set-up and a hand-laid gauge; of the mesh
 its error bar, from a coarser companion."""
 
-_ENOUGH = 100  # contact points that a body compared with itself is left with
+_ENOUGH = {2: 100, 3: 500}  # contact points that a tilted body is left with
 _PLACES = ("gauge_x_mm", "gauge_y_mm", "gauge_angle_deg")
-Read = Callable[[Problem, tuple[str, ...], Float], Float]
-"""Strain (g, m) of some gauges of a problem at mu (m,)."""
 
 
 def chosen(given: Mapping[str, float] | None) -> dict[str, float]:
@@ -100,90 +101,127 @@ def _inside(model: Model, gauge: Gauge) -> bool:
 
 @dataclass(frozen=True)
 class Pressed:
-    """What was found of the body as it should be: strain (n,) of every gauge by name at mu (n,)."""
+    """What was found of the body as it should be.
+
+    Attributes
+    ----------
+    mu, strain : (n,), and (n,) of every gauge by name
+    few : numbers of the mu at which other bodies and paths are pressed
+    frame : the last one of any press
+    pressed : presses that others may start from
+    """
 
     mu: Float
     strain: Mapping[str, Float]
+    few: Int
+    frame: Frame
+    pressed: Like
+
+
+@dataclass(frozen=True)
+class Body:
+    """The body that others are compared with: strain (m,) of the gauge at mu (m,), and presses they may start from."""
+
+    problem: Problem
+    gauge: Gauge
+    mu: Float
+    strain: Float
+    pressed: Like
+
+    def change(self, problem: Problem) -> Float:
+        """What the strain (m,) changes by once the body is another."""
+        return read(problem, (self.gauge.name,), self.mu, self.pressed)[0] - self.strain
+
+    def rebuilt(self, **changes: Any) -> Problem:
+        """The body with another model, without the gauges that nobody reads; all of them where they stiffen it."""
+        model = self.problem.model
+        alone = model if model.inclusions else replace(model, gauges=(self.gauge,))
+        return built_like(self.problem, replace(alone, **changes))
+
+
+def read(problem: Problem, names: tuple[str, ...], mu: Float, like: Like | None = None) -> Float:
+    """Strain (g, m) of some gauges at mu (m,), nan where a press failed."""
+    frames = [p.frame for p in presses(problem, mu.tolist(), like)]
+    return np.array([[f.gauges[n] if f.outcome.ok else math.nan for f in frames] for n in names])
 
 
 def slopes(
-    problem: Problem, gauge: Gauge, tolerances: Mapping[str, float], base: Pressed, few: Int, read: Read,
-    say: Callable[[str], None],
-) -> Iterator[Tolerance]:  # fmt: skip
-    """Every tolerance with its slope at all mu of `base`.
+    problem: Problem, gauge: Gauge, tolerances: Mapping[str, float], base: Pressed, say: Callable[[str], None]
+) -> Iterator[Tolerance]:
+    """Every tolerance with its slope at all mu of `base`; those between the few are interpolated.
 
     Parameters
     ----------
     problem : the condensed body
     base : strains of its gauges, those a little off among them unless it has inclusions
-    few : numbers of the mu at which other bodies and paths are pressed; slopes in between are interpolated
-    read : presses; a press that failed gives nan, and is passed over
-    say : told which tolerance is being tried
+    say : told which tolerance is being tried; a press that fails is passed over
     """
+    at = base.few
+    body = Body(problem, gauge, base.mu[at], base.strain[gauge.name][at], base.pressed)
     for name, sd in tolerances.items():
         say(f"tolerance {name}")
         beside = _beside(problem.model, gauge, name, sd, base)
-        at = np.arange(len(base.mu)) if beside else few
-        mine = base.strain[gauge.name][at]
-        pairs = beside or list(_steps(problem, gauge, name, sd, base.mu[at], mine, read))
-        if not pairs:
+        where = np.arange(len(base.mu)) if beside else at
+        steps = beside or list(_meshed(body, base.frame, sd) if name == "mesh" else _steps(body, name, sd))
+        if not steps:
             continue
-        (a, at_a), (b, at_b) = [*pairs, (0.0, mine)][:2]
+        steps = [(step, _between(base.mu, base.mu[where], effect)) for step, effect in steps]
+        if not all(np.isfinite(effect).all() for _, effect in steps):
+            continue
         # a step may be cut short, for instance at the body's edge: its effect is scaled to one sd
-        effects = np.array([(strain - mine) * sd / step for step, strain in pairs])
-        slope, spread = (at_a - at_b) / (a - b), np.sqrt(np.mean(effects**2, axis=0))
-        good = np.isfinite(slope)
-        if good.any():
-            known = [np.interp(base.mu, base.mu[at][good], values[good]) for values in (slope, spread)]
-            yield Tolerance(name, TOLERANCES[name][1], sd, *known)
+        effects = np.array([effect * sd / step for step, effect in steps])
+        (a, at_a), (b, at_b) = [*steps, (0.0, np.zeros(len(base.mu)))][:2]
+        yield Tolerance(name, TOLERANCES[name][1], sd, (at_a - at_b) / (a - b), np.sqrt(np.mean(effects**2, axis=0)))
+
+
+def _between(mu: Float, at: Float, values: Float) -> Float:
+    """Values (n,) at mu (n,) by PCHIP of those (m,) at some that are known, constant beyond; nan where none is."""
+    from scipy.interpolate import PchipInterpolator
+
+    good = np.isfinite(values)
+    if good.sum() < 2:
+        return np.full(len(mu), values[good][0] if good.any() else math.nan)
+    at, values = at[good], values[good]
+    return np.asarray(PchipInterpolator(at, values)(np.clip(mu, at[0], at[-1])))
 
 
 def _beside(model: Model, gauge: Gauge, name: str, sd: float, base: Pressed) -> list[tuple[float, Float]]:
-    """Steps of a gauge's place, and strains read from the same presses."""
+    """Steps of a gauge's place, and what they change, read from the same presses."""
     if model.inclusions:
         return []
     off = [m for m in moved_gauges(model, gauge, {name: sd}) if m.gauge.name in base.strain]
-    return [(m.step, base.strain[m.gauge.name]) for m in off]
+    return [(m.step, base.strain[m.gauge.name] - base.strain[gauge.name]) for m in off]
 
 
-def _steps(
-    problem: Problem, gauge: Gauge, name: str, sd: float, mu: Float, mine: Float, read: Read
-) -> Iterator[tuple[float, Float]]:
-    """One or two steps of a tolerance, and strain (m,) after them; one is compared with no step at all."""
+def _steps(body: Body, name: str, sd: float) -> Iterator[tuple[float, Float]]:
+    """One or two steps of a tolerance, and what they change the strain (m,) by."""
+    problem, gauge = body.problem, body.gauge
     model = problem.model
     if name == "depth_mm":
         shallowest = min(leg.depth_mm for leg in model.legs if leg.depth_mm > 0.0)
         for step in (sd, -min(sd, 0.5 * shallowest)):
             legs = tuple(replace(leg, depth_mm=leg.depth_mm + step * (leg.depth_mm > 0.0)) for leg in model.legs)
-            yield step, read(replace(problem, model=replace(model, legs=legs)), (gauge.name,), mu)[0]
+            yield step, body.change(replace(problem, model=replace(model, legs=legs)))
     elif name == "E_percent":
         alone = model.inclusions is None and model.object_compliance is None
         # strains do not know the modulus unless something else in the scene has a stiffness too
-        yield sd, mine if alone else read(with_modulus(problem, 1.0 + 0.01 * sd), (gauge.name,), mu)[0]
+        yield sd, np.zeros(len(body.mu)) if alone else body.change(with_modulus(problem, 1.0 + 0.01 * sd))
     elif name == "nu":
         step = _step_of_nu(model.material.nu, sd)
-        changed = replace(_alone(model, gauge), material=replace(model.material, nu=model.material.nu + step))
-        yield step, read(build(changed), (gauge.name,), mu)[0]
-    elif name == "mesh":
-        yield from _meshed(problem, gauge, sd, mu, mine, read)
+        yield step, body.change(body.rebuilt(material=replace(model.material, nu=model.material.nu + step)))
     elif name == "tilt_deg":
-        yield from _tilted(problem, gauge, sd, mu, mine, read)
+        yield from _tilted(body, sd)
     elif name in _PLACES and model.inclusions:  # a foil stiffens the body where it lies
         off = _off(gauge, name, sd)
         if _inside(model, off):
             gauges = tuple(off if g.name == gauge.name else g for g in model.gauges)
-            yield sd, read(build(replace(model, gauges=gauges)), (gauge.name,), mu)[0]
+            yield sd, body.change(body.rebuilt(gauges=gauges))
 
 
 def _step_of_nu(nu: float, sd: float) -> float:
     """Down, unless that leaves the range or the element that the body is made of."""
     other_side = nu - sd < MIXED_FROM <= nu
     return sd if nu - sd < 0.0 or (other_side and nu + sd <= 0.5) else -sd
-
-
-def _alone(model: Model, gauge: Gauge) -> Model:
-    """The model without the gauges that nobody reads; all of them where they stiffen the body."""
-    return model if model.inclusions else replace(model, gauges=(gauge,))
 
 
 def with_modulus(problem: Problem, times: float) -> Problem:
@@ -205,48 +243,44 @@ def with_modulus(problem: Problem, times: float) -> Problem:
     return replace(changed, bare=soft(problem.bare)) if problem.bare else changed
 
 
-def _meshed(
-    problem: Problem, gauge: Gauge, sd: float, mu: Float, mine: Float, read: Read
-) -> Iterator[tuple[float, Float]]:
+def _meshed(body: Body, frame: Frame, sd: float) -> Iterator[tuple[float, Float]]:
     """The strain off by its error bar; of a mesh that has no coarser companion none is known."""
     try:
-        beside = companion(problem)
+        beside = companion(body.problem)
     except Finger3dError:
         return
-    yield sd, mine + sd * strain_error(problem, beside, mine, read(beside, (gauge.name,), mu)[0])
+    coarse = read(beside, (body.gauge.name,), body.mu)[0]
+    yield sd, sd * strain_error(body.problem, frame, beside, body.strain, coarse)
 
 
 def _coarser(problem: Problem) -> MeshOptions:
-    """Edge lengths of a body that is compared with itself: longer, with a hundred points left to touch in a section;
-    structured where the design allows, so that nothing is meshed for long.
+    """Edge lengths of a tilted body, which is compared with its own mirror image: longer, with some points left to
+    touch; structured where the design allows, so that nothing is meshed for long.
     """
-    options, points = problem.model.mesh, len(problem.points.nodes)
-    times = min(2.0, max(1.0, points / _ENOUGH)) if problem.dim == 2 else 1.25
+    options, left = problem.model.mesh, len(problem.points.nodes) / _ENOUGH[problem.dim]
+    times = min(2.0, max(1.0, left)) if problem.dim == 2 else min(1.5, max(1.25, math.sqrt(left)))
     mesher: Any = "swept" if hasattr(problem.model.design, "section") else options.mesher
     return replace(options, size_mm=times * options.size_mm, base_size_mm=times * options.base_size_mm, mesher=mesher)
 
 
-def _tilted(
-    problem: Problem, gauge: Gauge, sd: float, mu: Float, mine: Float, read: Read
-) -> Iterator[tuple[float, Float]]:
+def _tilted(body: Body, sd: float) -> Iterator[tuple[float, Float]]:
     """A plane that is not level; of a scene that is its own mirror image one tilt gives both, by the mirrored gauge."""
-    model = problem.model
+    problem, gauge, model = body.problem, body.gauge, body.problem.model
     thing: Any = model.object
     if not isinstance(thing, Plane):
         return
-    step = math.radians(sd)
-    model = replace(model, mesh=_coarser(problem))
+    step, mesh = math.radians(sd), _coarser(problem)
     if "x" in problem.axes and not model.inclusions:
         image = replace(gauge, name=f"{gauge.name} mirrored", x_mm=-gauge.x_mm, angle=math.pi - gauge.angle)
-        other = build(replace(model, object=replace(thing, tilt=step), gauges=(gauge, image), symmetry=None))
-        there, back = read(other, (gauge.name, image.name), mu)
+        other = body.rebuilt(mesh=mesh, object=replace(thing, tilt=step), gauges=(gauge, image), symmetry=None)
+        there, back = read(other, (gauge.name, image.name), body.mu)
     else:
         tilted = [
-            replace(_alone(model, gauge), object=replace(thing, tilt=thing.tilt + sign * step), symmetry=None)
+            body.rebuilt(mesh=mesh, object=replace(thing, tilt=thing.tilt + sign * step), symmetry=None)
             for sign in (1.0, -1.0)
         ]
-        there, back = (read(build(one), (gauge.name,), mu)[0] for one in tilted)
+        there, back = (read(one, (gauge.name,), body.mu)[0] for one in tilted)
     # the body's mesh is another one, whole: it is compared with itself
     half = 0.5 * (there - back)
-    yield sd, mine + half
-    yield -sd, mine - half
+    yield sd, half
+    yield -sd, -half
