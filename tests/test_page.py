@@ -16,6 +16,7 @@ import pytest
 
 from finger3d.cli import main
 from finger3d.errors import Finger3dError
+from finger3d.model import Gauge
 from finger3d.page import (
     Code,
     Figure,
@@ -265,6 +266,22 @@ def test_the_view_keeps_to_its_budget(solid: Path, section: Path) -> None:
     slid = view_of(replace(states, target=states.target + [0.0, 1.5, 0.0]))
     assert slid is not None
     assert slid.labels[-1] == "step 4: 0.5 mm deep, slid 1.5 mm along x"
+
+
+def test_the_view_carries_the_gauges_of_every_step_on_the_face_in_front(solid: Path) -> None:
+    states = load_states(solid / "steps.npz")
+    view = view_of(states, [Gauge("g", 1.0, 4.0), Gauge("elsewhere", 1.0, 9.0)])
+    assert view is not None
+    assert view.gauge_labels == ("g, 0°, z = 0",)
+    assert view.gauges.shape == (4, 1, 3, 3)
+    # SOLID is 2 mm wide and pressed by 0.5 mm: at rest the gauge would be at (1, 4, 1)
+    at = view.gauges[:, 0, 1]
+    assert np.all(np.diff(at[:, 1]) < 0.0)
+    assert np.all((at[:, 1] < 4.0) & (at[:, 1] > 3.5))
+    assert np.all((at[:, 2] > 1.0) & (at[:, 2] < 1.3))
+    none = view_of(states)
+    assert none is not None
+    assert none.gauges.shape == (4, 0, 3, 3)
 
 
 def test_steps_of_something_else_are_refused_in_one_line(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ import pytest
 
 from finger3d.cli import main
 from finger3d.compare import compare
+from finger3d.page import load_states
 from finger3d.panels import DPI
 from tests.test_page import SECTION, SOLID
 
@@ -117,6 +118,39 @@ def test_a_page_opens_without_complaint_request_or_sideways_scrolling(
     visit.page.close()
 
 
+_DRAWN = """(() => document.getElementById("view-stage").data.map((t) => ({
+    kind: t.type, colour: t.color, scale: t.showscale === true, triangles: t.i ? t.i.length : 0, text: t.text})))()"""
+
+
+def test_the_open_part_of_the_surface_is_grey_and_gauges_can_be_shown(browser: Any, results: dict[str, Path]) -> None:
+    visit = Visit(browser, results["solid"], 1280)
+    states = load_states(results["solid"] / "steps.npz")
+    for step, field in ((4, "pressure"), (1, "pressure"), (4, "status")):
+        visit.page.select_option("#view-field", field)
+        visit.page.locator("#view-step").fill(str(step - 1))
+        drawn = {
+            kind: [t for t in visit.page.evaluate(_DRAWN) if t["kind"] == kind] for kind in ("mesh3d", "scatter3d")
+        }
+        names = [label for t in drawn["scatter3d"] if t["text"] for label in t["text"]]
+        assert names == ["<g>, 0°, z = 0"]
+        shown = {t["colour"]: t["triangles"] for t in drawn["mesh3d"] if not t["scale"]}
+        # each facet of the contact surface in six, two for each corner
+        status = np.zeros(len(states.points), dtype=int)
+        status[states.nodes] = states.status[step - 1]
+        corners = status[states.corners[states.on_contact]]
+        if field == "status":
+            assert "#c4c4c4" not in shown
+            continue
+        assert shown["#c4c4c4"] == 2 * np.count_nonzero(corners == 0) > 0
+        (coloured,) = (t for t in drawn["mesh3d"] if t["scale"])
+        assert coloured["triangles"] == 2 * np.count_nonzero(corners) > 0
+    assert visit.page.locator(".key .open").is_visible()
+    visit.page.locator("#view-gauges").uncheck()
+    assert not any(t["kind"] == "scatter3d" for t in visit.page.evaluate(_DRAWN))
+    assert visit.complaints == []
+    visit.page.close()
+
+
 def test_the_view_turns_and_answers_its_controls(browser: Any, results: dict[str, Path]) -> None:
     visit = Visit(browser, results["solid"], 1280, "dark")
     pressure = visit.stage()
@@ -126,7 +160,7 @@ def test_the_view_turns_and_answers_its_controls(browser: Any, results: dict[str
     orange = (status[..., 0] - status[..., 2] > 120).mean()
     assert orange > 0.01
     assert np.abs(status - pressure).mean() > 1.0
-    assert visit.page.locator("#view-key").is_visible()
+    assert visit.page.locator(".key .zone").first.is_visible()
     visit.page.locator("#view-step").fill("0")
     assert visit.page.locator("#view-label").inner_text() == "step 1: 0.125 mm deep"
     assert np.abs(visit.stage() - status).mean() > 0.5

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 
 from finger3d.contact.conditions import TOLERANCE
 from finger3d.contact.law import OPEN, STATUS_NAMES
+from finger3d.model import Gauge
 from finger3d.page.build import Figure, Row, Section, Table, write_page
 from finger3d.page.results import how_modelled, read_json, title_of
 from finger3d.page.states import States, load_states
@@ -65,13 +67,20 @@ def press_page(folder: str | Path) -> Path:
         headline(good[-1], errors_of(summary)) if good else (),
         sections,
         [Figure(name, text) for name, text in _PICTURES.items()],
-        view_of(states) if states else None,
+        view_of(states, _gauges(summary["scene"])) if states else None,
         command="press",
         outcome=f"{summary['outcome']}{last if summary['outcome'] == 'converged' else ''}",
         good=summary["outcome"] == "converged",
         notes=[*summary["warnings"], *summary["advice"], *_what_bars_leave_out(summary)],
         versions=summary["versions"],
     )
+
+
+def _gauges(scene: Mapping[str, Any]) -> list[Gauge]:
+    return [
+        Gauge(g["name"], g["x_mm"], g["y_mm"], g["z_mm"], math.radians(g["angle_deg"]), g["length_mm"])
+        for g in scene.get("gauge") or ()
+    ]
 
 
 def headline(step: Mapping[str, Any], errors: Mapping[str, float]) -> list[Row]:

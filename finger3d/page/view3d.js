@@ -8,7 +8,8 @@
   const n = data.vertices, names = ["open", "stick", "slip"];
   const stage = document.getElementById("view-stage"), field = document.getElementById("view-field");
   const slider = document.getElementById("view-step"), label = document.getElementById("view-label");
-  const key = document.getElementById("view-key");
+  const gauges = document.getElementById("view-gauges");
+  const show = (kind, on) => document.querySelectorAll(`.key .${kind}`).forEach((e) => { e.hidden = !on; });
 
   // Each contact triangle in six around its centre, two for each corner: a corner's status covers what is nearest to it.
   const edges = new Map(), parents = [], six = { i: [], j: [], k: [] }, owner = [];
@@ -37,6 +38,13 @@
   for (let s = 0; s < steps; s++) for (let v = 0; v < n; v++) {
     highest = Math.max(highest, pressure[s * n + v]); farthest = Math.max(farthest, shift(s, v));
   }
+  // How far in front of the face gauges are drawn, and their names, or the face would hide them; in parts of the body.
+  const LINE = 0.008, NAME = 0.04;
+  const extent = Math.max(...[0, 1, 2].map((a) => {
+    const at = rest.filter((v, p) => p % 3 === a);
+    return at.reduce((x, y) => Math.max(x, y)) - at.reduce((x, y) => Math.min(x, y));
+  }));
+
   // On a narrow screen the scale lies below the body, and the camera steps back.
   const narrow = () => stage.clientWidth < 600;
   const scale = (title, top) => ({ cmin: 0, cmax: top || 1, colorscale: "Viridis", showscale: true,
@@ -50,22 +58,39 @@
     const corners = parents.slice(0, n);
     const far = (list) => list.map((vs) => mean(vs, (v) => shift(s, v)));
     const base = { type: "mesh3d", flatshading: false, lighting: light, lightposition: { x: -2e4, y: 8e4, z: 5e4 } };
-    const side = { ...base, ...place(corners), ...sides, hoverinfo: "skip", color: "#d9d6cf", name: "body" };
+    const side = { ...base, ...place(corners), ...sides, hoverinfo: "skip", color: "#d9d6cf" };
     const press = parents.map((vs) => mean(vs, (v) => pressure[s * n + v]));
     const said = parents.map((vs) => [...new Set(vs.map((v) => names[status[s * n + v]]))].join(" / "));
     const text = parents.map((vs, p) => `${said[p]}<br>pressure ${press[p].toPrecision(3)} MPa`
       + `<br>moved ${mean(vs, (v) => shift(s, v)).toPrecision(3)} mm`);
-    const face = { ...base, ...place(parents), ...six, text, name: "contact surface",
+    const only = (keep) => {
+      const on = owner.map((v, t) => t).filter((t) => keep(status[s * n + owner[t]]));
+      return { i: on.map((t) => six.i[t]), j: on.map((t) => six.j[t]), k: on.map((t) => six.k[t]) };
+    };
+    const face = { ...base, ...place(parents), ...six, text,
       hovertemplate: "x %{x:.2f}, y %{y:.2f}, z %{z:.2f} mm<br>%{text}<extra></extra>" };
     if (what === "status") Object.assign(face, { intensitymode: "cell", intensity: owner.map((v) => status[s * n + v]),
       cmin: -0.5, cmax: 2.5, showscale: false, colorscale: [[0, "#c4c4c4"], [1 / 3, "#c4c4c4"], [1 / 3, "#1f3f77"],
         [2 / 3, "#1f3f77"], [2 / 3, "#f28e2b"], [1, "#f28e2b"]] });
-    if (what === "pressure") Object.assign(face, { intensity: press, ...scale("contact pressure (MPa)", highest) });
+    const open = { ...face, ...only((state) => state === 0), color: "#c4c4c4" };
+    if (what === "pressure") Object.assign(face, only((state) => state !== 0),
+      { intensity: press, ...scale("contact pressure (MPa)", highest) });
     if (what === "moved") {
       Object.assign(face, { intensity: far(parents), ...scale("displacement (mm)", farthest) });
       Object.assign(side, { intensity: far(corners), ...scale("", farthest), showscale: false });
     }
-    return [side, face];
+    const lines = !gauges.checked ? [] : data.gauges[s].flatMap((line, g) => {
+      const mark = { type: "scatter3d", hoverinfo: "skip", textfont: { color: "#b0006a", size: 13 } };
+      const [, [x, y, z]] = line;
+      return [
+        { ...mark, mode: "lines+markers", x: line.map((p) => p[0]), y: line.map((p) => p[1]),
+          z: line.map((p) => p[2] + LINE * extent), line: { color: "#b0006a", width: 6 },
+          marker: { color: "#b0006a", size: [0, 5, 0], line: { width: 0 } } },
+        { ...mark, mode: "text", x: [x], y: [y], z: [z + NAME * extent], text: [data.gaugeLabels[g]],
+          textposition: "bottom center" },
+      ];
+    });
+    return [...lines, side, face, ...(what === "pressure" ? [open] : [])];
   }
 
   // The axes stay as they are from step to step, so that the finger is seen to move.
@@ -74,16 +99,17 @@
     for (const list of [rest, moved]) for (let p = a; p < list.length; p += 3) {
       low = Math.min(low, list[p]); high = Math.max(high, list[p]);
     }
-    return [low - 0.02 * (high - low), high + 0.02 * (high - low)];
+    const front = a === 2 && data.gaugeLabels.length ? (NAME + 0.01) * extent : 0;
+    return [low - 0.02 * (high - low), high + Math.max(front, 0.02 * (high - low))];
   });
   // As far away as a body needs whose longest extent has to fit into the width of the stage.
-  const size = range.map(([low, high]) => high - low), cube = Math.cbrt(size[0] * size[1] * size[2]);
-  const back = 1.1 * Math.max(...size) / cube * Math.max(1, 1.5 * stage.clientHeight / stage.clientWidth);
+  const size = range.map(([low, high]) => high - low), largest = Math.max(...size), cube = Math.cbrt(size[0] * size[1] * size[2]);
+  const back = 1.1 * largest / cube * Math.max(1, 1.6 * stage.clientHeight / stage.clientWidth);
   const eye = { x: -0.35 * back, y: 0.6 * back, z: 0.85 * back };
   function layout() {
     const style = getComputedStyle(document.body), ink = style.color, line = style.getPropertyValue("--line").trim();
     const axis = (a) => ({ title: { text: "xyz"[a] + " (mm)" }, range: range[a], gridcolor: line, zerolinecolor: line,
-      showbackground: false, nticks: 6, showspikes: false });
+      showbackground: false, nticks: narrow() ? 4 : 6, showspikes: false });
     return { margin: { l: 0, r: 0, t: 0, b: 0 }, paper_bgcolor: "rgba(0,0,0,0)", font: { color: ink, size: 12 },
       uirevision: "keep", showlegend: false,
       scene: { xaxis: axis(0), yaxis: axis(1), zaxis: axis(2), aspectmode: "data", dragmode: "orbit",
@@ -93,11 +119,13 @@
   function draw() {
     const s = Number(slider.value);
     label.textContent = data.labels[s];
-    key.hidden = field.value !== "status";
+    show("zone", field.value === "status");
+    show("open", field.value !== "moved");
     return Plotly.react(stage, traces(s, field.value), layout(), config);
   }
   field.addEventListener("change", draw);
   slider.addEventListener("input", draw);
+  gauges.addEventListener("change", draw);
   window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
   draw().then(() => { stage.dataset.drawn = "yes"; });
 })();

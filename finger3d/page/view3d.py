@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import base64
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d.marks import marks_of
+from finger3d.mesh import Mesh
+from finger3d.model import Gauge
 from finger3d.page.build import asset
 from finger3d.page.states import States, chosen
 
@@ -30,6 +34,8 @@ class View3D:
     pressure : (s, v) MPa
     status : (s, v) 0 open, 1 stick, 2 slip
     labels : (s,) what each increment is called
+    gauges : (s, g, 3, 3) mm, start, middle and end of every gauge at each increment, on the face in front (+z)
+    gauge_labels : (g,) what is written beside them
     """
 
     rest: Array
@@ -39,22 +45,27 @@ class View3D:
     pressure: Array
     status: Array
     labels: tuple[str, ...]
+    gauges: Array
+    gauge_labels: tuple[str, ...]
 
     def html(self) -> str:
         """The box it stands in, with its controls."""
         last = len(self.labels) - 1
         hidden = " hidden" if last == 0 else ""
+        none = "" if self.gauge_labels else " hidden"
         return (
             '<div class="view"><div class="controls">'
             '<label>colour <select id="view-field"><option value="pressure">contact pressure</option>'
             '<option value="status">stick and slip</option><option value="moved">displacement</option></select></label>'
             f'<label{hidden}>step <input id="view-step" type="range" min="0" max="{last}" value="{last}"></label>'
+            f'<label{none}><input id="view-gauges" type="checkbox"{"" if none else " checked"}>gauges</label>'
             '<output id="view-label"></output>'
-            '<span class="key" id="view-key" hidden><span><i style="background:#1f3f77"></i>stick</span>'
-            '<span><i style="background:#f28e2b"></i>slip</span>'
-            '<span><i style="background:#c4c4c4"></i>open</span></span>'
+            '<span class="key"><span class="zone"><i style="background:#1f3f77"></i>stick</span>'
+            '<span class="zone"><i style="background:#f28e2b"></i>slip</span>'
+            '<span class="open"><i style="background:#c4c4c4"></i>open, no contact</span></span>'
             '</div><div class="stage" id="view-stage"></div>'
             "<p>True scale, deformed. Drag to turn, scroll or pinch to zoom; point at the contact surface to read it."
+            f"{' Gauges are inside; they are marked on the face in front.' if self.gauge_labels else ''}"
             "<noscript> The 3D view needs JavaScript; the pictures below show the last step.</noscript></p></div>"
         )
 
@@ -69,6 +80,8 @@ class View3D:
             "status": _packed(self.status, "u1"),
             "body": _packed(self.body, "<u4"),
             "contact": _packed(self.contact, "<u4"),
+            "gauges": np.round(self.gauges, 3).tolist(),
+            "gaugeLabels": self.gauge_labels,
         }
         text = json.dumps(data).replace("</", "<\\/")
         return (
@@ -77,7 +90,7 @@ class View3D:
         )
 
 
-def view_of(states: States, budget: int = _BUDGET) -> View3D | None:
+def view_of(states: States, gauges: Sequence[Gauge] = (), budget: int = _BUDGET) -> View3D | None:
     """A view of a solid; as many increments as the budget (bytes) holds, None for a section or if not one fits."""
     if states.dim != 3:
         return None
@@ -89,6 +102,8 @@ def view_of(states: States, budget: int = _BUDGET) -> View3D | None:
         return None
     kept = chosen(len(states.step), most)
     rest = states.points[corners]
+    marks = marks_of(Mesh(states.points.astype(float), states.cells, {}), gauges, near=True)
+    at = [[mark.of(states.points + states.displacement[k]) for mark in marks] for k in kept]
     return View3D(
         rest=rest,
         body=triangles[~states.on_contact],
@@ -97,6 +112,8 @@ def view_of(states: States, budget: int = _BUDGET) -> View3D | None:
         pressure=np.array([states.on_points("pressure", k)[corners] for k in kept]),
         status=np.array([states.on_points("status", k)[corners] for k in kept]),
         labels=tuple(label(int(states.step[k]), states.target[k]) for k in kept),
+        gauges=np.array(at).reshape(len(kept), len(marks), 3, 3),
+        gauge_labels=tuple(mark.label for mark in marks),
     )
 
 
