@@ -53,6 +53,8 @@ def atomic(path: str | Path) -> Iterator[Path]:
             temporary.unlink()
 
 
+_LOCK = ".finger3d.lock"
+
 _RESULTS = {
     "press": "summary.json", "compare": "compare.json", "calibrate": "calibration.json", "sweep": "sweep.json",
     "design": "search.json",
@@ -63,6 +65,8 @@ _RESULTS = {
 @contextmanager
 def claimed(folder: str | Path, command: str = "") -> Iterator[Path]:
     """Make a folder and keep every other finger3d from writing there while the block runs.
+
+    A folder that this made, and into which nothing was written, is removed.
 
     Parameters
     ----------
@@ -79,9 +83,10 @@ def claimed(folder: str | Path, command: str = "") -> Iterator[Path]:
     for other, file in _RESULTS.items():
         if command not in ("", other) and (path / file).exists():
             raise Finger3dError(f"--out {path}: holds the results of a {other}; name another folder, or remove it")
+    made = [p for p in (path, *path.parents) if not p.exists()]
     try:
         path.mkdir(parents=True, exist_ok=True)
-        lock = FileLock(path / ".finger3d.lock", blocking=False)
+        lock = FileLock(path / _LOCK, blocking=False)
         lock.acquire()
     except Timeout:
         raise Finger3dError(
@@ -92,6 +97,11 @@ def claimed(folder: str | Path, command: str = "") -> Iterator[Path]:
     try:
         yield path
     finally:
+        if made and os.listdir(path) == [_LOCK]:
+            with suppress(OSError):  # of a folder that another run has found in the meantime
+                (path / _LOCK).unlink()
+                for folder in made:
+                    folder.rmdir()
         lock.release()
 
 

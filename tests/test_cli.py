@@ -57,6 +57,7 @@ def fake_press(monkeypatch):
         summary = {"outcome": str(calls.end), "steps": steps, "cost": {"seconds": {"total": 1.5}}}
         report.stage("meshing")
         report.say("mesh taken from the cache")
+        out.mkdir(exist_ok=True)
         (out / "summary.json").write_text(json.dumps(summary))
         for i in range(2):
             report.step(i + 1, 2, f"remark {i}")
@@ -314,6 +315,7 @@ def test_compare_as_json_prints_its_file(scene, tmp_path, monkeypatch, capsys):
 
     def compare(scene, out, widths, report):
         report.stage("plane strain")
+        out.mkdir()
         (out / "compare.json").write_text(json.dumps({"verdict": ["2D would do"], "outcome": "converged"}))
         return SimpleNamespace(verdict=("2D would do",), outcome=Outcome.CONVERGED, cases=())
 

@@ -74,10 +74,10 @@ MISTAKES = {
         ["no such key", "[finger] takes geometry, radius_mm, width_mm"],
     ),
     "geometry not a text": ('"clipped_cylinder"', "3", ["finger.geometry = 3", '"block"']),
-    "geometry from a file": (
+    "geometry from a file that is not there": (
         "clipped_cylinder",
         "finger.STEP",
-        ["finger.radius_mm = 100.0: no such key", "[finger] takes geometry)", "3 more mistakes"],
+        ["finger.geometry: ", "finger.STEP: there is no such file; give its path from the scene's folder", '"block"'],
     ),
     "geometry of another kind": (
         "clipped_cylinder",

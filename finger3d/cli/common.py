@@ -87,12 +87,13 @@ def check_writable(out: Path, scene: Path) -> None:
 
 
 def check_folder(out: Path) -> None:
+    """Refuse a folder that cannot be written; one that is not there yet is left to those who write into it."""
     try:
-        out.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=out):
+        there = next(p for p in (out, *out.parents, Path()) if p.exists())
+        if there == out and not out.is_dir():
+            raise Finger3dError(f"--out {out}: is a file; name a folder")
+        with tempfile.TemporaryFile(dir=there):
             pass
-    except FileExistsError:
-        raise Finger3dError(f"--out {out}: is a file; name a folder") from None
     except OSError as error:
         raise Finger3dError(f"--out {out}: cannot be written: {error.strerror}") from None
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
-from finger3d.cli.common import Set, app, check_writable, complain, print_rows
+from finger3d.cli.common import Json, Set, app, check_writable, complain, print_json, print_rows, reporting
 from finger3d.errors import Finger3dError
-from finger3d.report import reporter
 
 
 @app.command
@@ -34,6 +34,7 @@ def design(
     ] = "differential-evolution",
     seed: Annotated[int, Parameter(help="For the optimiser's random numbers.")] = 0,
     set_: Set = None,
+    json_: Json = False,
 ) -> int:
     """Search for the design with the largest objective; the scene is where it starts.
 
@@ -55,13 +56,16 @@ def design(
         method, seed,
     )  # fmt: skip
     check_writable(out, scene)
-    report = reporter()
+    report, aside = reporting(json_)
     try:
-        with report:
+        with aside, report:
             found = search(problem, out, report)
     except KeyboardInterrupt:
         complain(f"interrupted; every design judged is kept in {out / 'evaluations.csv'}; the same command goes on")
         return 130
+    if json_:
+        print_json(json.loads((out / "design.json").read_text(encoding="utf-8")))
+        return 0
     chosen = zip((f.key for f in problem.free), found.best.values, strict=True)
     print_rows(
         found.scene.title,

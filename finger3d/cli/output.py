@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
-from finger3d.cli.common import Set, app, check_folder, complain, load, print_rows
+from finger3d.cli.common import Json, Set, app, check_folder, complain, load, print_json, print_rows, reporting
 from finger3d.errors import Finger3dError
 from finger3d.printing.options import MoldOptions
-from finger3d.report import reporter
 
 
 @app.command
@@ -24,6 +24,7 @@ def export(
     tolerance_mm: Annotated[float, Parameter(help="Largest distance of triangles from the surface.")] = 0.05,
     options: Annotated[MoldOptions | None, Parameter(name="*", group="Mold (with --mold)")] = None,
     set_: Set = None,
+    json_: Json = False,
 ) -> int:
     """Write the finger as STEP and STL, and with --mold everything to cast it: parts, plate, sheet, picture.
 
@@ -41,13 +42,16 @@ def export(
     check_folder(out)
     from finger3d.printing import export as run
 
-    report = reporter()
+    report, aside = reporting(json_)
     try:
-        with report:
+        with aside, report:
             done = run(loaded, out, chosen if mold else None, ascii_, tolerance_mm, report)
     except KeyboardInterrupt:
         complain(f"interrupted; the files that are in {out} are whole")
         return 130
+    if json_:
+        print_json({"results": out, **asdict(done)})
+        return 0
     off = done.stl_volume_mm3 / done.volume_mm3 - 1.0
     rows = [
         ("volume", f"{done.volume_mm3:.6g} mm3; finger.stl {off:+.1e} of it"),

@@ -252,7 +252,8 @@ def _object(placed: Table | None, found: dict[Place, str]) -> RigidObject | None
     try:
         return placed.build()
     except Finger3dError as error:
-        found["object", "path"] = f"object.path: {error}"
+        hint = "; give its path from the scene's folder" if str(error).endswith("there is no such file") else ""
+        found["object", "path"] = f"object.path: {error}{hint}"
         return None
 
 
@@ -274,8 +275,17 @@ def _named(
         return "", None
     value = given_table[key]
     if name == "finger" and bodies.is_file(value):
-        rest = {k: v for k, v in given_table.items() if k != key}
-        return value, _checked(FileTable, rest, (name,), found, also=(key,))
+        if not Path(value).exists():
+            # Told alone: the other keys may well be those of the design that the file was to replace.
+            found[name, key] = (
+                f"{name}.{key}: {value}: there is no such file; give its path from the scene's folder, or a design: "
+                f"{listed(known)}"
+            )
+            return "", None
+        rest, mistakes = {k: v for k, v in given_table.items() if k != key}, dict[Place, str]()
+        table = _checked(FileTable, rest, (name,), mistakes, also=(key,))
+        found |= {p: t.replace("no such key", "no such key beside a file, take it out") for p, t in mistakes.items()}
+        return value, table
     if name == "finger" and isinstance(value, str) and "." in value:
         found[name, key] = f"{name}.{key} = {shown(value)}: a file must be named {listed(SUFFIXES)}"
     elif name == "object" and isinstance(value, str) and value.lower().endswith(SUFFIXES):
@@ -283,9 +293,9 @@ def _named(
     elif not isinstance(value, str) or value not in known:
         found[name, key] = choose((name, key), value, list(known))
     else:
-        table = known[value] if issubclass(known[value], Table) else table_of(known[value])
+        kind = known[value] if issubclass(known[value], Table) else table_of(known[value])
         rest = {k: v for k, v in given_table.items() if k != key}
-        return value, _checked(table, rest, (name,), found, also=(key,))
+        return value, _checked(kind, rest, (name,), found, also=(key,))
     return "", None
 
 
