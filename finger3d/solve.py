@@ -212,13 +212,15 @@ def march(problem: Problem, near: Sequence[Float] = ()) -> Iterator[Frame]:
     state = kinematics.start(problem)
     pace: tuple[Target, Float] | None = None
     work = dissipation = 0.0
+    pull = problem.world_force(state)
     # what the gauges would read if nothing were embedded: the same path in the same body without
     beside = march(replace(problem.bare, model=problem.model)) if problem.bare else None
     for number, target in enumerate(targets(problem.model.legs)):
         guess = near[number] if number < len(near) else _guess(state, at, target, pace)
         found, done = _increment(problem, state, at, target, 0 if literal else _CUTS, guess)
         for before, after, a, b in done:
-            work += _work(problem, before, after, a, b)
+            last, pull = pull, problem.world_force(after)
+            work += _work(0.5 * (last + pull), a, b)
             dissipation += _dissipated(problem, before, after)
         pace = at, state.force
         state, at = found.state, target
@@ -297,11 +299,10 @@ def _increment(
     ), done + more
 
 
-def _work(problem: Problem, before: ContactState, after: ContactState, a: Target, b: Target) -> float:
-    """Work (mJ) of the object on the finger, forces taken as their mean over the increment."""
-    mean = 0.5 * (problem.world_force(before) + problem.world_force(after))
+def _work(force: Float, a: Target, b: Target) -> float:
+    """Work (mJ) of the object on the finger, by the mean of the forces (m, 3) N over the increment."""
     moved = np.array([b.slide_x_mm - a.slide_x_mm, a.depth_mm - b.depth_mm, b.slide_z_mm - a.slide_z_mm])
-    return float(mean.sum(axis=0) @ moved)
+    return float(force.sum(axis=0) @ moved)
 
 
 def _dissipated(problem: Problem, before: ContactState, after: ContactState) -> float:

@@ -373,6 +373,47 @@ def test_effects_the_scene_names_are_in_the_curve() -> None:
     assert found.tolerances[0].slope.any()
 
 
+@pytest.mark.parametrize("bulk", [True, False])
+def test_a_fast_viscous_press_reads_the_instantaneous_body_and_a_slow_one_the_relaxed(bulk: bool) -> None:
+    def viscous(duration_s: float) -> Calibration:
+        effects = {"viscosity": {"prony": [[0.5, 1.0]], "bulk": bulk}}
+        timed = scene(effects=effects, press={"depth_mm": 10.0, "steps": 4, "duration_s": duration_s})
+        return calibrate(timed, "g36", mus=FEW, tolerances={**NONE, "gauge_x_mm": 0.3, "tilt_deg": 0.5})
+
+    def elastic(nu: float) -> Calibration:
+        still = scene(material={"E_MPa": 1.0, "nu": nu})
+        return calibrate(still, "g36", mus=FEW, tolerances={**NONE, "gauge_x_mm": 0.3, "tilt_deg": 0.5})
+
+    k, g = 1.0 / (3.0 * (1.0 - 2.0 * 0.45)), 0.5 / (2.0 * (1.0 + 0.45))
+    relaxed = 0.45 if bulk else (3.0 * k - 2.0 * g) / (2.0 * (3.0 * k + g))
+    # a share 1e-6 of the time constant moves the moduli by as much; contact edges may turn that into a little more
+    for one, other in ((viscous(1e-6), elastic(0.45)), (viscous(1e6), elastic(relaxed))):
+        assert one.strain == pytest.approx(other.strain, rel=1e-4)
+        for a, b in zip(one.tolerances, other.tolerances, strict=True):
+            assert a.slope == pytest.approx(b.slope, rel=1e-3, abs=1e-6), a.name
+
+
+def test_a_viscous_curve_is_read_after_the_hold_and_tells_mu() -> None:
+    legs = [{"depth_mm": 10.0, "steps": 4, "duration_s": 0.2}, {"depth_mm": 10.0, "steps": 2, "duration_s": 3.0}]
+    changes = {"press": {"leg": legs}, "effects": {"viscosity": {"prony": [[0.4, 0.5]], "bulk": False}}}
+    found = calibrate(scene(**changes), "g36", mus=FEW)
+    assert {t.name for t in found.tolerances} == set(TOLERANCES)
+    *_, before, frame = march(build(scene(**changes, friction={"mu": 0.4}).model()))
+    assert found.strain[2] == pytest.approx(frame.gauges["g36"], rel=1e-9)
+    assert abs(found.strain[2] - before.gauges["g36"]) > 1e-5  # it creeps
+    (answer,) = estimate(found, frame.gauges["g36"], tolerances=False)
+    assert answer.mu == pytest.approx(0.4, abs=1e-6)
+
+
+def test_two_answers_of_a_monotone_curve_are_blamed_on_what_is_not_known() -> None:
+    error = 0.06 * np.linspace(0.02, 1.2, 25) ** 4
+    wide = Tolerance("mesh", "error bar", 1.0, error, error)
+    found = curve(lambda mu: 0.1 * np.exp(-2.0 * mu), tolerances=(wide,))
+    (answer,) = estimate(found, 0.05)
+    assert answer.status == "ambiguous"
+    assert answer.verdict.endswith("; what is not known exactly reaches that far")
+
+
 def test_large_deformation_goes_the_long_way_and_says_so(tmp_path: Path) -> None:
     class Told(Report):
         lines: list[str] = []

@@ -64,21 +64,22 @@ def advance(
     while True:
         problem = Increments(change, matrix, mu, rho, length_scale)
         with threads_for(c * d):
-            method, found, error, spent = _settle(problem, start)
+            method, found, moved, error, spent = _settle(problem, start)
         total += spent
-        if found is None:
+        if found is None or moved is None:
             return Increment(previous, Outcome.NO_CONVERGENCE, error, total, method)
         revised = law.revised(mu, found.status)
         if revised is None:
             break
         mu, start = revised, found.force
-    moved = problem.moved(found.force)
     state = next_state(previous, found.force, moved, found.status)
     return Increment(state, Outcome.CONVERGED, error, total, method)
 
 
-def _settle(problem: Increments, start: Float) -> tuple[str, Iterate | None, float, int]:
-    """Method, solution, its residual, and the iterations spent; None and the least residual where all attempts fail."""
+def _settle(problem: Increments, start: Float) -> tuple[str, Iterate | None, Float | None, float, int]:
+    """Method, solution, where it has moved to (c, d) mm, its residual, and the iterations spent; None, and the least
+    residual, where all attempts fail.
+    """
     spent, least = 0, np.inf
     for method, attempt in _ladder(problem, start):
         spent += attempt.iterations
@@ -87,9 +88,9 @@ def _settle(problem: Increments, start: Float) -> tuple[str, Iterate | None, flo
         moved = problem.moved(attempt.force)
         error = residual(attempt.force, moved, attempt.status, problem.mu, problem.length_scale)
         if error <= TOLERANCE:
-            return method, attempt, error, spent
+            return method, attempt, moved, error, spent
         least = min(least, error)
-    return "none", None, least, spent
+    return "none", None, None, least, spent
 
 
 def _ladder(problem: Increments, start: Float) -> Iterator[tuple[str, Iterate]]:

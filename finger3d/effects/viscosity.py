@@ -299,6 +299,11 @@ class Viscoelastic(SmallStrain):
     prony: Prony
     bulk: bool
 
+    @property
+    def independent(self) -> bool:  # type: ignore[override]
+        """Not where presses share a factor for every length of step, and solve with it."""
+        return self.bulk
+
     def _body(self, problem: Any) -> Body:
         return AllRelaxes(problem) if self.bulk else ShearRelaxes(problem)
 

@@ -198,7 +198,10 @@ def _worded(
     high = math.inf if found[-1][1] >= last else found[-1][1]
     if len(answers) > 1:
         names = " or ".join(_named(a, first, last) for a in answers)
-        return told("ambiguous", f"ambiguous: {names}; the curve is not monotone", low, high)
+        steps = np.sign(np.diff(calibration.at(calibration.grid, shape)))
+        turns = bool((steps > 0.0).any() and (steps < 0.0).any())
+        why = "the curve is not monotone" if turns else "what is not known exactly reaches that far"
+        return told("ambiguous", f"ambiguous: {names}; {why}", low, high)
     best = answers[0]
     if low == 0.0 and high == math.inf:
         text = f"out of range: no mu from {first:g} to {last:g} can be told apart by this strain"

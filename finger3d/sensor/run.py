@@ -40,7 +40,7 @@ MUS = tuple(float(mu) for mu in np.linspace(0.02, 1.2, 25).round(10))
 """Values of mu that are pressed unless others are given."""
 
 _FILES = ("calibration.json", "calibration.csv", "calibration.png", "reduced.npz", "map.png", "map.csv", "report.html")
-_SLOPES = {True: 7, False: 3}  # values of mu at which tolerances are tried: with one compliance for all, and without
+_SLOPES = {True: 7, False: 3}  # values of mu at which tolerances are tried: in small strain, and beyond
 
 
 @dataclass
@@ -209,7 +209,7 @@ def _condensed(model: Model, gauge: Gauge, wanted: Mapping[str, float], sweep: S
 
 
 def _press(problem: Problem, sweep: Sweep, report: Report) -> None:
-    if type(problem.model.kinematics) is not SmallStrain:
+    if not isinstance(problem.model.kinematics, SmallStrain):
         name = dict(problem.model.filled).get("kinematics", "this body")
         report.say(f"{name}: its compliance changes on the way, so that every one of {len(sweep.mus)} mu is a full "
                    "march, and so is every tolerance")  # fmt: skip
@@ -230,7 +230,7 @@ def _press(problem: Problem, sweep: Sweep, report: Report) -> None:
 
 def _few(problem: Problem, count: int) -> NDArray[np.int64]:
     """Numbers, among `count` values of mu, of those at which tolerances are tried."""
-    wanted = _SLOPES[type(problem.model.kinematics) is SmallStrain]
+    wanted = _SLOPES[isinstance(problem.model.kinematics, SmallStrain)]
     return np.unique(np.linspace(0, count - 1, wanted).round().astype(int))
 
 
@@ -273,7 +273,7 @@ def _write(
     if type(model.kinematics) is SmallStrain:
         Condensed.of(own).save(folder / "reduced.npz")
     else:
-        report.say("no reduced.npz: the body's compliance changes on the way")
+        report.say("no reduced.npz: the body's answer changes on the way")
     draw(folder / "calibration.png", calibration)
     if maps:
         from finger3d.sensor.maps import StrainMap, draw_map
