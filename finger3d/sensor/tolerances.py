@@ -22,9 +22,9 @@ from finger3d.fem.assembly import MIXED_FROM
 from finger3d.fem.condense import stiffened
 from finger3d.history import Frame
 from finger3d.kinematics import SmallStrain
-from finger3d.model import Gauge, MeshOptions, Model
+from finger3d.model import Gauge, Leg, MeshOptions, Model
 from finger3d.objects import Plane
-from finger3d.problem import Problem, at_points
+from finger3d.problem import Problem, at_points, targets
 from finger3d.sensor.curve import Tolerance
 from finger3d.sensor.presses import Like, presses
 from finger3d.solve import build
@@ -128,9 +128,9 @@ class Body:
     strain: Float
     pressed: Like
 
-    def change(self, problem: Problem) -> Float:
-        """What the strain (m,) changes by once the body is another."""
-        return read(problem, (self.gauge.name,), self.mu, self.pressed)[0] - self.strain
+    def change(self, problem: Problem, like: Like | None = None) -> Float:
+        """What the strain (m,) changes by once the body, or its path, is another; started from presses `like` it."""
+        return read(problem, (self.gauge.name,), self.mu, like or self.pressed)[0] - self.strain
 
     def rebuilt(self, **changes: Any) -> Problem:
         """The body with another model, without the gauges that nobody reads; all of them where they stiffen it."""
@@ -201,7 +201,7 @@ def _steps(body: Body, name: str, sd: float) -> Iterator[tuple[float, Float]]:
         shallowest = min(leg.depth_mm for leg in model.legs if leg.depth_mm > 0.0)
         for step in (sd, -min(sd, 0.5 * shallowest)):
             legs = tuple(replace(leg, depth_mm=leg.depth_mm + step * (leg.depth_mm > 0.0)) for leg in model.legs)
-            yield step, body.change(replace(problem, model=replace(model, legs=legs)))
+            yield step, body.change(replace(problem, model=replace(model, legs=legs)), _along(body, legs))
     elif name == "E_percent":
         alone = model.inclusions is None and model.object_compliance is None
         # strains do not know the modulus unless something else in the scene has a stiffness too
@@ -216,6 +216,20 @@ def _steps(body: Body, name: str, sd: float) -> Iterator[tuple[float, Float]]:
         if _inside(model, off):
             gauges = tuple(off if g.name == gauge.name else g for g in model.gauges)
             yield sd, body.change(body.rebuilt(gauges=gauges))
+
+
+def _along(body: Body, legs: tuple[Leg, ...]) -> Like:
+    """The body's presses as they may be on other legs: forces go on with the depth at the pace of each increment."""
+    own = [t.depth_mm for t in targets(body.problem.model.legs)]
+    strides = np.diff([0.0, *own])
+    change = np.subtract([t.depth_mm for t in targets(legs)], own)
+    share = np.divide(change, strides, out=np.zeros(len(own)), where=strides != 0.0)
+
+    def moved(forces: tuple[Float, ...]) -> tuple[Float, ...]:
+        before = (np.zeros_like(forces[0]), *forces)
+        return tuple(f + s * (f - last) for f, last, s in zip(forces, before, share, strict=False))
+
+    return {mu: replace(one, forces=moved(one.forces)) for mu, one in body.pressed.items()}
 
 
 def _step_of_nu(nu: float, sd: float) -> float:
