@@ -89,12 +89,16 @@ class Frame:
     method: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class History:
     """Frames of one press, with the points they speak of."""
 
     points: ContactPoints
     frames: tuple[Frame, ...]
+
+    def __repr__(self) -> str:
+        """One line: the arrays would fill pages."""
+        return f"<History of {len(self.frames)} frames, {len(self.points.nodes)} contact points: {self.outcome}>"
 
     @property
     def outcome(self) -> Outcome:

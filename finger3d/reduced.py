@@ -52,7 +52,7 @@ class Body:
     width_mm: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Condensed:
     """A body condensed to its contact points and gauges, free of its mesh.
 
@@ -66,6 +66,12 @@ class Condensed:
     problem: Problem
     others: Surface
     about: Mapping[str, Any]
+
+    def __repr__(self) -> str:
+        """One line: the compliance would fill pages."""
+        where = f"{len(self.problem.points.nodes)} contact points"
+        read = f", gauges {', '.join(self.gauges)}" if self.gauges else ""
+        return f"<Condensed body: {where}, {self.problem.model.domain}{read}>"
 
     @classmethod
     def of(cls, problem: Problem) -> Condensed:

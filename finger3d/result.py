@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from html import escape
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Literal
@@ -32,7 +31,7 @@ class Picture:
             temporary.write_bytes(self.png)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PressResult:
     """A finished press, also one that stopped at a step that did not converge.
 
@@ -62,8 +61,8 @@ class PressResult:
 
     history: History
     out: Path
-    _numbers: dict[str, Any] = field(repr=False)
-    _folder: TemporaryDirectory[str] | None = field(default=None, repr=False, compare=False)
+    _numbers: dict[str, Any]
+    _folder: TemporaryDirectory[str] | None = field(default=None, compare=False)
 
     @property
     def outcome(self) -> Outcome:
@@ -120,22 +119,35 @@ class PressResult:
         last = next((f for f in reversed(frames) if f.outcome.ok), frames[-1])
         return contact_table(self.history.points, last.state)
 
-    def _repr_html_(self) -> str:
-        from finger3d.page.build import number
-        from finger3d.page.press import errors_of, headline
+    def __repr__(self) -> str:
+        """One line: title, outcome, force and depth of the last good step."""
+        return f"<PressResult {self._title}: {self._said()}>"
+
+    @property
+    def _title(self) -> str:
         from finger3d.page.results import title_of
 
-        good = [step for step in self._numbers["steps"] if step["outcome"] == "converged"]
-        rows = "".join(
-            f"<tr><td>{escape(row.name)}</td><td>{escape(number(row.value, row.error))} {escape(row.unit)}</td></tr>"
+        return title_of(self._numbers["scene"])
+
+    def _good(self) -> list[dict[str, Any]]:
+        return [step for step in self._numbers["steps"] if step["outcome"] == "converged"]
+
+    def _said(self) -> str:
+        good = self._good()
+        last = f", {good[-1]['normal_force_N']:.5g} N at {good[-1]['depth_mm']:.4g} mm" if good else ""
+        return f"{self.outcome}, {len(good)} steps{last}"
+
+    def _repr_html_(self) -> str:
+        from finger3d.notebook import card
+        from finger3d.page.build import number
+        from finger3d.page.press import errors_of, headline
+
+        good = self._good()
+        rows = [
+            (row.name, f"{number(row.value, row.error)} {row.unit}".strip())
             for row in (headline(good[-1], errors_of(self._numbers)) if good else ())
-        )
-        title = escape(title_of(self._numbers["scene"]))
-        notes = "".join(f"<li>{escape(t)}</li>" for key in ("warnings", "advice") for t in self._numbers[key])
-        return (
-            f"<b>{title}</b>: {escape(str(self.outcome))}, {len(good)} steps<table>{rows}</table>"
-            f"{f'<ul>{notes}</ul>' if notes else ''}"
-        )
+        ]
+        return card(self._title, self._said(), rows, self._numbers["warnings"], self._numbers["advice"])
 
 
 def grid(folder: str | Path, step: int | None = None) -> pyvista.UnstructuredGrid:

@@ -6,6 +6,8 @@ import csv
 import doctest
 import importlib
 import json
+import re
+from html import escape
 from pathlib import Path
 
 import numpy as np
@@ -70,12 +72,52 @@ def test_fields_of_the_end_and_of_every_kept_step(solid: PressResult) -> None:
 def test_a_notebook_shows_numbers_and_the_picture(solid: PressResult, tmp_path: Path) -> None:
     html = solid._repr_html_()
     force = solid.summary()["steps"][-1]["normal_force_N"]
-    assert f"<td>normal force</td><td>{force:.5g} N</td>" in html
+    assert re.search(rf"<td[^>]*>normal force</td><td[^>]*>{force:.5g} N</td>", html)
     assert "<script>" not in html  # of the scene's title
+    assert all(escape(text) in html for text in solid.summary()["advice"])
+    assert repr(solid).endswith(f": converged, 4 steps, {force:.5g} N at 0.5 mm>")
     picture = solid.plot_contact()
     assert picture._repr_png_().startswith(b"\x89PNG")
     picture.save(tmp_path / "new" / "contact.png")
     assert (tmp_path / "new" / "contact.png").stat().st_size > 10_000
+
+
+def test_what_a_notebook_prints_of_the_other_objects_is_short_and_its_html_is_whole(
+    solid: PressResult, tmp_path: Path
+) -> None:
+    from finger3d.compare import Comparison
+    from finger3d.compare.cases import Case
+    from finger3d.notebook import card
+    from finger3d.sensor.curve import Calibration
+    from finger3d.solve import build
+
+    scene = finger3d.load(_written(tmp_path))
+    mu = np.linspace(0.1, 1.0, 5)
+    good = Case(
+        "solid", 2.0, 0.5, "swept", finger3d.Outcome.CONVERGED, {"force_N_per_mm": 1.5}, {"force_N_per_mm": 0.1}
+    )
+    failed = Case("plane <b>", 2.0, 0.5, "swept", finger3d.Outcome.NO_CONVERGENCE)
+    shown = {
+        "Scene": scene,
+        "Calibration": Calibration("<g>", mu, 0.01 * mu, 1e-4, 0.1),
+        "Comparison": Comparison((good, failed), ("2D would do",), tmp_path),
+        "Condensed": finger3d.Condensed.of(build(scene.model())),
+        "History": solid.history,
+    }
+    for name, found in shown.items():
+        assert repr(found).startswith(f"<{name} ")
+        assert len(repr(found)) < 250
+        assert "\n" not in repr(found)
+    parts = {
+        "Scene": ("E_MPa = 1.0", "domain = plane-stress", "steps = 4"),
+        "Calibration": ("Gauge &lt;g&gt;", "second-order fit", "usable from mu"),
+        "Comparison": ("1.50 ± 0.10", "plane &lt;b&gt;", escape(str(finger3d.Outcome.NO_CONVERGENCE)), "2D would do"),
+    }
+    for name, texts in parts.items():
+        html = shown[name]._repr_html_()  # type: ignore[attr-defined]
+        assert all(text in html for text in texts), (name, html)
+    assert "1 remark<" in card("t", "s", folded=["<a>"])
+    assert "&lt;a&gt;" in card("t", "s", folded=["<a>"])
 
 
 def test_without_a_folder_the_files_go_with_the_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

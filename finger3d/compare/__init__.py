@@ -28,13 +28,29 @@ _WIDTHS = (1.0, 4.0, 12.0, 24.0)
 _INCOMPLETE = "incomplete: the comparison was still running, or was interrupted; the cases written are good"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Comparison:
     """The cases solved, the verdict on them in sentences, and where everything was written."""
 
     cases: tuple[Case, ...]
     verdict: tuple[str, ...]
     out: Path
+
+    def __repr__(self) -> str:
+        """One line."""
+        return f"<Comparison of {len(self.cases)} cases: {self.outcome}; {self.out}>"
+
+    def _repr_html_(self) -> str:
+        from finger3d.compare.verdict import FORCE
+        from finger3d.notebook import card
+        from finger3d.page.build import number
+
+        rows = [
+            (c.model, f"{c.width_mm:g}", number(c.numbers[FORCE], c.errors.get(FORCE)) if c.ok else str(c.outcome))
+            for c in self.cases
+        ]
+        said = f"{self.outcome}, {len(self.cases)} cases"
+        return card("2D against 3D", said, rows, self.verdict, head=("model", "width (mm)", "force per width (N/mm)"))
 
     @property
     def outcome(self) -> Outcome:

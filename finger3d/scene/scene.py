@@ -36,7 +36,7 @@ from finger3d.scene.tables import (
 AnyTable = TypeVar("AnyTable", bound=Table)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Scene:
     """A checked scene. Two scenes are equal when they say the same after defaults are filled in.
 
@@ -63,6 +63,25 @@ class Scene:
     def title(self) -> str:
         """The title, or the file's name."""
         return self.tables.title or (self.path.stem if self.path else "scene")
+
+    def __repr__(self) -> str:
+        """One line: title, body, domain, effects."""
+        effects = f", {', '.join(self.effects)}" if self.effects else ""
+        return f"<Scene {self.title}: {self.design}, {self.domain}{effects}>"
+
+    def _repr_html_(self) -> str:
+        """The tables with every default filled in."""
+        from finger3d.notebook import card
+
+        rows = [
+            (name, ", ".join(f"{k} = {v}" for k, v in settings.items()) if isinstance(settings, Mapping) else "")
+            for name, settings in self.as_dict().items()
+            if name not in ("title", "gauge", "effects")
+        ]
+        named = [(f"gauge {g['name']}", g) for g in self.as_dict()["gauge"]]
+        named += [(f"effect {name}", settings) for name, settings in self.as_dict()["effects"].items()]
+        rows += [(name, ", ".join(f"{k} = {v}" for k, v in given.items() if k != "name")) for name, given in named]
+        return card(self.title, self.domain, rows)
 
     @property
     def domain(self) -> Domain:

@@ -65,7 +65,7 @@ class Tolerance:
     spread: Float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Calibration:
     """Strain (n,) of a gauge at ascending mu (n,), of the points that converged.
 
@@ -96,6 +96,17 @@ class Calibration:
                 f"calibrate: only {len(self.mu)} of {len(self.mu) + len(self.failed)} values of mu converged, {FEWEST} "
                 f"are needed; first failure: {self.failed[0][1] if self.failed else 'none'}"
             )
+
+    def __repr__(self) -> str:
+        """One line: gauge, range of mu, points."""
+        return f"<Calibration of gauge {self.gauge}: {len(self.mu)} values of mu, {self.mu[0]:g} to {self.mu[-1]:g}>"
+
+    def _repr_html_(self) -> str:
+        from finger3d.notebook import card
+        from finger3d.sensor.run import summary
+
+        rows = [(name.strip(), str(said)) for name, said in summary(self)]
+        return card(f"Gauge {self.gauge}", f"{len(self.mu)} values of mu", rows, [self.verdict()])
 
     @cached_property
     def fit(self) -> Fit:
