@@ -198,6 +198,25 @@ def test_what_makes_it_another_sweep_is_named(vary, expected, scene, tmp_path):
         pass
 
 
+def test_one_body_is_swept_without_workers_and_its_points_are_shown(scene, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("finger3d.sweep.cluster.local", lambda *a: pytest.fail("workers were started"))
+    vary = ["--vary", "friction.mu=0.1,0.2,0.3,0.4,0.5,0.6", "--vary", "gauge.g36.angle_deg=15,30"]
+    assert main(["sweep", str(scene), *COARSE, *vary, "--out", str(tmp_path)]) == 0
+    told = capsys.readouterr().out
+    found = table(tmp_path)
+    assert len(found) == 12
+    for row in found[:10]:
+        names = ("friction.mu", "gauge.g36.angle_deg", "normal_force_N", "friction_sum_N")
+        mine = [f"{float(row[name]):.5g}" for name in names]
+        (line,) = (line.split() for line in told.splitlines() if line.split()[:4] == mine)
+        assert line[-2:] == [f"{float(row['gauge_g36']):.5g}", "converged"]
+    assert "the first 10 of 12 points" in told
+    assert main(["sweep", str(scene), *COARSE, *vary, "--out", str(tmp_path), "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert (data["points"], data["kept"], data["failed"], data["bodies"]) == (12, 12, 0, 1)
+    assert [row["gauge_g36"] for row in data["rows"]] == [float(row["gauge_g36"]) for row in found]
+
+
 def test_a_folder_in_use_is_refused(scene, tmp_path):
     sweep = points_of(scene, "friction.mu=0.06")
     with Kept(sweep, tmp_path).open(), pytest.raises(Finger3dError, match="another finger3d is writing there"):

@@ -157,10 +157,11 @@ def load_points(scene: Path) -> list:
     return list(combinations(scene, COARSE[1::2], ["friction.mu=0.02", f"material.nu={nu}"]).points)
 
 
-def test_ctrl_c_ends_with_130_and_one_line(root, scene, tmp_path):
+@pytest.mark.parametrize("bodies", [1, 2], ids=["here", "workers"])
+def test_ctrl_c_ends_with_130_and_one_line(bodies, root, scene, tmp_path):
     out = tmp_path / "out"
     # so many that none is left only after many seconds: a hundred were sometimes done before the signal came
-    command = sweeping(scene, out, 1000, 1, "--workers", "1")
+    command = sweeping(scene, out, 1000 // bodies, bodies, "--workers", "1")
     with started(command, environment(root, str(tmp_path)), tmp_path, tmp_path / "log") as parent:
         until(lambda: len(lines(out)) >= 5, "five points")
         # a terminal sends it to the workers, too

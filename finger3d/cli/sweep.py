@@ -2,17 +2,33 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from finger3d.cli.common import Set, app, check_writable, complain, print_rows
+from finger3d.cli.common import (
+    Json,
+    Set,
+    app,
+    check_writable,
+    complain,
+    print_columns,
+    print_json,
+    print_rows,
+    reporting,
+)
 from finger3d.errors import Finger3dError, MissingError
-from finger3d.report import reporter
+from finger3d.page.build import number
 
 if TYPE_CHECKING:
     from finger3d.sweep import Kept
+
+MAIN = ("normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm")
+"""Numbers of a point that are shown."""
+
+_SHOWN, _GAUGES = 10, 3  # points and gauges
 
 
 @app.command
@@ -27,7 +43,11 @@ def sweep(
     out: Annotated[Path, Parameter(help="Folder for the results; that of the same sweep is gone on with.")],
     set_: Set = None,
     scheduler: Annotated[str | None, Parameter(help="Address of a Dask scheduler, instead of processes here.")] = None,
-    workers: Annotated[int | None, Parameter(help="Processes on this machine; default one for each core.")] = None,
+    workers: Annotated[
+        int | None,
+        Parameter(help="Processes on this machine; default one for each core, and none beside this one for one body."),
+    ] = None,
+    json_: Json = False,
 ) -> int:
     """Press every combination of some values, in parallel; the same command goes on after an interruption.
 
@@ -47,9 +67,9 @@ def sweep(
     from finger3d.sweep import combinations
     from finger3d.sweep import sweep as run
 
-    report = reporter()
+    report, aside = reporting(json_)
     try:
-        with report:
+        with aside, report:
             report.stage("checking every point")
             points = combinations(scene, set_ or [], vary)
             check_writable(out, scene)
@@ -57,7 +77,11 @@ def sweep(
     except KeyboardInterrupt:
         complain(f"interrupted; {_said(report.steps_done, report.steps_total, out)}")
         return 130
-    print_rows(points.title, _rows(kept, out))
+    if json_:
+        print_json(_as_dict(kept, out))
+    else:
+        _print_points(kept)
+        print_rows(points.title, _rows(kept, out))
     failed = [row for row in (kept.rows | kept.lost).values() if row["outcome"] != "converged"]
     if not failed:
         return 0
@@ -69,6 +93,37 @@ def sweep(
 
 def _said(done: int, total: int, out: Path) -> str:
     return f"{done} of {total} points are kept in {out}; the same command goes on" if done else "no point was finished"
+
+
+def _points(kept: Kept) -> list[dict[str, Any]]:
+    """Every point as a row of the table in the results."""
+    columns = kept.columns()
+    return [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
+
+
+def _as_dict(kept: Kept, out: Path) -> dict[str, Any]:
+    points = _points(kept)
+    failed = sum(row["outcome"] != "converged" for row in points)
+    return {
+        "results": out, "points": len(kept.sweep.points), "kept": len(kept.rows), "failed": failed,
+        "bodies": len(kept.sweep.bodies), "rows": points,
+    }  # fmt: skip
+
+
+def _print_points(kept: Kept) -> None:
+    """The varied keys and the main numbers of the first points."""
+    points = _points(kept)
+    if not points:
+        return
+    gauges = [name for name in points[0] if name.startswith("gauge_")][:_GAUGES]
+    head = [*(v.key for v in kept.sweep.vary), *(name for name in (*MAIN, *gauges, "outcome") if name in points[0])]
+    print_columns(head, ([_cell(row[name]) for name in head] for row in points[:_SHOWN]))
+    if len(points) > _SHOWN:
+        print(f"  the first {_SHOWN} of {len(points)} points; all are in results.csv")
+
+
+def _cell(value: Any) -> str:
+    return "" if isinstance(value, float) and math.isnan(value) else number(value)
 
 
 def _rows(kept: Kept, out: Path) -> list[tuple[str, str]]:

@@ -17,7 +17,7 @@ from finger3d.sweep import cluster
 from finger3d.sweep.kept import Kept
 from finger3d.sweep.picture import draw
 from finger3d.sweep.points import Sweep
-from finger3d.sweep.work import Task, on_worker
+from finger3d.sweep.work import Task, on_worker, press_all
 
 WAIT_S = 60.0
 """How long a sweep goes on waiting without any worker, or without its scheduler."""
@@ -39,7 +39,8 @@ def sweep(
     points : from `finger3d.sweep.combinations`
     out : folder for points.jsonl, results.parquet and results.csv; that of the same sweep is gone on with
     scheduler : address of a Dask scheduler; None starts workers on this machine
-    workers : processes on this machine; None: one for each core, at most one for each body
+    workers : processes on this machine; None: one for each core, at most one for each body; a single body is pressed
+        by this process
     report : told about every point
 
     Returns
@@ -62,15 +63,12 @@ def sweep(
             report.say(f"{before} of {len(points.points)} points are kept from before")
         tasks = _tasks(points, kept)
         if tasks:
-            where: AbstractContextManager[Any]
-            report.stage("starting workers" if scheduler is None else f"connecting to {scheduler}")
-            if scheduler is None:
-                where = cluster.local(workers or cluster.default_workers(len(tasks)))
-            else:
-                where = cluster.remote(scheduler)
             try:
-                with where as client:
-                    _Run(client, kept, tasks, report).go()
+                if len(tasks) == 1 and scheduler is None:
+                    _Run(None, kept, tasks, report).here()
+                else:
+                    with _cluster(scheduler, workers, len(tasks), report) as client:
+                        _Run(client, kept, tasks, report).go()
             except BaseException:
                 # what ended the run is the news; tables that cannot be written beside it are not
                 with suppress(Finger3dError):
@@ -82,6 +80,11 @@ def sweep(
             draw(folder / "sweep.png", columns, [v.key for v in points.vary])
         sweep_page(folder)
         return kept
+
+
+def _cluster(scheduler: str | None, workers: int | None, bodies: int, report: Report) -> AbstractContextManager[Any]:
+    report.stage("starting workers" if scheduler is None else f"connecting to {scheduler}")
+    return cluster.local(workers or cluster.default_workers(bodies)) if scheduler is None else cluster.remote(scheduler)
 
 
 def _tasks(points: Sweep, kept: Kept) -> list[Task]:
@@ -107,6 +110,12 @@ class _Run:
 
     def _topic(self, body: str) -> str:
         return f"{self.name}-{body}"
+
+    def here(self) -> None:
+        """Press all bodies in this process, with its threads, and keep the rows."""
+        self.report.stage("pressing")
+        for task in self.tasks.values():
+            press_all(task, self._row, threads=None)
 
     def go(self) -> None:
         """Submit all bodies, and keep what arrives until none is left."""

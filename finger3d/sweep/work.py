@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -16,14 +16,17 @@ _TROUBLE = (Finger3dError, ArithmeticError, ValueError, RuntimeError, MemoryErro
 Task = tuple[str, points.Body, Sequence[tuple[int, Variant]]]
 
 
-def press_all(task: Task, tell: Callable[[Mapping[str, Any]], None], done: frozenset[int] = frozenset()) -> None:
-    """Press a body as all its points, one thread for the numerics.
+def press_all(
+    task: Task, tell: Callable[[dict[str, Any]], object], done: frozenset[int] = frozenset(), threads: int | None = 1
+) -> None:
+    """Press a body as all its points.
 
     Parameters
     ----------
     task : key of the body, how to build it, number and variant of every point
     tell : given the row of each point as it is finished
     done : numbers of the points that are finished already
+    threads : for the numerics; one, as workers share the machine, and None for all that are there
     """
     from threadpoolctl import threadpool_limits
 
@@ -31,8 +34,7 @@ def press_all(task: Task, tell: Callable[[Mapping[str, Any]], None], done: froze
     members = [(n, v) for n, v in members if n not in done]
     if not members:
         return
-    # workers share the machine: one thread each
-    with threadpool_limits(limits=1):
+    with threadpool_limits(limits=threads):
         try:
             body = _built(how, [v for _, v in members])
         except _TROUBLE as error:
@@ -78,4 +80,4 @@ def on_worker(task: Task, topic: str) -> None:
 
     worker = get_worker()
     told = frozenset(int(event["row"]["point"]) for _, event in get_client().get_events(topic))
-    press_all(task, lambda row: worker.log_event(topic, {"row": dict(row)}), told)
+    press_all(task, lambda row: worker.log_event(topic, {"row": row}), told)
