@@ -20,7 +20,6 @@ from finger3d.cli.common import (
     reporting,
 )
 from finger3d.errors import Finger3dError, MissingError
-from finger3d.page.build import number
 
 if TYPE_CHECKING:
     from finger3d.sweep import Kept
@@ -112,18 +111,19 @@ def _as_dict(kept: Kept, out: Path) -> dict[str, Any]:
 
 def _print_points(kept: Kept) -> None:
     """The varied keys and the main numbers of the first points."""
+    from finger3d.page.build import number
+
+    def cell(value: Any) -> str:
+        return "" if isinstance(value, float) and math.isnan(value) else number(value)
+
     points = _points(kept)
     if not points:
         return
     gauges = [name for name in points[0] if name.startswith("gauge_")][:_GAUGES]
     head = [*(v.key for v in kept.sweep.vary), *(name for name in (*MAIN, *gauges, "outcome") if name in points[0])]
-    print_columns(head, ([_cell(row[name]) for name in head] for row in points[:_SHOWN]))
+    print_columns(head, ([cell(row[name]) for name in head] for row in points[:_SHOWN]))
     if len(points) > _SHOWN:
         print(f"  the first {_SHOWN} of {len(points)} points; all are in results.csv")
-
-
-def _cell(value: Any) -> str:
-    return "" if isinstance(value, float) and math.isnan(value) else number(value)
 
 
 def _rows(kept: Kept, out: Path) -> list[tuple[str, str]]:
