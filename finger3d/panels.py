@@ -37,8 +37,8 @@ class Sheet:
     cells: tuple[Box, ...]
 
     def save(self, path: str | Path, names: Sequence[str]) -> None:
-        """Write a PNG file that knows its panels by these names, in turn."""
-        save(self.figure, path, dict(zip(names, self.cells, strict=True)))
+        """Write a PNG file that knows its panels by these names, in turn; cells beyond the names are empty."""
+        save(self.figure, path, dict(zip(names, self.cells, strict=False)))
 
 
 @dataclass(frozen=True)

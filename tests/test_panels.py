@@ -14,6 +14,7 @@ from finger3d.compare.picture import draw as draw_comparison
 from finger3d.errors import Outcome
 from finger3d.model import Gauge
 from finger3d.panels import DPI, Panel, cells, panels_of, sheet
+from finger3d.search.picture import draw as draw_search
 from finger3d.sensor.curve import Calibration, Tolerance
 from finger3d.sensor.maps import StrainMap, draw_map
 from finger3d.sensor.picture import draw as draw_calibration
@@ -76,6 +77,12 @@ def sweep(path: Path) -> None:
     assert draw_sweep(path, {**columns, **good}, list(columns))
 
 
+def search(path: Path) -> None:
+    places = np.random.default_rng(0).random((30, 3))
+    values = [-1000.0 * a if b > 0.2 else np.nan for a, b, _ in places]
+    draw_search(path, ["finger.radius_mm", "gauge.g36.x_mm", "gauge.g36.angle_deg"], places, values, places[0], "best")
+
+
 @pytest.fixture
 def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """The figures that are saved; solids are drawn by matplotlib."""
@@ -95,8 +102,8 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
 @pytest.mark.parametrize(
     ("draw", "count"),
     [(contact, 2), (section, 2), (solid, 2), (comparison, 4), (calibration, 3), (strain_map, 3), (sweep, 6),
-     (lambda path: force_figure(path, STEPS), 2)],
-    ids=["contact", "section", "solid", "comparison", "calibration", "map", "sweep", "force"],
+     (search, 4), (lambda path: force_figure(path, STEPS), 2)],
+    ids=["contact", "section", "solid", "comparison", "calibration", "map", "sweep", "design", "force"],
 )  # fmt: skip
 def test_a_panel_is_legible_on_a_telephone_and_holds_all_that_belongs_to_it(
     tmp_path: Path, figures: list[Any], draw: Callable[[Path], object], count: int

@@ -12,9 +12,11 @@ import pytest
 
 from finger3d.cli import main
 from finger3d.errors import Finger3dError
+from finger3d.panels import panels_of
 from finger3d.scene import load, tree
 from finger3d.search import Free, Problem, Table, search, sensitivity
 from finger3d.solve import build, march
+from tests.test_page import words
 
 SETS = ["model.domain=plane-strain", "mesh.size_mm=4", "mesh.base_size_mm=16"]
 COARSE = [option for text in SETS for option in ("--set", text)]
@@ -82,6 +84,13 @@ def test_a_design_that_cannot_be_built_is_a_line_with_its_reason(problem, tmp_pa
     assert any("outside the finger" in row["outcome"] for row in rows)
     assert found.best.outcome == "converged"
     assert json.loads((tmp_path / "design.json").read_text())["best"] == found.best.value
+    page, failed = words(tmp_path / "report.html"), sum(row["outcome"] != "converged" for row in rows)
+    assert f"objective (sensitivity) {found.best.value:.5g}" in page
+    assert f"gauge.0.y_mm 40 60 {found.start.values[0]:.5g} {found.best.values[0]:.5g}" in page
+    assert f"{failed} of {len(rows)} designs have no number" in page
+    assert [panel.name for panel in panels_of(tmp_path / "design.png")[1]] == [
+        "The best design so far", "Every design against gauge.0.y_mm"
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("method", ["dual-annealing", "nelder-mead"])

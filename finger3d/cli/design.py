@@ -75,6 +75,7 @@ def design(
             ("judged", f"{len(found.evaluations)} designs, {found.bodies} bodies condensed"),
             ("results", str(out / "best.toml")),
             ("", str(out / "evaluations.csv")),
+            ("", str(out / "report.html")),
         ],
     )
     return 0

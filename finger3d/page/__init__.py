@@ -10,6 +10,7 @@ folder, so that a page can be made again at any time::
 from __future__ import annotations
 
 from finger3d.page.build import Code, Figure, Row, Section, Table, write_page
+from finger3d.page.design import design_page
 from finger3d.page.press import press_page
 from finger3d.page.results import compare_page
 from finger3d.page.sensor import calibrate_page, sweep_page
@@ -26,6 +27,7 @@ __all__ = [
     "View3D",
     "calibrate_page",
     "compare_page",
+    "design_page",
     "load_states",
     "press_page",
     "sweep_page",

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from pathlib import Path
 from typing import Any
 
 from finger3d.page.build import Code, Figure, Row, Section, Table, write_page
-from finger3d.page.results import how_modelled, read_json, title_of
+from finger3d.page.results import how_modelled, read_json, read_rows, title_of
 
 _MOST_ROWS = 500
 
@@ -79,7 +78,7 @@ def sweep_page(folder: str | Path) -> Path:
     """
     folder = Path(folder)
     data = read_json(folder / "sweep.json")
-    rows = _rows(folder / "results.csv")
+    rows = read_rows(folder / "results.csv")
     failed = [row for row in rows if row["outcome"] != "converged"]
     forces = [float(row["normal_force_N"]) for row in rows if row["outcome"] == "converged"]
     names = [*data["vary"], "normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm"]
@@ -105,13 +104,6 @@ def sweep_page(folder: str | Path) -> Path:
         good=len(rows) == data["points"] and not failed,
         notes=[f"point {row['point']}: {row['outcome']}" for row in failed[:10]],
     )
-
-
-def _rows(path: Path) -> list[dict[str, str]]:
-    if not path.is_file():
-        return []
-    with path.open(newline="", encoding="utf-8") as stream:
-        return list(csv.DictReader(stream))
 
 
 def _number(text: str) -> Any:

@@ -17,9 +17,11 @@ from finger3d.family import Body, Variant, body_key
 from finger3d.history import measure
 from finger3d.kinematics import SmallStrain
 from finger3d.model import Gauge
+from finger3d.page import design_page
 from finger3d.reduced import friction_at
 from finger3d.report import Report
 from finger3d.scene import Scene
+from finger3d.search.picture import draw
 from finger3d.search.task import METHODS, Float, Free, Objective, Problem, Table, checked_start, objective_of
 from finger3d.solve import gauge_row
 
@@ -228,7 +230,8 @@ def search(problem: Problem, out: str | Path, report: Report | None = None) -> F
 
     Parameters
     ----------
-    out : folder for evaluations.csv, best.toml and design.json; that of the same search is gone on with
+    out : folder for evaluations.csv, best.toml, design.json, design.png and report.html; that of the same search is
+        gone on with
 
     Raises
     ------
@@ -244,6 +247,8 @@ def search(problem: Problem, out: str | Path, report: Report | None = None) -> F
 
 def _searched(problem: Problem, folder: Path, report: Report, judge: Objective, start: tuple[float, ...]) -> Found:
     _same(problem, folder)
+    for name in ("design.png", "report.html"):
+        (folder / name).unlink(missing_ok=True)
     run = _Search(problem, folder, report, judge)
     run.load()
     if run.known:
@@ -258,6 +263,12 @@ def _searched(problem: Problem, folder: Path, report: Report, judge: Objective, 
             _write_best(problem, folder, best, first, run)
     if best is None:
         raise Finger3dError(f"design: no design within the bounds gives a number; the first: {first.outcome}")
+    judged = tuple(run.known.values())
+    draw(
+        folder / "design.png", [f.key for f in problem.free], [e.values for e in judged], [e.value for e in judged],
+        first.values, Path(problem.objective).stem,
+    )  # fmt: skip
+    design_page(folder)
     return Found(best, first, tuple(run.done), run.bodies, problem.scene(best.values))
 
 
