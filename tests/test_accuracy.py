@@ -16,32 +16,10 @@ from finger3d.contact.law import Coulomb
 from finger3d.history import Frame
 from finger3d.model import Gauge, Leg, Material, MeshOptions, Model
 from finger3d.solve import Problem, build, march
+from tests.scenes import HALF_CYLINDER, changed
 
 FAST = {"assembly": 1.0, "contact": 0.1}
-SCENE = """
-[finger]
-geometry = "half_cylinder"
-radius_mm = 5.0
-width_mm = 2.0
-[material]
-E_MPa = 1.0
-nu = 0.3
-[friction]
-mu = 0.25
-[press]
-depth_mm = 0.5
-steps = 4
-[model]
-domain = "plane-strain"
-[mesh]
-size_mm = SIZE
-base_size_mm = BASE
-[[gauge]]
-name = "g"
-x_mm = 1.0
-y_mm = 4.0
-angle_deg = 30.0
-"""
+SCENE = changed(HALF_CYLINDER, domain="plane-strain")
 
 
 def half_cylinder(size: float, steps: int = 10) -> Model:
@@ -126,7 +104,7 @@ def test_the_companion_stays_within_the_finger() -> None:
 
 def test_press_prints_error_bars_and_keeps_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scene = tmp_path / "scene.toml"
-    scene.write_text(SCENE.replace("SIZE", "0.2").replace("BASE", "1.0"), encoding="utf-8")
+    scene.write_text(changed(SCENE, size_mm=0.2), encoding="utf-8")
     assert main(["press", str(scene), "--out", str(tmp_path / "a"), "--no-figures"]) == 0
     bars = json.loads((tmp_path / "a" / "summary.json").read_text(encoding="utf-8"))["error_estimate"]
     assert set(bars) == {"discretisation", "steps", "method", "seconds"}
@@ -140,7 +118,7 @@ def test_press_prints_error_bars_and_keeps_them(tmp_path: Path, capsys: pytest.C
 
 def test_a_mesh_too_coarse_to_judge_spoils_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scene = tmp_path / "scene.toml"
-    scene.write_text(SCENE.replace("SIZE", "3.0").replace("BASE", "5.0"), encoding="utf-8")
+    scene.write_text(changed(SCENE, size_mm=3.0, base_size_mm=5.0), encoding="utf-8")
     assert main(["press", str(scene), "--out", str(tmp_path / "out"), "--no-figures"]) == 0
     summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
     assert summary["error_estimate"]["discretisation"] == {}

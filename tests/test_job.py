@@ -14,32 +14,10 @@ from pathlib import Path
 import pytest
 
 from finger3d.cli import main
+from tests.scenes import HALF_CYLINDER, changed, solid
 
-SECTION = """
-[finger]
-geometry = "half_cylinder"
-radius_mm = 5.0
-width_mm = 2.0
-[material]
-E_MPa = 1.0
-nu = 0.3
-[friction]
-mu = 0.25
-[press]
-depth_mm = 0.5
-steps = 5
-[model]
-domain = "plane-stress"
-[mesh]
-size_mm = 0.2
-base_size_mm = 1.0
-[[gauge]]
-name = "g"
-x_mm = 1.0
-y_mm = 4.0
-angle_deg = 30.0
-"""
-SOLID = SECTION.replace('"plane-stress"', '"solid"').replace("size_mm = 0.2", 'size_mm = 0.4\nmesher = "swept"')
+SECTION = changed(HALF_CYLINDER, steps=5, size_mm=0.2)
+SOLID = solid(SECTION, 0.4)
 STEP_KEYS = set(
     """depth_mm slide_x_mm slide_z_mm time_s normal_force_N tangential_force_x_N tangential_force_z_N friction_sum_N
     outward_friction_x_N outward_friction_z_N contact_area_mm2 stick_area_mm2 contact_half_length_mm
@@ -153,7 +131,7 @@ def test_effects_and_warnings_are_told(tmp_path: Path) -> None:
 
 def test_steps_auto_reports_its_estimate(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    scene = written(tmp_path, SECTION.replace("steps = 5", 'steps = "auto"'))
+    scene = written(tmp_path, changed(SECTION, steps="auto"))
     assert main(["press", str(scene), "--out", str(out), "--no-figures"]) == 0
     summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
     estimate = summary["step_estimate"]
@@ -186,7 +164,7 @@ def test_a_scene_beyond_what_can_be_trusted_is_warned_of(tmp_path: Path, key: st
 
 
 def test_interruption_keeps_every_finished_step(tmp_path: Path) -> None:
-    scene = written(tmp_path, SECTION.replace("steps = 5", "steps = 100000"))
+    scene = written(tmp_path, changed(SECTION, steps=100000))
     out = tmp_path / "out"
     command = [sys.executable, "-m", "finger3d", "press", str(scene), "--out", str(out)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:

@@ -32,32 +32,11 @@ from finger3d.page import (
 from finger3d.page.build import CITE, PAPER, number
 from finger3d.page.states import chosen
 from finger3d.panels import panels_of, sheet
+from tests import scenes
+from tests.scenes import HALF_CYLINDER, changed
 
-SECTION = """
-title = "a <script>alert(1)</script> & ü"
-[finger]
-geometry = "half_cylinder"
-radius_mm = 5.0
-width_mm = 2.0
-[material]
-E_MPa = 1.0
-nu = 0.3
-[friction]
-mu = 0.25
-[press]
-depth_mm = 0.5
-steps = 4
-[model]
-domain = "plane-stress"
-[mesh]
-size_mm = 0.3
-base_size_mm = 1.0
-[[gauge]]
-name = "<g>"
-x_mm = 1.0
-y_mm = 4.0
-"""
-SOLID = SECTION.replace('"plane-stress"', '"solid"').replace("size_mm = 0.3", 'size_mm = 0.5\nmesher = "swept"')
+SECTION = changed(HALF_CYLINDER, title="a <script>alert(1)</script> & ü", name="<g>", angle_deg=0.0)
+SOLID = scenes.solid(SECTION, 0.5)
 
 
 def pressed(folder: Path, text: str, *arguments: str) -> Path:

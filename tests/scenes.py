@@ -1,0 +1,44 @@
+"""Scene files that several tests press."""
+
+from __future__ import annotations
+
+HALF_CYLINDER = """
+title = "half cylinder"
+[finger]
+geometry = "half_cylinder"
+radius_mm = 5.0
+width_mm = 2.0
+[material]
+E_MPa = 1.0
+nu = 0.3
+[friction]
+mu = 0.25
+[press]
+depth_mm = 0.5
+steps = 4
+[model]
+domain = "plane-stress"
+[mesh]
+size_mm = 0.3
+base_size_mm = 1.0
+[[gauge]]
+name = "g"
+x_mm = 1.0
+y_mm = 4.0
+angle_deg = 30.0
+"""
+"""A half cylinder of radius 5 mm on a plane, in 2D, with a gauge inside."""
+
+
+def changed(text: str, **values: object) -> str:
+    """A scene's text with other values of keys that stand in it once, by the names of the keys."""
+    lines = text.splitlines()
+    for key, value in values.items():
+        (at,) = (i for i, line in enumerate(lines) if line.startswith(f"{key} = "))
+        lines[at] = f'{key} = "{value}"' if isinstance(value, str) else f"{key} = {value}"
+    return "\n".join(lines) + "\n"
+
+
+def solid(text: str, size_mm: float) -> str:
+    """The scene in 3D, on a swept mesh."""
+    return changed(text, domain="solid", size_mm=size_mm).replace("[mesh]\n", '[mesh]\nmesher = "swept"\n')
