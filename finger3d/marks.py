@@ -53,26 +53,34 @@ def marks_of(mesh: Mesh, gauges: Sequence[Gauge], near: bool = False) -> tuple[M
     mesh : the whole finger at rest (unfolded, if symmetry was used), mm
     near : on the face that is next to a gauge along +z, for a solid that hides what is inside
     """
-    size = float(np.ptp(mesh.points, axis=0).max()) if len(gauges) else 0.0
+    if not gauges:
+        return ()
+    size, front = float(np.ptp(mesh.points, axis=0).max()), float(mesh.points[:, -1].max())
+    corners = mesh.points[mesh.cells[:, : mesh.dim + 1], :2]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    slack = 0.2 * (high - low).max(axis=1, keepdims=True)  # for the bulge of curved cells
     marks = []
     for gauge in gauges:
         middle, along = gauge.middle[: mesh.dim], gauge.direction[: mesh.dim]
-        if near:
-            middle = _near(mesh, middle)
         half = 0.5 * (gauge.length_mm or _SHOWN * size)
-        here = _weights(mesh, middle)
+        # to look through all cells for every point would take as long as drawing
+        beside = np.all((low - slack <= middle[:2] + half) & (middle[:2] - half <= high + slack), axis=1)
+        part = Mesh(mesh.points, mesh.cells[beside], {})
+        if near:
+            middle = _near(part, middle, front)
+        here = _weights(part, middle)
         if here is None:
             continue
-        ends = [_weights(mesh, middle + sign * half * along) or here for sign in (-1.0, 1.0)]
+        ends = [_weights(part, middle + sign * half * along) or here for sign in (-1.0, 1.0)]
         nodes, weights = zip(ends[0], here, ends[1], strict=True)
         label = f"{gauge.name}, {round(math.degrees(gauge.angle), 6):g}°" + (f", z = {gauge.z_mm:g}" if near else "")
         marks.append(Mark(label, np.array(nodes), np.array(weights)))
     return tuple(marks)
 
 
-def _near(mesh: Mesh, point: Float) -> Float:
-    """The point (3,) moved along z to the surface, where no other part of the body is in between."""
-    inside, outside = point[2], float(mesh.points[:, 2].max())
+def _near(mesh: Mesh, point: Float, outside: float) -> Float:
+    """The point (3,) moved along z to the surface, where no other part of the body is before the z outside."""
+    inside = point[2]
     if locate(mesh, np.array([*point[:2], outside])):
         inside = outside
     for _ in range(_HALVINGS if inside < outside else 0):

@@ -29,7 +29,7 @@ FACETS = {
 """Facets of a simplex, oriented outward for a positive cell."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Mesh:
     """A mesh of simplices.
 
@@ -44,6 +44,12 @@ class Mesh:
     points: Float
     cells: Int
     facets: Mapping[str, Int]
+
+    def __repr__(self) -> str:
+        """One line: the arrays would fill pages."""
+        kind = "quadratic" if self.is_quadratic else "linear"
+        labels = ", ".join(f"{label} {len(found)}" for label, found in self.facets.items())
+        return f"<Mesh of {len(self.cells)} {kind} cells, {len(self.points)} points, {self.dim}D; facets: {labels}>"
 
     @property
     def dim(self) -> int:

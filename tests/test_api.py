@@ -103,6 +103,7 @@ def test_what_a_notebook_prints_of_the_other_objects_is_short_and_its_html_is_wh
         "Comparison": Comparison((good, failed), ("2D would do",), tmp_path),
         "Condensed": finger3d.Condensed.of(build(scene.model())),
         "History": solid.history,
+        "Mesh": build(scene.model()).mesh,
     }
     for name, found in shown.items():
         assert repr(found).startswith(f"<{name} ")
