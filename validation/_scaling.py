@@ -1,19 +1,24 @@
-"""One whole press through the main job, timed by stage, with the peak memory of every stage."""
+"""One whole press through the main job, timed by stage, with the peak memory of every stage; and a whole sweep."""
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from finger3d.job import press
 from finger3d.report import Report
-from finger3d.scene import parse
+from finger3d.scene import Scene, parse
 
-from ._child import peak_mb, reset_peak
+from ._child import HOME, peak_mb, reset_peak
 
+BODIES = 16
 STAGES = ("mesh", "assembly", "condensation", "contact", "output", "error bars and page")
 
 
@@ -70,16 +75,34 @@ def prepare() -> None:
     available()
 
 
-def pressed(given: dict[str, Any]) -> dict[str, Any]:
-    """Seconds and peaks (MB) by stage, and sizes, of a press given as a dict."""
-    scene = parse(
+def _scene(size: float, base: float) -> Scene:
+    return parse(
         {
             "finger": {"geometry": "clipped_cylinder", "radius_mm": 100.0, "half_length_mm": 50.0,
                        "edge_height_mm": 36.6, "width_mm": 20.0},
             "material": {"E_MPa": 1.0, "nu": 0.49}, "friction": {"mu": 0.25}, "press": {"depth_mm": 10.0, "steps": 10},
-            "mesh": {"size_mm": given["size"], "base_size_mm": given["base"], "mesher": "swept"},
+            "mesh": {"size_mm": size, "base_size_mm": base, "mesher": "swept"},
         }
     )  # fmt: skip
+
+
+def sweep_seconds(size: Size, workers: int) -> float:
+    """Wall time (s) of the command ``finger3d sweep`` over `BODIES` values of nu, its start included."""
+    nus = ",".join(f"{0.30 + 0.01 * i:.2f}" for i in range(BODIES))
+    path = os.pathsep.join([str(HOME.parent), *filter(None, [os.environ.get("PYTHONPATH")])])
+    with tempfile.TemporaryDirectory(prefix="finger3d_scaling_") as folder:
+        scene = Path(folder, "body.toml")
+        scene.write_text(_scene(size.size, size.base).to_toml(), encoding="utf-8")
+        command = [sys.executable, "-m", "finger3d", "sweep", str(scene), "--vary", f"material.nu={nus}"]
+        command += ["--out", str(Path(folder, "out")), "--workers", str(workers)]
+        start = time.perf_counter()
+        subprocess.run(command, check=True, capture_output=True, env={**os.environ, "PYTHONPATH": path})
+        return time.perf_counter() - start
+
+
+def pressed(given: dict[str, Any]) -> dict[str, Any]:
+    """Seconds and peaks (MB) by stage, and sizes, of a press given as a dict."""
+    scene = _scene(given["size"], given["base"])
     watch = Watch()
     with tempfile.TemporaryDirectory(prefix="finger3d_scaling_") as folder:
         result = press(scene, folder, watch, figures=given["figures"])
