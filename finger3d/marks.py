@@ -66,12 +66,13 @@ def marks_of(mesh: Mesh, gauges: Sequence[Gauge], near: bool = False) -> tuple[M
         # to look through all cells for every point would take as long as drawing
         beside = np.all((low - slack <= middle[:2] + half) & (middle[:2] - half <= high + slack), axis=1)
         part = Mesh(mesh.points, mesh.cells[beside], {})
+        points = [middle + sign * half * along for sign in (-1.0, 0.0, 1.0)]
         if near:
-            middle = _near(part, middle, front)
-        here = _weights(part, middle)
+            points = [_near(part, point, front) for point in points]
+        start, here, end = (_weights(part, point) for point in points)
         if here is None:
             continue
-        ends = [_weights(part, middle + sign * half * along) or here for sign in (-1.0, 1.0)]
+        ends = start or here, end or here
         nodes, weights = zip(ends[0], here, ends[1], strict=True)
         label = f"{gauge.name}, {round(math.degrees(gauge.angle), 6):g}°" + (f", z = {gauge.z_mm:g}" if near else "")
         marks.append(Mark(label, np.array(nodes), np.array(weights)))

@@ -38,8 +38,8 @@
   for (let s = 0; s < steps; s++) for (let v = 0; v < n; v++) {
     highest = Math.max(highest, pressure[s * n + v]); farthest = Math.max(farthest, shift(s, v));
   }
-  // How far in front of the face gauges are drawn, and their names, or the face would hide them; in parts of the body.
-  const LINE = 0.008, NAME = 0.04;
+  // How far towards the viewer gauges are drawn, and their names, or the face would hide them; in parts of the body.
+  const LINE = 0.012, NAME = 0.1, FROM = [-0.32, 0.55, 0.77];
   const extent = Math.max(...[0, 1, 2].map((a) => {
     const at = rest.filter((v, p) => p % 3 === a);
     return at.reduce((x, y) => Math.max(x, y)) - at.reduce((x, y) => Math.min(x, y));
@@ -79,14 +79,14 @@
       Object.assign(face, { intensity: far(parents), ...scale("displacement (mm)", farthest) });
       Object.assign(side, { intensity: far(corners), ...scale("", farthest), showscale: false });
     }
+    const before = (points, share) => Object.fromEntries(["x", "y", "z"].map((name, a) =>
+      [name, points.map((p) => p[a] + share * extent * FROM[a])]));
     const lines = !gauges.checked ? [] : data.gauges[s].flatMap((line, g) => {
       const mark = { type: "scatter3d", hoverinfo: "skip", textfont: { color: "#b0006a", size: 13 } };
-      const [, [x, y, z]] = line;
       return [
-        { ...mark, mode: "lines+markers", x: line.map((p) => p[0]), y: line.map((p) => p[1]),
-          z: line.map((p) => p[2] + LINE * extent), line: { color: "#b0006a", width: 6 },
+        { ...mark, mode: "lines+markers", ...before(line, LINE), line: { color: "#b0006a", width: 6 },
           marker: { color: "#b0006a", size: [0, 5, 0], line: { width: 0 } } },
-        { ...mark, mode: "text", x: [x], y: [y], z: [z + NAME * extent], text: [data.gaugeLabels[g]],
+        { ...mark, mode: "text", ...before([line[1]], NAME), text: [data.gaugeLabels[g]],
           textposition: "bottom center" },
       ];
     });
@@ -99,12 +99,13 @@
     for (const list of [rest, moved]) for (let p = a; p < list.length; p += 3) {
       low = Math.min(low, list[p]); high = Math.max(high, list[p]);
     }
-    const front = a === 2 && data.gaugeLabels.length ? (NAME + 0.01) * extent : 0;
-    return [low - 0.02 * (high - low), high + Math.max(front, 0.02 * (high - low))];
+    const room = 0.02 * (high - low), name = data.gaugeLabels.length ? NAME * extent * FROM[a] : 0;
+    return [low - Math.max(room, -name), high + Math.max(room, name)];
   });
-  // As far away as a body needs whose longest extent has to fit into the width of the stage.
-  const size = range.map(([low, high]) => high - low), largest = Math.max(...size), cube = Math.cbrt(size[0] * size[1] * size[2]);
-  const back = 1.1 * largest / cube * Math.max(1, 1.6 * stage.clientHeight / stage.clientWidth);
+  // As far away as a body needs that has to fit into the stage, as wide and as high as it is seen from there.
+  const size = range.map(([low, high]) => high - low), cube = Math.cbrt(size[0] * size[1] * size[2]);
+  const wide = 0.92 * size[0] + 0.38 * size[2], high = 0.84 * size[1] + 0.5 * size[2] + 0.17 * size[0];
+  const back = Math.max(1.5 * high, 1.8 * wide * stage.clientHeight / stage.clientWidth) / cube;
   const eye = { x: -0.35 * back, y: 0.6 * back, z: 0.85 * back };
   function layout() {
     const style = getComputedStyle(document.body), ink = style.color, line = style.getPropertyValue("--line").trim();
@@ -113,7 +114,7 @@
     return { margin: { l: 0, r: 0, t: 0, b: 0 }, paper_bgcolor: "rgba(0,0,0,0)", font: { color: ink, size: 12 },
       uirevision: "keep", showlegend: false,
       scene: { xaxis: axis(0), yaxis: axis(1), zaxis: axis(2), aspectmode: "data", dragmode: "orbit",
-        camera: { up: { x: 0, y: 1, z: 0 }, center: { x: 0, y: 0, z: 0 }, eye: eye } } };
+        camera: { up: { x: 0, y: 1, z: 0 }, center: { x: 0, y: narrow() ? -0.12 : 0, z: 0 }, eye: eye } } };
   }
   const config = { responsive: true, displaylogo: false, displayModeBar: false };
   function draw() {
