@@ -79,13 +79,14 @@
       Object.assign(face, { intensity: far(parents), ...scale("displacement (mm)", farthest) });
       Object.assign(side, { intensity: far(corners), ...scale("", farthest), showscale: false });
     }
+    const tint = window.matchMedia("(prefers-color-scheme: dark)").matches ? "#e0408f" : "#b0006a";
     const before = (points, share) => Object.fromEntries(["x", "y", "z"].map((name, a) =>
       [name, points.map((p) => p[a] + share * extent * FROM[a])]));
     const lines = !gauges.checked ? [] : data.gauges[s].flatMap((line, g) => {
-      const mark = { type: "scatter3d", hoverinfo: "skip", textfont: { color: "#b0006a", size: 13 } };
+      const mark = { type: "scatter3d", hoverinfo: "skip", textfont: { color: tint, size: 13 } };
       return [
-        { ...mark, mode: "lines+markers", ...before(line, LINE), line: { color: "#b0006a", width: 6 },
-          marker: { color: "#b0006a", size: [0, 5, 0], line: { width: 0 } } },
+        { ...mark, mode: "lines+markers", ...before(line, LINE), line: { color: tint, width: 6 },
+          marker: { color: tint, size: [0, 5, 0], line: { width: 0 } } },
         { ...mark, mode: "text", ...before([line[1]], NAME), text: [data.gaugeLabels[g]],
           textposition: "bottom center" },
       ];
