@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d.drawing import Artist
 from finger3d.errors import Finger3dError
 from finger3d.export import atomic, claimed, write_csv
 from finger3d.history import Frame
@@ -103,15 +104,16 @@ def calibrate(
 
         check(model)
     settings = (known, asked, wanted, noise, limit, report, maps)
-    if out is None:
-        return _whole(scene, model, None, *settings)
-    with claimed(out, "calibrate") as folder:
-        return _whole(scene, model, folder, *settings)
+    with Artist(out is not None) as artist:
+        if out is None:
+            return _whole(scene, model, None, artist, *settings)
+        with claimed(out, "calibrate") as folder:
+            return _whole(scene, model, folder, artist, *settings)
 
 
 def _whole(
-    scene: Scene, model: Model, folder: Path | None, gauge: Gauge, mus: tuple[float, ...], wanted: Mapping[str, float],
-    noise: float, limit: float, report: Report, maps: bool,
+    scene: Scene, model: Model, folder: Path | None, artist: Artist, gauge: Gauge, mus: tuple[float, ...],
+    wanted: Mapping[str, float], noise: float, limit: float, report: Report, maps: bool,
 ) -> Calibration:  # fmt: skip
     """Calibrate and write what is found; an interruption leaves the curve so far in calibration.csv."""
     text = scene.to_toml()
@@ -137,7 +139,7 @@ def _whole(
     digest = hashlib.sha256(text.encode()).hexdigest()[:16]
     calibration = replace(calibration, scene=scene.as_dict(), hash=digest, about=about)
     if folder:
-        _write(folder, calibration, problem, model, gauge, sweep, report, maps)
+        _write(folder, artist, calibration, problem, model, gauge, sweep, report, maps)
     return calibration
 
 
@@ -260,12 +262,14 @@ def _keep(folder: Path, sweep: Sweep, gauge: str) -> None:
 
 
 def _write(
-    folder: Path, calibration: Calibration, problem: Problem, model: Model, gauge: Gauge, sweep: Sweep, report: Report,
-    maps: bool,
+    folder: Path, artist: Artist, calibration: Calibration, problem: Problem, model: Model, gauge: Gauge, sweep: Sweep,
+    report: Report, maps: bool,
 ) -> None:  # fmt: skip
     from finger3d.sensor.picture import draw
 
     report.stage("writing")
+    artist.draw(draw, folder / "calibration.png", calibration)
+    artist.begin()
     write_table(calibration, folder / "calibration.csv")
     own = replace(
         problem, model=replace(problem.model, gauges=model.gauges), gauge_rows=problem.gauge_rows[: len(model.gauges)]
@@ -274,7 +278,6 @@ def _write(
         Condensed.of(own).save(folder / "reduced.npz")
     else:
         report.say("no reduced.npz: the body's answer changes on the way")
-    draw(folder / "calibration.png", calibration)
     if maps:
         from finger3d.sensor.maps import StrainMap, draw_map
 
@@ -282,6 +285,7 @@ def _write(
         found.write(folder / "map.csv", gauge.angle, calibration.noise)
         draw_map(folder / "map.png", found, gauge, calibration)
     save(calibration, folder / "calibration.json")
+    artist.finish()
     calibrate_page(folder)
 
 
