@@ -46,11 +46,6 @@ class Memory:
     now: Float
     branches: Float
 
-    @classmethod
-    def empty(cls, size: int, branches: int) -> Memory:
-        """Nothing yet."""
-        return cls(np.zeros(size), np.zeros((branches, size)))
-
 
 @dataclass(frozen=True)
 class Step:
@@ -314,7 +309,8 @@ class Viscoelastic(SmallStrain):
     def start(self, problem: Any) -> ViscousState:
         """Nothing to remember."""
         _check_domain(problem.model, self.bulk)
-        empty = Memory.empty(self._body(problem).size, len(self.prony))
+        size = self._body(problem).size
+        empty = Memory(np.zeros(size), np.zeros((len(self.prony), size)))
         return ViscousState(**vars(super().start(problem)), memory=empty)
 
     def increment(self, problem: Any, state: ContactState, a: Any, b: Any, guess: Float | None) -> Increment:
