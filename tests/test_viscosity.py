@@ -181,7 +181,7 @@ def test_the_compliance_of_a_step_is_the_difference_quotient_of_its_response(
     body = kind(problem)
     rng = np.random.default_rng(0)
     rows = len(problem.condensed.compliance)
-    memory = Memory.empty(body.size, 2)
+    memory = Memory(np.zeros(body.size), np.zeros((2, body.size)))
     for seconds in (0.3, 0.7):  # so that there is a past
         step = Step(TWO, seconds)
         response = body.respond(step, memory)
