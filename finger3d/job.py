@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from contextlib import nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -120,6 +121,7 @@ def press(
     report: Report | None = None,
     figures: bool | None = None,
     error: bool = True,
+    artist: Artist | None = None,
 ) -> PressResult:
     """Press a scene, and write its results into a folder.
 
@@ -130,6 +132,7 @@ def press(
     report : told about stages and steps
     figures : whether to draw PNG files and to write report.html; None: if a folder is given
     error : whether to estimate the errors by mesh and increments, from a coarser run
+    artist : one that has entered already, and loads what drawing needs; None: one of its own
 
     Returns
     -------
@@ -151,8 +154,9 @@ def press(
     scene = load(scene) if isinstance(scene, str | Path) else scene
     temporary = TemporaryDirectory(prefix="finger3d-") if out is None else None
     figures = temporary is None if figures is None else figures
-    with claimed(temporary.name if temporary else str(out), "press") as folder, Artist(figures) as artist:
-        history, summary = _pressed(scene, folder, report or Report(), started, artist if figures else None, error)
+    with claimed(temporary.name if temporary else str(out), "press") as folder:
+        with nullcontext(artist) if artist else Artist(figures) as mine:
+            history, summary = _pressed(scene, folder, report or Report(), started, mine if figures else None, error)
     return PressResult(history, folder, summary, temporary)
 
 
@@ -325,8 +329,11 @@ def _fields(problem: Problem, output: _Output, folder: Path, artist: Artist | No
     mesh, parent, sign = unfold(problem.mesh, tuple("xyz".index(a) for a in problem.axes))
     flip = np.ones((len(parent), 3))
     flip[:, : problem.dim] = sign
+    whole_u = u[parent] * sign
     both = flip[:, :, None] * flip[:, None, :]
     table = contact_table(points, frame.state)
+    if artist:
+        _figures(problem, output, frame, mesh, whole_u, folder, artist)
     on_surface = {name: np.zeros(len(parent)) for name in ("pressure", "shear_x", "shear_z", "status")}
     ends, between = middles(mesh.facets["contact"], mesh.dim)
     for name in ("pressure", "shear_x", "shear_z"):
@@ -334,7 +341,6 @@ def _fields(problem: Problem, output: _Output, folder: Path, artist: Artist | No
         on_surface[name][between] = on_surface[name][ends].mean(axis=1)
     on_surface["status"][points.nodes] = frame.state.status
     on_surface["status"][between] = on_surface["status"][ends].min(axis=1)
-    whole_u = u[parent] * sign
     write_states(folder / "steps.npz", states_of(problem, good, mesh, parent, sign, whole_u))
     write_vtu(
         folder / "fields.vtu",
@@ -346,8 +352,6 @@ def _fields(problem: Problem, output: _Output, folder: Path, artist: Artist | No
             **on_surface,
         },
     )
-    if artist:
-        _figures(problem, output, frame, mesh, whole_u, folder, artist)
 
 
 def _told(history: History) -> str:

@@ -38,17 +38,20 @@ def press(
     scene
         The scene file (TOML); `finger3d new` writes one.
     """
-    loaded = load(scene, set_)
-    check_writable(out, scene)
-    from finger3d.job import press as run
+    from finger3d.drawing import Artist
 
-    report, aside = reporting(json_)
-    try:
-        with aside, report:
-            result = run(loaded, out, report, figures=figures, error=error)
-    except KeyboardInterrupt:
-        complain(f"interrupted; {kept(out, report.steps_total)}")
-        return 130
+    with Artist(figures) as artist:  # it loads what it needs while the scene is read
+        loaded = load(scene, set_)
+        check_writable(out, scene)
+        from finger3d.job import press as run
+
+        report, aside = reporting(json_)
+        try:
+            with aside, report:
+                result = run(loaded, out, report, figures=figures, error=error, artist=artist)
+        except KeyboardInterrupt:
+            complain(f"interrupted; {kept(out, report.steps_total)}")
+            return 130
     if json_:
         print_json(result.summary())
     else:
