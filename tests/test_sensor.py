@@ -330,6 +330,8 @@ def test_presses_started_from_their_neighbours_end_where_cold_ones_do(domain: st
     last = {k: sum(p.frame.iterations for p in found) for k, found in (("cold", cold.values()), ("chain", chain))}
     assert last["chain"] < 0.7 * last["cold"]
     assert [p.frame.iterations for p in again] == [1] * len(again)
+    far = list(pressing.presses(problem, (0.06, 0.5, 1.0)))  # forces at half the friction would be no help
+    assert [p.frame.iterations for p in far] == [pressing.press(problem, p.mu).frame.iterations for p in far]
 
 
 def test_slopes_between_the_few_mu_that_are_tried(monkeypatch: Any) -> None:

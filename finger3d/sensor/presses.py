@@ -20,6 +20,7 @@ from finger3d.solve import each, march
 Float = NDArray[np.float64]
 
 _FARTHEST = 2.0  # times the distance of the last two mu: forces are not continued beyond
+_NEAR = 0.1  # of mu: from one farther off a press takes more iterations than from its own path
 
 
 @dataclass(frozen=True)
@@ -59,10 +60,12 @@ def presses(problem: Problem, mus: Sequence[float], like: Like | None = None) ->
 def _start(problem: Problem, mu: float, near: Sequence[Press]) -> list[Float]:
     """Forces of the last press near, continued at the pace of the two; none of a body with other points."""
     shape = problem.compliance.shape[:2]
-    good = [p for p in near if p.forces[0].shape == shape]
+    good = [p for p in near if p.forces[0].shape == shape and abs(p.mu - mu) <= 2.0 * _NEAR]
     if not good:
         return []
     first, last = good[0], good[-1]
+    if abs(last.mu - mu) > _NEAR:
+        return []
     if first.mu == last.mu:
         return list(last.forces)
     share = min((mu - last.mu) / (last.mu - first.mu), _FARTHEST)
