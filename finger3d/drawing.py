@@ -28,10 +28,12 @@ class Artist:
     Parameters
     ----------
     wanted : whether anything will be drawn
+    module : where the functions are that will; the child loads it meanwhile
     """
 
-    def __init__(self, wanted: bool = True) -> None:
+    def __init__(self, wanted: bool = True, module: str = "finger3d.view") -> None:
         self._wanted = wanted
+        self._module = module
         self._calls: list[partial[Any]] = []
         self._child: subprocess.Popen[bytes] | None = None
         self._sent = False
@@ -40,7 +42,7 @@ class Artist:
         if self._wanted and "matplotlib" not in sys.modules:
             # a session of its own: Ctrl-C is for the parent, which lets begun pictures be finished
             self._child = subprocess.Popen(
-                [sys.executable, "-P", "-m", __name__], env=child_environment(), start_new_session=True,
+                [sys.executable, "-P", "-m", __name__, self._module], env=child_environment(), start_new_session=True,
                 stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
             )  # fmt: skip
         return self
@@ -81,19 +83,19 @@ class Artist:
                 stream.write(last)
 
 
-def _main() -> None:
-    _warm_up()
+def _main(module: str) -> None:
+    _warm_up(module)
     sent = sys.stdin.buffer.read()
     for call in pickle.loads(sent) if sent else ():
         call()
 
 
-def _warm_up() -> None:
+def _warm_up(module: str) -> None:
     """All that a first picture takes besides its own drawing, while the parent computes: modules, fonts."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    import_module("finger3d.view")
+    import_module(module)
     figure = Figure(figsize=(1.0, 1.0))
     FigureCanvasAgg(figure)
     figure.add_subplot().set_xlabel("x (mm)")
@@ -101,4 +103,4 @@ def _warm_up() -> None:
 
 
 if __name__ == "__main__":
-    _main()
+    _main(sys.argv[1])

@@ -104,7 +104,7 @@ def calibrate(
 
         check(model)
     settings = (known, asked, wanted, noise, limit, report, maps)
-    with Artist(out is not None) as artist:
+    with Artist(out is not None, "finger3d.sensor.picture") as artist:
         if out is None:
             return _whole(scene, model, None, artist, *settings)
         with claimed(out, "calibrate") as folder:
