@@ -134,15 +134,18 @@ def test_fillets_are_contact_and_hold_their_nodes(drawn: Path) -> None:
     body = imported(drawn / "rounded.step")
     mesh, _ = mesh_solid(body, options(0.9, 2.0), (-5.0, 5.0, -3.0, 3.0), BOTH)
     assert set(mesh.facets) == {"contact", "base", "ends", "walls", "symmetry_x", "symmetry_z"}
-    contact = mesh.points[np.unique(mesh.facets["contact"])]
+    nodes = np.unique(mesh.facets["contact"])
+    contact = mesh.points[nodes]
     off = [np.hypot(contact[:, i] - middle, contact[:, 1] - 3.5) - 1.5 for i, middle in ((0, 4.5), (2, 2.5))]
     off = np.abs(off).min(axis=0)[contact[:, 1] < 5.0 - 1e-9]
     assert np.quantile(off, 0.9) < 1e-9
     # The rest are nodes of the same facets on the walls, which the fillets run into smoothly.
     skin = Compound(body.solid().faces())
-    away = [skin.distance_to(Vertex(*map(float, p))) for p in contact]
+    away = np.array([skin.distance_to(Vertex(*map(float, p))) for p in contact])
     assert np.quantile(away, 0.95) < 1e-9
-    assert max(away) < 1e-4
+    assert away[np.isin(nodes, mesh.vertices)].max() < 1e-4
+    # In some meshes an edge is left straight, where a curved one would turn a cell inside out: its chord's sagitta.
+    assert away.max() < 1.5 * 0.9**2 / (8.0 * 1.5)  # of an edge somewhat longer than asked for, on a fillet of 1.5 mm
 
 
 def test_an_stl_finger_is_meshed_on_its_triangles(drawn: Path) -> None:
