@@ -156,7 +156,7 @@ def companion(problem: Problem) -> Problem:
     Finger3dError
         Where the mesh is so coarse that none is coarser.
     """
-    costly = problem.dim == 2 and type(problem.model.kinematics) is not SmallStrain
+    costly = problem.dim == 2 and not isinstance(problem.model.kinematics, SmallStrain)
     model = coarser(problem.model, _FACTOR_WHERE_STEPS_FACTOR if costly else FACTOR)
     _check_cost(problem, model)
     beside = built_like(problem, model)

@@ -24,9 +24,6 @@ from finger3d.errors import Finger3dError, MissingError
 if TYPE_CHECKING:
     from finger3d.sweep import Kept
 
-MAIN = ("normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm")
-"""Numbers of a point that are shown."""
-
 _SHOWN, _GAUGES = 10, 3  # points and gauges
 
 
@@ -111,6 +108,7 @@ def _as_dict(kept: Kept, out: Path) -> dict[str, Any]:
 
 def _print_points(kept: Kept) -> None:
     """The varied keys and the main numbers of the first points."""
+    from finger3d.accuracy import MAIN
     from finger3d.page.build import number
 
     def cell(value: Any) -> str:

@@ -46,11 +46,6 @@ def press(problem: Problem, mu: float, near: Sequence[Press] = ()) -> Press:
     return Press(mu, frame, tuple(forces))
 
 
-def last_frame(problem: Problem, mu: float) -> Frame:
-    """The last increment of a press of the condensed body with this mu."""
-    return press(problem, mu).frame
-
-
 def presses(problem: Problem, mus: Sequence[float], like: Like | None = None) -> Iterator[Press]:
     """Presses with ascending mu; where `like` has a press with the same mu, that is what it starts from."""
     known = like or {}
@@ -60,12 +55,10 @@ def presses(problem: Problem, mus: Sequence[float], like: Like | None = None) ->
 def _start(problem: Problem, mu: float, near: Sequence[Press]) -> list[Float]:
     """Forces of the last press near, continued at the pace of the two; none of a body with other points."""
     shape = problem.compliance.shape[:2]
-    good = [p for p in near if p.forces[0].shape == shape and abs(p.mu - mu) <= 2.0 * _NEAR]
-    if not good:
+    good = [p for p in near if p.forces[0].shape == shape]
+    if not good or abs(good[-1].mu - mu) > _NEAR:
         return []
     first, last = good[0], good[-1]
-    if abs(last.mu - mu) > _NEAR:
-        return []
     if first.mu == last.mu:
         return list(last.forces)
     share = min((mu - last.mu) / (last.mu - first.mu), _FARTHEST)
