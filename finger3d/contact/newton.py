@@ -21,6 +21,9 @@ _NEAR = 1e-6
 
 _DIVERGED = 1e9
 
+_CACHED = 30_000
+"""Numbers that are gathered at once."""
+
 
 @dataclass(frozen=True)
 class Iterate:
@@ -41,48 +44,58 @@ def force_of_sets(problem: Increments, status: NDArray[np.int8], trial: Float) -
     """
     c, d = trial.shape
     slip, stick = np.flatnonzero(status == SLIP), np.flatnonzero(status == STICK)
-    if not len(slip) + len(stick):
+    k, n = len(slip), len(stick) * d
+    if not n + k:
         return np.zeros((c, d))
     tangent = trial[slip, 1:]
     length = np.linalg.norm(tangent, axis=1)
     length = np.where(length > 0.0, length, 1.0)
     direction = tangent / length[:, None]
     mu = problem.mu[slip]
-    turn = np.minimum(mu * trial[slip, 0] / length, 1.0) if d > 2 else np.zeros(0)
-    across = np.stack([-direction[:, 1], direction[:, 0]], axis=1) if d > 2 else np.zeros((0, 0))
-    # unknowns: forces of sticking points, f_n of slipping ones, force across; equations: which displacement vanishes,
-    # weighted to a force.  Rows of the compliance are taken whole: gathering is as dear as the solution.
-    n, k, w = len(stick) * d, len(slip), len(turn)
-    normal, rho, compliance = slip * d, problem.rho.ravel(), problem.compliance
-    free_dofs, side = (stick[:, None] * d + np.arange(d)).ravel(), [normal + i for i in range(1, d)]
-    own = np.concatenate([free_dofs, normal])
     pull = mu[:, None] * direction
-    sides = [compliance.take(s, axis=0) for s in side]
-    moved = np.empty((n + k + w, c * d))  # displacements per unit of every unknown; the compliance is symmetric
-    moved[: n + k] = compliance.take(own, axis=0)
-    for i, rows in enumerate(sides):
-        moved[n : n + k] += pull[:, i, None] * rows
-        if w:
-            moved[n + k :] = across[:, i, None] * rows + (moved[n + k :] if i else 0.0)
-    turned = np.empty((n + k + w, n + k + w))  # equations run along its columns
-    np.multiply(moved.take(own, axis=1), rho[own], out=turned[:, : n + k])
-    right = np.empty(n + k + w)
-    free = problem.free.ravel()
-    right[: n + k] = rho[own] * free[own]
-    if w:
-        weigh = [turn * across[:, i] * rho[s] for i, s in enumerate(side)]
-        turned[:, n + k :] = sum(moved.take(s, axis=1) * weigh[i] for i, s in enumerate(side))
-        right[n + k :] = sum(weigh[i] * free[s] for i, s in enumerate(side))
-    at_w = n + k + np.arange(w)
-    turned[at_w, at_w] += 1.0 - turn
-    unknowns = np.linalg.solve(turned.T, -right)
+    # unknowns: forces of sticking points, f_n of slipping ones, force across; equations: which displacement vanishes,
+    # weighted to a force.  All is made in place of the compliance between points that touch, whose slipping ones come
+    # direction by direction: passes over it are as dear as the solution.
+    own = np.concatenate([(stick[:, None] * d + np.arange(d)).ravel(), slip * d])
+    sides = [slip * d + i for i in range(1, d)]
+    whole = _between(problem.compliance, np.concatenate([own, *sides]))
+    rho, free = problem.rho.ravel(), problem.free.ravel()
+    normal, first, second = (slice(n + i * k, n + (i + 1) * k) for i in range(3))
+    for i, side in enumerate((first, second)[: d - 1]):
+        whole[normal] += pull[:, i, None] * whole[side]  # displacements per unit of f_n; the compliance is symmetric
+    right = rho[own] * free[own]
+    whole[:, : n + k] *= rho[own]  # equations run along its columns
+    count = n + k
+    if d > 2:
+        count += k
+        turn = np.minimum(mu * trial[slip, 0] / length, 1.0)
+        across = np.stack([-direction[:, 1], direction[:, 0]], axis=1)
+        whole[first] *= across[:, 0, None]
+        whole[first] += across[:, 1, None] * whole[second]
+        weigh = [turn * across[:, i] * rho[side] for i, side in enumerate(sides)]
+        whole[:count, first] *= weigh[0]
+        whole[:count, first] += whole[:count, second] * weigh[1]
+        right = np.concatenate([right, weigh[0] * free[sides[0]] + weigh[1] * free[sides[1]]])
+        at = np.arange(n + k, count)
+        whole[at, at] += 1.0 - turn
+    unknowns = np.linalg.solve(whole[:count, :count].T, -right)
     force = np.zeros((c, d))
-    force.ravel()[free_dofs] = unknowns[:n]
-    force[slip, 0] = unknowns[n : n + k]
-    force[slip, 1:] = pull * unknowns[n : n + k, None]
-    if w:
-        force[slip, 1:] += across * unknowns[n + k :, None]
+    force.ravel()[own] = unknowns[: n + k]
+    force[slip, 1:] = pull * unknowns[normal, None]
+    if d > 2:
+        force[slip, 1:] += across * unknowns[first, None]
     return force
+
+
+def _between(matrix: Float, chosen: NDArray[np.int64]) -> Float:
+    """Entries of a matrix between the chosen rows and columns, row by row within what a cache holds."""
+    count = len(chosen)
+    found = np.empty((count, count))
+    stride = max(1, _CACHED // len(matrix))
+    for i in range(0, count, stride):
+        part = slice(i, i + stride)
+        np.take(matrix.take(chosen[part], axis=0), chosen, axis=1, out=found[part], mode="clip")  # "raise" would copy
+    return found
 
 
 def newton(problem: Increments, start: Float, limit: int, damped: bool) -> Iterate:
