@@ -1,23 +1,25 @@
-"""Error bars of a press: what its mesh and its increments leave unsaid, from a coarser run of each.
+"""Error bars of a press: what its mesh and its increments leave unsaid, from another run of each.
 
-The coarse companion has about twice the edge lengths, so an eighth of the cells of a solid and a quarter of those of a
-section; what it changes is taken down to the mesh at hand by the order of convergence (Richardson).  The order is that
-of quadratic elements with a bonded corner, 2 lambda (Williams 1952), for smooth data it would be higher.  A length is
-told by points, so its error is never below half their spacing.  ``validation/error_bars.py`` says how far the
-estimates may be trusted.
+The companion has about twice the edge lengths, so at best an eighth of the cells of a solid and a quarter of those of a
+section; what it changes is taken to the mesh at hand by the order of convergence (Richardson).  A mesh than which none
+is coarser is small, and gets a finer companion.  The order is that of quadratic elements with a bonded corner, 2 lambda
+(Williams 1952), for smooth data it would be higher.  A length is told by points, so its error is never below half their
+spacing.  An object that yields is meshed anew with the finger, so a bar covers both.  ``validation/error_bars.py`` says
+how far the estimates may be trusted.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d.design import mesh_section, mesh_solid
 from finger3d.errors import Finger3dError
 from finger3d.fem.surface import surface
 from finger3d.history import Frame, measure
@@ -28,11 +30,18 @@ from finger3d.objects.mesh import MeshObject
 from finger3d.solve import AUTO_START, Problem, build, contact_zone, march, symmetry
 
 Float = NDArray[np.float64]
+Say = Callable[[str], None]
 
 MAIN = ("normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm")
 """The numbers that get an error bar, beside every gauge."""
 
 FACTOR = 2.0
+_FINER = 0.5
+"""Where no mesh is coarser; such a mesh is small."""
+
+_LEAST_UNSTRUCTURED = 15_000
+"""Unknowns; asked for longer edges, pytetwild gives a curved body few less, and takes longer than for a finer mesh."""
+
 _FACTOR_WHERE_STEPS_FACTOR = 2.5
 """Of a section whose every step factors anew: at 2 its companion would take half as long as the press itself."""
 
@@ -43,6 +52,9 @@ STEP_ORDER = 1.0
 _LEAST_RATIO = 1.25
 _STEPS_SHARE, _STEPS_S = 0.15, 0.2
 """More increments may take this share of the time so far, or so many seconds."""
+
+_READ_S = 1.0
+"""Reading meshes from the cache takes less, making them by pytetwild more."""
 
 _FLOOR = 0.1
 """An edge told by points of distance h leaves a force uncertain by about this times (h/a)^2, friction and strains by
@@ -124,20 +136,22 @@ def _share(along: float, reach: float, across: float, half_width: float) -> floa
 
 
 def mesh_error(
-    fine: Mapping[str, float], coarse: Mapping[str, float], ratio: float, grains: tuple[Grain, Grain]
+    told: Mapping[str, float], other: Mapping[str, float], ratio: float, grains: tuple[Grain, Grain]
 ) -> dict[str, float]:
     """Discretisation error by name.
 
     Parameters
     ----------
-    fine, coarse : main numbers of the run and of its companion
-    ratio : how many times longer the companion's edges are
+    told, other : main numbers of the run and of its companion
+    ratio : how many times longer the companion's edges are; below 1 where it is the finer one
     grains : of both
     """
-    found, gain = {}, ratio**ORDER - 1.0
-    strain = max((abs(v) for k, v in fine.items() if k.startswith("gauge_")), default=0.0)
-    for name, value in fine.items():
-        change = abs(value - coarse[name])
+    found = {}
+    # (companion - run) = error (ratio^order - 1), whichever of them is finer
+    gain = abs(ratio**ORDER - 1.0)
+    strain = max((abs(v) for k, v in told.items() if k.startswith("gauge_")), default=0.0)
+    for name, value in told.items():
+        change = abs(value - other[name])
         if name in _LENGTHS:
             # the companion's own rounding to points is no change of the length
             change = max(0.0, change - 0.5 * grains[1].spacing_mm)
@@ -148,45 +162,49 @@ def mesh_error(
     return {k: float(v) for k, v in found.items() if math.isfinite(v)}
 
 
-def companion(problem: Problem) -> Problem:
-    """The coarser problem beside one, condensed; all of the contact face is kept where the problem keeps it all.
+def companion(problem: Problem, say: Say = lambda text: None) -> Problem:
+    """The problem beside one, condensed: coarser, or finer where none is coarser; all of the contact face is kept where
+    the problem keeps it all.
+
+    A body that cannot be swept is meshed once, which may take as long as its own mesh did, and read from the cache from
+    then on.
 
     Raises
     ------
     Finger3dError
-        Where the mesh is so coarse that none is coarser.
+        Where neither mesh can be made, or none differs enough to tell anything.
     """
-    costly = problem.dim == 2 and not isinstance(problem.model.kinematics, SmallStrain)
-    model = coarser(problem.model, _FACTOR_WHERE_STEPS_FACTOR if costly else FACTOR)
-    _check_cost(problem, model)
-    beside = built_like(problem, model)
-    if _ratio(problem, beside) < _LEAST_RATIO:
-        raise Finger3dError("the mesh is so coarse that no coarser one tells anything; lower mesh.size_mm")
-    return beside
+    model, own = problem.model, problem.model.mesh
+    costly = problem.dim == 2 and not isinstance(model.kinematics, SmallStrain)
+    longer = coarser(model, _FACTOR_WHERE_STEPS_FACTOR if costly else FACTOR).mesh
+    enough = problem.mesh.points.size >= _LEAST_UNSTRUCTURED
+    chosen = [longer] if longer.mesher == "swept" or enough else []
+    if model.domain == "solid" and own.mesher != longer.mesher and enough:
+        chosen.append(replace(longer, mesher=own.mesher))
+    for options in chosen:
+        if beside := _built_if(problem, replace(model, mesh=options), lambda ratio: ratio >= _LEAST_RATIO, say):
+            return beside
+    finer = replace(own, size_mm=_FINER * own.size_mm, base_size_mm=_FINER * own.base_size_mm)
+    if beside := _built_if(problem, replace(model, mesh=finer), lambda ratio: ratio <= 1.0 / _LEAST_RATIO, say):
+        return beside
+    raise Finger3dError("no other mesh differs enough from this one to tell anything; change mesh.size_mm")
 
 
-def built_like(problem: Problem, model: Model) -> Problem:
+def _built_if(problem: Problem, model: Model, enough: Callable[[float], bool], say: Say) -> Problem | None:
+    """A companion, condensed, if the ratio of edges is enough; a structured mesh is looked at first."""
+    if model.domain != "solid" or model.mesh.mesher == "swept":
+        made = mesh_solid if model.domain == "solid" else mesh_section
+        mesh = made(model.design, model.mesh, contact_zone(model), symmetry(model))[0]
+        if not enough((problem.mesh.points.size / mesh.points.size) ** (1.0 / problem.dim)):
+            return None
+    beside = built_like(problem, model, say if _unstructured(model) else lambda text: None)
+    return beside if enough(_ratio(problem, beside)) else None
+
+
+def built_like(problem: Problem, model: Model, say: Say = lambda text: None) -> Problem:
     """Another model condensed, to all of its contact face where the problem keeps all of its own."""
     everything = len(surface(problem.mesh, "contact", problem.thickness).nodes) == len(problem.surface.nodes)
-    return build(model, margin=math.inf) if everything else build(model)
-
-
-def _check_cost(problem: Problem, model: Model) -> None:
-    """Refuse a companion that pytetwild would have to mesh although the problem itself took its meshes from the cache,
-    and one whose object it would mesh: on a ball of 0.5 mm that took four times as long as the press.
-    """
-    unstructured = isinstance(model.object, Sphere | MeshObject) and model.domain == "solid"
-    if model.object_compliance is not None and unstructured:
-        raise Finger3dError("a coarser mesh of the elastic object would take longer than the press")
-    if model.domain != "solid" or model.mesh.mesher == "swept" or not problem.report.from_cache:
-        return
-    from finger3d.design.tetwild import cached
-
-    if not cached(model.design, model.mesh, contact_zone(model), symmetry(model)):
-        raise Finger3dError(
-            "a coarser mesh is not in the cache, and making one would take longer than the press; it is made together "
-            "with the mesh itself"
-        )
+    return build(model, say, margin=math.inf) if everything else build(model, say)
 
 
 def compared(problem: Problem, frame: Frame, beside: Problem, last: Frame) -> dict[str, float]:
@@ -196,17 +214,30 @@ def compared(problem: Problem, frame: Frame, beside: Problem, last: Frame) -> di
 
 
 def _ratio(problem: Problem, beside: Problem) -> float:
-    """How many times longer the edges are, by the unknowns: those at the base are bounded by the finger."""
+    """How many times longer the companion's edges are: by the unknowns, as those at the base are bounded by the finger.
+
+    Of two unstructured meshes at the contact: far from it their edges follow a growth that both share.
+    """
+    if all(p.dim == 3 and p.model.mesh.mesher != "swept" for p in (problem, beside)):
+        return _spacing(beside) / _spacing(problem)
     return float((problem.stiffness.upper.shape[0] / beside.stiffness.upper.shape[0]) ** (1.0 / problem.dim))
+
+
+def _spacing(problem: Problem) -> float:
+    """Typical distance (mm) of contact points where contact is predicted."""
+    x0, x1, z0, z1 = contact_zone(problem.model)
+    at = problem.points.points
+    inside = (at[:, 0] >= x0) & (at[:, 0] <= x1) & (at[:, 2] >= z0) & (at[:, 2] <= z1)
+    return float(np.sqrt(np.median(problem.points.area[inside if inside.any() else slice(None)])))
 
 
 def strain_error(problem: Problem, frame: Frame, beside: Problem, fine: Float, coarse: Float) -> Float:
     """Discretisation error (m,) of a gauge's strain (m,) at several coefficients of friction, from its companion's;
     the grain is that of a last `frame` at any of them.
     """
-    share = Grain.of(problem, frame).share
-    found = np.abs(fine - coarse) / (_ratio(problem, beside) ** ORDER - 1.0)
-    return np.maximum(found, _FLOOR * share * np.abs(fine).max(initial=0.0))
+    told, other = ({f"gauge_{k}": float(v) for k, v in enumerate(strain)} for strain in (fine, coarse))
+    found = mesh_error(told, other, _ratio(problem, beside), (Grain.of(problem, frame),) * 2)
+    return np.array([found.get(name, math.nan) for name in told])
 
 
 def relative(numbers: Mapping[str, float], errors: Mapping[str, float]) -> dict[str, float]:
@@ -248,13 +279,16 @@ def step_error(problem: Problem, numbers: Mapping[str, float], times: float = 4.
     return {k: float(v) for k, v in found.items() if math.isfinite(v)}
 
 
-def estimate(problem: Problem, frames: Sequence[Frame], spent: Mapping[str, float]) -> ErrorEstimate:
-    """Estimate the errors of the last frame by a coarser mesh and by more increments.
+def estimate(
+    problem: Problem, frames: Sequence[Frame], spent: Mapping[str, float], say: Say = lambda text: None
+) -> ErrorEstimate:
+    """Estimate the errors of the last frame by another mesh, coarser if there is one, and by more increments.
 
     Parameters
     ----------
     problem, frames : the press as it was solved, all increments good
     spent : seconds by stage, which say how many more increments are affordable, and on which mesh
+    say : told what is being done, where it may take long
 
     Returns
     -------
@@ -263,37 +297,51 @@ def estimate(problem: Problem, frames: Sequence[Frame], spent: Mapping[str, floa
     """
     start = time.perf_counter()
     try:
-        mesh, steps, method = _estimated(problem, frames, spent)
+        mesh, steps, method = _estimated(problem, frames, spent, say)
     except (Finger3dError, RuntimeError, ValueError, np.linalg.LinAlgError, MemoryError) as error:
         mesh, steps, method = {}, {}, f"no estimate: {error}"
     return ErrorEstimate(mesh, steps, method, time.perf_counter() - start)
 
 
 def _estimated(
-    problem: Problem, frames: Sequence[Frame], spent: Mapping[str, float]
+    problem: Problem, frames: Sequence[Frame], spent: Mapping[str, float], say: Say
 ) -> tuple[dict[str, float], dict[str, float], str]:
     if not frames or not frames[-1].outcome.ok:
         raise Finger3dError("the last step did not converge")
     # increments chosen by halving are numbers by now
     model = replace(problem.model, legs=_as_solved(problem.model.legs, len(frames)))
-    fine = replace(problem, model=model)
-    beside = companion(fine)
+    own = replace(problem, model=model)
+    beside = companion(own, say)
     begin = time.perf_counter()
     last = last_frame(beside)
-    coarse_s = time.perf_counter() - begin
-    mesh = compared(fine, frames[-1], beside, last)
-    here, times = _finer_steps(spent["contact"], coarse_s, max(_STEPS_SHARE * sum(spent.values()), _STEPS_S))
-    where = (fine, frames[-1]) if here else (beside, last)
+    beside_s = time.perf_counter() - begin
+    mesh = compared(own, frames[-1], beside, last)
+    here, times = _finer_steps(spent["contact"], beside_s, max(_STEPS_SHARE * sum(spent.values()), _STEPS_S))
+    where = (own, frames[-1]) if here else (beside, last)
     steps = step_error(where[0], main_numbers(*where), times)
-    options = beside.model.mesh
     count = {4.0: "four times", 2.0: "twice", 0.5: "half"}[times]
-    place = "" if here else " on the coarse mesh"
-    method = (
-        f"mesh: {beside.stiffness.upper.shape[0]} dofs ({options.mesher if problem.dim == 3 else 'structured'}, "
-        f"{options.size_mm:.4g} and {options.base_size_mm:.4g} mm) beside, order {ORDER}; "
-        f"steps: {count} as many{place}, order {STEP_ORDER:g}"
-    )
-    return mesh, steps, method
+    kind = "coarse" if _ratio(own, beside) > 1.0 else "finer"
+    place = "" if here else f" on the {kind} mesh"
+    return mesh, steps, f"{_on_mesh(beside, kind)}; steps: {count} as many{place}, order {STEP_ORDER:g}"
+
+
+def _on_mesh(beside: Problem, kind: str) -> str:
+    """How the error of the mesh was found, and what was paid once for it."""
+    options = beside.model.mesh
+    mesher = options.mesher if beside.dim == 3 else "structured"
+    told = f"{mesher}, {options.size_mm:.4g} and {options.base_size_mm:.4g} mm"
+    told += ", of both bodies" if beside.model.object_compliance else ""
+    text = f"mesh: {beside.stiffness.upper.shape[0]} dofs ({told}) beside, {'finer, ' * (kind == 'finer')}order {ORDER}"
+    made = beside.seconds["cad"] + beside.seconds["mesh"] + beside.seconds.get("object_mesh", 0.0)
+    if _unstructured(beside.model) and made > _READ_S:
+        text += f" (meshing took {made:.1f} s; kept in the cache, it is paid once)"
+    return text
+
+
+def _unstructured(model: Model) -> bool:
+    """Whether pytetwild meshes the finger or the object."""
+    soft = model.object_compliance is not None and isinstance(model.object, Sphere | MeshObject)
+    return model.domain == "solid" and (soft or model.mesh.mesher != "swept")
 
 
 def _finer_steps(fine_s: float, coarse_s: float, budget: float) -> tuple[bool, float]:

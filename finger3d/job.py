@@ -187,7 +187,7 @@ def _pressed(
     if error:
         output.factorizations = problem.factorizations
         report.stage("estimating the error")
-        output.error = estimate(problem, output.frames, output.seconds)
+        output.error = estimate(problem, output.frames, output.seconds, report.say)
         summary = output.write(_told(history))
     if artist:
         report.stage("drawing")

@@ -155,7 +155,9 @@ def _round(model: Model, tolerance: float) -> tuple[Problem, Round, MeshOptions]
     beside = companion(problem)
     last = last_frame(beside)
     number, error = worst(numbers, compared(problem, frame, beside, last))
-    sizes = _next(problem, number, error, tolerance, numbers, main_numbers(beside, last))
+    # a finer companion, beside the coarsest of meshes, does not tell the two lengths apart
+    coarse = main_numbers(beside, last) if beside.model.mesh.base_size_mm >= model.mesh.base_size_mm else None
+    sizes = _next(problem, number, error, tolerance, numbers, coarse)
     seconds = time.perf_counter() - start
     options = model.mesh
     dofs = int(problem.stiffness.upper.shape[0])
@@ -168,7 +170,7 @@ def _next(
     error: float,
     tolerance: float,
     fine: Mapping[str, float],
-    coarse: Mapping[str, float],
+    coarse: Mapping[str, float] | None,
 ) -> MeshOptions:
     """Smaller edge lengths, of the contact, of the base, or both, as the worst number asks for."""
     options = problem.model.mesh
@@ -183,12 +185,12 @@ def _next(
 
 
 def _shares(
-    problem: Problem, number: str, fine: Mapping[str, float], coarse: Mapping[str, float]
+    problem: Problem, number: str, fine: Mapping[str, float], coarse: Mapping[str, float] | None
 ) -> tuple[float, float]:
     """What part of the change to the companion comes from the contact's edge length, and from the base's."""
     options = problem.model.mesh
     size = min(FACTOR * options.size_mm, options.base_size_mm)
-    if size < 1.1 * options.size_mm:
+    if coarse is None or size < 1.1 * options.size_mm:
         return 1.0, 1.0
     third = build(replace(problem.model, mesh=replace(_swept(problem, options), size_mm=size)))
     middle = main_numbers(third, last_frame(third))[number]
