@@ -7,7 +7,7 @@ import pytest
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from finger3d.fem.assembly import Elasticity, stiffness
+from finger3d.fem.assembly import _CHUNK, Elasticity, stiffness
 from finger3d.fem.elements import quadrature
 from finger3d.mesh import Mesh, quadratic
 from tests.meshes import body_load, edge_load, error_norms, grid, mapped
@@ -65,6 +65,27 @@ def test_rigid_motions_cost_nothing_and_nothing_else_does(dim: int, mixed: bool)
     rigid = dim * (dim + 1) // 2
     assert np.abs(values[:rigid]).max() < 1e-12 * values[-1]
     assert values[rigid] > 1e-6 * values[-1]
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("mixed", [False, True])
+def test_other_numbers_of_the_nodes_give_the_same_matrix_in_another_order(dim: int, mixed: bool) -> None:
+    mesh = mapped(grid((20, 8) if dim == 2 else (5, 3, 4), 0.2), lambda x: x + 0.05 * np.sin(2 * x[:, ::-1]))
+    assert len(mesh.cells) > _CHUNK
+    n, elastic = len(mesh.points), Elasticity.of(1.0, 0.3, mixed=mixed)
+    to = np.random.default_rng(0).permutation(n)
+    turned = Mesh(mesh.points[np.argsort(to)], to[mesh.cells], {})
+    one, other = stiffness(mesh, elastic), stiffness(turned, elastic)
+    upper = one.upper
+    assert upper.has_canonical_format
+    assert (upper.indices[upper.indptr[:-1]] == np.arange(upper.shape[0])).all()  # upper triangle, diagonal stored
+    order = (to[:, None] * dim + np.arange(dim)).ravel()
+    if mixed:
+        number = np.searchsorted(other.pressure_vertices, to[one.pressure_vertices])
+        order = np.concatenate([order, n * dim + number])
+    difference = full(other.upper)[order][:, order] - full(upper)
+    assert upper.nnz == other.upper.nnz
+    assert abs(difference).max() < 1e-14 * abs(upper).max()  # sums in another order
 
 
 @pytest.mark.parametrize("dim", [2, 3])

@@ -39,7 +39,8 @@ def test_tangent_is_the_derivative_of_the_stress(mixed: bool) -> None:
 )
 def test_assembled_tangent_is_the_derivative_of_the_internal_forces(dim: int, nu: float, stress: bool) -> None:
     mesh = mapped(grid((2,) * dim, 0.15), lambda x: x + 0.03 * np.sin(3 * x[:, ::-1]))
-    law, pattern = NeoHooke.of(1.0, nu, stress), Pattern.of(mesh)
+    law = NeoHooke.of(1.0, nu, stress)
+    pattern = Pattern.of(mesh, law.mixed)
     rng = np.random.default_rng(1)
     size = assemble(mesh, law, np.zeros(mesh.points.size + (len(mesh.vertices) if law.mixed else 0)), pattern)[1].size
     x = 0.03 * rng.normal(size=size)
@@ -53,7 +54,7 @@ def test_assembled_tangent_is_the_derivative_of_the_internal_forces(dim: int, nu
 @pytest.mark.parametrize(("dim", "nu", "stress"), [(2, 0.3, False), (2, 0.3, True), (3, 0.45, False)])
 def test_tangent_at_rest_is_the_linear_stiffness(dim: int, nu: float, stress: bool) -> None:
     mesh = quadratic(grid((2,) * dim, 0.2))
-    tangent, force = assemble(mesh, NeoHooke.of(1.0, nu, stress), np.zeros(mesh.points.size), Pattern.of(mesh))
+    tangent, force = assemble(mesh, NeoHooke.of(1.0, nu, stress), np.zeros(mesh.points.size), Pattern.of(mesh, False))
     linear = stiffness(mesh, Elasticity.of(1.0, nu, stress))
     assert np.abs((tangent.upper - linear.upper).data).max() < 1e-12
     assert not force.any()
@@ -91,7 +92,7 @@ def test_plane_stress_has_no_stress_across_the_section() -> None:
 def test_inverted_cells_are_an_error() -> None:
     mesh = quadratic(grid((1, 1, 1)))
     with pytest.raises(InvertedError):
-        assemble(mesh, NeoHooke.of(1.0, 0.3), -2.0 * mesh.points.ravel(), Pattern.of(mesh))
+        assemble(mesh, NeoHooke.of(1.0, 0.3), -2.0 * mesh.points.ravel(), Pattern.of(mesh, False))
 
 
 def test_thick_sphere_under_pressure() -> None:
@@ -109,7 +110,7 @@ def test_thick_sphere_under_pressure() -> None:
 
     want = f(stretch) - f((1 + (inner / outer) ** 3 * (stretch**3 - 1)) ** (1 / 3))
     mesh = mapped(grid((6, 4, 4)), shell)
-    law, pattern, n = NeoHooke(1.0, 1e7, True), Pattern.of(mesh), mesh.points.size
+    law, pattern, n = NeoHooke(1.0, 1e7, True), Pattern.of(mesh, True), mesh.points.size
     radius = np.linalg.norm(mesh.points, axis=1)
     moved_to = (radius**3 + inner**3 * (stretch**3 - 1)) ** (1 / 3)
     exact = mesh.points * (moved_to / radius - 1.0)[:, None]

@@ -169,7 +169,8 @@ def _places(problem: Any) -> tuple[Pattern, sp.csr_matrix]:
         pairs = (beside.T @ beside).tocoo()
         rows = sp.kron(beside, np.ones((d, d)), format="csr")[problem.kept]
         rows.sort_indices()
-        return Pattern.of(problem.mesh, (pairs.row.astype(np.int64), pairs.col.astype(np.int64))), rows
+        linked = pairs.row.astype(np.int64), pairs.col.astype(np.int64)
+        return Pattern.of(problem.mesh, problem.elastic.mixed, linked), rows
 
     made: tuple[Pattern, sp.csr_matrix] = problem.later.once("places", make)
     return made

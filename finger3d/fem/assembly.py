@@ -6,7 +6,9 @@ Displacement form: ``lam div(u) div(v) + 2 G eps(u):eps(v)``.  Mixed form (Taylo
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -17,6 +19,7 @@ from finger3d.mesh import Mesh
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
+AnyInt = NDArray[np.int32] | NDArray[np.int64]
 
 MIXED_FROM = 0.48
 """Poisson's ratio from which the mixed form is used (linear elements lock, and the pressure of quadratic ones
@@ -26,7 +29,8 @@ oscillates, design.md sec. 5)."""
 # where it changes results by about 1e-7 (relative), below any mesh error.
 _LEAST_COMPRESSIBILITY = 1e-7
 
-_CHUNK = 2048
+# Cells at a time: so few that their matrices stay in a core's cache, and that the next ones find the memory at hand.
+_CHUNK = 256
 
 
 @dataclass(frozen=True)
@@ -85,64 +89,157 @@ def on_places(matrix: sp.csr_matrix, places: sp.csr_matrix) -> Float:
 
 @dataclass(frozen=True)
 class Pattern:
-    """Where the cells' node-node blocks go in the upper triangle; one per mesh, for any number of assemblies.
+    """Where the entries of cells go in the upper triangle; one per mesh, for any number of assemblies.
+
+    The matrix is made of blocks: (d, d) of two nodes, (d, 1) of a node and a pressure, (1, 1) of two pressures.  A row
+    of a node is one shorter than the row before it, since of the diagonal block only the upper triangle is stored.
 
     Attributes
     ----------
-    slot : (e, pairs) number of the block of every local pair a <= b
-    row, col : (blocks,) node numbers, row <= col
-    local : the local pairs, as two index arrays (pairs,)
-    swapped : (e, pairs) whether a pair's nodes stand the other way round in the matrix
+    indptr, indices : (N + 1,), (nnz,) of the csr matrix
+    start : (blocks,) number of a block's first entry among the nnz
+    length : (blocks,) entries in the first of the rows that the block stands in
+    slot : (e, pairs) block of every local pair: of two nodes, then of a pressure and a node, then of two pressures
+    swapped : (e, pairs of nodes) whether a pair's nodes stand the other way round in the matrix
+    vertices : numbers of the nodes with a pressure, ascending
     """
 
-    slot: Int
-    row: Int
-    col: Int
-    local: tuple[Int, Int]
+    indptr: AnyInt
+    indices: AnyInt
+    start: Int
+    length: Int
+    slot: NDArray[np.int32]
     swapped: NDArray[np.bool_]
+    vertices: Int
 
     @classmethod
-    def of(cls, mesh: Mesh, linked: tuple[Int, Int] | None = None) -> Pattern:
-        """Find the pattern of a mesh, with places for `linked` pairs of nodes that no cell joins."""
-        count = len(mesh.points)
-        a, b = np.triu_indices(mesh.cells.shape[1])
-        first, second = mesh.cells[:, a], mesh.cells[:, b]
-        key = np.minimum(first, second) * count + np.maximum(first, second)
-        also = np.minimum(*linked) * count + np.maximum(*linked) if linked else np.zeros(0, dtype=np.int64)
-        unique, slot = np.unique(np.concatenate([key.ravel(), also]), return_inverse=True)
-        return cls(slot[: key.size].reshape(key.shape), unique // count, unique % count, (a, b), first > second)
+    def of(cls, mesh: Mesh, mixed: bool, linked: tuple[Int, Int] | None = None) -> Pattern:
+        """Find the pattern of a mesh, with pressures if `mixed`, and with places for `linked` pairs of nodes."""
+        n, d = mesh.points.shape
+        vertices = mesh.vertices if mixed else np.zeros(0, dtype=np.int64)
+        count = n + len(vertices)
+        number = np.full(n, -1)
+        number[vertices] = np.arange(n, count)
+        k, corners = mesh.cells.shape[1], d + 1 if mixed else 0
+        (a, b), (p, r) = _pairs(k), _pairs(corners)
+        pairs = len(a) + corners * k + len(p)
+        size = len(mesh.cells) * pairs
+        keys = np.empty(size + (len(linked[0]) if linked else 0), dtype=np.int64)
+        of_cells = keys[:size].reshape(-1, pairs)
+        if linked:
+            keys[size:] = _key(*linked, count)
+        swapped = np.empty((len(mesh.cells), len(a)), dtype=np.bool_)
+        for part in cell_parts(mesh):
+            cells = mesh.cells[part]
+            pressures = number[cells[:, :corners]]
+            beside = (cells[:, None] * count + pressures[:, :, None]).reshape(len(cells), -1)
+            found = [_key(cells[:, a], cells[:, b], count), beside, _key(pressures[:, p], pressures[:, r], count)]
+            np.concatenate(found, axis=1, out=of_cells[part])
+            swapped[part] = cells[:, a] > cells[:, b]
+        blocks, slot = _numbered(keys)
+        places = _places(*np.divmod(blocks, count), n, len(vertices), d)
+        return cls(*places, slot[:size].reshape(-1, pairs), swapped, vertices)
 
-    def add(self, blocks: Float, part: slice, cell: Float) -> None:
-        """Add the blocks (e, k, k, d, d) of some cells to `blocks` (blocks, d, d)."""
-        upper = cell[:, self.local[0], self.local[1]]
-        turn = self.swapped[part]
-        upper[turn] = np.swapaxes(upper[turn], 1, 2)
-        np.add.at(blocks, self.slot[part].ravel(), upper.reshape(-1, *blocks.shape[1:]))
+    def matrix(self, data: Float) -> sp.csr_matrix:
+        """The upper triangle (N, N) with the entries (nnz,), zeros kept."""
+        size = len(self.indptr) - 1
+        return sp.csr_matrix((data, self.indices, self.indptr), shape=(size, size))
 
-    def upper(self, blocks: Float, nodes: int) -> sp.csr_matrix:
-        """Upper triangle (nodes d, nodes d) of the matrix that the blocks (blocks, d, d) make up, zeros kept."""
-        d = blocks.shape[1]
-        starts = np.searchsorted(self.row, np.arange(nodes + 1))
-        whole = sp.bsr_matrix((blocks, self.col, starts), shape=(nodes * d, nodes * d)).tocsr()
-        rows = np.repeat(np.arange(nodes * d, dtype=whole.indices.dtype), np.diff(whole.indptr))
-        keep = whole.indices >= rows  # a diagonal block has entries below the diagonal too
-        kept = np.concatenate([[0], np.cumsum(keep)])[whole.indptr]
-        return sp.csr_matrix((whole.data[keep], whole.indices[keep], kept), shape=whole.shape)
+    def add(self, data: Float, part: slice, cell: Float) -> None:
+        """Add the symmetric matrices (e, k, d, k, d) of some cells' nodes to the entries (nnz,)."""
+        e, k, d = cell.shape[:3]
+        flat = cell.reshape(e, -1)
+        a, b = _pairs(k)
+        first, swapped = (a * d * k + b) * d, self.swapped[part]
+        parts = [[np.take(flat, first + (i * k * d + j), axis=1) for j in range(d)] for i in range(d)]
+        slot = self.slot[part, : len(a)]
+        for i, at in enumerate(_rows(self.start[slot], self.length[slot], d)):
+            for j in range(d):
+                value = np.where(swapped, parts[j][i], parts[i][j])
+                own = 0 if j >= i else k  # the pairs of a node with itself come first
+                np.add.at(data[j:], at[:, own:].ravel(), value[:, own:].ravel())
+
+    def add_pressure(self, data: Float, part: slice, coupling: Float, mass: Float) -> None:
+        """Add couplings (e, p, k, d) of some cells' pressures and nodes, and symmetric (e, p, p) of their pressures."""
+        _, corners, k, d = coupling.shape
+        p, r = _pairs(corners)
+        end = self.slot.shape[1] - len(p)
+        slot = self.slot[part, end - corners * k : end]
+        for i, at in enumerate(_rows(self.start[slot], self.length[slot], d)):
+            np.add.at(data, at.ravel(), coupling[..., i].ravel())
+        np.add.at(data, self.start[self.slot[part, end:]].ravel(), mass[:, p, r].ravel())
 
 
-def _cell_blocks(gradients: Float, weights: Float, elastic: Elasticity, lame: float) -> Float:
-    """Element stiffness blocks (e, k, k, d, d) from gradients (e, q, k, d) and weights (e, q)."""
+def cell_parts(mesh: Mesh) -> Iterator[slice]:
+    """The cells, some at a time."""
+    return (slice(start, start + _CHUNK) for start in range(0, len(mesh.cells), _CHUNK))
+
+
+def _pairs(k: int) -> tuple[Int, Int]:
+    """Local pairs a <= b: each with itself, then those of two."""
+    a, b = np.triu_indices(k, 1)
+    return np.concatenate([np.arange(k), a]), np.concatenate([np.arange(k), b])
+
+
+def _key(first: Int, second: Int, count: int) -> Int:
+    """Pairs as numbers, the same both ways round, which sort by the lesser, then by the greater."""
+    return np.minimum(first, second) * count + np.maximum(first, second)
+
+
+def _numbered(key: Int) -> tuple[Int, NDArray[np.int32]]:
+    """The different keys, ascending, and which of them each one is; np.unique takes twice the memory."""
+    order = np.argsort(key)
+    ranked = key[order]
+    new = np.ones(len(key), dtype=np.bool_)
+    np.not_equal(ranked[1:], ranked[:-1], out=new[1:])
+    slot = np.empty(len(key), dtype=np.int32)
+    slot[order] = np.cumsum(new, dtype=np.int32) - 1
+    return ranked[new], slot
+
+
+def _places(row: Int, col: Int, n: int, pressures: int, d: int) -> tuple[AnyInt, AnyInt, Int, Int]:
+    """The attributes indptr, indices, start and length from the blocks' nodes; those from n on are pressures."""
+    width = np.where(col < n, d, 1)
+    before = np.cumsum(width) - width
+    length = np.bincount(row, width, minlength=n + pressures).astype(np.int64)
+    rows = np.concatenate([np.maximum(length[:n, None] - np.arange(d), 0).ravel(), length[n:]])
+    indptr = np.concatenate([[0], np.cumsum(rows)])
+    kind: type[Any] = np.int32 if indptr[-1] < np.iinfo(np.int32).max else np.int64
+    unknown = np.concatenate([np.arange(n) * d, n * d + np.arange(pressures)])
+    start = indptr[unknown][row] + before - (np.cumsum(length) - length)[row]
+    length = length[row]
+    indices = np.empty(indptr[-1], dtype=kind)
+    of_nodes, of_pressures = col < n, row >= n
+    for part, tall, wide in ((of_nodes, d, d), (~of_nodes & ~of_pressures, d, 1), (of_pressures, 1, 1)):
+        beside = row[part] < col[part]
+        first = unknown[col[part]].astype(kind)
+        for i, at in enumerate(_rows(start[part], length[part], tall)):
+            for j in range(wide):
+                stored = slice(None) if j >= i else beside
+                indices[(at + j)[stored]] = (first + j)[stored]
+    return indptr.astype(kind), indices, start, length
+
+
+def _rows(start: Int, length: Int, count: int) -> Iterator[Int]:
+    """Numbers among the nnz of the first entry of every row of blocks, were the diagonal ones stored whole."""
+    for _ in range(count):
+        yield start
+        length = length - 1
+        start = start + length
+
+
+def _cell_matrices(gradients: Float, weights: Float, elastic: Elasticity, lame: float) -> Float:
+    """Element stiffness (e, k, d, k, d) from gradients (e, q, k, d) and weights (e, q)."""
     e, q, k, d = gradients.shape
     flat = gradients.reshape(e, q, k * d)
     outer = np.matmul(np.swapaxes(flat * weights[:, :, None], 1, 2), flat).reshape(e, k, d, k, d)
-    outer = outer.transpose(0, 1, 3, 2, 4)  # (e, a, b, i, j) = sum_q w G_ai G_bj
-    blocks = elastic.shear * np.swapaxes(outer, 3, 4)
+    cell = elastic.shear * np.swapaxes(outer, 2, 4)  # outer[e, a, i, b, j] = sum_q w G_ai G_bj
     if lame:
-        blocks = blocks + lame * outer
-    laplace = elastic.shear * np.einsum("eabii->eab", outer)
+        cell += lame * outer
+    laplace = elastic.shear * np.einsum("eaibi->eab", outer)
     for i in range(d):
-        blocks[..., i, i] += laplace
-    return blocks
+        cell[:, :, i, :, i] += laplace
+    return cell
 
 
 def stiffness(mesh: Mesh, elastic: Elasticity, thickness: float = 1.0) -> Stiffness:
@@ -155,66 +252,25 @@ def stiffness(mesh: Mesh, elastic: Elasticity, thickness: float = 1.0) -> Stiffn
     thickness : mm
         Width of a 2D section (1 for a solid), so that forces are N.
     """
-    n, d = mesh.points.shape
+    d = mesh.dim
     bary, w = quadrature(d, 2 if mesh.is_quadratic else 1)
-    pattern = Pattern.of(mesh)
-    blocks = np.zeros((len(pattern.row), d, d))
+    pattern = Pattern.of(mesh, elastic.mixed)
+    data = np.zeros(len(pattern.indices))
     hats = shape(bary, False)
-    p_blocks, masses = [], []
+    scale = pressure_scale(mesh, elastic.shear) if elastic.mixed else 1.0
     lame = 0.0 if elastic.mixed else elastic.lame
-    for start in range(0, len(mesh.cells), _CHUNK):
-        part = slice(start, start + _CHUNK)
+    for part in cell_parts(mesh):
         gradients, det = physical_gradients(mesh.points[mesh.cells[part]], bary, mesh.is_quadratic)
         weights = det * (w * thickness)
-        pattern.add(blocks, part, _cell_blocks(gradients, weights, elastic, lame))
+        pattern.add(data, part, _cell_matrices(gradients, weights, elastic, lame))
         if elastic.mixed:
-            p_blocks.append(np.einsum("eq,qp,eqkd->epkd", weights, hats, gradients, optimize=True))
-            masses.append(np.einsum("eq,qp,qr->epr", weights, hats, hats, optimize=True))
-    matrix = pattern.upper(blocks, n)
-    vertices = np.zeros(0, dtype=np.int64)
-    scale = 1.0
-    if elastic.mixed:
-        vertices, scale = mesh.vertices, pressure_scale(mesh, elastic.shear)
-        coupling, mass = scale * np.concatenate(p_blocks), -(scale**2) / elastic.lame * np.concatenate(masses)
-        matrix = bordered(matrix, pressure_entries(mesh, coupling, mass, vertices), n * d + len(vertices))
-    return Stiffness(matrix, vertices, scale)
+            weighted = np.swapaxes(weights[:, :, None] * hats, 1, 2)  # (e, p, q)
+            e, q, k, _ = gradients.shape
+            coupling = np.matmul(scale * weighted, gradients.reshape(e, q, k * d)).reshape(e, -1, k, d)
+            pattern.add_pressure(data, part, coupling, -(scale**2) / elastic.lame * np.matmul(weighted, hats))
+    return Stiffness(pattern.matrix(data), pattern.vertices, scale)
 
 
 def pressure_scale(mesh: Mesh, shear: float) -> float:
     """Unit (MPa) of the pressure unknowns in which their entries are of the size of the displacements'."""
     return float(shear * len(mesh.cells) ** (1.0 / mesh.dim) / np.ptp(mesh.points, axis=0).max())
-
-
-def bordered(matrix: sp.csr_matrix, entries: list[tuple[Float, Int, Int]], size: int) -> sp.csr_matrix:
-    """Matrix (size, size) with further columns and rows after those of a matrix (m, m).
-
-    Parameters
-    ----------
-    entries : values, rows and columns from m on; repeated ones add up, zeros are kept
-    """
-    data, rows, cols = (np.concatenate(parts) for parts in zip(*entries, strict=True))
-    beside = sp.csr_matrix((data, (rows, cols)), shape=(size, size))
-    starts = np.concatenate([matrix.indptr, np.full(size - matrix.shape[0], matrix.indptr[-1])])
-    own, more = np.diff(starts), np.diff(beside.indptr)
-    # every further column comes after the matrix's own, so that rows are joined end to end
-    at_own = np.arange(matrix.nnz) + np.repeat(beside.indptr[:-1], own)
-    at_more = np.arange(beside.nnz) + np.repeat(starts[1:], more)
-    values, indices = np.empty(matrix.nnz + beside.nnz), np.empty(matrix.nnz + beside.nnz, dtype=matrix.indices.dtype)
-    values[at_own], values[at_more] = matrix.data, beside.data
-    indices[at_own], indices[at_more] = matrix.indices, beside.indices
-    return sp.csr_matrix((values, indices, starts + beside.indptr), shape=(size, size))
-
-
-def pressure_entries(mesh: Mesh, coupling: Float, mass: Float, vertices: Int) -> list[tuple[Float, Int, Int]]:
-    """Entries above the diagonal of cell couplings (e, p, k, d) of u with p, and of cell blocks (e, p, p) of p."""
-    n, d = mesh.points.shape
-    number = np.full(n, -1)
-    number[vertices] = n * d + np.arange(len(vertices))
-    pressures = number[mesh.cells[:, : d + 1]]
-    dof = mesh.cells[:, :, None] * d + np.arange(d)
-    rows = np.broadcast_to(dof[:, None], coupling.shape)
-    cols = np.broadcast_to(pressures[:, :, None, None], coupling.shape)
-    r = np.broadcast_to(pressures[:, :, None], mass.shape)
-    c = np.broadcast_to(pressures[:, None, :], mass.shape)
-    upper = r <= c
-    return [(coupling.ravel(), rows.ravel(), cols.ravel()), (mass[upper], r[upper], c[upper])]

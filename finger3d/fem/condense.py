@@ -86,6 +86,8 @@ def condense(
     """
     start = time.perf_counter()
     upper, size = stiffness.upper, stiffness.upper.shape[0]
+    if not upper.has_sorted_indices:
+        upper = upper.sorted_indices()
     solver = solver or os.environ.get("FINGER3D_SOLVER") or _default_solver()
     keep = np.ones(size, dtype=bool)
     keep[fixed] = False
@@ -131,40 +133,74 @@ def _default_solver() -> str:
 
 
 @dataclass(frozen=True)
-class _Series:
-    """PARDISO's factor, and where the entries of stiffness and rows stand in its matrix: for the next such matrix.
+class _Places:
+    """Where the entries of stiffness and rows stand in PARDISO's matrix ``[[K, R^T], [R, 0]]`` of the free unknowns.
 
     Attributes
     ----------
-    places : what must be the same to use it again
-    take : number of every entry in (0, stiffness, rows)
+    given : what must be the same for another stiffness and other rows to stand there too
+    kept : (nnz of the stiffness,) whether an entry is of free unknowns
+    body : (nnz of PARDISO's matrix,) whether an entry is one of these; the others are of the rows, or zeros
+    beside, take : numbers of the places of entries of the rows, and of these entries
     """
 
-    places: tuple[Int, ...]
+    given: tuple[Int, ...]
+    kept: NDArray[np.bool_]
+    body: NDArray[np.bool_]
+    beside: Int
     take: Int
+
+    def values(self, upper: sp.csr_matrix, rows: sp.csr_matrix) -> Float:
+        """Entries (nnz,) of PARDISO's matrix."""
+        found = np.zeros(len(self.body))
+        found[self.body] = upper.data[self.kept]
+        found[self.beside] = rows.data[self.take]
+        return found
+
+
+@dataclass(frozen=True)
+class _Series:
+    """PARDISO's factor, and the places in its matrix: for the next such matrix."""
+
+    places: _Places
     factor: SchurFactor
 
     @classmethod
     def of(cls, upper: sp.csr_matrix, free: Int, rows: sp.csr_matrix, spent: _Series | None) -> _Series:
-        """Factor ``[[K, R^T], [R, 0]]`` of the free unknowns, in the places of an earlier one where it fits."""
+        """Factor the free unknowns with the rows beside them, in the places of an earlier one where it fits."""
         from finger3d.fem.pardiso import SchurFactor
 
-        places = (upper.indptr, upper.indices, free, rows.indptr, rows.indices)
-        values = np.concatenate([[0.0], upper.data, rows.data])
-        if spent and all(map(np.array_equal, places, spent.places)):
-            spent.factor.renew(values[spent.take])
+        given = (upper.indptr, upper.indices, free, rows.indptr, rows.indices)
+        if spent and all(map(np.array_equal, given, spent.places.given)):
+            spent.factor.renew(spent.places.values(upper, rows))
             return spent
-        count = len(upper.data)
-        numbers = np.arange(1.0, len(values))
-        k = sp.csr_matrix((numbers[:count], upper.indices, upper.indptr), upper.shape)[free][:, free].tocoo()
-        b = sp.csr_matrix((numbers[count:], rows.indices, rows.indptr), rows.shape)[:, free].tocoo()
-        (r, n), last = b.shape, len(free) + np.arange(rows.shape[0])
-        i, j = np.concatenate([k.row, b.col, last]), np.concatenate([k.col, n + b.row, last])
-        whole = sp.csr_matrix((np.concatenate([k.data, b.data, np.zeros(r)]), (i, j)), shape=(n + r, n + r))
-        whole.sort_indices()
-        take = whole.data.astype(np.int64)
-        whole.data = values[take]
-        return cls(places, take, SchurFactor(whole, r))
+        places, matrix = _augmented(upper, free, rows)
+        return cls(places, SchurFactor(matrix, rows.shape[0]))
+
+
+def _augmented(upper: sp.csr_matrix, free: Int, rows: sp.csr_matrix) -> tuple[_Places, sp.csr_matrix]:
+    """Upper triangle of ``[[K, R^T], [R, 0]]``; the entries of R^T follow those of K in every row."""
+    n, r = len(free), rows.shape[0]
+    is_free = np.zeros(upper.shape[0], dtype=np.bool_)
+    is_free[free] = True
+    kept = is_free[upper.indices]
+    kept &= np.repeat(is_free, np.diff(upper.indptr))
+    own = np.add.reduceat(kept, upper.indptr[:-1], dtype=np.int64)[free]  # no row is empty: it has its diagonal
+    numbered = sp.csr_matrix((np.arange(rows.nnz), rows.indices, rows.indptr), rows.shape)
+    turned = numbered[:, free].T.tocsr()
+    more = np.diff(turned.indptr)
+    indptr = np.concatenate([[0], np.cumsum(np.concatenate([own + more, np.ones(r, dtype=np.int64)]))])
+    beside = np.arange(turned.nnz) + np.repeat(np.cumsum(own), more)
+    body = np.ones(indptr[-1], dtype=np.bool_)
+    body[beside] = False
+    body[len(body) - r :] = False
+    number = np.cumsum(is_free, dtype=upper.indices.dtype) - 1
+    indices = np.empty(len(body), dtype=upper.indices.dtype)
+    indices[body] = number[upper.indices[kept]]
+    indices[beside] = n + turned.indices
+    indices[len(body) - r :] = np.arange(n, n + r)
+    places = _Places((upper.indptr, upper.indices, free, rows.indptr, rows.indices), kept, body, beside, turned.data)
+    return places, sp.csr_matrix((places.values(upper, rows), indices, indptr), shape=(n + r, n + r))
 
 
 def _superlu(upper: sp.csr_matrix, rows: sp.csr_matrix) -> tuple[Float, int, Callable[[Float], Float]]:

@@ -12,6 +12,8 @@ from finger3d.mesh import EDGES
 
 Float = NDArray[np.float64]
 
+_CYCLES = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
+
 
 def shape(bary: Float, quadratic: bool) -> Float:
     """Shape functions (q, k) at barycentric points (q, d + 1), nodes in VTK order."""
@@ -80,9 +82,22 @@ def jacobians(nodes: Float, reference: Float) -> Float:
 def physical_gradients(nodes: Float, bary: Float, quadratic: bool) -> tuple[Float, Float]:
     """Gradients (e, q, k, d) in space, 1/mm, and Jacobian determinants (e, q), for cells with nodes (e, k, d)."""
     reference = gradient(bary, quadratic)
-    jacobian = jacobians(nodes, reference)
-    determinant = np.linalg.det(jacobian)
-    return reference @ np.linalg.inv(jacobian), determinant
+    inverse, determinant = _inverted(jacobians(nodes, reference))
+    return reference @ inverse, determinant
+
+
+def _inverted(matrix: Float) -> tuple[Float, Float]:
+    """Inverses and determinants of matrices (e, q, d, d), d = 2 or 3, by cofactors: LAPACK takes thrice as long."""
+    m = np.ascontiguousarray(np.moveaxis(matrix, (2, 3), (0, 1)))
+    if len(m) == 2:
+        adjugate = np.array([[m[1, 1], -m[0, 1]], [-m[1, 0], m[0, 0]]])
+    else:
+        adjugate = np.empty_like(m)
+        for i, p, q in _CYCLES:
+            for j, r, s in _CYCLES:
+                adjugate[j, i] = m[p, r] * m[q, s] - m[p, s] * m[q, r]
+    determinant = (m[0] * adjugate[:, 0]).sum(axis=0)
+    return np.moveaxis(adjugate / determinant, (0, 1), (2, 3)), determinant
 
 
 def surface_measure(nodes: Float, bary: Float, quadratic: bool) -> Float:

@@ -10,10 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from finger3d.fem.assembly import MIXED_FROM, Pattern, Stiffness, bordered, pressure_entries, pressure_scale
+from finger3d.fem.assembly import MIXED_FROM, Pattern, Stiffness, cell_parts, pressure_scale
 from finger3d.fem.elements import gradient, physical_gradients, quadrature, shape
 from finger3d.fem.surface import locate
 from finger3d.mesh import EDGES, Mesh
@@ -21,7 +20,6 @@ from finger3d.mesh import EDGES, Mesh
 Float = NDArray[np.float64]
 
 _LEAST_COMPRESSIBILITY = 1e-7  # 1 / K in units of 1 / G, as in the linear form
-_CHUNK = 1024
 _THICKNESS_ITERATIONS = 30
 
 
@@ -112,20 +110,21 @@ def cell_response(law: NeoHooke, slope: Float, p: Float | None) -> tuple[Float, 
 def assemble(
     mesh: Mesh, law: NeoHooke, unknowns: Float, pattern: Pattern, thickness: float = 1.0
 ) -> tuple[Stiffness, Float]:
-    """Tangent (upper triangle) and internal forces (N,) at given unknowns (N,); raises InvertedError."""
+    """Tangent (upper triangle) and internal forces (N,) at given unknowns (N,); raises InvertedError.
+
+    The pattern must be mixed as the law is.
+    """
     n, d = mesh.points.shape
     bary, w = quadrature(d, 2)
     hats = shape(bary, False)
     u = unknowns[: n * d].reshape(n, d)
-    vertices = mesh.vertices if law.mixed else np.zeros(0, dtype=np.int64)
+    vertices = pattern.vertices
     scale = pressure_scale(mesh, law.shear) if law.mixed else 1.0
     p_nodes = np.zeros(n)
     p_nodes[vertices] = scale * unknowns[n * d :]
-    blocks = np.zeros((len(pattern.row), d, d))
+    data = np.zeros(len(pattern.indices))
     force, p_force = np.zeros((n, d)), np.zeros(n)
-    couplings, masses = [], []
-    for start in range(0, len(mesh.cells), _CHUNK):
-        part = slice(start, start + _CHUNK)
+    for part in cell_parts(mesh):
         cells = mesh.cells[part]
         gradients, det = physical_gradients(mesh.points[cells], bary, mesh.is_quadratic)
         weights = det * (w * thickness)
@@ -138,17 +137,14 @@ def assemble(
         right = np.matmul(weighted, np.swapaxes(gradients, 2, 3)).reshape(e, q, d, d, d, k)  # i J k b
         right = np.ascontiguousarray(right.transpose(0, 1, 3, 2, 4, 5)).reshape(e, q * d, d * d * k)
         left = np.ascontiguousarray(gradients.transpose(0, 2, 1, 3)).reshape(e, k, q * d)
-        pattern.add(blocks, part, np.matmul(left, right).reshape(e, k, d, d, k).transpose(0, 1, 4, 2, 3))
+        pattern.add(data, part, np.matmul(left, right).reshape(e, k, d, d, k).transpose(0, 1, 2, 4, 3))
         if law.mixed and p is not None:
             flux = np.einsum("eqiJ,eqaJ->eqai", cofactor, gradients, optimize=True)
-            couplings.append(scale * np.einsum("eq,qp,eqai->epai", weights, hats, flux, optimize=True))
-            masses.append(-(scale**2) / law.bulk * np.einsum("eq,qp,qr->epr", weights, hats, hats, optimize=True))
+            coupling = scale * np.einsum("eq,qp,eqai->epai", weights, hats, flux, optimize=True)
+            mass = -(scale**2) / law.bulk * np.einsum("eq,qp,qr->epr", weights, hats, hats, optimize=True)
+            pattern.add_pressure(data, part, coupling, mass)
             np.add.at(p_force, cells[:, : d + 1], scale * (weights * (j - 1.0 - p / law.bulk)) @ hats)
-    matrix: sp.csr_matrix = pattern.upper(blocks, n)
-    if law.mixed:
-        entries = pressure_entries(mesh, np.concatenate(couplings), np.concatenate(masses), vertices)
-        matrix = bordered(matrix, entries, n * d + len(vertices))
-    return Stiffness(matrix, vertices, scale), np.concatenate([force.ravel(), p_force[vertices]])
+    return Stiffness(pattern.matrix(data), vertices, scale), np.concatenate([force.ravel(), p_force[vertices]])
 
 
 def stretch(mesh: Mesh, u: Float, point: Float, direction: Float) -> float:
