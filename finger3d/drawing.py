@@ -91,14 +91,16 @@ def _main(module: str) -> None:
 
 
 def _warm_up(module: str) -> None:
-    """All that a first picture takes besides its own drawing, while the parent computes: modules, fonts."""
+    """All that a first picture takes besides its own drawing, while the parent computes: modules, fonts, formulae."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     import_module(module)
     figure = Figure(figsize=(1.0, 1.0))
     FigureCanvasAgg(figure)
-    figure.add_subplot().set_xlabel("x (mm)")
+    axes = figure.add_subplot(xlabel="x (mm)", title="x")
+    axes.semilogy([1.0, 100.0], label="x")  # its ticks are powers, which are set as formulae
+    axes.legend(title="x")
     figure.savefig(BytesIO(), format="png")
 
 

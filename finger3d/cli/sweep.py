@@ -60,19 +60,23 @@ def sweep(
         raise Finger3dError(f"--workers {workers}: must be at least 1")
     if workers is not None and scheduler is not None:
         raise Finger3dError("--workers and --scheduler: give one of them; a cluster has its own workers")
-    from finger3d.sweep import combinations
-    from finger3d.sweep import sweep as run
+    from finger3d.drawing import Artist
 
-    report, aside = reporting(json_)
-    try:
-        with aside, report:
-            report.stage("checking every point")
-            points = combinations(scene, set_ or [], vary)
-            check_writable(out, scene)
-            kept = run(points, out, scheduler, workers, report)
-    except KeyboardInterrupt:
-        complain(f"interrupted; {_said(report.steps_done, report.steps_total, out)}")
-        return 130
+    several = any("," in text for text in vary)
+    with Artist(several, "finger3d.sweep.picture") as artist:  # it loads what it needs while the points are checked
+        from finger3d.sweep import combinations
+        from finger3d.sweep import sweep as run
+
+        report, aside = reporting(json_)
+        try:
+            with aside, report:
+                report.stage("checking every point")
+                points = combinations(scene, set_ or [], vary)
+                check_writable(out, scene)
+                kept = run(points, out, scheduler, workers, report, artist)
+        except KeyboardInterrupt:
+            complain(f"interrupted; {_said(report.steps_done, report.steps_total, out)}")
+            return 130
     if json_:
         print_json(_as_dict(kept, out))
     else:

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import PchipInterpolator
 
 from finger3d.errors import MissingError
 
@@ -117,8 +118,6 @@ class Calibration:
 
     @cached_property
     def _pchip(self) -> Any:
-        from scipy.interpolate import PchipInterpolator
-
         return PchipInterpolator(self.mu, self.strain)
 
     def at(self, mu: ArrayLike, shape: Shape = "interpolation") -> Float:
@@ -143,8 +142,6 @@ class Calibration:
     @cached_property
     def interpolation_error(self) -> float:
         """Strain error of the interpolation: what leaving out every second point changes at these, rms, over 4."""
-        from scipy.interpolate import PchipInterpolator
-
         kept = np.unique([*range(0, len(self.mu), 2), len(self.mu) - 1])
         out = np.setdiff1d(np.arange(len(self.mu)), kept)
         left = self.strain[out] - PchipInterpolator(self.mu[kept], self.strain[kept])(self.mu[out])

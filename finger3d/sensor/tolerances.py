@@ -1,9 +1,9 @@
 """What else moves the strain: depth, material, tilt, and where the gauge really lies, by finite differences.
 
-Depth and E ask nothing of the mesh: one is another path, the other another scale of the same compliance.  Gauges that
-are a little off are read beside the true one from the same presses; only a foil with its own stiffness, nu and tilt
-need bodies of their own.  Differences are over one tolerance, for depth, nu and tilt at a few mu; slopes in between are
-interpolated.
+Gauges that are a little off are read beside the true one from the same presses.  All else is a difference between two
+presses, of a fine mesh those of the coarser one that its error bar comes from: depth is another path of it, E another
+scale of its compliance; nu, tilt and a foil that lies elsewhere are bodies of their own.  Differences are over one
+tolerance, at a few mu; slopes in between are interpolated.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
 
 from finger3d.accuracy import built_like, companion, strain_error
 from finger3d.errors import Finger3dError
@@ -45,7 +46,8 @@ TOLERANCES: dict[str, tuple[float, str]] = {
 """Standard deviations assumed unless others are given: a careful laboratory set-up and a hand-laid gauge; of the mesh
 its error bar, from a coarser companion."""
 
-_ENOUGH = {2: 100, 3: 500}  # contact points that a tilted body is left with
+_ENOUGH = {2: 150, 3: 500}  # contact points that make a coarser body's differences good to a fifth of the largest
+_LEFT = {2: 100, 3: 500}  # contact points that a tilted body is left with
 _PLACES = ("gauge_x_mm", "gauge_y_mm", "gauge_angle_deg")
 
 
@@ -142,7 +144,11 @@ class Body:
 def read(problem: Problem, names: tuple[str, ...], mu: Float, like: Like | None = None) -> Float:
     """Strain (g, m) of some gauges at mu (m,), nan where a press failed."""
     frames = [p.frame for p in presses(problem, mu.tolist(), like)]
-    return np.array([[f.gauges[n] if f.outcome.ok else math.nan for f in frames] for n in names])
+    return np.array([[_strain(f, n) for f in frames] for n in names])
+
+
+def _strain(frame: Frame, name: str) -> float:
+    return frame.gauges[name] if frame.outcome.ok else math.nan
 
 
 def slopes(
@@ -158,11 +164,19 @@ def slopes(
     """
     at = base.few
     body = Body(problem, gauge, base.mu[at], base.strain[gauge.name][at], base.pressed)
+    enough = len(problem.points.nodes) >= 2 ** (problem.dim - 1) * _ENOUGH[problem.dim]
+    coarse = None
+    if "mesh" in tolerances or (enough and set(tolerances) - set(_PLACES)):
+        say("a coarser body")
+        coarse = _beside_mesh(body)
     for name, sd in tolerances.items():
         say(f"tolerance {name}")
         beside = _beside(problem.model, gauge, name, sd, base)
         where = np.arange(len(base.mu)) if beside else at
-        steps = beside or list(_meshed(body, base.frame, sd) if name == "mesh" else _steps(body, name, sd))
+        if name == "mesh":
+            steps = [(sd, sd * _mesh_error(body, coarse, base.frame))] if coarse else []
+        else:
+            steps = beside or list(_steps(coarse if coarse and enough else body, name, sd))
         if not steps:
             continue
         steps = [(step, _between(base.mu, base.mu[where], effect)) for step, effect in steps]
@@ -176,8 +190,6 @@ def slopes(
 
 def _between(mu: Float, at: Float, values: Float) -> Float:
     """Values (n,) at mu (n,) by PCHIP of those (m,) at some that are known, constant beyond; nan where none is."""
-    from scipy.interpolate import PchipInterpolator
-
     good = np.isfinite(values)
     if good.sum() < 2:
         return np.full(len(mu), values[good][0] if good.any() else math.nan)
@@ -257,21 +269,27 @@ def with_modulus(problem: Problem, times: float) -> Problem:
     return replace(changed, bare=soft(problem.bare)) if problem.bare else changed
 
 
-def _meshed(body: Body, frame: Frame, sd: float) -> Iterator[tuple[float, Float]]:
-    """The strain off by its error bar; of a mesh that has no coarser companion none is known."""
+def _beside_mesh(body: Body) -> Body | None:
+    """The same on the coarser mesh that the error bar comes from; none of a mesh that has no coarser one."""
     try:
-        beside = companion(body.problem)
+        problem = companion(body.problem)
     except Finger3dError:
-        return
-    coarse = read(beside, (body.gauge.name,), body.mu)[0]
-    yield sd, sd * strain_error(body.problem, frame, beside, body.strain, coarse)
+        return None
+    pressed = {p.mu: p for p in presses(problem, body.mu.tolist())}
+    strain = np.array([_strain(p.frame, body.gauge.name) for p in pressed.values()])
+    return Body(problem, body.gauge, body.mu, strain, pressed)
+
+
+def _mesh_error(body: Body, coarse: Body, frame: Frame) -> Float:
+    """Error bar (m,) of the strain, by its grain in a last frame at any mu."""
+    return strain_error(body.problem, frame, coarse.problem, body.strain, coarse.strain)
 
 
 def _coarser(problem: Problem) -> MeshOptions:
     """Edge lengths of a tilted body, which is compared with its own mirror image: longer, with some points left to
     touch; structured where the design allows, so that nothing is meshed for long.
     """
-    options, left = problem.model.mesh, len(problem.points.nodes) / _ENOUGH[problem.dim]
+    options, left = problem.model.mesh, len(problem.points.nodes) / _LEFT[problem.dim]
     times = min(2.0, max(1.0, left)) if problem.dim == 2 else min(1.5, max(1.25, math.sqrt(left)))
     mesher: Any = "swept" if hasattr(problem.model.design, "section") else options.mesher
     return replace(options, size_mm=times * options.size_mm, base_size_mm=times * options.base_size_mm, mesher=mesher)

@@ -6,10 +6,11 @@ import math
 import queue
 import time
 import uuid
-from contextlib import AbstractContextManager, suppress
+from contextlib import AbstractContextManager, nullcontext, suppress
 from pathlib import Path
 from typing import Any
 
+from finger3d.drawing import Artist
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.page import sweep_page
 from finger3d.report import Report
@@ -31,6 +32,7 @@ def sweep(
     scheduler: str | None = None,
     workers: int | None = None,
     report: Report | None = None,
+    artist: Artist | None = None,
 ) -> Kept:
     """Press every point of a sweep that is not kept yet.
 
@@ -42,6 +44,7 @@ def sweep(
     workers : processes on this machine; None: one for each core, at most one for each body; a single body is pressed
         by this process
     report : told about every point
+    artist : who draws; started here, where several numbers are varied, unless given
 
     Returns
     -------
@@ -62,24 +65,32 @@ def sweep(
         if before := len(kept.rows):
             report.say(f"{before} of {len(points.points)} points are kept from before")
         tasks = _tasks(points, kept)
-        if tasks:
-            try:
-                if len(tasks) == 1 and scheduler is None:
-                    _Run(None, kept, tasks, report).here()
-                else:
-                    with _cluster(scheduler, workers, len(tasks), report) as client:
-                        _Run(client, kept, tasks, report).go()
-            except BaseException:
-                # what ended the run is the news; tables that cannot be written beside it are not
-                with suppress(Finger3dError):
-                    kept.write()
-                raise
-        kept.write()
-        columns = kept.columns()
-        if columns["point"]:
-            draw(folder / "sweep.png", columns, [v.key for v in points.vary])
+        several = bool(tasks) and any(len(v.texts) > 1 for v in points.vary)
+        with nullcontext(artist) if artist else Artist(several, draw.__module__) as mine:
+            _press(kept, tasks, scheduler, workers, report)
+            columns = kept.columns()
+            if columns["point"]:
+                mine.draw(draw, folder / "sweep.png", columns, [v.key for v in points.vary])
+                mine.begin()
+            kept.write()
+            mine.finish()
         sweep_page(folder)
         return kept
+
+
+def _press(kept: Kept, tasks: list[Task], scheduler: str | None, workers: int | None, report: Report) -> None:
+    """Press what is left; whatever ends this, what is finished is in the tables."""
+    try:
+        if len(tasks) == 1 and scheduler is None:
+            _Run(None, kept, tasks, report).here()
+        elif tasks:
+            with _cluster(scheduler, workers, len(tasks), report) as client:
+                _Run(client, kept, tasks, report).go()
+    except BaseException:
+        # what ended the run is the news; tables that cannot be written beside it are not
+        with suppress(Finger3dError):
+            kept.write()
+        raise
 
 
 def _cluster(scheduler: str | None, workers: int | None, bodies: int, report: Report) -> AbstractContextManager[Any]:
