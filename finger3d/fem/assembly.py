@@ -137,6 +137,7 @@ class Pattern:
             np.concatenate(found, axis=1, out=of_cells[part])
             swapped[part] = cells[:, a] > cells[:, b]
         blocks, slot = _numbered(keys)
+        del keys, of_cells
         places = _places(*np.divmod(blocks, count), n, len(vertices), d)
         return cls(*places, slot[:size].reshape(-1, pairs), swapped, vertices)
 
@@ -190,33 +191,34 @@ def _numbered(key: Int) -> tuple[Int, NDArray[np.int32]]:
     """The different keys, ascending, and which of them each one is; np.unique takes twice the memory."""
     order = np.argsort(key)
     ranked = key[order]
-    new = np.ones(len(key), dtype=np.bool_)
+    new = np.zeros(len(key), dtype=np.bool_)
     np.not_equal(ranked[1:], ranked[:-1], out=new[1:])
     slot = np.empty(len(key), dtype=np.int32)
-    slot[order] = np.cumsum(new, dtype=np.int32) - 1
+    slot[order] = np.cumsum(new, dtype=np.int32)
+    new[:1] = True
     return ranked[new], slot
 
 
 def _places(row: Int, col: Int, n: int, pressures: int, d: int) -> tuple[AnyInt, AnyInt, Int, Int]:
     """The attributes indptr, indices, start and length from the blocks' nodes; those from n on are pressures."""
-    width = np.where(col < n, d, 1)
-    before = np.cumsum(width) - width
-    length = np.bincount(row, width, minlength=n + pressures).astype(np.int64)
+    count = n + pressures
+    before = np.concatenate([[0], np.cumsum(np.where(col < n, d, 1))])  # entries in first rows
+    first = before[np.searchsorted(row, np.arange(count + 1))]
+    length = np.diff(first)
     rows = np.concatenate([np.maximum(length[:n, None] - np.arange(d), 0).ravel(), length[n:]])
     indptr = np.concatenate([[0], np.cumsum(rows)])
     kind: type[Any] = np.int32 if indptr[-1] < np.iinfo(np.int32).max else np.int64
-    unknown = np.concatenate([np.arange(n) * d, n * d + np.arange(pressures)])
-    start = indptr[unknown][row] + before - (np.cumsum(length) - length)[row]
-    length = length[row]
+    unknown = np.concatenate([np.arange(n) * d, np.arange(n * d, n * d + pressures)])
+    start, length = (indptr[unknown] - first[:-1])[row], length[row]
+    start += before[:-1]
     indices = np.empty(indptr[-1], dtype=kind)
     of_nodes, of_pressures = col < n, row >= n
     for part, tall, wide in ((of_nodes, d, d), (~of_nodes & ~of_pressures, d, 1), (of_pressures, 1, 1)):
-        beside = row[part] < col[part]
-        first = unknown[col[part]].astype(kind)
+        beside, column = row[part] < col[part], unknown[col[part]].astype(kind)
         for i, at in enumerate(_rows(start[part], length[part], tall)):
             for j in range(wide):
                 stored = slice(None) if j >= i else beside
-                indices[(at + j)[stored]] = (first + j)[stored]
+                indices[(at + j)[stored]] = (column + j)[stored]
     return indptr.astype(kind), indices, start, length
 
 
