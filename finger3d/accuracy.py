@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,7 @@ from finger3d.solve import AUTO_START, Problem, build, contact_zone, march, symm
 
 Float = NDArray[np.float64]
 Say = Callable[[str], None]
+Told = Callable[[Problem, Frame], dict[str, float]]
 
 MAIN = ("normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm")
 """The numbers that get an error bar, beside every gauge."""
@@ -60,7 +61,7 @@ _FLOOR = 0.1
 """An edge told by points of distance h leaves a force uncertain by about this times (h/a)^2, friction and strains by
 this times h/a; calibrated in validation/error_bars.py, where changes that cancel would promise more."""
 
-_LENGTHS = ("contact_half_length_mm", "stick_half_length_mm")
+_FORCES = ("normal_force_N", "force_N_per_mm")
 
 
 @dataclass(frozen=True)
@@ -72,16 +73,20 @@ class ErrorEstimate:
     discretisation, steps : by name, those of `MAIN` and ``gauge_<name>``
     method : one line on how, or ``no estimate: ...``
     seconds : what the estimate took
+    beside : the numbers of the companion
+    ratio : how many times longer its edges are; below 1 where it is the finer one
     """
 
     discretisation: dict[str, float]
     steps: dict[str, float]
     method: str
-    seconds: float
+    seconds: float = 0.0
+    beside: dict[str, float] = field(default_factory=dict)
+    ratio: float = math.nan
 
     def as_dict(self) -> dict[str, Any]:
         """For summary.json."""
-        return asdict(self)
+        return {key: getattr(self, key) for key in ("discretisation", "steps", "method", "seconds")}
 
     def of(self, name: str) -> float | None:
         """Both errors of a number together, None without an estimate."""
@@ -142,32 +147,39 @@ def mesh_error(
 
     Parameters
     ----------
-    told, other : main numbers of the run and of its companion
+    told, other : numbers of the run and of its companion: those of `MAIN`, gauges, or those of `compare`
     ratio : how many times longer the companion's edges are; below 1 where it is the finer one
     grains : of both
     """
     found = {}
-    # (companion - run) = error (ratio^order - 1), whichever of them is finer
-    gain = abs(ratio**ORDER - 1.0)
+    by = gain(ratio)
     strain = max((abs(v) for k, v in told.items() if k.startswith("gauge_")), default=0.0)
     for name, value in told.items():
         change = abs(value - other[name])
-        if name in _LENGTHS:
+        if _is_length(name):
+            ends = 0.5 if "_half_" in name else 1.0
             # the companion's own rounding to points is no change of the length
-            change = max(0.0, change - 0.5 * grains[1].spacing_mm)
-            found[name] = max(change / gain, 0.5 * grains[0].spacing_mm)
+            change = max(0.0, change - ends * grains[1].spacing_mm)
+            found[name] = max(change / by, ends * grains[0].spacing_mm)
         else:
-            share = _FLOOR * grains[0].share ** (2 if name == "normal_force_N" else 1)
-            found[name] = max(change / gain, share * (strain if name.startswith("gauge_") else abs(value)))
+            share = _FLOOR * grains[0].share ** (2 if name in _FORCES else 1)
+            found[name] = max(change / by, share * (strain if name.startswith("gauge_") else abs(value)))
     return {k: float(v) for k, v in found.items() if math.isfinite(v)}
 
 
-def companion(problem: Problem, say: Say = lambda text: None) -> Problem:
-    """The problem beside one, condensed: coarser, or finer where none is coarser; all of the contact face is kept where
-    the problem keeps it all.
+def gain(ratio: float) -> float:
+    """The change to a companion over the error of the run, edges being `ratio` times as long there (Richardson)."""
+    return abs(ratio**ORDER - 1.0)
 
-    A body that cannot be swept is meshed once, which may take as long as its own mesh did, and read from the cache from
-    then on.
+
+def _is_length(name: str) -> bool:
+    return name.endswith(("_length_mm", "_length_end_mm"))
+
+
+def companion(problem: Problem, say: Say = lambda text: None) -> Problem:
+    """The problem beside one, condensed: coarser, or finer where none is coarser.
+
+    What cannot be swept is meshed once, which may take as long as its own mesh did, and then lies in the cache.
 
     Raises
     ------
@@ -207,10 +219,12 @@ def built_like(problem: Problem, model: Model, say: Say = lambda text: None) -> 
     return build(model, say, margin=math.inf) if everything else build(model, say)
 
 
-def compared(problem: Problem, frame: Frame, beside: Problem, last: Frame) -> dict[str, float]:
-    """Discretisation error by name, of a frame of a problem, from that of its companion."""
+def compared(
+    problem: Problem, frame: Frame, beside: Problem, last: Frame, told: Told = main_numbers
+) -> dict[str, float]:
+    """Discretisation error by name, of what is told of a frame of a problem, from that of its companion."""
     grains = Grain.of(problem, frame), Grain.of(beside, last)
-    return mesh_error(main_numbers(problem, frame), main_numbers(beside, last), _ratio(problem, beside), grains)
+    return mesh_error(told(problem, frame), told(beside, last), _ratio(problem, beside), grains)
 
 
 def _ratio(problem: Problem, beside: Problem) -> float:
@@ -245,7 +259,7 @@ def relative(numbers: Mapping[str, float], errors: Mapping[str, float]) -> dict[
     strain = max((abs(v) for k, v in numbers.items() if k.startswith("gauge_")), default=0.0)
     found = {}
     for name, error in errors.items():
-        if name in _LENGTHS:
+        if _is_length(name):
             scale = numbers["contact_half_length_mm"]
         else:
             scale = strain if name.startswith("gauge_") else abs(numbers[name])
@@ -260,27 +274,33 @@ def worst(numbers: Mapping[str, float], errors: Mapping[str, float]) -> tuple[st
     return name, shares[name]
 
 
-def step_error(problem: Problem, numbers: Mapping[str, float], times: float = 4.0) -> dict[str, float]:
+def step_error(
+    problem: Problem, numbers: Mapping[str, float], times: float = 4.0, told: Told = main_numbers
+) -> dict[str, float]:
     """Error by increments, by name: what `times` as many change, on the same condensation.
 
     Four times as many bound the error in 97 % of the cases of ``validation/error_bars.py``, twice in 94 %, half in
     85 %: few increments and half of them often agree by chance.
     """
-    counts = _counts(problem.model.legs)
+    counts = [leg.steps if isinstance(leg.steps, int) else AUTO_START for leg in problem.model.legs]
     others = [max(1, round(times * n)) for n in counts]
     if others == counts:
         raise Finger3dError("a single increment cannot be halved")
     legs = tuple(replace(leg, steps=n) for leg, n in zip(problem.model.legs, others, strict=True))
     trial = replace(problem, model=replace(problem.model, legs=legs))
-    other = main_numbers(trial, last_frame(trial))
+    other = told(trial, last_frame(trial))
     ratio = sum(counts) / sum(others)
-    gain = abs(ratio**STEP_ORDER - 1.0)
-    found = {name: abs(value - other[name]) / gain for name, value in numbers.items()}
+    by = abs(ratio**STEP_ORDER - 1.0)
+    found = {name: abs(value - other[name]) / by for name, value in numbers.items()}
     return {k: float(v) for k, v in found.items() if math.isfinite(v)}
 
 
 def estimate(
-    problem: Problem, frames: Sequence[Frame], spent: Mapping[str, float], say: Say = lambda text: None
+    problem: Problem,
+    frames: Sequence[Frame],
+    spent: Mapping[str, float],
+    say: Say = lambda text: None,
+    told: Told = main_numbers,
 ) -> ErrorEstimate:
     """Estimate the errors of the last frame by another mesh, coarser if there is one, and by more increments.
 
@@ -289,6 +309,7 @@ def estimate(
     problem, frames : the press as it was solved, all increments good
     spent : seconds by stage, which say how many more increments are affordable, and on which mesh
     say : told what is being done, where it may take long
+    told : the numbers by name of a problem's frame; see `mesh_error` for the names
 
     Returns
     -------
@@ -297,15 +318,15 @@ def estimate(
     """
     start = time.perf_counter()
     try:
-        mesh, steps, method = _estimated(problem, frames, spent, say)
+        found = _estimated(problem, frames, spent, say, told)
     except (Finger3dError, RuntimeError, ValueError, np.linalg.LinAlgError, MemoryError) as error:
-        mesh, steps, method = {}, {}, f"no estimate: {error}"
-    return ErrorEstimate(mesh, steps, method, time.perf_counter() - start)
+        found = ErrorEstimate({}, {}, f"no estimate: {error}")
+    return replace(found, seconds=time.perf_counter() - start)
 
 
 def _estimated(
-    problem: Problem, frames: Sequence[Frame], spent: Mapping[str, float], say: Say
-) -> tuple[dict[str, float], dict[str, float], str]:
+    problem: Problem, frames: Sequence[Frame], spent: Mapping[str, float], say: Say, told: Told
+) -> ErrorEstimate:
     if not frames or not frames[-1].outcome.ok:
         raise Finger3dError("the last step did not converge")
     # increments chosen by halving are numbers by now
@@ -315,14 +336,16 @@ def _estimated(
     begin = time.perf_counter()
     last = last_frame(beside)
     beside_s = time.perf_counter() - begin
-    mesh = compared(own, frames[-1], beside, last)
+    mesh = compared(own, frames[-1], beside, last, told)
     here, times = _finer_steps(spent["contact"], beside_s, max(_STEPS_SHARE * sum(spent.values()), _STEPS_S))
     where = (own, frames[-1]) if here else (beside, last)
-    steps = step_error(where[0], main_numbers(*where), times)
+    steps = step_error(where[0], told(*where), times, told)
     count = {4.0: "four times", 2.0: "twice", 0.5: "half"}[times]
-    kind = "coarse" if _ratio(own, beside) > 1.0 else "finer"
+    ratio = _ratio(own, beside)
+    kind = "coarse" if ratio > 1.0 else "finer"
     place = "" if here else f" on the {kind} mesh"
-    return mesh, steps, f"{_on_mesh(beside, kind)}; steps: {count} as many{place}, order {STEP_ORDER:g}"
+    method = f"{_on_mesh(beside, kind)}; steps: {count} as many{place}, order {STEP_ORDER:g}"
+    return ErrorEstimate(mesh, steps, method, beside=told(beside, last), ratio=ratio)
 
 
 def _on_mesh(beside: Problem, kind: str) -> str:
@@ -366,10 +389,6 @@ def last_frame(problem: Problem) -> Frame:
     if frame is None:
         raise Finger3dError("there are no increments to march")
     return frame
-
-
-def _counts(legs: Sequence[Leg]) -> list[int]:
-    return [leg.steps if isinstance(leg.steps, int) else AUTO_START for leg in legs]
 
 
 def _as_solved(legs: tuple[Leg, ...], count: int) -> tuple[Leg, ...]:

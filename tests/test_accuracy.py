@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from finger3d import accuracy, designs
 from finger3d.accuracy import (
@@ -57,6 +58,15 @@ def pressed(model: Model) -> tuple[Problem, list[Frame]]:
 def last_of(model: Model) -> dict[str, float]:
     problem, frames = pressed(model)
     return main_numbers(problem, frames[-1])
+
+
+def test_the_order_is_that_of_the_corners_of_the_base() -> None:
+    # Williams 1952: where a held face meets a free one at a right angle, in plane strain and along an edge of a solid,
+    # displacements go as r^lambda, sin^2(lambda pi/2) = (4 (1 - nu)^2 - lambda^2)/(3 - 4 nu), forces converge in
+    # 2 lambda; at nu = 0.49 that is 1.20
+    nu = 0.49
+    root = brentq(lambda p: np.sin(p * np.pi / 2) ** 2 - (4 * (1 - nu) ** 2 - p**2) / (3 - 4 * nu), 0.5, 0.8)
+    assert pytest.approx(2.0 * root, abs=0.01) == ORDER
 
 
 def test_an_error_of_the_assumed_order_is_found_exactly() -> None:

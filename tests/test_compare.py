@@ -11,12 +11,14 @@ from pathlib import Path
 import pytest
 
 import finger3d.compare as compare_module
+from finger3d.accuracy import FACTOR, estimate
 from finger3d.cli import main
 from finger3d.compare import Case, cases, compare
-from finger3d.compare.cases import COARSER, corner_order, resized, solved, widened
+from finger3d.compare.cases import resized, solved, widened
 from finger3d.compare.verdict import FORCE, Deviation, deviation, matched, reached, rounded, sentences
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.scene import load
+from finger3d.solve import build, march
 
 SCENE = """
 title = "coarse finger"
@@ -126,29 +128,36 @@ def test_error_bars_hold_the_answer_of_a_fine_mesh(scene, domain, nu):
     for size in (5.0, 3.0, 2.0):
         coarse = solved("coarse", resized(model, size))
         for key in (FORCE, "contact_length_mm"):
-            assert abs(coarse.numbers[key] - fine.numbers[key]) <= coarse.errors[key], (size, key)
-        assert coarse.force_error < 0.003 * size
+            # within twice, as issue 8 has it of a press's bars, which these are
+            assert abs(coarse.numbers[key] - fine.numbers[key]) <= 2.0 * coarse.errors[key], (size, key)
+        assert coarse.errors[FORCE] < 0.003 * size * coarse.numbers[FORCE]
 
 
-def test_no_error_bar_is_below_that_of_the_sections(scene):
-    model = load(scene).model()
-    assert solved("solid", model, 0.07).force_error >= 0.07
-
-
-@pytest.mark.parametrize(("nu", "order"), [(0.0, 2.0), (0.3, 1.42), (0.5, 1.19)])
-def test_corner_order_is_williams(nu, order):
-    assert corner_order(nu) == pytest.approx(order, abs=0.005)
-
-
-def test_plane_stress_has_the_corner_of_a_smaller_nu():
-    assert corner_order(0.5, plane_stress=True) == pytest.approx(corner_order(1.0 / 3.0))
+@pytest.mark.parametrize("domain", ["plane-strain", "solid"])
+def test_a_case_has_the_very_bars_of_a_press(scene, domain):
+    model = load(scene, [f"model.domain={domain}"]).model()
+    case = solved(domain, model)
+    problem = build(model)
+    # what a press spends decides how its increments are judged: so much that four times as many are affordable here
+    frames = tuple(march(problem))
+    bars = estimate(problem, frames, {"all": 60.0, "contact": 0.1})
+    main = {FORCE: "normal_force_N", "friction_sum_N_per_mm": "friction_sum_N", "gauge_g36": "gauge_g36"}
+    main |= {"contact_length_mm": "contact_half_length_mm", "stick_length_mm": "stick_half_length_mm"}
+    # the same problem but for the points that never touch: round-off apart, the error of the mesh is the very same
+    found = estimate(problem, frames, {"all": 60.0, "contact": 0.1}, told=lambda p, f: cases.measured(p.points, f))
+    for key, name in main.items():
+        times = 2.0 if "length" in key else 1.0 if "gauge" in key else 1.0 / model.design.width_mm
+        assert found.discretisation[key] == pytest.approx(times * bars.discretisation[name], rel=1e-6), key
+        assert found.steps[key] == pytest.approx(times * bars.steps[name], rel=1e-6, abs=1e-12), key
+        assert case.errors[key] >= 0.999999 * found.discretisation[key], key
+    assert set(case.errors) == set(case.numbers)
 
 
 @pytest.mark.parametrize("width", [1.0, 20.0, 2000.0])
 def test_other_widths_are_structured_and_have_room_for_the_companion(scene, width):
     wide = widened(load(scene, ["mesh.mesher=ftetwild"]).model(), width)
     assert (wide.design.width_mm, wide.mesh.mesher) == (width, "swept")
-    assert wide.mesh.size_mm * COARSER <= min(width, 50.0)
+    assert wide.mesh.size_mm * FACTOR <= min(width, 50.0)
     assert wide.mesh.base_size_mm / wide.mesh.size_mm == pytest.approx(12.0 / 5.0)
 
 
@@ -204,8 +213,10 @@ def test_a_deviation_carries_both_error_bars():
 def test_on_swept_meshes_a_common_error_cancels():
     plane, solid = case("plane strain", 20.0, 15.0, 0.15), case("solid", 20.0, 10.0, 0.1)
     plane, solid = replace(plane, companion={FORCE: 15.3}), replace(solid, companion={FORCE: 10.2})
-    assert matched(plane, solid).error == pytest.approx(0.0, abs=1e-12)
-    assert matched(plane, replace(solid, mesher="ftetwild")).error > 0.01
+    # both change by 2 %, so the deviation does not: of the bar of two unrelated errors a quarter is kept
+    apart = matched(plane, replace(solid, mesher="ftetwild")).error
+    assert matched(plane, solid).error == pytest.approx(0.25 * apart, rel=1e-12)
+    assert apart > 0.01
 
 
 def test_what_the_mesh_cannot_tell_is_not_told():
@@ -275,10 +286,10 @@ def test_widths_that_are_none_are_refused_in_one_line(scene, tmp_path, capsys, w
 
 
 def test_a_case_that_fails_is_named_and_the_others_are_kept(scene, tmp_path, monkeypatch, capsys):
-    def failing(name, model, least=0.0):
+    def failing(name, model):
         if name == "solid":
             return Case(name, model.design.width_mm, model.mesh.size_mm, "swept", Outcome.NO_CONVERGENCE)
-        return solved(name, model, least)
+        return solved(name, model)
 
     monkeypatch.setattr(compare_module, "solved", failing)
     assert main(["compare", str(scene), "--out", str(tmp_path / "out"), "--widths", "50"]) == 3
@@ -291,10 +302,10 @@ def test_a_case_that_fails_is_named_and_the_others_are_kept(scene, tmp_path, mon
 
 
 def test_an_interrupted_comparison_keeps_its_cases(scene, tmp_path, monkeypatch, capsys):
-    def interrupted(name, model, least=0.0):
+    def interrupted(name, model):
         if name == "solid":
             raise KeyboardInterrupt
-        return solved(name, model, least)
+        return solved(name, model)
 
     monkeypatch.setattr(compare_module, "solved", interrupted)
     assert main(["compare", str(scene), "--out", str(tmp_path / "out")]) == 130

@@ -1,4 +1,4 @@
-"""One scene as different models: pressed on a mesh and on a coarser companion, and measured per width."""
+"""One scene as different models: pressed, measured per width, and with the error bars of a press."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d.accuracy import FACTOR, estimate
 from finger3d.errors import Outcome
 from finger3d.history import ContactPoints, Frame, contact_table, measure
 from finger3d.increments import automatic, refine
@@ -18,18 +19,6 @@ from finger3d.model import Model
 from finger3d.solve import Problem, build, march
 
 Float = NDArray[np.float64]
-
-COARSER = 1.5
-"""Edge lengths of the companion mesh of a model, in those of the mesh itself."""
-
-_FINER = 3.0
-"""How much finer a section is also solved: it costs little, and two meshes seldom agree there by chance."""
-
-_SAFETY = 3.0
-"""On the error that a mesh and a coarser one tell (Roache 1998, grid convergence index); 1.25 with a much finer one."""
-
-_SCATTER = 2.0
-"""The same for what jumps from mesh to mesh rather than follow a rate: strains at a point, peaks."""
 
 _POINTS = 600
 """Contact points of the meshed part up to which a solid of another width is quick (a few seconds)."""
@@ -46,10 +35,12 @@ class Case:
     model : plane stress, plane strain, solid, or solid with held ends
     size_mm : edge length at the contact
     numbers : quantity -> value, forces per width; see `measured`
-    errors : quantity -> error bar, from the companion mesh; empty without one
+    errors : quantity -> error bar by mesh and increments, as `finger3d press` has it; empty without one
     lines : line along x ("z = 0", "end") -> columns x_mm, pressure_MPa, shear_x_MPa, shear_z_MPa, status
     outcome : of the path; anything but CONVERGED leaves `numbers` empty
-    companion : the numbers on the companion mesh, 1.5 times coarser
+    companion : the numbers on the companion mesh
+    ratio : how many times longer its edges are
+    method : how the errors were estimated, or why not
     """
 
     model: str
@@ -62,16 +53,13 @@ class Case:
     lines: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     seconds: float = 0.0
     companion: Mapping[str, float] = field(default_factory=dict)
+    ratio: float = FACTOR
+    method: str = ""
 
     @property
     def ok(self) -> bool:
         """Whether there are numbers to compare."""
         return self.outcome.ok
-
-    @property
-    def force_error(self) -> float:
-        """Relative error of the force; 0 where it is not known."""
-        return self.errors.get("force_N_per_mm", 0.0) / abs(self.numbers.get("force_N_per_mm", 1.0) or 1.0)
 
     @property
     def is_section(self) -> bool:
@@ -83,30 +71,8 @@ class Case:
         return {
             "model": self.model, "width_mm": self.width_mm, "size_mm": self.size_mm, "mesher": self.mesher,
             "outcome": str(self.outcome), "numbers": dict(self.numbers), "errors": dict(self.errors),
-            "lines": {k: dict(v) for k, v in self.lines.items()}, "seconds": self.seconds,
+            "lines": {k: dict(v) for k, v in self.lines.items()}, "seconds": self.seconds, "error_method": self.method,
         }  # fmt: skip
-
-
-def corner_order(nu: float, plane_stress: bool = False) -> float:
-    """Order 2 lambda in which forces converge, from r^lambda at the ends of the held base (Williams 1952).
-
-    Where a held face meets a free one at a right angle, in plane strain and along an edge of a solid,
-    ``sin^2(lambda pi/2) = (4 (1 - nu)^2 - lambda^2)/(3 - 4 nu)``: the order is 1.19 at nu = 0.5, 1.42 at 0.3, and 2 (no
-    singularity) at 0.  The edge of a contact that slips is milder: 3.
-    """
-    from scipy.optimize import brentq
-
-    poisson = nu / (1.0 + nu) if plane_stress else nu
-
-    def left_over(power: float) -> float:
-        return float(math.sin(power * math.pi / 2) ** 2 - (4 * (1 - poisson) ** 2 - power**2) / (3 - 4 * poisson))
-
-    grid = np.linspace(0.5, 1.0, 201)
-    values = [left_over(p) for p in grid]
-    for a, b, fa, fb in zip(grid[:-1], grid[1:], values[:-1], values[1:], strict=True):
-        if fa < 0.0 < fb:
-            return 2.0 * float(brentq(left_over, a, b))
-    return 2.0
 
 
 def resized(model: Model, size_mm: float) -> Model:
@@ -119,8 +85,8 @@ def widened(model: Model, width_mm: float) -> Model:
     """A solid of another width: structured, no finer than the scene's, and coarse enough to be quick."""
     design = replace(model.design, width_mm=width_mm)
     free = 4 // 2 ** len(set(model.object.mirrors()) & {"x", "z"})
-    size = min(model.mesh.size_mm, width_mm / COARSER)
-    largest = min(min(design.height_mm, design.half_length_mm) / 4.0, width_mm) / COARSER
+    size = min(model.mesh.size_mm, width_mm / FACTOR)
+    largest = min(min(design.height_mm, design.half_length_mm) / 4.0, width_mm) / FACTOR
 
     def points(size_mm: float) -> float:
         layers = max(2, math.ceil(width_mm / (4.0 * size_mm)))
@@ -131,55 +97,43 @@ def widened(model: Model, width_mm: float) -> Model:
     return resized(replace(model, design=design, mesh=replace(model.mesh, mesher="swept")), size)
 
 
-def solved(name: str, model: Model, least: float = 0.0) -> Case:
-    """Press the model on its mesh and on others, which tell the error bars.
-
-    A section is judged by a finer mesh, a solid by a coarser one.  `least` is a relative error that no number is said
-    to beat: for a solid that of the sections on the same in-plane mesh.
-    """
+def solved(name: str, model: Model) -> Case:
+    """Press the model, with error bars from `finger3d.accuracy.estimate`, the same that a press gets."""
     start = time.perf_counter()
-    size = model.mesh.size_mm
-    coarse, fine = measured_on(name, resized(model, COARSER * size)), measured_on(name, model)
-    order = corner_order(model.material.nu, model.domain == "plane-stress")
-    other, factor = coarse, _SAFETY / (COARSER**order - 1.0)
-    if model.domain != "solid":
-        other, factor = measured_on(name, resized(model, size / _FINER)), 1.25 / (1.0 - _FINER**-order)
-    seconds = time.perf_counter() - start
-    if not (fine.ok and other.ok and coarse.ok):
-        return replace(fine, seconds=seconds)
-    changed = {key: abs(value - other.numbers[key]) for key, value in fine.numbers.items()}
-    least = max(least, factor * changed["force_N_per_mm"] / abs(fine.numbers["force_N_per_mm"]))
-    errors = {}
-    for key, value in fine.numbers.items():
-        # nothing is better known than the force, though two meshes may agree in it by chance
-        errors[key] = max((factor if key.endswith("_N_per_mm") else _SCATTER) * changed[key], least * abs(value))
-        if key.endswith(("_length_mm", "_length_end_mm")):
-            # known to a point at either end
-            errors[key] = max(changed[key], 2.0 * size)
-    return replace(fine, errors=errors, seconds=seconds, companion=coarse.numbers)
+    problem, frames, case = _pressed(name, model)
+    if case.ok:
+        spent = {**problem.seconds, "contact": case.seconds - sum(problem.seconds.values())}
+        found = estimate(problem, frames, spent, told=lambda p, f: measured(p.points, f))
+        errors = {key: error for key in case.numbers if (error := found.of(key)) is not None}
+        case = replace(case, errors=errors, companion=found.beside, ratio=found.ratio, method=found.method)
+    return replace(case, seconds=time.perf_counter() - start)
 
 
 def measured_on(name: str, model: Model) -> Case:
     """The model pressed on its own mesh only: numbers without error bars."""
+    return _pressed(name, model)[2]
+
+
+def _pressed(name: str, model: Model) -> tuple[Problem, tuple[Frame, ...], Case]:
+    start = time.perf_counter()
     # all of the contact face: how far contact reaches differs from model to model
     problem = build(model, margin=math.inf)
-    frame = _last(problem)
-    width = model.design.width_mm
+    frames = _frames(problem)
+    frame = frames[-1]
     mesher = "swept" if problem.dim == 2 else model.mesh.mesher
-    empty = Case(name, width, model.mesh.size_mm, mesher, frame.outcome)
-    if not frame.outcome.ok:
-        return empty
-    return replace(empty, numbers=measured(problem.points, frame), lines=lines_along_x(problem.points, frame))
+    case = Case(name, model.design.width_mm, model.mesh.size_mm, mesher, frame.outcome)
+    if frame.outcome.ok:
+        case = replace(case, numbers=measured(problem.points, frame), lines=lines_along_x(problem.points, frame))
+    return problem, frames, replace(case, seconds=time.perf_counter() - start)
 
 
-def _last(problem: Problem) -> Frame:
+def _frames(problem: Problem) -> tuple[Frame, ...]:
+    if not automatic(problem):
+        return tuple(march(problem))
     frames: tuple[Frame, ...] = ()
-    if automatic(problem):
-        for finer, _ in refine(problem):
-            frames = finer
-    else:
-        frames = tuple(march(problem))
-    return frames[-1]
+    for finer, _ in refine(problem):
+        frames = finer
+    return frames
 
 
 def measured(points: ContactPoints, frame: Frame) -> dict[str, float]:
