@@ -36,7 +36,20 @@ def half_height(size: Float) -> float:
     return float(0.5 * _MARGIN * max(size[1], size[0] * WINDOW[1] / WINDOW[0]))
 
 
-def cropped(images: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], tuple[int, int]]:
+def framed(
+    images: NDArray[np.uint8], frame: tuple[Float, Float]
+) -> tuple[NDArray[np.uint8], tuple[float, float, float, float]]:
+    """Images (s, h, w, 3) of a window around a frame, middle (3,) and width and height (2,), without white margins; and
+    the left, right, lower and upper end of what is kept, mm as `flat` gives them.
+    """
+    kept, (top, left) = _cropped(images)
+    middle, size = frame
+    pixel = 2.0 * half_height(size) / images.shape[1]
+    x, y = flat(middle) + pixel * np.array([left - 0.5 * images.shape[2], 0.5 * images.shape[1] - top])
+    return kept, (x, x + pixel * kept.shape[2], y - pixel * kept.shape[1], y)
+
+
+def _cropped(images: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], tuple[int, int]]:
     """Images (s, h, w, 3) without the margin that all of them leave white, and the first row and column kept."""
     stack = images[..., :3]
     inked = np.min(stack, axis=(0, 3)) < 250

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.camera import AXES, WINDOW, cropped, flat, half_height
+from finger3d.camera import AXES, WINDOW, flat, framed, half_height
 from finger3d.contact.law import OPEN, SLIP, STICK
 from finger3d.errors import MissingError
 from finger3d.mesh import EDGES, Mesh
@@ -265,11 +265,8 @@ def render_solid(
     found = rendered("finger3d.render", {"colours": np.array(colours), **arrays}, must)
     if found is None:
         return None
-    images, (top, left) = cropped(found)
-    middle, size = skin.frame
-    pixel = 2.0 * half_height(size) / found.shape[1]
-    x, y = flat(middle) + pixel * np.array([left - 0.5 * found.shape[2], 0.5 * found.shape[1] - top])
-    return list(images), (x, x + pixel * images.shape[2], y - pixel * images.shape[1], y)
+    images, extent = framed(found, skin.frame)
+    return list(images), extent
 
 
 def rendered(module: str, arrays: Mapping[str, Any], must: bool = False) -> NDArray[np.uint8] | None:

@@ -41,6 +41,11 @@ def orange(image: np.ndarray) -> float:
     return float(((panel[..., 0] - panel[..., 2] > 90) & (panel[..., 0] > panel[..., 1] + 30)).mean())
 
 
+def marked(image: np.ndarray) -> int:
+    """Pixels in the colour of gauges."""
+    return int((np.abs(image - np.array([0xB0, 0x00, 0x6A])).max(axis=2) < 12).sum())
+
+
 def frames(path: Path) -> list[np.ndarray]:
     from PIL import Image
 
@@ -57,6 +62,7 @@ def test_a_section_as_picture_and_animation(section: Path, tmp_path: Path, capsy
     assert main(["show", str(section), "--png", str(png), "--gif", str(gif)]) == 0
     assert capsys.readouterr().out == f"{png} written\n{gif} written\n"
     assert orange(pixels(png)) > 1e-3
+    assert marked(pixels(png)) > 30
     first, *_, last = frames(gif)
     assert len(frames(gif)) == 4
     assert first.shape == last.shape
@@ -73,6 +79,7 @@ def test_a_solid_with_and_without_opengl(
     assert main(["show", str(solid), "--png", str(tmp_path / "a.png"), "--step", "2"]) == 0
     image = pixels(tmp_path / "a.png")
     assert orange(image) > 1e-3
+    assert marked(image) > 30
     # the left panel shows pressure, not status
     assert orange(image[:, ::-1]) < 0.5 * orange(image)
     assert main(["show", str(solid), "--png", str(tmp_path / "b.png")]) == 0
@@ -86,6 +93,7 @@ def test_the_window_off_screen_answers_its_controls(solid: Path, section: Path, 
         command = [sys.executable, "-P", "-m", "finger3d.show.window", str(folder), str(picture)]
         assert render.run_child(command) is None
         assert pixels(picture).std() > 10.0
+        assert marked(pixels(picture)) > 30
 
 
 def test_values_of_the_window(solid: Path) -> None:

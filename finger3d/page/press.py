@@ -67,7 +67,7 @@ def press_page(folder: str | Path) -> Path:
         headline(good[-1], errors_of(summary)) if good else (),
         sections,
         [Figure(name, text) for name, text in _PICTURES.items()],
-        view_of(states, _gauges(summary["scene"])) if states else None,
+        view_of(states, gauges_of(summary["scene"])) if states else None,
         command="press",
         outcome=f"{summary['outcome']}{last if summary['outcome'] == 'converged' else ''}",
         good=summary["outcome"] == "converged",
@@ -76,7 +76,8 @@ def press_page(folder: str | Path) -> Path:
     )
 
 
-def _gauges(scene: Mapping[str, Any]) -> list[Gauge]:
+def gauges_of(scene: Mapping[str, Any]) -> list[Gauge]:
+    """The gauges of a scene as summary.json holds it."""
     return [
         Gauge(g["name"], g["x_mm"], g["y_mm"], g["z_mm"], math.radians(g["angle_deg"]), g["length_mm"])
         for g in scene.get("gauge") or ()

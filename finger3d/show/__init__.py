@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from finger3d.errors import Finger3dError, MissingError
+from finger3d.model import Gauge
+from finger3d.page.press import gauges_of
 from finger3d.page.results import read_json
 from finger3d.page.states import States, load_states
 from finger3d.page.view3d import label
@@ -15,8 +17,8 @@ from finger3d.page.view3d import label
 __all__ = ["found", "show", "show_window"]
 
 
-def found(folder: str | Path) -> tuple[States, str]:
-    """The steps kept in a folder of results, and the title of its scene.
+def found(folder: str | Path) -> tuple[States, str, list[Gauge]]:
+    """The steps kept in a folder of results, and the title and the gauges of its scene.
 
     Raises
     ------
@@ -34,7 +36,8 @@ def found(folder: str | Path) -> tuple[States, str]:
     if not (folder / "steps.npz").exists():
         why = " ".join(str(summary.get("outcome", "unknown")).split())
         raise MissingError(f"{folder}: has no fields to show; its outcome is: {why}; press {folder}/scene.toml again")
-    return load_states(folder / "steps.npz"), summary["scene"].get("title") or folder.name
+    scene = summary["scene"]
+    return load_states(folder / "steps.npz"), scene.get("title") or folder.name, gauges_of(scene)
 
 
 def show(
@@ -56,11 +59,11 @@ def show(
     """
     from finger3d.show.draw import frames, write_gif, write_png
 
-    states, title = found(folder)
+    states, title, gauges = found(folder)
     if png is not None:
-        write_png(png, frames(states, [_number(folder, states, step)], title)[0])
+        write_png(png, frames(states, [_number(folder, states, step)], title, gauges)[0])
     if gif is not None:
-        write_gif(gif, frames(states, range(len(states.step)), title))
+        write_gif(gif, frames(states, range(len(states.step)), title, gauges))
 
 
 def _number(folder: str | Path, states: States, step: int | None) -> int:

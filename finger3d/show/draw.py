@@ -17,8 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d import render, view
+from finger3d.camera import framed
 from finger3d.export import atomic
+from finger3d.marks import draw_marks, marks_of
 from finger3d.mesh import Mesh
+from finger3d.model import Gauge
 from finger3d.page.states import States
 from finger3d.render import Skin, skin_of
 
@@ -32,21 +35,24 @@ _DPI = {"png": 120, "gif": 65}
 _FRAME_MS, _LAST_MS = 450, 1500
 
 
-def frames(states: States, numbers: Sequence[int], title: str) -> list[Figure]:
+def frames(states: States, numbers: Sequence[int], title: str, gauges: Sequence[Gauge] = ()) -> list[Figure]:
     """Figures of some of the kept steps, with one camera and one scale of pressure.
 
     Parameters
     ----------
     numbers : which of the kept steps, from 0
+    gauges : marked where they are in each of them
     """
     from finger3d.show import captions
 
     names = captions(states)
     titles = [f"{title}\n{names[k]}" for k in numbers]
     highest = float(max(states.pressure[k].max(initial=0.0) for k in numbers)) or 1.0
-    if states.dim == 2:
-        return _sections(states, numbers, titles, highest)
     mesh = mesh_of(states)
+    found = marks_of(mesh, gauges, near=mesh.dim == 3)
+    marks = [[(mark.label, mark.of(states.points + states.displacement[k])) for mark in found] for k in numbers]
+    if states.dim == 2:
+        return _sections(states, numbers, titles, highest, marks)
     skins, colours = [], []
     for k in numbers:
         shear = np.column_stack([states.shear_x[k], states.shear_z[k]])
@@ -55,7 +61,7 @@ def frames(states: States, numbers: Sequence[int], title: str) -> list[Figure]:
         skins.append(skin)
         by_status = np.repeat(view.palette()[skin.status][:, None], 3, axis=1)
         colours.append((view.pressure_colours(skin.pressure, highest), by_status))
-    return _solids(skins, colours, titles, highest)
+    return _solids(skins, colours, titles, highest, marks)
 
 
 def mesh_of(states: States) -> Mesh:
@@ -88,7 +94,9 @@ def _pixels(figure: Figure) -> Image:
     return Image.open(stream).convert("RGB").quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
 
 
-def _sections(states: States, numbers: Sequence[int], titles: Sequence[str], highest: float) -> list[Figure]:
+def _sections(
+    states: States, numbers: Sequence[int], titles: Sequence[str], highest: float, marks: Sequence[view.Marks]
+) -> list[Figure]:
     from matplotlib.collections import LineCollection, PolyCollection
 
     moved = states.points + states.displacement[list(numbers)]
@@ -97,7 +105,7 @@ def _sections(states: States, numbers: Sequence[int], titles: Sequence[str], hig
     arc, outline = states.facets[states.on_contact], states.facets[:, :2]
     corners = states.cells[:, :3]
     figures = []
-    for k, at, title in zip(numbers, moved, titles, strict=True):
+    for k, at, title, lines in zip(numbers, moved, titles, marks, strict=True):
         middle = at[arc[:, 2]] if arc.shape[1] == 3 else at[arc].mean(axis=1)
         halves = np.stack([at[arc[:, :2]], np.repeat(middle[:, None], 2, axis=1)], axis=2).reshape(-1, 2, 2)
         pressure, status = (states.on_points(name, k)[arc[:, :2]].ravel() for name in ("pressure", "status"))
@@ -112,15 +120,20 @@ def _sections(states: States, numbers: Sequence[int], titles: Sequence[str], hig
             axes.set(xlim=low[0] + span[0] * np.array([-0.04, 1.04]), ylim=low[1] + span[1] * np.array([-0.04, 1.1]))
             axes.set_xlabel("x (mm)", labelpad=1)
         panels[0].set_ylabel("y (mm)")
+        draw_marks(panels[0], lines)
         view.keys(figure, highest, {"finger at rest": view.REST})
         figures.append(figure)
     return figures
 
 
 def _solids(
-    skins: Sequence[Skin], colours: Sequence[tuple[Array, Array]], titles: Sequence[str], highest: float
+    skins: Sequence[Skin],
+    colours: Sequence[tuple[Array, Array]],
+    titles: Sequence[str],
+    highest: float,
+    marks: Sequence[view.Marks],
 ) -> list[Figure]:
-    images = _rendered(skins, colours)
+    images, extent = _rendered(skins, colours) or (None, None)
     flat = np.concatenate([render.flat(skin.points) for skin in skins])
     low, span = flat.min(axis=0), np.ptp(flat, axis=0)
     aspect = float(span[1] / span[0]) if images is None else images.shape[2] / images.shape[3]
@@ -129,39 +142,52 @@ def _solids(
         figure, panels = view.two_panels(aspect, title)
         for number, axes in enumerate(panels):
             if images is not None:
-                axes.imshow(images[k, number], interpolation="antialiased")
+                axes.imshow(images[k, number], interpolation="antialiased", extent=extent)
             else:
                 render.draw_solid(axes, skins[k], colours[k][number], arrows=False)
                 axes.set(xlim=(low[0], low[0] + span[0]), ylim=(low[1], low[1] + span[1]))
             axes.set_axis_off()
+        draw_marks(panels[0], [(name, render.flat(line)) for name, line in marks[k]])
         view.keys(figure, highest, {"finger at rest": view.REST})
         figures.append(figure)
     return figures
 
 
-def _rendered(skins: Sequence[Skin], colours: Sequence[tuple[Array, Array]]) -> Array | None:
-    """Images (s, 2, h, w, 3) by PyVista in a child, or None where it does not work or is not wanted."""
+def _rendered(
+    skins: Sequence[Skin], colours: Sequence[tuple[Array, Array]]
+) -> tuple[Array, tuple[float, float, float, float]] | None:
+    """Images (s, 2, h, w, 3) by PyVista in a child, without their common margin, and their extent in mm; or None where
+    it does not work or is not wanted.
+    """
     wanted = os.environ.get("FINGER3D_RENDERER", "")
     if wanted == "matplotlib":
         return None
     arrays = {f"{f.name}_{k}": getattr(skin, f.name) for k, skin in enumerate(skins) for f in fields(Skin)}
     arrays |= {f"colours_{k}": np.array(both) for k, both in enumerate(colours)}
-    return render.rendered("finger3d.show.draw", arrays, must=wanted == "pyvista")
+    found = render.rendered("finger3d.show.draw", arrays, must=wanted == "pyvista")
+    if found is None:
+        return None
+    images, extent = framed(found.reshape(-1, *found.shape[2:]), _frame(skins))
+    return images.reshape(-1, 2, *images.shape[1:]), extent
+
+
+def _frame(skins: Sequence[Skin]) -> tuple[Array, Array]:
+    """One frame around all of them: they must not move unless the finger does."""
+    flat = np.concatenate([render.flat(skin.points) for skin in skins])
+    first = skins[0].frame[0]
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    shift = 0.5 * (low + high) - render.flat(first)
+    return first + shift @ render.AXES[:2], high - low
 
 
 def _child(source: str, target: str) -> None:
-    """Render every skin twice with one camera, crop the common margin, and save the images (s, 2, h, w, 3)."""
+    """Render every skin twice with one camera, and save the images (s, 2, h, w, 3)."""
     import pyvista as pv
 
     data = np.load(source)
     count = sum(name.startswith("colours_") for name in data.files)
     skins = [Skin(**{f.name: data[f"{f.name}_{k}"] for f in fields(Skin)}) for k in range(count)]
-    # One frame around all of them: they must not move unless the finger does.
-    flat = np.concatenate([render.flat(skin.points) for skin in skins])
-    first = skins[0].frame[0]
-    low, high = flat.min(axis=0), flat.max(axis=0)
-    shift = 0.5 * (low + high) - render.flat(first)
-    frame = first + shift @ render.AXES[:2], high - low
+    frame = _frame(skins)
     images = []
     for k, skin in enumerate(skins):
         plotter = pv.Plotter(
@@ -173,7 +199,7 @@ def _child(source: str, target: str) -> None:
             plotter.render()  # a screenshot alone repeats the picture before
             images.append(plotter.screenshot(return_img=True))
         plotter.close()
-    stack, _ = render.cropped(np.array(images))
+    stack = np.array(images)
     np.save(target, stack.reshape(count, 2, *stack.shape[1:]))
 
 

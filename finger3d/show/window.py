@@ -10,9 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from finger3d.marks import COLOUR, marks_of
 from finger3d.page.states import States
 from finger3d.result import grid
 from finger3d.show import captions, found
+from finger3d.show.draw import mesh_of
 
 FIELDS = {
     "pressure": "contact pressure (MPa)",
@@ -30,7 +32,7 @@ class Window:
     def __init__(self, folder: str, off_screen: bool = False) -> None:
         import pyvista as pv
 
-        self.states, title = found(folder)
+        self.states, title, gauges = found(folder)
         self.end = grid(folder)
         self.rest = np.array(self.end.points)
         # Contact is known at vertices: straight cells, or every edge would dip to 0 in its middle.
@@ -47,6 +49,11 @@ class Window:
             )
         else:  # a section has nothing to cut
             self.plotter.add_mesh(self.shown, **look)
+        self.mapper = self.plotter.mapper  # the plotter's own is that of the last mesh
+        self.marks = marks_of(mesh_of(self.states), gauges, near=self.states.dim == 3)
+        self.lines = [pv.lines_from_points(self.rest[:3]) for _ in self.marks]
+        for line in self.lines:
+            self.plotter.add_mesh(line, color=COLOUR, line_width=5, lighting=False)
         self.plotter.add_slider_widget(
             self.to_step, rng=[1, max(len(self.states.step), 2)], value=len(self.states.step), title="kept step",
             fmt="%.0f", style="modern",
@@ -54,7 +61,9 @@ class Window:
         )  # fmt: skip
         for key, name in zip("12345", FIELDS, strict=True):
             self.plotter.add_key_event(key, lambda name=name: self.to_field(name))
-        self.plotter.view_vector((-0.45, 1.05, 1.0), viewup=(0.0, 1.0, 0.0))
+        self.plotter.view_vector(
+            (-0.45, 1.05, 1.0) if self.states.dim == 3 else (0.0, 0.0, 1.0), viewup=(0.0, 1.0, 0.0)
+        )
         self.plotter.add_axes(color="black")
         self.update()
 
@@ -79,12 +88,24 @@ class Window:
         value = values(self.states, self.end, self.field, self.step)
         self.shown["value"] = value
         self.shown.Modified()
+        self._mark(u[:, : self.states.dim])
         highest = 2.0 if self.field == "status" else float(np.nan_to_num(value).max(initial=0.0)) or 1.0
-        self.plotter.mapper.scalar_range = (0.0, highest)
+        self.mapper.scalar_range = (0.0, highest)
         keys = "   ".join(f"{key} {name}" for key, name in zip("12345", FIELDS, strict=True))
         text = f"{captions(self.states)[self.step]}\n{FIELDS[self.field]}\nkeys: {keys}"
         self.plotter.add_text(text, position="upper_left", font_size=10, color="black", name="told")
         self.plotter.render()
+
+    def _mark(self, u: Any) -> None:
+        """Move the gauges' lines and names."""
+        for line, mark in zip(self.lines, self.marks, strict=True):
+            line.points = padded(mark.of(self.states.points + u))
+        if self.marks:
+            self.plotter.add_point_labels(
+                np.array([line.points[1] for line in self.lines]), [mark.label for mark in self.marks], name="gauges",
+                text_color=COLOUR, font_size=14, bold=False, shape_color="white", shape_opacity=0.8, show_points=False,
+                always_visible=True, reset_camera=False,
+            )  # fmt: skip
 
 
 def padded(u: Any) -> Any:
