@@ -106,7 +106,8 @@
   // As far away as a body needs that has to fit into the stage, as wide and as high as it is seen from there.
   const size = range.map(([low, high]) => high - low), cube = Math.cbrt(size[0] * size[1] * size[2]);
   const wide = 0.92 * size[0] + 0.38 * size[2], high = 0.84 * size[1] + 0.5 * size[2] + 0.17 * size[0];
-  const back = Math.max(1.5 * high, 1.8 * wide * stage.clientHeight / stage.clientWidth) / cube;
+  const room = narrow() ? 2.1 : 1.8;  // titles of axes are as wide on a narrow screen
+  const back = Math.max(1.5 * high, room * wide * stage.clientHeight / stage.clientWidth) / cube;
   const eye = { x: -0.35 * back, y: 0.6 * back, z: 0.85 * back };
   function layout() {
     const style = getComputedStyle(document.body), ink = style.color, line = style.getPropertyValue("--line").trim();
