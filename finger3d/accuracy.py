@@ -114,26 +114,30 @@ def coarser(model: Model, factor: float = FACTOR) -> Model:
 class Grain:
     """How finely the contact points tell: their distance (mm) along x, and the larger of that over the half-length of
     the contact and of their distance along z over the half width.
+
+    `alone`: contact with friction has no length, so that it tells nothing of the friction.
     """
 
     spacing_mm: float
     share: float
+    alone: bool = False
 
     @classmethod
     def of(cls, problem: Problem, frame: Frame) -> Grain:
         """Of a frame; medians where points touch."""
         points, reach = problem.points, measure(problem.points, frame)["contact_half_length_mm"]
+        alone = reach == 0.0 and problem.model.friction.static > 0.0
         half_width = points.half_width_mm
         if points.dim == 3 and problem.model.mesh.mesher != "swept":
             step = float(np.sqrt(np.median(points.area)))
-            return cls(step, _share(step, reach, step, half_width))
+            return cls(step, _share(step, reach, step, half_width), alone)
         at = np.round(points.points, 9)
         line = np.unique(at[at[:, 2] == 0.0, 0])
         near = line[np.abs(line - frame.lowest[0]) <= 1.2 * reach]
         steps = np.diff(near if len(near) > 1 else line)
         step = float(np.median(steps)) if len(steps) else problem.model.mesh.size_mm
         across = np.diff(np.unique(at[:, 2]))
-        return cls(step, _share(step, reach, float(np.median(across)) if len(across) else 0.0, half_width))
+        return cls(step, _share(step, reach, float(np.median(across)) if len(across) else 0.0, half_width), alone)
 
 
 def _share(along: float, reach: float, across: float, half_width: float) -> float:
@@ -156,14 +160,17 @@ def mesh_error(
     strain = max((abs(v) for k, v in told.items() if k.startswith("gauge_")), default=0.0)
     for name, value in told.items():
         change = abs(value - other[name])
-        if _is_length(name):
+        if is_length(name):
             ends = 0.5 if "_half_" in name else 1.0
             # the companion's own rounding to points is no change of the length
             change = max(0.0, change - ends * grains[1].spacing_mm)
             found[name] = max(change / by, ends * grains[0].spacing_mm)
         else:
             share = _FLOOR * grains[0].share ** (2 if name in _FORCES else 1)
-            found[name] = max(change / by, share * (strain if name.startswith("gauge_") else abs(value)))
+            scale = strain if name.startswith("gauge_") else abs(value)
+            if grains[0].alone and name.startswith("friction_sum"):
+                scale = max(scale, *(abs(told[key]) for key in _FORCES if key in told))
+            found[name] = max(change / by, share * scale)
     return {k: float(v) for k, v in found.items() if math.isfinite(v)}
 
 
@@ -172,7 +179,8 @@ def gain(ratio: float) -> float:
     return abs(ratio**ORDER - 1.0)
 
 
-def _is_length(name: str) -> bool:
+def is_length(name: str) -> bool:
+    """Whether a number is a length, which points tell."""
     return name.endswith(("_length_mm", "_length_end_mm"))
 
 
@@ -252,26 +260,6 @@ def strain_error(problem: Problem, frame: Frame, beside: Problem, fine: Float, c
     told, other = ({f"gauge_{k}": float(v) for k, v in enumerate(strain)} for strain in (fine, coarse))
     found = mesh_error(told, other, _ratio(problem, beside), (Grain.of(problem, frame),) * 2)
     return np.array([found.get(name, math.nan) for name in told])
-
-
-def relative(numbers: Mapping[str, float], errors: Mapping[str, float]) -> dict[str, float]:
-    """Errors as shares: of a force, of itself; of a length, of the contact's; of a strain, of the largest read."""
-    strain = max((abs(v) for k, v in numbers.items() if k.startswith("gauge_")), default=0.0)
-    found = {}
-    for name, error in errors.items():
-        if _is_length(name):
-            scale = numbers["contact_half_length_mm"]
-        else:
-            scale = strain if name.startswith("gauge_") else abs(numbers[name])
-        found[name] = error / scale if scale > 0.0 else (math.inf if error > 0.0 else 0.0)
-    return found
-
-
-def worst(numbers: Mapping[str, float], errors: Mapping[str, float]) -> tuple[str, float]:
-    """The number with the largest relative error, and that error."""
-    shares = relative(numbers, errors)
-    name = max(shares, key=lambda k: shares[k])
-    return name, shares[name]
 
 
 def step_error(

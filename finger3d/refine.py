@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
-from finger3d.accuracy import FACTOR, ORDER, companion, compared, last_frame, main_numbers, worst
+from finger3d.accuracy import FACTOR, ORDER, companion, compared, is_length, last_frame, main_numbers
 from finger3d.errors import Finger3dError
 from finger3d.model import MeshOptions, Model
 from finger3d.solve import Problem, build
@@ -32,7 +32,7 @@ class Round:
 
     Attributes
     ----------
-    error, number : largest estimated error, relative (see `accuracy.relative`), and the number that has it
+    error, number : largest estimated error, relative (see `relative`), and the number that has it
     seconds : of this round, estimate included
     """
 
@@ -109,7 +109,7 @@ def refined(
     Parameters
     ----------
     model : with the edge lengths of the first round
-    tolerance : relative, see `accuracy.relative`
+    tolerance : relative, see `relative`
     max_seconds : no round is begun that is forecast to end later, output included
     say : told one line a round
 
@@ -144,6 +144,26 @@ def refined(
     best = min(rounds, key=lambda r: r.error)
     mesh = replace(model.mesh, size_mm=best.size_mm, base_size_mm=best.base_size_mm)
     return Refined(tolerance, mesh, tuple(rounds), stopped, problem if best is rounds[-1] else None)
+
+
+def relative(numbers: Mapping[str, float], errors: Mapping[str, float]) -> dict[str, float]:
+    """Errors as shares: of a force, of itself; of a length, of the contact's; of a strain, of the largest read."""
+    strain = max((abs(v) for k, v in numbers.items() if k.startswith("gauge_")), default=0.0)
+    found = {}
+    for name, error in errors.items():
+        if is_length(name):
+            scale = numbers["contact_half_length_mm"]
+        else:
+            scale = strain if name.startswith("gauge_") else abs(numbers[name])
+        found[name] = error / scale if scale > 0.0 else (math.inf if error > 0.0 else 0.0)
+    return found
+
+
+def worst(numbers: Mapping[str, float], errors: Mapping[str, float]) -> tuple[str, float]:
+    """The number with the largest relative error, and that error."""
+    shares = relative(numbers, errors)
+    name = max(shares, key=lambda k: shares[k])
+    return name, shares[name]
 
 
 def _round(model: Model, tolerance: float) -> tuple[Problem, Round, MeshOptions]:

@@ -166,6 +166,17 @@ def test_an_error_is_found_exactly_from_a_finer_mesh_too() -> None:
     assert found["normal_force_N"] == pytest.approx(scale, rel=1e-12)
 
 
+@pytest.mark.parametrize(("mu", "least"), [(0.25, 0.1), (0.0, 0.0)])
+def test_one_point_that_touches_tells_nothing_of_friction(mu: float, least: float) -> None:
+    # on the plane of symmetry it has none, on the companion either; with friction on, "0 +- 0" would be a lie
+    model = replace(half_cylinder(3.0), mesh=MeshOptions(3.0, 5.0, "swept"), legs=(Leg(0.6, steps=10),))
+    problem, frames = pressed(replace(model, friction=Coulomb(mu)))
+    told, found = main_numbers(problem, frames[-1]), estimate(problem, frames, FAST)
+    assert told["friction_sum_N"] == pytest.approx(0.0, abs=1e-12)
+    # a tenth of the force, the floor of a contact no longer than the distance of its points
+    assert found.discretisation["friction_sum_N"] == pytest.approx(least * told["normal_force_N"], abs=1e-12)
+
+
 def test_a_gauges_error_at_several_coefficients_is_that_of_several_gauges() -> None:
     problem, frames = pressed(half_cylinder(0.4))
     beside = companion(problem)

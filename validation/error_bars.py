@@ -2,7 +2,9 @@
 
 Source: issue 8; Richardson 1911 for the estimate, Williams 1952 for its order.  Truth is the finest mesh, or, for a
 cylinder on a half-plane, Hertz' length under the force found (Johnson 1985, sec. 4.2).  nu = .4 and mu = .125 and .5
-were not among the cases that the floor and the order were chosen by.
+were not among the cases that the floor and the order were chosen by.  Two meshes are so coarse that their companion is
+the finer one; a ball on a block has a companion by pytetwild; of two soft balls, both are meshed anew, and the truth,
+by pytetwild too, has edges no less than half as long.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ import numpy as np
 from finger3d.accuracy import MAIN, Grain, companion, compared, main_numbers, step_error
 from finger3d.contact.law import Coulomb
 from finger3d.design import designs
+from finger3d.effects.elastic_object import SoftObject
 from finger3d.history import Frame
 from finger3d.model import Domain, Gauge, Leg, Material, MeshOptions, Model
 from finger3d.objects import Cylinder, Plane, Sphere
@@ -45,8 +48,9 @@ class Case:
     def at(self, size: float) -> Model:
         """The model at an edge length."""
         options = replace(self.model.mesh, size_mm=size, base_size_mm=self.grading * size)
-        # the truth is structured, so that it is the same on every run
-        return replace(self.model, mesh=replace(options, mesher="swept") if size == self.truth else options)
+        # the truth is structured where it can be, so that it is the same on every run
+        structured = size == self.truth and hasattr(self.model.design, "section")
+        return replace(self.model, mesh=replace(options, mesher="swept") if structured else options)
 
 
 @dataclass(frozen=True)
@@ -88,6 +92,7 @@ def cases(quick: bool) -> list[Case]:
     if quick:
         return [
             Case("half cylinder", _model(half, 0.4, "plane-strain", 1.0, near), (0.4, 0.2), 0.1, 5.0),
+            _coarsest(half, "plane-strain", near),
             Case("Fig. 9 solid", _model(fig9, 0.4, "solid", 10.0, far), (5.0,), 3.4, 4.0),
         ]
     out = []
@@ -108,7 +113,26 @@ def cases(quick: bool) -> list[Case]:
     under = (Gauge("a", 0.5, 7.5, angle=0.5), Gauge("b", 0.0, 7.0))
     block = designs()["block"](half_length_mm=8.0, height_mm=8.0, width_mm=16.0)
     model = _model(block, 0.4, "solid", 0.5, under, Sphere(radius_mm=10.0))
-    return [*out, Case("sphere on a block", model, (1.0, 0.7, 0.5), 0.3, 4.0), _line(block)]
+    wild = replace(model, mesh=replace(model.mesh, mesher="ftetwild"))
+    out += [_coarsest(half, plane, near) for plane in planes]
+    return [
+        *out, Case("sphere on a block", model, (1.0, 0.7, 0.5), 0.3, 4.0), _line(block),
+        Case("sphere on a block, solid pytetwild", wild, (0.7, 0.5), 0.3, 10.0), _soft(),
+    ]  # fmt: skip
+
+
+def _coarsest(half: Any, plane: Domain, near: tuple[Gauge, ...]) -> Case:
+    """Edges at the base as long as the finger is high: no mesh is coarser."""
+    model = _model(half, 0.4, plane, 1.0, near)
+    return Case(f"half cylinder, {plane}, coarsest", model, (3.0, 2.5), 0.1, 5.0 / 3.0)
+
+
+def _soft() -> Case:
+    """Two soft balls, that of the finger held on its cut; the coarser mesh is too small for a coarser companion."""
+    ball = designs()["hemisphere"](radius_mm=8.0)
+    model = _model(ball, 0.45, "solid", 1.0, (), Sphere(radius_mm=10.0), "ftetwild")
+    model = replace(model, object_compliance=SoftObject(1.0, 0.45))
+    return Case("two soft balls, solid pytetwild", model, (0.7, 0.5), 0.25, 8.0)
 
 
 def _line(block: Any) -> Case:
