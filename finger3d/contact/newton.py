@@ -19,6 +19,9 @@ since a gap's round-off enters its bound times mu."""
 _NEAR = 1e-6
 """Residual of the projection, as a share of the forces and times mu, below which the conditions are judged."""
 
+_STALLED = 1e-3
+"""Share by which the residual must have fallen where full steps come back to a set of states."""
+
 _DIVERGED = 1e9
 
 _CACHED = 30_000
@@ -101,7 +104,7 @@ def _between(matrix: Float, chosen: NDArray[np.int64]) -> Float:
 def newton(problem: Increments, start: Float, limit: int, damped: bool) -> Iterate:
     """Semismooth Newton from forces `start` (c, d) N; full steps, or with a backtracking search on the residual force.
 
-    A set of states that comes back with the same residual ends the full-step variant: it would cycle from there.
+    A set of states that comes back with no smaller a residual ends it: it would cycle from there.
     """
     force, near = start, _NEAR * float(problem.mu.max(initial=1.0))
     projected, status, trial = project(problem, force, problem.moved(force))
@@ -109,7 +112,7 @@ def newton(problem: Increments, start: Float, limit: int, damped: bool) -> Itera
     seen: dict[bytes, float] = {}
     iteration = 0
     for iteration in range(1, limit + 1):
-        if seen.get(status.tobytes()) == merit:
+        if merit >= (1.0 if damped else 1.0 - _STALLED) * seen.get(status.tobytes(), np.inf):
             break
         seen[status.tobytes()] = merit
         try:
