@@ -40,6 +40,9 @@ FACTOR = 2.0
 _FINER = 0.5
 """Where no mesh is coarser; such a mesh is small."""
 
+_FACTOR_WHERE_GRADED = 3.0
+"""Of a swept companion beside an unstructured mesh, if at 2 it has as many unknowns, fine all along x and z."""
+
 _LEAST_UNSTRUCTURED = 15_000
 """Unknowns; asked for longer edges, pytetwild gives a curved body few less, and takes longer than for a finer mesh."""
 
@@ -199,8 +202,9 @@ def companion(problem: Problem, say: Say = lambda text: None) -> Problem:
     longer = coarser(model, _FACTOR_WHERE_STEPS_FACTOR if costly else FACTOR).mesh
     enough = problem.mesh.points.size >= _LEAST_UNSTRUCTURED
     chosen = [longer] if longer.mesher == "swept" or enough else []
-    if model.domain == "solid" and own.mesher != longer.mesher and enough:
-        chosen.append(replace(longer, mesher=own.mesher))
+    if model.domain == "solid" and own.mesher != longer.mesher:
+        chosen.append(coarser(model, _FACTOR_WHERE_GRADED).mesh)
+        chosen += [replace(longer, mesher=own.mesher)] if enough else []
     for options in chosen:
         if beside := _built_if(problem, replace(model, mesh=options), lambda ratio: ratio >= _LEAST_RATIO, say):
             return beside
@@ -238,11 +242,15 @@ def compared(
 def _ratio(problem: Problem, beside: Problem) -> float:
     """How many times longer the companion's edges are: by the unknowns, as those at the base are bounded by the finger.
 
-    Of two unstructured meshes at the contact: far from it their edges follow a growth that both share.
+    Of two unstructured meshes at the contact, as far from it their edges follow a growth that both share; between an
+    unstructured mesh and a swept one, which are graded otherwise, the geometric mean of both.
     """
-    if all(p.dim == 3 and p.model.mesh.mesher != "swept" for p in (problem, beside)):
-        return _spacing(beside) / _spacing(problem)
-    return float((problem.stiffness.upper.shape[0] / beside.stiffness.upper.shape[0]) ** (1.0 / problem.dim))
+    by_unknowns = float((problem.stiffness.upper.shape[0] / beside.stiffness.upper.shape[0]) ** (1.0 / problem.dim))
+    wild = sum(p.dim == 3 and p.model.mesh.mesher != "swept" for p in (problem, beside))
+    if not wild:
+        return by_unknowns
+    at_contact = _spacing(beside) / _spacing(problem)
+    return at_contact if wild == 2 else math.sqrt(by_unknowns * at_contact)
 
 
 def _spacing(problem: Problem) -> float:

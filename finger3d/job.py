@@ -131,7 +131,7 @@ def press(
     out : folder, made if it is not there; None: a temporary one, which is removed together with what is returned
     report : told about stages and steps
     figures : whether to draw PNG files and to write report.html; None: if a folder is given
-    error : whether to estimate the errors by mesh and increments, from a coarser run
+    error : whether to estimate the errors by mesh and increments, from a run on another mesh
     artist : one that has entered already, and loads what drawing needs; None: one of its own
 
     Returns

@@ -302,6 +302,17 @@ def test_an_elastic_ball_is_meshed_anew_for_the_companion_and_kept(made: list[st
     assert made == ["hemisphere", "hemisphere"]
 
 
+def test_a_swept_companion_that_is_no_coarser_gets_longer_edges(made: list[str]) -> None:
+    # below a ball pytetwild is fine where it touches, sweeping all along x and z of it: a swept mesh of edges of 0.6 mm
+    # stands in for an unstructured one of 0.4 mm, with about as many unknowns as a swept one of 0.8 mm has
+    block = designs()["block"](half_length_mm=6.0, height_mm=6.0, width_mm=12.0)
+    model = replace(unstructured(), design=block, mesh=MeshOptions(0.6, 4.5, "swept"))
+    problem, _ = pressed(model)
+    beside = companion(replace(problem, model=replace(model, mesh=MeshOptions(0.4, 3.0, "ftetwild"))))
+    assert (beside.model.mesh.mesher, beside.model.mesh.size_mm) == ("swept", pytest.approx(1.2))
+    assert made == []
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["ball", "soft_ball"])
 def test_scenes_that_pytetwild_meshes_get_bars_that_tell_something(name: str) -> None:

@@ -26,7 +26,9 @@ def press(
     out: Annotated[Path, Parameter(help="Folder for the results.")],
     set_: Set = None,
     figures: Annotated[bool, Parameter(negative="--no-figures", help="Draw the pictures.")] = True,
-    error: Annotated[bool, Parameter(negative="--no-error", help="Estimate the errors, from a coarser run.")] = True,
+    error: Annotated[
+        bool, Parameter(negative="--no-error", help="Estimate errors, from a run on another mesh.")
+    ] = True,
     json_: Json = False,
 ) -> int:
     """Solve a scene: CAD, mesh, contact, results.
