@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,7 +65,7 @@ def advance(
     while True:
         problem = Increments(change, matrix, mu, rho, length_scale)
         with threads_for(c * d):
-            method, found, moved, error, spent = _settle(problem, start)
+            method, found, moved, error, spent = _settle(problem, start, guess is None)
         total += spent
         if found is None or moved is None:
             return Increment(previous, Outcome.NO_CONVERGENCE, error, total, method)
@@ -76,12 +77,12 @@ def advance(
     return Increment(state, Outcome.CONVERGED, error, total, method)
 
 
-def _settle(problem: Increments, start: Float) -> tuple[str, Iterate | None, Float | None, float, int]:
+def _settle(problem: Increments, start: Float, turns: bool) -> tuple[str, Iterate | None, Float | None, float, int]:
     """Method, solution, where it has moved to (c, d) mm, its residual, and the iterations spent; None, and the least
     residual, where all attempts fail.
     """
     spent, least = 0, np.inf
-    for method, attempt in _ladder(problem, start):
+    for method, attempt in _ladder(problem, start, turns):
         spent += attempt.iterations
         if not attempt.solved:
             continue
@@ -93,10 +94,18 @@ def _settle(problem: Increments, start: Float) -> tuple[str, Iterate | None, Flo
     return "none", None, None, least, spent
 
 
-def _ladder(problem: Increments, start: Float) -> Iterator[tuple[str, Iterate]]:
-    """Attempts from the fastest to the most patient; each is tried only if the one before failed."""
-    yield "newton", newton(problem, start, 30, damped=False)
-    yield "damped", newton(problem, start, 60, damped=True)
+def _ladder(problem: Increments, start: Float, turns: bool) -> Iterator[tuple[str, Iterate]]:
+    """Attempts from the fastest to the most patient; each is tried only if the one before failed.
+
+    Where the path begins or turns the start is far away: full steps overshoot there, and come back to where they were.
+    """
+    full, damped = partial(newton, problem, start, 30, False), partial(newton, problem, start, 60, True)
+    if turns:
+        yield "newton", damped()
+        yield "full steps", full()
+    else:
+        yield "newton", full()
+        yield "damped", damped()
     yield "ramp", _ramp(problem, start)
     yield "pivots", _pivots(problem, start)
     force, spent = start, 0

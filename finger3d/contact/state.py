@@ -59,7 +59,7 @@ class Increment:
     iterations : int
         Linear solves, all attempts together.
     method : str
-        Which member of the ladder settled it: newton, damped, ramp, pivots, sweeps; or paper.
+        Which member of the ladder settled it: newton, damped or full steps, ramp, pivots, sweeps; or paper.
     """
 
     state: ContactState

@@ -168,7 +168,7 @@ def slopes(
     coarse = None
     if "mesh" in tolerances or (enough and set(tolerances) - set(_PLACES)):
         say("a coarser body")
-        coarse = _beside_mesh(body)
+        coarse = _beside_mesh(body, say)
     for name, sd in tolerances.items():
         say(f"tolerance {name}")
         beside = _beside(problem.model, gauge, name, sd, base)
@@ -269,10 +269,10 @@ def with_modulus(problem: Problem, times: float) -> Problem:
     return replace(changed, bare=soft(problem.bare)) if problem.bare else changed
 
 
-def _beside_mesh(body: Body) -> Body | None:
+def _beside_mesh(body: Body, say: Callable[[str], None]) -> Body | None:
     """The same on the coarser mesh that the error bar comes from; none of a mesh that has no coarser one."""
     try:
-        problem = companion(body.problem)
+        problem = companion(body.problem, say)
     except Finger3dError:
         return None
     pressed = {p.mu: p for p in presses(problem, body.mu.tolist())}
