@@ -69,12 +69,6 @@ def mesh_tetwild(
     return mesh, report(mesh, multiple, volume, seconds, cache_path=str(path) if stored else None)
 
 
-def cached(design: Any, options: Any, zone: Zone, symmetry: tuple[str, ...] = ()) -> bool:
-    """Whether `mesh_tetwild` would read this mesh from the cache."""
-    key = cache.key(design, options, rounded_zone(design, options, zone), symmetry)
-    return (cache.folder() / f"{key}.npz").is_file()
-
-
 def _made(
     design: Any, options: Any, zone: Zone, symmetry: tuple[str, ...], say: Callable[[str], None]
 ) -> tuple[Mesh, float, float]:
