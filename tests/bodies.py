@@ -1,9 +1,10 @@
-"""Small triangulated bodies that tests compare with."""
+"""Small triangulated bodies that tests compare with, and solids as STEP files."""
 
 from __future__ import annotations
 
 import itertools
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -56,4 +57,12 @@ def write_stl(path: Path, surface: Triangles) -> Path:
         lines += ["vertex {!r} {!r} {!r}".format(*map(float, p)) for p in corners]
         lines += ["endloop", "endfacet"]
     path.write_text("\n".join([*lines, "endsolid test"]) + "\n", encoding="ascii")
+    return path
+
+
+def step_of(path: Path, solid: Any, **options: Any) -> Path:
+    """Write a solid, and return where."""
+    from build123d import export_step
+
+    assert export_step(solid, path, **options)
     return path

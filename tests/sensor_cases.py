@@ -1,11 +1,13 @@
-"""The scene that tests of calibration press, and what they leave out."""
+"""The scene that tests of calibration press, what they leave out, and curves without a press."""
 
 from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from finger3d.scene import parse
-from finger3d.sensor import TOLERANCES
+from finger3d.sensor import TOLERANCES, Calibration
 
 SCENE: dict[str, Any] = {
     "finger": {
@@ -27,3 +29,20 @@ NONE = dict.fromkeys(TOLERANCES, 0.0)
 
 def scene(**changes: Any) -> Any:
     return parse({**SCENE, **changes})
+
+
+def curve(function: Any, **changes: Any) -> Calibration:
+    mu = np.linspace(0.02, 1.2, 25)
+    return Calibration("g", mu, function(mu), **{"noise": 1.5e-4, "limit": 0.1, **changes})
+
+
+def straight(mu: Any) -> Any:
+    return 0.09 - 0.0015 * mu
+
+
+def saturating(mu: Any) -> Any:
+    return 0.01 * np.exp(-4.0 * mu)
+
+
+def turning(mu: Any) -> Any:
+    return 0.01 * (mu - 0.6) ** 2
