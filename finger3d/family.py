@@ -11,22 +11,28 @@ import hashlib
 import json
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
-from itertools import dropwhile
+from itertools import dropwhile, takewhile
 from pathlib import Path
 from typing import Any
 
 from finger3d.contact.law import FrictionLaw
-from finger3d.errors import Outcome
+from finger3d.errors import Finger3dError, Outcome
 from finger3d.history import Frame, measure
 from finger3d.increments import automatic, refine
 from finger3d.model import Gauge, Leg, MeshOptions, Model
 from finger3d.scene import Scene
-from finger3d.solve import Problem, build, covers, march
+from finger3d.solve import Problem, build, covered, each, march, whole
 
 _FREE = ("title", "friction", "press", "contact", "gauge")
 _SIZES = ("size_mm", "base_size_mm")
+_WAIT_S = 1.0  # that finished presses may wait to be proved together
+
+TROUBLE = (Finger3dError, ArithmeticError, ValueError, RuntimeError, MemoryError)
+"""What one press, or the build of its body, may fail of without taking others along."""
 
 
 @dataclass(frozen=True)
@@ -121,53 +127,150 @@ class Body:
         self._free = model.inclusions is not None
         self.problem = build(replace(model, legs=shared_legs(variants), gauges=gauges), say)
         self.seconds = time.perf_counter() - start
-        self._done: dict[Any, Pressed] = {}
+        self._done: dict[Any, Pressed | Exception] = {}
 
     def problem_of(self, variant: Variant) -> Problem:
         """The condensed body under the friction, path and rule of a variant, with all gauges of all variants."""
         own = replace(self.problem.model, friction=variant.friction, legs=variant.legs, rule=variant.rule)
         return replace(self.problem, model=own)
 
-    def frames(self, variant: Variant) -> tuple[Frame, ...]:
-        """Frames of a variant; if contact reached beyond the candidate points, on all of the contact face."""
-        found = _frames(self.problem_of(variant))
-        if found[-1].outcome.ok and not covers(self.problem, found[-1]):
-            start = time.perf_counter()
-            self._say("contact reached beyond the candidate points; condensing all of the contact face")
-            self.problem = build(self.problem.model, self._say, math.inf)
-            self.seconds += time.perf_counter() - start
-            return _frames(self.problem_of(variant))
-        return found
+    def frames(self, variants: Sequence[Variant]) -> list[tuple[Frame, ...]]:
+        """Frames of each variant, all of `problem` as it then is.
+
+        If contact reached beyond the candidate points, that is the body condensed to all of its contact face.
+        """
+        found: list[_Run | None] = [None] * len(variants)
+        while left := [i for i, run in enumerate(found) if run is None or run.problem is not self.problem]:
+            for i, run in zip(left, self._runs([variants[i] for i in left], None), strict=True):
+                found[i] = run
+        return [run.known() for run in found if run]
 
     def press(self, variant: Variant) -> Pressed:
         """The last step's numbers of a variant."""
-        key = variant.friction, variant.legs, variant.rule
-        known = key in self._done
-        if not known:
-            self._done[key] = self._pressed(variant)
-        pressed = self._done[key]
-        gauges = self._own(variant, pressed.gauges) if pressed.gauges else {}
-        return replace(pressed, gauges=gauges, seconds=0.0 if known else pressed.seconds)
+        found = next(self.presses([variant]))
+        if isinstance(found, Exception):
+            raise found
+        return found
 
-    def _pressed(self, variant: Variant) -> Pressed:
+    def presses(self, variants: Sequence[Variant], most: int | None = None) -> Iterator[Pressed | Exception]:
+        """The last step's numbers of each variant, or what it failed of, in that order; each at most some way behind.
+
+        Variants that differ in their gauges only share a press.  As many run at once as pays, and no more than `most`.
+        """
+        new = {_press_of(v): v for v in variants if _press_of(v) not in self._done}
+        runs, keys, unpaid = self._runs(list(new.values()), most), iter(new), set(new)
+        for variant in variants:
+            key = _press_of(variant)
+            while key not in self._done:
+                self._done[next(keys)] = next(runs).pressed()
+            pressed = self._done[key]
+            if isinstance(pressed, Pressed):
+                gauges = self.strains(variant, pressed.gauges) if pressed.gauges else {}
+                pressed = replace(pressed, gauges=gauges, seconds=pressed.seconds if key in unpaid else 0.0)
+            unpaid.discard(key)
+            yield pressed
+
+    def _runs(self, variants: Sequence[Variant], most: int | None) -> Iterator[_Run]:
+        """Each variant pressed, and proved to touch no point beyond the candidates; several are proved at once.
+
+        What is finished waits for that a second, or for as long as the press beside it takes.
+        """
+        left = deque(variants)
+        while left:
+            waiting: list[_Run] = []
+            since, reached = time.perf_counter(), False
+            wait = 0.0 if whole(self.problem) else _WAIT_S
+            with closing(each(self.problem, self._run, tuple(left), most)) as runs:
+                for run in runs:
+                    waiting.append(run)
+                    if len(waiting) < len(left) and time.perf_counter() - since < wait:
+                        continue
+                    proved = _proved(self.problem, waiting)
+                    for done in proved:
+                        left.popleft()
+                        yield done
+                    if reached := len(proved) < len(waiting):
+                        break
+                    waiting, since = [], time.perf_counter()
+            if reached:
+                try:
+                    self._widen()
+                except TROUBLE as error:
+                    left.popleft()
+                    yield replace(waiting[len(proved)], frames=error.with_traceback(None))
+
+    def _run(self, variant: Variant, before: Sequence[_Run]) -> _Run:
         start = time.perf_counter()
-        frames = self.frames(variant)
-        seconds = time.perf_counter() - start
-        residual = max(f.residual for f in frames)
-        for number, frame in enumerate(frames, start=1):
-            if not frame.outcome.ok:
-                at = f"step {number} (depth {frame.target.depth_mm:.4g} mm)"
-                return Pressed(f"{at}: {frame.outcome}", residual, {}, {}, seconds)
-        numbers = measure(self.problem.points, frames[-1])
-        gauges = numbers.pop("gauges")
-        for key in ("iterations", "residual", "method", "outcome"):
-            numbers.pop(key)
-        return Pressed(str(Outcome.CONVERGED), residual, numbers, gauges, seconds)
+        frames: tuple[Frame, ...] | Exception
+        try:
+            frames = _frames(self.problem_of(variant))
+        except TROUBLE as error:
+            frames = error.with_traceback(None)  # which would keep all arrays on the way
+        return _Run(self.problem, frames, time.perf_counter() - start)
 
-    def _own(self, variant: Variant, gauges: dict[str, float]) -> dict[str, float]:
+    def _widen(self) -> None:
+        start = time.perf_counter()
+        self._say("contact reached beyond the candidate points; condensing all of the contact face")
+        self.problem = build(self.problem.model, self._say, math.inf)
+        self.seconds += time.perf_counter() - start
+
+    def strains(self, variant: Variant, gauges: dict[str, float]) -> dict[str, float]:
+        """Strain of a variant's gauges by their names in it, from that of all gauges of all variants."""
         if self._free:
             return gauges
         return {g.name: gauges[self._names[replace(g, name="")]] for g in variant.gauges}
+
+
+@dataclass(frozen=True)
+class _Run:
+    """Frames of a press of a problem, or what it failed of."""
+
+    problem: Problem
+    frames: tuple[Frame, ...] | Exception
+    seconds: float
+
+    @property
+    def end(self) -> Frame | None:
+        """The last frame, if all converged."""
+        return None if isinstance(self.frames, Exception) or not self.frames[-1].outcome.ok else self.frames[-1]
+
+    def known(self) -> tuple[Frame, ...]:
+        """The frames; raises what it failed of."""
+        if isinstance(self.frames, Exception):
+            raise self.frames
+        return self.frames
+
+    def pressed(self) -> Pressed | Exception:
+        """What is told of it."""
+        if isinstance(self.frames, Exception):
+            return self.frames
+        residual = max(f.residual for f in self.frames)
+        for number, frame in enumerate(self.frames, start=1):
+            if not frame.outcome.ok:
+                at = f"step {number} (depth {frame.target.depth_mm:.4g} mm)"
+                return Pressed(f"{at}: {frame.outcome}", residual, {}, {}, self.seconds)
+        numbers = measure(self.problem.points, self.frames[-1])
+        gauges = numbers.pop("gauges")
+        for key in ("iterations", "residual", "method", "outcome"):
+            numbers.pop(key)
+        return Pressed(str(Outcome.CONVERGED), residual, numbers, gauges, self.seconds)
+
+
+def _proved(problem: Problem, runs: Sequence[_Run]) -> list[_Run]:
+    """The runs before the first that went beyond the candidate points; each pays its part of the proof."""
+    start = time.perf_counter()
+    try:
+        good = iter(covered(problem, [run.end for run in runs if run.end]))
+    except TROUBLE as error:
+        return [replace(run, frames=error.with_traceback(None)) for run in runs]
+    proved = list(takewhile(lambda run: run.end is None or next(good), runs))
+    share = (time.perf_counter() - start) / len(runs)
+    return [replace(run, seconds=run.seconds + share) for run in proved]
+
+
+def _press_of(variant: Variant) -> tuple[Any, ...]:
+    """What of a variant makes a press: all but its gauges."""
+    return variant.friction, variant.legs, variant.rule
 
 
 def _frames(problem: Problem) -> tuple[Frame, ...]:

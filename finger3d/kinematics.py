@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
@@ -39,12 +40,16 @@ class Kinematics(Protocol):
         """All unknowns (N,) of the meshed part in a state."""
         ...
 
+    def all_unknowns(self, problem: Any, states: Sequence[ContactState]) -> Iterator[Float]:
+        """The same in each of several states, which may cost less than one after another."""
+        ...
+
     def gauges(self, problem: Any, state: ContactState) -> dict[str, float]:
         """Strain of every gauge by name."""
         ...
 
-    def gap(self, problem: Any, state: ContactState, target: Any, face: Surface) -> Float:
-        """Gap (c,) mm of any points of the contact face in a state, candidates or not."""
+    def gaps(self, problem: Any, states: Sequence[ContactState], targets: Sequence[Any], face: Surface) -> list[Float]:
+        """Gap (c,) mm of any points of the contact face, candidates or not, in each state under its target."""
         ...
 
     def fields(self, problem: Any, state: ContactState) -> tuple[Float, Float, Float]:
@@ -76,19 +81,26 @@ class SmallStrain:
         return rule(state, problem.free(b), problem.compliance, problem.model.friction, scale, guess)
 
     def unknowns(self, problem: Any, state: ContactState) -> Float:
-        """From the forces, with the factor at hand."""
-        return problem.unknowns(state.force)
+        """Those of one state."""
+        return next(iter(self.all_unknowns(problem, [state])))
+
+    def all_unknowns(self, problem: Any, states: Sequence[ContactState]) -> Iterator[Float]:
+        """From the forces, with the factor at hand: one back-substitution for many states."""
+        return problem.unknowns_of([state.force for state in states])
 
     def gauges(self, problem: Any, state: ContactState) -> dict[str, float]:
         """From the forces, through the gauges' rows."""
         return problem.gauge_strains(state.force)
 
-    def gap(self, problem: Any, state: ContactState, target: Any, face: Surface) -> Float:
+    def gaps(self, problem: Any, states: Sequence[ContactState], targets: Sequence[Any], face: Surface) -> list[Float]:
         """Gap at rest, changed by the displacement along the object's normal."""
         from finger3d.fem.recover import displacement
 
-        u = displacement(problem.mesh, self.unknowns(problem, state))
-        return problem.gap(target, face) + (face.trace @ u) @ problem.points.frame[0]
+        normal = problem.points.frame[0]
+        return [
+            problem.gap(target, face) + (face.trace @ displacement(problem.mesh, unknowns)) @ normal
+            for target, unknowns in zip(targets, self.all_unknowns(problem, states), strict=True)
+        ]
 
     def fields(self, problem: Any, state: ContactState) -> tuple[Float, Float, Float]:
         """Linear strain and stress; a section gets the component across it that its assumption implies."""

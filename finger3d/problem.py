@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
@@ -27,6 +27,7 @@ AUTO_START = 10
 
 _COVERED = 0.5  # least share of a point's hat that must be under the object
 _BESIDE = 2.0  # gap beside an object, in heights of the finger: finite, and never closed
+_AT_ONCE = 8_000_000  # unknowns of fields that are solved for together: 64 MB, and as much again a few times on the way
 _KEPT = 5  # a factor is what takes the memory; a path rarely has more than four lengths of increments
 
 
@@ -171,8 +172,19 @@ class Problem:
         return rows
 
     def unknowns(self, force: Float) -> Float:
-        """All unknowns of the part's body under contact forces (c, d)."""
-        rows, compliance = self.row_forces(force), self.condensed.compliance
+        """All unknowns (N,) of the part's body under contact forces (c, d)."""
+        return self._unknowns(self.row_forces(force))
+
+    def unknowns_of(self, forces: Sequence[Float]) -> Iterator[Float]:
+        """The same for each of several forces (c, d): as many at once as fit into some memory."""
+        at_once = max(1, _AT_ONCE // self.stiffness.upper.shape[0])
+        for first in range(0, len(forces), at_once):
+            rows = np.stack([self.row_forces(force) for force in forces[first : first + at_once]], axis=1)
+            yield from self._unknowns(rows).T
+
+    def _unknowns(self, rows: Float) -> Float:
+        """All unknowns (N, ...) under forces (r, ...) on the condensed rows; springs add theirs."""
+        compliance = self.condensed.compliance
         if len(self.springs):
             rows[-len(self.springs) :] = spring_forces(compliance, self.springs, compliance @ rows)
         return self.condensed.unknowns(rows)

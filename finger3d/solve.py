@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextvars import ContextVar
 from dataclasses import replace
-from itertools import repeat
+from itertools import islice
+from threading import Event
 from typing import TypeVar
 
 import numpy as np
@@ -36,18 +39,22 @@ __all__ = [
     "Problem",
     "build",
     "contact_zone",
+    "covered",
     "covers",
     "each",
     "gauge_row",
     "march",
     "symmetry",
     "targets",
+    "whole",
 ]
 
 MARGIN = 0.3  # candidate points reach to a rigid gap of this share of the depth; checked after the solution
 _CUTS = 6
 _WORTH = 500  # contact rows from which presses at once are quicker than in turn
 _LOOKS = 20  # and where rigid gaps are, for the candidate points
+_NEARLY = 0.95  # of the face: so many candidates, and all are: a few more rows cost less than to check every press
+_LEFT: ContextVar[Event | None] = ContextVar("left", default=None)  # set in a thread whose press nobody waits for
 
 
 def symmetry(model: Model) -> tuple[str, ...]:
@@ -125,19 +132,32 @@ def _read(rows: Float, kept: NDArray[np.int64], count: int, dim: int, gauges: in
 
 def covers(problem: Problem, frame: Frame) -> bool:
     """Whether no point of the contact face outside the candidates went through the object."""
+    return covered(problem, [frame])[0]
+
+
+def covered(problem: Problem, frames: Sequence[Frame]) -> list[bool]:
+    """The same for each of several frames; in small strain at the price of one back-substitution."""
+    if whole(problem):
+        return [True] * len(frames)
     face = surface(problem.mesh, "contact", problem.thickness)
     others = ~np.isin(face.nodes, problem.surface.nodes)
-    if not others.any():
-        return True
-    gap = problem.model.kinematics.gap(problem, frame.part, frame.target, face)
-    return bool(gap[others].min() > -1e-9 * frame.target.depth_mm)
+    parts, ends = [f.part for f in frames], [f.target for f in frames]
+    gaps = problem.model.kinematics.gaps(problem, parts, ends, restrict(face, others))
+    return [bool(gap.min() > -1e-9 * end.depth_mm) for gap, end in zip(gaps, ends, strict=True)]
+
+
+def whole(problem: Problem) -> bool:
+    """Whether all of the contact face are candidates, so that nothing is beyond them."""
+    corners = problem.mesh.facets["contact"][:, : problem.dim]
+    return len(np.unique(corners)) == len(problem.surface.nodes)
 
 
 def _candidates(model: Model, face: Surface, touch: float, margin: float) -> Surface:
     path = targets(tuple(replace(leg, steps=_stations(leg)) for leg in model.legs))
     nearest = np.min([rigid_gap(model, face, touch, t) for t in path], axis=0)
     reach = margin * max(t.depth_mm for t in path) + max(float(nearest.min()), 0.0)
-    return restrict(face, nearest < reach)
+    near = nearest < reach
+    return face if near.mean() >= _NEARLY else restrict(face, near)
 
 
 def _stations(leg: Leg) -> int:
@@ -216,6 +236,8 @@ def march(problem: Problem, near: Sequence[Float] = ()) -> Iterator[Frame]:
     # what the gauges would read if nothing were embedded: the same path in the same body without
     beside = march(replace(problem.bare, model=problem.model)) if problem.bare else None
     for number, target in enumerate(targets(problem.model.legs)):
+        if (left := _LEFT.get()) and left.is_set():
+            raise _LeftError
         guess = near[number] if number < len(near) else _guess(state, at, target, pace)
         found, done = _increment(problem, state, at, target, 0 if literal else _CUTS, guess)
         for before, after, a, b in done:
@@ -233,27 +255,40 @@ def march(problem: Problem, near: Sequence[Float] = ()) -> Iterator[Frame]:
             return
 
 
-def each(problem: Problem, press: Callable[[Asked, Sequence[Told]], Told], asked: Sequence[Asked]) -> Iterator[Told]:
+def each(
+    problem: Problem, press: Callable[[Asked, Sequence[Told]], Told], asked: Sequence[Asked], most: int | None = None
+) -> Generator[Told, None, None]:
     """What `press` tells of everything asked, in that order; for presses of one problem, under one law after another.
 
-    `press` is given what it told of the last two before, from which it may start.  Where presses share nothing that
-    changes, as many run at once as there are cores, each on one thread: dense systems of this size gain more by that
-    than by threads of their own, and smaller ones spend their time in Python.
+    `press` is given what it told of the last two that are known when it begins, from which it may start.  Where presses
+    share nothing that changes, as many run at once as there are cores, or as `most` says, each on one thread: dense
+    systems of this size gain more by that than by threads of their own, and smaller ones spend their time in Python.
+    Whoever stops asking does not wait for those that run: they end with their increment.
     """
     before: tuple[Told, ...] = ()
-    alone = len(problem.kept) < _WORTH or len(asked) < 2 or cores() < 2
+    at_once = min(len(asked), cores() if most is None else most)
+    alone = len(problem.kept) < _WORTH or at_once < 2
     if alone or not getattr(problem.model.kinematics, "independent", False):
         for one in asked:
             before = (*before, press(one, before))[-2:]
             yield before[-1]
         return
+    left, rest = Event(), iter(asked)
     # One limit around them all: those inside would each restore what another has set.
-    with one_thread(), ThreadPoolExecutor(cores()) as pool:
-        for first in range(0, len(asked), cores()):
-            found = pool.map(press, asked[first : first + cores()], repeat(before))  # cancels the rest, if this ends
-            for told in found:
-                before = (*before, told)[-2:]
-                yield told
+    with one_thread(), ThreadPoolExecutor(at_once, initializer=_LEFT.set, initargs=(left,)) as pool:
+        running = deque(pool.submit(press, one, before) for one in islice(rest, at_once))
+        try:
+            while running:
+                before = (*before, running.popleft().result())[-2:]
+                running.extend(pool.submit(press, one, before) for one in islice(rest, 1))
+                yield before[-1]
+        finally:
+            left.set()
+            pool.shutdown(cancel_futures=True)
+
+
+class _LeftError(Exception):
+    """Nobody waits for this press any more."""
 
 
 def _free(problem: Problem, beside: Iterator[Frame] | None) -> dict[str, float]:

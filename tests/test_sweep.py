@@ -268,8 +268,8 @@ def test_a_body_that_cannot_be_built_and_a_point_that_fails_are_rows(scene, monk
     class Weak:
         seconds = 0.0
 
-        def press(self, variant: object) -> None:
-            raise MemoryError
+        def presses(self, variants: list, most: int | None) -> list:
+            return [MemoryError() for _ in variants]
 
     monkeypatch.setattr("finger3d.sweep.work._built", lambda *a: Weak())
     assert [row["outcome"] for row in pressed_here(sweep)] == ["MemoryError: no further words"] * 2

@@ -8,6 +8,7 @@ let the contact rule solve contact exactly, repeat.  The multipliers are total: 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -120,6 +121,10 @@ class FiniteStrain:
         assert state.unknowns is not None
         return state.unknowns
 
+    def all_unknowns(self, problem: Any, states: Sequence[ContactState]) -> Iterator[Float]:
+        """Those of each state."""
+        return (self.unknowns(problem, state) for state in states)
+
     def gauges(self, problem: Any, state: ContactState) -> dict[str, float]:
         """Relative elongation of a line along the gauge, at its point or between its ends."""
         mesh, axes = problem.mesh, problem.axes
@@ -133,9 +138,10 @@ class FiniteStrain:
             out[gauge.name] = float(np.linalg.norm(ends[1] - ends[0])) / gauge.length_mm - 1.0
         return out
 
-    def gap(self, problem: Any, state: ContactState, target: Any, face: Surface) -> Float:
+    def gaps(self, problem: Any, states: Sequence[ContactState], targets: Sequence[Any], face: Surface) -> list[Float]:
         """Gap of the moved points."""
-        return _contact(problem, face, displacement(problem.mesh, self.unknowns(problem, state)), target).gap
+        moved = (displacement(problem.mesh, unknowns) for unknowns in self.all_unknowns(problem, states))
+        return [_contact(problem, face, u, target).gap for u, target in zip(moved, targets, strict=True)]
 
     def fields(self, problem: Any, state: ContactState) -> tuple[Float, Float, Float]:
         """Displacement, Green-Lagrange strain and Cauchy stress."""

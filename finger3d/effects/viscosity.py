@@ -14,7 +14,7 @@ displacement in place of f_e: one factorisation of K_b + alpha K_s for each leng
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Protocol
 
@@ -337,9 +337,9 @@ class Viscoelastic(SmallStrain):
         after = ViscousState(**vars(found.state), memory=step.after(memory, body.shape(rows)))
         return Increment(after, found.outcome, found.residual, found.iterations, found.method)
 
-    def unknowns(self, problem: Any, state: ContactState) -> Float:
-        """From the memory."""
-        return self._body(problem).unknowns(self._memory(state).now)
+    def all_unknowns(self, problem: Any, states: Sequence[ContactState]) -> Iterator[Float]:
+        """From each memory."""
+        return (self._body(problem).unknowns(self._memory(state).now) for state in states)
 
     def gauges(self, problem: Any, state: ContactState) -> dict[str, float]:
         """From the memory, through the gauges' rows."""

@@ -50,12 +50,15 @@ class Condensed:
     _series: _Series | None = field(default=None, repr=False)
 
     def unknowns(self, force: Float) -> Float:
-        """All unknowns (N,) under row forces (r,) N, with the factor at hand: displacements mm, then pressures."""
+        """All unknowns (N, ...) under row forces (r, ...) N, with the factor at hand: displacements mm, then pressures.
+
+        Several forces at once, as columns (r, k), cost less than one after another: the factor is read once.
+        """
         return self.solve(self._rows.T @ force)
 
     def solve(self, load: Float) -> Float:
-        """All unknowns (N,) under loads (N,) on any of them; held ones stay zero."""
-        whole = np.zeros(self._rows.shape[1])
+        """All unknowns (N, ...) under loads (N, ...) on any of them; held ones stay zero."""
+        whole = np.zeros(load.shape, order="F")  # one field after another
         whole[self._free] = self._solve(load[self._free])
         return whole
 

@@ -96,8 +96,8 @@ def states_of(problem: Problem, frames: Sequence[Frame], mesh: Mesh, parent: Arr
 
     kept = chosen(len(frames))
     u = np.empty((len(kept), *mesh.points.shape), dtype=np.float32)
-    for k, number in enumerate(kept[:-1]):
-        unknowns = problem.model.kinematics.unknowns(problem, frames[number].part)
+    parts = [frames[number].part for number in kept[:-1]]
+    for k, unknowns in enumerate(problem.model.kinematics.all_unknowns(problem, parts)):
         u[k] = displacement(problem.mesh, unknowns)[parent] * sign
     u[-1] = last
     tables = [contact_table(problem.points, frames[i].state) for i in kept]

@@ -119,7 +119,7 @@ class _Search:
         variants = [Variant.of(replace(model, friction=friction_at(model.friction, mu))) for mu in self.problem.mus]
         try:
             body = Body(model, variants if whole else [replace(v, gauges=()) for v in variants], self.report.say)
-            ends = [body.frames(v)[-1] for v in variants]
+            ends = [frames[-1] for frames in body.frames(variants)]
         except Finger3dError as error:
             return _Pressed(outcome=" ".join(str(error).split()))
         for mu, frame in zip(self.problem.mus, ends, strict=True):
@@ -127,10 +127,10 @@ class _Search:
                 return _Pressed(outcome=f"mu = {mu:g}: {frame.outcome}")
         steps = tuple(measure(body.problem.points, frame) for frame in ends)
         if whole:
-            pressed = [body.press(v) for v in variants]
-            return _Pressed(steps, lambda g: np.array([p.gauges[g.name] for p in pressed]))
+            strains = [body.strains(v, frame.gauges) for v, frame in zip(variants, ends, strict=True)]
+            return _Pressed(steps, lambda g: np.array([strain[g.name] for strain in strains]))
         mesh, axes = body.problem.mesh, body.problem.axes
-        u = np.array([body.problem.unknowns(frame.part.force) for frame in ends])[:, : mesh.points.size]
+        u = np.array([x[: mesh.points.size] for x in body.problem.unknowns_of([f.part.force for f in ends])])
         return _Pressed(steps, lambda g: np.asarray(gauge_row(mesh, g, axes)[:, : mesh.points.size] @ u.T).ravel())
 
     def _write(self, found: Evaluation) -> None:

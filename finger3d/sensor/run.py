@@ -29,7 +29,7 @@ from finger3d.sensor.curve import FEWEST, NOISE, RESOLUTION, Calibration, Range,
 from finger3d.sensor.files import save, write_table
 from finger3d.sensor.presses import Press, presses
 from finger3d.sensor.tolerances import Pressed, chosen, moved_gauges, slopes
-from finger3d.solve import MARGIN, build, covers
+from finger3d.solve import MARGIN, build, covered
 from finger3d.versions import versions
 
 if TYPE_CHECKING:
@@ -203,8 +203,7 @@ def _condensed(model: Model, gauge: Gauge, wanted: Mapping[str, float], sweep: S
             problem = with_steps(problem, estimate.steps if estimate else len(frames))
         _press(problem, sweep, report)
         sweep.seconds["presses"] = time.perf_counter() - start
-        ends = [sweep.frames[mu] for mu in (min(sweep.frames), max(sweep.frames))] if sweep.frames else []
-        if all(covers(problem, frame) for frame in ends):
+        if all(covered(problem, list(sweep.frames.values()))):
             break
         report.say("contact reached beyond the candidate points; once more with all of the contact face")
     return problem

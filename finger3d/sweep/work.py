@@ -7,11 +7,8 @@ from dataclasses import replace
 from typing import Any
 
 from finger3d.errors import Finger3dError
-from finger3d.family import Body, Variant
+from finger3d.family import TROUBLE, Body, Pressed, Variant
 from finger3d.sweep import points
-
-_TROUBLE = (Finger3dError, ArithmeticError, ValueError, RuntimeError, MemoryError)
-"""What one point, or the build of its body, may fail of without taking the worker along."""
 
 Task = tuple[str, points.Body, Sequence[tuple[int, Variant]]]
 
@@ -37,12 +34,12 @@ def press_all(
     with threadpool_limits(limits=threads):
         try:
             body = _built(how, [v for _, v in members])
-        except _TROUBLE as error:
+        except TROUBLE as error:
             for number, _ in members:
                 tell({"point": number, "body": key, "outcome": _reason(error)})
             return
-        for number, variant in members:
-            tell({"point": number, "body": key, **_row(body, variant)})
+        for (number, _), pressed in zip(members, body.presses([v for _, v in members], threads), strict=True):
+            tell({"point": number, "body": key, **_row(body, pressed)})
 
 
 def _built(how: points.Body, variants: Sequence[Variant]) -> Body:
@@ -51,11 +48,9 @@ def _built(how: points.Body, variants: Sequence[Variant]) -> Body:
     return Body(replace(parse(how.given).model(), mesh=how.mesh), variants)
 
 
-def _row(body: Body, variant: Variant) -> dict[str, Any]:
-    try:
-        pressed = body.press(variant)
-    except _TROUBLE as error:
-        return {"outcome": _reason(error)}
+def _row(body: Body, pressed: Pressed | Exception) -> dict[str, Any]:
+    if isinstance(pressed, Exception):
+        return {"outcome": _reason(pressed)}
     return {
         **pressed.numbers,
         **{f"gauge_{name}": strain for name, strain in pressed.gauges.items()},
