@@ -5,13 +5,18 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from finger3d.contact.law import Coulomb
 from finger3d.family import Body, Variant, body_key, families, finest, shared_legs
+from finger3d.fem.recover import displacement
+from finger3d.fem.surface import restrict, surface
 from finger3d.history import measure
+from finger3d.kinematics import SmallStrain
 from finger3d.model import Leg
 from finger3d.scene import Scene, parse, tree
-from finger3d.solve import build, march
+from finger3d.solve import build, covered, covers, march, whole
 
 BLOCK = {
     "finger": {"geometry": "block", "half_length_mm": 4.0, "height_mm": 3.0, "width_mm": 4.0},
@@ -155,3 +160,134 @@ def test_the_shared_path_goes_everywhere_and_nowhere_else():
     assert shared_legs([variant(*a)]) == a
     assert shared_legs([variant(*b), variant(Leg(1.0))]) == b
     assert shared_legs([variant(*a), variant(*b)]) == (*a, Leg(1.0), Leg(0.0), *b)
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        [],
+        ["effects.embedded_gauge={E_MPa=3000.0, thickness_mm=0.02, width_mm=1.0}", "gauge.0.length_mm=1.0"],
+        ["effects.elastic_object={E_MPa=10.0, nu=0.3}"],
+        ["effects.viscosity={prony=[[0.3, 0.5]]}", "press.duration_s=1.0"],
+        ["effects.viscosity={prony=[[0.3, 0.5]], bulk=false}", "press.duration_s=1.0"],
+        ["effects.large_deformation={}"],
+    ],
+    ids=["paper", "embedded gauge", "elastic object", "viscosity", "shear relaxes", "large deformation"],
+)
+@pytest.mark.parametrize("at_once", [8_000_000, 1], ids=["together", "in chunks"])
+def test_several_presses_are_proved_as_each_on_its_own(effect, at_once, monkeypatch):
+    """The gaps beyond the candidates are those of a back-substitution for each press, over the whole face."""
+    monkeypatch.setattr("finger3d.problem._AT_ONCE", at_once)
+    model = scene(*effect).model()
+    problem = build(model)
+    assert not whole(problem)
+    ends = [
+        list(
+            march(
+                replace(
+                    problem, model=replace(model, friction=Coulomb(mu), legs=(Leg(depth, steps=2, duration_s=1.0),))
+                )
+            )
+        )[-1]
+        for mu, depth in ((0.1, 0.3), (0.5, 0.2), (1.0, 0.1))
+    ]
+    face = surface(problem.mesh, "contact", problem.thickness)
+    others = ~np.isin(face.nodes, problem.surface.nodes)
+    kinematics = model.kinematics
+    together = kinematics.gaps(problem, [f.part for f in ends], [f.target for f in ends], restrict(face, others))
+    for frame, found in zip(ends, together, strict=True):
+        (alone,) = kinematics.gaps(problem, [frame.part], [frame.target], face)
+        assert np.abs(found - alone[others]).max() <= 1e-12 * frame.target.depth_mm
+        if isinstance(kinematics, SmallStrain):
+            u = displacement(problem.mesh, kinematics.unknowns(problem, frame.part))
+            moved = problem.gap(frame.target, face) + (face.trace @ u) @ problem.points.frame[0]
+            assert np.abs(found - moved[others]).max() <= 1e-12 * frame.target.depth_mm
+    assert covered(problem, ends) == [covers(problem, frame) for frame in ends] == [True] * 3
+
+
+def test_one_solver_proves_as_the_other(monkeypatch):
+    problem = build(scene().model())
+    ends = [list(march(problem))[-1]] * 3
+    monkeypatch.setenv("FINGER3D_SOLVER", "superlu")
+    other = build(scene().model())
+    assert other.condensed.solver == "superlu"
+    forces = [f.part.force for f in ends]
+    for a, b in zip(problem.unknowns_of(forces), other.unknowns_of(forces), strict=True):
+        assert np.abs(a - b).max() <= 1e-12 * np.abs(b).max()
+
+
+def test_a_face_that_is_touched_nearly_everywhere_is_all_candidates():
+    """Then nothing is beyond them, and no press pays a proof."""
+    level = ["object={shape='plane'}", "finger={geometry='block', half_length_mm=4.0, height_mm=3.0, width_mm=4.0}"]
+    assert whole(build(scene(*level).model()))
+    assert not whole(build(scene().model()))
+
+
+NARROW = (
+    -0.8
+)  # candidates of a body at first: what is a fifth of the depth above its lowest point; a shallow press ends there
+
+
+def narrowed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("finger3d.family.build", lambda m, say, margin=NARROW: build(m, say, margin))
+
+
+@pytest.mark.parametrize("threads", [False, True], ids=["in turn", "at once"])
+def test_presses_together_are_the_presses_alone(threads, monkeypatch):
+    """Two reach beyond the candidates, one does not, two differ in their gauges only; in the order asked."""
+    monkeypatch.setattr("finger3d.solve._WORTH", 1 if threads else 10**6)
+    monkeypatch.setattr("finger3d.solve.cores", lambda: 2)
+    shallow = "press.depth_mm=0.03"
+    changes = [[shallow], ["friction.mu=0.1"], ["friction.mu=1.0"], ["friction.mu=0.1", "gauge.0.x_mm=0.5"]]
+    models = [scene(*change).model() for change in changes]
+    variants = [Variant.of(m) for m in models]
+    wide = Body(models[1], variants)
+    alone = [wide.press(v) for v in variants]
+    narrowed(monkeypatch)
+    said: list[str] = []
+    body = Body(models[1], variants, said.append)
+    together = list(body.presses(variants))
+    assert sum("beyond" in text for text in said) == 1
+    for one, other in zip(alone, together, strict=True):
+        assert other.numbers == pytest.approx(one.numbers, rel=1e-9)
+        assert other.gauges == pytest.approx(one.gauges, rel=1e-9)
+    assert together[1].gauges != together[3].gauges
+    assert [p.seconds > 0.0 for p in together] == [True, True, True, False]
+    # frames speak of the body as it is in the end
+    again = Body(models[1], variants)
+    assert {f[-1].part.force.shape for f in again.frames(variants)} == {(len(again.problem.surface.nodes), 2)}
+
+
+@pytest.mark.parametrize("threads", [False, True], ids=["in turn", "at once"])
+def test_a_press_that_fails_takes_no_other_along(threads, monkeypatch):
+    monkeypatch.setattr("finger3d.solve._WORTH", 1 if threads else 10**6)
+    monkeypatch.setattr("finger3d.solve.cores", lambda: 2)
+    models = [scene(f"friction.mu={mu}").model() for mu in (0.1, 0.5, 1.0)]
+    body = Body(models[0], [Variant.of(m) for m in models])
+
+    def failing(problem):
+        if problem.model.friction.static == 0.5:
+            raise MemoryError("none left")
+        return march(problem)
+
+    monkeypatch.setattr("finger3d.family.march", failing)
+    first, second, third = body.presses([Variant.of(m) for m in models])
+    assert isinstance(second, MemoryError)
+    assert first.outcome == third.outcome == "converged"
+    with pytest.raises(MemoryError, match="none left"):
+        body.press(Variant.of(models[1]))
+
+
+def test_a_body_that_cannot_be_widened_fails_those_that_need_it_only(monkeypatch):
+    models = [scene(change).model() for change in ("friction.mu=0.1", "press.depth_mm=0.03", "friction.mu=1.0")]
+    variants = [Variant.of(m) for m in models]
+
+    def once(model, say, margin=NARROW):
+        if margin == math.inf:
+            raise MemoryError
+        return build(model, say, margin)
+
+    monkeypatch.setattr("finger3d.family.build", once)
+    found = list(Body(models[0], variants).presses(variants))
+    assert [isinstance(p, MemoryError) for p in found] == [True, False, True]
+    assert found[1].outcome == "converged"

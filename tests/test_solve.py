@@ -246,3 +246,25 @@ def test_presses_at_once_are_the_presses_in_turn(monkeypatch: pytest.MonkeyPatch
         for mu, found in zip(mus, at_once, strict=True)
         for a, b in zip(found, press(mu), strict=True)
     )
+
+
+def test_presses_nobody_waits_for_end_with_their_increment(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As after Ctrl-C: a long press at once with a short one, after which no more is asked."""
+    from finger3d import solve
+    from finger3d.solve import each
+
+    monkeypatch.setattr(solve, "_WORTH", 1)
+    monkeypatch.setattr(solve, "cores", lambda: 2)
+    problem = build(block())
+    increments = {1: 0, 2000: 0}
+
+    def press(steps: int, before: Sequence[Any] = ()) -> int:
+        for _ in march(replace(problem, model=replace(problem.model, legs=(Leg(0.3, steps=steps),)))):
+            increments[steps] += 1
+        return steps
+
+    told = each(problem, press, list(increments))
+    assert next(told) == 1
+    told.close()
+    assert increments[1] == 1
+    assert increments[2000] < 2000

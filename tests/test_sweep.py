@@ -8,6 +8,7 @@ import json
 import os
 import socket
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -273,6 +274,27 @@ def test_a_body_that_cannot_be_built_and_a_point_that_fails_are_rows(scene, monk
 
     monkeypatch.setattr("finger3d.sweep.work._built", lambda *a: Weak())
     assert [row["outcome"] for row in pressed_here(sweep)] == ["MemoryError: no further words"] * 2
+
+
+@pytest.mark.parametrize("threads", [1, None], ids=["a worker", "here"])
+def test_workers_gain_no_threads(threads, scene, monkeypatch):
+    """Two workers on two cores are as many as there is room for; a body pressed by this process takes them all."""
+    pools = []
+
+    class Pool(ThreadPoolExecutor):
+        def __init__(self, most: int, **settings: object) -> None:
+            pools.append(most)
+            super().__init__(most, **settings)
+
+    monkeypatch.setattr("finger3d.solve.ThreadPoolExecutor", Pool)
+    monkeypatch.setattr("finger3d.solve._WORTH", 1)
+    monkeypatch.setattr("finger3d.solve.cores", lambda: 2)
+    sweep = points_of(scene, "friction.mu=0.06,0.3,1")
+    (body, how), rows = next(iter(sweep.bodies.items())), []
+    press_all((body, how, [(p.number, p.variant) for p in sweep.points]), rows.append, threads=threads)
+    assert [row["point"] for row in rows] == [0, 1, 2]
+    assert {row["outcome"] for row in rows} == {"converged"}
+    assert pools == ([] if threads else [2])
 
 
 def test_the_scene_of_these_tests_is_small(scene):
