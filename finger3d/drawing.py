@@ -29,12 +29,12 @@ class Artist:
     Parameters
     ----------
     wanted : whether anything will be drawn
-    module : where the functions are that will; the child loads it meanwhile
+    modules : where the functions are that will; the child loads them meanwhile
     """
 
-    def __init__(self, wanted: bool = True, module: str = "finger3d.view") -> None:
+    def __init__(self, wanted: bool = True, *modules: str) -> None:
         self._wanted = wanted
-        self._module = module
+        self._modules = modules or ("finger3d.view",)
         self._calls: list[partial[Any]] = []
         self._child: subprocess.Popen[bytes] | None = None
         self._sent = False
@@ -43,7 +43,7 @@ class Artist:
         if self._wanted and "matplotlib" not in sys.modules:
             # a session of its own: Ctrl-C is for the parent, which lets begun pictures be finished
             self._child = subprocess.Popen(
-                [sys.executable, "-P", "-m", __name__, self._module], env=child_environment(), start_new_session=True,
+                [sys.executable, "-P", "-m", __name__, *self._modules], env=child_environment(), start_new_session=True,
                 stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
             )  # fmt: skip
         return self
@@ -84,8 +84,8 @@ class Artist:
                 stream.write(last)
 
 
-def _main(module: str) -> None:
-    _warm_up(module)
+def _main(modules: list[str]) -> None:
+    _warm_up(modules)
     sent = sys.stdin.buffer.read()
     for call in pickle.loads(sent) if sent else ():
         call()
@@ -93,12 +93,13 @@ def _main(module: str) -> None:
     os._exit(0)
 
 
-def _warm_up(module: str) -> None:
+def _warm_up(modules: list[str]) -> None:
     """All that a first picture takes besides its own drawing, while the parent computes: modules, fonts, formulae."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    import_module(module)
+    for module in modules:
+        import_module(module)
     figure = Figure(figsize=(1.0, 1.0))
     FigureCanvasAgg(figure)
     axes = figure.add_subplot(xlabel="x (mm)", title="x")
@@ -108,4 +109,4 @@ def _warm_up(module: str) -> None:
 
 
 if __name__ == "__main__":
-    _main(sys.argv[1])
+    _main(sys.argv[1:])

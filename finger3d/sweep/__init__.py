@@ -15,7 +15,10 @@ if TYPE_CHECKING:
 
 _HOME = {"Kept": "kept", "Sweep": "points", "combinations": "points", "sweep": "run"}
 
-__all__ = ["Kept", "Sweep", "combinations", "sweep"]
+DRAWN_BY = ("finger3d.sweep.picture", "finger3d.page")
+"""Modules that the picture and the page of a sweep are made by."""
+
+__all__ = ["DRAWN_BY", "Kept", "Sweep", "combinations", "sweep"]
 
 
 def __getattr__(name: str) -> Any:
