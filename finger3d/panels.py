@@ -111,7 +111,8 @@ def panels_of(path: str | Path) -> tuple[tuple[int, int], list[Panel]]:
 
     with PngImageFile(str(path)) as image:
         size = image.size
-        known: list[list[Any]] = json.loads(image.text.get(_KEY, "[]"))
+        # `save` writes it before the pixels; `text` would read these first
+        known: list[list[Any]] = json.loads(image.info.get(_KEY, "[]"))
     found = []
     for name, *box in known:
         left, top, right, bottom = (round(share * size[i % 2]) for i, share in enumerate(box))

@@ -9,13 +9,36 @@ folder, so that a page can be made again at any time::
 
 from __future__ import annotations
 
-from finger3d.page.build import Code, Figure, Row, Section, Table, write_page
-from finger3d.page.design import design_page
-from finger3d.page.press import press_page
-from finger3d.page.results import compare_page
-from finger3d.page.sensor import calibrate_page, sweep_page
-from finger3d.page.states import States, load_states, write_states
-from finger3d.page.view3d import View3D, view_of
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from finger3d.page.build import Code, Figure, Row, Section, Table, write_page
+    from finger3d.page.design import design_page
+    from finger3d.page.press import press_page
+    from finger3d.page.results import compare_page
+    from finger3d.page.sensor import calibrate_page, sweep_page
+    from finger3d.page.states import States, load_states, write_states
+    from finger3d.page.view3d import View3D, view_of
+
+_HOME = {
+    "Code": "build",
+    "Figure": "build",
+    "Row": "build",
+    "Section": "build",
+    "Table": "build",
+    "write_page": "build",
+    "design_page": "design",
+    "press_page": "press",
+    "compare_page": "results",
+    "calibrate_page": "sensor",
+    "sweep_page": "sensor",
+    "States": "states",
+    "load_states": "states",
+    "write_states": "states",
+    "View3D": "view3d",
+    "view_of": "view3d",
+}
 
 __all__ = [
     "Code",
@@ -35,3 +58,9 @@ __all__ = [
     "write_page",
     "write_states",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOME:  # a page loads what it shows, and no more
+        return getattr(importlib.import_module(f"finger3d.page.{_HOME[name]}"), name)
+    raise AttributeError(f"module 'finger3d.page' has no attribute {name!r}")
