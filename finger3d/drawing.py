@@ -21,7 +21,6 @@ from finger3d.render import child_environment
 from finger3d.versions import versions
 
 _PATIENCE_S = 20.0  # for pictures that were begun when the user interrupted
-_NICE = 10  # beside two threads of a factorisation, a child that is no nicer makes it half as long again
 
 
 class Artist:
@@ -89,8 +88,6 @@ class Artist:
 
 def _main(modules: list[str]) -> None:
     gc.disable()  # which looks through all of matplotlib again and again, for what this short life leaves
-    if hasattr(os, "nice"):  # not on Windows
-        os.nice(_NICE)
     _warm_up(modules)
     sent = sys.stdin.buffer.read()
     for call in pickle.loads(sent) if sent else ():
