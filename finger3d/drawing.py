@@ -87,8 +87,10 @@ class Artist:
 
 
 def _main(modules: list[str]) -> None:
-    gc.disable()  # which looks through all of matplotlib again and again, for what this short life leaves
+    gc.disable()
     _warm_up(modules)
+    gc.freeze()  # all of matplotlib stays, and need not be looked through for what the pictures leave
+    gc.enable()
     sent = sys.stdin.buffer.read()
     for call in pickle.loads(sent) if sent else ():
         call()
