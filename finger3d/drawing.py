@@ -18,7 +18,6 @@ from io import BytesIO
 from typing import Any, Self
 
 from finger3d.render import child_environment
-from finger3d.versions import versions
 
 _PATIENCE_S = 20.0  # for pictures that were begun when the user interrupted
 
@@ -31,12 +30,12 @@ class Artist:
     Parameters
     ----------
     wanted : whether anything will be drawn
-    modules : where the functions are that will; the child loads them meanwhile
+    module : where the functions are that will; the child loads it meanwhile
     """
 
-    def __init__(self, wanted: bool = True, *modules: str) -> None:
+    def __init__(self, wanted: bool = True, module: str = "finger3d.view") -> None:
         self._wanted = wanted
-        self._modules = modules or ("finger3d.view",)
+        self._module = module
         self._calls: list[partial[Any]] = []
         self._child: subprocess.Popen[bytes] | None = None
         self._sent = False
@@ -45,7 +44,7 @@ class Artist:
         if self._wanted and "matplotlib" not in sys.modules:
             # a session of its own: Ctrl-C is for the parent, which lets begun pictures be finished
             self._child = subprocess.Popen(
-                [sys.executable, "-P", "-m", __name__, *self._modules], env=child_environment(), start_new_session=True,
+                [sys.executable, "-P", "-m", __name__, self._module], env=child_environment(), start_new_session=True,
                 stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
             )  # fmt: skip
         return self
@@ -86,9 +85,9 @@ class Artist:
                 stream.write(last)
 
 
-def _main(modules: list[str]) -> None:
+def _main(module: str) -> None:
     gc.disable()
-    _warm_up(modules)
+    _warm_up(module)
     gc.freeze()  # all of matplotlib stays, and need not be looked through for what the pictures leave
     gc.enable()
     sent = sys.stdin.buffer.read()
@@ -98,14 +97,12 @@ def _main(modules: list[str]) -> None:
     os._exit(0)
 
 
-def _warm_up(modules: list[str]) -> None:
+def _warm_up(module: str) -> None:
     """All that a first picture takes besides its own drawing, while the parent computes: modules, fonts, formulae."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    for module in modules:
-        import_module(module)
-    versions()  # for the page
+    import_module(module)
     figure = Figure(figsize=(1.0, 1.0))
     FigureCanvasAgg(figure)
     axes = figure.add_subplot(xlabel="x (mm)", title="x")
@@ -115,4 +112,4 @@ def _warm_up(modules: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    _main(sys.argv[1:])
+    _main(sys.argv[1])

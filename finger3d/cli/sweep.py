@@ -61,10 +61,9 @@ def sweep(
     if workers is not None and scheduler is not None:
         raise Finger3dError("--workers and --scheduler: give one of them; a cluster has its own workers")
     from finger3d.drawing import Artist
-    from finger3d.sweep import DRAWN_BY
 
     several = any("," in text for text in vary)
-    with Artist(several, *DRAWN_BY) as artist:  # it loads what it needs while the points are checked
+    with Artist(several, "finger3d.sweep.picture") as artist:  # it loads what it needs while the points are checked
         from finger3d.sweep import combinations
         from finger3d.sweep import sweep as run
 

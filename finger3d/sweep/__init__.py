@@ -15,10 +15,7 @@ if TYPE_CHECKING:
 
 _HOME = {"Kept": "kept", "Sweep": "points", "combinations": "points", "sweep": "run"}
 
-DRAWN_BY = ("finger3d.sweep.picture", "finger3d.page.sensor")
-"""Modules that the picture and the page of a sweep are made by."""
-
-__all__ = ["DRAWN_BY", "Kept", "Sweep", "combinations", "sweep"]
+__all__ = ["Kept", "Sweep", "combinations", "sweep"]
 
 
 def __getattr__(name: str) -> Any:

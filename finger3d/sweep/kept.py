@@ -34,7 +34,7 @@ class Kept:
         self.sweep, self.folder = sweep, folder
         self.rows: dict[int, Row] = {}
         self.lost: dict[int, Row] = {}
-        self._written, self._cost = -math.inf, 0.0
+        self._written, self._cost = math.inf, 0.0
 
     @contextmanager
     def open(self) -> Iterator[Kept]:
@@ -101,8 +101,13 @@ class Kept:
         return [p.number for p in self.sweep.points if p.number not in self.rows]
 
     def refresh(self) -> None:
-        """Write the tables, unless that was done just now."""
-        if time.monotonic() - self._written > max(_EVERY_S, self._cost / _SHARE):
+        """Write the tables, unless that was done just now; a second after the first row for the first time.
+
+        What writes them takes as long to load as many presses: a short sweep needs it once, at its end.
+        """
+        now = time.monotonic()
+        self._written = min(self._written, now)
+        if now - self._written > max(_EVERY_S, self._cost / _SHARE):
             self.write()
 
     def write(self) -> None:

@@ -14,7 +14,7 @@ from finger3d.drawing import Artist
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.page import sweep_page
 from finger3d.report import Report
-from finger3d.sweep import DRAWN_BY, cluster
+from finger3d.sweep import cluster
 from finger3d.sweep.kept import Kept
 from finger3d.sweep.picture import draw
 from finger3d.sweep.points import Sweep
@@ -66,15 +66,15 @@ def sweep(
             report.say(f"{before} of {len(points.points)} points are kept from before")
         tasks = _tasks(points, kept)
         several = bool(tasks) and any(len(v.texts) > 1 for v in points.vary)
-        with nullcontext(artist) if artist else Artist(several, *DRAWN_BY) as mine:
+        with nullcontext(artist) if artist else Artist(several, draw.__module__) as mine:
             _press(kept, tasks, scheduler, workers, report)
-            kept.write()
             columns = kept.columns()
             if columns["point"]:
                 mine.draw(draw, folder / "sweep.png", columns, [v.key for v in points.vary])
-            mine.draw(sweep_page, folder)
-            mine.begin()
+                mine.begin()
+            kept.write()
             mine.finish()
+        sweep_page(folder)
         return kept
 
 
