@@ -13,6 +13,7 @@ from finger3d.contact.conditions import TOLERANCE, Increments, residual, stiffne
 from finger3d.contact.law import FrictionLaw
 from finger3d.contact.lemke import friction_start
 from finger3d.contact.newton import Iterate, force_of_sets, newton, sweeps
+from finger3d.contact.predict import predict
 from finger3d.contact.state import ContactState, Increment, next_state, refusal
 from finger3d.contact.threads import threads_for
 from finger3d.errors import Outcome
@@ -99,13 +100,14 @@ def _ladder(problem: Increments, start: Float, turns: bool) -> Iterator[tuple[st
 
     Where the path begins or turns the start is far away: full steps overshoot there, and come back to where they were.
     """
-    full, damped = partial(newton, problem, start, 30, False), partial(newton, problem, start, 60, True)
+    near = predict(problem, start)
+    full, damped = partial(newton, problem, limit=30, damped=False), partial(newton, problem, limit=60, damped=True)
     if turns:
-        yield "newton", damped()
-        yield "full steps", full()
+        yield "newton", damped(near)
+        yield "full steps", full(start)
     else:
-        yield "newton", full()
-        yield "damped", damped()
+        yield "newton", full(near)
+        yield "damped", damped(start)
     yield "ramp", _ramp(problem, start)
     yield "pivots", _pivots(problem, start)
     force, spent = start, 0

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.contact.conditions import Increments, project, residual
+from finger3d.contact.conditions import Increments, lengths, project, residual
 from finger3d.contact.law import SLIP, STICK
 
 Float = NDArray[np.float64]
@@ -24,13 +27,22 @@ _STALLED = 1e-3
 
 _DIVERGED = 1e9
 
+_CORRECTIONS, _PAYS = 12, 0.1
+"""Corrections with one factor, and the share of the residual that one may leave: it costs a tenth of an iteration."""
+
+_FINE = 1e-13
+"""Residual at which corrections end: they come down by steps, where Newton's last iteration reaches round-off."""
+
 _CACHED = 30_000
 """Numbers that are gathered at once."""
 
 
 @dataclass(frozen=True)
 class Iterate:
-    """Forces (c, d) N after some iterations with the sets (c,) they belong to, and whether they are a solution."""
+    """Forces (c, d) N after some iterations with the sets (c,) they belong to, and whether they are a solution.
+
+    An iteration is a system of equations set up and factored; corrections with its factor are part of it.
+    """
 
     force: Float
     status: NDArray[np.int8]
@@ -45,49 +57,117 @@ def force_of_sets(problem: Increments, status: NDArray[np.int8], trial: Float) -
     point has d unknowns; a slipping one its f_n, with f_t = mu f_n e, and in 3D the force across e, which follows the
     slip's turning (the derivative of the projection).
     """
-    c, d = trial.shape
-    slip, stick = np.flatnonzero(status == SLIP), np.flatnonzero(status == STICK)
-    k, n = len(slip), len(stick) * d
-    if not n + k:
-        return np.zeros((c, d))
-    tangent = trial[slip, 1:]
-    length = np.linalg.norm(tangent, axis=1)
-    length = np.where(length > 0.0, length, 1.0)
-    direction = tangent / length[:, None]
-    mu = problem.mu[slip]
-    pull = mu[:, None] * direction
-    # unknowns: forces of sticking points, f_n of slipping ones, force across; equations: which displacement vanishes,
-    # weighted to a force.  All is made in place of the compliance between points that touch, whose slipping ones come
-    # direction by direction: passes over it are as dear as the solution.
-    own = np.concatenate([(stick[:, None] * d + np.arange(d)).ravel(), slip * d])
-    sides = [slip * d + i for i in range(1, d)]
-    whole = _between(problem.compliance, np.concatenate([own, *sides]))
-    rho, free = problem.rho.ravel(), problem.free.ravel()
-    normal, first, second = (slice(n + i * k, n + (i + 1) * k) for i in range(3))
-    for i, side in enumerate((first, second)[: d - 1]):
-        whole[normal] += pull[:, i, None] * whole[side]  # displacements per unit of f_n; the compliance is symmetric
-    right = rho[own] * free[own]
-    whole[:, : n + k] *= rho[own]  # equations run along its columns
-    count = n + k
-    if d > 2:
-        count += k
-        turn = np.minimum(mu * trial[slip, 0] / length, 1.0)
-        across = np.stack([-direction[:, 1], direction[:, 0]], axis=1)
-        whole[first] *= across[:, 0, None]
-        whole[first] += across[:, 1, None] * whole[second]
-        weigh = [turn * across[:, i] * rho[side] for i, side in enumerate(sides)]
-        whole[:count, first] *= weigh[0]
-        whole[:count, first] += whole[:count, second] * weigh[1]
-        right = np.concatenate([right, weigh[0] * free[sides[0]] + weigh[1] * free[sides[1]]])
-        at = np.arange(n + k, count)
-        whole[at, at] += 1.0 - turn
-    unknowns = np.linalg.solve(whole[:count, :count].T, -right)
-    force = np.zeros((c, d))
-    force.ravel()[own] = unknowns[: n + k]
-    force[slip, 1:] = pull * unknowns[normal, None]
-    if d > 2:
-        force[slip, 1:] += across * unknowns[first, None]
-    return force
+    return _System.of(problem, status, trial).solution()
+
+
+@dataclass(frozen=True)
+class _System:
+    """The equations of the sets, factored.
+
+    Attributes
+    ----------
+    solve : right side (k,) -> unknowns (k,): forces of `own`, then those across the slip of `slip`
+    right : (k,)
+    own : numbers among c d of the sticking points' directions, then of the slipping ones' normals
+    slip : (s,) points
+    pull : (s, d - 1) friction per normal force
+    across : (s, d - 1) direction across the slip; in 2D there is none
+    """
+
+    shape: tuple[int, ...]
+    solve: Callable[[Float], Float]
+    right: Float
+    own: NDArray[np.int64]
+    slip: NDArray[np.int64]
+    pull: Float
+    across: Float
+
+    @classmethod
+    def of(cls, problem: Increments, status: NDArray[np.int8], trial: Float) -> _System:
+        """The equations of the sets of `force_of_sets`."""
+        c, d = trial.shape
+        slip, stick = np.flatnonzero(status == SLIP), np.flatnonzero(status == STICK)
+        k, n = len(slip), len(stick) * d
+        tangent = trial[slip, 1:]
+        length = lengths(tangent)
+        length = np.where(length > 0.0, length, 1.0)
+        direction = tangent / length[:, None]
+        across = np.stack([-direction[:, 1], direction[:, 0]], axis=1) if d > 2 else direction
+        mu = problem.mu[slip]
+        pull = mu[:, None] * direction
+        # unknowns: forces of sticking points, f_n of slipping ones, force across; equations: which displacement
+        # vanishes, weighted to a force.  All is made in place of the compliance between points that touch, whose
+        # slipping ones come direction by direction: passes over it are as dear as the solution.
+        own = np.concatenate([(stick[:, None] * d + np.arange(d)).ravel(), slip * d])
+        sides = [slip * d + i for i in range(1, d)]
+        whole = _between(problem.compliance, np.concatenate([own, *sides]))
+        rho, free = problem.rho.ravel(), problem.free.ravel()
+        normal, first, second = (slice(n + i * k, n + (i + 1) * k) for i in range(3))
+        for i, side in enumerate((first, second)[: d - 1]):
+            whole[normal] += pull[:, i, None] * whole[side]  # displacements per unit of f_n; compliance is symmetric
+        right = rho[own] * free[own]
+        whole[:, : n + k] *= rho[own]  # equations run along its columns
+        count = n + k
+        if d > 2:
+            count += k
+            turn = np.minimum(mu * trial[slip, 0] / length, 1.0)
+            whole[first] *= across[:, 0, None]
+            whole[first] += across[:, 1, None] * whole[second]
+            weigh = [turn * across[:, i] * rho[side] for i, side in enumerate(sides)]
+            whole[:count, first] *= weigh[0]
+            whole[:count, first] += whole[:count, second] * weigh[1]
+            right = np.concatenate([right, weigh[0] * free[sides[0]] + weigh[1] * free[sides[1]]])
+            at = np.arange(n + k, count)
+            whole[at, at] += 1.0 - turn
+        return cls((c, d), _solver(whole[:count, :count].T, count > n + k), -right, own, slip, pull, across)
+
+    def solution(self) -> Float:
+        """Forces (c, d) that meet the equations."""
+        return self._forces(self.solve(self.right)) if len(self.right) else np.zeros(self.shape)
+
+    @property
+    def turns(self) -> bool:
+        """Whether slip directions are among the unknowns, which makes the equations change with them."""
+        return len(self.right) > len(self.own)
+
+    def corrected(self, force: Float, mismatch: Float) -> Float:
+        """Forces (c, d) nearer to a solution with the same sets, from their mismatch (c, d) with the projection.
+
+        Simplified Newton: the factor is that of slip directions which have turned a little since.  `force` must be
+        `rubbing`, for the equations know nothing of friction that is longer than mu f_n.
+        """
+        across = np.sum(mismatch[self.slip, 1:] * self.across, axis=1)
+        change = self.solve(-np.concatenate([mismatch.ravel()[self.own], across]))
+        return self.rubbing(force + self._forces(change))
+
+    def rubbing(self, force: Float) -> Float:
+        """Forces (c, d) with friction mu f_n at slipping points, wherever it points."""
+        found = force.copy()
+        length = lengths(found[self.slip, 1:])
+        size = lengths(self.pull) * found[self.slip, 0]
+        found[self.slip, 1:] *= (size / np.where(length > 0.0, length, 1.0))[:, None]
+        return found
+
+    def _forces(self, unknowns: Float) -> Float:
+        force = np.zeros(self.shape)
+        own, slipping = len(self.own), len(self.slip)
+        force.ravel()[self.own] = unknowns[:own]
+        force[self.slip, 1:] = self.pull * unknowns[own - slipping : own, None]
+        if len(unknowns) > own:
+            force[self.slip, 1:] += self.across * unknowns[own:, None]
+        return force
+
+
+def _solver(matrix: Float, again: bool) -> Callable[[Float], Float]:
+    """What solves with a matrix; factored at once if it will be asked again."""
+    if not again:
+        return partial(np.linalg.solve, matrix)
+    from scipy.linalg.lapack import dgetrf, dgetrs  # not at the top: 2D never asks again, and need not load it
+
+    factor, pivots, trouble = dgetrf(matrix, overwrite_a=True)
+    if trouble:
+        raise np.linalg.LinAlgError("singular")
+    return lambda right: np.asarray(dgetrs(factor, pivots, right)[0])
 
 
 def _between(matrix: Float, chosen: NDArray[np.int64]) -> Float:
@@ -101,40 +181,78 @@ def _between(matrix: Float, chosen: NDArray[np.int64]) -> Float:
     return found
 
 
+class _Tried(NamedTuple):
+    """Forces (c, d) N, where they move the points (c, d) mm, and their projection: forces, states, trial forces.
+
+    `merit` is how far they are from it, N.
+    """
+
+    force: Float
+    moved: Float
+    projected: Float
+    status: NDArray[np.int8]
+    trial: Float
+    merit: float
+
+    @classmethod
+    def of(cls, problem: Increments, force: Float) -> _Tried:
+        moved = problem.moved(force)
+        projected, status, trial = project(problem, force, moved)
+        return cls(force, moved, projected, status, trial, float(np.linalg.norm(force - projected)))
+
+    def solves(self, problem: Increments, status: NDArray[np.int8], exact: float = _EXACT) -> bool:
+        """Whether the conditions hold with these states."""
+        near = _NEAR * float(problem.mu.max(initial=1.0)) * float(np.linalg.norm(self.force))
+        if not self.merit <= near:
+            return False
+        return residual(self.force, self.moved, status, problem.mu, problem.length_scale) <= exact
+
+
 def newton(problem: Increments, start: Float, limit: int, damped: bool) -> Iterate:
     """Semismooth Newton from forces `start` (c, d) N; full steps, or with a backtracking search on the residual force.
 
     A set of states that comes back with no smaller a residual ends it: it would cycle from there.
     """
-    force, near = start, _NEAR * float(problem.mu.max(initial=1.0))
-    projected, status, trial = project(problem, force, problem.moved(force))
-    merit = float(np.linalg.norm(force - projected))
+    here = _Tried.of(problem, start)
     seen: dict[bytes, float] = {}
     iteration = 0
     for iteration in range(1, limit + 1):
-        if merit >= (1.0 if damped else 1.0 - _STALLED) * seen.get(status.tobytes(), np.inf):
+        status = here.status
+        if here.merit >= (1.0 if damped else 1.0 - _STALLED) * seen.get(status.tobytes(), np.inf):
             break
-        seen[status.tobytes()] = merit
+        seen[status.tobytes()] = here.merit
         try:
-            target = force_of_sets(problem, status, trial)
+            system = _System.of(problem, status, here.trial)
+            target = system.solution()
         except np.linalg.LinAlgError:
             break
-        share, candidate, moved = 1.0, target, problem.moved(target)
-        while True:
-            projected, next_status, next_trial = project(problem, candidate, moved)
-            next_merit = float(np.linalg.norm(candidate - projected))
-            if share == 1.0 and next_merit <= near * float(np.linalg.norm(target)):
-                if residual(target, moved, status, problem.mu, problem.length_scale) <= _EXACT:
-                    return Iterate(target, status, True, iteration)
-            if not damped or next_merit <= (1.0 - 1e-4 * share) * merit or share < 1e-3:
-                break
+        share, there = 1.0, _Tried.of(problem, target)
+        if there.solves(problem, status):
+            return Iterate(target, status, True, iteration)
+        while damped and not there.merit <= (1.0 - 1e-4 * share) * here.merit and share >= 1e-3:
             share *= 0.5
-            candidate = force + share * (target - force)
-            moved = problem.moved(candidate)
-        if not np.isfinite(next_merit):
+            there = _Tried.of(problem, here.force + share * (target - here.force))
+        if not np.isfinite(there.merit):
             break
-        force, status, trial, merit = candidate, next_status, next_trial, next_merit
-    return Iterate(force, status, False, iteration)
+        if share == 1.0 and system.turns and (there.status == status).all():
+            there = _turned(problem, system, there)
+            if there.solves(problem, status):
+                return Iterate(there.force, status, True, iteration)
+        here = there
+    return Iterate(here.force, here.status, False, iteration)
+
+
+def _turned(problem: Increments, system: _System, found: _Tried) -> _Tried:
+    """What corrections with the factor at hand make of forces whose sets are those of the system, while they pay."""
+    best = _Tried.of(problem, system.rubbing(found.force))
+    for _ in range(_CORRECTIONS):
+        if (best.status != found.status).any() or best.solves(problem, found.status, _FINE):
+            break
+        tried = _Tried.of(problem, system.corrected(best.force, best.force - best.projected))
+        if not tried.merit <= _PAYS * best.merit:
+            break
+        best = tried
+    return min(found, best, key=lambda t: t.merit)
 
 
 def sweeps(problem: Increments, start: Float, count: int) -> Float:

@@ -57,7 +57,8 @@ class Increment:
     residual : float
         Largest violation of Eqs. (1)-(4) and of "friction opposes slip", dimensionless.
     iterations : int
-        Linear solves, all attempts together.
+        Systems of equations set up and factored, all attempts together; corrections with a factor at hand are part of
+        its iteration.
     method : str
         Which member of the ladder settled it: newton, damped or full steps, ramp, pivots, sweeps; or paper.
     """

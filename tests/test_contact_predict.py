@@ -1,0 +1,118 @@
+"""What makes contact quick: a start from normal contact, and corrections with a factor at hand; neither decides."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from finger3d.contact import advance as ladder
+from finger3d.contact import newton
+from finger3d.contact.conditions import Increments, project, stiffness_weights
+from finger3d.contact.law import SLIP, Coulomb
+from finger3d.contact.predict import predict
+from finger3d.contact.state import ContactState, Increment
+from tests.contact_cases import half_space, random_compliance
+
+
+def sphere(points: int = 11, spacing: float = 0.1) -> tuple[np.ndarray, np.ndarray]:
+    """Compliance and gap of a square of half-space points under a sphere of radius 1."""
+    axis = spacing * (np.arange(points) - (points - 1) / 2.0)
+    x, z = (a.ravel() for a in np.meshgrid(axis, axis))
+    return half_space(x, z, spacing, 0.3), 0.5 * (x**2 + z**2)
+
+
+def increments(compliance: np.ndarray, free: np.ndarray, mu: float) -> Increments:
+    c, d = free.shape
+    matrix = compliance.reshape(c * d, c * d)
+    return Increments(free, matrix, np.full(c, mu), stiffness_weights(matrix, d), 1.0)
+
+
+def pressed(compliance: np.ndarray, gap: np.ndarray, mu: float) -> list[Increment]:
+    """Four increments: two of pressing, two with a slide askew."""
+    state, out = ContactState.at_rest(gap, 3), []
+    for depth, x, z in ((0.05, 0.0, 0.0), (0.1, 0.0, 0.0), (0.1, 0.004, 0.002), (0.1, 0.008, 0.004)):
+        free = np.stack([gap - depth, np.full(len(gap), -x), np.full(len(gap), -z)], axis=1)
+        out.append(ladder.advance(state, free, compliance, Coulomb(mu), 0.1))
+        assert out[-1].outcome.ok
+        state = out[-1].state
+    return out
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_without_friction_the_start_is_the_answer(dim: int) -> None:
+    rng = np.random.default_rng(3)
+    compliance, free = random_compliance(rng, 9, dim, 1.0), rng.normal(size=(9, dim))
+    found = predict(increments(compliance, free, 0.0), np.zeros((9, dim)))
+    wanted = ladder.advance(ContactState.at_rest(np.zeros(9), dim), free, compliance, Coulomb(0.0), 1.0)
+    assert wanted.outcome.ok
+    assert wanted.state.force[:, 0].max() > 0.0
+    assert np.abs(found - wanted.state.force).max() < 1e-12 * wanted.state.force.max()
+
+
+def test_the_start_is_admissible_and_nearer_to_the_answer() -> None:
+    compliance, gap = sphere()
+    free = np.stack([gap - 0.1, *np.zeros((2, len(gap)))], axis=1)
+    problem = increments(compliance, free, 0.25)
+    wanted = pressed(compliance, gap, 0.25)[1].state.force
+    far = np.zeros_like(wanted)
+    found = predict(problem, far)
+    assert (np.linalg.norm(found[:, 1:], axis=1) <= (0.25 + 1e-12) * found[:, 0]).all()
+    # friction and normal forces answer each other by mu times Dundurs' beta = 0.29 here, so one turn leaves about 7 %
+    assert np.linalg.norm(found - wanted) < 0.07 * np.linalg.norm(far - wanted)
+
+
+def test_forces_under_which_nothing_opens_or_closes_are_kept() -> None:
+    compliance, gap = sphere()
+    free = np.stack([gap - 0.1, *np.zeros((2, len(gap)))], axis=1)
+    force = pressed(compliance, gap, 0.25)[1].state.force
+    assert predict(increments(compliance, free, 0.25), force) is force
+
+
+def test_a_singular_compliance_leaves_the_start_as_it_is() -> None:
+    free = np.full((2, 2), -1.0)
+    force = np.array([[1.0, 0.0], [0.0, 0.0]])
+    problem = Increments(free, np.ones((4, 4)), np.full(2, 0.3), np.ones((2, 2)), 1.0)
+    assert predict(problem, force) is force
+
+
+@pytest.mark.parametrize("mu", [0.06, 0.25, 1.0])
+def test_start_and_corrections_change_what_it_takes_and_not_the_answer(
+    monkeypatch: pytest.MonkeyPatch, mu: float
+) -> None:
+    compliance, gap = sphere()
+    quick = pressed(compliance, gap, mu)
+    monkeypatch.setattr(newton, "_CORRECTIONS", 0)
+    monkeypatch.setattr(ladder, "predict", lambda problem, force: force)
+    plain = pressed(compliance, gap, mu)
+    for a, b in zip(quick, plain, strict=True):
+        assert np.array_equal(a.state.status, b.state.status)
+        assert np.abs(a.state.force - b.state.force).max() < 1e-10 * b.state.force.max()
+    assert sum(a.iterations for a in quick) < 0.75 * sum(b.iterations for b in plain)
+
+
+def test_a_correction_shrinks_the_mismatch_of_slip_directions() -> None:
+    compliance, gap = sphere()
+    state = pressed(compliance, gap, 0.25)[1].state
+    free = np.stack([gap - 0.1, *np.zeros((2, len(gap)))], axis=1)
+    free[:, 1:] -= 0.01
+    problem = increments(compliance, free, 0.25)
+    start = newton.newton(problem, state.force, 30, damped=False)
+    assert start.solved
+    slips = start.status == SLIP
+    assert slips.sum() > 5
+    # slip directions a little astray; the system is that of these
+    angle = 0.01 * np.random.default_rng(0).normal(size=len(gap))
+    astray = start.force.copy()
+    astray[slips, 1] -= (angle * start.force[:, 2])[slips]
+    astray[slips, 2] += (angle * start.force[:, 1])[slips]
+    _, status, trial = project(problem, astray, problem.moved(astray))
+    assert (status == start.status).all()
+    system = newton._System.of(problem, status, trial)
+    force = system.rubbing(system.solution())
+    sizes = []
+    for _ in range(3):
+        projected, _, _ = project(problem, force, problem.moved(force))
+        sizes.append(np.linalg.norm(force - projected))
+        force = system.corrected(force, force - projected)
+    assert sizes[1] < 0.1 * sizes[0]
+    assert sizes[2] < 0.1 * sizes[1]
