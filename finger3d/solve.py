@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from finger3d.contact.law import SLIP
 from finger3d.contact.state import ContactState, Increment
+from finger3d.contact.threads import one_thread
 from finger3d.design import mesh_section, mesh_solid
 from finger3d.fem.assembly import Elasticity, stiffness
 from finger3d.fem.condense import condense, stiffened
@@ -272,13 +273,10 @@ def each(
             before = (*before, press(one, before))[-2:]
             yield before[-1]
         return
-    import scipy.linalg.lapack  # noqa: F401  SciPy's own BLAS: no limit that is set before it is loaded holds for it
-    from threadpoolctl import threadpool_limits
-
     left, rest = Event(), iter(asked)
     # One limit around them all: those inside would each restore what another has set.
     with (
-        threadpool_limits(limits=1, user_api="blas"),
+        one_thread(problem.dim > 2),
         ThreadPoolExecutor(at_once, initializer=_LEFT.set, initargs=(left,)) as pool,
     ):
         running = deque(pool.submit(press, one, before) for one in islice(rest, at_once))

@@ -27,7 +27,7 @@ def prepare() -> None:
 
     if available():
         PyPardisoSolver().libmkl.MKL_Get_Max_Threads()
-    threads_for(1)
+    threads_for(1, lapack=True)
     designs()
 
 

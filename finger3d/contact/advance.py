@@ -65,7 +65,7 @@ def advance(
     total = 0
     while True:
         problem = Increments(change, matrix, mu, rho, length_scale)
-        with threads_for(c * d):
+        with threads_for(c * d, d > 2):  # in 3D Newton factors by SciPy
             method, found, moved, error, spent = _settle(problem, start, guess is None)
         total += spent
         if found is None or moved is None:

@@ -11,17 +11,19 @@ SMALL = 3000
 
 
 @cache
-def _controller() -> Any:
+def _controller(lapack: bool) -> Any:
+    if lapack:
+        import scipy.linalg.lapack  # noqa: F401  a BLAS of its own: no limit set before it is loaded holds for it
     from threadpoolctl import ThreadpoolController
 
     return ThreadpoolController().select(user_api="blas")
 
 
-def one_thread() -> AbstractContextManager[Any]:
-    """Context in which dense algebra runs on one thread."""
-    return _controller().limit(limits=1)
+def one_thread(lapack: bool) -> AbstractContextManager[Any]:
+    """Context in which dense algebra runs on one thread, with `lapack` that of SciPy too."""
+    return _controller(lapack).limit(limits=1)
 
 
-def threads_for(unknowns: int) -> AbstractContextManager[Any]:
+def threads_for(unknowns: int, lapack: bool) -> AbstractContextManager[Any]:
     """Context in which dense algebra of this size runs on as many threads as help it."""
-    return one_thread() if unknowns < SMALL else nullcontext()
+    return one_thread(lapack) if unknowns < SMALL else nullcontext()
