@@ -21,8 +21,9 @@ True
 
 from __future__ import annotations
 
-import importlib
 from typing import TYPE_CHECKING, Any
+
+from finger3d.lazy import from_home
 
 if TYPE_CHECKING:
     from finger3d.contact.law import Coulomb
@@ -90,14 +91,15 @@ __all__ = [
 ]
 
 
+_load = from_home(__name__, _HOME)
+
+
 def __getattr__(name: str) -> Any:
     if name == "__version__":
         from importlib.metadata import version
 
         return version("finger3d")
-    if name in _HOME:
-        return getattr(importlib.import_module(f"finger3d.{_HOME[name]}"), name)
-    raise AttributeError(f"module 'finger3d' has no attribute {name!r}")
+    return _load(name)
 
 
 def __dir__() -> list[str]:

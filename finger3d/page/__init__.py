@@ -9,8 +9,9 @@ folder, so that a page can be made again at any time::
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from finger3d.lazy import from_home
 
 if TYPE_CHECKING:
     from finger3d.page.build import Code, Figure, Row, Section, Table, write_page
@@ -59,8 +60,4 @@ __all__ = [
     "write_states",
 ]
 
-
-def __getattr__(name: str) -> Any:
-    if name in _HOME:  # a page loads what it shows, and no more
-        return getattr(importlib.import_module(f"finger3d.page.{_HOME[name]}"), name)
-    raise AttributeError(f"module 'finger3d.page' has no attribute {name!r}")
+__getattr__ = from_home(__name__, _HOME)  # a page loads what it shows, and no more

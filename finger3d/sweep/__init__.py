@@ -5,8 +5,9 @@ Names are loaded when they are first used: the child that draws needs none of th
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from finger3d.lazy import from_home
 
 if TYPE_CHECKING:
     from finger3d.sweep.kept import Kept
@@ -17,8 +18,4 @@ _HOME = {"Kept": "kept", "Sweep": "points", "combinations": "points", "sweep": "
 
 __all__ = ["Kept", "Sweep", "combinations", "sweep"]
 
-
-def __getattr__(name: str) -> Any:
-    if name in _HOME:
-        return getattr(importlib.import_module(f"finger3d.sweep.{_HOME[name]}"), name)
-    raise AttributeError(f"module 'finger3d.sweep' has no attribute {name!r}")
+__getattr__ = from_home(__name__, _HOME)
