@@ -262,7 +262,7 @@ def _proved(problem: Problem, runs: Sequence[_Run]) -> list[_Run]:
     try:
         good = iter(covered(problem, [run.end for run in runs if run.end]))
     except TROUBLE as error:
-        return [replace(run, frames=error.with_traceback(None)) for run in runs]
+        return [replace(run, frames=error.with_traceback(None)) if run.end else run for run in runs]
     proved = list(takewhile(lambda run: run.end is None or next(good), runs))
     share = (time.perf_counter() - start) / len(runs)
     return [replace(run, seconds=run.seconds + share) for run in proved]

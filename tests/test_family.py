@@ -223,9 +223,8 @@ def test_a_face_that_is_touched_nearly_everywhere_is_all_candidates():
     assert not whole(build(scene().model()))
 
 
-NARROW = (
-    -0.8
-)  # candidates of a body at first: what is a fifth of the depth above its lowest point; a shallow press ends there
+NARROW = -0.8
+"""Margin of a body at first: its candidates reach to a fifth of the depth, where a shallow press ends."""
 
 
 def narrowed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -276,6 +275,24 @@ def test_a_press_that_fails_takes_no_other_along(threads, monkeypatch):
     assert first.outcome == third.outcome == "converged"
     with pytest.raises(MemoryError, match="none left"):
         body.press(Variant.of(models[1]))
+
+
+def test_presses_that_cannot_be_proved_fail_and_what_failed_before_keeps_its_reason(monkeypatch):
+    models = [scene(f"friction.mu={mu}").model() for mu in (0.1, 0.5)]
+    variants = [Variant.of(m) for m in models]
+    body = Body(models[0], variants)
+
+    def failing(problem):
+        if problem.model.friction.static == 0.5:
+            raise ArithmeticError("its own")
+        return march(problem)
+
+    def unproved(problem, frames):
+        raise MemoryError("no proof")
+
+    monkeypatch.setattr("finger3d.family.march", failing)
+    monkeypatch.setattr("finger3d.family.covered", unproved)
+    assert [str(p) for p in body.presses(variants)] == ["no proof", "its own"]
 
 
 def test_a_body_that_cannot_be_widened_fails_those_that_need_it_only(monkeypatch):
