@@ -24,7 +24,7 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.surface import surface
 from finger3d.history import Frame, measure
 from finger3d.kinematics import SmallStrain
-from finger3d.model import Leg, Model
+from finger3d.model import Leg, MeshOptions, Model
 from finger3d.objects import Sphere
 from finger3d.objects.mesh import MeshObject
 from finger3d.solve import AUTO_START, Problem, build, contact_zone, march, symmetry
@@ -197,21 +197,31 @@ def companion(problem: Problem, say: Say = lambda text: None) -> Problem:
     Finger3dError
         Where neither mesh can be made, or none differs enough to tell anything.
     """
-    model, own = problem.model, problem.model.mesh
-    costly = problem.dim == 2 and not isinstance(model.kinematics, SmallStrain)
+    model = problem.model
+    coarse, fine = companions(model, problem.mesh.points.size)
+    for options in coarse:
+        if beside := _built_if(problem, replace(model, mesh=options), lambda ratio: ratio >= _LEAST_RATIO, say):
+            return beside
+    for options in fine:
+        if beside := _built_if(problem, replace(model, mesh=options), lambda ratio: ratio <= 1.0 / _LEAST_RATIO, say):
+            return beside
+    raise Finger3dError("no other mesh differs enough from this one to tell anything; change mesh.size_mm")
+
+
+def companions(model: Model, unknowns: float) -> tuple[list[MeshOptions], list[MeshOptions]]:
+    """Meshes that may stand beside one of so many unknowns: coarser ones and finer ones, the best first.
+
+    A curved body may be meshed finer than was asked for, so that half the edge length changes nothing yet.
+    """
+    own, enough = model.mesh, unknowns >= _LEAST_UNSTRUCTURED
+    costly = model.domain != "solid" and not isinstance(model.kinematics, SmallStrain)
     longer = coarser(model, _FACTOR_WHERE_STEPS_FACTOR if costly else FACTOR).mesh
-    enough = problem.mesh.points.size >= _LEAST_UNSTRUCTURED
     chosen = [longer] if longer.mesher == "swept" or enough else []
     if model.domain == "solid" and own.mesher != longer.mesher:
         chosen.append(coarser(model, _FACTOR_WHERE_GRADED).mesh)
         chosen += [replace(longer, mesher=own.mesher)] if enough else []
-    for options in chosen:
-        if beside := _built_if(problem, replace(model, mesh=options), lambda ratio: ratio >= _LEAST_RATIO, say):
-            return beside
-    finer = replace(own, size_mm=_FINER * own.size_mm, base_size_mm=_FINER * own.base_size_mm)
-    if beside := _built_if(problem, replace(model, mesh=finer), lambda ratio: ratio <= 1.0 / _LEAST_RATIO, say):
-        return beside
-    raise Finger3dError("no other mesh differs enough from this one to tell anything; change mesh.size_mm")
+    shares = _FINER, _FINER**2
+    return chosen, [replace(own, size_mm=f * own.size_mm, base_size_mm=f * own.base_size_mm) for f in shares]
 
 
 def _built_if(problem: Problem, model: Model, enough: Callable[[float], bool], say: Say) -> Problem | None:

@@ -22,6 +22,7 @@ from finger3d.versions import versions
 
 if TYPE_CHECKING:
     from finger3d.accuracy import ErrorEstimate
+    from finger3d.ahead import Ahead
     from finger3d.increments import StepEstimate
     from finger3d.refine import Refined
     from finger3d.scene import Scene
@@ -148,6 +149,7 @@ def press(
     >>> len(finger3d.press(stiff).history.frames)
     4
     """
+    from finger3d.ahead import Ahead
     from finger3d.scene import load
 
     started = time.perf_counter()
@@ -155,13 +157,14 @@ def press(
     temporary = TemporaryDirectory(prefix="finger3d-") if out is None else None
     figures = temporary is None if figures is None else figures
     with claimed(temporary.name if temporary else str(out), "press") as folder:
-        with nullcontext(artist) if artist else Artist(figures) as mine:
-            history, summary = _pressed(scene, folder, report or Report(), started, mine if figures else None, error)
+        with nullcontext(artist) if artist else Artist(figures) as mine, Ahead(scene if error else None) as ahead:
+            drawing, beside = mine if figures else None, ahead if error else None
+            history, summary = _pressed(scene, folder, report or Report(), started, drawing, beside)
     return PressResult(history, folder, summary, temporary)
 
 
 def _pressed(
-    scene: Scene, folder: Path, report: Report, started: float, artist: Artist | None, error: bool
+    scene: Scene, folder: Path, report: Report, started: float, artist: Artist | None, ahead: Ahead | None
 ) -> tuple[History, dict[str, Any]]:
     from finger3d.accuracy import estimate
     from finger3d.page import press_page
@@ -184,9 +187,10 @@ def _pressed(
     output.warnings += _coarse_warning(problem, output.frames)
     history = History(problem.points, tuple(output.frames))
     summary = output.write(_told(history))
-    if error:
+    if ahead:
         output.factorizations = problem.factorizations
         report.stage("estimating the error")
+        ahead.wait()
         output.error = estimate(problem, output.frames, output.seconds, report.say)
         summary = output.write(_told(history))
     if artist:

@@ -290,6 +290,21 @@ def test_a_small_unstructured_mesh_is_judged_by_a_finer_one(made: list[str]) -> 
     assert made == ["lump", "lump"]
 
 
+def test_a_body_meshed_finer_than_asked_for_is_judged_by_one_still_finer(made: list[str], monkeypatch: Any) -> None:
+    asked: list[float] = []
+
+    def no_coarser_than(model: Model, *more: Any) -> Problem:
+        asked.append(model.mesh.size_mm)
+        mesh = replace(model.mesh, size_mm=min(model.mesh.size_mm, 0.4), base_size_mm=min(model.mesh.base_size_mm, 1.0))
+        return build(replace(model, mesh=mesh), *more)
+
+    model = replace(unstructured(), mesh=MeshOptions(0.8, 2.0, "ftetwild"))
+    monkeypatch.setattr(accuracy, "build", no_coarser_than)
+    problem = replace(no_coarser_than(model), model=model)
+    assert companion(problem).mesh.points.size > 1.5 * problem.mesh.points.size
+    assert asked == [0.8, 0.4, 0.2]
+
+
 def test_an_elastic_ball_is_meshed_anew_for_the_companion_and_kept(made: list[str]) -> None:
     soft = replace(unstructured(object_compliance=SoftObject(1.0, 0.45)), mesh=MeshOptions(0.4, 1.0, "swept"))
     problem, frames = pressed(replace(soft, design=soft.design.block))
