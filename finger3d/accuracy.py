@@ -38,7 +38,7 @@ MAIN = ("normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_hal
 
 FACTOR = 2.0
 _FINER = 0.5
-"""Where no mesh is coarser; such a mesh is small."""
+"""Where no mesh is coarser; such a mesh is small.  Its square where a curved body is finer already than was asked."""
 
 _FACTOR_WHERE_GRADED = 3.0
 """Of a swept companion beside an unstructured mesh, if at 2 it has as many unknowns, fine all along x and z."""
@@ -197,22 +197,16 @@ def companion(problem: Problem, say: Say = lambda text: None) -> Problem:
     Finger3dError
         Where neither mesh can be made, or none differs enough to tell anything.
     """
-    model = problem.model
-    coarse, fine = companions(model, problem.mesh.points.size)
-    for options in coarse:
-        if beside := _built_if(problem, replace(model, mesh=options), lambda ratio: ratio >= _LEAST_RATIO, say):
-            return beside
-    for options in fine:
-        if beside := _built_if(problem, replace(model, mesh=options), lambda ratio: ratio <= 1.0 / _LEAST_RATIO, say):
-            return beside
+    coarse, fine = companions(problem.model, problem.mesh.points.size)
+    for chosen, enough in ((coarse, lambda r: r >= _LEAST_RATIO), (fine, lambda r: r <= 1.0 / _LEAST_RATIO)):
+        for options in chosen:
+            if beside := _built_if(problem, replace(problem.model, mesh=options), enough, say):
+                return beside
     raise Finger3dError("no other mesh differs enough from this one to tell anything; change mesh.size_mm")
 
 
 def companions(model: Model, unknowns: float) -> tuple[list[MeshOptions], list[MeshOptions]]:
-    """Meshes that may stand beside one of so many unknowns: coarser ones and finer ones, the best first.
-
-    A curved body may be meshed finer than was asked for, so that half the edge length changes nothing yet.
-    """
+    """Meshes that may stand beside one of so many unknowns: coarser ones and finer ones, the best first."""
     own, enough = model.mesh, unknowns >= _LEAST_UNSTRUCTURED
     costly = model.domain != "solid" and not isinstance(model.kinematics, SmallStrain)
     longer = coarser(model, _FACTOR_WHERE_STEPS_FACTOR if costly else FACTOR).mesh
