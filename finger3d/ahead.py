@@ -10,16 +10,15 @@ import pickle
 import signal
 import subprocess
 import sys
-from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
 from tempfile import TemporaryDirectory
-from typing import Any, Self
+from typing import Self
 
 from finger3d.accuracy import companions
 from finger3d.model import Model
 from finger3d.render import child_environment
-from finger3d.scene import Scene, parse
+from finger3d.scene import Scene, parse, tree
 from finger3d.solve import build, contact_zone, symmetry
 
 _NODES = 1.55
@@ -52,7 +51,7 @@ class Ahead:
         )  # fmt: skip
         assert self._child.stdin is not None
         with suppress(BrokenPipeError), self._child.stdin as stream:
-            stream.write(pickle.dumps(_plain(self._scene.given)))
+            stream.write(pickle.dumps(tree.plain(self._scene.given)))
         return self
 
     def wait(self) -> None:
@@ -67,13 +66,6 @@ class Ahead:
             self._child.wait()
         if self._litter is not None:
             self._litter.cleanup()
-
-
-def _plain(given: Any) -> Any:
-    """What the user wrote, in types that can be sent."""
-    if isinstance(given, Mapping):
-        return {k: _plain(v) for k, v in given.items()}
-    return [_plain(v) for v in given] if isinstance(given, list | tuple) else given
 
 
 def _takes_long(model: Model) -> bool:
