@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from finger3d.design import mesh_section, mesh_solid
 from finger3d.errors import Finger3dError
+from finger3d.export import MAIN
 from finger3d.fem.surface import surface
 from finger3d.history import Frame, measure
 from finger3d.kinematics import SmallStrain
@@ -32,9 +33,6 @@ from finger3d.solve import AUTO_START, Problem, build, contact_zone, march, symm
 Float = NDArray[np.float64]
 Say = Callable[[str], None]
 Told = Callable[[Problem, Frame], dict[str, float]]
-
-MAIN = ("normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm")
-"""The numbers that get an error bar, beside every gauge."""
 
 FACTOR = 2.0
 _FINER = 0.5

@@ -20,6 +20,9 @@ from numpy.typing import ArrayLike, NDArray
 from finger3d.errors import Finger3dError
 from finger3d.mesh import Mesh
 
+MAIN = ("normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm")
+"""The numbers of a press that short tables show, and that get an error bar, beside every gauge."""
+
 _CELL_TYPES = {(2, 3): 5, (2, 6): 22, (3, 4): 10, (3, 10): 24}
 """VTK's number for a cell, by dimension and number of nodes."""
 

@@ -17,15 +17,16 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 from itertools import dropwhile, takewhile
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from finger3d.contact.law import FrictionLaw
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.history import Frame, measure
-from finger3d.increments import automatic, refine
 from finger3d.model import Gauge, Leg, MeshOptions, Model
 from finger3d.scene import Scene
-from finger3d.solve import Problem, build, covered, each, march, whole
+
+if TYPE_CHECKING:
+    from finger3d.solve import Problem
 
 _FREE = ("title", "friction", "press", "contact", "gauge")
 _SIZES = ("size_mm", "base_size_mm")
@@ -116,6 +117,9 @@ class Body:
     def __init__(
         self, model: Model, variants: Sequence[Variant], say: Callable[[str], None] = lambda text: None
     ) -> None:
+        # the solver and SciPy are for those who press; who only sorts scenes by body does without
+        from finger3d.solve import build
+
         start = time.perf_counter()
         self._say = say
         gauges = model.gauges
@@ -175,6 +179,8 @@ class Body:
 
         What is finished waits for that a second, or for as long as the press beside it takes.
         """
+        from finger3d.solve import each, whole
+
         left = deque(variants)
         while left:
             waiting: list[_Run] = []
@@ -209,6 +215,8 @@ class Body:
         return _Run(self.problem, frames, time.perf_counter() - start)
 
     def _widen(self) -> None:
+        from finger3d.solve import build
+
         start = time.perf_counter()
         self._say("contact reached beyond the candidate points; condensing all of the contact face")
         self.problem = build(self.problem.model, self._say, math.inf)
@@ -258,6 +266,8 @@ class _Run:
 
 def _proved(problem: Problem, runs: Sequence[_Run]) -> list[_Run]:
     """The runs before the first that went beyond the candidate points; each pays its part of the proof."""
+    from finger3d.solve import covered
+
     start = time.perf_counter()
     try:
         good = iter(covered(problem, [run.end for run in runs if run.end]))
@@ -274,6 +284,9 @@ def _press_of(variant: Variant) -> tuple[Any, ...]:
 
 
 def _frames(problem: Problem) -> tuple[Frame, ...]:
+    from finger3d.increments import automatic, refine
+    from finger3d.solve import march
+
     if not automatic(problem):
         return tuple(march(problem))
     frames: tuple[Frame, ...] = ()

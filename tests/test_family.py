@@ -92,11 +92,9 @@ def test_a_shallower_press_on_the_mesh_of_the_deepest():
 def test_candidates_are_widened_when_contact_reaches_beyond_them(monkeypatch):
     model = scene("friction.mu=0.0").model()
     wide = Body(model, [Variant.of(model)]).press(Variant.of(model))
-    import finger3d.family as family
-
     said = []
     first = [lambda m, say, margin=-0.8: build(m, say, margin)]
-    monkeypatch.setattr(family, "build", lambda m, say, *margin: first[0](m, say, *margin))
+    monkeypatch.setattr("finger3d.solve.build", lambda m, say, *margin: first[0](m, say, *margin))
     narrow = Body(model, [Variant.of(model)], said.append)
     again = narrow.press(Variant.of(model))
     assert any("beyond" in text for text in said)
@@ -228,7 +226,7 @@ NARROW = -0.8
 
 
 def narrowed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("finger3d.family.build", lambda m, say, margin=NARROW: build(m, say, margin))
+    monkeypatch.setattr("finger3d.solve.build", lambda m, say, margin=NARROW: build(m, say, margin))
 
 
 @pytest.mark.parametrize("threads", [False, True], ids=["in turn", "at once"])
@@ -269,7 +267,7 @@ def test_a_press_that_fails_takes_no_other_along(threads, monkeypatch):
             raise MemoryError("none left")
         return march(problem)
 
-    monkeypatch.setattr("finger3d.family.march", failing)
+    monkeypatch.setattr("finger3d.solve.march", failing)
     first, second, third = body.presses([Variant.of(m) for m in models])
     assert isinstance(second, MemoryError)
     assert first.outcome == third.outcome == "converged"
@@ -290,8 +288,8 @@ def test_presses_that_cannot_be_proved_fail_and_what_failed_before_keeps_its_rea
     def unproved(problem, frames):
         raise MemoryError("no proof")
 
-    monkeypatch.setattr("finger3d.family.march", failing)
-    monkeypatch.setattr("finger3d.family.covered", unproved)
+    monkeypatch.setattr("finger3d.solve.march", failing)
+    monkeypatch.setattr("finger3d.solve.covered", unproved)
     assert [str(p) for p in body.presses(variants)] == ["no proof", "its own"]
 
 
@@ -304,7 +302,7 @@ def test_a_body_that_cannot_be_widened_fails_those_that_need_it_only(monkeypatch
             raise MemoryError
         return build(model, say, margin)
 
-    monkeypatch.setattr("finger3d.family.build", once)
+    monkeypatch.setattr("finger3d.solve.build", once)
     found = list(Body(models[0], variants).presses(variants))
     assert [isinstance(p, MemoryError) for p in found] == [True, False, True]
     assert found[1].outcome == "converged"

@@ -5,12 +5,16 @@ from __future__ import annotations
 import csv
 import errno
 import json
+import math
 import os
 import socket
+import subprocess
+import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
@@ -20,6 +24,7 @@ from finger3d.scene import load
 from finger3d.sweep import Kept, Sweep, combinations
 from finger3d.sweep import run as running
 from finger3d.sweep.points import Vary
+from finger3d.sweep.table import write_parquet
 from finger3d.sweep.work import press_all
 
 COARSE = ["--set", "model.domain=plane-strain", "--set", "mesh.size_mm=4", "--set", "mesh.base_size_mm=16"]
@@ -223,6 +228,29 @@ def test_a_folder_in_use_is_refused(scene, tmp_path):
     with Kept(sweep, tmp_path).open(), pytest.raises(Finger3dError, match="another finger3d is writing there"):
         with Kept(sweep, tmp_path).open():
             pass
+
+
+def test_columns_without_pandas_are_what_pyarrow_makes_of_them(tmp_path):
+    columns = {
+        "point": list(range(11)),
+        "nu": [0.3, math.nan, -0.0, math.inf, 1e-300, *[0.1] * 6],
+        "kept": [True, False, False, True, True, True, False, True, False, True, True],
+        "outcome": ["converged", "", "step 3 (depth 1.5 mm): \u03bc \U0001f91a", "a\nb", *["converged"] * 7],
+    }
+    write_parquet(tmp_path / "mine.parquet", columns)
+    pq.write_table(pa.table(columns), tmp_path / "its.parquet")
+    mine, its = (pq.read_table(tmp_path / name) for name in ("mine.parquet", "its.parquet"))
+    mine.validate(full=True)
+    assert mine.schema == its.schema
+    # as texts, as nan is not equal to itself
+    assert repr(mine.to_pydict()) == repr(its.to_pydict())
+
+
+def test_a_sweep_leaves_pandas_to_others(tmp_path):
+    code = "from pathlib import Path; from finger3d.sweep.table import write_parquet; import sys; "
+    code += "write_parquet(Path(sys.argv[1]), {'a': [1.0], 'b': ['x'], 'c': [True], 'd': [1]}); "
+    code += "sys.exit('pandas' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code, str(tmp_path / "a.parquet")], timeout=60).returncode == 0
 
 
 @pytest.mark.parametrize("name", ["points.jsonl", "results.parquet"])

@@ -83,11 +83,16 @@ def assert_nothing_repeated_or_lost(out: Path, total: int) -> None:
 
 
 def children(pid: int) -> list[int]:
-    """Worker processes of a parent, by Linux's process table."""
-    mine = [int(n) for n in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
-    for task in Path(f"/proc/{pid}/task").iterdir():
-        mine += [int(n) for n in (task / "children").read_text().split()]
-    return [n for n in dict.fromkeys(mine) if "spawn_main" in Path(f"/proc/{n}/cmdline").read_text()]
+    """Processes that a process, or one of its threads, has started, by Linux's process table."""
+    tasks = Path(f"/proc/{pid}/task").iterdir()
+    return list(dict.fromkeys(int(n) for task in tasks for n in (task / "children").read_text().split()))
+
+
+def workers_of(pid: int) -> list[int]:
+    """Worker processes of a sweep: copies, made by the one child that loads what they need."""
+    servers = [n for n in children(pid) if "forkserver" in Path(f"/proc/{n}/cmdline").read_text()]
+    assert len(servers) == 1
+    return children(servers[0])
 
 
 def killed_and_resumed(command: list[str], out: Path, total: int, env: dict[str, str], where: Path) -> None:
@@ -95,7 +100,9 @@ def killed_and_resumed(command: list[str], out: Path, total: int, env: dict[str,
     log = where / "sweep.log"
     with started(command, env, where, log) as parent:
         until(lambda: len(lines(out)) >= total // 10, "a tenth of the points")
-        workers = children(parent.pid)
+        workers = workers_of(parent.pid)
+        assert len(workers) == 2
+        server = int(Path(f"/proc/{workers[0]}/stat").read_text().rpartition(")")[2].split()[1])
         os.kill(workers[0], signal.SIGKILL)
         count = len(lines(out))
         until(lambda: len(lines(out)) >= count + total // 5 or parent.poll() is not None, "points after the kill")
@@ -103,7 +110,7 @@ def killed_and_resumed(command: list[str], out: Path, total: int, env: dict[str,
         parent.wait()
     before = lines(out)
     assert total // 10 <= len(before) < total, log.read_text()
-    until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in workers), "workers end with their parent")
+    until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in [*workers, server]), "workers end with their parent")
     with started(command, env, where, log) as parent:
         assert parent.wait(timeout=250) == 0, log.read_text()
     # what was kept is the beginning of what is there: none was pressed again

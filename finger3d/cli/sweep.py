@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from finger3d.sweep import Kept
 
 _SHOWN, _GAUGES = 10, 3  # points and gauges
+_SHARED = ("friction.", "press.", "contact.", "gauge.")  # keys that leave one body, which is pressed without workers
 
 
 @app.command
@@ -60,6 +61,10 @@ def sweep(
         raise Finger3dError(f"--workers {workers}: must be at least 1")
     if workers is not None and scheduler is not None:
         raise Finger3dError("--workers and --scheduler: give one of them; a cluster has its own workers")
+    from finger3d.sweep.cluster import prepare
+
+    if scheduler is None and any("," in text and not text.strip().startswith(_SHARED) for text in vary):
+        prepare()  # it goes on while the points are checked
     from finger3d.drawing import Artist
 
     several = any("," in text for text in vary)
@@ -112,7 +117,7 @@ def _as_dict(kept: Kept, out: Path) -> dict[str, Any]:
 
 def _print_points(kept: Kept) -> None:
     """The varied keys and the main numbers of the first points."""
-    from finger3d.accuracy import MAIN
+    from finger3d.export import MAIN
     from finger3d.page.build import number
 
     def cell(value: Any) -> str:

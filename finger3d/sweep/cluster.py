@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
+import os
 import signal
-from collections.abc import Iterator
+import sys
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -17,23 +18,72 @@ CONNECT_S = 10.0
 
 _MEMORY_SHARE = 0.9
 
+_ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+
+# only Linux's libraries are known to bear that a process is copied which has loaded them
+_METHOD = "forkserver" if sys.platform == "linux" else "spawn"
+
+_QUIET = {
+    "distributed.worker.multiprocessing-method": _METHOD,
+    # Dask would have all memory given back to the system at once: a sixth of a press goes into getting it again
+    "distributed.nanny.pre-spawn-environ": _ONE_THREAD,
+    # what Dask logs of a lost worker is told by the sweep in its own words
+    "logging.distributed": "critical",
+    # it would look 50 to 1000 times a second what every worker is at, and nobody reads that
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.system-monitor.gil.enabled": False,
+    "distributed.admin.system-monitor.disk": False,
+    "distributed.admin.system-monitor.interval": "5s",
+    "distributed.admin.tick.interval": "1s",
+}
+
+
+def prepare() -> None:
+    """Let a process load what workers need while this one goes on; each worker is then a copy of it."""
+    if _METHOD != "forkserver":
+        return
+    from multiprocessing import forkserver, set_forkserver_preload
+
+    set_forkserver_preload(["finger3d.sweep.loaded"])
+    # what lies where the user is must not be taken for a module
+    with _for_us_alone(), _environment(_ONE_THREAD | {"PYTHONSAFEPATH": "1"}):
+        forkserver.ensure_running()
+
+
+@contextmanager
+def _environment(wanted: Mapping[str, str]) -> Iterator[None]:
+    """This process's environment with some names set, for what is started in the block."""
+    before = {name: os.environ.get(name) for name in wanted}
+    os.environ.update(wanted)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
 
 @contextmanager
 def local(workers: int) -> Iterator[Any]:
     """Client of `workers` processes on this machine, one thread each, with their share of its memory as the limit."""
     import dask
+    import distributed.utils
     from distributed import Client, LocalCluster
     from distributed.system import MEMORY_LIMIT
 
-    # what Dask logs of a lost worker is told by the sweep in its own words
-    quiet = {"logging.distributed": "critical", "distributed.admin.system-monitor.gil.enabled": False}
-    with dask.config.set(quiet):
+    prepare()
+    # Dask would have it load pandas and others, and load them here as well
+    distributed.utils._forkserver_preload_set = True
+    with dask.config.set(_QUIET):
         try:
             with _for_us_alone():
                 cluster = LocalCluster(
                     n_workers=workers, threads_per_worker=1, processes=True, host="127.0.0.1",
                     dashboard_address="127.0.0.1:0",  # None would still ask for port 8787, and warn if it is taken
                     memory_limit=int(_MEMORY_SHARE * MEMORY_LIMIT / workers), silence_logs=logging.CRITICAL,
+                    env={**os.environ, **_ONE_THREAD},  # that of now: the copied process may be older
                 )  # fmt: skip
         except (OSError, RuntimeError, TimeoutError) as error:
             raise MissingError(f"sweep: no worker could be started on this machine: {error}") from None
@@ -58,6 +108,8 @@ def _for_us_alone() -> Iterator[None]:
 @contextmanager
 def remote(address: str) -> Iterator[Any]:
     """Client of the cluster whose scheduler is at `address`, which has workers with this version of finger3d."""
+    import asyncio
+
     from distributed import Client
 
     if ":" not in address.removeprefix("tcp://").removeprefix("tls://"):

@@ -112,15 +112,14 @@ class Kept:
 
     def write(self) -> None:
         """Write results.parquet and results.csv."""
-        import pyarrow as pa
-        import pyarrow.parquet as pq
+        from finger3d.sweep.table import write_parquet
 
         start = time.monotonic()
         columns = self.columns()
         if columns["point"]:
             with self._room("results.parquet"):
                 with atomic(self.folder / "results.parquet") as temporary:
-                    pq.write_table(pa.table(columns), temporary)
+                    write_parquet(temporary, columns)
                 write_csv(self.folder / "results.csv", columns)
         self._written = time.monotonic()
         self._cost = self._written - start

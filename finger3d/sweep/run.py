@@ -6,7 +6,8 @@ import math
 import queue
 import time
 import uuid
-from contextlib import AbstractContextManager, nullcontext, suppress
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import Any
 
@@ -67,25 +68,31 @@ def sweep(
         tasks = _tasks(points, kept)
         several = bool(tasks) and any(len(v.texts) > 1 for v in points.vary)
         with nullcontext(artist) if artist else Artist(several, draw.__module__) as mine:
-            _press(kept, tasks, scheduler, workers, report)
-            columns = kept.columns()
-            if columns["point"]:
-                mine.draw(draw, folder / "sweep.png", columns, [v.key for v in points.vary])
-                mine.begin()
+            with _pressed(kept, tasks, scheduler, workers, report):  # the picture is drawn while workers end
+                columns = kept.columns()
+                if columns["point"]:
+                    mine.draw(draw, folder / "sweep.png", columns, [v.key for v in points.vary])
+                    mine.begin()
             kept.write()
             mine.finish()
         sweep_page(folder)
         return kept
 
 
-def _press(kept: Kept, tasks: list[Task], scheduler: str | None, workers: int | None, report: Report) -> None:
-    """Press what is left; whatever ends this, what is finished is in the tables."""
+@contextmanager
+def _pressed(
+    kept: Kept, tasks: list[Task], scheduler: str | None, workers: int | None, report: Report
+) -> Iterator[None]:
+    """Press what is left, then run the block; whatever ends this, what is finished is in the tables."""
     try:
-        if len(tasks) == 1 and scheduler is None:
-            _Run(None, kept, tasks, report).here()
-        elif tasks:
+        if tasks and (len(tasks) > 1 or scheduler):
             with _cluster(scheduler, workers, len(tasks), report) as client:
                 _Run(client, kept, tasks, report).go()
+                yield
+        else:
+            if tasks:
+                _Run(None, kept, tasks, report).here()
+            yield
     except BaseException:
         # what ended the run is the news; tables that cannot be written beside it are not
         with suppress(Finger3dError):
