@@ -16,8 +16,8 @@ from tempfile import TemporaryDirectory
 from typing import Self
 
 from finger3d.accuracy import companions
+from finger3d.children import child_environment
 from finger3d.model import Model
-from finger3d.render import child_environment
 from finger3d.scene import Scene, parse, tree
 from finger3d.solve import build, contact_zone, symmetry
 

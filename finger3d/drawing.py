@@ -17,7 +17,7 @@ from importlib import import_module
 from io import BytesIO
 from typing import Any, Self
 
-from finger3d.render import child_environment
+from finger3d.children import child_environment
 
 _PATIENCE_S = 20.0  # for pictures that were begun when the user interrupted
 

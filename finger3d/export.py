@@ -10,9 +10,9 @@ import secrets
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from enum import Enum
+from html import escape
 from pathlib import Path
 from typing import Any
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -220,7 +220,7 @@ class _Appended:
         data = np.ascontiguousarray(values.astype(values.dtype.newbyteorder("<"), copy=False))
         components = 1 if data.ndim == 1 else data.shape[1]
         self._text.append(
-            f'<DataArray type="{_VTK_NAMES[data.dtype.str[1:]]}" Name={quoteattr(name)} '
+            f'<DataArray type="{_VTK_NAMES[data.dtype.str[1:]]}" Name="{escape(name)}" '
             f'NumberOfComponents="{components}" format="appended" offset="{self._offset}"/>'
         )
         self._blocks += [np.uint64(data.nbytes).astype("<u8").tobytes(), data.tobytes()]

@@ -63,12 +63,13 @@ class _Output:
         if time.perf_counter() - self._written > _WRITE_EVERY_S:
             self.write(_INCOMPLETE)
 
-    def write(self, outcome: str) -> dict[str, Any]:
+    def write(self, outcome: str, tables: bool = True) -> dict[str, Any]:
+        """The summary, and with it the tables, unless those on disk tell of these very frames."""
         begin = time.perf_counter()
         steps = [measure(self.problem.points, f) for f in self.frames]
         summary = self._summary(steps, outcome)
         write_json(self.out / "summary.json", summary)
-        if steps:
+        if steps and tables:
             flat = [{**s, **{f"gauge_{k}": v for k, v in s["gauges"].items()}} for s in steps]
             write_csv(self.out / "history.csv", {k: [row[k] for row in flat] for k in flat[0] if k != "gauges"})
             last = next((f for f in reversed(self.frames) if f.outcome.ok), self.frames[-1])
@@ -186,13 +187,13 @@ def _pressed(
     output.seconds["output"] += time.perf_counter() - begin
     output.warnings += _coarse_warning(problem, output.frames)
     history = History(problem.points, tuple(output.frames))
-    summary = output.write(_told(history))
+    summary = output.write(_told(history), tables=False)
     if ahead:
         output.factorizations = problem.factorizations
         report.stage("estimating the error")
         ahead.wait()
         output.error = estimate(problem, output.frames, output.seconds, report.say)
-        summary = output.write(_told(history))
+        summary = output.write(_told(history), tables=False)
     if artist:
         report.stage("drawing")
         artist.finish()
@@ -373,6 +374,7 @@ def _voigt(tensor: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
 
 def _figures(problem: Problem, output: _Output, frame: Frame, mesh: Any, u: Any, folder: Path, artist: Artist) -> None:
     from finger3d import view
+    from finger3d.marks import marks_of
 
     steps = [measure(problem.points, f) for f in output.frames if f.outcome.ok]
     table = contact_table(problem.points, frame.state)
@@ -383,6 +385,7 @@ def _figures(problem: Problem, output: _Output, frame: Frame, mesh: Any, u: Any,
     artist.draw(view.force_figure, folder / "force.png", steps)
     artist.draw(
         view.finger_picture, folder / "finger.png", mesh, u, table, problem.points.nodes,
-        f"{steps[-1]['normal_force_N']:.4g} N at {frame.target.depth_mm:g} mm", gauges=problem.model.gauges,
+        f"{steps[-1]['normal_force_N']:.4g} N at {frame.target.depth_mm:g} mm",
+        marks=marks_of(mesh, problem.model.gauges, near=mesh.dim == 3),
     )  # fmt: skip
     artist.begin()

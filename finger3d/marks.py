@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.fem.elements import shape
-from finger3d.fem.surface import locate
 from finger3d.mesh import Mesh
-from finger3d.model import Gauge
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from finger3d.model import Gauge
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -81,6 +80,8 @@ def marks_of(mesh: Mesh, gauges: Sequence[Gauge], near: bool = False) -> tuple[M
 
 def _near(mesh: Mesh, point: Float, outside: float) -> Float:
     """The point (3,) moved along z to the surface, where no other part of the body is before the z outside."""
+    from finger3d.fem.surface import locate
+
     inside = point[2]
     if locate(mesh, np.array([*point[:2], outside])):
         inside = outside
@@ -91,6 +92,10 @@ def _near(mesh: Mesh, point: Float, outside: float) -> Float:
 
 
 def _weights(mesh: Mesh, point: Float) -> tuple[Int, Float] | None:
+    # not above: a process that only draws marks needs no SciPy
+    from finger3d.fem.elements import shape
+    from finger3d.fem.surface import locate
+
     found = locate(mesh, point)
     if not found:
         return None

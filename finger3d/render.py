@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.camera import AXES, WINDOW, flat, framed, half_height
+from finger3d.children import child_environment
 from finger3d.contact.law import OPEN, SLIP, STICK
 from finger3d.errors import MissingError
 from finger3d.mesh import EDGES, Mesh
@@ -282,13 +283,6 @@ def rendered(module: str, arrays: Mapping[str, Any], must: bool = False) -> NDAr
     if must:
         raise MissingError(f"PyVista cannot render here: {_failure[0]}; unset FINGER3D_RENDERER to use matplotlib")
     return None
-
-
-def child_environment() -> dict[str, str]:
-    """This process's environment, in which a child imports this very package."""
-    here = str(Path(__file__).resolve().parent.parent)
-    path = os.pathsep.join(p for p in (here, os.environ.get("PYTHONPATH")) if p)
-    return {**os.environ, "PYTHONPATH": path}
 
 
 def run_child(command: list[str], window: bool = False) -> str | None:

@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from finger3d.contact.law import OPEN, SLIP, STATUS_NAMES, STICK
-from finger3d.marks import draw_marks, marks_of
+from finger3d.marks import Mark, draw_marks
 from finger3d.mesh import Mesh
-from finger3d.model import Gauge
 from finger3d.outlines import edges_of, outline_of
 from finger3d.panels import WIDEST, blank, cells, save, sheet
 from finger3d.render import BODY, COLOURS, LINE, OBJECT, REST, Skin, draw_solid, flat, render_solid, skin_of
@@ -43,7 +42,7 @@ def finger_picture(
     contact_nodes: ArrayLike,
     title: str = "",
     profile: Float | None = None,
-    gauges: Sequence[Gauge] = (),
+    marks: Sequence[Mark] = (),
 ) -> str:
     """Draw the deformed finger at true scale: contact pressure on the left, stick and slip on the right.
 
@@ -54,7 +53,7 @@ def finger_picture(
     table : columns of contact.csv, of which pressure_MPa, shear_x_MPa, shear_z_MPa and status are read, each (c,)
     contact_nodes : (c,) numbers of the contact points in `mesh`
     profile : (k, 2) x and y in mm of the object's surface, drawn as a line (2D) or an outline (solid)
-    gauges : marked where they lie, with name and angle
+    marks : of gauges (`finger3d.marks.marks_of`), drawn where they lie, with name and angle
 
     Returns
     -------
@@ -63,13 +62,13 @@ def finger_picture(
     """
     nodes, status = np.asarray(contact_nodes, dtype=np.int64), _status(table)
     pressure = _column(table, "pressure_MPa")
-    marks = [(mark.label, mark.of(mesh.points + displacement)) for mark in marks_of(mesh, gauges, near=mesh.dim == 3)]
+    lines = [(mark.label, mark.of(mesh.points + displacement)) for mark in marks]
     if mesh.dim == 2:
-        figure, renderer = _section(mesh, displacement, pressure, status, nodes, profile, title, marks), "matplotlib"
+        figure, renderer = _section(mesh, displacement, pressure, status, nodes, profile, title, lines), "matplotlib"
     else:
         shear = np.column_stack([_column(table, "shear_x_MPa"), _column(table, "shear_z_MPa")])
         skin = skin_of(mesh, displacement, pressure, shear, status, nodes, profile)
-        figure, renderer = _solid(skin, title, marks)
+        figure, renderer = _solid(skin, title, lines)
     top = 0.4 / figure.get_figheight() if title else 0.0
     names = ("Contact pressure on the deformed finger, at true scale", "The zones that stick and slip")
     save(figure, path, dict(zip(names, cells(1, 2, top), strict=True)))

@@ -53,7 +53,7 @@ def test_the_picture_shows_the_gauge_beside_the_pressure_only(
     monkeypatch.setenv("FINGER3D_RENDERER", "matplotlib")
     mesh = finger((12, 5, 4)[:dim])
     result = pressed(mesh)
-    finger_picture(tmp_path / "with.png", mesh, **result, gauges=[POINT, LONG])
+    finger_picture(tmp_path / "with.png", mesh, **result, marks=marks_of(mesh, [POINT, LONG], near=dim == 3))
     finger_picture(tmp_path / "without.png", mesh, **result)
     assert share(tmp_path / "without.png", COLOUR, within=0.02) == 0.0
     image = pixels(tmp_path / "with.png")

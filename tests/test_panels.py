@@ -12,6 +12,7 @@ import pytest
 from finger3d.compare.cases import Case
 from finger3d.compare.picture import draw as draw_comparison
 from finger3d.errors import Outcome
+from finger3d.marks import marks_of
 from finger3d.model import Gauge
 from finger3d.panels import DPI, Panel, cells, panels_of, sheet
 from finger3d.search.picture import draw as draw_search
@@ -24,6 +25,8 @@ from tests.test_view import MU, STEPS, finger, pressed
 
 PHONE = 368  # CSS pixels that a page 400 wide leaves for a figure
 LEGIBLE = 7  # CSS pixels of an em: below, lower-case letters have less than four pixels
+
+GAUGE = Gauge("g36", 36.0, 40.0)
 
 MUS = np.linspace(0.05, 1.0, 6)
 CAUSES = ("depth_mm", "E_percent", "nu", "tilt_deg", "gauge_x_mm", "gauge_y_mm", "gauge_angle_deg", "mesh")
@@ -39,12 +42,13 @@ def contact(path: Path) -> None:
 
 def section(path: Path) -> None:
     mesh = finger((20, 4))
-    finger_picture(path, mesh, **pressed(mesh), title="9 N", gauges=[Gauge("g36", 36.0, 40.0)], profile=np.eye(2))
+    finger_picture(path, mesh, **pressed(mesh), title="9 N", marks=marks_of(mesh, [GAUGE]), profile=np.eye(2))
 
 
 def solid(path: Path) -> None:
     mesh = finger((20, 4, 3))
-    finger_picture(path, mesh, **pressed(mesh), title="9 N", gauges=[Gauge("g36", 36.0, 40.0)], profile=np.eye(2))
+    marks = marks_of(mesh, [GAUGE], near=True)
+    finger_picture(path, mesh, **pressed(mesh), title="9 N", marks=marks, profile=np.eye(2))
 
 
 def comparison(path: Path) -> None:
