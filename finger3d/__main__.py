@@ -7,7 +7,10 @@ import sys
 def main() -> int:
     """Load the command line and run it."""
     try:
-        from finger3d.cli import main as run
+        from finger3d.lazy import loading
+
+        with loading():
+            from finger3d.cli import main as run
 
         return run()
     except KeyboardInterrupt:

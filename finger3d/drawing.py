@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import gc
 import os
 import pickle
 import subprocess
@@ -18,6 +17,7 @@ from io import BytesIO
 from typing import Any, Self
 
 from finger3d.children import child_environment
+from finger3d.lazy import loading
 
 _PATIENCE_S = 20.0  # for pictures that were begun when the user interrupted
 
@@ -86,10 +86,8 @@ class Artist:
 
 
 def _main(module: str) -> None:
-    gc.disable()
-    _warm_up(module)
-    gc.freeze()  # all of matplotlib stays, and need not be looked through for what the pictures leave
-    gc.enable()
+    with loading():
+        _warm_up(module)
     sent = sys.stdin.buffer.read()
     for call in pickle.loads(sent) if sent else ():
         call()

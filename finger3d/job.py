@@ -168,7 +168,6 @@ def _pressed(
     scene: Scene, folder: Path, report: Report, started: float, artist: Artist | None, ahead: Ahead | None
 ) -> tuple[History, dict[str, Any]]:
     from finger3d.accuracy import estimate
-    from finger3d.page import press_page
     from finger3d.solve import covers
 
     _clear(folder)
@@ -196,6 +195,8 @@ def _pressed(
         summary = output.write(_told(history), tables=False)
     if artist:
         report.stage("drawing")
+        from finger3d.page import press_page  # while the pictures are drawn
+
         artist.finish()
         press_page(folder)
     return history, summary

@@ -329,8 +329,8 @@ def _section(
     by_status = palette()[state[arc[:, :2]].ravel()]
     outline, edges = outline_of(mesh, moved), edges_of(mesh, moved)
     for axes, colours in zip(panels, (pressure_colours(of_half, highest), by_status), strict=True):
-        axes.add_patch(PathPatch(outline, facecolor=BODY, edgecolor=LINE, lw=0.5))
-        axes.add_patch(PathPatch(edges, facecolor="none", edgecolor=LINE, lw=0.25))
+        axes.add_artist(PathPatch(outline, facecolor=BODY, edgecolor=LINE, lw=0.5))
+        axes.add_artist(PathPatch(edges, facecolor="none", edgecolor=LINE, lw=0.25))
         if profile is not None:
             axes.plot(*profile.T, color=OBJECT, lw=1.5, zorder=2)
         axes.add_collection(LineCollection(list(halves), colors=colours, lw=5, capstyle="butt", zorder=3))

@@ -128,9 +128,9 @@ def _child(size: float, mus: Sequence[float], plain: bool) -> dict[str, float]:
 def _run(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
     package = str(Path(__file__).resolve().parents[1])
     paths = os.pathsep.join(filter(None, [package, os.environ.get("PYTHONPATH")]))
-    return subprocess.run(
-        command, capture_output=True, text=True, check=True, env={**os.environ, "PYTHONPATH": paths}
-    )  # fmt: skip
+    # a user's Python keeps what it compiled; one that may not would compile all of finger3d in every run
+    environment = {**os.environ, "PYTHONPATH": paths, "PYTHONDONTWRITEBYTECODE": ""}
+    return subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
 
 
 def _least(runs: Sequence[dict[str, float]]) -> dict[str, float]:

@@ -14,6 +14,7 @@ from cyclopts import App, Parameter
 
 import finger3d
 from finger3d.errors import Finger3dError
+from finger3d.lazy import loading, postpone
 from finger3d.report import Report, reporter
 
 if TYPE_CHECKING:
@@ -74,7 +75,10 @@ def print_json(data: Any) -> None:
 
 
 def load(path: Path, overrides: list[str] | None) -> Scene:
-    from finger3d.scene import load
+    with loading():
+        # SciPy imports every part of NumPy; these take a third of its time, and no command uses them
+        postpone("numpy.f2py", "numpy.testing")
+        from finger3d.scene import load
 
     return load(path, overrides or [])
 

@@ -13,6 +13,7 @@ from cyclopts import Parameter
 
 from finger3d.cli.common import Json, Set, app, check_writable, complain, kept, load, print_json, print_rows, reporting
 from finger3d.errors import Finger3dError, MissingError
+from finger3d.lazy import loading
 
 if TYPE_CHECKING:
     from finger3d.scene import Scene
@@ -45,7 +46,9 @@ def press(
     with Artist(figures) as artist:  # it loads what it needs while the scene is read
         loaded = load(scene, set_)
         check_writable(out, scene)
-        from finger3d.job import press as run
+        with loading():
+            import finger3d.ahead  # noqa: F401  all that the job will import
+            from finger3d.job import press as run
 
         report, aside = reporting(json_)
         try:
