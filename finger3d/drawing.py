@@ -14,6 +14,7 @@ from contextlib import suppress
 from functools import partial
 from importlib import import_module
 from io import BytesIO
+from threading import Thread
 from typing import Any, Self
 
 from finger3d.children import child_environment
@@ -31,20 +32,23 @@ class Artist:
     ----------
     wanted : whether anything will be drawn
     module : where the functions are that will; the child loads it meanwhile
+    formulae : whether it also gets ready to set formulae, which the ticks of logarithmic axes are
     """
 
-    def __init__(self, wanted: bool = True, module: str = "finger3d.view") -> None:
+    def __init__(self, wanted: bool = True, module: str = "finger3d.view", formulae: bool = True) -> None:
         self._wanted = wanted
         self._module = module
+        self._formulae = formulae
         self._calls: list[partial[Any]] = []
         self._child: subprocess.Popen[bytes] | None = None
-        self._sent = False
+        self._sender: Thread | None = None
 
     def __enter__(self) -> Self:
         if self._wanted and "matplotlib" not in sys.modules:
             # a session of its own: Ctrl-C is for the parent, which lets begun pictures be finished
+            command = [sys.executable, "-P", "-m", __name__, self._module]
             self._child = subprocess.Popen(
-                [sys.executable, "-P", "-m", __name__, self._module], env=child_environment(), start_new_session=True,
+                command + (["formulae"] if self._formulae else []), env=child_environment(), start_new_session=True,
                 stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
             )  # fmt: skip
         return self
@@ -52,9 +56,10 @@ class Artist:
     def __exit__(self, *_: object) -> None:
         if self._child is None:
             return
-        self._close()
+        if not self._sender:
+            self._close()
         try:
-            self._child.wait(_PATIENCE_S if self._sent else 0.0)
+            self._child.wait(_PATIENCE_S if self._sender else 0.0)
         except subprocess.TimeoutExpired:
             self._child.kill()
 
@@ -64,14 +69,16 @@ class Artist:
 
     def begin(self) -> None:
         """Let the child start on what was noted, while this process goes on."""
-        if self._child is None or not self._calls:
+        if self._child is None or not self._calls or self._sender:
             return
-        self._sent = True
-        self._close(pickle.dumps(self._calls, pickle.HIGHEST_PROTOCOL))
+        # The pipe holds less than a picture needs, and the child may be loading still: a thread waits for it.
+        data = pickle.dumps(self._calls, pickle.HIGHEST_PROTOCOL)
+        self._sender = Thread(target=self._close, args=(data,))
+        self._sender.start()
 
     def finish(self) -> None:
         """Wait until all is drawn."""
-        if self._child is None or not self._sent or self._child.wait() != 0:
+        if self._child is None or not self._sender or self._child.wait() != 0:
             for call in self._calls:
                 call()
         self._calls = []
@@ -85,9 +92,9 @@ class Artist:
                 stream.write(last)
 
 
-def _main(module: str) -> None:
+def _main(module: str, formulae: bool) -> None:
     with loading():
-        _warm_up(module)
+        _warm_up(module, formulae)
     sent = sys.stdin.buffer.read()
     for call in pickle.loads(sent) if sent else ():
         call()
@@ -95,7 +102,7 @@ def _main(module: str) -> None:
     os._exit(0)
 
 
-def _warm_up(module: str) -> None:
+def _warm_up(module: str, formulae: bool = True) -> None:
     """All that a first picture takes besides its own drawing, while the parent computes: modules, fonts, formulae."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -104,10 +111,11 @@ def _warm_up(module: str) -> None:
     figure = Figure(figsize=(1.0, 1.0))
     FigureCanvasAgg(figure)
     axes = figure.add_subplot(xlabel="x (mm)", title="x")
-    axes.semilogy([1.0, 100.0], label="x")  # its ticks are powers, which are set as formulae
+    draw = axes.semilogy if formulae else axes.plot  # the ticks of the first are powers, which are set as formulae
+    draw([1.0, 100.0], label="x")
     axes.legend(title="x")
     figure.savefig(BytesIO(), format="png")
 
 
 if __name__ == "__main__":
-    _main(sys.argv[1])
+    _main(sys.argv[1], "formulae" in sys.argv[2:])

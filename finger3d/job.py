@@ -158,7 +158,10 @@ def press(
     temporary = TemporaryDirectory(prefix="finger3d-") if out is None else None
     figures = temporary is None if figures is None else figures
     with claimed(temporary.name if temporary else str(out), "press") as folder:
-        with nullcontext(artist) if artist else Artist(figures) as mine, Ahead(scene if error else None) as ahead:
+        with (
+            nullcontext(artist) if artist else Artist(figures, formulae=False) as mine,
+            Ahead(scene if error else None) as ahead,
+        ):
             drawing, beside = mine if figures else None, ahead if error else None
             history, summary = _pressed(scene, folder, report or Report(), started, drawing, beside)
     return PressResult(history, folder, summary, temporary)

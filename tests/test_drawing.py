@@ -57,6 +57,22 @@ def test_an_error_of_a_picture_is_raised_here(tmp_path: Path) -> None:
             artist.finish()
 
 
+def test_to_begin_does_not_wait_for_a_child_that_is_loading(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    begun = tmp_path / "begun"
+    (tmp_path / "loads_until_begun.py").write_text(
+        "import time\nfrom pathlib import Path\nend = time.monotonic() + 20.0\n"
+        f"while not Path({str(begun)!r}).exists():\n    assert time.monotonic() < end\n    time.sleep(0.01)\n"
+    )
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
+    with Artist(module="loads_until_begun") as artist:
+        artist.draw(len, bytes(2**20))  # more than a pipe holds
+        artist.draw(note_process, tmp_path / "a")
+        artist.begin()
+        begun.touch()
+        artist.finish()
+    assert process(tmp_path / "a") != os.getpid()
+
+
 def test_pictures_that_were_begun_are_finished_when_interrupted(tmp_path: Path) -> None:
     def interrupted() -> None:
         with Artist() as artist:

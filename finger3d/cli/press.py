@@ -43,7 +43,7 @@ def press(
     """
     from finger3d.drawing import Artist
 
-    with Artist(figures) as artist:  # it loads what it needs while the scene is read
+    with Artist(figures, formulae=False) as artist:  # it loads what it needs while the scene is read
         loaded = load(scene, set_)
         check_writable(out, scene)
         with loading():
