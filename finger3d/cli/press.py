@@ -124,7 +124,8 @@ def compare(
             "them and writes them to its scene.toml, take that one"
         )
     check_writable(out, scene)
-    from finger3d.compare import compare as run
+    with loading():
+        from finger3d.compare import compare as run
 
     report, aside = reporting(json_)
     try:

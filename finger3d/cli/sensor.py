@@ -12,6 +12,7 @@ from cyclopts import Parameter
 
 from finger3d.cli.common import Json, Set, app, check_writable, complain, load, print_json, print_rows, reporting
 from finger3d.errors import Finger3dError, MissingError
+from finger3d.lazy import loading
 
 if TYPE_CHECKING:
     from finger3d.sensor import Estimate
@@ -55,9 +56,10 @@ def calibrate(
     """
     loaded = load(scene, set_)
     check_writable(out, scene)
-    from finger3d.sensor import calibrate as run
-    from finger3d.sensor.files import as_dict
-    from finger3d.sensor.run import parsed_mus, summary
+    with loading():
+        from finger3d.sensor import calibrate as run
+        from finger3d.sensor.files import as_dict
+        from finger3d.sensor.run import parsed_mus, summary
 
     report, aside = reporting(json_)
     try:
