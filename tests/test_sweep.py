@@ -253,6 +253,17 @@ def test_a_sweep_leaves_pandas_to_others(tmp_path):
     assert subprocess.run([sys.executable, "-c", code, str(tmp_path / "a.parquet")], timeout=60).returncode == 0
 
 
+def test_what_workers_are_copied_from_has_one_thread_and_what_they_need():
+    # a copy has no thread but the one that copies: locks that others held would be held for ever
+    code = "import os, sys, finger3d.sweep.loaded; "
+    code += "print(len(os.listdir('/proc/self/task')), *(m in sys.modules for m in sys.argv[1:]), flush=True)"
+    env = {**os.environ, "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    command = [sys.executable, "-c", code, "distributed.worker", "finger3d.solve", "pypardiso", "pandas"]
+    done = subprocess.run(command, env=env, capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.split() == ["1", "True", "True", "True", "False"]
+
+
 @pytest.mark.parametrize("name", ["points.jsonl", "results.parquet"])
 def test_a_full_disk_is_one_line_that_says_what_is_kept(name, scene, tmp_path, monkeypatch):
     sweep = points_of(scene, "friction.mu=0.06,1")

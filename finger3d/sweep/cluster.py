@@ -7,7 +7,8 @@ import os
 import signal
 import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import Any
 
 from finger3d.errors import Finger3dError, MissingError
@@ -39,14 +40,19 @@ _QUIET = {
 
 
 def prepare() -> None:
-    """Let a process load what workers need while this one goes on; each worker is then a copy of it."""
+    """Let a process load what workers need while this one goes on; each worker is then a copy of it.
+
+    That it cannot be started is told where a worker is.
+    """
     if _METHOD != "forkserver":
         return
     from multiprocessing import forkserver, set_forkserver_preload
 
+    # it loads this very package, and takes nothing that lies where the user is for a module
+    here = str(Path(__file__).resolve().parents[2])
+    path = os.pathsep.join(p for p in (here, os.environ.get("PYTHONPATH")) if p)
     set_forkserver_preload(["finger3d.sweep.loaded"])
-    # what lies where the user is must not be taken for a module
-    with _for_us_alone(), _environment(_ONE_THREAD | {"PYTHONSAFEPATH": "1"}):
+    with suppress(OSError), _for_us_alone(), _environment(_ONE_THREAD | {"PYTHONPATH": path, "PYTHONSAFEPATH": "1"}):
         forkserver.ensure_running()
 
 
