@@ -20,6 +20,7 @@ from finger3d.cli.common import (
     reporting,
 )
 from finger3d.errors import Finger3dError, MissingError
+from finger3d.lazy import loading
 
 if TYPE_CHECKING:
     from finger3d.sweep import Kept
@@ -69,8 +70,9 @@ def sweep(
 
     several = any("," in text for text in vary)
     with Artist(several, "finger3d.sweep.picture") as artist:  # it loads what it needs while the points are checked
-        from finger3d.sweep import combinations
-        from finger3d.sweep import sweep as run
+        with loading():
+            from finger3d.sweep import combinations
+            from finger3d.sweep import sweep as run
 
         report, aside = reporting(json_)
         try:

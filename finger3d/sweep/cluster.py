@@ -8,9 +8,9 @@ import signal
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from pathlib import Path
 from typing import Any
 
+from finger3d.children import child_environment
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.versions import cores
 
@@ -49,8 +49,7 @@ def prepare() -> None:
     from multiprocessing import forkserver, set_forkserver_preload
 
     # it loads this very package, and takes nothing that lies where the user is for a module
-    here = str(Path(__file__).resolve().parents[2])
-    path = os.pathsep.join(p for p in (here, os.environ.get("PYTHONPATH")) if p)
+    path = child_environment()["PYTHONPATH"]
     set_forkserver_preload(["finger3d.sweep.loaded"])
     with suppress(OSError), _for_us_alone(), _environment(_ONE_THREAD | {"PYTHONPATH": path, "PYTHONSAFEPATH": "1"}):
         forkserver.ensure_running()

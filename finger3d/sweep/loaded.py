@@ -1,9 +1,10 @@
 """What a worker needs, loaded once: the process that imports this is copied for every worker."""
 
 import atexit
-import gc
 import os
 from importlib import import_module
+
+from finger3d.lazy import loading, postpone
 
 _NAMES = (
     "dask", "numpy", "distributed", "distributed.nanny", "scipy.sparse", "scipy.linalg", "threadpoolctl",
@@ -17,14 +18,14 @@ def _load() -> None:
         if os.getppid() != asked:  # a mistake was found in the meantime: nobody will want workers
             os._exit(0)
         import_module(name)
+        if name == "numpy":
+            postpone("numpy.f2py", "numpy.testing")  # SciPy imports them; no worker uses them
     from finger3d.fem import pardiso
 
     pardiso.available()  # which loads its library
 
 
-gc.disable()
-_load()
-gc.freeze()  # no worker need look through it for what its presses leave
-gc.enable()
+with loading():
+    _load()
 # To take all that down in good order would keep waiting whoever reads what the sweep says. Workers do not come here.
 atexit.register(os._exit, 0)
