@@ -19,6 +19,9 @@ Float = NDArray[np.float64]
 TOLERANCE = 1e-8
 """Largest residual at which a step may call itself converged (contract.md)."""
 
+_CACHED = 30_000
+"""Numbers that are gathered at once."""
+
 
 @dataclass(frozen=True)
 class Increments:
@@ -45,6 +48,16 @@ class Increments:
     def moved(self, force: Float) -> Float:
         """Gap and change of position (c, d) mm under forces (c, d) N."""
         return self.free + (self.compliance @ force.ravel()).reshape(force.shape)
+
+    def between(self, chosen: NDArray[np.int64]) -> Float:
+        """Compliance (k, k) between the chosen ones of c d forces, gathered within what a cache holds."""
+        found = np.empty((len(chosen), len(chosen)))
+        stride = max(1, _CACHED // len(self.compliance))
+        for i in range(0, len(chosen), stride):
+            part = slice(i, i + stride)
+            rows = self.compliance.take(chosen[part], axis=0)
+            np.take(rows, chosen, axis=1, out=found[part], mode="clip")  # "raise" would copy
+        return found
 
 
 def lengths(vectors: Float) -> Float:

@@ -31,10 +31,8 @@ _CORRECTIONS, _PAYS = 12, 0.1
 """Corrections with one factor, and the share of the residual that one may leave: it costs a tenth of an iteration."""
 
 _FINE = 1e-13
-"""Residual at which corrections end: they come down by steps, where Newton's last iteration reaches round-off."""
-
-_CACHED = 30_000
-"""Numbers that are gathered at once."""
+"""Share of the forces that corrections leave: they come down by steps, where Newton's last iteration reaches
+round-off."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +98,7 @@ class _System:
         # slipping ones come direction by direction: passes over it are as dear as the solution.
         own = np.concatenate([(stick[:, None] * d + np.arange(d)).ravel(), slip * d])
         sides = [slip * d + i for i in range(1, d)]
-        whole = _between(problem.compliance, np.concatenate([own, *sides]))
+        whole = problem.between(np.concatenate([own, *sides]))
         rho, free = problem.rho.ravel(), problem.free.ravel()
         normal, first, second = (slice(n + i * k, n + (i + 1) * k) for i in range(3))
         for i, side in enumerate((first, second)[: d - 1]):
@@ -170,17 +168,6 @@ def _solver(matrix: Float, again: bool) -> Callable[[Float], Float]:
     return lambda right: np.asarray(dgetrs(factor, pivots, right)[0])
 
 
-def _between(matrix: Float, chosen: NDArray[np.int64]) -> Float:
-    """Entries of a matrix between the chosen rows and columns, row by row within what a cache holds."""
-    count = len(chosen)
-    found = np.empty((count, count))
-    stride = max(1, _CACHED // len(matrix))
-    for i in range(0, count, stride):
-        part = slice(i, i + stride)
-        np.take(matrix.take(chosen[part], axis=0), chosen, axis=1, out=found[part], mode="clip")  # "raise" would copy
-    return found
-
-
 class _Tried(NamedTuple):
     """Forces (c, d) N, where they move the points (c, d) mm, and their projection: forces, states, trial forces.
 
@@ -200,12 +187,17 @@ class _Tried(NamedTuple):
         projected, status, trial = project(problem, force, moved)
         return cls(force, moved, projected, status, trial, float(np.linalg.norm(force - projected)))
 
-    def solves(self, problem: Increments, status: NDArray[np.int8], exact: float = _EXACT) -> bool:
+    @property
+    def fine(self) -> bool:
+        """Whether nothing is left to correct."""
+        return self.merit <= _FINE * float(np.linalg.norm(self.force))
+
+    def solves(self, problem: Increments, status: NDArray[np.int8]) -> bool:
         """Whether the conditions hold with these states."""
         near = _NEAR * float(problem.mu.max(initial=1.0)) * float(np.linalg.norm(self.force))
         if not self.merit <= near:
             return False
-        return residual(self.force, self.moved, status, problem.mu, problem.length_scale) <= exact
+        return residual(self.force, self.moved, status, problem.mu, problem.length_scale) <= _EXACT
 
 
 def newton(problem: Increments, start: Float, limit: int, damped: bool) -> Iterate:
@@ -227,7 +219,7 @@ def newton(problem: Increments, start: Float, limit: int, damped: bool) -> Itera
         except np.linalg.LinAlgError:
             break
         share, there = 1.0, _Tried.of(problem, target)
-        if there.solves(problem, status):
+        if (there.fine or not system.turns) and there.solves(problem, status):
             return Iterate(target, status, True, iteration)
         while damped and not there.merit <= (1.0 - 1e-4 * share) * here.merit and share >= 1e-3:
             share *= 0.5
@@ -246,7 +238,7 @@ def _turned(problem: Increments, system: _System, found: _Tried) -> _Tried:
     """What corrections with the factor at hand make of forces whose sets are those of the system, while they pay."""
     best = _Tried.of(problem, system.rubbing(found.force))
     for _ in range(_CORRECTIONS):
-        if (best.status != found.status).any() or best.solves(problem, found.status, _FINE):
+        if best.fine or (best.status != found.status).any():
             break
         tried = _Tried.of(problem, system.corrected(best.force, best.force - best.projected))
         if not tried.merit <= _PAYS * best.merit:

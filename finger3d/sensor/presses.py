@@ -1,6 +1,6 @@
 """Presses of one condensed body under one coefficient of friction after another, each started from those before.
 
-Forces at a neighbouring mu halve the time of a press: its increments need no other start, and fewer iterations.  They
+Forces at a neighbouring mu take a third off the time of a press, whose increments then need no other start.  They
 decide nothing: what is found is proved as always.
 """
 
@@ -20,7 +20,7 @@ from finger3d.solve import each, march
 Float = NDArray[np.float64]
 
 _FARTHEST = 2.0  # times the distance of the last two mu: forces are not continued beyond
-_NEAR = 0.1  # of mu: from one farther off a press takes more iterations than from its own path
+_NEAR = 0.1  # of mu: from one farther off a press takes longer than from its own path
 
 
 @dataclass(frozen=True)
