@@ -37,7 +37,7 @@ LARGE, MIDDLE, QUICK = 0.85, 1.0, 2.5  # mm: 150 000, 42 000 and 6 000 unknowns
 MUS = (0.06, 0.125, 0.25, 0.5, 1.0)
 MU = 0.25
 GRADING = {LARGE: 2.06}  # how much longer edges are far from the contact, else 4: the large one has 1 150 contact rows
-SECTION = """
+SCENE = """
 [finger]
 geometry = "clipped_cylinder"
 radius_mm = 100.0
@@ -51,12 +51,20 @@ nu = 0.49
 mu = 0.25
 [press]
 depth_mm = 10.0
+"""
+SECTION = SCENE + """
 [model]
 domain = "plane-strain"
 [mesh]
 size_mm = 0.3
 base_size_mm = 1.0
 """  # 26 000 unknowns
+SOLID = SCENE + f"""
+[mesh]
+mesher = "swept"
+size_mm = {MIDDLE}
+base_size_mm = {4.0 * MIDDLE}
+"""
 
 
 def fig9(size: float, domain: Domain = "solid", mesher: Any = "swept") -> Model:
@@ -153,6 +161,22 @@ def _press_overhead(repeats: int) -> float:
     return min(found)
 
 
+def _five_against_one(scene: str, repeats: int) -> float:
+    """Wall time of `finger3d sweep` of all of MUS over that of one, all of Python and output included."""
+    found: dict[int, list[float]] = {1: [], len(MUS): []}
+    with tempfile.TemporaryDirectory(prefix="finger3d_bench_") as folder:
+        path = Path(folder, "scene.toml")
+        path.write_text(scene, encoding="utf-8")
+        command = [sys.executable, "-m", "finger3d", "sweep", str(path), "--vary"]
+        for number in range(repeats):
+            for mus in ((MU,), MUS):
+                values = "friction.mu=" + ",".join(f"{mu:g}" for mu in mus)
+                begin = time.perf_counter()
+                _run([*command, values, "--out", str(Path(folder, f"{number}_{len(mus)}"))])
+                found[len(mus)].append(time.perf_counter() - begin)
+    return min(found[len(MUS)]) / min(found[1])
+
+
 def _warm_cache(size: float) -> tuple[float, float]:
     """Seconds of a mesh by pytetwild, made and read again, in a cache of its own."""
     model = fig9(size, mesher="ftetwild")
@@ -177,7 +201,11 @@ def run(quick: bool) -> tuple[Row, ...]:
     load = os.getloadavg()[0]
     sizes = (QUICK,) if quick else (MIDDLE, LARGE)
     runs = {size: [_child(size, MUS, True)] for size in sizes}
-    overhead = _press_overhead(1 if quick else 3)
+    repeats = 1 if quick else 3
+    overhead = _press_overhead(repeats)
+    swept = {"section": _five_against_one(SECTION, repeats)}
+    if not quick:
+        swept[f"solid, {runs[MIDDLE][0]['dofs']:.0f} unknowns"] = _five_against_one(SOLID, repeats)
     made = None if quick else _warm_cache(2.0)
     if not quick:
         for size in sizes:
@@ -185,11 +213,12 @@ def run(quick: bool) -> tuple[Row, ...]:
     load = max(load, os.getloadavg()[0])
     best = {size: _least([_common(r, runs[size]) for r in runs[size]]) for size in sizes}
     rows = _ratios(best[sizes[-1]], load)
+    rows += [_row(f"finger3d sweep of 5 values of mu against one, {k}", 1.25, v, load) for k, v in swept.items()]
     for size in sizes:
         first = runs[size][0]
         once = first["assembly"] + first["condensation"]
         five = (once + first["contact_all"]) / (once + first["contact"])
-        rows.append(_row(f"5 values of mu against one, {first['dofs']:.0f} unknowns", 1.25, five, load))
+        rows.append(_row(f"5 values of mu against one, stages alone, {first['dofs']:.0f} unknowns", 1.25, five, load))
     rows.append(_row("press of a section over its solve and estimate, s", 1.5, overhead, load))
     if made:
         what = f"pytetwild on a warm cache against a cold one ({made[0]:.1f} s)"

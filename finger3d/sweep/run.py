@@ -67,13 +67,15 @@ def sweep(
             report.say(f"{before} of {len(points.points)} points are kept from before")
         tasks = _tasks(points, kept)
         several = bool(tasks) and any(len(v.texts) > 1 for v in points.vary)
-        with nullcontext(artist) if artist else Artist(several, draw.__module__) as mine:
+        with nullcontext(artist) if artist else Artist(several, draw.__module__, formulae=False) as mine:
             with _pressed(kept, tasks, scheduler, workers, report):  # the picture is drawn while workers end
                 columns = kept.columns()
                 if columns["point"]:
                     mine.draw(draw, folder / "sweep.png", columns, [v.key for v in points.vary])
                     mine.begin()
             kept.write()
+            import PIL.PngImagePlugin  # noqa: F401  the page will, and now the picture is drawn
+
             mine.finish()
         sweep_page(folder)
         return kept
