@@ -28,6 +28,7 @@ LIMITS_MB = {40_000: 2_000.0, 160_000: 5_000.0, 500_000: 20_000.0}
 UNKNOWNS = (Size(2.0, 8.0), Size(1.0, 4.0), Size(0.75, 3.0), Size(0.58, 2.32), Size(0.75, 0.98))
 ROWS = (Size(2.0, 8.0), Size(1.0, 16.0), Size(0.6, 16.0), Size(0.4, 16.0))
 SWEPT = Size(1.2, 5.0)
+WORKER_TRIES = 3
 NEED_GB = 14.0  # of free memory, for the largest
 COLOURS = dict(zip(STAGES, ("C7", "C0", "C1", "C3", "C2", "#c5b0d5"), strict=True))
 
@@ -87,9 +88,11 @@ def _growth_rows(runs: Runs, unknowns: Sequence[Size], quick: bool) -> list[Row]
 
 
 def _workers() -> list[Row]:
-    one, two = (sweep_seconds(SWEPT, count) for count in (1, 2))
+    # in turn, and the shorter time of each counts: what others do on the machine only ever makes it longer
+    tries = [[sweep_seconds(SWEPT, count) for count in (1, 2)] for _ in range(WORKER_TRIES)]
+    one, two = (min(times) for times in zip(*tries, strict=True))
     what = f"times faster with two local workers, {BODIES} bodies of 31 446 unknowns"
-    why = f"the whole command with its start: {one:.0f} s by one"
+    why = f"the whole command with its start: {one:.0f} s by one, the shortest of {WORKER_TRIES}"
     return [Row(what, "issue 7", 1.7, one / two, 0.0, why, "validation", "at least")]
 
 
