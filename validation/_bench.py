@@ -52,25 +52,19 @@ mu = 0.25
 [press]
 depth_mm = 10.0
 """
-SECTION = (
-    SCENE
-    + """
+SECTION = f"""{SCENE}
 [model]
 domain = "plane-strain"
 [mesh]
 size_mm = 0.3
 base_size_mm = 1.0
-"""
-)  # 26 000 unknowns
-SOLID = (
-    SCENE
-    + f"""
+"""  # 26 000 unknowns
+SOLID = f"""{SCENE}
 [mesh]
 mesher = "swept"
 size_mm = {MIDDLE}
 base_size_mm = {4.0 * MIDDLE}
 """
-)
 
 
 def fig9(size: float, domain: Domain = "solid", mesher: Any = "swept") -> Model:
