@@ -69,7 +69,8 @@ def sweep(
     from finger3d.drawing import Artist
 
     several = any("," in text for text in vary)
-    with Artist(several, "finger3d.sweep.picture", formulae=False) as artist:  # it loads what it needs while the points are checked
+    # it loads what it needs while the points are checked
+    with Artist(several, "finger3d.sweep.picture", formulae=False) as artist:
         with loading():
             from finger3d.sweep import combinations
             from finger3d.sweep import sweep as run

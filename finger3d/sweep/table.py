@@ -9,11 +9,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import accumulate
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
+
+if TYPE_CHECKING:
+    import pyarrow
 
 
 def write_parquet(path: Path, columns: Mapping[str, Sequence[Any]]) -> None:
@@ -24,12 +25,17 @@ def write_parquet(path: Path, columns: Mapping[str, Sequence[Any]]) -> None:
     OSError
         If the file cannot be written.
     """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     arrays = [_array(values) for values in columns.values()]
     pq.write_table(pa.table(arrays, names=list(columns)), path)
 
 
-def _array(values: Sequence[Any]) -> pa.Array:
+def _array(values: Sequence[Any]) -> pyarrow.Array:
     """What ``pyarrow.array(values)`` gives, by Arrow's memory layout of each type."""
+    import pyarrow as pa
+
     kind, count = type(values[0]) if values else float, len(values)
     if kind is str:
         parts = [v.encode() for v in values]
