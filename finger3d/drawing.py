@@ -45,10 +45,10 @@ class Artist:
 
     def __enter__(self) -> Self:
         if self._wanted and "matplotlib" not in sys.modules:
-            # a session of its own: Ctrl-C is for the parent, which lets begun pictures be finished
+            # a group of its own: Ctrl-C is for the parent, which lets begun pictures be finished
             command = [sys.executable, "-P", "-m", __name__, self._module]
             self._child = subprocess.Popen(
-                command + (["formulae"] if self._formulae else []), env=child_environment(), start_new_session=True,
+                command + (["formulae"] if self._formulae else []), env=child_environment(), process_group=0,
                 stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
             )  # fmt: skip
         return self
@@ -93,6 +93,8 @@ class Artist:
 
 
 def _main(module: str, formulae: bool) -> None:
+    if hasattr(os, "nice"):
+        os.nice(10)  # the solver goes first, and when this is waited for, nothing of the parent's runs beside it
     with loading():
         _warm_up(module, formulae)
     sent = sys.stdin.buffer.read()

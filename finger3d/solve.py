@@ -156,8 +156,9 @@ def _candidates(model: Model, face: Surface, touch: float, margin: float) -> Sur
     path = targets(tuple(replace(leg, steps=_stations(leg)) for leg in model.legs))
     nearest = np.min([rigid_gap(model, face, touch, t) for t in path], axis=0)
     reach = margin * max(t.depth_mm for t in path) + max(float(nearest.min()), 0.0)
-    near = nearest < reach
-    return face if near.mean() >= _NEARLY else restrict(face, near)
+    order = np.argsort(nearest, kind="stable")  # so that points which touch come before those which do not
+    near = order[nearest[order] < reach]
+    return restrict(face, order if len(near) >= _NEARLY * len(order) else near)
 
 
 def _stations(leg: Leg) -> int:

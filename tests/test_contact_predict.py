@@ -40,6 +40,18 @@ def pressed(compliance: np.ndarray, gap: np.ndarray, mu: float) -> list[Incremen
 
 
 @pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("bearing", [0, 1, 4, 9])
+def test_forces_of_the_first_points_move_all_points(dim: int, bearing: int) -> None:
+    rng = np.random.default_rng(bearing)
+    problem = increments(random_compliance(rng, 9, dim, 1.0), rng.normal(size=(9, dim)), 0.25)
+    force = np.zeros((9, dim))
+    force[:bearing] = rng.normal(size=(bearing, dim))
+    moved = problem.free + (problem.compliance @ force.ravel()).reshape(9, dim)
+    assert problem.moved(force) == pytest.approx(moved, abs=1e-13)
+    assert problem.gap(force) == pytest.approx(moved[:, 0], abs=1e-13)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
 def test_without_friction_the_start_is_the_answer(dim: int) -> None:
     rng = np.random.default_rng(3)
     compliance, free = random_compliance(rng, 9, dim, 1.0), rng.normal(size=(9, dim))
@@ -58,14 +70,15 @@ def test_the_start_is_admissible_and_each_turn_nearer_to_the_answer(monkeypatch:
     assert answer.outcome.ok
     wanted = answer.state.force
     left = []
-    for turns in (1, 2, 3, 4):
-        monkeypatch.setattr(start, "_TURNS", turns)
+    for turns in (1, 2, 3):
+        monkeypatch.setattr(start, "_STEPS", turns * start._TURN)
         found = predict(problem, np.zeros_like(wanted))
         assert (np.linalg.norm(found[:, 1:], axis=1) <= (0.25 + 1e-12) * found[:, 0]).all()
         left.append(np.linalg.norm(found - wanted) / np.linalg.norm(wanted))
-    # friction and normal forces answer each other by mu times Dundurs' beta = 0.29 here: a turn leaves about 7 %
+    # friction and normal forces answer each other by mu times Dundurs' beta = 0.29 here: a turn leaves about 7 %, and
+    # its gradient steps as much again of the friction
     assert left[0] < 0.07
-    assert (np.divide(left[1:], left[:-1]) < 0.1).all()
+    assert (np.divide(left[1:], left[:-1]) < 0.15).all()
 
 
 def test_forces_under_which_nothing_opens_or_closes_are_kept() -> None:

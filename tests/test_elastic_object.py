@@ -155,10 +155,7 @@ def test_energy_goes_into_both_bodies() -> None:
     problem, frames = run(
         Effect(1.0, 0.3).apply(pad(object=Cylinder(radius_mm=4.0), friction=Coulomb(0.0), legs=(Leg(0.3, steps=20),)))
     )
-    force = frames[-1].state.force[np.flatnonzero(np.all(problem.sign == 1.0, axis=1))]
-    part = np.zeros((len(problem.surface.nodes), 3))
-    part[problem.parent[np.all(problem.sign == 1.0, axis=1)]] = force
-    part /= problem.share[np.all(problem.sign == 1.0, axis=1)][:, None]
+    part = frames[-1].part.force
     stored = 0.5 * 4.0 * np.einsum("id,idje,je->", part, problem.compliance, part)
     assert frames[-1].external_work_mJ == pytest.approx(stored, rel=0.01)
 

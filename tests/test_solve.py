@@ -53,6 +53,16 @@ def last(model: Model) -> dict[str, float]:
     return measure(problem.points, frames[-1])
 
 
+@pytest.mark.parametrize("domain", ["solid", "plane-strain"])
+def test_points_that_touch_come_first(domain: str) -> None:
+    """The object sinks into the points in nearly the order of their distance: products end with the last that bears."""
+    problem, frames = run(fig9(domain=domain))
+    for frame in frames:
+        touching = np.flatnonzero(frame.part.force[:, 0])
+        assert touching[-1] < 1.1 * len(touching) + 1
+    assert len(touching) < 0.9 * len(problem.surface.nodes)
+
+
 # references.md sec. 2, the paper's half cylinder; P within 1 %, lengths within .013 plus half a contact point
 @pytest.mark.parametrize(
     ("depth", "force", "a", "c"),

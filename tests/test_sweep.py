@@ -19,7 +19,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from finger3d.cli import main
+from finger3d.cli.sweep import _SHARED
 from finger3d.errors import Finger3dError, MissingError
+from finger3d.family import _FREE
 from finger3d.scene import load
 from finger3d.sweep import Kept, Sweep, combinations
 from finger3d.sweep import run as running
@@ -334,6 +336,11 @@ def test_workers_gain_no_threads(threads, scene, monkeypatch):
     assert [row["point"] for row in rows] == [0, 1, 2]
     assert {row["outcome"] for row in rows} == {"converged"}
     assert pools == ([] if threads else [2])
+
+
+def test_the_command_knows_which_keys_share_a_body():
+    """It says so before it loads what sorts scenes by body; if they part, workers are prepared for nothing."""
+    assert {key.removesuffix(".") for key in _SHARED} == set(_FREE) - {"title"}
 
 
 def test_the_scene_of_these_tests_is_small(scene):

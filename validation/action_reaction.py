@@ -67,7 +67,7 @@ def balance(problem: Problem, frame: Frame) -> Balance:
     push = problem.points.world(frame.state.force)
     # a contact force acts where its hat's mean is, which for a moment is the hat's mean place
     place = np.zeros_like(push)
-    place[:, :d] = problem.surface.trace @ problem.mesh.points
+    place[:, :d] = (problem.surface.trace @ problem.mesh.points)[problem.parent]  # no symmetry here: no sign
     scale = np.linalg.norm(push.sum(axis=0))
     turning = np.cross(arm, reaction).sum(axis=0) + np.cross(place, push).sum(axis=0)
     stored = 0.5 * float(unknowns @ inner)

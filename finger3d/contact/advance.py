@@ -66,33 +66,30 @@ def advance(
     while True:
         problem = Increments(change, matrix, mu, rho, length_scale)
         with threads_for(c * d, d > 2):  # in 3D Newton factors by SciPy
-            method, found, moved, error, spent = _settle(problem, start, guess is None)
+            method, found, error, spent = _settle(problem, start, guess is None)
         total += spent
-        if found is None or moved is None:
+        if found is None:
             return Increment(previous, Outcome.NO_CONVERGENCE, error, total, method)
         revised = law.revised(mu, found.status)
         if revised is None:
             break
         mu, start = revised, found.force
-    state = next_state(previous, found.force, moved, found.status)
+    state = next_state(previous, found.force, found.moved, found.status)
     return Increment(state, Outcome.CONVERGED, error, total, method)
 
 
-def _settle(problem: Increments, start: Float, turns: bool) -> tuple[str, Iterate | None, Float | None, float, int]:
-    """Method, solution, where it has moved to (c, d) mm, its residual, and the iterations spent; None, and the least
-    residual, where all attempts fail.
-    """
+def _settle(problem: Increments, start: Float, turns: bool) -> tuple[str, Iterate | None, float, int]:
+    """Method, solution, its residual and the iterations spent; None and the least residual where all attempts fail."""
     spent, least = 0, np.inf
     for method, attempt in _ladder(problem, start, turns):
         spent += attempt.iterations
         if not attempt.solved:
             continue
-        moved = problem.moved(attempt.force)
-        error = residual(attempt.force, moved, attempt.status, problem.mu, problem.length_scale)
+        error = residual(attempt.force, attempt.moved, attempt.status, problem.mu, problem.length_scale)
         if error <= TOLERANCE:
-            return method, attempt, moved, error, spent
+            return method, attempt, error, spent
         least = min(least, error)
-    return "none", None, None, least, spent
+    return "none", None, least, spent
 
 
 def _ladder(problem: Increments, start: Float, turns: bool) -> Iterator[tuple[str, Iterate]]:
@@ -146,23 +143,22 @@ def _pivots(problem: Increments, start: Float) -> Iterate:
             if not beyond.any():
                 break
             inside |= beyond
-    return Iterate(start, np.zeros(len(start), dtype=np.int8), False, spent)
+    return Iterate(start, problem.moved(start), np.zeros(len(start), dtype=np.int8), False, spent)
 
 
 def _ramp(problem: Increments, start: Float) -> Iterate:
     """Follow the solution from no friction to the coefficient asked for, halving the stride where it breaks."""
-    attempt = newton(replace(problem, mu=np.zeros_like(problem.mu)), start, 60, damped=True)
-    spent = attempt.iterations
+    found = newton(replace(problem, mu=np.zeros_like(problem.mu)), start, 60, damped=True)
+    spent = found.iterations
     reached, stride = 0.0, 0.25
-    force, status = attempt.force, attempt.status
     # beyond mu ~ 5 nothing changes but full stick, so the share runs over a saturating scale
-    while attempt.solved and reached < 1.0 and stride > 1e-3:
+    while found.solved and reached < 1.0 and stride > 1e-3:
         share = min(reached + stride, 1.0)
         mu = problem.mu if share == 1.0 else problem.mu * share / (1.0 + (1.0 - share) * problem.mu)
-        trial = newton(replace(problem, mu=mu), force, 40, damped=True)
+        trial = newton(replace(problem, mu=mu), found.force, 40, damped=True)
         spent += trial.iterations
         if trial.solved:
-            force, status, reached, stride = trial.force, trial.status, share, stride * 1.5
+            found, reached, stride = trial, share, stride * 1.5
         else:
             stride *= 0.5
-    return Iterate(force, status, reached >= 1.0, spent)
+    return replace(found, solved=reached >= 1.0, iterations=spent)

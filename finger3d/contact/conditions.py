@@ -47,15 +47,28 @@ class Increments:
 
     def moved(self, force: Float) -> Float:
         """Gap and change of position (c, d) mm under forces (c, d) N."""
-        return self.free + (self.compliance @ force.ravel()).reshape(force.shape)
+        return self.free + self._times(self.compliance, force).reshape(force.shape)
+
+    def gap(self, force: Float) -> Float:
+        """Gap (c,) mm under forces (c, d) N."""
+        return self.free[:, 0] + self._times(self.compliance[:: force.shape[1]], force)
+
+    @staticmethod
+    def _times(rows: Float, force: Float) -> Float:
+        """Rows (k, c d) times forces (c, d), up to the last point that bears one: those pressed deepest come first."""
+        forces = force.ravel()
+        last = np.flatnonzero(forces)[-1:] + 1
+        reach = int(last[0]) if len(last) else 0
+        return rows[:, :reach] @ forces[:reach]
 
     def between(self, chosen: NDArray[np.int64]) -> Float:
         """Compliance (k, k) between the chosen ones of c d forces, gathered within what a cache holds."""
         found = np.empty((len(chosen), len(chosen)))
-        stride = max(1, _CACHED // len(self.compliance))
+        reach = int(chosen.max(initial=-1)) + 1
+        stride = max(1, _CACHED // max(1, reach))
         for i in range(0, len(chosen), stride):
             part = slice(i, i + stride)
-            rows = self.compliance.take(chosen[part], axis=0)
+            rows = self.compliance[chosen[part], :reach]
             np.take(rows, chosen, axis=1, out=found[part], mode="clip")  # "raise" would copy
         return found
 

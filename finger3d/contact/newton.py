@@ -37,12 +37,14 @@ round-off."""
 
 @dataclass(frozen=True)
 class Iterate:
-    """Forces (c, d) N after some iterations with the sets (c,) they belong to, and whether they are a solution.
+    """Forces (c, d) N after some iterations, where they move the points (c, d) mm, the sets (c,) they belong to.
 
-    An iteration is a system of equations set up and factored; corrections with its factor are part of it.
+    `solved` says whether they are a solution.  An iteration is a system of equations set up and factored; corrections
+    with its factor are part of it.
     """
 
     force: Float
+    moved: Float
     status: NDArray[np.int8]
     solved: bool
     iterations: int
@@ -117,7 +119,7 @@ class _System:
             right = np.concatenate([right, weigh[0] * free[sides[0]] + weigh[1] * free[sides[1]]])
             at = np.arange(n + k, count)
             whole[at, at] += 1.0 - turn
-        return cls((c, d), _solver(whole[:count, :count].T, count > n + k), -right, own, slip, pull, across)
+        return cls((c, d), solver(whole[:count, :count].T, count > n + k), -right, own, slip, pull, across)
 
     def solution(self) -> Float:
         """Forces (c, d) that meet the equations."""
@@ -156,9 +158,9 @@ class _System:
         return force
 
 
-def _solver(matrix: Float, again: bool) -> Callable[[Float], Float]:
+def solver(matrix: Float, again: bool) -> Callable[[Float], Float]:
     """What solves with a matrix; factored at once if it will be asked again."""
-    if not again:
+    if not (again and len(matrix)):  # LAPACK takes no empty ones
         return partial(np.linalg.solve, matrix)
     from scipy.linalg.lapack import dgetrf, dgetrs  # not at the top: 2D never asks again, and need not load it
 
@@ -220,7 +222,7 @@ def newton(problem: Increments, start: Float, limit: int, damped: bool) -> Itera
             break
         share, there = 1.0, _Tried.of(problem, target)
         if (there.fine or not system.turns) and there.solves(problem, status):
-            return Iterate(target, status, True, iteration)
+            return Iterate(target, there.moved, status, True, iteration)
         while damped and not there.merit <= (1.0 - 1e-4 * share) * here.merit and share >= 1e-3:
             share *= 0.5
             there = _Tried.of(problem, here.force + share * (target - here.force))
@@ -229,9 +231,9 @@ def newton(problem: Increments, start: Float, limit: int, damped: bool) -> Itera
         if share == 1.0 and system.turns and (there.status == status).all():
             there = _turned(problem, system, there)
             if there.solves(problem, status):
-                return Iterate(there.force, status, True, iteration)
+                return Iterate(there.force, there.moved, status, True, iteration)
         here = there
-    return Iterate(here.force, here.status, False, iteration)
+    return Iterate(here.force, here.moved, here.status, False, iteration)
 
 
 def _turned(problem: Increments, system: _System, found: _Tried) -> _Tried:

@@ -84,8 +84,8 @@ def surface(mesh: Mesh, label: str, thickness: float = 1.0) -> Surface:
     return Surface(nodes, mesh.points[nodes], area, (average @ values).tocsr(), samples, average, values, along)
 
 
-def restrict(surface: Surface, keep: NDArray[np.bool_]) -> Surface:
-    """The contact points where `keep` (c,) holds."""
+def restrict(surface: Surface, keep: NDArray[np.bool_] | Int) -> Surface:
+    """The contact points where `keep` (c,) holds, or those of the numbers `keep` in this order."""
     return replace(
         surface,
         nodes=surface.nodes[keep],
