@@ -74,34 +74,26 @@ def fig9(size: float, domain: Domain = "solid", mesher: Any = "swept") -> Model:
     return Model(design, Material(1.0, 0.49), options, (Leg(10.0, steps=10),), friction=Coulomb(0.25), domain=domain)
 
 
-def measured(size: float, mus: Sequence[float], plain: bool) -> dict[str, float]:
-    """One press in this process, seconds by stage, then all of `mus`, if several; peak memory; then plain PARDISO.
+def measured(size: float) -> dict[str, float]:
+    """A press in this process and one of all MUS, seconds by stage; peak memory; the same again; then plain PARDISO.
 
-    Before the plain one the press is made once more, and the shorter time counts: the plain one finds memory that was
-    used before, and memory touched for the first time is slow, above all on a virtual machine.
+    The shorter time of each stage counts: the plain factorisation finds memory that was used before, and memory touched
+    for the first time is slow, above all on a virtual machine.
     """
     import resource
 
     problem, found = _pressed(size)
-    if len(mus) > 1:
-        begin = time.perf_counter()
-        if not all(told.frame.outcome.ok for told in presses(problem, mus)):
-            raise AssertionError("not every mu converged")
-        found["contact_all"] = time.perf_counter() - begin
-    found["peak_MB"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
-    if plain:
-        del problem  # its factor need not lie beside
-        problem, again = _pressed(size)
-        found |= {k: min(v, found[k]) for k, v in again.items()}
-        free = np.setdiff1d(np.arange(problem.stiffness.upper.shape[0]), problem.held)
-        upper = problem.stiffness.upper[free][:, free]
-        del problem
-        found["factorisation"] = _plain(upper)
-    return found
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    del problem  # its factor need not lie beside
+    problem, again = _pressed(size)
+    free = np.setdiff1d(np.arange(problem.stiffness.upper.shape[0]), problem.held)
+    upper = problem.stiffness.upper[free][:, free]
+    del problem
+    return _least([found, again]) | {"peak_MB": peak, "factorisation": _plain(upper)}
 
 
 def _pressed(size: float) -> tuple[Problem, dict[str, float]]:
-    """The finger condensed, and pressed in ten increments; seconds by stage, numbers of unknowns and rows."""
+    """The finger condensed, and pressed in ten increments, under one mu and all; seconds by stage, unknowns, rows."""
     problem = build(fig9(size))
     found = {k: problem.seconds[k] for k in ("assembly", "condensation")}
     found |= {"dofs": problem.stiffness.upper.shape[0], "rows": len(problem.kept)}
@@ -109,7 +101,11 @@ def _pressed(size: float) -> tuple[Problem, dict[str, float]]:
     *_, frame = march(replace(problem, model=replace(problem.model, friction=Coulomb(MU))))
     if not frame.outcome.ok:
         raise AssertionError(f"mu = {MU:g}: {frame.outcome}")
-    return problem, found | {"contact": time.perf_counter() - begin}
+    found["contact"] = time.perf_counter() - begin
+    begin = time.perf_counter()
+    if not all(told.frame.outcome.ok for told in presses(problem, MUS)):
+        raise AssertionError("not every mu converged")
+    return problem, found | {"contact_all": time.perf_counter() - begin}
 
 
 def _plain(upper: Any) -> float:
@@ -127,9 +123,9 @@ def _plain(upper: Any) -> float:
     return seconds
 
 
-def _child(size: float, mus: Sequence[float], plain: bool) -> dict[str, float]:
+def _child(size: float) -> dict[str, float]:
     """`measured` in a process of its own, which starts with a clean memory."""
-    command = [sys.executable, __file__, json.dumps([size, list(mus), plain])]
+    command = [sys.executable, __file__, json.dumps(size)]
     return dict(json.loads(_run(command).stdout.splitlines()[-1]))
 
 
@@ -200,25 +196,26 @@ def run(quick: bool) -> tuple[Row, ...]:
     """Every ratio once; quick: on a small mesh, where they mean nothing, and without pytetwild."""
     load = os.getloadavg()[0]
     sizes = (QUICK,) if quick else (MIDDLE, LARGE)
-    runs = {size: [_child(size, MUS, True)] for size in sizes}
+    runs = {size: [_child(size)] for size in sizes}
     repeats = 1 if quick else 3
     overhead = _press_overhead(repeats)
-    swept = {"section": _five_against_one(SECTION, repeats)}
+    pairs = 1 if quick else 5
+    swept = {"section": _five_against_one(SECTION, pairs)}
     if not quick:
-        swept[f"solid, {runs[MIDDLE][0]['dofs']:.0f} unknowns"] = _five_against_one(SOLID, repeats)
+        swept[f"solid, {runs[MIDDLE][0]['dofs']:.0f} unknowns"] = _five_against_one(SOLID, pairs)
     made = None if quick else _warm_cache(2.0)
     if not quick:
         for size in sizes:
-            runs[size].append(_child(size, (MU,), True))
+            runs[size].append(_child(size))
     load = max(load, os.getloadavg()[0])
-    best = {size: _least([_common(r, runs[size]) for r in runs[size]]) for size in sizes}
+    best = {size: _least(runs[size]) for size in sizes}
     rows = _ratios(best[sizes[-1]], load)
     rows += [_row(f"finger3d sweep of 5 values of mu against one, {k}", 1.25, v, load) for k, v in swept.items()]
     for size in sizes:
-        first = runs[size][0]
-        once = first["assembly"] + first["condensation"]
-        five = (once + first["contact_all"]) / (once + first["contact"])
-        rows.append(_row(f"5 values of mu against one, stages alone, {first['dofs']:.0f} unknowns", 1.25, five, load))
+        once = best[size]["assembly"] + best[size]["condensation"]
+        five = (once + best[size]["contact_all"]) / (once + best[size]["contact"])
+        what = f"5 values of mu against one, stages alone, {best[size]['dofs']:.0f} unknowns"
+        rows.append(_row(what, 1.25, five, load))
     rows.append(_row("press of a section over its solve and estimate, s", 1.5, overhead, load))
     if made:
         what = f"pytetwild on a warm cache against a cold one ({made[0]:.1f} s)"
@@ -244,11 +241,6 @@ def _beside_calculix(quick: bool, load: float) -> list[Row]:
     return [replace(row, reason=f"{row.reason}; load {load:.1f}", kind="statement") for row in told]
 
 
-def _common(one: dict[str, float], all_runs: Sequence[dict[str, float]]) -> dict[str, float]:
-    """What every run of a size has."""
-    return {k: v for k, v in one.items() if all(k in run for run in all_runs)}
-
-
 def _ratios(best: dict[str, float], load: float) -> list[Row]:
     chain = best["assembly"] + best["condensation"] + best["contact"]
     factor = best["factorisation"]
@@ -268,7 +260,7 @@ def _row(what: str, most: float, got: float, load: float, reason: str = "the iss
 def main(arguments: Sequence[str]) -> None:
     """The table; or, in a child, one measurement as JSON."""
     if arguments and not arguments[0].startswith("-"):
-        print(json.dumps(measured(*json.loads(arguments[0]))))
+        print(json.dumps(measured(json.loads(arguments[0]))))
         return
     from finger3d.cli.common import print_columns
     from finger3d.study import table
