@@ -33,12 +33,15 @@ class Artist:
     wanted : whether anything will be drawn
     module : where the functions are that will; the child loads it meanwhile
     formulae : whether it also gets ready to set formulae, which the ticks of logarithmic axes are
+    behind : whether it loads only while this process leaves room, for a picture that takes less time than what comes
+        before it; others would come later
     """
 
-    def __init__(self, wanted: bool = True, module: str = "finger3d.view", formulae: bool = True) -> None:
+    def __init__(
+        self, wanted: bool = True, module: str = "finger3d.view", formulae: bool = True, behind: bool = False
+    ) -> None:
         self._wanted = wanted
-        self._module = module
-        self._formulae = formulae
+        self._words = [module, *["formulae"] * formulae, *["behind"] * behind]
         self._calls: list[partial[Any]] = []
         self._child: subprocess.Popen[bytes] | None = None
         self._sender: Thread | None = None
@@ -46,9 +49,8 @@ class Artist:
     def __enter__(self) -> Self:
         if self._wanted and "matplotlib" not in sys.modules:
             # a group of its own: Ctrl-C is for the parent, which lets begun pictures be finished
-            command = [sys.executable, "-P", "-m", __name__, self._module]
             self._child = subprocess.Popen(
-                command + (["formulae"] if self._formulae else []), env=child_environment(), process_group=0,
+                [sys.executable, "-P", "-m", __name__, *self._words], env=child_environment(), process_group=0,
                 stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
             )  # fmt: skip
         return self
@@ -92,11 +94,11 @@ class Artist:
                 stream.write(last)
 
 
-def _main(module: str, formulae: bool) -> None:
-    if hasattr(os, "nice"):
-        os.nice(10)  # the solver goes first, and when this is waited for, nothing of the parent's runs beside it
+def _main(module: str, *words: str) -> None:
+    if "behind" in words and hasattr(os, "nice"):
+        os.nice(10)
     with loading():
-        _warm_up(module, formulae)
+        _warm_up(module, "formulae" in words)
     sent = sys.stdin.buffer.read()
     for call in pickle.loads(sent) if sent else ():
         call()
@@ -120,4 +122,4 @@ def _warm_up(module: str, formulae: bool = True) -> None:
 
 
 if __name__ == "__main__":
-    _main(sys.argv[1], "formulae" in sys.argv[2:])
+    _main(*sys.argv[1:])

@@ -22,7 +22,7 @@ def bench() -> ModuleType:
 
 
 def test_a_child_measures_every_stage(bench: ModuleType) -> None:
-    found = bench._child(6.0, (0.25, 1.0), True)
+    found = bench._child(6.0)
     assert set(found) == {
         "assembly", "condensation", "contact", "contact_all", "dofs", "rows", "peak_MB", "factorisation"
     }  # fmt: skip

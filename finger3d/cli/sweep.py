@@ -70,7 +70,7 @@ def sweep(
 
     several = any("," in text for text in vary)
     # it loads what it needs while the points are checked
-    with Artist(several, "finger3d.sweep.picture", formulae=False) as artist:
+    with Artist(several, "finger3d.sweep.picture", formulae=False, behind=True) as artist:
         with loading():
             from finger3d.sweep import combinations
             from finger3d.sweep import sweep as run

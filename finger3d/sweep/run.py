@@ -67,7 +67,7 @@ def sweep(
             report.say(f"{before} of {len(points.points)} points are kept from before")
         tasks = _tasks(points, kept)
         several = bool(tasks) and any(len(v.texts) > 1 for v in points.vary)
-        with nullcontext(artist) if artist else Artist(several, draw.__module__, formulae=False) as mine:
+        with nullcontext(artist) if artist else Artist(several, draw.__module__, formulae=False, behind=True) as mine:
             with _pressed(kept, tasks, scheduler, workers, report):  # the picture is drawn while workers end
                 columns = kept.columns()
                 if columns["point"]:
