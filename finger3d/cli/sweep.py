@@ -74,6 +74,7 @@ def sweep(
         with loading():
             from finger3d.sweep import combinations
             from finger3d.sweep import sweep as run
+            from finger3d.sweep.run import finish
 
         report, aside = reporting(json_)
         try:
@@ -82,14 +83,11 @@ def sweep(
                 points = combinations(scene, set_ or [], vary)
                 check_writable(out, scene)
                 kept = run(points, out, scheduler, workers, report, artist)
+            _tell(kept, out, json_)  # while the picture is drawn
+            finish(out, artist)
         except KeyboardInterrupt:
             complain(f"interrupted; {_said(report.steps_done, report.steps_total, out)}")
             return 130
-    if json_:
-        print_json(_as_dict(kept, out))
-    else:
-        _print_points(kept)
-        print_rows(points.title, _rows(kept, out))
     failed = [row for row in (kept.rows | kept.lost).values() if row["outcome"] != "converged"]
     if not failed:
         return 0
@@ -97,6 +95,14 @@ def sweep(
         f"{scene}: {len(failed)} of {len(points.points)} points gave no numbers, the first: {failed[0]['outcome']}"
     )
     return MissingError.exit_code
+
+
+def _tell(kept: Kept, out: Path, json_: bool) -> None:
+    if json_:
+        print_json(_as_dict(kept, out))
+    else:
+        _print_points(kept)
+        print_rows(kept.sweep.title, _rows(kept, out))
 
 
 def _said(done: int, total: int, out: Path) -> str:

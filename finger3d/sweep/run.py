@@ -45,7 +45,7 @@ def sweep(
     workers : processes on this machine; None: one for each core, at most one for each body; a single body is pressed
         by this process
     report : told about every point
-    artist : who draws; started here, where several numbers are varied, unless given
+    artist : who draws, and whose picture the caller waits for by `finish`; one of its own, waited for, unless given
 
     Returns
     -------
@@ -74,11 +74,17 @@ def sweep(
                     mine.draw(draw, folder / "sweep.png", columns, [v.key for v in points.vary])
                     mine.begin()
             kept.write()
-            import PIL.PngImagePlugin  # noqa: F401  the page will, and now the picture is drawn
-
-            mine.finish()
-        sweep_page(folder)
+            if not artist:
+                finish(folder, mine)
         return kept
+
+
+def finish(out: str | Path, artist: Artist) -> None:
+    """Wait for the picture of a sweep, and write the page with it."""
+    import PIL.PngImagePlugin  # noqa: F401  the page will, and now the picture is drawn
+
+    artist.finish()
+    sweep_page(Path(out))
 
 
 @contextmanager
