@@ -81,8 +81,6 @@ def sweep(
 
 def finish(out: str | Path, artist: Artist) -> None:
     """Wait for the picture of a sweep, and write the page with it."""
-    import PIL.PngImagePlugin  # noqa: F401  the page will, and now the picture is drawn
-
     artist.finish()
     sweep_page(Path(out))
 
