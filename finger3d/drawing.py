@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import pickle
 import subprocess
@@ -18,7 +19,6 @@ from threading import Thread
 from typing import Any, Self
 
 from finger3d.children import child_environment
-from finger3d.lazy import loading
 
 _PATIENCE_S = 20.0  # for pictures that were begun when the user interrupted
 
@@ -80,6 +80,8 @@ class Artist:
 
     def finish(self) -> None:
         """Wait until all is drawn."""
+        if self._sender:
+            import PIL.PngImagePlugin  # noqa: F401  for a page that shows what is drawn: there is time for it now
         if self._child is None or not self._sender or self._child.wait() != 0:
             for call in self._calls:
                 call()
@@ -97,8 +99,8 @@ class Artist:
 def _main(module: str, *words: str) -> None:
     if "behind" in words and hasattr(os, "nice"):
         os.nice(10)
-    with loading():
-        _warm_up(module, "formulae" in words)
+    gc.disable()  # nothing lives long here
+    _warm_up(module, "formulae" in words)
     sent = sys.stdin.buffer.read()
     for call in pickle.loads(sent) if sent else ():
         call()

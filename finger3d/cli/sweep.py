@@ -62,16 +62,16 @@ def sweep(
         raise Finger3dError(f"--workers {workers}: must be at least 1")
     if workers is not None and scheduler is not None:
         raise Finger3dError("--workers and --scheduler: give one of them; a cluster has its own workers")
-    from finger3d.sweep.cluster import prepare
-
-    if scheduler is None and any("," in text and not text.strip().startswith(_SHARED) for text in vary):
-        prepare()  # it goes on while the points are checked
     from finger3d.drawing import Artist
 
     several = any("," in text for text in vary)
-    # it loads what it needs while the points are checked
+    # it loads what it needs while the points are checked, and so do the workers
     with Artist(several, "finger3d.sweep.picture", formulae=False, behind=True) as artist:
         with loading():
+            from finger3d.sweep.cluster import prepare
+
+            if scheduler is None and any("," in text and not text.strip().startswith(_SHARED) for text in vary):
+                prepare()
             from finger3d.sweep import combinations
             from finger3d.sweep import sweep as run
             from finger3d.sweep.run import finish
