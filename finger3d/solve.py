@@ -51,7 +51,7 @@ __all__ = [
 
 MARGIN = 0.3  # candidate points reach to a rigid gap of this share of the depth; checked after the solution
 _CUTS = 6
-_WORTH = 500  # contact rows from which presses at once are quicker than in turn
+_WORTH = 1000  # contact rows from which presses at once are quicker than in turn
 _LOOKS = 20  # and where rigid gaps are, for the candidate points
 _NEARLY = 0.95  # of the face: so many candidates, and all are: a few more rows cost less than to check every press
 _LEFT: ContextVar[Event | None] = ContextVar("left", default=None)  # set in a thread whose press nobody waits for

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,7 +12,8 @@ from hypothesis import strategies as st
 from finger3d.contact.advance import advance
 from finger3d.contact.law import OPEN, SLIP, STICK, Coulomb
 from finger3d.contact.newton import uniqueness
-from finger3d.contact.state import ContactState
+from finger3d.contact.paper import swap
+from finger3d.contact.state import ContactState, Increment
 from finger3d.errors import Outcome
 from tests.contact_cases import half_plane, random_compliance, violation
 
@@ -176,6 +179,24 @@ def test_floating_body_and_nan_are_outcomes_not_numbers() -> None:
     bad[0, 1, 0, 1] = -1.0
     assert advance(state, free, bad, Coulomb(0.3), 1.0).outcome is Outcome.INDEFINITE
     assert advance(state, free, compliance * np.nan, Coulomb(0.3), 1.0).outcome is Outcome.NOT_FINITE
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+@pytest.mark.parametrize("rule", [advance, swap])
+def test_a_number_that_is_none_shows_wherever_it_is_between_points_that_touch(
+    rule: Callable[..., Increment], value: float
+) -> None:
+    compliance, gap, path = states_3d()
+    before = press(compliance, gap, path[:1], 0.3)[0]
+    free = np.column_stack([gap - 0.6, np.full(len(gap), -0.05), np.full(len(gap), -0.1)])
+    touching = np.flatnonzero(advance(before, free, compliance, Coulomb(0.3), 1.0).state.force[:, 0])
+    for i, j, a, b in ((0, -1, 0, 0), (1, 2, 1, 2), (-1, 0, 2, 0)):
+        bad = compliance.copy()
+        bad[touching[i], a, touching[j], b] = bad[touching[j], b, touching[i], a] = value
+        for state in (ContactState.at_rest(gap, 3), before):
+            found = rule(state, free, bad, Coulomb(0.3), 1.0)
+            assert found.outcome is Outcome.NOT_FINITE
+            assert found.state is state
 
 
 def test_one_point_coulomb_is_unique_below_its_critical_coefficient() -> None:

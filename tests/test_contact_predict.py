@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from unittest.mock import Mock
+
 import numpy as np
 import pytest
 
@@ -51,15 +53,21 @@ def test_forces_of_the_first_points_move_all_points(dim: int, bearing: int) -> N
     assert problem.gap(force) == pytest.approx(moved[:, 0], abs=1e-13)
 
 
-@pytest.mark.parametrize("dim", [2, 3])
-def test_without_friction_the_start_is_the_answer(dim: int) -> None:
+@pytest.mark.parametrize(
+    ("dim", "precision", "digits"),
+    [(2, np.float64, 1e-12), (3, np.float64, 1e-12), (3, np.float32, 1e-6)],  # round-off, times a condition below 10
+)
+def test_without_friction_the_start_is_the_answer(
+    monkeypatch: pytest.MonkeyPatch, dim: int, precision: type, digits: float
+) -> None:
+    monkeypatch.setitem(start._PRECISION, dim, precision)
     rng = np.random.default_rng(3)
     compliance, free = random_compliance(rng, 9, dim, 1.0), rng.normal(size=(9, dim))
     found = predict(increments(compliance, free, 0.0), np.zeros((9, dim)))
     wanted = ladder.advance(ContactState.at_rest(np.zeros(9), dim), free, compliance, Coulomb(0.0), 1.0)
     assert wanted.outcome.ok
     assert wanted.state.force[:, 0].max() > 0.0
-    assert np.abs(found - wanted.state.force).max() < 1e-12 * wanted.state.force.max()
+    assert np.abs(found - wanted.state.force).max() < digits * wanted.state.force.max()
 
 
 def test_the_start_is_admissible_and_each_turn_nearer_to_the_answer(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -71,7 +79,9 @@ def test_the_start_is_admissible_and_each_turn_nearer_to_the_answer(monkeypatch:
     wanted = answer.state.force
     usual = predict(problem, np.zeros_like(wanted))
     assert np.linalg.norm(usual - wanted) < start._SETTLED * np.linalg.norm(wanted)
+    assert (np.linalg.norm(usual[:, 1:], axis=1) <= 0.25 * (1.0 + 1e-6) * usual[:, 0]).all()  # single precision
     left = []
+    monkeypatch.setitem(start._PRECISION, 3, np.float64)
     monkeypatch.setattr(start, "_TURN", 40)  # which carries a turn to its end
     monkeypatch.setattr(start, "_STILL", 0.0)
     for turns in (1, 2, 3, 4):
@@ -105,12 +115,55 @@ def test_start_and_corrections_change_what_it_takes_and_not_the_answer(
     compliance, gap = sphere()
     quick = pressed(compliance, gap, mu)
     monkeypatch.setattr(newton, "_CORRECTIONS", 0)
+    monkeypatch.setattr(newton, "_SINGLE", 0)
     monkeypatch.setattr(ladder, "predict", lambda problem, force: force)
     plain = pressed(compliance, gap, mu)
     for a, b in zip(quick, plain, strict=True):
         assert np.array_equal(a.state.status, b.state.status)
         assert np.abs(a.state.force - b.state.force).max() < 1e-10 * b.state.force.max()
     assert sum(a.iterations for a in quick) < 0.75 * sum(b.iterations for b in plain)
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.06, 0.25, 1.0])
+def test_single_precision_costs_no_digit_and_no_iteration(monkeypatch: pytest.MonkeyPatch, mu: float) -> None:
+    compliance, gap = sphere()
+    single = pressed(compliance, gap, mu)
+    monkeypatch.setattr(newton, "_SINGLE", 0)
+    double = pressed(compliance, gap, mu)
+    for a, b in zip(single, double, strict=True):
+        assert np.array_equal(a.state.status, b.state.status)
+        assert np.abs(a.state.force - b.state.force).max() < 1e-10 * b.state.force.max()
+        assert (a.method, b.method) == ("newton", "newton")
+    assert sum(a.iterations for a in single) <= sum(b.iterations for b in double)
+
+
+@pytest.mark.parametrize(("dim", "mu", "used"), [(3, 0.25, True), (3, 1e6, False), (2, 0.25, False)])
+def test_single_precision_is_for_three_dimensions_and_moderate_friction(
+    monkeypatch: pytest.MonkeyPatch, dim: int, mu: float, used: bool
+) -> None:
+    compliance, gap = sphere()
+    free = np.stack([gap - 0.1, *np.zeros((2, len(gap)))], axis=1)
+    problem = increments(compliance[:, :dim, :, :dim], free[:, :dim], mu)
+    found = []
+    monkeypatch.setattr(newton, "newton", lambda *args: found.append(args[4:]) or Mock(solved=True))
+    newton.quick_newton(problem, np.zeros_like(problem.free), 30, False)
+    assert found == ([(np.float32,)] if used else [()])
+
+
+def test_what_single_precision_cannot_settle_is_settled_in_double() -> None:
+    # two points that move together but for a hundred-millionth, and a third to keep them company
+    compliance = np.kron(np.array([[1.0, 1.0 - 1e-8, 0.0], [1.0 - 1e-8, 1.0, 0.0], [0.0, 0.0, 1.0]]), np.eye(3))
+    free = np.zeros((3, 3))
+    free[:, 0] = -1.0
+    problem = increments(compliance.reshape(3, 3, 3, 3), free, 0.25)
+    single = newton.newton(problem, np.ones_like(free), newton._SINGLE, True, np.float32)
+    assert not single.solved
+    double = newton.newton(problem, np.ones_like(free), 30, True)
+    assert double.solved
+    both = newton.quick_newton(problem, np.ones_like(free), 30, True)
+    assert np.array_equal(both.force, double.force)
+    assert both.iterations == single.iterations + double.iterations
+    assert both.force[:, 0] == pytest.approx([1.0 / (2.0 - 1e-8)] * 2 + [1.0], rel=1e-7)
 
 
 def test_a_correction_shrinks_the_mismatch_of_slip_directions() -> None:

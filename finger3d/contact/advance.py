@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 from finger3d.contact.conditions import TOLERANCE, Increments, residual, stiffness_weights
 from finger3d.contact.law import FrictionLaw
 from finger3d.contact.lemke import friction_start
-from finger3d.contact.newton import Iterate, force_of_sets, newton, sweeps
+from finger3d.contact.newton import Iterate, force_of_sets, newton, quick_newton, sweeps
 from finger3d.contact.predict import predict
 from finger3d.contact.state import ContactState, Increment, next_state, refusal
 from finger3d.contact.threads import threads_for
@@ -54,27 +53,27 @@ def advance(
     """
     c, d = free.shape
     matrix = compliance.reshape(c * d, c * d)
-    refused = refusal(free, matrix, weights is None)
-    if refused:
-        return Increment(previous, refused, np.inf, 0, "none")
-    change = free.copy()
-    change[:, 1:] -= previous.position
-    rho = stiffness_weights(matrix, d) if weights is None else weights
-    mu = law.coefficients(previous.status)
-    start = previous.force if guess is None else guess
-    total = 0
-    while True:
-        problem = Increments(change, matrix, mu, rho, length_scale)
-        with threads_for(c * d, d > 2):  # in 3D Newton factors by SciPy
+    with threads_for(c * d, d > 2):  # in 3D Newton factors by SciPy
+        refused = refusal(free, matrix, weights is None)
+        if refused:
+            return Increment(previous, refused, np.inf, 0, "none")
+        change = free.copy()
+        change[:, 1:] -= previous.position
+        rho = stiffness_weights(matrix, d) if weights is None else weights
+        mu = law.coefficients(previous.status)
+        start = previous.force if guess is None else guess
+        total = 0
+        while True:
+            problem = Increments(change, matrix, mu, rho, length_scale)
             method, found, error, spent = _settle(problem, start, guess is None)
-        total += spent
-        if found is None:
-            return Increment(previous, Outcome.NO_CONVERGENCE, error, total, method)
-        revised = law.revised(mu, found.status)
-        if revised is None:
-            break
-        mu, start = revised, found.force
-    state = next_state(previous, found.force, found.moved, found.status)
+            total += spent
+            if found is None:
+                return Increment(previous, Outcome.NO_CONVERGENCE, error, total, method)
+            revised = law.revised(mu, found.status)
+            if revised is None:
+                break
+            mu, start = revised, found.force
+        state = next_state(previous, found.force, found.moved, found.status)
     return Increment(state, Outcome.CONVERGED, error, total, method)
 
 
@@ -98,13 +97,12 @@ def _ladder(problem: Increments, start: Float, turns: bool) -> Iterator[tuple[st
     Where the path begins or turns the start is far away: full steps overshoot there, and come back to where they were.
     """
     near = predict(problem, start)
-    full, damped = partial(newton, problem, limit=30, damped=False), partial(newton, problem, limit=60, damped=True)
     if turns:
-        yield "newton", damped(near)
-        yield "full steps", full(start)
+        yield "newton", quick_newton(problem, near, 60, damped=True)
+        yield "full steps", newton(problem, start, 30, damped=False)
     else:
-        yield "newton", full(near)
-        yield "damped", damped(start)
+        yield "newton", quick_newton(problem, near, 30, damped=False)
+        yield "damped", newton(problem, start, 60, damped=True)
     yield "ramp", _ramp(problem, start)
     yield "pivots", _pivots(problem, start)
     force, spent = start, 0

@@ -8,6 +8,7 @@ out.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,14 +62,14 @@ class Increments:
         reach = int(last[0]) if len(last) else 0
         return rows[:, :reach] @ forces[:reach]
 
-    def between(self, chosen: NDArray[np.int64]) -> Float:
+    def between(self, chosen: NDArray[np.int64], precision: type[Any] = np.float64) -> NDArray[Any]:
         """Compliance (k, k) between the chosen ones of c d forces, gathered within what a cache holds."""
-        found = np.empty((len(chosen), len(chosen)))
+        found: NDArray[Any] = np.empty((len(chosen), len(chosen)), dtype=precision)
         reach = int(chosen.max(initial=-1)) + 1
         stride = max(1, _CACHED // max(1, reach))
         for i in range(0, len(chosen), stride):
             part = slice(i, i + stride)
-            rows = self.compliance[chosen[part], :reach]
+            rows: NDArray[Any] = self.compliance[chosen[part], :reach].astype(precision, copy=False)
             np.take(rows, chosen, axis=1, out=found[part], mode="clip")  # "raise" would copy
         return found
 

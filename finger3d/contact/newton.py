@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +20,16 @@ _EXACT = 1e-11
 since a gap's round-off enters its bound times mu."""
 
 _NEAR = 1e-6
-"""Residual of the projection, as a share of the forces and times mu, below which the conditions are judged."""
+"""Residual of the projection, as a share of the forces, and times a mu above 1, below which the conditions are
+judged."""
 
 _STALLED = 1e-3
 """Share by which the residual must have fallen where full steps come back to a set of states."""
 
 _DIVERGED = 1e9
+
+_SINGLE, _RUBBER = 4, 2.0
+"""Iterations of `quick_newton` in single precision, and the largest mu for it: above 10 digits are often wanting."""
 
 _CORRECTIONS, _PAYS = 12, 0.1
 """Corrections with one factor, and the share of the residual that one may leave: it costs a tenth of an iteration."""
@@ -72,6 +76,7 @@ class _System:
     slip : (s,) points
     pull : (s, d - 1) friction per normal force
     across : (s, d - 1) direction across the slip; in 2D there is none
+    exact : whether its solution is that of the sets: no slip direction turns, and no digit is left out
     """
 
     shape: tuple[int, ...]
@@ -81,9 +86,12 @@ class _System:
     slip: NDArray[np.int64]
     pull: Float
     across: Float
+    exact: bool
 
     @classmethod
-    def of(cls, problem: Increments, status: NDArray[np.int8], trial: Float) -> _System:
+    def of(
+        cls, problem: Increments, status: NDArray[np.int8], trial: Float, precision: type[Any] = np.float64
+    ) -> _System:
         """The equations of the sets of `force_of_sets`."""
         c, d = trial.shape
         slip, stick = np.flatnonzero(status == SLIP), np.flatnonzero(status == STICK)
@@ -100,41 +108,38 @@ class _System:
         # slipping ones come direction by direction: passes over it are as dear as the solution.
         own = np.concatenate([(stick[:, None] * d + np.arange(d)).ravel(), slip * d])
         sides = [slip * d + i for i in range(1, d)]
-        whole = problem.between(np.concatenate([own, *sides]))
-        rho, free = problem.rho.ravel(), problem.free.ravel()
+        whole = problem.between(np.concatenate([own, *sides]), precision)
+        free, kind = problem.free.ravel(), whole.dtype  # one factor of another precision would make all of it double
+        rho, pulls, sideways = (a.astype(kind, copy=False) for a in (problem.rho.ravel(), pull, across))
         normal, first, second = (slice(n + i * k, n + (i + 1) * k) for i in range(3))
         for i, side in enumerate((first, second)[: d - 1]):
-            whole[normal] += pull[:, i, None] * whole[side]  # displacements per unit of f_n; compliance is symmetric
+            whole[normal] += pulls[:, i, None] * whole[side]  # displacements per unit of f_n; compliance is symmetric
         right = rho[own] * free[own]
         whole[:, : n + k] *= rho[own]  # equations run along its columns
         count = n + k
         if d > 2:
             count += k
-            turn = np.minimum(mu * trial[slip, 0] / length, 1.0)
-            whole[first] *= across[:, 0, None]
-            whole[first] += across[:, 1, None] * whole[second]
-            weigh = [turn * across[:, i] * rho[side] for i, side in enumerate(sides)]
+            turn = np.minimum(mu * trial[slip, 0] / length, 1.0).astype(kind, copy=False)
+            whole[first] *= sideways[:, 0, None]
+            whole[first] += sideways[:, 1, None] * whole[second]
+            weigh = [turn * sideways[:, i] * rho[side] for i, side in enumerate(sides)]
             whole[:count, first] *= weigh[0]
             whole[:count, first] += whole[:count, second] * weigh[1]
             right = np.concatenate([right, weigh[0] * free[sides[0]] + weigh[1] * free[sides[1]]])
             at = np.arange(n + k, count)
             whole[at, at] += 1.0 - turn
-        return cls((c, d), solver(whole[:count, :count].T, count > n + k), -right, own, slip, pull, across)
+        exact = count == n + k and precision is np.float64
+        return cls((c, d), solver(whole[:count, :count].T, not exact), -right, own, slip, pull, across, exact)
 
     def solution(self) -> Float:
         """Forces (c, d) that meet the equations."""
         return self._forces(self.solve(self.right)) if len(self.right) else np.zeros(self.shape)
 
-    @property
-    def turns(self) -> bool:
-        """Whether slip directions are among the unknowns, which makes the equations change with them."""
-        return len(self.right) > len(self.own)
-
     def corrected(self, force: Float, mismatch: Float) -> Float:
         """Forces (c, d) nearer to a solution with the same sets, from their mismatch (c, d) with the projection.
 
-        Simplified Newton: the factor is that of slip directions which have turned a little since.  `force` must be
-        `rubbing`, for the equations know nothing of friction that is longer than mu f_n.
+        Simplified Newton: the factor is that of slip directions which have turned a little since, or wants digits.
+        `force` must be `rubbing`, for the equations know nothing of friction that is longer than mu f_n.
         """
         across = np.sum(mismatch[self.slip, 1:] * self.across, axis=1)
         change = self.solve(-np.concatenate([mismatch.ravel()[self.own], across]))
@@ -158,16 +163,17 @@ class _System:
         return force
 
 
-def solver(matrix: Float, again: bool) -> Callable[[Float], Float]:
+def solver(matrix: NDArray[Any], again: bool) -> Callable[[NDArray[Any]], NDArray[Any]]:
     """What solves with a matrix; factored at once if it will be asked again."""
     if not (again and len(matrix)):  # LAPACK takes no empty ones
         return partial(np.linalg.solve, matrix)
-    from scipy.linalg.lapack import dgetrf, dgetrs  # not at the top: 2D never asks again, and need not load it
+    from scipy.linalg.lapack import get_lapack_funcs  # not at the top: 2D never asks again, and need not load it
 
-    factor, pivots, trouble = dgetrf(matrix, overwrite_a=True)
+    getrf, getrs = get_lapack_funcs(("getrf", "getrs"), (matrix,))
+    factor, pivots, trouble = getrf(matrix, overwrite_a=True)
     if trouble:
         raise np.linalg.LinAlgError("singular")
-    return lambda right: np.asarray(dgetrs(factor, pivots, right)[0])
+    return lambda right: np.asarray(getrs(factor, pivots, right)[0])
 
 
 class _Tried(NamedTuple):
@@ -189,10 +195,10 @@ class _Tried(NamedTuple):
         projected, status, trial = project(problem, force, moved)
         return cls(force, moved, projected, status, trial, float(np.linalg.norm(force - projected)))
 
-    @property
-    def fine(self) -> bool:
-        """Whether nothing is left to correct."""
-        return self.merit <= _FINE * float(np.linalg.norm(self.force))
+    def fine(self, problem: Increments) -> bool:
+        """Whether nothing is left to correct, neither of the forces nor of the gaps that violate them."""
+        gaps = _EXACT * problem.length_scale * float(problem.rho.min(initial=np.inf))
+        return self.merit <= min(_FINE * float(np.linalg.norm(self.force)), gaps)
 
     def solves(self, problem: Increments, status: NDArray[np.int8]) -> bool:
         """Whether the conditions hold with these states."""
@@ -202,10 +208,25 @@ class _Tried(NamedTuple):
         return residual(self.force, self.moved, status, problem.mu, problem.length_scale) <= _EXACT
 
 
-def newton(problem: Increments, start: Float, limit: int, damped: bool) -> Iterate:
+def quick_newton(problem: Increments, start: Float, limit: int, damped: bool) -> Iterate:
+    """`newton`, in 3D and under moderate friction in single precision first, and if that settles nothing in double.
+
+    Corrections bring the digits that a factor in single precision leaves out, and cost less than it saves.
+    """
+    if start.shape[1] < 3 or problem.mu.max(initial=0.0) > _RUBBER:
+        return newton(problem, start, limit, damped)
+    single = newton(problem, start, _SINGLE, damped, np.float32)
+    if single.solved:
+        return single
+    double = newton(problem, start, limit, damped)
+    return replace(double, iterations=single.iterations + double.iterations)
+
+
+def newton(problem: Increments, start: Float, limit: int, damped: bool, precision: type[Any] = np.float64) -> Iterate:
     """Semismooth Newton from forces `start` (c, d) N; full steps, or with a backtracking search on the residual force.
 
-    A set of states that comes back with no smaller a residual ends it: it would cycle from there.
+    A set of states that comes back with no smaller a residual ends it: it would cycle from there.  `precision` is that
+    of the factors.
     """
     here = _Tried.of(problem, start)
     seen: dict[bytes, float] = {}
@@ -216,22 +237,20 @@ def newton(problem: Increments, start: Float, limit: int, damped: bool) -> Itera
             break
         seen[status.tobytes()] = here.merit
         try:
-            system = _System.of(problem, status, here.trial)
+            system = _System.of(problem, status, here.trial, precision)
             target = system.solution()
         except np.linalg.LinAlgError:
             break
         share, there = 1.0, _Tried.of(problem, target)
-        if (there.fine or not system.turns) and there.solves(problem, status):
-            return Iterate(target, there.moved, status, True, iteration)
+        if not (there.fine(problem) or system.exact) and (there.status == status).all():
+            there = _turned(problem, system, there)
+        if there.solves(problem, status):
+            return Iterate(there.force, there.moved, status, True, iteration)
         while damped and not there.merit <= (1.0 - 1e-4 * share) * here.merit and share >= 1e-3:
             share *= 0.5
             there = _Tried.of(problem, here.force + share * (target - here.force))
         if not np.isfinite(there.merit):
             break
-        if share == 1.0 and system.turns and (there.status == status).all():
-            there = _turned(problem, system, there)
-            if there.solves(problem, status):
-                return Iterate(there.force, there.moved, status, True, iteration)
         here = there
     return Iterate(here.force, here.moved, here.status, False, iteration)
 
@@ -240,7 +259,7 @@ def _turned(problem: Increments, system: _System, found: _Tried) -> _Tried:
     """What corrections with the factor at hand make of forces whose sets are those of the system, while they pay."""
     best = _Tried.of(problem, system.rubbing(found.force))
     for _ in range(_CORRECTIONS):
-        if best.fine or (best.status != found.status).any():
+        if best.fine(problem) or (best.status != found.status).any():
             break
         tried = _Tried.of(problem, system.corrected(best.force, best.force - best.projected))
         if not tried.merit <= _PAYS * best.merit:

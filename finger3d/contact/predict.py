@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,9 +31,13 @@ _STEPS, _TURN = 40, 8
 _STILL, _SETTLED = 1e-4, 1e-3
 """Shares of the largest friction and of the normal forces by which the last step and the last turn may change them."""
 
-_TINY = 1e-300
+_TINY = 1e-30
 
-Solve = Callable[[Float], Float]
+_PRECISION = {1: np.float64, 2: np.float64, 3: np.float32}
+"""Of what is computed here, which decides nothing, by dimension: matrices of 2D are in the cache either way."""
+
+Array = NDArray[np.floating[Any]]
+Solve = Callable[[Array], Array]
 
 
 def predict(problem: Increments, force: Float) -> Float:
@@ -49,7 +53,7 @@ def predict(problem: Increments, force: Float) -> Float:
     try:
         at, normal, press = _normal(problem, force, touches & (touched | _deep(gap, touches & ~touched)))
         if len(at) and force.shape[1] > 1:
-            found[at] = _in_turn(_Touching.of(problem, at, press), normal, force[at, 1:])
+            found[at] = _in_turn(_Touching.of(problem, at, press), normal, force[at, 1:].astype(normal.dtype))
         else:
             found[at, 0] = normal
     except np.linalg.LinAlgError:  # of a body that floats, or an indefinite compliance: others judge it
@@ -62,7 +66,7 @@ def _deep(gap: Float, closes: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return gap <= np.quantile(gap[closes], _DEEP) if closes.any() else closes
 
 
-def _normal(problem: Increments, force: Float, touches: NDArray[np.bool_]) -> tuple[NDArray[np.int64], Float, Solve]:
+def _normal(problem: Increments, force: Float, touches: NDArray[np.bool_]) -> tuple[NDArray[np.intp], Array, Solve]:
     """Normal forces under friction as expected: the active set of a symmetric problem, from points that touch.
 
     Returns
@@ -72,14 +76,15 @@ def _normal(problem: Increments, force: Float, touches: NDArray[np.bool_]) -> tu
     press : gaps (k,) that are to be closed -> normal forces (k,)
     """
     d = force.shape[1]
+    precision = _PRECISION[d]
     expected = force.copy()
     expected[:, 0] = 0.0
     open_gap = problem.gap(expected)
     for _ in range(_CHANGES):
         at = np.flatnonzero(touches)
-        press = solver(problem.between(at * d), d > 2)
+        press: Solve = solver(problem.between(at * d, precision), d > 2)
         expected[:] = 0.0
-        normal = expected[at, 0] = press(-open_gap[at])
+        expected[at, 0] = normal = press(-open_gap[at].astype(precision))
         gap = open_gap + problem.gap(expected) - problem.free[:, 0]
         last, touches = touches, expected[:, 0] > problem.rho[:, 0] * gap
         if (touches == last).all():
@@ -95,33 +100,34 @@ class _Touching(NamedTuple):
     makes normal forces (k,) of gaps (k,); `step` (k (d - 1),) N/mm is that of a gradient.
     """
 
-    gap: Float
-    slip: Float
+    gap: Array
+    slip: Array
     press: Solve
-    coupling: Float
-    tangential: Float
-    mu: Float
-    step: Float
+    coupling: Array
+    tangential: Array
+    mu: Array
+    step: Array
 
     @classmethod
     def of(cls, problem: Increments, points: NDArray[np.int64], press: Solve) -> _Touching:
         d, k = problem.free.shape[1], len(points)
         chosen = (np.arange(d)[:, None] + points * d).ravel()
-        whole, free, rho = problem.between(chosen), problem.free.ravel()[chosen], problem.rho.ravel()[chosen[k:]]
-        tangential = whole[k:, k:]
-        step = rho / _largest(tangential, rho)
-        return cls(free[:k], free[k:], press, whole[:k, k:], tangential, problem.mu[points], step)
+        whole = problem.between(chosen, _PRECISION[d])
+        free, rho = (a.ravel()[chosen].astype(whole.dtype) for a in (problem.free, problem.rho))
+        coupling, tangential, rho = whole[:k, k:], whole[k:, k:], rho[k:]
+        mu, step = problem.mu[points].astype(whole.dtype), rho / _largest(tangential, rho)
+        return cls(free[:k], free[k:], press, coupling, tangential, mu, step)
 
-    def under(self, normal: Float) -> tuple[Float, Float]:
+    def under(self, normal: Array) -> tuple[Array, Array]:
         """Slip (k (d - 1),) mm under no friction, and bound (k,) N of it, where normal forces (k,) press."""
         return self.slip + normal @ self.coupling, self.mu * normal
 
-    def pressed(self, friction: Float) -> Float:
+    def pressed(self, friction: Array) -> Array:
         """Normal forces (k,) under friction (k (d - 1),)."""
         return np.maximum(self.press(-(self.gap + self.coupling @ friction)), 0.0)
 
 
-def _in_turn(among: _Touching, normal: Float, friction: Float) -> Float:
+def _in_turn(among: _Touching, normal: Array, friction: Array) -> Array:
     """Forces (k, d) from normal forces (k,) and friction (k, d - 1) expected.
 
     Friction takes accelerated projected gradient steps, and every few of them the normal forces follow it.
@@ -144,7 +150,7 @@ def _in_turn(among: _Touching, normal: Float, friction: Float) -> Float:
     return np.vstack([normal, _cut(rubbing, bound).reshape(friction.T.shape)]).T
 
 
-def _largest(matrix: Float, rho: Float) -> float:
+def _largest(matrix: Array, rho: Array) -> float:
     """Largest eigenvalue of a compliance (k, k) weighed by rho: of a motion of all points alike, nearly."""
     root = np.sqrt(rho)
     vector = root
@@ -153,7 +159,7 @@ def _largest(matrix: Float, rho: Float) -> float:
     return 1.1 * float(np.linalg.norm(vector))
 
 
-def _cut(friction: Float, bound: Float) -> Float:
+def _cut(friction: Array, bound: Array) -> Array:
     """Friction (k (d - 1),) cut back to its bound (k,)."""
     k = len(bound)
     if len(friction) == k:
