@@ -33,15 +33,11 @@ class Artist:
     wanted : whether anything will be drawn
     module : where the functions are that will; the child loads it meanwhile
     formulae : whether it also gets ready to set formulae, which the ticks of logarithmic axes are
-    behind : whether it loads only while this process leaves room, for a picture that takes less time than what comes
-        before it; others would come later
     """
 
-    def __init__(
-        self, wanted: bool = True, module: str = "finger3d.view", formulae: bool = True, behind: bool = False
-    ) -> None:
+    def __init__(self, wanted: bool = True, module: str = "finger3d.view", formulae: bool = True) -> None:
         self._wanted = wanted
-        self._words = [module, *["formulae"] * formulae, *["behind"] * behind]
+        self._words = [module, *["formulae"] * formulae]
         self._calls: list[partial[Any]] = []
         self._child: subprocess.Popen[bytes] | None = None
         self._sender: Thread | None = None
@@ -97,8 +93,6 @@ class Artist:
 
 
 def _main(module: str, *words: str) -> None:
-    if "behind" in words and hasattr(os, "nice"):
-        os.nice(10)
     gc.disable()  # nothing lives long here
     _warm_up(module, "formulae" in words)
     sent = sys.stdin.buffer.read()

@@ -75,8 +75,9 @@ class Visit:
         self.page.on("request", lambda request: self.requests.append(request.url))
         self.url = (folder / "report.html").as_uri()
         self.page.goto(self.url)
-        if self.page.locator("#view-stage").count():
-            self.page.wait_for_selector("#view-stage[data-drawn=yes]", timeout=_PATIENCE_MS)
+        for drawing in ("#view-stage", ".chart > div"):
+            if self.page.locator(drawing).count():
+                self.page.wait_for_selector(f"{drawing}[data-drawn=yes]", timeout=_PATIENCE_MS)
 
     def stage(self) -> np.ndarray[Any, Any]:
         """Pixels of the 3D view's middle (h, w, 3), without its scale."""
@@ -89,7 +90,7 @@ class Visit:
 
 
 @pytest.mark.parametrize("width", [1280, 400])
-@pytest.mark.parametrize("name", ["section", "solid", "compare", "sweep", "calibrate"])
+@pytest.mark.parametrize("name", ["section", "solid", "compare", "calibrate"])
 def test_a_page_opens_without_complaint_request_or_sideways_scrolling(
     browser: Any, results: dict[str, Path], name: str, width: int
 ) -> None:
@@ -115,6 +116,43 @@ def test_a_page_opens_without_complaint_request_or_sideways_scrolling(
     assert visit.complaints == []
     # an image in an SVG counts as a request, though it is in the page
     assert [url for url in visit.requests if not url.startswith("data:")] == [visit.url]
+    visit.page.close()
+
+
+_CHARTS = """[...document.querySelectorAll(".chart > div")].map((box) => {
+    const place = (e) => { const b = e.getBoundingClientRect(); return [b.left, b.top, b.right, b.bottom]; };
+    const words = ".xtick text, .ytick text, .xtitle, .ytitle, .legendtext, .legendtitletext";
+    const texts = [...box.querySelectorAll(words)];
+    return { box: place(box), points: box.querySelectorAll(".point").length, texts: texts.map(place),
+        said: texts.map((e) => e.textContent) };
+})"""
+
+
+@pytest.mark.parametrize("width", [1280, 400])
+def test_the_charts_of_a_sweep_are_drawn_with_their_points_and_no_text_covers_another(
+    browser: Any, results: dict[str, Path], width: int
+) -> None:
+    visit = Visit(browser, results["sweep"], width)
+    assert visit.page.evaluate("document.documentElement.scrollWidth") <= width
+    charts = visit.page.evaluate(_CHARTS)
+    assert len(charts) == 4  # force and strain, against mu and depth
+    assert len({chart["box"][0] for chart in charts}) == (2 if width == 1280 else 1)
+    for chart in charts:
+        assert chart["points"] == 4
+        left, top, right, bottom = chart["box"]
+        for i, (a, b, c, d) in enumerate(chart["texts"]):
+            assert left <= a < c <= right
+            assert top <= b < d <= bottom
+            # glyphs are lower than their boxes: lines of text may come within a pixel or two
+            over = [
+                p for p in chart["texts"][:i] if min(c, p[2]) - max(a, p[0]) > 2 and min(d, p[3]) - max(b, p[1]) > 3
+            ]
+            assert not over, chart["said"]
+    said = [set(chart["said"]) for chart in charts]
+    assert {"friction.mu", "normal force (N)", "press.depth_mm", "0.3", "0.5"} <= said[0]
+    assert {"press.depth_mm", "strain, <g>", "friction.mu", "0.1", "0.3"} <= said[3]
+    assert visit.complaints == []
+    assert visit.requests == [visit.url]
     visit.page.close()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from finger3d.compare.picture import draw as draw_comparison
 from finger3d.errors import Outcome
 from finger3d.marks import marks_of
 from finger3d.model import Gauge
+from finger3d.page import sweep_charts
 from finger3d.panels import DPI, Panel, cells, panels_of, sheet
 from finger3d.search.picture import draw as draw_search
 from finger3d.sensor.curve import Calibration, Tolerance
@@ -74,11 +76,13 @@ def strain_map(path: Path) -> None:
 
 
 def sweep(path: Path) -> None:
-    grid = np.array(np.meshgrid([0.06, 0.25, 1.0], [0.3, 0.45, 0.49], [5.0, 10.0])).reshape(3, -1)
-    columns = dict(zip(("friction.mu", "material.nu", "press.depth_mm"), grid.tolist(), strict=True))
-    force = [1000.0 * a * b * c for a, b, c in grid.T]
-    good = {"outcome": ["converged"] * len(force), "normal_force_N": force, "gauge_g36": [f - 9e3 for f in force]}
-    assert draw_sweep(path, {**columns, **good}, list(columns))
+    keys = ["friction.mu", "material.nu", "press.depth_mm"]
+    rows = [
+        {**dict(zip(keys, map(str, (a, b, c)), strict=True)), "outcome": "converged",
+         "normal_force_N": str(1000.0 * a * b * c), "gauge_g36": str(1000.0 * a * b * c - 9e3)}
+        for a, b, c in product([0.06, 0.25, 1.0], [0.3, 0.45, 0.49], [5.0, 10.0, 15.0])
+    ]  # fmt: skip
+    draw_sweep(path, sweep_charts(rows, keys))
 
 
 def search(path: Path) -> None:

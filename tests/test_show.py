@@ -123,6 +123,10 @@ def test_values_of_the_window(solid: Path) -> None:
         (["whole", "--step", "1"], 2, "--step goes with --png"),
         (["whole", "--png", "a.jpg"], 2, "must end in .png"),
         (["whole", "--png", "a.png", "--step", "9"], 2, "step 9 is not among those kept: 1, 2, 3, 4"),
+        (["swept"], 2, "is of a sweep: open swept/report.html, or give --png alone"),
+        (["swept", "--png", "a.png", "--step", "1"], 2, "give --png alone"),
+        (["swept", "--png", "a.jpg"], 2, "must end in .png"),
+        (["swept", "--png", "a.png"], 2, "no varied key has two numbers among the points that converged"),
     ],
 )
 def test_nothing_to_show_is_one_line(
@@ -136,6 +140,8 @@ def test_nothing_to_show_is_one_line(
     (tmp_path / "cut").mkdir()
     cut = {"outcome": "incomplete: it was interrupted", "scene": {}}
     (tmp_path / "cut" / "summary.json").write_text(json.dumps(cut))
+    (tmp_path / "swept").mkdir()
+    (tmp_path / "swept" / "sweep.json").write_text(json.dumps({"vary": {"friction.mu": ["0.1", "0.2"]}}))
     (tmp_path / "whole").symlink_to(section)
     assert main(["show", *arguments]) == code
     out, err = capsys.readouterr()

@@ -22,6 +22,7 @@ from finger3d.cli import main
 from finger3d.cli.sweep import _SHARED
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.family import _FREE
+from finger3d.panels import panels_of
 from finger3d.scene import load
 from finger3d.sweep import Kept, Sweep, combinations
 from finger3d.sweep import run as running
@@ -219,6 +220,13 @@ def test_one_body_is_swept_without_workers_and_its_points_are_shown(scene, tmp_p
         (line,) = (line.split() for line in told.splitlines() if line.split()[:4] == mine)
         assert line[-2:] == [f"{float(row['gauge_g36']):.5g}", "converged"]
     assert "the first 10 of 12 points" in told
+    assert str(tmp_path / "report.html") in told
+    assert main(["show", str(tmp_path), "--png", str(tmp_path / "a.png")]) == 0
+    assert [panel.name for panel in panels_of(tmp_path / "a.png")[1]] == [
+        f"{what} against {key}" for what in ("Normal force", "Strain, g36")
+        for key in ("friction.mu", "gauge.g36.angle_deg")
+    ]  # fmt: skip
+    capsys.readouterr()
     assert main(["sweep", str(scene), *COARSE, *vary, "--out", str(tmp_path), "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
     assert (data["points"], data["kept"], data["failed"], data["bodies"]) == (12, 12, 0, 1)

@@ -16,7 +16,7 @@ def show(
     folder: Path,
     /,
     *,
-    png: Annotated[Path | None, Parameter(help="Write a picture of a step instead of opening a window.")] = None,
+    png: Annotated[Path | None, Parameter(help="Write a picture (of a step) instead of opening a window.")] = None,
     gif: Annotated[Path | None, Parameter(help="Write an animation of the steps instead.")] = None,
     step: Annotated[int | None, Parameter(help="Number of the step in the picture; default the last.")] = None,
 ) -> int:
@@ -27,8 +27,10 @@ def show(
     Parameters
     ----------
     folder
-        What `finger3d press` wrote.
+        What `finger3d press` wrote; or `finger3d sweep`, for the --png of its charts.
     """
+    if (folder / "sweep.json").is_file():
+        return _show_sweep(folder, png, gif, step)
     from finger3d import show as run
 
     if png is None and gif is None:
@@ -37,13 +39,29 @@ def show(
         run.show_window(folder)
         return 0
     run.found(folder)
-    for path, ending in ((png, ".png"), (gif, ".gif")):
-        if path is not None and path.suffix.lower() != ending:
-            raise Finger3dError(f"show: --{ending[1:]} {path}: must end in {ending}")
-        if path is not None:
-            check_folder(path.parent)
+    _check(png, ".png")
+    _check(gif, ".gif")
     run.show(folder, png, gif, step)
     for path in (png, gif):
         if path is not None:
             print(f"{path} written")
     return 0
+
+
+def _show_sweep(folder: Path, png: Path | None, gif: Path | None, step: int | None) -> int:
+    if png is None or gif is not None or step is not None:
+        raise Finger3dError(f"show: {folder} is of a sweep: open {folder / 'report.html'}, or give --png alone")
+    _check(png, ".png")
+    from finger3d.sweep.picture import picture
+
+    picture(folder, png)
+    print(f"{png} written")
+    return 0
+
+
+def _check(path: Path | None, ending: str) -> None:
+    if path is None:
+        return
+    if path.suffix.lower() != ending:
+        raise Finger3dError(f"show: --{ending[1:]} {path}: must end in {ending}")
+    check_folder(path.parent)

@@ -62,32 +62,25 @@ def sweep(
         raise Finger3dError(f"--workers {workers}: must be at least 1")
     if workers is not None and scheduler is not None:
         raise Finger3dError("--workers and --scheduler: give one of them; a cluster has its own workers")
-    from finger3d.drawing import Artist
+    with loading():
+        from finger3d.sweep.cluster import prepare
 
-    several = any("," in text for text in vary)
-    # it loads what it needs while the points are checked, and so do the workers
-    with Artist(several, "finger3d.sweep.picture", formulae=False, behind=True) as artist:
-        with loading():
-            from finger3d.sweep.cluster import prepare
+        if scheduler is None and any("," in text and not text.strip().startswith(_SHARED) for text in vary):
+            prepare()  # workers load what they need while the points are checked
+        from finger3d.sweep import combinations
+        from finger3d.sweep import sweep as run
 
-            if scheduler is None and any("," in text and not text.strip().startswith(_SHARED) for text in vary):
-                prepare()
-            from finger3d.sweep import combinations
-            from finger3d.sweep import sweep as run
-            from finger3d.sweep.run import finish
-
-        report, aside = reporting(json_)
-        try:
-            with aside, report:
-                report.stage("checking every point")
-                points = combinations(scene, set_ or [], vary)
-                check_writable(out, scene)
-                kept = run(points, out, scheduler, workers, report, artist)
-            _tell(kept, out, json_)  # while the picture is drawn
-            finish(out, artist)
-        except KeyboardInterrupt:
-            complain(f"interrupted; {_said(report.steps_done, report.steps_total, out)}")
-            return 130
+    report, aside = reporting(json_)
+    try:
+        with aside, report:
+            report.stage("checking every point")
+            points = combinations(scene, set_ or [], vary)
+            check_writable(out, scene)
+            kept = run(points, out, scheduler, workers, report)
+    except KeyboardInterrupt:
+        complain(f"interrupted; {_said(report.steps_done, report.steps_total, out)}")
+        return 130
+    _tell(kept, out, json_)
     failed = [row for row in (kept.rows | kept.lost).values() if row["outcome"] != "converged"]
     if not failed:
         return 0
@@ -151,4 +144,5 @@ def _rows(kept: Kept, out: Path) -> list[tuple[str, str]]:
         ("time of workers", f"{sum(built.values()):.1f} s meshing and condensing, {seconds:.1f} s contact"),
         ("results", str(out / "results.csv")),
         ("", str(out / "results.parquet")),
+        ("", str(out / "report.html")),
     ]

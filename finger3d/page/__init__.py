@@ -15,10 +15,11 @@ from finger3d.lazy import from_home
 
 if TYPE_CHECKING:
     from finger3d.page.build import Code, Figure, Row, Section, Table, write_page
+    from finger3d.page.chart import Chart, Line
     from finger3d.page.design import design_page
     from finger3d.page.press import press_page
     from finger3d.page.results import compare_page
-    from finger3d.page.sensor import calibrate_page, sweep_page
+    from finger3d.page.sensor import calibrate_page, sweep_charts, sweep_page
     from finger3d.page.states import States, load_states, write_states
     from finger3d.page.view3d import View3D, view_of
 
@@ -29,10 +30,13 @@ _HOME = {
     "Section": "build",
     "Table": "build",
     "write_page": "build",
+    "Chart": "chart",
+    "Line": "chart",
     "design_page": "design",
     "press_page": "press",
     "compare_page": "results",
     "calibrate_page": "sensor",
+    "sweep_charts": "sensor",
     "sweep_page": "sensor",
     "States": "states",
     "load_states": "states",
@@ -42,8 +46,10 @@ _HOME = {
 }
 
 __all__ = [
+    "Chart",
     "Code",
     "Figure",
+    "Line",
     "Row",
     "Section",
     "States",
@@ -54,6 +60,7 @@ __all__ = [
     "design_page",
     "load_states",
     "press_page",
+    "sweep_charts",
     "sweep_page",
     "view_of",
     "write_page",

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from importlib import resources
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,7 @@ from finger3d.panels import panels_of
 from finger3d.versions import versions as installed
 
 if TYPE_CHECKING:
+    from finger3d.page.chart import Chart
     from finger3d.page.view3d import View3D
 
 # The page may run its own script and show its own pictures, and may not ask any machine for anything.
@@ -95,6 +97,7 @@ def write_page(
     sections: Sequence[Section] = (),
     figures: Sequence[Figure] = (),
     view: View3D | None = None,
+    charts: Sequence[Chart] = (),
     *,
     command: str = "",
     outcome: str = "converged",
@@ -110,6 +113,7 @@ def write_page(
     folder : where the page goes, and where figures without a folder are
     headline : the numbers a reader came for
     view : a body to turn, in 3D
+    charts : curves to read values off
     command : what made the results, for instance ``press``
     outcome, good : one line on how it went, and whether that is well
     notes : warnings and advice, shown under the headline
@@ -136,17 +140,25 @@ def write_page(
         body.append(f'<ul class="notes">{"".join(f"<li>{escape(note)}</li>" for note in notes)}</ul>')
     if view is not None:
         body.append(view.html())
-    body.append(_figures(folder, figures))
+    body += [_figures(folder, figures), _grid(chart.html() for chart in charts)]
     found = installed() if versions is None else versions
     closing = [
         Section("Versions", [", ".join(f"{k} {v}" for k, v in found.items())]),
         Section("How to cite", [f"{CITE}, version {found.get('finger3d', 'unknown')}.", f"{PAPER}."]),
     ]
     body += [_section(folder, s) for s in (*sections, *closing)]
-    script = view.script() if view is not None else ""
+    scripts = [view.script()] if view is not None else []
+    if charts:
+        from finger3d.page.chart import script
+
+        scripts.append(script(charts))
+    before, after = _document(title, "\n".join(body))
     target = folder / file
-    with atomic(target) as temporary:
-        temporary.write_text(_document(title, "\n".join(body), script), encoding="utf-8")
+    with atomic(target) as temporary, temporary.open("wb") as stream:
+        stream.write(before.encode())
+        if scripts:
+            stream.write(b"<script>" + _plotly() + b"</script>\n")
+        stream.write("".join([*scripts, after]).encode())
     return target
 
 
@@ -174,6 +186,15 @@ def number(value: object, error: float | None = None) -> str:
 def asset(name: str) -> str:
     """Text of a file that travels with this package."""
     return resources.files("finger3d.page").joinpath(name).read_text(encoding="utf-8")
+
+
+def _plotly() -> bytes:
+    """plotly.js from plotly's wheel, as it is on disk: to import plotly, or to make 5 MB text, would take longer."""
+    found = find_spec("plotly")
+    assert found is not None
+    assert found.origin is not None
+    library = Path(found.origin).with_name("package_data") / "plotly.min.js"
+    return library.read_bytes().replace(b"</script", b"<\\/script")
 
 
 def _card(row: Row) -> str:
@@ -217,7 +238,11 @@ def _cell(value: object) -> str:
 
 def _figures(folder: Path, figures: Sequence[Figure]) -> str:
     """Pictures in a grid, each panel of one in a place of its own; a picture's data stand in the page once."""
-    shown = "".join(_figure(folder / figure.path, figure.caption) for figure in figures)
+    return _grid(_figure(folder / figure.path, figure.caption) for figure in figures)
+
+
+def _grid(figures: Iterable[str]) -> str:
+    shown = "".join(figures)
     return f'<div class="figures">{shown}</div>' if shown else ""
 
 
@@ -240,11 +265,12 @@ def _figure(path: Path, caption: str) -> str:
     return "".join(shown)
 
 
-def _document(title: str, body: str, script: str) -> str:
+def _document(title: str, body: str) -> tuple[str, str]:
+    """What comes before the scripts that draw, and what comes after them."""
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n<link rel="icon" href="data:,">\n'
         f"<title>{escape(title)} - finger3d</title>\n<style>\n{asset('style.css')}</style>\n</head>\n"
-        f"<body>\n<main>\n{body}\n</main>\n<script>{_UNFOLD}</script>\n{script}</body>\n</html>\n"
-    )
+        f"<body>\n<main>\n{body}\n</main>\n<script>{_UNFOLD}</script>\n"
+    ), "</body>\n</html>\n"

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from finger3d.page.build import Code, Figure, Row, Section, Table, write_page
+from finger3d.page.chart import Chart, Line
 from finger3d.page.results import how_modelled, read_json, read_rows, title_of
 
 _MOST_ROWS = 500
+_MOST_KEYS, _MOST_GAUGES, _MOST_LINES = 3, 2, 8  # of the charts of a sweep
 
 
 def calibrate_page(folder: str | Path) -> Path:
@@ -98,12 +101,47 @@ def sweep_page(folder: str | Path) -> Path:
             Section("Varied", [Table(("key", "values"), varied)]),
             Section("Scene", [Code(json.dumps(data["scene"], indent=2), "the scene that was varied")]),
         ],
-        [Figure("sweep.png", "Normal force and gauge strains against what was varied")],
+        charts=sweep_charts(rows, list(data["vary"])),
         command="sweep",
         outcome=f"{len(rows) - len(failed)} of {data['points']} points converged",
         good=len(rows) == data["points"] and not failed,
         notes=[f"point {row['point']}: {row['outcome']}" for row in failed[:10]],
     )
+
+
+def sweep_charts(rows: Sequence[Mapping[str, str]], keys: Sequence[str]) -> list[Chart]:
+    """Normal force and gauge strains, in turn, against each varied key that has several numbers.
+
+    Parameters
+    ----------
+    rows : of results.csv; those without numbers are left out
+    keys : varied; every setting of the others than a chart's own is a line of it
+    """
+    good = [{name: _number(text) for name, text in row.items()} for row in rows if row["outcome"] == "converged"]
+    along = [key for key in keys if len({row[key] for row in good}) > 1 and _numbers(row[key] for row in good)]
+    gauges = [name for name in (good[0] if good else {}) if name.startswith("gauge_")]
+    told = {"normal_force_N": ("Normal force", "normal force (N)")}
+    for name in gauges[:_MOST_GAUGES]:
+        gauge = name.removeprefix("gauge_")
+        told[name] = (f"Strain, {gauge}", f"strain, {gauge}")
+    found = []
+    for name, (called, title) in told.items():
+        for key in along[:_MOST_KEYS]:
+            others = [k for k in keys if k != key]
+            lines: dict[str, list[tuple[float, float]]] = {}
+            for row in good:
+                setting = ", ".join(f"{v:.12g}" if isinstance(v, float) else v for v in (row[k] for k in others))
+                lines.setdefault(setting, []).append((row[key], row[name]))
+            shown = [
+                Line(label, *zip(*sorted(points), strict=True)) for label, points in list(lines.items())[:_MOST_LINES]
+            ]
+            left_out = len(lines) - len(shown)
+            found.append(Chart(f"{called} against {key}", key, title, shown, ", ".join(others), left_out))
+    return found
+
+
+def _numbers(values: Iterable[Any]) -> bool:
+    return all(isinstance(value, float) for value in values)
 
 
 def _number(text: str) -> Any:

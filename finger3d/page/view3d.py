@@ -70,7 +70,7 @@ class View3D:
         )
 
     def script(self) -> str:
-        """Plotly, the numbers, and what joins them."""
+        """The numbers, and what lets plotly draw them."""
         data = {
             "labels": self.labels,
             "vertices": len(self.rest),
@@ -85,7 +85,6 @@ class View3D:
         }
         text = json.dumps(data).replace("</", "<\\/")
         return (
-            f"<script>{_plotly()}</script>\n"
             f'<script type="application/json" id="view-data">{text}</script>\n<script>{asset("view3d.js")}</script>\n'
         )
 
@@ -126,15 +125,3 @@ def label(step: int, target: Array) -> str:
 
 def _packed(values: Array, kind: str) -> str:
     return base64.b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")
-
-
-def _plotly() -> str:
-    """plotly.js from plotly's wheel, read as text: importing plotly would take as long as the rest of the page."""
-    from importlib.util import find_spec
-    from pathlib import Path
-
-    found = find_spec("plotly")
-    assert found is not None
-    assert found.origin is not None
-    library = Path(found.origin).with_name("package_data") / "plotly.min.js"
-    return library.read_text(encoding="utf-8").replace("</script", "<\\/script")

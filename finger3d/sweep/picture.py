@@ -1,85 +1,69 @@
-"""sweep.png: what changes with what was varied, a panel for each key that has several numbers."""
+"""A sweep as a picture for paper and slides: the charts of its page, a panel each."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from itertools import product
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from finger3d.errors import Finger3dError
+from finger3d.page import Chart, sweep_charts
+from finger3d.page.results import read_json, read_rows
 from finger3d.panels import sheet
 
-_MOST_LINES = 8
-_MOST_PANELS = 3
 _LINE = 0.21  # inches of a line of the legend,
 _WIDE = 64  # and letters that fit into it
 
 
-def draw(path: Path, columns: Mapping[str, Sequence[Any]], keys: Sequence[str]) -> bool:
-    """Draw the normal force (and the first gauge's strain) against each varied number; a line for each other setting.
+def picture(folder: str | Path, path: str | Path) -> None:
+    """Draw what is kept of a sweep.
 
-    Returns
-    -------
-    bool
-        Whether there was anything to draw.
+    Parameters
+    ----------
+    folder : of the sweep
+    path : of the PNG file
+
+    Raises
+    ------
+    Finger3dError
+        If nothing of it can be drawn, or the file cannot be written.
     """
-    good = np.array([outcome == "converged" for outcome in columns["outcome"]], dtype=bool)
-    along = [k for k in keys if len(set(columns[k])) > 1 and not isinstance(columns[k][0], str)][:_MOST_PANELS]
-    if not along or not good.any():
-        return False
-    told = ["normal_force_N", *[name for name in columns if name.startswith("gauge_")][:1]]
-    lines = {key: _lines(columns, good, [k for k in keys if k != key]) for key in along}
-    high = max(1 + math.ceil(min(len(labels), _MOST_LINES + 1) / _abreast(labels)) for labels in lines.values())
-    below = 0.65 + _LINE * high * (len(keys) > 1)
-    made = sheet(len(told), len(along), (5.6, 3.5 + below), (0.9, 0.15, below, 0.2))
-    for axes, (name, key) in zip(made.axes, product(told, along), strict=True):
-        _panel(axes, columns, lines[key], key, [k for k in keys if k != key], name)
-    made.save(path, [f"{_called(name)} against {key}" for name, key in product(told, along)])
-    return True
+    folder = Path(folder)
+    keys = list(read_json(folder / "sweep.json")["vary"])
+    charts = sweep_charts(read_rows(folder / "results.csv"), keys)
+    if not charts:
+        raise Finger3dError(f"{folder}: nothing to draw; no varied key has two numbers among the points that converged")
+    draw(path, charts)
 
 
-def _lines(columns: Mapping[str, Sequence[Any]], good: Any, others: Sequence[str]) -> dict[str, list[int]]:
-    """Numbers of the good rows by their setting of the other keys, as it is written in the legend."""
-    found: dict[str, list[int]] = {}
-    for i in np.flatnonzero(good).tolist():
-        values = [columns[k][i] for k in others]
-        setting = ", ".join(f"{v:.12g}" if isinstance(v, float) else str(v) for v in values)
-        found.setdefault(setting, []).append(i)
-    return found
+def draw(path: str | Path, charts: Sequence[Chart]) -> None:
+    """Draw charts, those of one y in a row."""
+    columns = len({chart.x for chart in charts})
+    high = max(1 + math.ceil((len(chart.lines) + bool(chart.more)) / _abreast(chart)) for chart in charts)
+    below = 0.65 + _LINE * high * any(chart.legend for chart in charts)
+    made = sheet(len(charts) // columns, columns, (5.6, 3.5 + below), (0.9, 0.15, below, 0.2))
+    for axes, chart in zip(made.axes, charts, strict=True):
+        _panel(axes, chart)
+    made.save(path, [chart.caption for chart in charts])
 
 
-def _abreast(labels: Iterable[str]) -> int:
+def _abreast(chart: Chart) -> int:
     """How many labels have room beside each other in a panel."""
-    return max(1, min(4, _WIDE // (6 + max(map(len, labels)))))
+    return max(1, min(4, _WIDE // (6 + max(len(line.label) for line in chart.lines))))
 
 
-def _panel(
-    axes: Any,
-    columns: Mapping[str, Sequence[Any]],
-    lines: Mapping[str, Sequence[int]],
-    key: str,
-    others: Sequence[str],
-    name: str,
-) -> None:
-    for label, rows in list(lines.items())[:_MOST_LINES]:
-        on = sorted(rows, key=lambda i: columns[key][i])
-        x, y = (np.array([columns[k][i] for i in on], dtype=float) for k in (key, name))
-        axes.plot(x, y, "o-", ms=4, lw=1.2, label=label)
-    if len(lines) > _MOST_LINES:
-        axes.plot([], [], " ", label=f"and {len(lines) - _MOST_LINES} more")
-    axes.set_xlabel(key)
-    axes.set_ylabel("normal force (N)" if name == "normal_force_N" else f"strain, {name.removeprefix('gauge_')}")
+def _panel(axes: Any, chart: Chart) -> None:
+    for line in chart.lines:
+        axes.plot(line.x, line.y, "o-", ms=4, lw=1.2, label=line.label)
+    if chart.more:
+        axes.plot([], [], " ", label=f"and {chart.more} more")
+    axes.set_xlabel(chart.x)
+    axes.set_ylabel(chart.y)
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(True, color="#e4e4e4", lw=0.6)
-    if others:
+    if chart.legend:
         axes.legend(
-            title=", ".join(others), frameon=False, fontsize=9, title_fontsize=9, loc="upper center",
-            bbox_to_anchor=(0.45, -0.13), ncols=_abreast(lines),
+            title=chart.legend, frameon=False, fontsize=9, title_fontsize=9, loc="upper center",
+            bbox_to_anchor=(0.45, -0.13), ncols=_abreast(chart),
         )  # fmt: skip
-
-
-def _called(name: str) -> str:
-    return "Normal force" if name == "normal_force_N" else f"Strain, {name.removeprefix('gauge_')}"

@@ -7,17 +7,15 @@ import queue
 import time
 import uuid
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from finger3d.drawing import Artist
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.page import sweep_page
 from finger3d.report import Report
 from finger3d.sweep import cluster
 from finger3d.sweep.kept import Kept
-from finger3d.sweep.picture import draw
 from finger3d.sweep.points import Sweep
 from finger3d.sweep.work import Task, on_worker, press_all
 
@@ -33,7 +31,6 @@ def sweep(
     scheduler: str | None = None,
     workers: int | None = None,
     report: Report | None = None,
-    artist: Artist | None = None,
 ) -> Kept:
     """Press every point of a sweep that is not kept yet.
 
@@ -45,7 +42,6 @@ def sweep(
     workers : processes on this machine; None: one for each core, at most one for each body; a single body is pressed
         by this process
     report : told about every point
-    artist : who draws, and whose picture the caller waits for by `finish`; one of its own, waited for, unless given
 
     Returns
     -------
@@ -66,23 +62,10 @@ def sweep(
         if before := len(kept.rows):
             report.say(f"{before} of {len(points.points)} points are kept from before")
         tasks = _tasks(points, kept)
-        several = bool(tasks) and any(len(v.texts) > 1 for v in points.vary)
-        with nullcontext(artist) if artist else Artist(several, draw.__module__, formulae=False, behind=True) as mine:
-            with _pressed(kept, tasks, scheduler, workers, report):  # the picture is drawn while workers end
-                columns = kept.columns()
-                if columns["point"]:
-                    mine.draw(draw, folder / "sweep.png", columns, [v.key for v in points.vary])
-                    mine.begin()
-            kept.write()
-            if not artist:
-                finish(folder, mine)
+        with _pressed(kept, tasks, scheduler, workers, report):
+            kept.write()  # while workers end
+        sweep_page(folder)
         return kept
-
-
-def finish(out: str | Path, artist: Artist) -> None:
-    """Wait for the picture of a sweep, and write the page with it."""
-    artist.finish()
-    sweep_page(Path(out))
 
 
 @contextmanager

@@ -1,0 +1,35 @@
+"use strict";
+(function () {
+  const charts = JSON.parse(document.getElementById("chart-data").textContent);
+  const boxes = [...document.querySelectorAll(".chart > div")];
+  const dark = window.matchMedia("(prefers-color-scheme: dark)");
+  const plain = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;");  // plotly takes tags for its own
+  const LINE = 18, BELOW = 48, WIDE = 7.5;  // pixels of a line of the legend, below the axes, and of a letter
+
+  function traces(chart) {
+    return chart.lines.map((line) => ({ type: "scatter", mode: "lines+markers", name: plain(line.label),
+      x: line.x, y: line.y, line: { width: 1.6 }, marker: { size: 6 },
+      hovertemplate: `%{x:.6~g}, %{y:.5~g}<extra>${chart.lines.length > 1 ? plain(line.label) : ""}</extra>` }));
+  }
+  function layout(chart, box) {
+    const style = getComputedStyle(document.body), grid = style.getPropertyValue("--line").trim();
+    const axis = (title) => ({ title: { text: plain(title), standoff: 8 }, gridcolor: grid, zerolinecolor: grid,
+      linecolor: grid, automargin: true, exponentformat: "power", nticks: 7 });
+    // The legend has as many lines as its entries take beside each other, and one for its title.
+    const several = chart.lines.length > 1, longest = Math.max(...chart.lines.map((line) => line.label.length));
+    const abreast = Math.max(1, Math.floor((box.clientWidth - 20) / (45 + WIDE * longest)));
+    const legend = several ? LINE * (1.5 + Math.ceil(chart.lines.length / abreast)) : 0;
+    return { height: 300 + legend, margin: { l: 60, r: 12, t: 10, b: BELOW + legend },
+      paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", showlegend: several,
+      font: { color: style.color, size: 12, family: style.fontFamily }, xaxis: axis(chart.x), yaxis: axis(chart.y),
+      legend: { orientation: "h", yref: "container", y: 0, yanchor: "bottom", x: 0,
+        title: { text: plain(chart.legend), side: "top" } } };
+  }
+  function draw() {
+    return Promise.all(boxes.map((box, i) => Plotly.react(box, traces(charts[i]), layout(charts[i], box), {
+      responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"],
+      toImageButtonOptions: { filename: charts[i].caption, scale: 2 } })));
+  }
+  dark.addEventListener("change", draw);
+  draw().then(() => boxes.forEach((box) => { box.dataset.drawn = "yes"; }));
+})();
