@@ -24,6 +24,10 @@ _CACHED = 30_000
 """Numbers that are gathered at once."""
 
 
+PRECISION: dict[int, type[Any]] = {1: np.float64, 2: np.float64, 3: np.float32}
+"""Of what decides nothing, and of first factors, by dimension: matrices of 2D are in the cache either way."""
+
+
 @dataclass(frozen=True)
 class Increments:
     """One increment to be solved: find force (c, d) such that ``moved = free + C force`` meets the conditions.

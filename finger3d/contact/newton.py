@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.contact.conditions import Increments, lengths, project, residual
+from finger3d.contact.conditions import PRECISION, Increments, lengths, project, residual
 from finger3d.contact.law import SLIP, STICK
 
 Float = NDArray[np.float64]
@@ -213,9 +213,10 @@ def quick_newton(problem: Increments, start: Float, limit: int, damped: bool) ->
 
     Corrections bring the digits that a factor in single precision leaves out, and cost less than it saves.
     """
-    if start.shape[1] < 3 or problem.mu.max(initial=0.0) > _RUBBER:
+    precision = PRECISION[start.shape[1]]
+    if precision is np.float64 or problem.mu.max(initial=0.0) > _RUBBER:
         return newton(problem, start, limit, damped)
-    single = newton(problem, start, _SINGLE, damped, np.float32)
+    single = newton(problem, start, _SINGLE, damped, precision)
     if single.solved:
         return single
     double = newton(problem, start, limit, damped)

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.contact.conditions import Increments
+from finger3d.contact.conditions import PRECISION, Increments, project
 from finger3d.contact.newton import solver
 
 Float = NDArray[np.float64]
@@ -31,23 +31,23 @@ _STEPS, _TURN = 40, 8
 _STILL, _SETTLED = 1e-4, 1e-3
 """Shares of the largest friction and of the normal forces by which the last step and the last turn may change them."""
 
-_TINY = 1e-30
+_FITS = 1e-2
+"""Share of the forces by which those expected may miss their projection, and be the start: Newton is done soon then."""
 
-_PRECISION = {1: np.float64, 2: np.float64, 3: np.float32}
-"""Of what is computed here, which decides nothing, by dimension: matrices of 2D are in the cache either way."""
+_TINY = 1e-30
 
 Array = NDArray[np.floating[Any]]
 Solve = Callable[[Array], Array]
 
 
 def predict(problem: Increments, force: Float) -> Float:
-    """Forces (c, d) N to start from, given those expected: these, unless points open or close under them.
+    """Forces (c, d) N to start from, given those expected: these, unless points open or close under them, or rub else.
 
     They decide nothing.
     """
     gap = problem.gap(force)
     touched, touches = force[:, 0] > 0.0, force[:, 0] > problem.rho[:, 0] * gap
-    if (touched == touches).all():
+    if (touched == touches).all() and _fits(problem, force):
         return force
     found = np.zeros_like(force)
     try:
@@ -59,6 +59,12 @@ def predict(problem: Increments, force: Float) -> Float:
     except np.linalg.LinAlgError:  # of a body that floats, or an indefinite compliance: others judge it
         return force
     return found
+
+
+def _fits(problem: Increments, force: Float) -> bool:
+    """Whether forces (c, d) nearly are their own projection."""
+    missed = force - project(problem, force, problem.moved(force))[0]
+    return float(np.linalg.norm(missed)) <= _FITS * float(np.linalg.norm(force))
 
 
 def _deep(gap: Float, closes: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -76,7 +82,7 @@ def _normal(problem: Increments, force: Float, touches: NDArray[np.bool_]) -> tu
     press : gaps (k,) that are to be closed -> normal forces (k,)
     """
     d = force.shape[1]
-    precision = _PRECISION[d]
+    precision = PRECISION[d]
     expected = force.copy()
     expected[:, 0] = 0.0
     open_gap = problem.gap(expected)
@@ -112,7 +118,7 @@ class _Touching(NamedTuple):
     def of(cls, problem: Increments, points: NDArray[np.int64], press: Solve) -> _Touching:
         d, k = problem.free.shape[1], len(points)
         chosen = (np.arange(d)[:, None] + points * d).ravel()
-        whole = problem.between(chosen, _PRECISION[d])
+        whole = problem.between(chosen, PRECISION[d])
         free, rho = (a.ravel()[chosen].astype(whole.dtype) for a in (problem.free, problem.rho))
         coupling, tangential, rho = whole[:k, k:], whole[k:, k:], rho[k:]
         mu, step = problem.mu[points].astype(whole.dtype), rho / _largest(tangential, rho)
