@@ -263,6 +263,15 @@ def test_a_sweep_leaves_pandas_to_others(tmp_path):
     assert subprocess.run([sys.executable, "-c", code, str(tmp_path / "a.parquet")], timeout=60).returncode == 0
 
 
+def test_a_sweep_of_one_body_waits_for_no_plotting_library(scene, tmp_path):
+    code = "import sys; from finger3d.cli import main; main(sys.argv[1:]); "
+    code += "sys.exit(repr({'matplotlib', 'PIL', 'plotly', 'pandas', 'distributed'} & set(sys.modules)))"
+    words = ["sweep", str(scene), *COARSE, "--vary", "friction.mu=0.1,0.2", "--out", str(tmp_path)]
+    done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, timeout=120)
+    assert done.stderr.splitlines()[-1] == "set()"
+    assert 'class="chart"' in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
 def test_what_workers_are_copied_from_has_one_thread_and_what_they_need():
     # a copy has no thread but the one that copies: locks that others held would be held for ever
     code = "import os, sys, finger3d.sweep.loaded; "
