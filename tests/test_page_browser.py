@@ -12,7 +12,7 @@ import pytest
 
 from finger3d.cli import main
 from finger3d.compare import compare
-from finger3d.page import load_states
+from finger3d.page import Chart, Line, load_states, write_page
 from finger3d.panels import DPI
 from tests.test_page import SECTION, SOLID
 
@@ -154,6 +154,25 @@ def test_the_charts_of_a_sweep_are_drawn_with_their_points_and_no_text_covers_an
     assert visit.complaints == []
     assert visit.requests == [visit.url]
     visit.page.close()
+
+
+def test_charts_of_long_names_and_of_any_text_are_drawn_within_their_boxes(browser: Any, tmp_path: Path) -> None:
+    text = "<!--<script>"  # leaves a script open, unless it is escaped
+    legend = ", ".join(["material.E_MPa", "finger.edge_height_mm", "object.radius_mm", text])
+    lines = [Line(f"{i}, {i}, {text}", (0.0, 1.0), (0.0, float(i))) for i in range(6)]
+    write_page(tmp_path, "long names", charts=[Chart(text, text, text, lines, legend)] * 2)
+    for width in (1280, 400):
+        visit = Visit(browser, tmp_path, width)
+        for chart in visit.page.evaluate(_CHARTS):
+            assert chart["points"] == 12
+            assert {text, f"0, 0, {text}"} <= set(chart["said"])
+            left, top, right, bottom = chart["box"]
+            assert all(left <= a < c <= right and top <= b < d <= bottom for a, b, c, d in chart["texts"])
+        visit.page.emulate_media(media="print", color_scheme="dark")
+        ink = "[...document.querySelectorAll('.chart text')].map((e) => getComputedStyle(e).fill)"
+        assert set(visit.page.evaluate(ink)) == {"rgb(0, 0, 0)"}
+        assert visit.complaints == []
+        visit.page.close()
 
 
 _DRAWN = """(() => document.getElementById("view-stage").data.map((t) => ({

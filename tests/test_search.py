@@ -106,7 +106,10 @@ def test_an_objective_from_a_file_on_the_command_line(root, tmp_path, capsys):
     scene, out = root / "geometries" / "fig9.toml", tmp_path / "out"
     arguments = ["design", str(scene), *COARSE, "--free", "gauge.g36.angle_deg=0:90", "--out", str(out)]
     assert main([*arguments, "--objective", str(judge), "--budget", "40", "--mu", "0.1,0.5"]) == 0
-    assert "best.toml" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "best.toml" in told
+    judged = (out / "evaluations.csv").read_text().splitlines()[1:]
+    assert f" {len(judged)} designs, " in told
     assert load(out / "best.toml").tables.gauge[0].angle_deg == pytest.approx(40.0, abs=2.0)
     judge.write_text("def objective(table):\n    return table.strains\n")
     assert main([*arguments[:-1], str(tmp_path / "other"), "--objective", str(judge)]) == 2

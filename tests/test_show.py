@@ -123,10 +123,11 @@ def test_values_of_the_window(solid: Path) -> None:
         (["whole", "--step", "1"], 2, "--step goes with --png"),
         (["whole", "--png", "a.jpg"], 2, "must end in .png"),
         (["whole", "--png", "a.png", "--step", "9"], 2, "step 9 is not among those kept: 1, 2, 3, 4"),
-        (["swept"], 2, "is of a sweep: open swept/report.html, or give --png alone"),
+        (["swept"], 2, "holds a sweep: it is not finished, and the same command goes on, or give --png alone"),
         (["swept", "--png", "a.png", "--step", "1"], 2, "give --png alone"),
         (["swept", "--png", "a.jpg"], 2, "must end in .png"),
         (["swept", "--png", "a.png"], 2, "no varied key has two numbers among the points that converged"),
+        (["respelt", "--png", "a.png"], 2, "is not as a sweep wrote it"),
     ],
 )
 def test_nothing_to_show_is_one_line(
@@ -142,6 +143,9 @@ def test_nothing_to_show_is_one_line(
     (tmp_path / "cut" / "summary.json").write_text(json.dumps(cut))
     (tmp_path / "swept").mkdir()
     (tmp_path / "swept" / "sweep.json").write_text(json.dumps({"vary": {"friction.mu": ["0.1", "0.2"]}}))
+    (tmp_path / "respelt").mkdir()
+    (tmp_path / "respelt" / "sweep.json").write_text(json.dumps({"vary": {"friction.mu": ["0.1", "0.2"]}}))
+    (tmp_path / "respelt" / "results.csv").write_text("point;outcome\n0;converged\n")
     (tmp_path / "whole").symlink_to(section)
     assert main(["show", *arguments]) == code
     out, err = capsys.readouterr()

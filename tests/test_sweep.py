@@ -222,6 +222,8 @@ def test_one_body_is_swept_without_workers_and_its_points_are_shown(scene, tmp_p
     assert "the first 10 of 12 points" in told
     assert str(tmp_path / "report.html") in told
     assert main(["show", str(tmp_path), "--png", str(tmp_path / "a.png")]) == 0
+    assert main(["show", str(tmp_path)]) == 2
+    assert f"open {tmp_path / 'report.html'}, or give --png alone" in capsys.readouterr().err
     assert [panel.name for panel in panels_of(tmp_path / "a.png")[1]] == [
         f"{what} against {key}" for what in ("Normal force", "Strain, g36")
         for key in ("friction.mu", "gauge.g36.angle_deg")

@@ -66,14 +66,13 @@ def design(
     if json_:
         print_json(json.loads((out / "design.json").read_text(encoding="utf-8")))
         return 0
-    judged = {e.values for e in found.evaluations}  # an optimiser may ask for a design again
     chosen = zip((f.key for f in problem.free), found.best.values, strict=True)
     print_rows(
         found.scene.title,
         [
             ("objective", f"{found.best.value:.5g}, at the start {found.start.value:.5g}"),
             *((key, f"{value:.5g}") for key, value in chosen),
-            ("judged", f"{len(judged)} designs, {found.bodies} bodies condensed"),
+            ("judged", f"{found.judged} designs, {found.bodies} bodies condensed"),
             ("results", str(out / "best.toml")),
             ("", str(out / "evaluations.csv")),
             ("", str(out / "report.html")),

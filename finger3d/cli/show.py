@@ -50,7 +50,9 @@ def show(
 
 def _show_sweep(folder: Path, png: Path | None, gif: Path | None, step: int | None) -> int:
     if png is None or gif is not None or step is not None:
-        raise Finger3dError(f"show: {folder} is of a sweep: open {folder / 'report.html'}, or give --png alone")
+        page = folder / "report.html"
+        look = f"open {page}" if page.exists() else "it is not finished, and the same command goes on"
+        raise Finger3dError(f"show: {folder} holds a sweep: {look}, or give --png alone")
     _check(png, ".png")
     from finger3d.sweep.picture import picture
 

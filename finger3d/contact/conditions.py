@@ -25,7 +25,7 @@ _CACHED = 30_000
 
 
 PRECISION: dict[int, type[Any]] = {1: np.float64, 2: np.float64, 3: np.float32}
-"""Of what decides nothing, and of first factors, by dimension: matrices of 2D are in the cache either way."""
+"""Precision of starts and of Newton's first factors, by dimension: matrices of 2D fit into the cache in double too."""
 
 
 @dataclass(frozen=True)

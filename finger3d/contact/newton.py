@@ -29,7 +29,7 @@ _STALLED = 1e-3
 _DIVERGED = 1e9
 
 _SINGLE, _RUBBER = 4, 2.0
-"""Iterations of `quick_newton` in single precision, and the largest mu for it: above 10 digits are often wanting."""
+"""Iterations of `quick_newton` in single precision, and the largest mu for it: at mu = 10 it often wants digits."""
 
 _CORRECTIONS, _PAYS = 12, 0.1
 """Corrections with one factor, and the share of the residual that one may leave: it costs a tenth of an iteration."""
@@ -109,7 +109,7 @@ class _System:
         own = np.concatenate([(stick[:, None] * d + np.arange(d)).ravel(), slip * d])
         sides = [slip * d + i for i in range(1, d)]
         whole = problem.between(np.concatenate([own, *sides]), precision)
-        free, kind = problem.free.ravel(), whole.dtype  # one factor of another precision would make all of it double
+        free, kind = problem.free.ravel(), whole.dtype  # one operand in double would make all of it so
         rho, pulls, sideways = (a.astype(kind, copy=False) for a in (problem.rho.ravel(), pull, across))
         normal, first, second = (slice(n + i * k, n + (i + 1) * k) for i in range(3))
         for i, side in enumerate((first, second)[: d - 1]):

@@ -41,7 +41,7 @@ Solve = Callable[[Array], Array]
 
 
 def predict(problem: Increments, force: Float) -> Float:
-    """Forces (c, d) N to start from, given those expected: these, unless points open or close under them, or rub else.
+    """Forces (c, d) N to start from, given those expected: these, if hardly anything would change under them.
 
     They decide nothing.
     """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,7 +11,7 @@ from html import escape
 from importlib import resources
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from finger3d.export import atomic
 from finger3d.panels import panels_of
@@ -186,6 +187,11 @@ def number(value: object, error: float | None = None) -> str:
 def asset(name: str) -> str:
     """Text of a file that travels with this package."""
     return resources.files("finger3d.page").joinpath(name).read_text(encoding="utf-8")
+
+
+def embedded(data: Any) -> str:
+    """JSON to stand in a script element: no "<" in it, which could end the element or begin a comment."""
+    return json.dumps(data).replace("<", "\\u003c")
 
 
 def _plotly() -> bytes:

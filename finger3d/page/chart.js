@@ -6,6 +6,13 @@
   const plain = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;");  // plotly takes tags for its own
   const LINE = 18, BELOW = 48, WIDE = 7.5;  // pixels of a line of the legend, below the axes, and of a letter
 
+  // The names in a legend's title, in lines of so many letters.
+  function broken(text, most) {
+    return text.split(", ").reduce((lines, name) => {
+      const longer = lines.length ? `${lines[lines.length - 1]}, ${name}` : name;
+      return longer.length > most && lines.length ? [...lines, name] : [...lines.slice(0, -1), longer];
+    }, []);
+  }
   function traces(chart) {
     return chart.lines.map((line) => ({ type: "scatter", mode: "lines+markers", name: plain(line.label),
       x: line.x, y: line.y, line: { width: 1.6 }, marker: { size: 6 },
@@ -18,12 +25,13 @@
     // The legend has as many lines as its entries take beside each other, and one for its title.
     const several = chart.lines.length > 1, longest = Math.max(...chart.lines.map((line) => line.label.length));
     const abreast = Math.max(1, Math.floor((box.clientWidth - 20) / (45 + WIDE * longest)));
-    const legend = several ? LINE * (1.5 + Math.ceil(chart.lines.length / abreast)) : 0;
+    const title = broken(chart.legend, (box.clientWidth - 90) / WIDE);
+    const legend = several ? LINE * (0.5 + title.length + Math.ceil(chart.lines.length / abreast)) : 0;
     return { height: 300 + legend, margin: { l: 60, r: 12, t: 10, b: BELOW + legend },
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", showlegend: several,
       font: { color: style.color, size: 12, family: style.fontFamily }, xaxis: axis(chart.x), yaxis: axis(chart.y),
       legend: { orientation: "h", yref: "container", y: 0, yanchor: "bottom", x: 0,
-        title: { text: plain(chart.legend), side: "top" } } };
+        title: { text: title.map(plain).join("<br>"), side: "top" } } };
   }
   function draw() {
     return Promise.all(boxes.map((box, i) => Plotly.react(box, traces(charts[i]), layout(charts[i], box), {

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
-from finger3d.page.build import asset
+from finger3d.page.build import asset, embedded
 
 
 @dataclass(frozen=True)
@@ -60,8 +59,7 @@ def script(charts: Sequence[Chart]) -> str:
         }
         for chart in charts
     ]  # fmt: skip
-    text = json.dumps(data).replace("</", "<\\/")
-    numbers = f'<script type="application/json" id="chart-data">{text}</script>\n'
+    numbers = f'<script type="application/json" id="chart-data">{embedded(data)}</script>\n'
     return f"{numbers}<script>{asset('chart.js')}</script>\n"
 
 

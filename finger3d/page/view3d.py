@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 from finger3d.marks import marks_of
 from finger3d.mesh import Mesh
 from finger3d.model import Gauge
-from finger3d.page.build import asset
+from finger3d.page.build import asset, embedded
 from finger3d.page.states import States, chosen
 
 Array = NDArray[Any]
@@ -83,10 +82,8 @@ class View3D:
             "gauges": np.round(self.gauges, 3).tolist(),
             "gaugeLabels": self.gauge_labels,
         }
-        text = json.dumps(data).replace("</", "<\\/")
-        return (
-            f'<script type="application/json" id="view-data">{text}</script>\n<script>{asset("view3d.js")}</script>\n'
-        )
+        numbers = f'<script type="application/json" id="view-data">{embedded(data)}</script>\n'
+        return f"{numbers}<script>{asset('view3d.js')}</script>\n"
 
 
 def view_of(states: States, gauges: Sequence[Gauge] = (), budget: int = _BUDGET) -> View3D | None:

@@ -41,11 +41,15 @@ class Evaluation:
 
 @dataclass(frozen=True)
 class Found:
-    """What a search came to; `scene` is the best design, ready to be pressed."""
+    """What a search came to; `scene` is the best design, ready to be pressed.
+
+    `evaluations` are in the order asked for, some more than once; `judged` designs are in evaluations.csv.
+    """
 
     best: Evaluation
     start: Evaluation
     evaluations: tuple[Evaluation, ...]
+    judged: int
     bodies: int
     scene: Scene
 
@@ -269,7 +273,7 @@ def _searched(problem: Problem, folder: Path, report: Report, judge: Objective, 
         first.values, Path(problem.objective).stem,
     )  # fmt: skip
     design_page(folder)
-    return Found(best, first, tuple(run.done), run.bodies, problem.scene(best.values))
+    return Found(best, first, tuple(run.done), len(judged), run.bodies, problem.scene(best.values))
 
 
 def _same(problem: Problem, folder: Path) -> None:

@@ -1,6 +1,6 @@
 """Presses of one condensed body under one coefficient of friction after another, each started from those before.
 
-Where mu changes by less than a tenth, forces at the mu before take up to half off the time of a press, whose increments
+Where mu changes by 0.1 at most, forces at the mu before take up to half off the time of a press, whose increments
 then need no other start.  They decide nothing: what is found is proved as always.
 """
 

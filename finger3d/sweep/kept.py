@@ -67,9 +67,9 @@ class Kept:
         elif (self.folder / JOURNAL).exists():
             raise Finger3dError(f"--out {self.folder}: holds {JOURNAL} without {IDENTITY}; name another folder")
         text = "".join(_line(row) for row in self.rows.values())
-        with self._room(JOURNAL), atomic(self.folder / JOURNAL) as temporary:
+        with self.room(JOURNAL), atomic(self.folder / JOURNAL) as temporary:
             temporary.write_text(text, encoding="utf-8")
-        with self._room(IDENTITY):
+        with self.room(IDENTITY):
             write_json(path, wanted)
 
     def _identity(self) -> dict[str, Any]:
@@ -117,7 +117,7 @@ class Kept:
         start = time.monotonic()
         columns = self.columns()
         if columns["point"]:
-            with self._room("results.parquet"):
+            with self.room("results.parquet"):
                 with atomic(self.folder / "results.parquet") as temporary:
                     write_parquet(temporary, columns)
                 write_csv(self.folder / "results.csv", columns)
@@ -143,7 +143,8 @@ class Kept:
         return f"{len(self.rows)} of {len(self.sweep.points)} points are kept in {self.folder}"
 
     @contextmanager
-    def _room(self, name: str) -> Iterator[None]:
+    def room(self, name: str) -> Iterator[None]:
+        """Write a file of this name within; what hinders it is told with how much is kept."""
         try:
             yield
         except Finger3dError as error:

@@ -30,8 +30,13 @@ def picture(folder: str | Path, path: str | Path) -> None:
         If nothing of it can be drawn, or the file cannot be written.
     """
     folder = Path(folder)
-    keys = list(read_json(folder / "sweep.json")["vary"])
-    charts = sweep_charts(read_rows(folder / "results.csv"), keys)
+    try:
+        keys = list(read_json(folder / "sweep.json")["vary"])
+        charts = sweep_charts(read_rows(folder / "results.csv"), keys)
+    except (KeyError, TypeError, ValueError):  # a spreadsheet may have saved them anew
+        raise Finger3dError(
+            f"{folder}: sweep.json or results.csv is not as a sweep wrote it; remove the folder, and sweep again"
+        ) from None
     if not charts:
         raise Finger3dError(f"{folder}: nothing to draw; no varied key has two numbers among the points that converged")
     draw(path, charts)

@@ -37,7 +37,7 @@ def sweep(
     Parameters
     ----------
     points : from `finger3d.sweep.combinations`
-    out : folder for points.jsonl, results.parquet and results.csv; that of the same sweep is gone on with
+    out : folder for points.jsonl, results.parquet, results.csv and report.html; that of the same sweep is gone on with
     scheduler : address of a Dask scheduler; None starts workers on this machine
     workers : processes on this machine; None: one for each core, at most one for each body; a single body is pressed
         by this process
@@ -64,7 +64,8 @@ def sweep(
         tasks = _tasks(points, kept)
         with _pressed(kept, tasks, scheduler, workers, report):
             kept.write()  # while workers end
-        sweep_page(folder)
+        with kept.room("report.html"):
+            sweep_page(folder)
         return kept
 
 
