@@ -77,10 +77,10 @@ def sweep(
             points = combinations(scene, set_ or [], vary)
             check_writable(out, scene)
             kept = run(points, out, scheduler, workers, report)
+        _tell(kept, out, json_)
     except KeyboardInterrupt:
         complain(f"interrupted; {_said(report.steps_done, report.steps_total, out)}")
         return 130
-    _tell(kept, out, json_)
     failed = [row for row in (kept.rows | kept.lost).values() if row["outcome"] != "converged"]
     if not failed:
         return 0
