@@ -1,6 +1,7 @@
 """What a press will take, before anything is solved: size, time and memory from a calibrated model.
 
-Calibrated on the Fig. 9 finger on 2 cores, 25 000 to 86 000 unknowns in 3D; good to a factor 2.
+Calibrated on the Fig. 9 finger on 2 cores, by the runs of validation/cost_of_accuracy.py and scaling.py: up to 386 000
+unknowns in 2D and 509 000 in 3D; good to a factor 2.
 """
 
 from __future__ import annotations
@@ -13,12 +14,13 @@ from finger3d.model import Model
 from finger3d.solve import AUTO_START, contact_zone, symmetry
 
 _BASE_MB = 170.0
+_TETWILD_MB = 500.0  # while it meshes, however little
 _IMPORT_S = 0.4
 _FIGURES_S = {2: 1.0, 3: 4.5}
 _NEWTON = 3  # factorisations in a step at finite strain
 _NUMERIC = 0.8  # of a condensation, once the ordering is known; with two solutions
 _TANGENT = 0.8  # assemblies of the linear stiffness
-_NEWTON_S = {2: 0.02, 3: 0.2}  # besides, in each step
+_NEWTON_S = {2: 0.008, 3: 0.12}  # besides, in each step
 _FOIL_ROWS = {2: 16, 3: 96}  # of a foil, mirror images together
 _FOIL_S = {2: 0.02, 3: 0.2}
 
@@ -45,7 +47,9 @@ def forecast(model: Model) -> dict[str, Any]:
     mixed = model.domain != "plane-stress" and model.material.nu >= MIXED_FROM
     size = _size(model, zone, axes, mixed)
     count = sum(leg.steps if isinstance(leg.steps, int) else 8 * AUTO_START for leg in model.legs)
-    seconds = _seconds(size, d, count, d == 3 and model.mesh.mesher == "ftetwild")
+    tetwild = d == 3 and model.mesh.mesher == "ftetwild"
+    seconds = _seconds(size, d, count, tetwild)
+    memory = max(_memory(size, d), _TETWILD_MB if tetwild else 0.0)
     costs = {name: _costs(name, model, size, seconds, count) for _, name in model.filled}
     return {
         "domain": model.domain,
@@ -58,7 +62,7 @@ def forecast(model: Model) -> dict[str, Any]:
         **{f"{stage}_s": round(s, 2) for stage, s in seconds.items()},
         **{name: f"costs {cost.why}" for name, cost in costs.items()},
         "total_s": round(sum(seconds.values()) + sum(cost.seconds for cost in costs.values()), 1),
-        "memory_MB": round(_memory(size, d) + sum(cost.memory_mb for cost in costs.values())),
+        "memory_MB": round(memory + sum(cost.memory_mb for cost in costs.values())),
     }
 
 
@@ -129,13 +133,14 @@ def _size(model: Model, zone: tuple[float, float, float, float], axes: tuple[str
 
 
 def _seconds(size: _Size, d: int, steps: int, tetwild: bool) -> dict[str, float]:
-    active = 0.8 * size.contact_points * (2.0 if d == 3 else 1.3)
+    points = size.contact_points
+    dense = 0.065 * (points / 680.0) ** 2.4 if d == 3 else 0.038 * (points / 700.0) ** 2.75
     return {
         "start": _IMPORT_S,
         "mesh": 3.0 + 3.5e-4 * size.cells if tetwild else 3e-7 * size.dofs,
-        "assembly": 2e-5 * size.dofs if d == 3 else 8e-6 * size.dofs,
-        "condensation": 3.5 * (size.dofs / 85_000.0) ** 1.6 if d == 3 else 0.02 + 1e-5 * size.dofs,
-        "contact": steps * (0.003 + 9.0 * (2e-6 * active + 2.5e-11 * active**3)),
+        "assembly": 8e-6 * size.dofs if d == 3 else 0.005 + 3e-6 * size.dofs,
+        "condensation": 6.0 * (size.dofs / 85_000.0) ** 1.75 if d == 3 else 0.004 + 8e-6 * size.dofs,
+        "contact": steps * (0.0025 + dense),
         "output": _FIGURES_S[d],
     }
 
