@@ -76,8 +76,6 @@ class Artist:
 
     def finish(self) -> None:
         """Wait until all is drawn."""
-        if self._sender:
-            import PIL.PngImagePlugin  # noqa: F401  for a page that shows what is drawn: there is time for it now
         if self._child is None or not self._sender or self._child.wait() != 0:
             for call in self._calls:
                 call()

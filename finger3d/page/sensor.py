@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -118,7 +118,8 @@ def sweep_charts(rows: Sequence[Mapping[str, str]], keys: Sequence[str]) -> list
     keys : varied; every setting of the others than a chart's own is a line of it
     """
     good = [{name: _number(text) for name, text in row.items()} for row in rows if row["outcome"] == "converged"]
-    along = [key for key in keys if len({row[key] for row in good}) > 1 and _numbers(row[key] for row in good)]
+    values = {key: {row[key] for row in good} for key in keys}
+    along = [key for key, of in values.items() if len(of) > 1 and all(isinstance(v, float) for v in of)]
     gauges = [name for name in (good[0] if good else {}) if name.startswith("gauge_")]
     told = {"normal_force_N": ("Normal force", "normal force (N)")}
     for name in gauges[:_MOST_GAUGES]:
@@ -138,10 +139,6 @@ def sweep_charts(rows: Sequence[Mapping[str, str]], keys: Sequence[str]) -> list
             left_out = len(lines) - len(shown)
             found.append(Chart(f"{called} against {key}", key, title, shown, ", ".join(others), left_out))
     return found
-
-
-def _numbers(values: Iterable[Any]) -> bool:
-    return all(isinstance(value, float) for value in values)
 
 
 def _number(text: str) -> Any:

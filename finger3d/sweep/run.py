@@ -6,8 +6,7 @@ import math
 import queue
 import time
 import uuid
-from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -61,33 +60,26 @@ def sweep(
         report.steps_done, report.steps_total = len(kept.rows), len(points.points)
         if before := len(kept.rows):
             report.say(f"{before} of {len(points.points)} points are kept from before")
-        tasks = _tasks(points, kept)
-        with _pressed(kept, tasks, scheduler, workers, report):
-            kept.write()  # while workers end
+        try:
+            _press(kept, _tasks(points, kept), scheduler, workers, report)
+        except BaseException:
+            # what ended the run is the news; tables that cannot be written beside it are not
+            with suppress(Finger3dError):
+                kept.write()
+            raise
+        kept.write()
         with kept.room("report.html"):
             sweep_page(folder)
         return kept
 
 
-@contextmanager
-def _pressed(
-    kept: Kept, tasks: list[Task], scheduler: str | None, workers: int | None, report: Report
-) -> Iterator[None]:
-    """Press what is left, then run the block; whatever ends this, what is finished is in the tables."""
-    try:
-        if tasks and (len(tasks) > 1 or scheduler):
-            with _cluster(scheduler, workers, len(tasks), report) as client:
-                _Run(client, kept, tasks, report).go()
-                yield
-        else:
-            if tasks:
-                _Run(None, kept, tasks, report).here()
-            yield
-    except BaseException:
-        # what ended the run is the news; tables that cannot be written beside it are not
-        with suppress(Finger3dError):
-            kept.write()
-        raise
+def _press(kept: Kept, tasks: list[Task], scheduler: str | None, workers: int | None, report: Report) -> None:
+    """Press what is left: a single body in this process, several, or any on a cluster, by workers."""
+    if len(tasks) > 1 or (tasks and scheduler):
+        with _cluster(scheduler, workers, len(tasks), report) as client:
+            _Run(client, kept, tasks, report).go()
+    elif tasks:
+        _Run(None, kept, tasks, report).here()
 
 
 def _cluster(scheduler: str | None, workers: int | None, bodies: int, report: Report) -> AbstractContextManager[Any]:
