@@ -53,15 +53,13 @@ def dundurs(nu: float) -> float:
 def line(nu: float, mu: float) -> Pressed:
     """Solve in plane strain; c/a must lie between 0.05 and 0.995."""
     count = _NODES[0] // 2
-    found: list[Float] = []
     # c is taken at grid angles, which all numbers of nodes share; mu falls as c does
     low, high = 1, count - 1
     while high - low > 1:
         middle = (low + high) // 2
         low, high = (middle, high) if _extrapolated(nu, middle)[0] < mu else (low, middle)
     first = min(max(low - 1, 1), count - 4)
-    found = [_extrapolated(nu, j) for j in range(first, first + 4)]
-    table = np.array(found)
+    table = np.array([_extrapolated(nu, j) for j in range(first, first + 4)])
     weights = [
         np.prod([(mu - table[k, 0]) / (table[j, 0] - table[k, 0]) for k in range(4) if k != j]) for j in range(4)
     ]
@@ -72,13 +70,18 @@ def line(nu: float, mu: float) -> Pressed:
 @cache
 def _extrapolated(nu: float, number: int) -> Float:
     """Return mu, c, and the constants of `Pressed` for c at a grid angle, extrapolated twice in 1/nodes."""
-    coarse, middle, fine = (_punch(dundurs(nu), n, number * n // _NODES[0]) for n in _NODES)
+    coarse = _punch(dundurs(nu), _NODES[0], number, np.geomspace(0.01, 5.0, 120))
+    near = coarse[0] * np.array([0.97, 1.03])
+    middle, fine = (_punch(dundurs(nu), n, number * n // _NODES[0], near) for n in _NODES[1:])
     once, twice = 2.0 * middle - coarse, 2.0 * fine - middle
     return np.asarray((4.0 * twice - once) / 3.0)
 
 
-def _punch(beta: float, nodes: int, stuck: int) -> Float:
-    """Solve the flat punch with `stuck` nodes of the right half in the stick zone, and integrate."""
+def _punch(beta: float, nodes: int, stuck: int, trials: Float) -> Float:
+    """Solve the flat punch with `stuck` nodes of the right half in the stick zone, and integrate.
+
+    mu is sought between the first two of `trials` where the condition at c changes its sign without a pole.
+    """
     half = nodes // 2
     angle = (np.arange(half) + 0.5) * np.pi / nodes  # from the middle of the contact, x = sin(angle)
     t, x = np.sin(angle), np.sin(np.arange(half) * np.pi / nodes)
@@ -101,9 +104,10 @@ def _punch(beta: float, nodes: int, stuck: int) -> Float:
         p = z[:half]
         return float(slope[-1] @ z), p, np.concatenate([z[half:], mu * p[stuck:]])
 
-    trials = np.geomspace(0.01, 5.0, 120)
     misses = [solved(mu)[0] for mu in trials]
-    at = next(k for k in range(119) if misses[k] * misses[k + 1] < 0.0 and abs(misses[k] - misses[k + 1]) < 1e3)
+    at = next(
+        k for k in range(len(trials) - 1) if misses[k] * misses[k + 1] < 0.0 and abs(misses[k] - misses[k + 1]) < 1e3
+    )
     mu = brentq(lambda m: solved(m)[0], trials[at], trials[at + 1], xtol=1e-13)
     _, p, q = solved(mu)
     scale = 1.0 / np.sum(-p * np.log1p(-(t**2)) / t**2 / nodes)  # dP/da = scale a / (A R)

@@ -114,11 +114,11 @@ def _theory_rows(ball: Problem, soft_ball: Problem) -> list[Row]:
     return [
         Row(
             f"ball without friction: force over Hertz's at equal a = {a:.2f} mm", LAYER,
-            layer * round_by_parabola((a / 8.0) ** 2), hard, 0.01, "the theory has no sides; the block's are 12 mm away",
+            layer * round_by_parabola((a / 8.0) ** 2), hard, 0.01, "the block's sides, 12 mm away, are neglected",
         ),
         Row(
             f"soft ball without friction: force over Hertz's at equal a = {b:.2f} mm", HERTZ,
-            round_by_parabola(q), soft, 0.02, "theory for half-spaces; half balls are held on their cuts, 3 a away",
+            round_by_parabola(q), soft, 0.02, "theory for half-spaces; half balls are held 3 a away",
         ),
     ]  # fmt: skip
 
