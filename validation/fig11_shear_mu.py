@@ -1,9 +1,9 @@
 """Does the shear strain in the Fig. 9 finger change with friction more than in the half cylinder, also at large mu?
 
 Source: Maeno 2004, Fig. 11 and Sec. III-B: 10 mm, plane strain: "when compared to Fig. 7, Fig. 11 reveals larger change
-in shear strain"; "in particular, shear strain changes even when the friction coefficient is large at the node x = 36
-mm"; "the area near the edge of contact slips easily because both sides of the finger have been removed". Fig. 7 is
-plane stress and Fig. 11 plane strain, so the two geometries are also compared in one plane state.
+in shear strain"; "in particular, shear strain changes even when the friction coefficient is large at the node
+x = 36 mm"; "the area near the edge of contact slips easily because both sides of the finger have been removed".
+Fig. 7 is plane stress and Fig. 11 plane strain, so the two geometries are also compared in one plane state.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """What did the paper's coarse mesh and its literal swap rule get right, and what wrong?
 
-Source: Maeno 2004, Sec. II-A and Fig. 1: 96 nodes, 108 elements, nodes held in contact, every node that violates Eqs.
-(1)-(4) changed and solved again.  96 nodes and 108 elements are neither all triangles (about 150) nor all
+Source: Maeno 2004, Sec. II-A and Fig. 1: 96 nodes, 108 elements, nodes held in contact, every node that violates
+Eqs. (1)-(4) changed and solved again.  96 nodes and 108 elements are neither all triangles (about 150) nor all
 quadrilaterals (about 75), and Fig. 1 is not described in the text, so this is a mesh of linear triangles with 96 nodes
 or as near as it gets.  Contact is node by node, as in the paper.  Judged by quadratic elements of .05 mm.
 """
