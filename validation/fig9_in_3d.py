@@ -1,8 +1,8 @@
 """What would a designer have concluded from the plane strain section, and what is true of the finger 20 mm wide?
 
-Source: Maeno 2004, Sec. III computes plane strain, Sec. IV builds the finger 20 mm wide and presses it 10 mm.  The
-statements of Figs. 10 to 12 are put to the solid in small strain, where the paper has them too, at nu = .45 and .49.
-Its end faces are free.  Large deformation is left out here; it changes the answer by as much again.
+Source: Maeno 2004; Sec. III computes plane strain, Sec. IV builds the finger 20 mm wide and presses it 10 mm.  The
+statements about Figs. 10 to 12 are tested on the solid with free end faces, at nu = 0.45 and 0.49.  Like the paper, the
+study uses small strain; large deformation changes the results by as much again.
 """
 
 from __future__ import annotations

@@ -1,16 +1,15 @@
 """Are the gallery's scenes solved right: the forces of every one against theory or another mesh?
 
-Every scene of geometries/ whose object is not flat is read as `finger3d press` reads it.  One number of each is the
-normal force at the end, on the scene's mesh and on another with edges 1.4 times as long: of the other mesher where the
-scene's is swept, of the same one where sweeping would be wasteful or the finger has no section. No two of pytetwild's
-meshes are alike, and the force on a coin's sharp rim scatters by 0.7 % with them: where it is the reference, that is
-the mean of five, with edges 1.3 to 1.5 times as long.
+Every scene of geometries/ whose object is not flat is read as `finger3d press` reads it.  The normal force at the end
+is compared on the scene's mesh and on another one with edges 1.4 times as long: one of the other mesher where the
+scene's is swept, one of the same mesher where sweeping would be wasteful or the finger has no section.  pytetwild's
+meshes differ from run to run, and the force on a coin's sharp rim varies by 0.7 % with them; where pytetwild is the
+reference, the mean of five meshes is used, with edges 1.3 to 1.5 times as long.
 
-Two have a theory beside, without friction: the ball's force at equal a is that of a bonded layer (`_layer`, Lebedev and
-Ufliand 1958), the soft ball's that of Hertz with both moduli and both radii (Johnson 1985 sec. 4.2); a^2 = (5/2) <r^2>
-under Hertz's pressure, which no single point decides.  A sphere is no parabola: as the sum of flat punches of radii t
-up to a, dP = 2 E* t d' dt with d' = 2t/R + 4t^3/3R^3 and <r^2> = 2t^2/3 under each (Sneddon 1965), it has 1 + 0.4 q
-times the force and (1 + 10q/21)/(1 + 0.4 q) times the <r^2>, q = (a/R)^2; for two, q = a^2 (R1^-3 + R2^-3) R.
+Two scenes are also compared with theory, without friction: the ball with a bonded layer (validation/REFERENCES.md, 1.7)
+and the soft ball with Hertz's solution for both moduli and both radii (1.3).  Forces are compared at equal a, with a^2
+= (5/2) <r^2> under Hertz's pressure.  A sphere is no parabola: with q = (a/R)^2 it has 1 + 0.4 q times the force and (1
++ 10q/21)/(1 + 0.4 q) times the <r^2> (1.1); for two spheres q = a^2 (R1^-3 + R2^-3) R.
 """
 
 from __future__ import annotations
