@@ -102,13 +102,17 @@ def main_numbers(problem: Problem, frame: Frame) -> dict[str, float]:
 
 
 def coarser(model: Model, factor: float = FACTOR) -> Model:
-    """The companion: edge lengths times a factor, within the finger; swept where the design has a section."""
+    """The companion: edge lengths times a factor, within the finger; swept where the design has a section.
+
+    A swept companion may have a single layer over half the width: with two it would be no coarser along z than a mesh
+    whose edges are longer than a quarter of the width.
+    """
     design, options = model.design, model.mesh
     section = min(design.height_mm, 2.0 * design.half_length_mm)
     base = min(factor * options.base_size_mm, section)
     size = min(factor * options.size_mm, base, design.width_mm if model.domain == "solid" else math.inf)
     mesher: Any = "swept" if hasattr(design, "section") else options.mesher
-    return replace(model, mesh=replace(options, size_mm=size, base_size_mm=base, mesher=mesher))
+    return replace(model, mesh=replace(options, size_mm=size, base_size_mm=base, mesher=mesher, layers=1))
 
 
 @dataclass(frozen=True)
@@ -212,8 +216,11 @@ def companions(model: Model, unknowns: float) -> tuple[list[MeshOptions], list[M
     if model.domain == "solid" and own.mesher != longer.mesher:
         chosen.append(coarser(model, _FACTOR_WHERE_GRADED).mesh)
         chosen += [replace(longer, mesher=own.mesher)] if enough else []
-    shares = _FINER, _FINER**2
-    return chosen, [replace(own, size_mm=f * own.size_mm, base_size_mm=f * own.base_size_mm) for f in shares]
+    finer = [
+        replace(own, size_mm=f * own.size_mm, base_size_mm=f * own.base_size_mm, layers=round(own.layers / f))
+        for f in (_FINER, _FINER**2)
+    ]
+    return chosen, finer
 
 
 def _built_if(problem: Problem, model: Model, enough: Callable[[float], bool], say: Say) -> Problem | None:

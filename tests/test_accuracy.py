@@ -328,6 +328,42 @@ def test_a_swept_companion_that_is_no_coarser_gets_longer_edges(made: list[str])
     assert made == []
 
 
+FIG9 = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
+
+
+def fig9(size: float, mu: float = 0.125, nu: float = 0.4) -> Model:
+    return Model(
+        FIG9, Material(1.0, nu), MeshOptions(size, 4.0 * size, "swept"), (Leg(10.0, steps=10),), friction=Coulomb(mu)
+    )  # fmt: skip
+
+
+def rows_along_z(problem: Problem) -> int:
+    return len(np.unique(np.abs(problem.points.points[:, 2]).round(9)))
+
+
+@pytest.mark.parametrize("size", [8.0, 5.6, 4.0, 2.8])
+def test_the_companion_of_a_swept_solid_is_coarser_along_the_width_too(size: float) -> None:
+    problem = build(fig9(size))
+    assert rows_along_z(companion(problem)) < rows_along_z(problem)
+
+
+def test_a_finer_companion_is_finer_along_the_width_too() -> None:
+    block = designs()["block"](half_length_mm=4.0, height_mm=4.0, width_mm=8.0)
+    problem = build(replace(fig9(4.0), design=block, mesh=MeshOptions(4.0, 4.0, "swept"), legs=(Leg(0.3, steps=2),)))
+    beside = companion(problem)
+    assert beside.model.mesh.size_mm < 4.0
+    assert rows_along_z(beside) > rows_along_z(problem)
+
+
+def test_the_friction_sum_of_a_swept_solid_is_within_two_bars() -> None:
+    # truth: 34.61 at 1 mm (34.6 at 0.75 mm), 10 increments in both; nine tenths of the sum are friction along z
+    for size in (4.0, 2.8):
+        problem, frames = pressed(fig9(size))
+        bar = estimate(problem, frames, FAST).discretisation["friction_sum_N"]
+        assert abs(main_numbers(problem, frames[-1])["friction_sum_N"] - 34.61) <= 2.0 * bar
+        assert bar <= 0.2 * 34.61
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["ball", "soft_ball"])
 def test_scenes_that_pytetwild_meshes_get_bars_that_tell_something(name: str) -> None:
