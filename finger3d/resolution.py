@@ -66,7 +66,8 @@ def _edge_length(points: ContactPoints, touching: NDArray[np.bool_]) -> float:
 def least_bars(points: ContactPoints, frame: Frame, along_z_mm: float) -> dict[str, float]:
     """Lower bounds of error bars that follow from the size of the zones in points, by name (mm, mm2, N, N/mm).
 
-    An area is uncertain by half the area of the points at the rim of its zone.  In a solid, a half-length is uncertain
+    An area is uncertain by half the area of the points along the border of its zone, the mean of those on either side
+    of it and of one point at least.  In a solid, a half-length is uncertain
     by half of its part along which the zone is less than three points wide: a zone that thin may be absent, or longer
     than it seems.  Friction along z is uncertain as the points are far apart along z.
 
@@ -80,7 +81,8 @@ def least_bars(points: ContactPoints, frame: Frame, along_z_mm: float) -> dict[s
     one = float(np.median(points.area[touching])) if touching.any() else 0.0
     found: dict[str, float] = {}
     for name, zone in (("contact", touching), ("stick", frame.state.status == STICK)):
-        found[f"{name}_area_mm2"] = 0.5 * max(float(points.area[points.rim(zone)].sum()), one)
+        border = [float(points.area[points.rim(side)].sum()) for side in (zone, ~zone)]
+        found[f"{name}_area_mm2"] = 0.5 * max(0.5 * sum(border), one)
         on = zone[nearest]
         if points.dim == 3 and on.any():
             half = 0.5 * float(np.ptp(line[on]))

@@ -7,7 +7,9 @@ import pytest
 
 from finger3d import designs
 from finger3d.contact.law import OPEN, STICK, Coulomb
-from finger3d.history import ContactPoints, measure
+from finger3d.contact.state import ContactState
+from finger3d.errors import Outcome
+from finger3d.history import ContactPoints, Frame, Target, measure
 from finger3d.model import Leg, Material, MeshOptions, Model
 from finger3d.objects import Sphere
 from finger3d.resolution import least_bars
@@ -64,6 +66,18 @@ def test_a_length_does_not_depend_on_the_half_that_is_meshed(symmetry: tuple[str
     for name, zone in (("contact", status != OPEN), ("stick", status == STICK)):
         on = at[zone & (at[:, 2] == 0.0), 0]
         assert numbers[f"{name}_half_length_mm"] == pytest.approx(0.5 * np.ptp(on), rel=1e-12)
-    bars = least_bars(problem.points, frame, 0.8)
-    # the rim of a round zone is most of it here, and never more than all
-    assert 0.25 * numbers["contact_area_mm2"] < bars["contact_area_mm2"] <= 0.5 * numbers["contact_area_mm2"]
+
+
+def test_an_area_is_uncertain_by_half_a_spacing_all_round() -> None:
+    # a circle of radius 8 known to half the spacing of 1 mm: its area is known to pi 8
+    points = grid(31, 31, shift=-15.0)
+    touching = np.hypot(points.points[:, 0] - 15.0, points.points[:, 2]) <= 8.0
+    state = ContactState(
+        np.where(touching, STICK, OPEN), np.zeros((len(touching), 3)), np.zeros(len(touching)),
+        np.zeros((len(touching), 2)), np.zeros((len(touching), 2)),
+    )  # fmt: skip
+    frame = Frame(Target(1.0), state, state, (15.0, 0.0), {}, 0.0, 0.0, Outcome.CONVERGED, 0.0, 1, "newton")
+    bars = least_bars(points, frame, 1.0)
+    assert bars["contact_area_mm2"] == bars["stick_area_mm2"] == pytest.approx(8.0 * np.pi, rel=0.15)
+    # all of the line but its two tips lies three points deep in the zone
+    assert bars["contact_half_length_mm"] <= 0.5
