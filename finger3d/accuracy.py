@@ -3,8 +3,8 @@
 The companion has about twice the edge lengths, so at best an eighth of the cells of a solid and a quarter of those of a
 section; what it changes is taken to the mesh at hand by the order of convergence (Richardson).  A mesh than which none
 is coarser is small, and gets a finer companion.  The order is that of quadratic elements with a bonded corner, 2 lambda
-(Williams 1952), for smooth data it would be higher.  A length is told by points, so its error is never below half their
-spacing.  An object that yields is meshed anew with the finger, so a bar covers both.  ``validation/error_bars.py`` says
+(Williams 1952), for smooth data it would be higher.  `finger3d.resolution` bounds the bars of lengths and areas from
+below.  An object that yields is meshed anew with the finger, so a bar covers both.  ``validation/error_bars.py`` says
 how far the estimates may be trusted.
 """
 
@@ -21,13 +21,14 @@ from numpy.typing import NDArray
 
 from finger3d.design import mesh_section, mesh_solid
 from finger3d.errors import Finger3dError
-from finger3d.export import MAIN
+from finger3d.export import AREAS, MAIN
 from finger3d.fem.surface import surface
 from finger3d.history import Frame, measure
 from finger3d.kinematics import SmallStrain
 from finger3d.model import Leg, MeshOptions, Model
 from finger3d.objects import Sphere
 from finger3d.objects.mesh import MeshObject
+from finger3d.resolution import Grain
 from finger3d.solve import AUTO_START, Problem, build, contact_zone, march, symmetry
 
 Float = NDArray[np.float64]
@@ -98,51 +99,21 @@ class ErrorEstimate:
 def main_numbers(problem: Problem, frame: Frame) -> dict[str, float]:
     """The numbers that get an error bar, by name."""
     told = measure(problem.points, frame)
-    return {name: told[name] for name in MAIN} | {f"gauge_{k}": v for k, v in told["gauges"].items()}
+    return {name: told[name] for name in (*MAIN, *AREAS)} | {f"gauge_{k}": v for k, v in told["gauges"].items()}
 
 
 def coarser(model: Model, factor: float = FACTOR) -> Model:
-    """The companion: edge lengths times a factor, within the finger; swept where the design has a section."""
+    """The companion: edge lengths times a factor, within the finger; swept where the design has a section.
+
+    A swept companion may have a single layer over half the width: with two it would be no coarser along z than a mesh
+    whose edges are longer than a quarter of the width.
+    """
     design, options = model.design, model.mesh
     section = min(design.height_mm, 2.0 * design.half_length_mm)
     base = min(factor * options.base_size_mm, section)
     size = min(factor * options.size_mm, base, design.width_mm if model.domain == "solid" else math.inf)
     mesher: Any = "swept" if hasattr(design, "section") else options.mesher
-    return replace(model, mesh=replace(options, size_mm=size, base_size_mm=base, mesher=mesher))
-
-
-@dataclass(frozen=True)
-class Grain:
-    """How finely the contact points tell: their distance (mm) along x, and the larger of that over the half-length of
-    the contact and of their distance along z over the half width.
-
-    `alone`: contact with friction has no length, so that it tells nothing of the friction.
-    """
-
-    spacing_mm: float
-    share: float
-    alone: bool = False
-
-    @classmethod
-    def of(cls, problem: Problem, frame: Frame) -> Grain:
-        """Of a frame; medians where points touch."""
-        points, reach = problem.points, measure(problem.points, frame)["contact_half_length_mm"]
-        alone = reach == 0.0 and problem.model.friction.static > 0.0
-        half_width = points.half_width_mm
-        if points.dim == 3 and problem.model.mesh.mesher != "swept":
-            step = float(np.sqrt(np.median(points.area)))
-            return cls(step, _share(step, reach, step, half_width), alone)
-        at = np.round(points.points, 9)
-        line = np.unique(at[at[:, 2] == 0.0, 0])
-        near = line[np.abs(line - frame.lowest[0]) <= 1.2 * reach]
-        steps = np.diff(near if len(near) > 1 else line)
-        step = float(np.median(steps)) if len(steps) else problem.model.mesh.size_mm
-        across = np.diff(np.unique(at[:, 2]))
-        return cls(step, _share(step, reach, float(np.median(across)) if len(across) else 0.0, half_width), alone)
-
-
-def _share(along: float, reach: float, across: float, half_width: float) -> float:
-    return min(1.0, max(along / max(reach, along), across / half_width))
+    return replace(model, mesh=replace(options, size_mm=size, base_size_mm=base, mesher=mesher, layers=1))
 
 
 def mesh_error(
@@ -165,13 +136,16 @@ def mesh_error(
             ends = 0.5 if "_half_" in name else 1.0
             # the companion's own rounding to points is no change of the length
             change = max(0.0, change - ends * grains[1].spacing_mm)
-            found[name] = max(change / by, ends * grains[0].spacing_mm)
+            found[name] = max(change / by, ends * grains[0].spacing_mm, grains[0].least.get(name, 0.0))
+        elif name in AREAS:
+            change = max(0.0, change - grains[1].least.get(name, 0.0))
+            found[name] = max(change / by, grains[0].least.get(name, 0.0))
         else:
             share = _FLOOR * grains[0].share ** (2 if name in _FORCES else 1)
             scale = strain if name.startswith("gauge_") else abs(value)
             if grains[0].alone and name.startswith("friction_sum"):
                 scale = max(scale, *(abs(told[key]) for key in _FORCES if key in told))
-            found[name] = max(change / by, share * scale)
+            found[name] = max(change / by, share * scale, grains[0].least.get(name, 0.0))
     return {k: float(v) for k, v in found.items() if math.isfinite(v)}
 
 
@@ -212,8 +186,11 @@ def companions(model: Model, unknowns: float) -> tuple[list[MeshOptions], list[M
     if model.domain == "solid" and own.mesher != longer.mesher:
         chosen.append(coarser(model, _FACTOR_WHERE_GRADED).mesh)
         chosen += [replace(longer, mesher=own.mesher)] if enough else []
-    shares = _FINER, _FINER**2
-    return chosen, [replace(own, size_mm=f * own.size_mm, base_size_mm=f * own.base_size_mm) for f in shares]
+    finer = [
+        replace(own, size_mm=f * own.size_mm, base_size_mm=f * own.base_size_mm, layers=round(own.layers / f))
+        for f in (_FINER, _FINER**2)
+    ]
+    return chosen, finer
 
 
 def _built_if(problem: Problem, model: Model, enough: Callable[[float], bool], say: Say) -> Problem | None:

@@ -23,6 +23,9 @@ from finger3d.mesh import Mesh
 MAIN = ("normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm")
 """The numbers of a press that short tables show, and that get an error bar, beside every gauge."""
 
+AREAS = ("contact_area_mm2", "stick_area_mm2")
+"""Those that get an error bar besides."""
+
 _CELL_TYPES = {(2, 3): 5, (2, 6): 22, (3, 4): 10, (3, 10): 24}
 """VTK's number for a cell, by dimension and number of nodes."""
 

@@ -14,6 +14,9 @@ from finger3d.errors import Outcome
 
 Float = NDArray[np.float64]
 
+_ON_LINE = 1e-9
+"""Distance from the line z = 0, in half widths, below which a vertex lies on it: round-off of its coordinates."""
+
 
 @dataclass(frozen=True)
 class Target:
@@ -36,7 +39,9 @@ class ContactPoints:
     area : (m,) mm2
     frame : (d, d), or (m, d, d) where each point has its own: normal into the finger, then tangents
     half_width_mm, band_mm : float
-        A point counts to the line z = 0 within `band_mm`; a section counts whole.
+        Where no point lies on the line z = 0, figures show the points within `band_mm` of it.
+    edges : (e, 2)
+        Pairs of points that an edge of the surface mesh joins.
     """
 
     nodes: NDArray[np.int64]
@@ -45,6 +50,7 @@ class ContactPoints:
     frame: Float
     half_width_mm: float
     band_mm: float
+    edges: NDArray[np.int64]
 
     @property
     def dim(self) -> int:
@@ -54,6 +60,36 @@ class ContactPoints:
     def seen_in(self, state: ContactState) -> ContactPoints:
         """The points with the directions of a state, where they turn with the motion."""
         return self if state.frames is None else replace(self, frame=state.frames)
+
+    def middle_line(self) -> tuple[Float, NDArray[np.int64]]:
+        """Where the surface mesh meets the line z = 0: x (k,) mm, and the number (k,) of the point nearest on the edge.
+
+        The vertices on the line, and the intersections of edges that cross it; all points of a section.
+        """
+        x, z = self.points[:, 0], self.points[:, 2]
+        z = np.where(np.abs(z) <= _ON_LINE * self.half_width_mm, 0.0, z)
+        on = np.flatnonzero(z == 0.0)
+        i, j = self.edges[z[self.edges[:, 0]] * z[self.edges[:, 1]] < 0.0].T
+        share = z[i] / (z[i] - z[j])
+        crossing = x[i] + share * (x[j] - x[i])
+        return np.concatenate([x[on], crossing]), np.concatenate([on, np.where(share <= 0.5, i, j)])
+
+    def rim(self, inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Points (m,) of a zone that an edge joins with a point outside it."""
+        i, j = self.edges.T
+        out = np.zeros(len(inside), dtype=bool)
+        out[i[inside[i] & ~inside[j]]] = True
+        out[j[inside[j] & ~inside[i]]] = True
+        return out
+
+    def resolved(self, inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Points (m,) of a zone where it is at least three points wide: inner ones, and their neighbours in it."""
+        inner = inside & ~self.rim(inside)
+        i, j = self.edges.T
+        out = inner.copy()
+        out[i[inner[j] & inside[i]]] = True
+        out[j[inner[i] & inside[j]]] = True
+        return out
 
     def world(self, local: Float) -> Float:
         """Vectors (m, 3) in x, y, z from vectors (m, d) in the frame."""
@@ -111,14 +147,19 @@ def _half_extent(x: Float) -> float:
 
 
 def measure(points: ContactPoints, frame: Frame) -> dict[str, Any]:
-    """The entry of `steps` in summary.json for one frame."""
+    """The entry of `steps` in summary.json for one frame.
+
+    ``contact_half_length_mm`` and ``stick_half_length_mm`` are half the distance along x between the first and the last
+    point of the line z = 0 that touch or stick.  The line has the vertices of the surface mesh on it and the
+    intersections of its edges with it, each with the state of the nearer end of the edge.
+    """
     state, target = frame.state, frame.target
     points = points.seen_in(state)
     world = points.world(state.force)
     friction = points.friction(state.force)
     touching, sticking = state.status != OPEN, state.status == STICK
     x, z = points.points[:, 0], points.points[:, 2]
-    middle = np.abs(z) <= points.band_mm
+    line, nearest = points.middle_line()
     outward_x = friction[:, 0] * np.sign(x - frame.lowest[0])
     outward_z = friction[:, 2] * np.sign(z - frame.lowest[1])
     numbers: dict[str, Any] = {
@@ -134,8 +175,8 @@ def measure(points: ContactPoints, frame: Frame) -> dict[str, Any]:
         "outward_friction_z_N": float(outward_z.sum()),
         "contact_area_mm2": float(points.area[touching].sum()),
         "stick_area_mm2": float(points.area[sticking].sum()),
-        "contact_half_length_mm": _half_extent(x[touching & middle]),
-        "stick_half_length_mm": _half_extent(x[sticking & middle]),
+        "contact_half_length_mm": _half_extent(line[touching[nearest]]),
+        "stick_half_length_mm": _half_extent(line[sticking[nearest]]),
     }
     if points.dim == 3:
         end = np.abs(z - points.half_width_mm) <= 1e-6 * points.half_width_mm

@@ -65,11 +65,20 @@ class Gauge:
 
 @dataclass(frozen=True)
 class MeshOptions:
-    """Edge lengths at the contact and far from it (mm), and the mesher (solids only; sections are structured)."""
+    """Edge lengths at the contact and far from it (mm), and the mesher (solids only; sections are structured).
+
+    `layers` is the least number of layers of a swept mesh over half the width; one layer cannot follow the bulge of a
+    free end.
+    """
 
     size_mm: float
     base_size_mm: float
     mesher: Literal["ftetwild", "swept"] = "ftetwild"
+    layers: int = 2
+
+    def as_table(self) -> dict[str, Any]:
+        """The keys of ``[mesh]`` in a scene."""
+        return {"size_mm": self.size_mm, "base_size_mm": self.base_size_mm, "mesher": self.mesher}
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ from finger3d.versions import versions
 
 Float = NDArray[np.float64]
 
-FORMAT, VERSION = "finger3d condensed body", 1
+FORMAT, VERSION = "finger3d condensed body", 2
 _SHAPES: dict[str, type] = {kind.__name__: kind for kind in (Plane, Cylinder, Sphere, Wedge, Wave, MeshObject)}
 _PATH = ("depth_mm", "slide_x_mm", "slide_z_mm")
 _ENOUGH = 0.5 * MARGIN  # of the depth: candidates reach to a rigid gap of MARGIN; half of that must be left
@@ -272,6 +272,7 @@ def _arrays_of(problem: Problem) -> dict[str, Any]:
         "parent": problem.parent, "sign": problem.sign, "share": problem.share, "nodes": problem.points.nodes,
         "points": problem.points.points, "area": problem.points.area,
         "band": np.array([problem.points.half_width_mm, problem.points.band_mm]),
+        "edges": problem.points.edges,
         **_face_arrays("face", _bare(problem.surface)),
     }  # fmt: skip
     if problem.bare:
@@ -292,7 +293,8 @@ def _assembled(model: Model, arrays: Mapping[str, Any], touch_mm: float, axes: t
     factored = Factored(np.zeros((0, 0)), 0, 0, 0.0, "none", whole, none, _no_mesh)
     half_width, band = arrays["band"]
     points = ContactPoints(
-        arrays["nodes"], arrays["points"], arrays["area"], model.object.frame(d), float(half_width), float(band)
+        arrays["nodes"], arrays["points"], arrays["area"], model.object.frame(d), float(half_width), float(band),
+        arrays["edges"],
     )  # fmt: skip
     problem = Problem(
         model, mesh, report, elastic, Stiffness(whole, none, 1.0), _face("face", arrays, d), factored,

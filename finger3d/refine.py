@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from finger3d.accuracy import FACTOR, ORDER, companion, compared, is_length, last_frame, main_numbers
 from finger3d.errors import Finger3dError
+from finger3d.export import AREAS
 from finger3d.model import MeshOptions, Model
 from finger3d.solve import Problem, build
 
@@ -166,6 +167,16 @@ def worst(numbers: Mapping[str, float], errors: Mapping[str, float]) -> tuple[st
     return name, shares[name]
 
 
+def judged(problem: Problem, names: Iterable[str]) -> list[str]:
+    """The numbers that a tolerance bounds: forces, strains and lengths, but in solids not the length of stick.
+
+    The stick zone of a solid is often less than three points wide on any affordable mesh, and then of unknown length.
+    Areas have bars of the same kind as lengths.
+    """
+    left_out = {*AREAS, *(["stick_half_length_mm"] if problem.dim == 3 else [])}
+    return [name for name in names if name not in left_out]
+
+
 def _round(model: Model, tolerance: float) -> tuple[Problem, Round, MeshOptions]:
     """Press on one mesh; the edge lengths to try next."""
     start = time.perf_counter()
@@ -174,7 +185,8 @@ def _round(model: Model, tolerance: float) -> tuple[Problem, Round, MeshOptions]
     numbers = main_numbers(problem, frame)
     beside = companion(problem)
     last = last_frame(beside)
-    number, error = worst(numbers, compared(problem, frame, beside, last))
+    errors = compared(problem, frame, beside, last)
+    number, error = worst(numbers, {name: errors[name] for name in judged(problem, errors)})
     # a finer companion, beside the coarsest of meshes, does not tell the two lengths apart
     coarse = main_numbers(beside, last) if beside.model.mesh.base_size_mm >= model.mesh.base_size_mm else None
     sizes = _next(problem, number, error, tolerance, numbers, coarse)

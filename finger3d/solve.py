@@ -198,7 +198,8 @@ def _unfolded(
 ) -> tuple[NDArray[np.int64], Float, Float, ContactPoints]:
     d = mesh.dim
     numbers = tuple("xyz".index(a) for a in axes)
-    _, parent_all, sign_all = unfold(Mesh(mesh.points, np.zeros((0, d + 1), dtype=np.int64), {}), numbers)
+    facets = {"contact": mesh.facets["contact"]}
+    shape, parent_all, sign_all = unfold(Mesh(mesh.points, np.zeros((0, d + 1), dtype=np.int64), facets), numbers)
     number = np.full(len(mesh.points), -1)
     number[face.nodes] = np.arange(len(face.nodes))
     nodes = np.flatnonzero(number[parent_all] >= 0)
@@ -211,9 +212,17 @@ def _unfolded(
     at[:, :d] = face.points[parent] * world_sign
     points = ContactPoints(
         nodes, at, face.area[parent] * share, model.object.frame(d), model.design.width_mm / 2.0,
-        0.75 * model.mesh.size_mm,
+        0.75 * model.mesh.size_mm, _edges(shape.facets["contact"][:, :d], nodes),
     )  # fmt: skip
     return parent, world_sign[:, [1, 0, 2][:d]], share, points
+
+
+def _edges(corners: NDArray[np.int64], nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Edges (e, 2) of facets with vertices (f, d), as positions in the ascending `nodes` (m,) that hold both ends."""
+    pairs = np.vstack([corners[:, [i, j]] for i in range(corners.shape[1]) for j in range(i)])
+    ends = np.minimum(np.searchsorted(nodes, pairs), len(nodes) - 1)
+    ends = np.sort(ends[(nodes[ends] == pairs).all(axis=1)], axis=1)
+    return np.unique(ends, axis=0)
 
 
 def march(problem: Problem, near: Sequence[Float] = ()) -> Iterator[Frame]:

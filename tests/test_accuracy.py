@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
@@ -25,7 +26,7 @@ from finger3d.accuracy import (
 )
 from finger3d.cli import main
 from finger3d.cli.press import with_error
-from finger3d.contact.law import Coulomb
+from finger3d.contact.law import STICK, Coulomb
 from finger3d.design import tetwild
 from finger3d.design.swept import mesh_swept
 from finger3d.effects.elastic_object import SoftObject
@@ -34,9 +35,10 @@ from finger3d.history import Frame
 from finger3d.mesh import Mesh
 from finger3d.model import Gauge, Leg, Material, MeshOptions, Model
 from finger3d.objects import Sphere
+from finger3d.refine import judged
 from finger3d.scene import load
 from finger3d.solve import Problem, build, march
-from tests.scenes import HALF_CYLINDER, changed
+from tests.scenes import HALF_CYLINDER, changed, solid
 
 FAST = {"assembly": 1.0, "contact": 0.1}
 SCENE = changed(HALF_CYLINDER, domain="plane-strain")
@@ -326,6 +328,75 @@ def test_a_swept_companion_that_is_no_coarser_gets_longer_edges(made: list[str])
     beside = companion(replace(problem, model=replace(model, mesh=MeshOptions(0.4, 3.0, "ftetwild"))))
     assert (beside.model.mesh.mesher, beside.model.mesh.size_mm) == ("swept", pytest.approx(1.2))
     assert made == []
+
+
+FIG9 = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
+
+
+def fig9(size: float, mu: float = 0.125, nu: float = 0.4) -> Model:
+    return Model(
+        FIG9, Material(1.0, nu), MeshOptions(size, 4.0 * size, "swept"), (Leg(10.0, steps=10),), friction=Coulomb(mu)
+    )  # fmt: skip
+
+
+def rows_along_z(problem: Problem) -> int:
+    return len(np.unique(np.abs(problem.points.points[:, 2]).round(9)))
+
+
+@pytest.mark.parametrize("size", [8.0, 5.6, 4.0, 2.8])
+def test_the_companion_of_a_swept_solid_is_coarser_along_the_width_too(size: float) -> None:
+    problem = build(fig9(size))
+    assert rows_along_z(companion(problem)) < rows_along_z(problem)
+
+
+def test_a_finer_companion_is_finer_along_the_width_too() -> None:
+    block = designs()["block"](half_length_mm=4.0, height_mm=4.0, width_mm=8.0)
+    problem = build(replace(fig9(4.0), design=block, mesh=MeshOptions(4.0, 4.0, "swept"), legs=(Leg(0.3, steps=2),)))
+    beside = companion(problem)
+    assert beside.model.mesh.size_mm < 4.0
+    assert rows_along_z(beside) > rows_along_z(problem)
+
+
+def test_the_friction_sum_of_a_swept_solid_is_within_two_bars() -> None:
+    # truth: 34.61 at 1 mm (34.6 at 0.75 mm), 10 increments in both; nine tenths of the sum are friction along z
+    for size in (4.0, 2.8):
+        problem, frames = pressed(fig9(size))
+        bar = estimate(problem, frames, FAST).discretisation["friction_sum_N"]
+        assert abs(main_numbers(problem, frames[-1])["friction_sum_N"] - 34.61) <= 2.0 * bar
+        assert bar <= 0.2 * 34.61
+
+
+def test_every_number_that_a_press_prints_has_a_bar(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(solid(HALF_CYLINDER, 0.7), encoding="utf-8")
+    assert main(["press", str(scene), "--out", str(tmp_path / "out"), "--no-figures"]) == 0
+    bars = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))["error_estimate"]
+    names = {"normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm", "contact_area_mm2"}
+    assert set(bars["discretisation"]) == names | {"stick_area_mm2", "gauge_g"}
+    assert len(re.findall(r" \+- [0-9]", capsys.readouterr().out)) == len(bars["discretisation"])
+
+
+def test_a_stick_zone_one_row_wide_is_not_resolved() -> None:
+    # Fig. 9 at 2 mm: the points that stick are a single row at z = 0; at 0.75 mm, 10 increments, the stick length is
+    # 62.1 mm and the area 171.5 mm2
+    problem, frames = pressed(fig9(2.0, mu=0.25, nu=0.49))
+    told, found = main_numbers(problem, frames[-1]), estimate(problem, frames, FAST).discretisation
+    points, sticks = problem.points, frames[-1].state.status == STICK
+    assert (points.points[sticks, 2] == 0.0).all()
+    assert abs(2.0 * told["stick_half_length_mm"] - 62.1) <= 2.0 * 2.0 * found["stick_half_length_mm"]
+    assert abs(told["stick_area_mm2"] - 171.5) <= 2.0 * found["stick_area_mm2"]
+    # nothing is known of a zone that thin: two bars reach from none to twice as much
+    assert found["stick_half_length_mm"] == pytest.approx(0.5 * told["stick_half_length_mm"])
+    assert found["stick_area_mm2"] >= 0.5 * told["stick_area_mm2"]
+    # contact is eleven rows wide and resolved: known to half the spacing of 1.96 mm
+    assert found["contact_half_length_mm"] < 1.5
+
+
+def test_in_solids_a_tolerance_leaves_out_the_stick_zone() -> None:
+    section = build(half_cylinder(0.4))
+    names = list(main_numbers(section, list(march(section))[-1]))
+    assert "stick_half_length_mm" in judged(section, names)
+    assert not {"stick_half_length_mm", "stick_area_mm2"} & set(judged(build(fig9(8.0)), names))
 
 
 @pytest.mark.slow

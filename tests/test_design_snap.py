@@ -27,7 +27,7 @@ def body_of(design: Any, symmetry: tuple[str, ...] = (), tolerance: float = 0.01
 def shaken(design: Any, symmetry: tuple[str, ...], by: float) -> tuple[np.ndarray, np.ndarray]:
     """Vertices and linear tets of a swept mesh, every vertex moved at random by up to `by` mm along each axis."""
     size = 0.12 * design.height_mm
-    options = SimpleNamespace(size_mm=size, base_size_mm=2 * size, mesher="swept")
+    options = SimpleNamespace(size_mm=size, base_size_mm=2 * size, mesher="swept", layers=2)
     mesh = mesh_solid(design, options, (-size, size, -size, size), symmetry)[0]
     used, tets = np.unique(mesh.cells[:, :4], return_inverse=True)
     points = mesh.points[used] + np.random.default_rng(1).uniform(-by, by, (len(used), 3))

@@ -29,7 +29,7 @@ ZONE = (-0.4, 0.4, -0.5, 0.5)
 
 def sizes(design: Any, share: float = 0.08, grow: float = 4.0) -> Any:
     size = share * design.height_mm
-    return SimpleNamespace(size_mm=size, base_size_mm=grow * size, mesher="swept")
+    return SimpleNamespace(size_mm=size, base_size_mm=grow * size, mesher="swept", layers=2)
 
 
 def zone(design: Any) -> tuple[float, float, float, float]:
@@ -188,7 +188,7 @@ def test_any_finger_gives_a_sound_section(
     ],
 )
 def test_sizes_that_cannot_work_are_refused_in_one_line(changes: dict[str, float], text: str) -> None:
-    options = SimpleNamespace(**{"size_mm": 2.0, "base_size_mm": 8.0, "mesher": "swept", **changes})
+    options = SimpleNamespace(**{"size_mm": 2.0, "base_size_mm": 8.0, "mesher": "swept", "layers": 2, **changes})
     with pytest.raises(Finger3dError, match=text) as refused:
         mesh_solid(FIG9, options, zone(FIG9))
     assert "\n" not in str(refused.value)
@@ -202,7 +202,7 @@ def test_a_wall_too_thin_for_the_size_is_refused() -> None:
 
 def test_a_design_without_section_cannot_be_swept() -> None:
     ball = designs()["hemisphere"](5.0)
-    options = SimpleNamespace(size_mm=1.0, base_size_mm=2.0, mesher="swept")
+    options = SimpleNamespace(size_mm=1.0, base_size_mm=2.0, mesher="swept", layers=2)
     with pytest.raises(Finger3dError, match="hemisphere.*'ftetwild'"):
         mesh_solid(ball, options, (-1, 1, -1, 1))
     with pytest.raises(Finger3dError, match="hemisphere.*'solid'"):
@@ -212,7 +212,7 @@ def test_a_design_without_section_cannot_be_swept() -> None:
 def test_structured_meshes_load_no_cad() -> None:
     code = (
         "import sys; from types import SimpleNamespace as N; from finger3d.design import *;"
-        "d = designs()['half_cylinder'](5.0, 10.0); o = N(size_mm=0.5, base_size_mm=2.0, mesher='swept');"
+        "d = designs()['half_cylinder'](5.0, 10.0); o = N(size_mm=0.5, base_size_mm=2.0, mesher='swept', layers=2);"
         "z = (-2, 2, -5, 5); mesh_section(d, o, z); mesh_solid(d, o, z);"
         "print({'build123d', 'OCP', 'pytetwild', 'trimesh', 'scipy', 'vtk'} & set(sys.modules))"
     )
@@ -225,3 +225,19 @@ def test_cell_angles_of_known_cells() -> None:
     assert cell_angles_deg(corner, np.array([[0, 1, 2, 3]]))[0] == pytest.approx(math.degrees(math.acos(3**-0.5)))
     assert cell_angles_deg(corner, np.array([[1, 0, 2, 3]]))[0] == 0.0
     assert cell_angles_deg(corner[:3, :2], np.array([[0, 1, 2]]))[0] == pytest.approx(45.0)
+
+
+@pytest.mark.parametrize("size", [5.6, 4.0, 2.8, 2.0])
+def test_no_layer_along_z_is_thicker_than_the_edges_at_the_contact(size: float) -> None:
+    options = SimpleNamespace(size_mm=size, base_size_mm=4.0 * size, mesher="swept", layers=2)
+    mesh = mesh_solid(FIG9, options, zone(FIG9))[0]
+    levels = np.unique(mesh.points[np.unique(mesh.facets["contact"][:, :3]), 2])
+    assert np.diff(levels).max() <= size
+
+
+def test_the_least_number_of_layers_is_kept() -> None:
+    for layers in (1, 2, 4):
+        options = SimpleNamespace(size_mm=12.0, base_size_mm=12.0, mesher="swept", layers=layers)
+        mesh = mesh_solid(FIG9, options, zone(FIG9))[0]
+        levels = np.unique(mesh.points[np.unique(mesh.facets["contact"][:, :3]), 2])
+        assert len(levels) == 2 * layers + 1

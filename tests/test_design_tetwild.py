@@ -113,7 +113,7 @@ def test_a_hemisphere_is_meshed_off_the_middle() -> None:
 @pytest.fixture
 def stored(tmp_path: Path) -> tuple[Path, Mesh]:
     """A small mesh in a file."""
-    options = SimpleNamespace(size_mm=2.0, base_size_mm=4.0, mesher="swept")
+    options = SimpleNamespace(size_mm=2.0, base_size_mm=4.0, mesher="swept", layers=2)
     mesh = mesh_solid(designs()["block"](5.0, 5.0, 5.0), options, (-1, 1, -1, 1))[0]
     path = tmp_path / "mesh.npz"
     assert cache.save(path, mesh, 250.0)

@@ -179,7 +179,7 @@ def test_press_slide_release_returns_to_rest() -> None:
     problem, frames = run(block(legs=legs))
     assert problem.axes == ("z",)
     slid, released = measure(problem.points, frames[7]), measure(problem.points, frames[10])
-    assert slid["tangential_force_x_N"] == pytest.approx(0.25 * slid["normal_force_N"], rel=1e-9)  # all slips
+    assert slid["friction_sum_N"] == pytest.approx(0.25 * slid["normal_force_N"], rel=1e-9)  # all slips
     assert released["normal_force_N"] == 0.0
     lost = [f.dissipation_mJ for f in frames]
     assert all(b >= a for a, b in zip(lost, lost[1:], strict=False))

@@ -170,7 +170,8 @@ def summary_rows(summary: Mapping[str, Any], out: Path) -> list[tuple[str, str]]
             ("friction sum", f"{told('friction_sum_N', 5)} N"),
             ("contact length", f"{told('contact_half_length_mm', 4, 2.0)} mm at z = 0"),
             ("stick length", f"{told('stick_half_length_mm', 4, 2.0)} mm at z = 0"),
-            ("stick area", f"{last['stick_area_mm2']:.4g} of {last['contact_area_mm2']:.4g} mm2 of contact"),
+            ("contact area", f"{told('contact_area_mm2', 4)} mm2"),
+            ("stick area", f"{told('stick_area_mm2', 4)} mm2"),
             ("residual", f"{max(s['residual'] for s in summary['steps']):.1e}, the largest of all steps"),
         ]
         rows += [(f"strain {name.removeprefix('gauge_')}", told(name, 5)) for name in gauges]

@@ -20,7 +20,6 @@ Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 Zone = tuple[float, float, float, float]
 
-_LAYER = 2.0  # thickness of a z-layer in contact edge lengths: stress varies less along z than along x
 _AXIS = {"x": 0, "z": 2}
 _FLATTEST_DEG = 0.5  # flatter ones come from a wall or an edge far thinner than the mesh
 
@@ -47,12 +46,15 @@ def mesh_section(design: Any, options: Any, zone: Zone, symmetry: tuple[str, ...
 
 
 def mesh_swept(design: Any, options: Any, zone: Zone, symmetry: tuple[str, ...] = ()) -> tuple[Mesh, MeshReport]:
-    """Mesh an extruded design with quadratic tets, mirror-exact about x = 0 and z = 0; see :func:`mesh_section`."""
+    """Mesh an extruded design with quadratic tets, mirror-exact about x = 0 and z = 0; see :func:`mesh_section`.
+
+    Layers along z are equal and at most ``size_mm`` thick; over half the width there are at least ``options.layers``.
+    """
     start = time.perf_counter()
     check_sizes(design, options, 3)
     half = 0.5 * design.width_mm
-    # At least two, however narrow the finger: its free ends bulge.
-    layers = max(2, math.ceil(half / (_LAYER * options.size_mm) - 1e-9))
+    # Friction varies along z as it does along x, so no layer is thicker than the edge length at the contact.
+    layers = max(options.layers, math.ceil(half / options.size_mm - 1e-9))
     axes = tuple(_AXIS[a] for a in ("x", "z") if a not in symmetry)
     grid, section = _grid(design, options, zone, 3, 3 * layers * 2 ** len(axes))
     levels = np.linspace(0.0, half, layers + 1)

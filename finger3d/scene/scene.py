@@ -6,7 +6,7 @@ import functools
 import math
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -96,7 +96,7 @@ class Scene:
 
     def with_mesh(self, mesh: MeshOptions) -> Scene:
         """The scene with edge lengths in place of a tolerance."""
-        return parse({**self.given, "mesh": asdict(mesh)}, self.path)
+        return parse({**self.given, "mesh": mesh.as_table()}, self.path)
 
     def model(self) -> Model:
         """Return the model: the baseline, and then every effect that is on. Angles are in radians."""
@@ -194,7 +194,7 @@ def parse(
             "object": {"shape": shape, **dict(placed or {})},
             "press": press.model_dump(),
             # with a tolerance the sizes are found by the press
-            "mesh": tables.mesh if tables.mesh.tolerance else tables.mesh.model_copy(update=asdict(mesh)),
+            "mesh": tables.mesh if tables.mesh.tolerance else tables.mesh.model_copy(update=mesh.as_table()),
             "effects": {name: settings.model_dump() for name, (settings, _) in effects.items()},
         }
     )
