@@ -15,7 +15,6 @@ from finger3d.errors import Finger3dError
 from finger3d.export import atomic, claimed, write_json
 from finger3d.family import Body, Variant, body_key
 from finger3d.history import measure
-from finger3d.kinematics import SmallStrain
 from finger3d.model import Gauge
 from finger3d.page import design_page
 from finger3d.reduced import friction_at
@@ -107,7 +106,7 @@ class _Search:
     def _press(self, scene: Scene) -> _Pressed:
         key = json.dumps([body_key(scene), scene.as_dict()["press"], scene.as_dict()["contact"]])
         model = scene.model()
-        whole = model.inclusions is not None or not isinstance(model.kinematics, SmallStrain)
+        whole = model.inclusions is not None or not model.kinematics.small_strain
         if whole:
             # these read their gauges in their own way, so a gauge moved is a press of its own
             key += repr(model.gauges)
@@ -134,7 +133,8 @@ class _Search:
             strains = [body.strains(v, frame.gauges) for v, frame in zip(variants, ends, strict=True)]
             return _Pressed(steps, lambda g: np.array([strain[g.name] for strain in strains]))
         mesh, axes = body.problem.mesh, body.problem.axes
-        u = np.array([x[: mesh.points.size] for x in body.problem.unknowns_of([f.part.force for f in ends])])
+        fields = body.problem.model.kinematics.all_unknowns(body.problem, [f.part for f in ends])
+        u = np.array([x[: mesh.points.size] for x in fields])
         return _Pressed(steps, lambda g: np.asarray(gauge_row(mesh, g, axes)[:, : mesh.points.size] @ u.T).ravel())
 
     def _write(self, found: Evaluation) -> None:

@@ -19,7 +19,6 @@ from finger3d.errors import Finger3dError
 from finger3d.export import atomic, claimed, write_csv
 from finger3d.history import Frame
 from finger3d.increments import automatic, refine, with_steps
-from finger3d.kinematics import SmallStrain
 from finger3d.model import Gauge, Model
 from finger3d.page import calibrate_page
 from finger3d.problem import Problem
@@ -210,7 +209,7 @@ def _condensed(model: Model, gauge: Gauge, wanted: Mapping[str, float], sweep: S
 
 
 def _press(problem: Problem, sweep: Sweep, report: Report) -> None:
-    if not isinstance(problem.model.kinematics, SmallStrain):
+    if not problem.model.kinematics.small_strain:
         name = dict(problem.model.filled).get("kinematics", "this body")
         report.say(f"{name}: its compliance changes on the way, so that every one of {len(sweep.mus)} mu is a full "
                    "march, and so is every tolerance")  # fmt: skip
@@ -231,7 +230,7 @@ def _press(problem: Problem, sweep: Sweep, report: Report) -> None:
 
 def _few(problem: Problem, count: int) -> NDArray[np.int64]:
     """Numbers, among `count` values of mu, of those at which tolerances are tried."""
-    wanted = _SLOPES[isinstance(problem.model.kinematics, SmallStrain)]
+    wanted = _SLOPES[problem.model.kinematics.small_strain]
     return np.unique(np.linspace(0, count - 1, wanted).round().astype(int))
 
 
@@ -273,7 +272,7 @@ def _write(
     own = replace(
         problem, model=replace(problem.model, gauges=model.gauges), gauge_rows=problem.gauge_rows[: len(model.gauges)]
     )
-    if type(model.kinematics) is SmallStrain:
+    if model.kinematics.elastic:
         Condensed.of(own).save(folder / "reduced.npz")
     else:
         report.say("no reduced.npz: the body's answer changes on the way")

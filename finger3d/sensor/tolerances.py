@@ -22,7 +22,6 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import MIXED_FROM
 from finger3d.fem.condense import stiffened
 from finger3d.history import Frame
-from finger3d.kinematics import SmallStrain
 from finger3d.model import Gauge, Leg, MeshOptions, Model
 from finger3d.objects import Plane
 from finger3d.problem import Problem, at_points, targets
@@ -252,7 +251,7 @@ def _step_of_nu(nu: float, sd: float) -> float:
 
 def with_modulus(problem: Problem, times: float) -> Problem:
     """The problem with its Young's modulus multiplied, in small strain from the same condensation."""
-    if type(problem.model.kinematics) is not SmallStrain:
+    if not problem.model.kinematics.elastic:
         material = replace(problem.model.material, E_MPa=problem.model.material.E_MPa * times)
         return build(replace(problem.model, material=material))
     c, d = problem.compliance.shape[:2]
