@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -62,10 +63,8 @@ def test_a_body_never_solves_with_the_factor_of_a_later_one(solver: str) -> None
     second = condense(twice, fixed, rows, solver, spent=first)
     assert np.abs(second.solve(load) - 0.5 * before).max() < 1e-12 * np.abs(before).max()
     assert np.array_equal(first.compliance, 2.0 * second.compliance)
-    try:
+    with pytest.raises(RuntimeError) if solver == "pardiso" else nullcontext():
         assert np.array_equal(first.solve(load), before)
-    except RuntimeError as error:
-        assert solver == "pardiso", error
     third = condense(matrix, fixed, rows, solver, spent=first)  # its factor is the second's by now
     assert np.abs(third.solve(load) - before).max() < 1e-12 * np.abs(before).max()
     assert np.abs(second.solve(load) - 0.5 * before).max() < 1e-12 * np.abs(before).max()

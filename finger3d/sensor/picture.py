@@ -90,6 +90,7 @@ def _causes(axes: Any, c: Calibration) -> None:
         "#e08214",
         "#8c510a",
         "#777777",
+        "#bdbdbd",
     ]
     axes.stackplot(
         mu, [rows[i] / total for i in keep], labels=[names[i] for i in keep], colors=[colours[i] for i in keep]
