@@ -24,7 +24,6 @@ from finger3d.errors import Finger3dError
 from finger3d.export import AREAS, MAIN
 from finger3d.fem.surface import surface
 from finger3d.history import Frame, measure
-from finger3d.kinematics import SmallStrain
 from finger3d.model import Leg, MeshOptions, Model
 from finger3d.objects import Sphere
 from finger3d.objects.mesh import MeshObject
@@ -180,7 +179,7 @@ def companion(problem: Problem, say: Say = lambda text: None) -> Problem:
 def companions(model: Model, unknowns: float) -> tuple[list[MeshOptions], list[MeshOptions]]:
     """Meshes that may stand beside one of so many unknowns: coarser ones and finer ones, the best first."""
     own, enough = model.mesh, unknowns >= _LEAST_UNSTRUCTURED
-    costly = model.domain != "solid" and not isinstance(model.kinematics, SmallStrain)
+    costly = model.domain != "solid" and not model.kinematics.small_strain
     longer = coarser(model, _FACTOR_WHERE_STEPS_FACTOR if costly else FACTOR).mesh
     chosen = [longer] if longer.mesher == "swept" or enough else []
     if model.domain == "solid" and own.mesher != longer.mesher:

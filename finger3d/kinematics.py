@@ -26,7 +26,17 @@ class Kinematics(Protocol):
 
     One that also answers for inclusions (`problem.springs`) says so by a class attribute ``inclusions = True``;
     one whose presses keep nothing in the problem, so that several may run at once, by ``independent = True``.
+
+    Attributes
+    ----------
+    small_strain : whether strain is linear in the displacement, which is where gauges read it
+    elastic : whether, besides, displacements follow from the contact forces alone (`Problem.unknowns_of`)
+
+    Ask these rather than the class: the viscoelastic body is a subclass of `SmallStrain`, and not elastic.
     """
+
+    small_strain: ClassVar[bool]
+    elastic: ClassVar[bool]
 
     def start(self, problem: Any) -> ContactState:
         """State at rest, before the first increment."""
@@ -66,6 +76,8 @@ def length_scale(problem: Any, a: Any, b: Any) -> float:
 class SmallStrain:
     """Linear elasticity over the condensed compliance: the paper's baseline."""
 
+    small_strain: ClassVar[bool] = True
+    elastic: ClassVar[bool] = True
     inclusions: ClassVar[bool] = True
     object_compliance: ClassVar[bool] = True
     independent: ClassVar[bool] = True

@@ -28,7 +28,6 @@ from finger3d.fem.assembly import Elasticity, Stiffness
 from finger3d.fem.condense import Condensed as Factored
 from finger3d.fem.surface import Surface, restrict, surface
 from finger3d.history import ContactPoints, History
-from finger3d.kinematics import SmallStrain
 from finger3d.mesh import Mesh
 from finger3d.model import Gauge, Leg, Material, MeshOptions, Model
 from finger3d.objects import Cylinder, MeshObject, Plane, Sphere, Wave, Wedge
@@ -83,7 +82,7 @@ class Condensed:
             If an effect makes the compliance depend on the state or on time.
         """
         model = problem.model
-        if type(model.kinematics) is not SmallStrain:
+        if not model.kinematics.elastic:
             name = dict(model.filled).get("kinematics", "its kinematics")
             raise Finger3dError(
                 f"effects.{name}: a body with it has no reduced model, its compliance changes on the way; "

@@ -44,5 +44,10 @@ def saturating(mu: Any) -> Any:
     return 0.01 * np.exp(-4.0 * mu)
 
 
+def kinked(mu: Any) -> Any:
+    """Steep to mu = 0.6, nearly flat beyond."""
+    return 0.02 - 0.02 * np.minimum(mu, 0.6) - 0.0012 * np.maximum(mu - 0.6, 0.0)
+
+
 def turning(mu: Any) -> Any:
     return 0.01 * (mu - 0.6) ** 2

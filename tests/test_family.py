@@ -13,7 +13,6 @@ from finger3d.family import Body, Variant, body_key, families, finest, shared_le
 from finger3d.fem.recover import displacement
 from finger3d.fem.surface import restrict, surface
 from finger3d.history import measure
-from finger3d.kinematics import SmallStrain
 from finger3d.model import Leg
 from finger3d.scene import Scene, parse, tree
 from finger3d.solve import build, covered, covers, march, whole
@@ -196,7 +195,7 @@ def test_several_presses_are_proved_as_each_on_its_own(effect, at_once, monkeypa
     for frame, found in zip(ends, together, strict=True):
         (alone,) = kinematics.gaps(problem, [frame.part], [frame.target], face)
         assert np.abs(found - alone[others]).max() <= 1e-12 * frame.target.depth_mm
-        if isinstance(kinematics, SmallStrain):
+        if kinematics.small_strain:
             u = displacement(problem.mesh, kinematics.unknowns(problem, frame.part))
             moved = problem.gap(frame.target, face) + (face.trace @ u) @ problem.points.frame[0]
             assert np.abs(found - moved[others]).max() <= 1e-12 * frame.target.depth_mm

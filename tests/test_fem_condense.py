@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -47,6 +50,24 @@ def test_field_follows_from_the_same_factor(solver: str) -> None:
     u = found.unknowns(force)
     assert np.abs(rows @ u[: rows.shape[1]] - found.compliance @ force).max() < 1e-11
     assert np.all(u[fixed] == 0.0)
+
+
+@pytest.mark.parametrize("solver", ["superlu", *(["pardiso"] if available() else [])])
+def test_a_body_never_solves_with_the_factor_of_a_later_one(solver: str) -> None:
+    """Twice the stiffness halves the displacements; the overwritten body may refuse, never answer for the other."""
+    mesh, matrix, fixed, rows = setup(0.3)
+    load = np.random.default_rng(0).normal(size=matrix.upper.shape[0])
+    first = condense(matrix, fixed, rows, solver)
+    before = first.solve(load)
+    twice = replace(matrix, upper=2.0 * matrix.upper)
+    second = condense(twice, fixed, rows, solver, spent=first)
+    assert np.abs(second.solve(load) - 0.5 * before).max() < 1e-12 * np.abs(before).max()
+    assert np.array_equal(first.compliance, 2.0 * second.compliance)
+    with pytest.raises(RuntimeError) if solver == "pardiso" else nullcontext():
+        assert np.array_equal(first.solve(load), before)
+    third = condense(matrix, fixed, rows, solver, spent=first)  # its factor is the second's by now
+    assert np.abs(third.solve(load) - before).max() < 1e-12 * np.abs(before).max()
+    assert np.abs(second.solve(load) - 0.5 * before).max() < 1e-12 * np.abs(before).max()
 
 
 @pytest.mark.parametrize("dim", [2, 3])

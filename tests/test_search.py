@@ -56,6 +56,21 @@ def test_gauges_are_searched_in_one_body_and_read_as_a_press_reads_them(problem,
     assert load(tmp_path / "best.toml").tables.gauge[0].angle_deg == found.best.values[0]
 
 
+@pytest.mark.parametrize("bulk", [True, False])
+def test_gauges_of_a_body_that_relaxes_are_read_as_a_press_reads_them(problem, bulk, tmp_path):
+    """Ten time constants long, so that the instantaneous field is far from the one the press ends with."""
+    visco = f"effects.viscosity={{prony = [[0.5, 0.1]], bulk = {str(bulk).lower()}}}"
+    given = tree.override(problem.given, [*SETS, visco, "press.duration_s=1.0", "press.steps=4", "material.nu=0.45"])
+    found = search(replace(problem, given=given, budget=1), tmp_path)
+    assert found.bodies == 1
+    model = found.scene.model()
+    strain = []
+    for mu in MUS:
+        own = build(replace(model, friction=replace(model.friction, mu=mu)))
+        strain.append(list(march(own))[-1].gauges["g36"])
+    assert found.best.value == pytest.approx(sensitivity(replace(table_of(strain), noise=problem.noise)), rel=1e-9)
+
+
 def test_a_search_goes_on_with_what_is_kept_and_is_the_same_every_time(problem, tmp_path):
     whole = search(replace(problem, budget=10), tmp_path / "whole")
     first = search(replace(problem, budget=4), tmp_path / "parts")

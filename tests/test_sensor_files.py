@@ -90,7 +90,7 @@ def test_from_a_scene_to_mu_with_two_commands(tmp_path: Path, scene_file: Path, 
     assert names == {"calibration.json", "calibration.csv", "calibration.png", "reduced.npz", "report.html",
                      "scene.toml", "map.png", "map.csv"}  # fmt: skip
     data = json.loads((out / "calibration.json").read_text())
-    assert (data["format"], data["version"], len(data["hash"])) == ("finger3d calibration", 1, 16)
+    assert (data["format"], data["version"], len(data["hash"])) == ("finger3d calibration", 2, 16)
     assert data["about"]["factorizations"] == 1
     assert Condensed.load(out / "reduced.npz").gauges == ("g36", "long")
     found = load(out / "calibration.json")
@@ -137,7 +137,8 @@ def test_calibration_files_that_are_none(tmp_path: Path) -> None:
     short = {**data, "curve": {"mu": data["curve"]["mu"][:5], "strain": data["curve"]["strain"]}}
     cases = {
         "not JSON, or cut short": good[: len(good) // 2],
-        "version 9, this finger3d reads version 1": json.dumps({**data, "version": 9}),
+        "version 9, this finger3d reads version 2": json.dumps({**data, "version": 9}),
+        "version 1, this finger3d reads version 2": json.dumps({**data, "version": 1}),
         "no calibration": json.dumps([1, 2]),
         "curve: field required": json.dumps({k: v for k, v in data.items() if k != "curve"}),
         "noise: input should be greater than 0": json.dumps({**data, "noise": 0.0}),

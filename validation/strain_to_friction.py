@@ -89,8 +89,8 @@ def _checks(domain: Domain, c: Calibration, problem: Problem, sweep: Sweep) -> l
     count = 4000
     mu = random.uniform(first, last, count)
     quiet = replace(c, tolerances=())
-    sure = math.hypot(c.noise, c.curve_error())  # what the set allows for, drawn whole
-    answers = estimate(quiet, c.at(mu) + random.normal(0.0, sure, count))
+    # what the set allows for, drawn whole
+    answers = estimate(quiet, c.at(mu) + random.normal(0.0, 1.0, count) * quiet.strain_sd(mu))
     hit = np.mean([any(a.low <= m <= a.high for a in e.candidates) for m, e in zip(mu, answers, strict=True)])
     share = math.erf(1.0 / math.sqrt(2.0))
     return [

@@ -23,7 +23,7 @@ Tolerances = Annotated[
         name="--tolerance",
         negative=(),
         help="Standard deviation of something not known exactly, for instance depth_mm=0.05; 0 leaves it out; may be "
-        "repeated. Of depth_mm, E_percent, nu, tilt_deg, gauge_x_mm, gauge_y_mm, gauge_angle_deg.",
+        "repeated. Of depth_mm, E_percent, nu, tilt_deg, gauge_x_mm, gauge_y_mm, gauge_angle_deg, mesh, increments.",
     ),
 ]
 

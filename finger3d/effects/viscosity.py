@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Protocol
+from typing import Annotated, Any, ClassVar, Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -290,6 +290,8 @@ class ViscousState(ContactState):
 @dataclass(frozen=True)
 class Viscoelastic(SmallStrain):
     """Small strain, with moduli that relax."""
+
+    elastic: ClassVar[bool] = False
 
     prony: Prony
     bulk: bool

@@ -85,7 +85,8 @@ def condense(
         What is read: row displacement = rows @ u; row forces act through the transpose.
     solver : "pardiso" or "superlu"; default FINGER3D_SOLVER, else PARDISO where it is installed
     spent : a body that is not needed any more
-        PARDISO overwrites its factor, and keeps its ordering if the entries stand in the same places.
+        PARDISO overwrites its factor, and keeps its ordering if the entries stand in the same places; that body keeps
+        its compliance but can no longer solve.
     """
     start = time.perf_counter()
     upper, size = stiffness.upper, stiffness.upper.shape[0]
@@ -100,7 +101,7 @@ def condense(
     solve: Callable[[Float], Float]
     if solver == "pardiso":
         series = _Series.of(upper, free, padded, spent._series if spent else None)
-        compliance, perturbed, solve = -series.factor.schur, series.factor.perturbed, series.factor.solve
+        compliance, perturbed, solve = -series.factor.schur, series.factor.perturbed, series.solve
     else:
         compliance, perturbed, solve = _superlu(upper[free][:, free], padded[:, free].tocsr())
     compliance = 0.5 * (compliance + compliance.T)
@@ -163,10 +164,25 @@ class _Places:
 
 @dataclass(frozen=True)
 class _Series:
-    """PARDISO's factor, and the places in its matrix: for the next such matrix."""
+    """PARDISO's factor, and the places in its matrix: for the next such matrix.
+
+    `number` is that of the factorisation: the next one in the same places overwrites the factor.
+    """
 
     places: _Places
     factor: SchurFactor
+    number: int = 1
+
+    @property
+    def current(self) -> bool:
+        """Whether the factor is still the one of this matrix."""
+        return self.number == self.factor.factorizations
+
+    def solve(self, load: Float) -> Float:
+        """Displacements ``K^-1 load``; raises RuntimeError once another matrix has been factored in its place."""
+        if not self.current:
+            raise RuntimeError("the factor of this condensed body was overwritten by a later one; condense it again")
+        return self.factor.solve(load)
 
     @classmethod
     def of(cls, upper: sp.csr_matrix, free: Int, rows: sp.csr_matrix, spent: _Series | None) -> _Series:
@@ -174,9 +190,9 @@ class _Series:
         from finger3d.fem.pardiso import SchurFactor
 
         given = (upper.indptr, upper.indices, free, rows.indptr, rows.indices)
-        if spent and all(map(np.array_equal, given, spent.places.given)):
+        if spent and spent.current and all(map(np.array_equal, given, spent.places.given)):
             spent.factor.renew(spent.places.values(upper, rows))
-            return spent
+            return cls(spent.places, spent.factor, spent.factor.factorizations)
         places, matrix = _augmented(upper, free, rows)
         return cls(places, SchurFactor(matrix, rows.shape[0]))
 

@@ -59,6 +59,8 @@ class SchurFactor:
         ``-R K^-1 R^T``.
     perturbed : int
         Pivots that PARDISO had to perturb; 0 for a trustworthy factor.
+    factorizations : int
+        Matrices factored so far; solutions are those of the last.
     """
 
     def __init__(self, upper: sp.csr_matrix, rows: int) -> None:
@@ -79,6 +81,7 @@ class SchurFactor:
         self._iparm[[0, 1, 9, 20]] = 1, 3, 13, 1  # own settings, parallel METIS, pivot threshold 1e-13, Bunch-Kaufman
         self._iparm[35] = 2  # Schur complement, and keep the factor for solves
         self._finalizer = weakref.finalize(self, _release, self._call, self._pt, self._n, self._iparm)
+        self.factorizations = 0
         self._phase(11, np.zeros(1), np.zeros(1), 1)
         self._factorize()
 
@@ -88,6 +91,7 @@ class SchurFactor:
         self._factorize()
 
     def _factorize(self) -> None:
+        self.factorizations += 1  # before the call, which may fail and yet overwrite
         schur = np.zeros((self._rows, self._rows), order="F")
         self._phase(22, np.zeros(1), schur, 1)
         self.schur = np.asarray(schur)

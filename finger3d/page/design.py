@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from finger3d.page.build import Code, Figure, Row, Section, Table, write_page
 from finger3d.page.results import read_json, read_rows, title_of
@@ -34,6 +37,7 @@ def design_page(folder: str | Path) -> Path:
         *(Row(key, value) for key, value in found["values"].items()),
         Row("designs judged", str(len(rows))),
         Row("bodies condensed", str(found["bodies"])),
+        *_increments(found.get("increments") or {}),
     ]
     free = [
         (key, *bounds[key], found["start_values"][key], value, _at_a_bound(value, *bounds[key]))
@@ -60,6 +64,14 @@ def design_page(folder: str | Path) -> Path:
         outcome=f"{len(good)} of {len(rows)} designs have a number",
         good=bool(good),
     )  # fmt: skip
+
+
+def _increments(found: Mapping[str, Any]) -> list[Row]:
+    """How many a press of the best design has, and the error that they leave."""
+    if not found:
+        return []
+    steps = ", ".join(map(str, found["steps"]))
+    return [Row(f"error of the strain with {steps} increments", f"{found['strain_error'] or math.nan:.2g}")]
 
 
 def _at_a_bound(value: float, low: float, high: float) -> str:

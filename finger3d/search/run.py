@@ -5,24 +5,25 @@ from __future__ import annotations
 import csv
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 
 from finger3d.errors import Finger3dError
 from finger3d.export import atomic, claimed, write_json
 from finger3d.family import Body, Variant, body_key
-from finger3d.history import measure
-from finger3d.kinematics import SmallStrain
-from finger3d.model import Gauge
+from finger3d.history import Frame, measure
+from finger3d.model import Gauge, Leg, Model
 from finger3d.page import design_page
 from finger3d.reduced import friction_at
 from finger3d.report import Report
 from finger3d.scene import Scene
 from finger3d.search.picture import draw
 from finger3d.search.task import METHODS, Float, Free, Objective, Problem, Table, checked_start, objective_of
+from finger3d.sensor.increments import found_increments, increment_error
 from finger3d.solve import gauge_row
 
 _INNER = 60  # readings of gauges in one body
@@ -63,6 +64,45 @@ class _Pressed:
     outcome: str = "converged"
 
 
+def _whole(model: Model) -> bool:
+    """Whether gauges are read in the body's own way, so that a gauge moved is a press of its own."""
+    return model.inclusions is not None or not model.kinematics.small_strain
+
+
+class _Bench:
+    """A design's body, built once and pressed under several mu."""
+
+    def __init__(self, model: Model, mus: Sequence[float], say: Callable[[str], None]) -> None:
+        self._model, self._apart = model, _whole(model)
+        variants = self._variants(mus, model.legs)
+        self.body = Body(model, variants if self._apart else [replace(v, gauges=()) for v in variants], say)
+
+    def _variants(self, mus: Sequence[float], legs: tuple[Leg, ...]) -> list[Variant]:
+        laws = [friction_at(self._model.friction, mu) for mu in mus]
+        return [Variant.of(replace(self._model, friction=law, legs=legs)) for law in laws]
+
+    def ends(self, mus: Sequence[float], legs: tuple[Leg, ...]) -> list[Frame]:
+        """The last frame under every mu."""
+        return [frames[-1] for frames in self.body.frames(self._variants(mus, legs))]
+
+    def reader(self, ends: Sequence[Frame]) -> Callable[[Gauge], Float]:
+        """Gauge -> strain (m,) of frames (m,)."""
+        body = self.body
+        if self._apart:
+            (variant,) = self._variants((0.0,), self._model.legs)
+            strains = [body.strains(variant, frame.gauges) for frame in ends]
+            return lambda g: np.array([strain[g.name] for strain in strains])
+        mesh, axes = body.problem.mesh, body.problem.axes
+        fields = body.problem.model.kinematics.all_unknowns(body.problem, [f.part for f in ends])
+        u = np.array([x[: mesh.points.size] for x in fields])
+        return lambda g: np.asarray(gauge_row(mesh, g, axes)[:, : mesh.points.size] @ u.T).ravel()
+
+    def strain(self, gauge: Gauge, mus: Sequence[float], legs: tuple[Leg, ...]) -> Float:
+        """Strain (m,) of a gauge under mus (m,), nan where a press failed."""
+        ends = self.ends(mus, legs)
+        return np.where([f.outcome.ok for f in ends], self.reader(ends)(gauge), math.nan)
+
+
 class _Spent(Exception):
     """The budget is used up."""
 
@@ -77,6 +117,7 @@ class _Search:
     done: list[Evaluation] = field(default_factory=list)
     bodies: int = 0
     spent: int = 0
+    chosen: tuple[int | Literal["auto"], ...] | None = None
     _pressed: dict[str, _Pressed] = field(default_factory=dict)
 
     def evaluate(self, values: Sequence[float] | Float) -> Evaluation:
@@ -107,35 +148,67 @@ class _Search:
     def _press(self, scene: Scene) -> _Pressed:
         key = json.dumps([body_key(scene), scene.as_dict()["press"], scene.as_dict()["contact"]])
         model = scene.model()
-        whole = model.inclusions is not None or not isinstance(model.kinematics, SmallStrain)
-        if whole:
-            # these read their gauges in their own way, so a gauge moved is a press of its own
+        if _whole(model):
             key += repr(model.gauges)
         if key not in self._pressed:
             while len(self._pressed) >= _KEPT:
                 self._pressed.pop(next(iter(self._pressed)))
-            self._pressed[key] = self._pressed_new(scene, whole)
+            self._pressed[key] = self._pressed_new(model)
             self.bodies += 1
         return self._pressed[key]
 
-    def _pressed_new(self, scene: Scene, whole: bool) -> _Pressed:
-        model = scene.model()
-        variants = [Variant.of(replace(model, friction=friction_at(model.friction, mu))) for mu in self.problem.mus]
+    def _pressed_new(self, model: Model) -> _Pressed:
+        mus = self.problem.mus
         try:
-            body = Body(model, variants if whole else [replace(v, gauges=()) for v in variants], self.report.say)
-            ends = [frames[-1] for frames in body.frames(variants)]
+            bench = _Bench(model, mus, self.report.say)
+            ends = bench.ends(mus, self._legs(bench, model))
         except Finger3dError as error:
             return _Pressed(outcome=" ".join(str(error).split()))
-        for mu, frame in zip(self.problem.mus, ends, strict=True):
+        for mu, frame in zip(mus, ends, strict=True):
             if not frame.outcome.ok:
                 return _Pressed(outcome=f"mu = {mu:g}: {frame.outcome}")
-        steps = tuple(measure(body.problem.points, frame) for frame in ends)
-        if whole:
-            strains = [body.strains(v, frame.gauges) for v, frame in zip(variants, ends, strict=True)]
-            return _Pressed(steps, lambda g: np.array([strain[g.name] for strain in strains]))
-        mesh, axes = body.problem.mesh, body.problem.axes
-        u = np.array([x[: mesh.points.size] for x in body.problem.unknowns_of([f.part.force for f in ends])])
-        return _Pressed(steps, lambda g: np.asarray(gauge_row(mesh, g, axes)[:, : mesh.points.size] @ u.T).ravel())
+        return _Pressed(tuple(measure(bench.body.problem.points, frame) for frame in ends), bench.reader(ends))
+
+    def _gauge(self, model: Model) -> Gauge | None:
+        """The gauge that is designed, if the scene has one."""
+        return next((g for g in model.gauges if self.problem.gauge in (None, g.name)), None)
+
+    def _legs(self, bench: _Bench, model: Model) -> tuple[Leg, ...]:
+        """The path with as many increments as the first design asked for: errors are then alike."""
+        gauge = self._gauge(model)
+        if gauge is None or all(isinstance(leg.steps, int) for leg in model.legs):
+            return model.legs
+        if self.chosen is None:
+            mus, noise = _three(self.problem.mus), self.problem.noise
+            found = found_increments(bench.body.problem, lambda p: bench.strain(gauge, mus, p.model.legs), noise)
+            self.report.say(str(found))
+            self.chosen = tuple(leg.steps for leg in found.legs)
+        return tuple(replace(leg, steps=n) for leg, n in zip(model.legs, self.chosen, strict=True))
+
+    def begin(self, start: Sequence[float]) -> None:
+        """Let the start choose the increments where its own press is remembered and would not."""
+        try:
+            model = self.problem.scene(start).model()
+            if any(leg.steps == "auto" for leg in model.legs):
+                self._legs(_Bench(model, _three(self.problem.mus), self.report.say), model)
+        except Finger3dError:
+            pass  # as at first: the first design that can be built chooses
+
+    def increments(self, values: Sequence[float]) -> dict[str, Any]:
+        """The increments of a design, and the error that they leave in its strain, by presses of more or fewer."""
+        model = self.problem.scene(values).model()
+        gauge, mus = self._gauge(model), _three(self.problem.mus)
+        if gauge is None:
+            return {}
+        bench = _Bench(model, mus, self.report.say)
+        legs = self._legs(bench, model)
+        problem = replace(bench.body.problem, model=replace(bench.body.problem.model, legs=legs))
+
+        def strain(other: Any) -> Float:
+            return bench.strain(gauge, mus, other.model.legs)
+
+        left = increment_error(problem, strain(problem), legs != model.legs, strain)
+        return {"steps": [leg.steps for leg in legs], "chosen": legs != model.legs, "strain_error": float(left.max())}
 
     def _write(self, found: Evaluation) -> None:
         path = self.folder / "evaluations.csv"
@@ -216,6 +289,11 @@ class _Search:
         return best if best > -_WORST else math.nan
 
 
+def _three(mus: Sequence[float]) -> tuple[float, ...]:
+    """The first, the middle and the last."""
+    return tuple(dict.fromkeys((mus[0], mus[len(mus) // 2], mus[-1])))
+
+
 def _minimise(method: str, cost: Callable[[Float], float], free: Sequence[Free], start: Float, seed: int) -> None:
     from scipy import optimize
 
@@ -257,6 +335,7 @@ def _searched(problem: Problem, folder: Path, report: Report, judge: Objective, 
     run.load()
     if run.known:
         report.say(f"{len(run.known)} designs are kept from before")
+        run.begin(start)
     report.stage("searching")
     first = run.evaluate(start)
     try:
@@ -267,6 +346,8 @@ def _searched(problem: Problem, folder: Path, report: Report, judge: Objective, 
             _write_best(problem, folder, best, first, run)
     if best is None:
         raise Finger3dError(f"design: no design within the bounds gives a number; the first: {first.outcome}")
+    report.stage("increments of the best")
+    _write_best(problem, folder, best, first, run, run.increments(best.values))
     judged = tuple(run.known.values())
     draw(
         folder / "design.png", [f.key for f in problem.free], [e.values for e in judged], [e.value for e in judged],
@@ -284,7 +365,10 @@ def _same(problem: Problem, folder: Path) -> None:
     write_json(path, wanted)
 
 
-def _write_best(problem: Problem, folder: Path, best: Evaluation, first: Evaluation, run: _Search) -> None:
+def _write_best(
+    problem: Problem, folder: Path, best: Evaluation, first: Evaluation, run: _Search,
+    increments: Mapping[str, Any] | None = None,
+) -> None:  # fmt: skip
     with atomic(folder / "best.toml") as path:
         path.write_text(problem.scene(best.values).to_toml(defaults=False), encoding="utf-8")
     names = [f.key for f in problem.free]
@@ -293,6 +377,6 @@ def _write_best(problem: Problem, folder: Path, best: Evaluation, first: Evaluat
         {
             "objective": problem.objective, "best": best.value, "values": dict(zip(names, best.values, strict=True)),
             "start": first.value, "start_values": dict(zip(names, first.values, strict=True)),
-            "designs": len(run.done), "bodies": run.bodies,
+            "designs": len(run.done), "bodies": run.bodies, "increments": increments or {},
         },
     )  # fmt: skip

@@ -141,15 +141,30 @@ class Calibration:
 
     @cached_property
     def interpolation_error(self) -> float:
-        """Strain error of the interpolation: what leaving out every second point changes at these, rms, over 4."""
-        kept = np.unique([*range(0, len(self.mu), 2), len(self.mu) - 1])
-        out = np.setdiff1d(np.arange(len(self.mu)), kept)
-        left = self.strain[out] - PchipInterpolator(self.mu[kept], self.strain[kept])(self.mu[out])
-        return float(np.sqrt(np.mean(left**2))) / _SHARPER
+        """Strain error of the interpolation, rms over mu: see :meth:`curve_error`."""
+        return float(np.sqrt(np.mean(self._missed[1:-1] ** 2)))
 
-    def curve_error(self, shape: Shape = "interpolation") -> float:
-        """Strain error of the curve used: of the interpolation, or the residual of the fit."""
-        return self.fit.rms if shape == "fit" else self.interpolation_error
+    @cached_property
+    def _missed(self) -> Float:
+        """Strain error (n,) of the interpolation near every mu."""
+        found = np.zeros(len(self.mu))
+        every = np.arange(len(self.mu))
+        for first in (1, 2):
+            out = every[first:-1:2]
+            kept = np.setdiff1d(every, out)
+            left = self.strain[out] - PchipInterpolator(self.mu[kept], self.strain[kept])(self.mu[out])
+            found[out] = np.abs(left) / _SHARPER
+        found[[0, -1]] = found[[1, -2]]
+        # a kink between two of the points is seen from either of them, or from the next
+        return np.max([found, np.append(found[1:], 0.0), np.append(0.0, found[:-1])], axis=0)
+
+    def curve_error(self, mu: ArrayLike, shape: Shape = "interpolation") -> Float:
+        """Strain error (m,) of the curve used at mu (m,).
+
+        Of the fit the residual, rms; of the interpolation what leaving out every second point changes at these, over 4.
+        """
+        at = np.asarray(mu, dtype=float)
+        return np.full(at.shape, self.fit.rms) if shape == "fit" else np.interp(at, self.mu, self._missed)
 
     @cached_property
     def grid(self) -> Float:
@@ -173,12 +188,12 @@ class Calibration:
     def strain_sd(self, mu: ArrayLike, std: ArrayLike | None = None, shape: Shape = "interpolation") -> Float:
         """Standard deviation of a reading about the curve: noise (or `std`), error of the curve, tolerances."""
         noise = np.asarray(self.noise if std is None else std, dtype=float)
-        squares = noise**2 + self.curve_error(shape) ** 2 + np.sum(self.tolerance_sd(mu) ** 2, axis=0)
+        squares = noise**2 + self.curve_error(mu, shape) ** 2 + np.sum(self.tolerance_sd(mu) ** 2, axis=0)
         return np.asarray(np.sqrt(squares))
 
     def shares(self, mu: float) -> dict[str, float]:
         """Share of every cause in the variance of mu at one mu: noise, curve, and each tolerance; they sum to 1."""
-        squares = {"noise": self.noise**2, "curve": self.curve_error() ** 2}
+        squares = {"noise": self.noise**2, "curve": float(self.curve_error(mu)) ** 2}
         squares |= {
             t.name: float(s) ** 2 for t, s in zip(self.tolerances, self.tolerance_sd(mu)[:, 0], strict=True)
         }  # fmt: skip

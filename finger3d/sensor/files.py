@@ -14,7 +14,7 @@ from finger3d.errors import Finger3dError
 from finger3d.export import write_csv, write_json
 from finger3d.sensor.curve import FEWEST, Calibration, Tolerance
 
-FORMAT, VERSION = "finger3d calibration", 1
+FORMAT, VERSION = "finger3d calibration", 2
 
 
 class _Part(BaseModel):

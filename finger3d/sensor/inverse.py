@@ -3,12 +3,18 @@
 With a standard deviation s(mu) of a reading about the curve e(mu), the 68 % set of a strain is ``|strain - e(mu)| <=
 s(mu)``: it holds the true mu as often as a normal error stays within one standard deviation, whatever the curve looks
 like (the inversion of a test, Neyman 1937).  Where the curve turns, it is two intervals, and both are named.
+
+The standard deviation of mu is the root mean square distance from the value told, over the likelihood of mu in the
+calibrated range, ``exp(-((strain - e(mu)) / s(mu))^2 / 2) / s(mu)``.  On a straight curve that is ``s / |de/dmu|``.
+Where a flat part is near, a reading that noise took from there to a steep part is told with the spread of both.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -23,11 +29,12 @@ Status = Literal["ok", "coarse", "ambiguous", "above", "below", "outside", "blin
 _CHUNK = 256  # readings at a time: each asks the whole grid
 _JOINED = 1e-9
 _TINY = 1e-12  # of strain, where nothing is uncertain
+_REACH, _NODES = 4.0, 129  # of the likelihood beside an interval, in its widths; nodes there
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """One answer: mu with its standard deviation, and the ends of its 68 % interval."""
+    """One answer: mu with its standard deviation (see the module), and the ends of its 68 % interval."""
 
     mu: float
     std: float
@@ -42,7 +49,7 @@ class Estimate:
     Attributes
     ----------
     strain, reading_std : the reading
-    mu, std : nan unless the status is "ok" or "coarse"
+    mu, std : nan unless the status is "ok" or "coarse"; std is the spread of the likelihood about mu
     low, high : ends of the 68 % set; infinite or 0 where the calibration does not reach, nan where it is empty
     status : ok; coarse: worse than the calibration's limit; ambiguous: several answers; above, below: beyond the end of
         what can be told apart; blind: nothing can; outside: no mu has this strain
@@ -151,22 +158,45 @@ def _joined(grid: Float, low: Float, high: Float) -> list[tuple[float, float]]:
     return found
 
 
-def _candidate(calibration: Calibration, ends: tuple[float, float], away: Float, sd: Float, shape: Shape) -> Candidate:
+def _candidates(grid: Float, found: list[tuple[float, float]], away: Float, sd: Float) -> Iterator[Candidate]:
+    """An answer for each interval, with its part of the likelihood; parts end where that is least in between."""
+    cuts = [float(grid[0])]
+    for (_, before), (after, _) in pairwise(found):
+        first, last = np.searchsorted(grid, [before, after])
+        between = grid[first:last]
+        times = np.abs(away[first:last]) / np.maximum(sd[first:last], _TINY)
+        cuts.append(float(between[np.argmax(times)]) if len(between) else 0.5 * (before + after))
+    cuts.append(float(grid[-1]))
+    for ends, part in zip(found, pairwise(cuts), strict=True):
+        mu = _best(grid, ends, away, sd)
+        yield Candidate(mu, _spread(grid, mu, ends, part, away, sd), *ends)
+
+
+def _spread(
+    grid: Float, mu: float, ends: tuple[float, float], part: tuple[float, float], away: Float, sd: Float
+) -> float:
+    """Root mean square distance from mu, over the likelihood in a part of the grid."""
+    (low, high), (first, last) = ends, part
+    beside = _REACH * (high - low)
+    near = np.linspace(max(first, low - beside), min(last, high + beside), _NODES)
+    at = np.sort(np.concatenate([part, near, grid[(grid > first) & (grid < last)]]))
+    std = np.maximum(np.interp(at, grid, sd), _TINY)
+    weight = np.exp(-0.5 * (np.interp(at, grid, away) / std) ** 2) / std
+    whole = float(np.trapezoid(weight, at))
+    return math.sqrt(float(np.trapezoid(weight * (at - mu) ** 2, at)) / whole) if whole else 0.5 * (high - low)
+
+
+def _best(grid: Float, ends: tuple[float, float], away: Float, sd: Float) -> float:
     """The best mu of an interval: where the curve has the strain, else where it is nearest in standard deviations."""
     low, high = ends
-    grid = calibration.grid
     first, last = np.searchsorted(grid, [low, high])
     at = np.concatenate([[low], grid[first:last], [high]])
     left = np.interp(at, grid, away)
     cross = np.flatnonzero(np.sign(left[:-1]) * np.sign(left[1:]) <= 0.0)
     if len(cross):
         roots = [_root(at[i], at[i + 1], left[i], left[i + 1]) for i in cross]
-        mu = float(np.mean([roots[0], roots[-1]]))
-    else:
-        mu = float(at[np.argmin(np.abs(left) / np.maximum(np.interp(at, grid, sd), _TINY))])
-    slope = abs(float(calibration.slope(mu, shape)))
-    std = float(np.interp(mu, grid, sd)) / slope if slope else math.inf
-    return Candidate(mu, std, low, high)
+        return float(np.mean([roots[0], roots[-1]]))
+    return float(at[np.argmin(np.abs(left) / np.maximum(np.interp(at, grid, sd), _TINY))])
 
 
 def _root(a: float, b: float, at_a: float, at_b: float) -> float:
@@ -179,7 +209,7 @@ def _worded(
 ) -> Estimate:  # fmt: skip
     """Name the case and say it."""
     first, last = float(calibration.mu[0]), float(calibration.mu[-1])
-    answers = tuple(_candidate(calibration, ends, away, sd, shape) for ends in found)
+    answers = tuple(_candidates(calibration.grid, found, away, sd)) if found else ()
 
     def told(status: Status, verdict: str, low: float, high: float, best: Candidate | None = None) -> Estimate:
         mu, std = (best.mu, best.std) if best else (math.nan, math.nan)
@@ -213,9 +243,8 @@ def _worded(
         if half <= calibration.limit:
             why = f"mu {side} {edge:.3g}, and the calibration ends at {end:g}"
         return told("above" if side == ">" else "below", f"out of range: {why}", low, high)
-    best = best if math.isfinite(best.std) else Candidate(best.mu, half, best.low, best.high)
-    text = f"mu = {best.mu:.3g} +- {best.std:.2g}"
-    if half > calibration.limit:
+    text = f"mu = {best.mu:.3g} +- {best.std:.2g} (68 % interval {best.low:.3g} to {best.high:.3g})"
+    if best.std > calibration.limit:
         return told("coarse", f"{text}: coarser than the limit of {calibration.limit:g}", low, high, best)
     return told("ok", text, low, high, best)
 
@@ -231,4 +260,4 @@ def _named(answer: Candidate, first: float, last: float) -> str:
         return f"mu > {answer.low:.3g}"
     if answer.low <= first:
         return f"mu < {answer.high:.3g}"
-    return f"mu = {answer.mu:.3g} +- {0.5 * (answer.high - answer.low):.2g}"
+    return f"mu = {answer.mu:.3g} +- {answer.std:.2g}"

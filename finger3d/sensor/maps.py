@@ -42,9 +42,9 @@ _NEWTON = 6
 
 def check(model: Model) -> None:
     """Refuse a body whose gauges do not read the small strain of a displacement field."""
-    kinematics = dict(model.filled).get("kinematics")
-    if kinematics == "large_deformation":
-        raise Finger3dError("--map: not with effects.large_deformation; take the effect out, or the map")
+    if not model.kinematics.small_strain:
+        name = dict(model.filled).get("kinematics", "kinematics")
+        raise Finger3dError(f"--map: not with effects.{name}; take the effect out, or the map")
 
 
 @dataclass(frozen=True)

@@ -75,7 +75,7 @@ def _resolution(axes: Any, c: Calibration) -> None:
 def _causes(axes: Any, c: Calibration) -> None:
     """Variance of mu by cause, stacked to 1."""
     mu = c.grid
-    rows = [np.full(len(mu), c.noise**2), np.full(len(mu), c.curve_error() ** 2), *c.tolerance_sd(mu) ** 2]
+    rows = [np.full(len(mu), c.noise**2), c.curve_error(mu) ** 2, *c.tolerance_sd(mu) ** 2]
     names = [f"noise {c.noise:g}", "interpolation", *(f"{t.name} ± {t.sd:g}" for t in c.tolerances)]
     total = np.sum(rows, axis=0)
     keep = [i for i, row in enumerate(rows) if (row / total).max() >= 0.005]
@@ -90,6 +90,7 @@ def _causes(axes: Any, c: Calibration) -> None:
         "#e08214",
         "#8c510a",
         "#777777",
+        "#bdbdbd",
     ]
     axes.stackplot(
         mu, [rows[i] / total for i in keep], labels=[names[i] for i in keep], colors=[colours[i] for i in keep]

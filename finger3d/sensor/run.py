@@ -18,17 +18,16 @@ from finger3d.drawing import Artist
 from finger3d.errors import Finger3dError
 from finger3d.export import atomic, claimed, write_csv
 from finger3d.history import Frame
-from finger3d.increments import automatic, refine, with_steps
-from finger3d.kinematics import SmallStrain
 from finger3d.model import Gauge, Model
 from finger3d.page import calibrate_page
 from finger3d.problem import Problem
-from finger3d.reduced import Condensed, friction_at
+from finger3d.reduced import Condensed
 from finger3d.report import Report
 from finger3d.sensor.curve import FEWEST, NOISE, RESOLUTION, Calibration, Range, Tolerance
 from finger3d.sensor.files import save, write_table
+from finger3d.sensor.increments import Increments, found_increments
 from finger3d.sensor.presses import Press, presses
-from finger3d.sensor.tolerances import Pressed, chosen, moved_gauges, slopes
+from finger3d.sensor.tolerances import Pressed, chosen, moved_gauges, read, slopes
 from finger3d.solve import MARGIN, build, covered
 from finger3d.versions import versions
 
@@ -46,13 +45,17 @@ _SLOPES = {True: 7, False: 3}  # values of mu at which tolerances are tried: in 
 
 @dataclass
 class Sweep:
-    """The presses of one calibration as they come: last frame by mu, or why there is none; a few with their paths."""
+    """The presses of one calibration as they come: last frame by mu, or why there is none; a few with their paths.
+
+    `increments` is known once there is a press.
+    """
 
     mus: tuple[float, ...]
     frames: dict[float, Frame] = field(default_factory=dict)
     failed: dict[float, str] = field(default_factory=dict)
     few: dict[float, Press] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
+    increments: Increments | None = None
 
     def strains(self, name: str) -> tuple[Float, Float]:
         """mu (n,) that converged and strain (n,) of a gauge."""
@@ -124,7 +127,7 @@ def _whole(
             path.write_text(text, encoding="utf-8")
     sweep, start = Sweep(mus), time.perf_counter()
     try:
-        problem = _condensed(model, gauge, wanted, sweep, report)
+        problem = _condensed(model, gauge, wanted, sweep, noise, report)
         calibration = _calibrated(problem, gauge, wanted, sweep, noise, limit, report)
     except (KeyboardInterrupt, Finger3dError):
         if folder and (sweep.frames or sweep.failed):
@@ -135,6 +138,7 @@ def _whole(
         "domain": model.domain, "effects": list(scene.effects), "dofs": int(problem.stiffness.upper.shape[0]),
         "contact_points": len(problem.surface.nodes), "mesh_hash": problem.report.hash, "seconds": sweep.seconds,
         "factorizations": problem.factorizations, "versions": versions(),
+        "increments": sweep.increments.as_dict() if sweep.increments else {},
     }  # fmt: skip
     digest = hashlib.sha256(text.encode()).hexdigest()[:16]
     calibration = replace(calibration, scene=scene.as_dict(), hash=digest, about=about)
@@ -155,7 +159,7 @@ def calibrated(
     """The same for a model made in Python; writes nothing. Returns also the condensed body and the last frames."""
     report, known, sweep = report or Report(), found_gauge(model, gauge), Sweep(_checked(mus, noise, limit))
     wanted = chosen(tolerances)
-    problem = _condensed(model, known, wanted, sweep, report)
+    problem = _condensed(model, known, wanted, sweep, noise, report)
     return _calibrated(problem, known, wanted, sweep, noise, limit, report), problem, sweep
 
 
@@ -186,21 +190,24 @@ def _checked(mus: Sequence[float], noise: float, limit: float) -> tuple[float, .
     return found
 
 
-def _condensed(model: Model, gauge: Gauge, wanted: Mapping[str, float], sweep: Sweep, report: Report) -> Problem:
+def _condensed(
+    model: Model, gauge: Gauge, wanted: Mapping[str, float], sweep: Sweep, noise: float, report: Report
+) -> Problem:
     """Build, press every mu, and once more with the whole contact face where contact went beyond the candidates."""
     extra = () if model.inclusions else tuple(m.gauge for m in moved_gauges(model, gauge, wanted))
     model = replace(model, gauges=(*model.gauges, *extra))
+    three = np.array(sweep.mus)[[0, len(sweep.mus) // 2, -1]]
     for margin in (MARGIN, math.inf):
         start = time.perf_counter()
         report.stage("condensing")
         problem = build(model, report.say, margin)
         sweep.seconds["build"] = time.perf_counter() - start
         start = time.perf_counter()
-        if automatic(problem):
-            report.stage("increments by step halving")
-            middle = friction_at(model.friction, sweep.mus[len(sweep.mus) // 2])
-            *_, (frames, estimate) = refine(replace(problem, model=replace(model, friction=middle)))
-            problem = with_steps(problem, estimate.steps if estimate else len(frames))
+        report.stage("increments")
+        sweep.increments = found_increments(problem, lambda p: read(p, (gauge.name,), three)[0], noise)
+        if sweep.increments.chosen:
+            report.say(str(sweep.increments))
+        problem = replace(problem, model=replace(problem.model, legs=sweep.increments.legs))
         _press(problem, sweep, report)
         sweep.seconds["presses"] = time.perf_counter() - start
         if all(covered(problem, list(sweep.frames.values()))):
@@ -210,7 +217,7 @@ def _condensed(model: Model, gauge: Gauge, wanted: Mapping[str, float], sweep: S
 
 
 def _press(problem: Problem, sweep: Sweep, report: Report) -> None:
-    if not isinstance(problem.model.kinematics, SmallStrain):
+    if not problem.model.kinematics.small_strain:
         name = dict(problem.model.filled).get("kinematics", "this body")
         report.say(f"{name}: its compliance changes on the way, so that every one of {len(sweep.mus)} mu is a full "
                    "march, and so is every tolerance")  # fmt: skip
@@ -231,7 +238,7 @@ def _press(problem: Problem, sweep: Sweep, report: Report) -> None:
 
 def _few(problem: Problem, count: int) -> NDArray[np.int64]:
     """Numbers, among `count` values of mu, of those at which tolerances are tried."""
-    wanted = _SLOPES[isinstance(problem.model.kinematics, SmallStrain)]
+    wanted = _SLOPES[problem.model.kinematics.small_strain]
     return np.unique(np.linspace(0, count - 1, wanted).round().astype(int))
 
 
@@ -244,10 +251,10 @@ def _calibrated(
     failed = tuple(sorted(sweep.failed.items()))
     bare = Calibration(gauge.name, mu, strain, noise, limit, (), failed)  # refuses too few points
     found: tuple[Tolerance, ...] = ()
-    if wanted:
+    if wanted and sweep.increments:
         strains = {g.name: sweep.strains(g.name)[1] for g in problem.model.gauges}
         base = Pressed(mu, strains, _few(problem, len(mu)), sweep.frames[float(mu[-1])], sweep.few)
-        found = tuple(slopes(problem, gauge, wanted, base, report.stage))
+        found = tuple(slopes(problem, gauge, wanted, base, sweep.increments, report.stage))
     sweep.seconds["tolerances"] = time.perf_counter() - start
     return replace(bare, tolerances=found)
 
@@ -273,7 +280,7 @@ def _write(
     own = replace(
         problem, model=replace(problem.model, gauges=model.gauges), gauge_rows=problem.gauge_rows[: len(model.gauges)]
     )
-    if type(model.kinematics) is SmallStrain:
+    if model.kinematics.elastic:
         Condensed.of(own).save(folder / "reduced.npz")
     else:
         report.say("no reduced.npz: the body's answer changes on the way")
@@ -329,6 +336,11 @@ def summary(calibration: Calibration) -> list[tuple[str, Any]]:
         (f"mu +- at mu = {at:.3g}", f"{sd:.2g} with all tolerances; shares of the variance below"),
         *((f"  {name}", f"{100.0 * share:.1f} %") for name, share in shares),
     ]
+    left = next((t for t in c.tolerances if t.name == "increments"), None)
+    if left is not None:
+        steps = ", ".join(str(n) for n in c.about.get("increments", {}).get("steps", ()))
+        said = f"leave an error of up to {left.spread.max():.2g} in the strain"
+        rows.insert(1, (f"increments {steps}".strip(), said))
     if c.failed:
         rows.append(("failed", ", ".join(f"mu = {mu:.4g}" for mu, _ in c.failed)))
     return rows

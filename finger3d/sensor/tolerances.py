@@ -3,7 +3,8 @@
 Gauges that are a little off are read beside the true one from the same presses.  All else is a difference between two
 presses, of a fine mesh those of the coarser one that its error bar comes from: depth is another path of it, E another
 scale of its compliance; nu, tilt and a foil that lies elsewhere are bodies of their own.  Differences are over one
-tolerance, at a few mu; slopes in between are interpolated.
+tolerance, at a few mu; slopes in between are interpolated.  What the increments leave out is a difference to presses of
+more or fewer of them.
 """
 
 from __future__ import annotations
@@ -22,11 +23,11 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import MIXED_FROM
 from finger3d.fem.condense import stiffened
 from finger3d.history import Frame
-from finger3d.kinematics import SmallStrain
 from finger3d.model import Gauge, Leg, MeshOptions, Model
 from finger3d.objects import Plane
 from finger3d.problem import Problem, at_points, targets
 from finger3d.sensor.curve import Tolerance
+from finger3d.sensor.increments import Increments, increment_error
 from finger3d.sensor.presses import Like, presses
 from finger3d.solve import build
 
@@ -42,9 +43,10 @@ TOLERANCES: dict[str, tuple[float, str]] = {
     "gauge_y_mm": (0.3, "mm"),
     "gauge_angle_deg": (2.0, "degree"),
     "mesh": (1.0, "error bar"),
+    "increments": (1.0, "error bar"),
 }
 """Standard deviations assumed unless others are given: a careful laboratory set-up and a hand-laid gauge; of the mesh
-its error bar, from a coarser companion."""
+its error bar, from a coarser companion, and of the increments theirs, from presses of more or fewer."""
 
 _ENOUGH = {2: 150, 3: 500}  # contact points that make a coarser body's differences good to a fifth of the largest
 _LEFT = {2: 100, 3: 500}  # contact points that a tilted body is left with
@@ -152,21 +154,27 @@ def _strain(frame: Frame, name: str) -> float:
 
 
 def slopes(
-    problem: Problem, gauge: Gauge, tolerances: Mapping[str, float], base: Pressed, say: Callable[[str], None]
-) -> Iterator[Tolerance]:
+    problem: Problem, gauge: Gauge, tolerances: Mapping[str, float], base: Pressed, increments: Increments,
+    say: Callable[[str], None],
+) -> Iterator[Tolerance]:  # fmt: skip
     """Every tolerance with its slope at all mu of `base`; those between the few are interpolated.
 
     Parameters
     ----------
     problem : the condensed body
+    increments : of its path; presses that are only compared with each other may have fewer
     base : strains of its gauges, those a little off among them unless it has inclusions
     say : told which tolerance is being tried; a press that fails is passed over
     """
     at = base.few
-    body = Body(problem, gauge, base.mu[at], base.strain[gauge.name][at], base.pressed)
+    own = base.strain[gauge.name][at]
+    body = Body(problem, gauge, base.mu[at], own, base.pressed)
+    others = set(tolerances) - {*_PLACES, "increments"}
+    if others and increments.light != problem.model.legs:
+        body = _body(replace(problem, model=replace(problem.model, legs=increments.light)), gauge, base.mu[at])
     enough = len(problem.points.nodes) >= 2 ** (problem.dim - 1) * _ENOUGH[problem.dim]
     coarse = None
-    if "mesh" in tolerances or (enough and set(tolerances) - set(_PLACES)):
+    if "mesh" in tolerances or (enough and others):
         say("a coarser body")
         coarse = _beside_mesh(body, say)
     for name, sd in tolerances.items():
@@ -175,6 +183,11 @@ def slopes(
         where = np.arange(len(base.mu)) if beside else at
         if name == "mesh":
             steps = [(sd, sd * _mesh_error(body, coarse, base.frame))] if coarse else []
+        elif name == "increments":
+            left = increment_error(
+                problem, own, increments.chosen, lambda other: read(other, (gauge.name,), base.mu[at])[0]
+            )  # fmt: skip
+            steps = [(sd, sd * left)]
         else:
             steps = beside or list(_steps(coarse if coarse and enough else body, name, sd))
         if not steps:
@@ -252,7 +265,7 @@ def _step_of_nu(nu: float, sd: float) -> float:
 
 def with_modulus(problem: Problem, times: float) -> Problem:
     """The problem with its Young's modulus multiplied, in small strain from the same condensation."""
-    if type(problem.model.kinematics) is not SmallStrain:
+    if not problem.model.kinematics.elastic:
         material = replace(problem.model.material, E_MPa=problem.model.material.E_MPa * times)
         return build(replace(problem.model, material=material))
     c, d = problem.compliance.shape[:2]
@@ -272,12 +285,16 @@ def with_modulus(problem: Problem, times: float) -> Problem:
 def _beside_mesh(body: Body, say: Callable[[str], None]) -> Body | None:
     """The same on the coarser mesh that the error bar comes from; none of a mesh that has no coarser one."""
     try:
-        problem = companion(body.problem, say)
+        return _body(companion(body.problem, say), body.gauge, body.mu)
     except Finger3dError:
         return None
-    pressed = {p.mu: p for p in presses(problem, body.mu.tolist())}
-    strain = np.array([_strain(p.frame, body.gauge.name) for p in pressed.values()])
-    return Body(problem, body.gauge, body.mu, strain, pressed)
+
+
+def _body(problem: Problem, gauge: Gauge, mu: Float) -> Body:
+    """A body pressed at mu (m,), to compare others with."""
+    pressed = {p.mu: p for p in presses(problem, mu.tolist())}
+    strain = np.array([_strain(p.frame, gauge.name) for p in pressed.values()])
+    return Body(problem, gauge, mu, strain, pressed)
 
 
 def _mesh_error(body: Body, coarse: Body, frame: Frame) -> Float:

@@ -1,0 +1,210 @@
+"""Is what a calibration says of its own error, by mesh and increments, the error that readings then show?
+
+No source; the readings are presses of the same section with more increments than the calibration's, on its mesh and on
+one of half the edge length, at coefficients of friction drawn between the calibrated ones, with noise added.  A half
+cylinder of 5 mm pressed 1 mm in plane strain; six gauges; 10, 20 and 40 increments, and as many as "auto" chooses.
+Nothing else that is not known is drawn, so all other tolerances are left out.  z is (reading - curve) / standard
+deviation of a reading, at the true mu; of mu (estimated - true) / told, where mu is told.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.design import designs
+from finger3d.model import Gauge, Leg, Material, MeshOptions, Model
+from finger3d.sensor import TOLERANCES, Calibration, estimate
+from finger3d.sensor.increments import error_left
+from finger3d.sensor.run import calibrated
+from finger3d.sensor.tolerances import read
+from finger3d.solve import build
+from finger3d.study import Result, Row
+
+from ._paper import columns
+
+Float = NDArray[np.float64]
+Steps = int | Literal["auto"]
+
+NOISE, RANGE = 1.5e-4, (0.05, 1.2)
+ON = {**dict.fromkeys(TOLERANCES, 0.0), "mesh": 1.0, "increments": 1.0}
+SAME, FINER = "same mesh", "finer mesh"
+LEVELS = (10, 20, 40, 80, 160, 320)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One reading of a calibrated gauge, and what was made of it."""
+
+    nu: float
+    steps: Steps
+    mesh: str
+    read_steps: int
+    gauge: str
+    mu: float
+    z: float
+    z_without: float
+    z_mu: float
+    inside: bool
+
+
+def gauges() -> tuple[Gauge, ...]:
+    """On an arc 0.5 mm under the surface, each place along x and along 45 degrees."""
+    places = [(4.5 * math.sin(t), 4.5 * math.cos(t), t) for t in np.radians((10.0, 25.0, 40.0))]
+    return tuple(
+        Gauge(f"{math.degrees(t):.0f}:{a:.0f}", float(x), float(y), 0.0, math.radians(a), 0.0)
+        for x, y, t in places
+        for a in (0.0, 45.0)
+    )
+
+
+def model(nu: float, size: float, steps: Steps) -> Model:
+    """The section with all gauges."""
+    body = designs()["half_cylinder"](radius_mm=5.0, width_mm=1.0)
+    legs = (Leg(1.0, steps=steps),)
+    return Model(
+        body, Material(1.0, nu), MeshOptions(size, 5.0 * size, "swept"), legs, gauges=gauges(), domain="plane-strain"
+    )  # fmt: skip
+
+
+def run(quick: bool) -> Result:
+    """Quick: one nu, three gauges, 10 increments."""
+    random = np.random.default_rng(20261123)
+    nus, counts, size = ((0.45,), (10,), 0.3) if quick else ((0.3, 0.49), (10, 20, 40, "auto"), 0.2)
+    found: list[Reading] = []
+    bare: dict[tuple[float, float, int], Float] = {}
+    for nu in nus:
+        mus = np.sort(random.uniform(*RANGE, 5 if quick else 12))
+        for steps in counts:
+            found += _readings(nu, size, steps, mus, random, bare, quick)
+    rows = list(_rows(found))
+    rows += _extrapolated(bare, nus[-1], size) if not quick else []
+    lines = [tuple(vars(r).values()) for r in found]
+    names = "nu steps mesh read_steps gauge mu z z_without_increments z_mu in_set"
+    return Result(tuple(rows), columns(names, lines), lambda figure: _draw(figure, found))
+
+
+def _readings(
+    nu: float, size: float, steps: Any, mus: Float, random: np.random.Generator, bare: dict[Any, Float], quick: bool
+) -> Iterator[Reading]:
+    """Every gauge calibrated, and read at `mus` in presses with more increments, on its mesh and on a finer one."""
+    curve = np.linspace(*RANGE, 17 if quick else 25)
+    told = gauges()[1::3] if quick else gauges()
+    found = {}
+    for gauge in told:
+        c, problem, sweep = calibrated(model(nu, size, steps), gauge.name, curve, NOISE, 0.1, ON)
+        assert sweep.increments is not None
+        own = int(sweep.increments.legs[0].steps)
+        found[gauge.name] = c, own
+    for mesh, edge in ((SAME, size), (FINER, 0.5 * size)):
+        for name, (c, own) in found.items():
+            for times in (2, 8) if steps != "auto" else (2,):
+                at = times * own
+                key = (nu, edge, at)
+                if key not in bare:
+                    bare[key] = _pressed(nu, edge, at, mus)
+                number = [g.name for g in gauges()].index(name)
+                yield from _judged(nu, steps, mesh, at, c, mus, bare[key][number], random)
+
+
+def _pressed(nu: float, size: float, steps: int, mus: Float) -> Float:
+    """Strain (g, m) of all gauges at mus (m,)."""
+    return read(build(model(nu, size, steps)), tuple(g.name for g in gauges()), mus)
+
+
+def _judged(
+    nu: float, steps: Steps, mesh: str, at: int, c: Calibration, mus: Float, strain: Float, random: np.random.Generator
+) -> Iterator[Reading]:
+    """Readings with noise against the curve; on the same mesh its tolerance is left out."""
+    keep = ("increments",) if mesh == SAME else ("mesh", "increments")
+    known = replace(c, tolerances=tuple(t for t in c.tolerances if t.name in keep))
+    without = replace(c, tolerances=tuple(t for t in known.tolerances if t.name != "increments"))
+    noisy = strain + random.normal(0.0, NOISE, len(mus))
+    for mu, reading, answer in zip(mus, noisy, estimate(known, noisy), strict=True):
+        away = reading - float(c.at(mu))
+        z_mu = (answer.mu - mu) / answer.std if answer.status in ("ok", "coarse") else math.nan
+        inside = any(a.low <= mu <= a.high for a in answer.candidates)
+        z, z_without = (away / float(one.strain_sd([mu])[0]) for one in (known, without))
+        yield Reading(nu, steps, mesh, at, c.gauge, float(mu), z, z_without, z_mu, inside)
+
+
+def _rows(found: list[Reading]) -> Iterator[Row]:
+    """Root mean square of z by increments and mesh, each near 1; and the largest there would be otherwise."""
+    for steps in dict.fromkeys(r.steps for r in found):
+        for mesh in (SAME, FINER):
+            some = [r for r in found if r.steps == steps and r.mesh == mesh]
+            what = f"calibrated with {steps} increments, read with more, {mesh}, {len(some)} readings"
+            z = np.array([r.z for r in some])
+            yield Row(
+                f"z of the strain, rms: {what}", "1 if the errors are as told", 0.9, _rms(z), 0.4,
+                "0.5 to 1.3: the error of a body is one draw", "sensitivity", "absolute",
+            )  # fmt: skip
+            z_mu = np.array([r.z_mu for r in some if math.isfinite(r.z_mu)])
+            if len(z_mu) > 10:
+                yield Row(
+                    f"z of mu, rms: {what}, {len(z_mu)} of which tell mu", "1 if the errors are as told", 0.9,
+                    _rms(z_mu), 0.4, "0.5 to 1.3, as above", "sensitivity", "absolute",
+                )  # fmt: skip
+            share = float(np.mean([r.inside for r in some]))
+            yield Row(
+                f"share of 68 % sets that hold the true mu: {what}", "erf(1/sqrt 2)", 0.683, share, 0.0,
+                "errors of one sign are told by their size, so more than 68 % may hold", "statement", "at least",
+            )  # fmt: skip
+            worst = float(np.abs([r.z_without for r in some]).max())
+            yield Row(
+                f"largest z of the strain without the tolerance of the increments: {what}", "no reference", 3.0, worst,
+                0.0, "a reading off by more than three standard deviations", "statement", "at least",
+            )  # fmt: skip
+
+
+def _rms(z: Float) -> float:
+    return float(np.sqrt(np.mean(z**2)))
+
+
+def _extrapolated(bare: dict[tuple[float, float, int], Float], nu: float, size: float) -> list[Row]:
+    """What extrapolation in 1/N leaves of the error, over what the finer of its two levels leaves; true: 640."""
+    mus = np.linspace(0.3, 1.2, 10)
+    strains = {n: _pressed(nu, size, n, mus) for n in (*LEVELS, 640)}
+    true, rows = strains[640], []
+    for a, b in zip(LEVELS, LEVELS[1:], strict=False):
+        plain, better = (_rms((s - true).ravel()) for s in (strains[b], 2.0 * strains[b] - strains[a]))
+        rows.append(
+            Row(
+                f"error of strain extrapolated from {a} and {b} increments, over that of {b}", "no reference", 1.0,
+                better / plain, 0.0, "below 1 it helps", "statement", "at most",
+            )
+        )  # fmt: skip
+    told = np.array([error_left({n: strains[n].ravel() for n in (b // 4, b // 2, b)}, b) for b in (40, 80, 160)])
+    off = np.array([np.abs(strains[b] - true).ravel() for b in (40, 80, 160)])
+    big = off > 0.1 * NOISE
+    rows.append(
+        Row(
+            "share of strains off by more than a tenth of the noise that are within twice the error told",
+            "no reference", 0.9, float(np.mean(off[big] <= 2.0 * told[big])), 0.0, "nine in ten", "statement",
+            "at least",
+        )
+    )  # fmt: skip
+    return rows
+
+
+def _draw(figure: Any, found: list[Reading]) -> None:
+    figure.set_size_inches(12.0, 4.6)
+    left, right = figure.subplots(1, 2)
+    cases = list(dict.fromkeys((r.steps, r.mesh) for r in found))
+    for k, (steps, mesh) in enumerate(cases):
+        some = [r for r in found if (r.steps, r.mesh) == (steps, mesh)]
+        where = k + np.random.default_rng(k).uniform(-0.3, 0.3, len(some))
+        left.semilogy(where, np.abs([r.z_without for r in some]), ".", ms=3, color="#bbbbbb")
+        left.semilogy(where, np.abs([r.z for r in some]), ".", ms=3, color="#2166ac")
+        right.plot([r.mu for r in some], [r.z for r in some], ".", ms=4, label=f"{steps}, {mesh}")
+    left.set(xticks=range(len(cases)), ylabel="|z| of the strain", ylim=(1e-2, None))
+    left.set_xticklabels([f"{s}\n{m}" for s, m in cases], fontsize=8)
+    left.set_title("blue: as told; grey: without the error of the increments")
+    right.axhspan(-1.0, 1.0, color="#dddddd", lw=0)
+    right.set(xlabel="true mu", ylabel="z of the strain", title="increments calibrated with, and mesh")
+    right.legend(fontsize=7, frameon=False)
