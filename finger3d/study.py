@@ -18,6 +18,7 @@ import time
 import types
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any, Literal
 
@@ -31,9 +32,13 @@ Kind = Literal["verification", "validation", "sensitivity", "statement"]
 Measure = Literal["relative", "absolute", "at most", "at least"]
 
 _COLUMNS = ("what", "kind", "reference", "wanted", "got", "measure", "error", "tolerance", "reason", "verdict")
-_SHAPING = "contact design effects fem objects triangles".split()
-_SHAPING += "history.py increments.py kinematics.py mesh.py model.py problem.py solve.py".split()
-"""What of the package shapes the numbers of a study: a change there makes its results old."""
+_NO_NUMBERS = ("cli/*", "page/*", "show/*", "*/picture.py")
+_NO_NUMBERS += tuple(f"{name}.py" for name in "__main__ camera drawing lazy marks notebook outlines panels".split())
+_NO_NUMBERS += ("render.py", "report.py", "view.py")
+"""Files of the package that only draw, write pages, report progress or parse commands. A change of any other one makes
+the results of all studies old."""
+
+_NUMBERS_AMONG_THEM = ("page/states.py",)
 
 
 @dataclass(frozen=True)
@@ -135,11 +140,22 @@ class Study:
     def stamp(self) -> str:
         """Hash of the sources that shape the study's numbers."""
         package = Path(__file__).resolve().parent
-        files = [p for name in _SHAPING for p in (package / name, *(package / name).rglob("*.py")) if p.is_file()]
+        folders = (package / "geometries", package.parent / "geometries")
+        scenes = [p for f in folders for suffix in ("py", "toml", "stl") for p in sorted(f.glob(f"*.{suffix}"))]
         digest = hashlib.sha256()
-        for path in [*sorted(files), *_with_helpers(self.path)]:
+        for path in [*sources(package), *scenes, *_with_helpers(self.path)]:
             digest.update(path.read_bytes())
         return digest.hexdigest()[:16]
+
+
+def sources(package: Path) -> list[Path]:
+    """Return the Python files of a package that can change a study's numbers: all but those that only draw or tell."""
+
+    def counts(path: Path) -> bool:
+        name = path.relative_to(package).as_posix()
+        return name in _NUMBERS_AMONG_THEM or not any(fnmatchcase(name, pattern) for pattern in _NO_NUMBERS)
+
+    return [path for path in sorted(package.rglob("*.py")) if counts(path) and "geometries" not in path.parts]
 
 
 def _with_helpers(path: Path) -> list[Path]:

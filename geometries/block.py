@@ -1,14 +1,14 @@
 """A block with a flat top. Runs alone: python geometries/block.py"""
 
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
-from annotated_types import Gt
 from numpy.typing import NDArray
 
 from finger3d.design.rules import check_dimensions
 from finger3d.design.section import Section, block_section
+from finger3d.ranges import Dimension
 
 
 @dataclass(frozen=True)
@@ -24,9 +24,9 @@ class Block:
 
     name: ClassVar[str] = "block"
 
-    half_length_mm: Annotated[float, Gt(0)]
-    height_mm: Annotated[float, Gt(0)]
-    width_mm: Annotated[float, Gt(0)]
+    half_length_mm: Dimension
+    height_mm: Dimension
+    width_mm: Dimension
 
     def __post_init__(self) -> None:
         check_dimensions(self)

@@ -1,14 +1,14 @@
 """The paper's Fig. 9 finger: a cylinder's top on straight walls. Runs alone: python geometries/clipped_cylinder.py"""
 
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
-from annotated_types import Ge, Gt
 from numpy.typing import NDArray
 
 from finger3d.design.rules import check_at_most, check_dimensions
 from finger3d.design.section import Section, cylinder_section
+from finger3d.ranges import Dimension, Zero
 
 
 @dataclass(frozen=True)
@@ -25,10 +25,10 @@ class ClippedCylinder:
 
     name: ClassVar[str] = "clipped_cylinder"
 
-    radius_mm: Annotated[float, Gt(0)]
-    half_length_mm: Annotated[float, Gt(0)]
-    edge_height_mm: Annotated[float, Ge(0)]
-    width_mm: Annotated[float, Gt(0)]
+    radius_mm: Dimension
+    half_length_mm: Dimension
+    edge_height_mm: Zero | Dimension
+    width_mm: Dimension
 
     def __post_init__(self) -> None:
         check_dimensions(self, zero_allowed=("edge_height_mm",))

@@ -1,14 +1,14 @@
 """The paper's R = 5 finger: half a cylinder on its flat side. Runs alone: python geometries/half_cylinder.py"""
 
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
-from annotated_types import Gt
 from numpy.typing import NDArray
 
 from finger3d.design.rules import check_dimensions
 from finger3d.design.section import Section, cylinder_section
+from finger3d.ranges import Dimension
 
 
 @dataclass(frozen=True)
@@ -23,8 +23,8 @@ class HalfCylinder:
 
     name: ClassVar[str] = "half_cylinder"
 
-    radius_mm: Annotated[float, Gt(0)]
-    width_mm: Annotated[float, Gt(0)]
+    radius_mm: Dimension
+    width_mm: Dimension
 
     def __post_init__(self) -> None:
         check_dimensions(self)

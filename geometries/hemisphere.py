@@ -2,13 +2,13 @@
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
-from annotated_types import Gt
 from numpy.typing import NDArray
 
 from finger3d.design.rules import check_dimensions
+from finger3d.ranges import Dimension
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Hemisphere:
 
     name: ClassVar[str] = "hemisphere"
 
-    radius_mm: Annotated[float, Gt(0)]
+    radius_mm: Dimension
 
     def __post_init__(self) -> None:
         check_dimensions(self)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 import pytest
@@ -106,6 +107,36 @@ def test_a_changed_helper_makes_those_old_that_use_it(folder: Path) -> None:
     before = {name: known[name].stamp() for name in known}
     (folder / "_shared.py").write_text("VALUE = 1.4\n")
     assert {name for name in known if known[name].stamp() != before[name]} == {"good"}
+
+
+PACKAGE = Path(study.__file__).parent
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "accuracy.py", "refine.py", "reduced.py", "forecast.py", "export.py", "study.py", "sensor/curve.py",
+        "search/run.py", "compare/cases.py", "scene/tables.py", "sweep/work.py", "page/states.py", "__init__.py",
+        "contact/newton.py", "fem/condense.py", "solve.py", "family.py", "effects/viscosity.py", "design/report.py",
+    ],
+)  # fmt: skip
+def test_what_shapes_numbers_makes_results_old(name: str) -> None:
+    assert PACKAGE / name in study.sources(PACKAGE)
+
+
+def test_a_new_module_counts_unless_it_is_left_out_by_name(tmp_path: Path) -> None:
+    for name in ("thermal.py", "sub/solver.py", "cli/press.py", "page/press.py", "page/states.py", "view.py",
+                 "sensor/picture.py"):  # fmt: skip
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text("")
+    found = {str(p.relative_to(tmp_path)) for p in study.sources(tmp_path)}
+    assert found == {"thermal.py", "sub/solver.py", "page/states.py"}
+
+
+def test_every_exclusion_is_there() -> None:
+    left_out = set(PACKAGE.rglob("*.py")) - set(study.sources(PACKAGE))
+    for pattern in study._NO_NUMBERS:
+        assert any(fnmatchcase(path.relative_to(PACKAGE).as_posix(), pattern) for path in left_out), pattern
 
 
 def test_an_interruption_keeps_the_studies_that_are_done(folder: Path) -> None:

@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from finger3d.errors import Finger3dError
+from finger3d.ranges import at_most
 from finger3d.versions import memory_bytes
 
 MAX_TETS = 1_000_000
@@ -38,7 +39,8 @@ def check_sizes(design: Any, options: Any, dim: int) -> None:
     name = min(extents, key=lambda k: extents[k])
     if size > extents[name]:
         raise Finger3dError(
-            f"mesh.size_mm = {size:g} is larger than the finger; allowed: at most its {name}, {extents[name]:g} mm"
+            f"mesh.size_mm = {size:g} is larger than the finger; allowed: at most its {name}, "
+            f"{at_most(extents[name])} mm"
         )
 
 

@@ -7,8 +7,7 @@ import math
 from typing import Any
 
 from finger3d.errors import Finger3dError
-
-SMALLEST_MM, LARGEST_MM = 1e-2, 1e4
+from finger3d.ranges import LARGEST_MM, SMALLEST_MM
 
 
 def check_dimensions(design: Any, *, zero_allowed: tuple[str, ...] = ()) -> None:

@@ -11,11 +11,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from annotated_types import Ge, Gt, Le
 from numpy.typing import NDArray
 
 from finger3d.design import designs, mesh_section, mesh_solid
@@ -28,6 +27,7 @@ from finger3d.mesh import Mesh, reflected
 from finger3d.model import MeshOptions, Model
 from finger3d.objects import Cylinder, MeshObject, Plane, Sphere
 from finger3d.problem import Problem
+from finger3d.ranges import Length, Modulus, Poisson
 
 Float = NDArray[np.float64]
 Zone = tuple[float, float, float, float]
@@ -232,9 +232,9 @@ class Effect:
     height_mm : thickness of the block behind a plane, wedge or wave; the finger's height unless given
     """
 
-    E_MPa: Annotated[float, Gt(0.0)]
-    nu: Annotated[float, Ge(0.0), Le(0.5)]
-    height_mm: Annotated[float, Gt(0.0)] | None = None
+    E_MPa: Modulus
+    nu: Poisson
+    height_mm: Length | None = None
 
     def apply(self, model: Model) -> Model:
         """Fill the slot of the object's compliance."""

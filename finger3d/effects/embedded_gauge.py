@@ -15,11 +15,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Annotated
 
 import numpy as np
 import scipy.sparse as sp
-from annotated_types import Gt
 from numpy.typing import NDArray
 
 from finger3d.effects.base import fill
@@ -29,10 +27,10 @@ from finger3d.fem.surface import displacement_row
 from finger3d.mesh import Mesh
 from finger3d.model import Gauge, Inlay, Model
 from finger3d.problem import folded
+from finger3d.ranges import Length, Modulus, at_most
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
-Positive = Annotated[float, Gt(0)]
 
 _PATCHES = {2: (16, 1), 3: (12, 8)}  # along and across, by dimension: within half a percent of any number
 _SAME = 1e-9  # mm, and radians
@@ -131,9 +129,9 @@ class Effect:
     thickness_mm, width_mm : its section
     """
 
-    E_MPa: Positive
-    thickness_mm: Positive
-    width_mm: Positive
+    E_MPa: Modulus
+    thickness_mm: Length
+    width_mm: Length
 
     def apply(self, model: Model) -> Model:
         """Fill the inclusions slot; every gauge must be a foil that fits."""
@@ -153,7 +151,7 @@ class Effect:
             if 0.5 * self.width_mm > room:
                 raise Finger3dError(
                     f'{here}.width_mm = {self.width_mm}: gauge "{gauge.name}" would stick out of the finger; '
-                    f"must be at most {2.0 * room:.6g} there"
+                    f"must be at most {at_most(2.0 * room)} there"
                 )
         if self.thickness_mm > model.mesh.size_mm:
             raise Finger3dError(

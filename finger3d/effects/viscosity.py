@@ -20,7 +20,7 @@ from typing import Annotated, Any, ClassVar, Protocol
 
 import numpy as np
 import scipy.sparse as sp
-from annotated_types import Gt, MinLen
+from annotated_types import MinLen
 from numpy.typing import NDArray
 from scipy.special import exprel
 
@@ -33,9 +33,9 @@ from finger3d.fem.recover import across, displacement, nodal_strain, pressure, s
 from finger3d.kinematics import RULES, SmallStrain, length_scale
 from finger3d.model import Model
 from finger3d.problem import at_points
+from finger3d.ranges import Fraction, Seconds
 
 Float = NDArray[np.float64]
-Positive = Annotated[float, Gt(0)]
 Prony = tuple[tuple[float, float], ...]
 
 
@@ -379,7 +379,7 @@ class Effect:
     bulk : whether the bulk modulus relaxes too, so that nu is constant; else only the shear modulus does
     """
 
-    prony: Annotated[tuple[tuple[Positive, Positive], ...], MinLen(1)]
+    prony: Annotated[tuple[tuple[Fraction, Seconds], ...], MinLen(1)]
     bulk: bool = True
 
     def __post_init__(self) -> None:

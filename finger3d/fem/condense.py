@@ -6,6 +6,8 @@ no MKL, SuperLU factors K and solves for every row, behind the same interface.
 
 from __future__ import annotations
 
+import itertools
+import math
 import os
 import time
 from collections.abc import Callable
@@ -97,16 +99,37 @@ def condense(
     keep[fixed] = False
     free = np.flatnonzero(keep)
     padded = sp.csr_matrix((rows.data, rows.indices, rows.indptr), shape=(rows.shape[0], size))
+    # PARDISO perturbs pivots below 1e-13 of the largest entry of [[K, R^T], [R, 0]]: K and every row of R are scaled to
+    # entries of order 1, by powers of two, so that neither the modulus nor the unit of a row changes a digit.
+    unit, units = _power_of_two(upper.data), _row_scales(padded)
+    scaled = sp.csr_matrix((upper.data / unit, upper.indices, upper.indptr), shape=upper.shape)
+    read = sp.csr_matrix((padded.data / np.repeat(units, np.diff(padded.indptr)), padded.indices, padded.indptr),
+                         shape=padded.shape)  # fmt: skip
     series: _Series | None = None
-    solve: Callable[[Float], Float]
+    factor_solve: Callable[[Float], Float]
     if solver == "pardiso":
-        series = _Series.of(upper, free, padded, spent._series if spent else None)
-        compliance, perturbed, solve = -series.factor.schur, series.factor.perturbed, series.solve
+        series = _Series.of(scaled, free, read, spent._series if spent else None)
+        compliance, perturbed, factor_solve = -series.factor.schur, series.factor.perturbed, series.solve
     else:
-        compliance, perturbed, solve = _superlu(upper[free][:, free], padded[:, free].tocsr())
-    compliance = 0.5 * (compliance + compliance.T)
+        compliance, perturbed, factor_solve = _superlu(scaled[free][:, free], read[:, free].tocsr())
+    compliance = units[:, None] * (0.5 / unit * (compliance + compliance.T)) * units
+
+    def solve(load: Float) -> Float:
+        return factor_solve(load) / unit
+
     seconds = time.perf_counter() - start
     return Condensed(compliance, perturbed, 1, seconds, solver, padded, free, solve, series)
+
+
+def _power_of_two(values: Float) -> float:
+    """Power of two next to the largest magnitude of `values`; 1 if there is none."""
+    largest = float(np.abs(values).max(initial=0.0))
+    return 2.0 ** round(math.log2(largest)) if 0.0 < largest < math.inf else 1.0
+
+
+def _row_scales(rows: sp.csr_matrix) -> Float:
+    """Power of two (r,) next to the largest magnitude in every row of a sparse matrix."""
+    return np.array([_power_of_two(rows.data[a:b]) for a, b in itertools.pairwise(rows.indptr)])
 
 
 def spring_forces(compliance: Float, springs: Float, moved: Float) -> Float:

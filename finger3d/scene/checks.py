@@ -10,6 +10,7 @@ import numpy as np
 
 from finger3d.model import MeshOptions, Model
 from finger3d.objects import Plane, Wave
+from finger3d.ranges import LONGEST_SLIDE, at_least, at_most
 from finger3d.scene.mistakes import dotted, shown
 from finger3d.scene.tables import GaugeTable, LegTable, MeshTable, SceneTable
 
@@ -31,7 +32,7 @@ def check(tables: SceneTable, legs: tuple[LegTable, ...], design: Any) -> list[s
             lines.append(f'model.domain = {shown(tables.model.domain)}: {lacks}; must be "solid"')
         if tables.mesh.mesher == "swept":
             lines.append(f'mesh.mesher = "swept": {lacks}; must be "ftetwild"')
-    lines += _legs(tables.press, legs, design.height_mm, solid)
+    lines += _legs(tables.press, legs, design, solid)
     lines += _sizes(tables.mesh, design, solid)
     twice = [name for name, n in Counter(g.name for g in tables.gauge).items() if n > 1]
     lines += [f"gauge.name = {shown(name)}: used more than once; every gauge needs its own name" for name in twice]
@@ -40,17 +41,25 @@ def check(tables: SceneTable, legs: tuple[LegTable, ...], design: Any) -> list[s
     return lines
 
 
-def _legs(press: dict[str, Any], legs: tuple[LegTable, ...], height: float, solid: bool) -> list[str]:
+def _legs(press: dict[str, Any], legs: tuple[LegTable, ...], design: Any, solid: bool) -> list[str]:
     lines = []
+    height, half_length = design.height_mm, design.half_length_mm
     for i, leg in enumerate(legs):
         at = ("press", "leg", i) if "leg" in press else ("press",)
-        allowed = f"a number above 0 and below the finger's height of {height:.6g} mm"
+        allowed = f"a number above 0 and below the finger's height of {at_most(height)} mm"
         if i > 0 and _target(leg) == _target(legs[i - 1]) and leg.duration_s is None:
             lines.append(f"{dotted(at)}: goes nowhere, its depth and slide are those of the leg before; take it out")
         if i == 0 and leg.depth_mm == 0.0 and (leg.slide_x_mm or leg.slide_z_mm):
             lines.append(f"{dotted(at)}: slides before first touch; give the first leg a depth_mm above 0")
         elif leg.depth_mm >= height or (i == 0 and leg.depth_mm == 0.0):
             lines.append(f"{dotted((*at, 'depth_mm'))} = {shown(leg.depth_mm)}: must be {allowed}")
+        for key in ("slide_x_mm", "slide_z_mm"):
+            far = LONGEST_SLIDE * half_length
+            if abs(value := getattr(leg, key)) > far:
+                lines.append(
+                    f"{dotted((*at, key))} = {shown(value)}: must be a number from -{at_most(far)} to {at_most(far)}, "
+                    f"{LONGEST_SLIDE:g} times the finger's half length"
+                )
         if not solid and leg.slide_z_mm != 0.0:
             lines.append(f"{dotted((*at, 'slide_z_mm'))} = {shown(leg.slide_z_mm)}: must be 0.0 in a 2D domain")
     return lines
@@ -77,19 +86,17 @@ def _sizes(mesh: MeshTable, design: Any, solid: bool) -> list[str]:
             ]
     if mesh.max_seconds is not None and mesh.tolerance is None:
         return [f"mesh.max_seconds = {shown(mesh.max_seconds)}: only with mesh.tolerance, whose refining it ends"]
-    if mesh.tolerance is not None and mesh.tolerance >= 1.0:
-        return [f"mesh.tolerance = {shown(mesh.tolerance)}: must be a number above 0 and below 1 (0.01 is 1 %)"]
     extent = smallest_mm(design, solid)
     section = smallest_mm(design, solid=False)
     if mesh.size_mm is not None and mesh.size_mm > extent:
         return [
-            f"mesh.size_mm = {shown(mesh.size_mm)}: larger than the finger; must be at most {extent:.6g}, "
+            f"mesh.size_mm = {shown(mesh.size_mm)}: larger than the finger; must be at most {at_most(extent)}, "
             "its smallest extent"
         ]
     if mesh.base_size_mm is not None and mesh.base_size_mm > section:
         return [
-            f"mesh.base_size_mm = {shown(mesh.base_size_mm)}: larger than the finger; must be at most {section:.6g}, "
-            "its smallest extent in the section"
+            f"mesh.base_size_mm = {shown(mesh.base_size_mm)}: larger than the finger; must be at most "
+            f"{at_most(section)}, its smallest extent in the section"
         ]
     if mesh.size_mm and mesh.base_size_mm and mesh.base_size_mm < mesh.size_mm:
         return [
@@ -139,7 +146,7 @@ def _gauge(index: int, gauge: GaugeTable, design: Any) -> list[str]:
         if not low <= value <= high:
             return [
                 f"{dotted((*at, key))} = {shown(value)}: gauge {shown(gauge.name)} is outside the finger; "
-                f"must be a number from {low:.6g} to {high:.6g}"
+                f"must be a number from {at_least(low)} to {at_most(high)}"
             ]
     along = np.array([-0.5, 0.5]) * gauge.length_mm if gauge.length_mm else np.zeros(1)
     x = gauge.x_mm + along * math.cos(math.radians(gauge.angle_deg))
@@ -160,6 +167,6 @@ def _gauge(index: int, gauge: GaugeTable, design: Any) -> list[str]:
             ]
         return [
             f"{dotted((*at, 'y_mm'))} = {shown(gauge.y_mm)}: gauge {shown(gauge.name)} is outside the finger; "
-            f"must be a number from 0 to {here:.6g} at x_mm = {shown(gauge.x_mm)}"
+            f"must be a number from 0 to {at_most(here)} at x_mm = {shown(gauge.x_mm)}"
         ]
     return []

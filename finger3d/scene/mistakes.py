@@ -13,6 +13,7 @@ from typing import Annotated, Any
 import annotated_types as at
 from pydantic import ValidationError
 
+from finger3d.ranges import Zero, number
 from finger3d.scene.tables import Table
 
 Place = tuple[str | int, ...]
@@ -77,13 +78,13 @@ def _bounds(metadata: Iterable[Any]) -> str:
     low = high = ""
     for m in metadata:
         if isinstance(m, at.Gt):
-            low = f"above {m.gt}"
+            low = f"above {_number(m.gt)}"
         elif isinstance(m, at.Ge):
-            low = f"from {m.ge} up"
+            low = f"from {_number(m.ge)} up"
         elif isinstance(m, at.Lt):
-            high = f"below {m.lt}"
+            high = f"below {_number(m.lt)}"
         elif isinstance(m, at.Le):
-            high = f"at most {m.le}"
+            high = f"at most {_number(m.le)}"
         elif isinstance(m, at.Interval):
             return _bounds(iter(m))
         elif isinstance(m, at.MinLen):
@@ -94,11 +95,26 @@ def _bounds(metadata: Iterable[Any]) -> str:
     return "".join(f" {b}" for b in (" and ".join(t for t in (low, high) if t),) if b)
 
 
+def _number(value: Any) -> str:
+    return number(value) if isinstance(value, int | float) else str(value)
+
+
+def _text(metadata: Sequence[Any]) -> str:
+    """Say what a text with bounds on its length, and perhaps of one line, may be."""
+    lines = "one line of printable text" if any(isinstance(m, at.Predicate) for m in metadata) else "a text"
+    longest = next((f", of at most {m.max_length} characters" for m in metadata if isinstance(m, at.MaxLen)), "")
+    return lines + (", not empty" if any(isinstance(m, at.MinLen) for m in metadata) else "") + longest
+
+
 def described(hint: Any) -> str:
     """Say in words what a type with bounds allows, for instance ``a number from 0 to 0.5``."""
     origin = typing.get_origin(hint)
+    if hint == Zero:
+        return "0"
     if origin is Annotated:
         kind, *metadata = typing.get_args(hint)
+        if kind is str:
+            return _text(metadata)
         return described(kind) + _bounds(metadata)
     if origin is typing.Literal:
         return listed(str(a) for a in typing.get_args(hint))

@@ -5,18 +5,34 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
+import types
 import typing
 from typing import Annotated, Any, Literal
 
-from annotated_types import Ge, Gt, Le, Lt, MinLen
+from annotated_types import Ge, Gt, Interval, Le, Lt, MinLen
 from pydantic import BaseModel, ConfigDict, create_model
 
 from finger3d.model import Domain
 from finger3d.objects import Axis, Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
+from finger3d.ranges import (
+    Angle,
+    Count,
+    Edge,
+    Friction,
+    Length,
+    Modulus,
+    Name,
+    PathName,
+    Place,
+    Poisson,
+    Scale,
+    Seconds,
+    Zero,
+)
 
-Positive = Annotated[float, Gt(0)]
-NotNegative = Annotated[float, Ge(0)]
-Steps = Annotated[int, Ge(1)] | Literal["auto"]
+Steps = Count | Literal["auto"]
+LARGEST = 1e12
+"""Largest magnitude of a number of a design or an effect that states no bound of its own."""
 
 
 class Table(BaseModel):
@@ -34,8 +50,8 @@ class MaterialTable(Table):
     nu : Poisson's ratio, 0.5 included; the paper gives none
     """
 
-    E_MPa: Positive
-    nu: Annotated[float, Ge(0), Le(0.5)]
+    E_MPa: Modulus
+    nu: Poisson
 
 
 class FrictionTable(Table):
@@ -46,7 +62,7 @@ class FrictionTable(Table):
     mu : friction coefficient; with kinetic_friction the static one
     """
 
-    mu: NotNegative
+    mu: Friction
 
 
 class LegTable(Table):
@@ -60,17 +76,17 @@ class LegTable(Table):
     duration_s : read only with viscosity
     """
 
-    depth_mm: NotNegative
-    slide_x_mm: float = 0.0
-    slide_z_mm: float = 0.0
+    depth_mm: Zero | Length
+    slide_x_mm: Place = 0.0
+    slide_z_mm: Place = 0.0
     steps: Steps = 10
-    duration_s: Positive | None = None
+    duration_s: Seconds | None = None
 
 
 class PressTable(LegTable):
     """[press] that stands for one leg."""
 
-    depth_mm: Positive
+    depth_mm: Length
 
 
 class LegsTable(Table):
@@ -113,11 +129,11 @@ class MeshTable(Table):
     max_seconds : with tolerance: stop refining then, with the best so far
     """
 
-    size_mm: Positive | None = None
-    base_size_mm: Positive | None = None
+    size_mm: Edge | None = None
+    base_size_mm: Edge | None = None
     mesher: Literal["ftetwild", "swept"] = "ftetwild"
-    tolerance: Positive | None = None
-    max_seconds: Positive | None = None
+    tolerance: Annotated[float, Ge(1e-6), Lt(1)] | None = None
+    max_seconds: Annotated[float, Ge(1e-3), Le(1e7)] | None = None
 
 
 class GaugeTable(Table):
@@ -131,18 +147,18 @@ class GaugeTable(Table):
     length_mm : above 0: the mean over that length
     """
 
-    name: Annotated[str, MinLen(1)]
-    x_mm: float
-    y_mm: float
-    z_mm: float = 0.0
-    angle_deg: float = 0.0
-    length_mm: NotNegative = 0.0
+    name: Name
+    x_mm: Place
+    y_mm: Place
+    z_mm: Place = 0.0
+    angle_deg: Angle = 0.0
+    length_mm: Zero | Length = 0.0
 
 
 class SceneTable(Table):
     """The whole file. Tables whose keys depend on a name are checked afterwards, against that name's own table."""
 
-    title: str | None = None
+    title: Name | None = None
     finger: dict[str, Any]
     material: MaterialTable
     object: dict[str, Any] | None = None
@@ -163,8 +179,8 @@ class ObjectTable(Table):
     x_mm, z_mm : where the object's lowest point is
     """
 
-    x_mm: float = 0.0
-    z_mm: float = 0.0
+    x_mm: Place = 0.0
+    z_mm: Place = 0.0
 
     def build(self) -> RigidObject:
         """Return the object, angles in radians; every shape says how."""
@@ -195,7 +211,7 @@ class CylinderTable(ObjectTable):
     axis : direction of the cylinder's line
     """
 
-    radius_mm: Positive
+    radius_mm: Length
     axis: Axis = "z"
 
     def build(self) -> RigidObject:
@@ -211,7 +227,7 @@ class SphereTable(ObjectTable):
     radius_mm : radius
     """
 
-    radius_mm: Positive
+    radius_mm: Length
 
     def build(self) -> RigidObject:
         """Return the sphere."""
@@ -229,7 +245,7 @@ class WedgeTable(ObjectTable):
     """
 
     angle_deg: Annotated[float, Gt(0), Lt(90)]
-    tip_radius_mm: NotNegative = 0.0
+    tip_radius_mm: Zero | Length = 0.0
     axis: Axis = "z"
 
     def build(self) -> RigidObject:
@@ -248,8 +264,8 @@ class WaveTable(ObjectTable):
     axis : direction of the crests
     """
 
-    wavelength_mm: Positive
-    amplitude_mm: NotNegative
+    wavelength_mm: Length
+    amplitude_mm: Zero | Length
     axis: Axis = "z"
 
     def build(self) -> RigidObject:
@@ -268,8 +284,8 @@ class MeshObjectTable(ObjectTable):
     scale : what its lengths are multiplied with, to be mm
     """
 
-    path: Annotated[str, MinLen(1)]
-    scale: Positive = 1.0
+    path: PathName
+    scale: Scale = 1.0
 
     def build(self) -> RigidObject:
         """Return the object; reads and checks its file."""
@@ -300,5 +316,20 @@ def table_of(record: type) -> type[Table]:
     fields: dict[str, Any] = {}
     for f in dataclasses.fields(record):
         default = f.default if f.default_factory is dataclasses.MISSING else f.default_factory()
-        fields[f.name] = (hints[f.name], ... if default is dataclasses.MISSING else default)
+        fields[f.name] = (_bounded(hints[f.name]), ... if default is dataclasses.MISSING else default)
     return create_model(record.__name__, __base__=Table, **fields)
+
+
+def _bounded(hint: Any) -> Any:
+    """Add bounds to a number whose type has none, so that no key of a design or an effect takes 1e300."""
+    origin = typing.get_origin(hint)
+    kind, *metadata = typing.get_args(hint) if origin is Annotated else (hint,)
+    if origin in (typing.Union, types.UnionType):
+        return typing.Union[tuple(_bounded(a) for a in typing.get_args(hint))]  # noqa: UP007
+    if kind not in (float, int):
+        return hint
+    if not any(isinstance(m, Ge | Gt | Interval) for m in metadata):
+        metadata.append(Ge(-LARGEST))
+    if not any(isinstance(m, Le | Lt | Interval) for m in metadata):
+        metadata.append(Le(LARGEST))
+    return Annotated[kind, *metadata]
