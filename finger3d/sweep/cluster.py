@@ -133,7 +133,10 @@ def remote(address: str) -> Iterator[Any]:
     except (OSError, TimeoutError, ImportError):
         raise silent from None
     with client:
-        _ready(client, address)
+        try:
+            _ready(client, address)
+        except OSError:
+            raise silent from None
         yield client
 
 
