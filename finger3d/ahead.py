@@ -12,11 +12,10 @@ import subprocess
 import sys
 from contextlib import suppress
 from dataclasses import replace
-from tempfile import TemporaryDirectory
 from typing import Self
 
 from finger3d.accuracy import companions
-from finger3d.children import child_environment
+from finger3d.children import child_environment, end_with
 from finger3d.model import Model
 from finger3d.scene import Scene, parse, tree
 from finger3d.solve import build, contact_zone, symmetry
@@ -38,16 +37,14 @@ class Ahead:
     def __init__(self, scene: Scene | None) -> None:
         self._scene = scene
         self._child: subprocess.Popen[bytes] | None = None
-        self._litter: TemporaryDirectory[str] | None = None
 
     def __enter__(self) -> Self:
         if self._scene is None or self._scene.tables.mesh.tolerance is not None or not _takes_long(self._scene.model()):
             return self
-        self._litter = TemporaryDirectory(prefix="finger3d_")
         # a session of its own, so that all of it can be ended: pytetwild runs in a child of the child
         self._child = subprocess.Popen(
-            [sys.executable, "-P", "-m", __name__], env={**child_environment(), "TMPDIR": self._litter.name},
-            stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
+            [sys.executable, "-P", "-m", __name__, str(os.getpid())], env=child_environment(), stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
         )  # fmt: skip
         assert self._child.stdin is not None
         with suppress(BrokenPipeError), self._child.stdin as stream:
@@ -64,8 +61,6 @@ class Ahead:
             with suppress(ProcessLookupError):
                 os.killpg(self._child.pid, signal.SIGKILL)
             self._child.wait()
-        if self._litter is not None:
-            self._litter.cleanup()
 
 
 def _takes_long(model: Model) -> bool:
@@ -91,4 +86,5 @@ def _expected(model: Model) -> Model:
 
 
 if __name__ == "__main__":
+    end_with(int(sys.argv[1]))
     build(_expected(parse(pickle.load(sys.stdin.buffer)).model()))

@@ -7,6 +7,8 @@ import json
 import math
 import os
 import secrets
+import zipfile
+import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from enum import Enum
@@ -109,6 +111,30 @@ def claimed(folder: str | Path, command: str = "") -> Iterator[Path]:
                 for folder in made:
                     folder.rmdir()
         lock.release()
+
+
+_DAMAGED = (
+    ValueError, TypeError, KeyError, AttributeError, EOFError, MemoryError, NotImplementedError, OverflowError,
+    RuntimeError, SyntaxError, zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
+"""What NumPy raises for an .npz file that is cut short, changed, or of another kind."""
+
+
+def read_arrays(path: str | Path) -> dict[str, NDArray[Any]]:
+    """Read all arrays of an .npz file.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read.
+    ValueError
+        If it is damaged.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            return {name: stored[name] for name in stored.files}
+    except _DAMAGED as error:
+        raise ValueError(f"no .npz file, or damaged: {error}") from error
 
 
 def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> None:

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import json
 import math
-import zipfile
-import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
@@ -23,7 +21,7 @@ from numpy.typing import NDArray
 from finger3d.contact.law import Coulomb, FrictionLaw
 from finger3d.design import MeshReport
 from finger3d.errors import Finger3dError
-from finger3d.export import atomic
+from finger3d.export import atomic, read_arrays
 from finger3d.fem.assembly import Elasticity, Stiffness
 from finger3d.fem.condense import Condensed as Factored
 from finger3d.fem.surface import Surface, restrict, surface
@@ -40,6 +38,7 @@ Float = NDArray[np.float64]
 FORMAT, VERSION = "finger3d condensed body", 2
 _SHAPES: dict[str, type] = {kind.__name__: kind for kind in (Plane, Cylinder, Sphere, Wedge, Wave, MeshObject)}
 _PATH = ("depth_mm", "slide_x_mm", "slide_z_mm")
+_STEPS = 1_000_000  # increments of a leg that a file may ask for
 _ENOUGH = 0.5 * MARGIN  # of the depth: candidates reach to a rigid gap of MARGIN; half of that must be left
 
 
@@ -194,12 +193,11 @@ class Condensed:
             In one line, if the file is not there, of another kind or version, or damaged.
         """
         try:
-            with np.load(path, allow_pickle=False) as stored:
-                arrays = {name: stored[name] for name in stored.files}
+            arrays = read_arrays(path)
             header = json.loads(arrays["header"].tobytes())
         except FileNotFoundError:
             raise Finger3dError(f"{path}: there is no such file") from None
-        except (OSError, ValueError, KeyError, AttributeError, EOFError, zipfile.BadZipFile, zlib.error):
+        except (OSError, ValueError, KeyError, RecursionError):
             raise Finger3dError(f"{path}: no condensed body, or cut short; condense the scene again") from None
         if not isinstance(header, dict) or header.get("format") != FORMAT:
             raise Finger3dError(f"{path}: no condensed body; `finger3d calibrate` writes one, reduced.npz")
@@ -210,10 +208,13 @@ class Condensed:
         try:
             model = _model(header, arrays)
             axes = tuple(header["axes"])
+            _check_arrays(arrays, 2 if model.domain != "solid" else 3, len(model.gauges))
             problem = _assembled(model, arrays, float(header["touch_mm"]), axes)
             return cls(problem, _face("other", arrays, problem.dim), header["about"])
-        except (KeyError, TypeError, ValueError, IndexError):
-            raise Finger3dError(f"{path}: parts of the condensed body are missing; condense the scene again") from None
+        except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError):
+            raise Finger3dError(
+                f"{path}: parts of the condensed body are missing or do not fit; condense the scene again"
+            ) from None
 
 
 def friction_at(law: FrictionLaw, mu: float) -> FrictionLaw:
@@ -252,6 +253,7 @@ def _face(name: str, arrays: Mapping[str, Any], dim: int) -> Surface:
     samples, nodes = arrays[f"{name}_samples"].reshape(-1, dim), arrays[f"{name}_nodes"]
     parts = (arrays[f"{name}_mean"], arrays[f"{name}_mean_at"], arrays[f"{name}_mean_rows"])
     mean = sp.csr_matrix(parts, shape=(len(nodes), len(samples)))
+    mean.check_format(full_check=True)  # of a file: its indices must be in range
     points = arrays[f"{name}_points"].reshape(-1, dim)
     none = sp.csr_matrix((len(nodes), 0)), sp.csr_matrix((len(samples), 0))
     return Surface(nodes, points, arrays[f"{name}_area"], none[0], samples, mean, none[1])
@@ -334,13 +336,86 @@ def _model(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> Model:
 
         placed["surface"] = Triangles(arrays["object_points"], arrays["object_faces"])
     rubs = dict(header["friction"])
-    law: FrictionLaw = Coulomb(rubs["mu"]) if rubs["kind"] == "Coulomb" else _kinetic(
-        Coulomb(rubs["static"]), rubs["ratio"], rubs["branch"]
+    law: FrictionLaw = Coulomb(_number(rubs["mu"])) if rubs["kind"] == "Coulomb" else _kinetic(
+        Coulomb(_number(rubs["static"])), _number(rubs["ratio"]), rubs["branch"]
     )  # fmt: skip
+    if header["domain"] not in ("solid", "plane-strain", "plane-stress") or header["rule"] not in (
+        "projection", "paper",
+    ):  # fmt: skip
+        raise ValueError("domain or rule")
+    if not header["legs"] or not set(header["axes"]) <= {"x", "z"} or _number(header["touch_mm"]) <= 0.0:
+        raise ValueError("legs, axes or touch_mm")
+    body, material = _made(Body, header["body"]), _made(Material, header["material"])
+    legs = tuple(_made(Leg, leg) for leg in header["legs"])
+    if not (body.height_mm > 0.0 < body.width_mm and material.E_MPa > 0.0 <= material.nu <= 0.5):
+        raise ValueError("body or material")
+    if not all(0.0 <= leg.depth_mm <= 10.0 * body.height_mm for leg in legs):
+        raise ValueError("a depth")
     return Model(
-        Body(**header["body"]), Material(**header["material"]), MeshOptions(**header["mesh"]),
-        tuple(Leg(**leg) for leg in header["legs"]), _SHAPES[kind](**placed), law,
-        gauges=tuple(Gauge(**g) for g in header["gauges"]), domain=header["domain"], rule=header["rule"],
-        symmetry=tuple(header["axes"]), warnings=tuple(header["warnings"]),
-        filled=tuple((slot, effect) for slot, effect in header["filled"]),
+        body, material, _made(MeshOptions, header["mesh"]), legs, _made(_SHAPES[kind], placed), law,
+        gauges=tuple(_made(Gauge, g) for g in header["gauges"]), domain=header["domain"], rule=header["rule"],
+        symmetry=tuple(header["axes"]), warnings=tuple(map(str, header["warnings"])),
+        filled=tuple((str(slot), str(effect)) for slot, effect in header["filled"]),
     )  # fmt: skip
+
+
+def _number(value: Any) -> float:
+    """The value as a float.
+
+    Raises
+    ------
+    ValueError
+        If it is no finite number.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise ValueError(f"{value!r} is no finite number")
+    return float(value)
+
+
+def _made(kind: Any, values: Mapping[str, Any]) -> Any:
+    """A dataclass from the header, whose fields have the types that it declares.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If a field is missing, unknown, or of another type.
+    """
+    made = kind(**values)
+    for field in fields(kind):
+        value, declared = getattr(made, field.name), str(field.type)
+        if value is None and declared.endswith("| None"):
+            continue
+        if declared.startswith("float"):
+            _number(value)
+        elif declared.startswith("int") and value != "auto" and (type(value) is not int or not 1 <= value <= _STEPS):
+            raise ValueError(f"{field.name} is no number of increments")
+        elif declared == "str" and not isinstance(value, str):
+            raise ValueError(f"{field.name} is no text")
+        elif field.name == "axis" and value not in ("x", "z"):
+            raise ValueError("axis is neither x nor z")
+    return made
+
+
+def _check_arrays(arrays: Mapping[str, Any], d: int, gauges: int) -> None:
+    """Raise ValueError or KeyError unless types and shapes of all arrays fit together, and numbers are finite."""
+    c, p = len(arrays["face_nodes"]), len(arrays["nodes"])
+    wanted: dict[str, tuple[int, ...]] = {
+        "compliance": (c * d, c * d), "gauge_rows": (gauges, c * d), "parent": (p,), "sign": (p, d), "share": (p,),
+        "nodes": (p,), "points": (p, 3), "area": (p,), "band": (2,),
+    }  # fmt: skip
+    if "bare_compliance" in arrays:
+        wanted |= {"bare_compliance": (c * d, c * d), "bare_gauge_rows": (gauges, c * d)}
+    for face in ("face", "other"):
+        m, samples, entries = (len(arrays[f"{face}_{name}"]) for name in ("nodes", "samples", "mean"))
+        wanted |= {
+            f"{face}_nodes": (m,), f"{face}_points": (m, d), f"{face}_area": (m,), f"{face}_samples": (samples, d),
+            f"{face}_mean": (entries,), f"{face}_mean_at": (entries,), f"{face}_mean_rows": (m + 1,),
+        }  # fmt: skip
+    if not c:
+        raise ValueError("no contact points")
+    whole = ("nodes", "parent", "mean_at", "mean_rows")
+    for name, shape in wanted.items():
+        values = arrays[name]
+        kinds = "iu" if name.endswith(whole) else "f"
+        if values.shape != shape or values.dtype.kind not in kinds or not np.isfinite(values).all():
+            raise ValueError(f"{name} does not fit")

@@ -115,6 +115,7 @@ def reporter(stream: TextIO | None = None) -> Report:
     ----------
     stream : where to; standard output if it is not given
     """
-    terminal = (stream or sys.stdout).isatty()
-    interactive = terminal and os.environ.get("TERM") != "dumb" and not os.environ.get("CI")
+    target = stream or sys.stdout
+    unicode = (target.encoding or "utf-8").lower().startswith("utf")  # bar and spinner are no ASCII
+    interactive = target.isatty() and unicode and os.environ.get("TERM") != "dumb" and not os.environ.get("CI")
     return BarReport(stream) if interactive else PlainReport(stream)

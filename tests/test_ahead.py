@@ -77,7 +77,12 @@ def test_without_an_estimate_nothing_is_begun() -> None:
         assert beside._child is None
 
 
-def test_an_interruption_ends_the_child_and_leaves_no_litter(ball: Scene) -> None:
+def test_an_interruption_ends_the_child_and_leaves_no_litter(
+    ball: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    litter = tmp_path / "tmp"
+    litter.mkdir()
+    monkeypatch.setenv("TMPDIR", str(litter))
     begun: list[Ahead] = []
 
     def interrupted() -> None:
@@ -89,13 +94,12 @@ def test_an_interruption_ends_the_child_and_leaves_no_litter(ball: Scene) -> Non
 
     with pytest.raises(KeyboardInterrupt):
         interrupted()
-    child, litter = begun[0]._child, begun[0]._litter
+    child = begun[0]._child
     assert child is not None
-    assert litter is not None
     assert child.poll() is not None
     with pytest.raises(ProcessLookupError):  # nor any child of the child
         os.killpg(child.pid, 0)
-    assert not Path(litter.name).exists()
+    assert not list(litter.iterdir())
 
 
 def test_a_child_that_fails_leaves_the_mesh_to_the_estimate(

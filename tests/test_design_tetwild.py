@@ -1,8 +1,10 @@
 """pytetwild guarded: checks before and after, crash, time limit, attempts; grading; cache. Two small real meshes."""
 
 import math
+import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -288,6 +290,42 @@ def test_a_crash_of_the_child_is_told_by_its_return_code() -> None:
 def test_a_child_that_takes_too_long_is_ended() -> None:
     with pytest.raises(UnusableMeshError, match="did not finish within 0 s"):
         tetwild._child(CUBE, SIDES, fine(), 1e-3, 0.05)
+
+
+KILLED = """
+import numpy as np
+from types import SimpleNamespace
+from finger3d.design import designs, tetwild
+from finger3d.design.sizing import sizing
+from tests.test_design_tetwild import CUBE, SIDES
+low, high = np.array([-5.0, 0, -5]), np.array([5.0, 10, 5])
+options = SimpleNamespace(size_mm=0.3, base_size_mm=0.3)
+field = sizing(designs()["block"](5.0, 10.0, 10.0), options, (-5, 5, -5, 5), low, high)
+print("meshing", flush=True)
+tetwild._child(CUBE, SIDES, field, 1e-3, 60.0)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="relies on prctl and /proc")
+def test_the_child_ends_with_its_parent_and_leaves_no_folder(root: Path, tmp_path: Path) -> None:
+    env = {**os.environ, "TMPDIR": str(tmp_path), "PYTHONPATH": str(root)}
+    running = subprocess.Popen([sys.executable, "-c", KILLED], cwd=root, env=env, stdout=subprocess.PIPE)
+    assert running.stdout is not None
+    assert running.stdout.readline() == b"meshing\n"
+    children = Path(f"/proc/{running.pid}/task/{running.pid}/children")
+    end = time.monotonic() + 60.0
+    # it is at work once its working folder is a removed one in the temporary folder
+    while not (found := children.read_text().split()) or "(deleted)" not in os.readlink(f"/proc/{found[0]}/cwd"):
+        assert time.monotonic() < end
+        time.sleep(0.02)
+    assert str(tmp_path) in os.readlink(f"/proc/{found[0]}/cwd")
+    running.kill()
+    running.wait()
+    end = time.monotonic() + 5.0
+    while Path(f"/proc/{found[0]}").exists():
+        assert time.monotonic() < end, "the child goes on without its parent"
+        time.sleep(0.02)
+    assert not list(tmp_path.iterdir())
 
 
 def test_three_attempts_and_then_one_line(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

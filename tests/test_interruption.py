@@ -10,6 +10,8 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -85,6 +87,52 @@ def test_ctrl_c_while_the_steps_are_written(root: Path, tmp_path: Path) -> None:
     judge(subprocess.CompletedProcess([], running.returncode, "", printed), out)
     assert "of 3000 steps are kept in" in printed
     assert json.loads((out / "summary.json").read_text(encoding="utf-8"))["steps"]
+
+
+def with_environment(text: str) -> list[int]:
+    """Running processes whose environment contains a text."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/environ"):
+        with suppress(OSError):  # of a process that has ended meanwhile
+            if text.encode() in path.read_bytes():
+                found.append(int(path.parent.name))
+    return found
+
+
+def until(true: Callable[[], bool], seconds: float) -> None:
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc, and relies on prctl")
+@pytest.mark.parametrize(("sent", "code"), [(signal.SIGTERM, 130), (signal.SIGKILL, -signal.SIGKILL)])
+def test_a_press_killed_while_it_meshes_leaves_no_child_and_no_folder(
+    root: Path, tmp_path: Path, sent: signal.Signals, code: int
+) -> None:
+    temporary, cache = tmp_path / "tmp", tmp_path / "cache"
+    temporary.mkdir()
+    env = {**os.environ, "TMPDIR": str(temporary), "FINGER3D_CACHE": str(cache), "OMP_NUM_THREADS": "1"}
+    command = press(root, tmp_path / "out", "--set", "mesh.size_mm=1.5")  # half a minute of meshing
+    running = subprocess.Popen(command, cwd=root, env=env, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+
+    def meshing() -> bool:
+        names = [Path(f"/proc/{pid}/cmdline") for pid in with_environment(str(cache))]
+        return any(path.exists() and b"_tetwild_child" in path.read_bytes() for path in names)
+
+    until(meshing, 60.0)
+    time.sleep(1.0)  # it loads pytetwild
+    running.send_signal(sent)
+    _, printed = running.communicate(timeout=60)
+    assert running.returncode == code
+    assert "Traceback" not in printed
+    until(lambda: not with_environment(str(cache)), 5.0)
+    assert not list(temporary.iterdir())
+    assert not list(cache.rglob("*.npz"))
+    if sent == signal.SIGTERM:
+        assert printed.splitlines()[-1].startswith("finger3d: interrupted")
 
 
 def test_an_import_that_ctrl_c_broke_off_is_an_interruption(root: Path, tmp_path, monkeypatch, capsys) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import subprocess
 import sys
 import time
@@ -158,6 +159,43 @@ def test_effects_without_a_fixed_compliance_are_refused(effect: Any) -> None:
     problem = build(effect.apply(model(legs=(Leg(0.5, steps=4, duration_s=1.0),))))
     with pytest.raises(Finger3dError, match="no reduced model"):
         Condensed.of(problem)
+
+
+def replaced(header: Any, path: tuple[Any, ...], value: Any) -> Any:
+    copy = json.loads(json.dumps(header))
+    at = copy
+    for key in path[:-1]:
+        at = at[key]
+    at[path[-1]] = value
+    return copy
+
+
+def test_a_header_or_arrays_that_do_not_fit_are_one_line(tmp_path: Path) -> None:
+    good = Condensed.of(build(model())).save(tmp_path / "good.npz")
+    with np.load(good) as stored:
+        arrays = dict(stored)
+    header = json.loads(arrays.pop("header").tobytes())
+    numbers: list[tuple[Any, ...]] = [
+        ("material", "E_MPa"), ("material", "nu"), ("legs", 0, "depth_mm"), ("legs", 0, "steps"),
+        ("body", "height_mm"), ("touch_mm",), ("object", "x_mm"), ("friction", "mu"), ("gauges", 0, "x_mm"),
+    ]  # fmt: skip
+    headers = [replaced(header, path, v) for path in numbers for v in (None, "a", [], {}, math.nan, math.inf)]
+    headers += [replaced(header, path, -1) for path in numbers[:6]]
+    headers += [replaced(header, (key,), v) for key in ("legs", "object", "domain", "axes") for v in (None, 5, "a")]
+    contents = [
+        (header, {**arrays, name: value})
+        for name, a in arrays.items()
+        if a.size
+        for value in (a[:-1], a[..., None], np.full(a.shape, "x"), np.full(a.shape, np.nan), np.array(1.0))
+    ]
+    path = tmp_path / "bad.npz"
+    for told, values in [*((h, arrays) for h in headers), *contents]:
+        text = np.frombuffer(json.dumps(told).encode(), dtype=np.uint8)
+        np.savez(path, **values, header=text)
+        with pytest.raises(Finger3dError, match="condense the scene again") as found:
+            Condensed.load(path)
+        assert str(found.value).startswith(f"{path}: ")
+        assert "\n" not in str(found.value)
 
 
 def test_damaged_files_are_one_line(tmp_path: Path) -> None:

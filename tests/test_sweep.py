@@ -180,6 +180,59 @@ def test_a_torn_line_is_dropped_and_its_point_done_again(scene, tmp_path):
     assert lines(tmp_path) == rows
 
 
+def edited(row: dict, **changes: object) -> str:
+    return json.dumps({k: v for k, v in {**row, **changes}.items() if v != "missing"})
+
+
+EDITS = [
+    {"point": p} for p in (None, "0", 0.5, True, -1, 7, [], {}, "missing", 10**400)
+] + [{"body": b} for b in (None, 5, "another", "missing")] + [{"outcome": o} for o in (None, 5, [], "missing")] + [
+    {"normal_force_N": v} for v in (None, "5", "", [], {}, True, 10**400, float("nan"), "missing")
+] + [{"gauge_g36": "5"}, {"a b": []}]  # fmt: skip
+
+
+def test_a_journal_edited_by_hand_is_one_line(scene, tmp_path, capsys):
+    sweep = points_of(scene, "friction.mu=0.06,1")
+    rows = pressed_here(sweep)
+    with Kept(sweep, tmp_path).open() as kept:
+        for row in rows:
+            kept.add(row)
+    journal, before = tmp_path / "points.jsonl", (tmp_path / "points.jsonl").read_text()
+    command = ["sweep", str(scene), *COARSE, "--vary", "friction.mu=0.06,1", "--out", str(tmp_path)]
+    for line in ["[]", "5", "null", '"a"', "[" * 100_000, *(edited(rows[1], **change) for change in EDITS)]:
+        journal.write_text(before.splitlines()[0] + "\n" + line + "\n")
+        assert main(command) == 2, line
+        err = capsys.readouterr().err
+        assert len(err.splitlines()) == 1
+        assert f"{journal}: line 2: " in err
+        assert "remove the line" in err
+        assert journal.read_text().splitlines()[1] == line  # nothing is lost
+    journal.unlink()
+    journal.mkdir()
+    assert main(command) == 2
+    assert str(journal) in capsys.readouterr().err
+
+
+def test_a_damaged_sweep_json_is_one_line(scene, tmp_path, capsys):
+    with Kept(points_of(scene, "friction.mu=0.06,1"), tmp_path).open():
+        pass
+    path = tmp_path / "sweep.json"
+    whole = json.loads(path.read_text())
+    vary = [None, 5, [], "a", {"friction.mu": 5}, {"friction.mu": [5]}, {"friction.mu": None}]
+    texts = ["", "{", "null", "5", "[]", '"a"', "{}", "[" * 100_000, *(json.dumps({**whole, "vary": v}) for v in vary)]
+    for data in [*(text.encode() for text in texts), b'{"vary": "\xe9"}']:
+        path.write_bytes(data)
+        for command in (
+            ["sweep", str(scene), *COARSE, "--vary", "friction.mu=0.06,1", "--out", str(tmp_path)],
+            ["show", str(tmp_path), "--png", str(tmp_path / "a.png")],
+        ):
+            assert main(command) == 2, data
+            err = capsys.readouterr().err
+            assert len(err.splitlines()) == 1, err
+            assert str(tmp_path) in err
+        assert path.read_bytes() == data
+
+
 def test_a_folder_of_another_sweep_is_refused(scene, tmp_path, capsys):
     with Kept(points_of(scene, "friction.mu=0.06,1"), tmp_path).open():
         pass

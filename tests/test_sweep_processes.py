@@ -132,24 +132,24 @@ def test_a_thousand_points_survive_kill_9(root, scene, tmp_path):
     assert_nothing_repeated_or_lost(out, 1000)
 
 
-def test_a_scheduler_and_two_workers_of_their_own(root, scene, tmp_path):
-    port, env, out = free_port(), environment(root, str(tmp_path)), tmp_path / "out"
+@contextmanager
+def dask(workers: int, env: dict[str, str], where: Path) -> Iterator[tuple[str, subprocess.Popen]]:
+    """Address and process of a scheduler with some workers."""
+    port = free_port()
     address = f"tcp://127.0.0.1:{port}"
     here = [sys.executable, "-m"]
-    with ExitStack() as running_:
-        command = [
-            *here,
-            "distributed.cli.dask_scheduler",
-            "--host",
-            "127.0.0.1",
-            "--port",
-            str(port),
-            "--no-dashboard",
-        ]
-        running_.enter_context(started(command, env, tmp_path, tmp_path / "scheduler.log"))
-        for i in range(2):
-            command = [*here, "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard"]
-            running_.enter_context(started(command, env, tmp_path, tmp_path / f"worker{i}.log"))
+    scheduler = ["distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]
+    worker = ["distributed.cli.dask_worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard"]
+    with ExitStack() as running:
+        process = running.enter_context(started([*here, *scheduler], env, where, where / "scheduler.log"))
+        for i in range(workers):
+            running.enter_context(started([*here, *worker], env, where, where / f"worker{i}.log"))
+        yield address, process
+
+
+def test_a_scheduler_and_two_workers_of_their_own(root, scene, tmp_path):
+    env, out = environment(root, str(tmp_path)), tmp_path / "out"
+    with dask(2, env, tmp_path) as (address, _):
         command = sweeping(scene, out, 3, 4, "--scheduler", address)
         # the scheduler may still be on its way: the time limit is there for that, too
         done = subprocess.run(command, env=env, cwd=tmp_path, capture_output=True, text=True, timeout=120)
@@ -157,6 +157,23 @@ def test_a_scheduler_and_two_workers_of_their_own(root, scene, tmp_path):
         assert done.stderr == ""
     assert_nothing_repeated_or_lost(out, 12)
     assert {row["body"] for row in lines(out)} == {p.body for p in load_points(scene)}
+
+
+@pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGTERM])
+def test_a_scheduler_that_dies_ends_a_sweep_with_3_and_one_line(sent, root, scene, tmp_path):
+    env, out = environment(root, str(tmp_path)), tmp_path / "out"
+    with dask(1, env, tmp_path) as (address, scheduler):
+        command = sweeping(scene, out, 500, 2, "--scheduler", address)
+        with started(command, env, tmp_path, tmp_path / "log") as parent:
+            until(lambda: len(lines(out)) >= 5, "five points")
+            scheduler.send_signal(sent)
+            assert parent.wait(timeout=60) == 3
+    said = (tmp_path / "log").read_text()
+    assert not [line for line in said.splitlines()[:-1] if not line.startswith("[")]
+    count = len(lines(out))
+    assert 5 <= count < 1000
+    assert f"{count} of 1000 points are kept in {out}" in said.splitlines()[-1]
+    assert len(table(out)) == count
 
 
 def load_points(scene: Path) -> list:

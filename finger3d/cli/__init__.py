@@ -9,11 +9,20 @@ from cyclopts import CycloptsError
 # importing registers the commands
 from finger3d.cli import design, output, press, project, sensor, show, sweep  # noqa: F401
 from finger3d.cli.common import app, complain
+from finger3d.cli.terminal import safe_streams, termination_interrupts
 from finger3d.errors import Finger3dError
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line and return its exit code; a user's mistake is one line on standard error."""
+    """Run the command line and return its exit code; a user's mistake is one line on standard error.
+
+    SIGTERM ends a command as Ctrl-C does.
+    """
+    with safe_streams(), termination_interrupts():
+        return _run(arguments)
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     try:
         return app(arguments, exit_on_error=False, print_error=False) or 0
     except CycloptsError as error:

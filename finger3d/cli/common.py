@@ -129,7 +129,7 @@ def print_rows(title: str, rows: Iterable[tuple[str, Any]]) -> None:
         table.add_row(Text(key), Text(str(value)))
     # In a pipe nothing limits the width: a folded path could not be copied.
     width = None if sys.stdout.isatty() else 500
-    Console(highlight=False, width=width).print(table)
+    Console(file=sys.stdout, highlight=False, width=width).print(table)
 
 
 def print_columns(head: Sequence[str], lines: Iterable[Sequence[str]]) -> None:
@@ -143,4 +143,4 @@ def print_columns(head: Sequence[str], lines: Iterable[Sequence[str]]) -> None:
         table.add_column(name, overflow="fold")
     for line in lines:
         table.add_row(*(Text(cell.replace("**", "")) for cell in line))
-    Console(highlight=False, width=None if sys.stdout.isatty() else 240).print(table)
+    Console(file=sys.stdout, highlight=False, width=None if sys.stdout.isatty() else 240).print(table)

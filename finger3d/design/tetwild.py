@@ -6,20 +6,20 @@ child process under a time limit, its output is checked, and it gets three attem
 
 from __future__ import annotations
 
+import io
 import math
 import os
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable
 from importlib.util import find_spec
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d.children import child_environment
 from finger3d.design import cache
 from finger3d.design.limits import MAX_TETS, check_count, check_sizes
 from finger3d.design.report import MeshReport, report
@@ -178,39 +178,35 @@ def _limit_seconds(cells: float, triangles: int) -> float:
 
 
 def _child(points: Float, triangles: Int, field: Sizing, epsilon: float, limit: float) -> tuple[Float, Int]:
-    """Run pytetwild in a child process, in an empty folder because it litters."""
+    """Run pytetwild in a child process."""
     from finger3d.design.snap import UnusableMeshError
 
     extent = np.ptp(points, axis=0)
     bg_points, bg_tets, bg_values = field.background()
-    package = str(Path(__file__).resolve().parents[2])
-    inherited = os.environ.get("PYTHONPATH")
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([package] + ([inherited] if inherited else []))}
-    with tempfile.TemporaryDirectory(prefix="finger3d_") as folder:
-        source, target = Path(folder, "in.npz"), Path(folder, "out.npz")
-        np.savez(
-            source,
-            points=points,
-            triangles=triangles,
-            edge_length=min(field.base_mm, float(extent.min())),  # an edge longer than the body hangs it
-            epsilon=epsilon,
-            stop_energy=STOP_ENERGY,
-            bg_points=bg_points,
-            bg_tets=bg_tets,
-            bg_values=bg_values,
+    given = io.BytesIO()
+    np.savez(
+        given,
+        points=points,
+        triangles=triangles,
+        edge_length=min(field.base_mm, float(extent.min())),  # an edge longer than the body hangs it
+        epsilon=epsilon,
+        stop_energy=STOP_ENERGY,
+        bg_points=bg_points,
+        bg_tets=bg_tets,
+        bg_values=bg_values,
+    )
+    command = [sys.executable, "-P", "-m", "finger3d.design._tetwild_child", str(os.getpid())]
+    try:
+        done = subprocess.run(
+            command, env=child_environment(), input=given.getbuffer(), timeout=limit, capture_output=True, check=False
         )
-        command = [sys.executable, "-m", "finger3d.design._tetwild_child", str(source), str(target)]
-        try:
-            done = subprocess.run(
-                command, cwd=folder, env=environment, timeout=limit, capture_output=True, text=True, check=False
-            )
-        except subprocess.TimeoutExpired as error:
-            raise UnusableMeshError(f"pytetwild did not finish within {limit:.0f} s") from error
-        if done.returncode != 0 or not target.exists():
-            said = (done.stderr.strip().splitlines() or ["no message"])[-1]
-            raise UnusableMeshError(f"pytetwild crashed (return code {done.returncode}): {said}")
-        with np.load(target, allow_pickle=False) as result:
-            return result["points"], result["tets"]
+    except subprocess.TimeoutExpired as error:
+        raise UnusableMeshError(f"pytetwild did not finish within {limit:.0f} s") from error
+    if done.returncode != 0:
+        said = (done.stderr.decode(errors="replace").strip().splitlines() or ["no message"])[-1]
+        raise UnusableMeshError(f"pytetwild crashed (return code {done.returncode}): {said}")
+    with np.load(io.BytesIO(done.stdout), allow_pickle=False) as result:
+        return result["points"], result["tets"]
 
 
 def check_tets(points: Float, tets: Int, volume_mm3: float) -> None:

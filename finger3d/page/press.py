@@ -77,11 +77,26 @@ def press_page(folder: str | Path) -> Path:
 
 
 def gauges_of(scene: Mapping[str, Any]) -> list[Gauge]:
-    """The gauges of a scene as summary.json holds it."""
+    """The gauges of a scene as summary.json holds it.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError, OverflowError
+        If they are not as a press writes them.
+    """
+
+    def number(value: Any) -> float:
+        if isinstance(value, str) or not math.isfinite(value):
+            raise ValueError(value)
+        return float(value)
+
     return [
-        Gauge(g["name"], g["x_mm"], g["y_mm"], g["z_mm"], math.radians(g["angle_deg"]), g["length_mm"])
+        Gauge(
+            str(g["name"]), number(g["x_mm"]), number(g["y_mm"]), number(g["z_mm"]),
+            math.radians(number(g["angle_deg"])), number(g["length_mm"]),
+        )
         for g in scene.get("gauge") or ()
-    ]
+    ]  # fmt: skip
 
 
 def headline(step: Mapping[str, Any], errors: Mapping[str, float]) -> list[Row]:

@@ -21,23 +21,34 @@ def read_json(path: Path) -> dict[str, Any]:
     Raises
     ------
     Finger3dError
-        If it is not there, or is no JSON.
+        If it is not there, or is no JSON object.
     """
     try:
-        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        found: Any = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise Finger3dError(f"{path.parent}: holds no {path.name}; give a folder of results") from None
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise Finger3dError(f"{path}: cannot be read ({error}); make the results again") from None
+    if not isinstance(found, dict):
+        raise Finger3dError(f"{path}: holds no JSON object; make the results again")
     return found
 
 
 def read_rows(path: Path) -> list[dict[str, str]]:
-    """Lines of a CSV file by column; none, if it is not there."""
+    """Lines of a CSV file by column; none, if it is not there.
+
+    Raises
+    ------
+    Finger3dError
+        If it cannot be read.
+    """
     if not path.is_file():
         return []
-    with path.open(newline="", encoding="utf-8") as stream:
-        return list(csv.DictReader(stream))
+    try:
+        with path.open(newline="", encoding="utf-8") as stream:
+            return list(csv.DictReader(stream))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise Finger3dError(f"{path}: cannot be read ({error}); make the results again") from None
 
 
 def title_of(scene: Mapping[str, Any]) -> str:

@@ -11,12 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.errors import Finger3dError
-from finger3d.export import atomic
+from finger3d.export import atomic, read_arrays
 from finger3d.history import Frame, contact_table
 from finger3d.mesh import Mesh, middles
 from finger3d.problem import Problem
 
 Array = NDArray[Any]
+
+_LARGEST = 1e9
+"""Bound of every number in steps.npz, in mm or MPa: far above any result, and far below an overflow in a drawing."""
 
 MOST = 10
 """Increments kept: each costs a solution with the factor at hand, and a displacement of every node on disk."""
@@ -136,10 +139,50 @@ def load_states(path: str | Path) -> States:
     Raises
     ------
     Finger3dError
-        If it cannot be read, or is of another version.
+        If it cannot be read, is damaged, or is of another version.
     """
     try:
-        with np.load(path) as data:
-            return States(**{f.name: data[f.name] for f in fields(States)})
-    except (OSError, ValueError, KeyError) as error:
-        raise Finger3dError(f"{path}: cannot be read as steps of a press ({error}); press the scene again") from None
+        data = read_arrays(path)
+        if missing := [f.name for f in fields(States) if f.name not in data]:
+            raise ValueError(f"{missing[0]} is missing")
+        states = States(**{f.name: data[f.name] for f in fields(States)})
+        _check(states)
+    except (OSError, ValueError) as error:
+        why = " ".join(str(error).split())
+        raise Finger3dError(f"{path}: cannot be read as steps of a press ({why}); press the scene again") from None
+    return states
+
+
+def _check(states: States) -> None:
+    """Raise ValueError unless types, shapes, indices and numbers of all arrays fit together."""
+    n, d = states.points.shape if states.points.ndim == 2 else (0, 0)
+    if d not in (2, 3) or not n:
+        raise ValueError(f"points has the shape {states.points.shape}")
+    s, m = len(np.atleast_1d(states.step)), len(np.atleast_1d(states.nodes))
+    e, t = len(np.atleast_1d(states.cells)), len(np.atleast_1d(states.facets))
+    wanted: dict[str, tuple[tuple[tuple[int, ...], ...], str]] = {
+        "points": (((n, d),), "f"),
+        "cells": (((e, d + 1), (e, (d + 1) * (d + 2) // 2)), "iu"),
+        "facets": (((t, d), (t, d * (d + 1) // 2)), "iu"),
+        "on_contact": (((t,),), "b"),
+        "nodes": (((m,),), "iu"),
+        "step": (((s,),), "iu"),
+        "target": (((s, 3),), "iuf"),
+        "displacement": (((s, n, d),), "f"),
+        **dict.fromkeys(("pressure", "shear_x", "shear_z", "gap"), (((s, m),), "f")),
+        "status": (((s, m),), "iu"),
+    }
+    for name, (shapes, kinds) in wanted.items():
+        values = getattr(states, name)
+        if values.shape not in shapes or not values.size or values.dtype.kind not in kinds:
+            raise ValueError(f"{name} is an array of {values.dtype}, shape {values.shape}, and does not fit the others")
+        if values.dtype.kind == "f" and not (np.abs(values) < _LARGEST).all():
+            raise ValueError(f"{name} has a number that is not finite or too large")
+    for name, low, high in (("cells", 0, n), ("facets", 0, n), ("nodes", 0, n), ("status", 0, 3), ("step", 1, 2**31)):
+        values = getattr(states, name)
+        if values.min() < low or values.max() >= high:
+            raise ValueError(f"{name} has a number out of range")
+    if (np.diff(states.step.astype(np.int64)) <= 0).any():
+        raise ValueError("step does not ascend")
+    if not states.on_contact.any() or (np.ptp(states.points, axis=0) <= 0.0).any():
+        raise ValueError("the body has no contact face, or no extent")

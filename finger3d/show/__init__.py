@@ -23,7 +23,7 @@ def found(folder: str | Path) -> tuple[States, str, list[Gauge]]:
     Raises
     ------
     Finger3dError
-        If the folder holds no results of a press.
+        If the folder holds no results of a press, or damaged ones.
     MissingError
         If its press was interrupted, so that there are numbers but no fields.
     """
@@ -36,8 +36,17 @@ def found(folder: str | Path) -> tuple[States, str, list[Gauge]]:
     if not (folder / "steps.npz").exists():
         why = " ".join(str(summary.get("outcome", "unknown")).split())
         raise MissingError(f"{folder}: has no fields to show; its outcome is: {why}; press {folder}/scene.toml again")
-    scene = summary["scene"]
-    return load_states(folder / "steps.npz"), scene.get("title") or folder.name, gauges_of(scene)
+    states = load_states(folder / "steps.npz")
+    try:
+        scene = summary["scene"]
+        title, gauges = scene.get("title") or folder.name, gauges_of(scene)
+        if not isinstance(title, str):
+            raise TypeError(title)
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
+        raise Finger3dError(
+            f"{folder / 'summary.json'}: its scene is not as a press wrote it; press {folder}/scene.toml again"
+        ) from None
+    return states, title, gauges
 
 
 def show(

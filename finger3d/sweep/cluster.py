@@ -119,7 +119,8 @@ def remote(address: str) -> Iterator[Any]:
 
     if ":" not in address.removeprefix("tcp://").removeprefix("tls://"):
         raise Finger3dError(f"--scheduler {address}: must be HOST:PORT, for instance tcp://127.0.0.1:8786")
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    for name in ("distributed", "distributed.client"):  # the second has a level of its own in Dask's configuration
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     silent = MissingError(
         f"--scheduler {address}: no Dask scheduler answered within {CONNECT_S:g} s; start one with `dask scheduler`, "
         "or look at the address"
@@ -132,7 +133,10 @@ def remote(address: str) -> Iterator[Any]:
     except (OSError, TimeoutError, ImportError):
         raise silent from None
     with client:
-        _ready(client, address)
+        try:
+            _ready(client, address)
+        except OSError:
+            raise silent from None
         yield client
 
 

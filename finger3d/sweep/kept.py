@@ -14,6 +14,7 @@ from typing import Any
 
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.export import atomic, claimed, write_csv, write_json
+from finger3d.scene.mistakes import shown
 from finger3d.sweep.points import Sweep
 
 JOURNAL, IDENTITY = "points.jsonl", "sweep.json"
@@ -55,15 +56,12 @@ class Kept:
         wanted = self._identity()
         path = self.folder / IDENTITY
         if path.exists():
-            try:
-                found = json.loads(path.read_text(encoding="utf-8"))
-            except ValueError:
-                found = {}
+            found = _identity_in(path)
             if found != wanted:
                 raise Finger3dError(
                     f"--out {self.folder}: holds another sweep ({_difference(found, wanted)}); name another folder"
                 )
-            self.rows = {row["point"]: row for row in _read(self.folder / JOURNAL)}
+            self.rows = dict(self._journal())
         elif (self.folder / JOURNAL).exists():
             raise Finger3dError(f"--out {self.folder}: holds {JOURNAL} without {IDENTITY}; name another folder")
         text = "".join(_line(row) for row in self.rows.values())
@@ -71,6 +69,54 @@ class Kept:
             temporary.write_text(text, encoding="utf-8")
         with self.room(IDENTITY):
             write_json(path, wanted)
+
+    def _journal(self) -> Iterator[tuple[int, Row]]:
+        """Number and row of every finished point; a line that was cut short is no row.
+
+        Raises
+        ------
+        Finger3dError
+            If the file cannot be read, or a line is no row of this sweep.
+        """
+        path = self.folder / JOURNAL
+        if not path.exists():
+            return
+        try:
+            lines = path.read_text(encoding="utf-8", errors="replace").split("\n")
+        except OSError as error:
+            raise Finger3dError(f"{path}: cannot be read: {error.strerror}; name another folder") from None
+        for number, line in enumerate(lines, start=1):
+            try:
+                row = json.loads(line)
+            except ValueError:
+                continue
+            except RecursionError:
+                row = None
+            if mistake := self._mistake(row):
+                raise Finger3dError(
+                    f"{path}: line {number}: {mistake}; remove the line, and the same command presses its point again"
+                )
+            yield row["point"], row
+
+    def _mistake(self, row: Any) -> str:
+        """What a row of the journal has that a sweep does not write, or nothing."""
+        if not isinstance(row, dict):
+            return "is no JSON object"
+        point = row.get("point")
+        if not isinstance(point, int) or isinstance(point, bool) or not 0 <= point < len(self.sweep.points):
+            return f"point must be a number from 0 to {len(self.sweep.points) - 1}"
+        if row.get("body") != self.sweep.points[point].body:
+            return f"body is not that of point {point}"
+        if not isinstance(row.get("outcome"), str):
+            return "outcome must be text"
+        for name, value in row.items():
+            if name not in ("point", "body", "outcome") and value is not None and not _is_number(value):
+                return f"{shown(name)} must be a number"
+        force = row.get("normal_force_N")
+        if row["outcome"] == "converged" and (force is None or not math.isfinite(force)):
+            return "normal_force_N must be a finite number"
+        taken = [v.key for v in self.sweep.vary if v.key in row]
+        return f"{taken[0]} is given by the sweep" if taken else ""
 
     def _identity(self) -> dict[str, Any]:
         from finger3d import __version__
@@ -161,17 +207,30 @@ def _line(row: Mapping[str, Any]) -> str:
     return json.dumps(row) + "\n"
 
 
-def _read(path: Path) -> Iterator[Row]:
-    """Rows of a journal; a line that was cut short is no row."""
-    if not path.exists():
-        return
-    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
-        try:
-            row = json.loads(line)
-        except ValueError:
-            continue
-        if isinstance(row, dict) and "point" in row:
-            yield row
+def _is_number(value: Any) -> bool:
+    """Whether a value is a number that fits into a double."""
+    return isinstance(value, float) or (isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**63)
+
+
+def _identity_in(path: Path) -> dict[str, Any]:
+    """Read sweep.json.
+
+    Raises
+    ------
+    Finger3dError
+        If it is not as a sweep writes it.
+    """
+    try:
+        found: Any = json.loads(path.read_text(encoding="utf-8"))
+        vary = found["vary"]
+        if not isinstance(vary, dict) or not all(isinstance(t, str) for texts in vary.values() for t in texts):
+            raise TypeError(vary)
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        raise Finger3dError(
+            f"{path}: cannot be read, or is not as a sweep wrote it; restore it, or name another folder with --out"
+        ) from None
+    checked: dict[str, Any] = found
+    return checked
 
 
 def _number(value: Any) -> float:

@@ -19,7 +19,7 @@ from finger3d.sweep.points import Sweep
 from finger3d.sweep.work import Task, on_worker, press_all
 
 WAIT_S = 60.0
-"""How long a sweep goes on waiting without any worker, or without its scheduler."""
+"""How long a sweep goes on waiting without any worker."""
 
 _LOOK_S, _SHOW_S = 0.5, 0.2
 
@@ -118,8 +118,20 @@ class _Run:
             press_all(task, self._row, threads=None)
 
     def go(self) -> None:
-        """Submit all bodies, and keep what arrives until none is left."""
+        """Submit all bodies, and keep what arrives until none is left.
+
+        Raises
+        ------
+        MissingError
+            If the scheduler cannot be reached any more, or no worker is left.
+        """
         self.report.stage("pressing")
+        try:
+            self._submit()
+        except OSError:  # of the connection: files that cannot be written are told by `Kept`
+            raise self._gone("no scheduler") from None
+
+    def _submit(self) -> None:
         for topic in self.tasks:
             self.client.subscribe_topic(topic, self._told)
         futures = {
@@ -132,7 +144,7 @@ class _Run:
             while futures:
                 self._take(futures)
         finally:
-            if futures:  # interrupted, or the cluster is gone: nobody waits for what is left
+            if futures and self.client.status == "running":  # interrupted: nobody waits for what is left
                 with suppress(OSError, TimeoutError):
                     self.client.cancel(list(futures.values()), force=True)
 
@@ -170,6 +182,8 @@ class _Run:
 
     def _ended(self, topic: str, future: Any) -> None:
         """Fetch what the events did not bring, and say why points are missing."""
+        if self.client.status != "running":  # a lost connection cancels every future
+            raise self._gone("no scheduler")
         key, _, members = self.tasks[topic]
         missing = [number for number, _ in members if number not in self.kept.rows]
         if missing:
@@ -186,11 +200,15 @@ class _Run:
     def _look(self) -> None:
         """Nothing came for a while: is anybody there?"""
         now = time.monotonic()
-        if self.client.status == "running" and self.client.scheduler_info(n_workers=-1)["workers"]:
+        if self.client.status != "running":
+            raise self._gone("no scheduler")
+        if self.client.scheduler_info(n_workers=-1)["workers"]:
             self._seen = now
-        elif self.client.status in ("closed", "closing") or now - self._seen > WAIT_S:
-            gone = "no worker" if self.client.status == "running" else "no scheduler"
-            raise MissingError(f"sweep: {gone} is left; {self.kept.said()}; the same command goes on")
+        elif now - self._seen > WAIT_S:
+            raise self._gone("no worker")
+
+    def _gone(self, what: str) -> MissingError:
+        return MissingError(f"sweep: {what} is left; {self.kept.said()}; the same command goes on")
 
 
 def _why(future: Any) -> str:
