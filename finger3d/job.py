@@ -226,6 +226,8 @@ def _coupling_warning(coupling: float) -> list[str]:
 
 
 def _depth_warning(problem: Problem) -> list[str]:
+    if problem.model.kinematics.finite_strain:
+        return []
     height = problem.model.design.height_mm
     share = max(leg.depth_mm for leg in problem.model.legs) / height
     if share <= _DEEP:

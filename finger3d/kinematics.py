@@ -26,7 +26,13 @@ class Kinematics(Protocol):
 
     One that also answers for inclusions (`problem.springs`) says so by a class attribute ``inclusions = True``;
     one whose presses keep nothing in the problem, so that several may run at once, by ``independent = True``.
+
+    Attributes
+    ----------
+    finite_strain : whether the strain measure is that of finite deformation; False for linear strain
     """
+
+    finite_strain: ClassVar[bool]
 
     def start(self, problem: Any) -> ContactState:
         """State at rest, before the first increment."""
@@ -66,6 +72,7 @@ def length_scale(problem: Any, a: Any, b: Any) -> float:
 class SmallStrain:
     """Linear elasticity over the condensed compliance: the paper's baseline."""
 
+    finite_strain: ClassVar[bool] = False
     inclusions: ClassVar[bool] = True
     object_compliance: ClassVar[bool] = True
     independent: ClassVar[bool] = True

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -51,6 +51,8 @@ class DeformedState(ContactState):
 @dataclass(frozen=True)
 class FiniteStrain:
     """Kinematics of a neo-Hookean body."""
+
+    finite_strain: ClassVar[bool] = True
 
     def _law(self, problem: Any) -> NeoHooke:
         material = problem.model.material

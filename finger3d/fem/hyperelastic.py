@@ -78,9 +78,12 @@ def _thickness(law: NeoHooke, f: Float) -> Float:
     """F (..., 3, 3) with F_33 such that P_33 = 0 (plane stress), by Newton from the isochoric value.
 
     Solves ``area F_33 - 1 = p(F_33) / K``, where the area is the determinant in the plane; well conditioned for any K.
+    Raises InvertedError where the area is not positive.
     """
     f = f.copy()
     area = f[..., 0, 0] * f[..., 1, 1] - f[..., 0, 1] * f[..., 1, 0]
+    if not (area > 0.0).all():
+        raise InvertedError
     plane = (f[..., :2, :2] ** 2).sum(axis=(-2, -1))
     stretch = 1.0 / area
     for _ in range(_THICKNESS_ITERATIONS):
