@@ -31,9 +31,10 @@ REFUSED = 0.5
 """Hidden depth over the depth of the press above which it is refused: most of the object is not seen."""
 
 _WARNED = 0.1
+_AIM = 0.05  # of the edge length that is named, as meshes are not regular
 _STATIONS = 4  # along each leg, as for the approach
 _BESIDE = {2: 2, 3: 4}  # contact points that are beside a place
-_PER_WAVE, _PER_RADIUS = 4.0, 0.5  # edges that a wavelength, and a radius, must have at least
+_PER_WAVE, _PER_RADIUS = 4.0, 2.0  # edges that a wavelength, and a radius, must have at least
 _FINER, _TRIES = 0.8, 80  # down to 2e-8 of the edge length
 _PATCH = 3  # edges on either side of a place
 _FORESEEN = 50  # the same before there is a mesh, at most
@@ -147,8 +148,8 @@ def needed_mm(model: Model, touch_mm: float, target: Target) -> float | None:
         size *= _FINER
         reach = _PATCH * size
         box = (at[0] - reach, at[0] + reach, at[1] - reach, at[1] + reach)
-        if hidden(pressed, regular(model, box, size, at), touch_mm, box=box).share <= _WARNED:
-            return float(f"{size:.2g}")
+        if hidden(pressed, regular(model, box, size, at), touch_mm, box=box).share <= _AIM:
+            return float(f"{min(size, _detail(model.object)[1]):.2g}")
     return None
 
 
@@ -194,7 +195,7 @@ def _hats(line: Float) -> tuple[Float, sp.csr_matrix]:
     number = np.arange(len(steps))
     mean[number, number] = (1.0 - share) * w * steps[:, None]
     mean[number + 1, number] = share * w * steps[:, None]
-    mean = mean.reshape(len(line), -1)
+    rows = mean.reshape(len(line), -1)
     return places, sp.csr_matrix(rows / rows.sum(axis=1, keepdims=True))
 
 
@@ -274,18 +275,22 @@ def _sentence(model: Model, found: Hidden, size: float | None) -> str:
 
 def _details(model: Model) -> list[str]:
     """Lengths of the object that are short beside the edges."""
-    thing, size = model.object, model.mesh.size_mm
-    if isinstance(thing, Wave):
-        name, length, edges = "wavelength_mm", thing.wavelength_mm, _PER_WAVE
-    elif isinstance(thing, Sphere | Cylinder):
-        name, length, edges = "radius_mm", thing.radius_mm, 1.0 / _PER_RADIUS
-    elif isinstance(thing, Wedge) and thing.tip_radius_mm > 0.0:
-        name, length, edges = "tip_radius_mm", thing.tip_radius_mm, 1.0 / _PER_RADIUS
-    else:
-        return []
-    if length >= edges * size * (1.0 - 1e-9):
+    name, largest = _detail(model.object)
+    size = model.mesh.size_mm
+    if size <= largest * (1.0 + 1e-9):
         return []
     return [
-        f"object.{name} = {length:g}: contact points {size:g} mm apart (mesh.size_mm) see only averages of it; "
-        f"mesh.size_mm = {float(f'{length / edges:.2g}'):g} resolves it"
+        f"object.{name} = {getattr(model.object, name):g}: contact points {size:g} mm apart (mesh.size_mm) see only "
+        f"averages of it; mesh.size_mm = {float(f'{largest:.2g}'):g} resolves it"
     ]
+
+
+def _detail(thing: Any) -> tuple[str, float]:
+    """The object's shortest length by name, and the largest edge length (mm) that resolves it."""
+    if isinstance(thing, Wave):
+        return "wavelength_mm", thing.wavelength_mm / _PER_WAVE
+    if isinstance(thing, Sphere | Cylinder):
+        return "radius_mm", thing.radius_mm / _PER_RADIUS
+    if isinstance(thing, Wedge) and thing.tip_radius_mm > 0.0:
+        return "tip_radius_mm", thing.tip_radius_mm / _PER_RADIUS
+    return "", math.inf
