@@ -251,7 +251,8 @@ def _unseen_warning(problem: Problem, frames: list[Frame]) -> list[str]:
     """Increments of positive depth that no contact point sees, as their averaged gaps are still open."""
     from finger3d.resolution import unseen
 
-    missed = unseen(problem.model, problem.surface, problem.touch_mm, [f.target for f in frames])
+    apart = [f.target for f in frames if f.outcome.ok and (f.state.status == OPEN).all()]
+    missed = unseen(problem.model, problem.surface, problem.touch_mm, apart)
     if not missed:
         return []
     return [

@@ -73,7 +73,9 @@ def hidden(model: Model, face: Surface, touch_mm: float, axes: tuple[str, ...] =
     path = targets(tuple(replace(leg, steps=_STATIONS) for leg in model.legs))
     deepest = max(t.depth_mm for t in path)
     found = Hidden(0.0, deepest <= 0.0, 0.0, path[-1])
-    for target in dict.fromkeys(t for t in path if t.depth_mm > 0.0):
+    # at one place nothing that was hidden comes into sight by pressing less
+    deepest_at = {(t.slide_x_mm, t.slide_z_mm): t for t in sorted(path, key=lambda t: t.depth_mm) if t.depth_mm > 0.0}
+    for target in deepest_at.values():
         seen = np.maximum(-rigid_gap(model, face, touch_mm, target), 0.0)
         best = seen[beside].reshape(len(face.samples), -1).max(axis=1)
         missed = [0.0, float((_overlap(model, face.samples, touch_mm, target) * upright - best).max())]
@@ -149,7 +151,7 @@ def needed_mm(model: Model, touch_mm: float, target: Target) -> float | None:
         reach = _PATCH * size
         box = (at[0] - reach, at[0] + reach, at[1] - reach, at[1] + reach)
         if hidden(pressed, regular(model, box, size, at), touch_mm, box=box).share <= _AIM:
-            return float(f"{min(size, _detail(model.object)[1]):.2g}")
+            return _rounded(min(size, _detail(model.object)[1]))
     return None
 
 
@@ -281,8 +283,14 @@ def _details(model: Model) -> list[str]:
         return []
     return [
         f"object.{name} = {getattr(model.object, name):g}: contact points {size:g} mm apart (mesh.size_mm) see only "
-        f"averages of it; mesh.size_mm = {float(f'{largest:.2g}'):g} resolves it"
+        f"averages of it; mesh.size_mm = {_rounded(largest):g} resolves it"
     ]
+
+
+def _rounded(size: float) -> float:
+    """Down to two significant digits."""
+    unit = 10.0 ** (math.floor(math.log10(size)) - 1)
+    return float(f"{math.floor(size / unit * (1.0 + 1e-12)) * unit:.2g}")
 
 
 def _detail(thing: Any) -> tuple[str, float]:
