@@ -3,8 +3,8 @@
 The companion has about twice the edge lengths, so at best an eighth of the cells of a solid and a quarter of those of a
 section; what it changes is taken to the mesh at hand by the order of convergence (Richardson).  A mesh than which none
 is coarser is small, and gets a finer companion.  The order is that of quadratic elements with a bonded corner, 2 lambda
-(Williams 1952), for smooth data it would be higher.  `finger3d.resolution` bounds the bars of lengths and areas from
-below.  An object that yields is meshed anew with the finger, so a bar covers both.  ``validation/error_bars.py`` says
+(Williams 1952), for smooth data it would be higher.  `finger3d.point_resolution` bounds the bars of lengths
+and areas from below.  An object that yields is meshed anew with the finger, so a bar covers both.  ``validation/error_bars.py`` says
 how far the estimates may be trusted.
 """
 
@@ -20,14 +20,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.design import mesh_section, mesh_solid
-from finger3d.errors import Finger3dError
+from finger3d.errors import Finger3dError, UnresolvedError
 from finger3d.export import AREAS, MAIN
 from finger3d.fem.surface import surface
 from finger3d.history import Frame, measure
 from finger3d.model import Leg, MeshOptions, Model
 from finger3d.objects import Sphere
 from finger3d.objects.mesh import MeshObject
-from finger3d.resolution import Grain
+from finger3d.point_resolution import Grain
 from finger3d.solve import AUTO_START, Problem, build, contact_zone, march, symmetry
 
 Float = NDArray[np.float64]
@@ -179,7 +179,7 @@ def companion(problem: Problem, say: Say = lambda text: None) -> Problem:
 def companions(model: Model, unknowns: float) -> tuple[list[MeshOptions], list[MeshOptions]]:
     """Meshes that may stand beside one of so many unknowns: coarser ones and finer ones, the best first."""
     own, enough = model.mesh, unknowns >= _LEAST_UNSTRUCTURED
-    costly = model.domain != "solid" and not model.kinematics.small_strain
+    costly = model.domain != "solid" and model.kinematics.finite_strain
     longer = coarser(model, _FACTOR_WHERE_STEPS_FACTOR if costly else FACTOR).mesh
     chosen = [longer] if longer.mesher == "swept" or enough else []
     if model.domain == "solid" and own.mesher != longer.mesher:
@@ -193,13 +193,19 @@ def companions(model: Model, unknowns: float) -> tuple[list[MeshOptions], list[M
 
 
 def _built_if(problem: Problem, model: Model, enough: Callable[[float], bool], say: Say) -> Problem | None:
-    """A companion, condensed, if the ratio of edges is enough; a structured mesh is looked at first."""
+    """A companion, condensed, if the ratio of edges is enough and the object does not pass between its points.
+
+    A structured mesh is looked at first.
+    """
     if model.domain != "solid" or model.mesh.mesher == "swept":
         made = mesh_solid if model.domain == "solid" else mesh_section
         mesh = made(model.design, model.mesh, contact_zone(model), symmetry(model))[0]
         if not enough((problem.mesh.points.size / mesh.points.size) ** (1.0 / problem.dim)):
             return None
-    beside = built_like(problem, model, say if _unstructured(model) else lambda text: None)
+    try:
+        beside = built_like(problem, model, say if _unstructured(model) else lambda text: None)
+    except UnresolvedError:
+        return None
     return beside if enough(_ratio(problem, beside)) else None
 
 

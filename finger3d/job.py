@@ -54,6 +54,7 @@ class _Output:
         self.coupling = problem.coupling()
         self.advice: list[str] = []
         self.warnings = [*problem.model.warnings, *_coupling_warning(self.coupling), *_depth_warning(problem)]
+        self.warnings += _resolution_warning(problem)
         self.seconds = {"cad": 0.0, "mesh": 0.0, **problem.seconds, "contact": 0.0, "output": 0.0}
         self._written = -math.inf
 
@@ -187,7 +188,7 @@ def _pressed(
     report.stage("writing fields")
     _fields(problem, output, folder, artist)
     output.seconds["output"] += time.perf_counter() - begin
-    output.warnings += _coarse_warning(problem, output.frames)
+    output.warnings += _coarse_warning(problem, output.frames) + _unseen_warning(problem, output.frames)
     history = History(problem.points, tuple(output.frames))
     summary = output.write(_told(history), tables=False)
     if ahead:
@@ -226,6 +227,8 @@ def _coupling_warning(coupling: float) -> list[str]:
 
 
 def _depth_warning(problem: Problem) -> list[str]:
+    if problem.model.kinematics.finite_strain:
+        return []
     height = problem.model.design.height_mm
     share = max(leg.depth_mm for leg in problem.model.legs) / height
     if share <= _DEEP:
@@ -233,6 +236,28 @@ def _depth_warning(problem: Problem) -> list[str]:
     return [
         f"the press reaches {100.0 * share:.0f} % of the finger's height of {height:.4g} mm: small strain is a poor "
         "model there, whatever the residual says; press less, or read the numbers as trends"
+    ]
+
+
+def _resolution_warning(problem: Problem) -> list[str]:
+    """Whether the contact points see the object's details."""
+    from finger3d.resolution import hidden, warnings
+
+    model, face, touch = problem.model, problem.surface, problem.touch_mm
+    return warnings(model, hidden(model, face, touch, problem.axes), touch)
+
+
+def _unseen_warning(problem: Problem, frames: list[Frame]) -> list[str]:
+    """Increments of positive depth that no contact point sees, as their averaged gaps are still open."""
+    from finger3d.resolution import unseen
+
+    apart = [f.target for f in frames if f.outcome.ok and (f.state.status == OPEN).all()]
+    missed = unseen(problem.model, problem.surface, problem.touch_mm, apart)
+    if not missed:
+        return []
+    return [
+        f"{len(missed)} of {len(frames)} increments reach no contact point and have no force, at depths up to "
+        f"{max(t.depth_mm for t in missed):.3g} mm; lower mesh.size_mm"
     ]
 
 

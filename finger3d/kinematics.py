@@ -29,13 +29,13 @@ class Kinematics(Protocol):
 
     Attributes
     ----------
-    small_strain : whether strain is linear in the displacement, which is where gauges read it
-    elastic : whether, besides, displacements follow from the contact forces alone (`Problem.unknowns_of`)
+    finite_strain : whether the strain measure is that of finite deformation; False for linear strain
+    elastic : whether strain is linear and displacements follow from the contact forces alone (`Problem.unknowns_of`)
 
     Ask these rather than the class: the viscoelastic body is a subclass of `SmallStrain`, and not elastic.
     """
 
-    small_strain: ClassVar[bool]
+    finite_strain: ClassVar[bool]
     elastic: ClassVar[bool]
 
     def start(self, problem: Any) -> ContactState:
@@ -76,7 +76,7 @@ def length_scale(problem: Any, a: Any, b: Any) -> float:
 class SmallStrain:
     """Linear elasticity over the condensed compliance: the paper's baseline."""
 
-    small_strain: ClassVar[bool] = True
+    finite_strain: ClassVar[bool] = False
     elastic: ClassVar[bool] = True
     inclusions: ClassVar[bool] = True
     object_compliance: ClassVar[bool] = True

@@ -89,6 +89,16 @@ def test_plane_stress_has_no_stress_across_the_section() -> None:
     assert abs(stress[0, 1, 1]) < 1e-6
 
 
+def test_plane_stress_of_an_incompressible_body_keeps_its_digits() -> None:
+    # at strains e of 1e-6 the neo-Hookean stress is the linear one, 4 G e for uniaxial strain, to a few e; with
+    # K (J - 1) at K = 1e7 G, round-off alone would be 1e-16 K / (4 G e) = 2e-4 of it
+    law, strain = NeoHooke.of(1.0, 0.5, plane_stress=True), 1e-6
+    slopes = np.zeros((50, 1, 2, 2))
+    slopes[:, 0, 0, 0] = strain * np.linspace(0.5, 1.5, 50)
+    stress = cell_response(law, slopes, None)[0][:, 0, 0, 0]
+    assert np.abs(stress / (4.0 * law.shear * slopes[:, 0, 0, 0]) - 1.0).max() < 1e-5
+
+
 def test_inverted_cells_are_an_error() -> None:
     mesh = quadratic(grid((1, 1, 1)))
     with pytest.raises(InvertedError):

@@ -12,7 +12,7 @@ from finger3d.errors import Outcome
 from finger3d.history import ContactPoints, Frame, Target, measure
 from finger3d.model import Leg, Material, MeshOptions, Model
 from finger3d.objects import Sphere
-from finger3d.resolution import least_bars
+from finger3d.point_resolution import least_bars
 from finger3d.solve import build, march
 
 

@@ -107,13 +107,16 @@ def test_advice_comes_with_numbers_and_goes_when_it_is_followed(tmp_path: Path) 
     for name, keys in {
         "small": ["press.depth_mm=1.0"],
         "large": ["press.depth_mm=1.0", "effects.large_deformation={}", "press.steps=60"],
+        "viscous": ["press.depth_mm=1.0", "press.duration_s=1.0", "effects.viscosity={prony=[[0.3, 0.5]]}"],
         "auto": ["press.steps=auto", "press.depth_mm=0.05"],
     }.items():
         out = tmp_path / name
         settings = [word for key in keys for word in ("--set", key)]
         assert main(["press", str(written(tmp_path)), "--out", str(out), "--no-figures", *settings]) == 0
         said[name] = " ".join(json.loads((out / "summary.json").read_text(encoding="utf-8"))["advice"])
-    assert "large_deformation would change the force by about +20 %" in said["small"]
+    assert "[effects.large_deformation]" in said["small"]
+    assert "strains reach" in said["viscous"]
+    assert "[effects.viscosity]" in said["viscous"]
     assert "5 equal increments leave the dissipation about 140 % high" in said["small"]
     assert "large_deformation" not in said["large"]
     assert "increments" not in said["large"] + said["auto"]
@@ -161,6 +164,17 @@ def test_a_scene_beyond_what_can_be_trusted_is_warned_of(tmp_path: Path, key: st
     out = tmp_path / "out"
     assert main(["press", str(written(tmp_path)), "--out", str(out), "--no-figures", "--set", key]) == 0
     assert any(text in w for w in json.loads((out / "summary.json").read_text(encoding="utf-8"))["warnings"])
+
+
+def test_a_deep_press_at_finite_strain_is_not_warned_of_small_strain(tmp_path: Path) -> None:
+    settings = {"small": [], "large": ["--set", "effects.large_deformation={}"]}
+    said = {}
+    for name, more in settings.items():
+        command = ["press", str(written(tmp_path, changed(SECTION, depth_mm=1.6))), "--out", str(tmp_path / name)]
+        assert main([*command, "--no-figures", "--no-error", *more]) == 0
+        said[name] = json.loads((tmp_path / name / "summary.json").read_text(encoding="utf-8"))["warnings"]
+    assert len(said["small"]) == 1
+    assert not said["large"]
 
 
 def test_interruption_keeps_every_finished_step(tmp_path: Path) -> None:

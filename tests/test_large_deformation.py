@@ -72,6 +72,18 @@ def test_newton_converges_quadratically(nu: float, monkeypatch: pytest.MonkeyPat
     assert all(b < max(1e3 * a**2, 1e-12) for a, b in pairs)
 
 
+def test_incompressible_plane_stress_converges_to_the_limit_of_nu() -> None:
+    forces = []
+    for nu in (0.499, 0.4999, 0.5):
+        problem = build(fig9(nu, 4.0, domain="plane-stress", legs=(Leg(3.0, steps=3),)))
+        *_, end = march(problem)
+        assert end.outcome is Outcome.CONVERGED
+        forces.append(measure(problem.points, end)["normal_force_N"])
+        assert problem.later.factorizations <= 5 * 3
+    # linear in 0.5 - nu, so extrapolation from the first two leaves the square: 1e-6 and a factor
+    assert forces[2] == pytest.approx(forces[1] + (forces[1] - forces[0]) / 9.0, rel=1e-5)
+
+
 def test_half_the_height() -> None:
     # the contact reaches the corner of the section on the way; nu = 0.5 in the test above is the mixed form
     problem = build(fig9(0.45, 4.0, legs=(Leg(25.0, steps=12),)))

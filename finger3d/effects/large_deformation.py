@@ -52,7 +52,7 @@ class DeformedState(ContactState):
 class FiniteStrain:
     """Kinematics of a neo-Hookean body."""
 
-    small_strain: ClassVar[bool] = False
+    finite_strain: ClassVar[bool] = True
     elastic: ClassVar[bool] = False
 
     def _law(self, problem: Any) -> NeoHooke:

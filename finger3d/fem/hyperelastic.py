@@ -2,7 +2,8 @@
 
 ``W = G/2 (J^(-2/3) I1 - 3) + K/2 (J - 1)^2``, isochoric split (Bonet and Wood 2008, sec. 6.5).  Near-incompressible
 bodies take the mixed form ``W_iso + p (J - 1) - p^2 / (2 K)`` with linear p = K (J - 1).  Plane strain has F_33 = 1; in
-plane stress F_33 follows from P_33 = 0 at every quadrature point, and is condensed out of the tangent.
+plane stress F_33 follows from P_33 = 0 at every quadrature point and is condensed out of the tangent.  The mean stress
+is then ``p J = G J^(-2/3) (I1/3 - F_33^2)``, which unlike K (J - 1) loses no digits where K is large.
 """
 
 from __future__ import annotations
@@ -45,13 +46,19 @@ class NeoHooke:
 
 
 def response(law: NeoHooke, f: Float, p: Float | None) -> tuple[Float, Float]:
-    """First Piola stress (..., 3, 3) and its derivative (..., 3, 3, 3, 3) by F; `p` (...,) MPa in the mixed form."""
+    """First Piola stress (..., 3, 3) and its derivative (..., 3, 3, 3, 3) by F; `p` (...,) MPa in the mixed form.
+
+    In plane stress F is one of `deformation`, for which P_33 = 0.
+    """
     j = np.linalg.det(f)
     inverse = np.linalg.inv(f)  # [J, i]
     turned = np.swapaxes(inverse, -1, -2)  # F^-T [i, J]
     i1 = np.einsum("...iJ,...iJ->...", f, f)
     g = law.shear * j ** (-2.0 / 3.0)
-    spherical = law.bulk * (j - 1.0) if p is None else p
+    if law.plane_stress:
+        spherical = g * (i1 / 3.0 - f[..., 2, 2] ** 2) / j
+    else:
+        spherical = law.bulk * (j - 1.0) if p is None else p
     stress = g[..., None, None] * (f - i1[..., None, None] / 3.0 * turned) + (spherical * j)[..., None, None] * turned
     both = np.einsum("...iJ,...kL->...iJkL", turned, turned)
     cross = np.einsum("...Jk,...Li->...iJkL", inverse, inverse)
@@ -68,15 +75,26 @@ def response(law: NeoHooke, f: Float, p: Float | None) -> tuple[Float, Float]:
 
 
 def _thickness(law: NeoHooke, f: Float) -> Float:
-    """F with its F_33 set so that P_33 = 0 (plane stress), by Newton from the isochoric guess."""
+    """F (..., 3, 3) with F_33 such that P_33 = 0 (plane stress), by Newton from the isochoric value.
+
+    Solves ``area F_33 - 1 = p(F_33) / K``, where the area is the determinant in the plane; well conditioned for any K.
+    Raises InvertedError where the area is not positive.
+    """
     f = f.copy()
-    f[..., 2, 2] = 1.0 / (f[..., 0, 0] * f[..., 1, 1] - f[..., 0, 1] * f[..., 1, 0])
+    area = f[..., 0, 0] * f[..., 1, 1] - f[..., 0, 1] * f[..., 1, 0]
+    if not (area > 0.0).all():
+        raise InvertedError
+    plane = (f[..., :2, :2] ** 2).sum(axis=(-2, -1))
+    stretch = 1.0 / area
     for _ in range(_THICKNESS_ITERATIONS):
-        stress, tangent = response(law, f, None)
-        step = -stress[..., 2, 2] / tangent[..., 2, 2, 2, 2]
-        f[..., 2, 2] += np.maximum(step, -0.5 * f[..., 2, 2])
+        factor = law.shear / (3.0 * law.bulk) * (area * stretch) ** (-5.0 / 3.0)
+        excess = plane - 2.0 * stretch**2
+        slope = area + factor * (5.0 / 3.0 * excess / stretch + 4.0 * stretch)
+        step = (factor * excess + 1.0 - area * stretch) / slope
+        stretch = stretch + np.maximum(step, -0.5 * stretch)
         if np.abs(step).max() < 1e-14:
-            return f
+            break
+    f[..., 2, 2] = stretch
     return f
 
 

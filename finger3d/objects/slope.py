@@ -26,17 +26,17 @@ class Slopes:
 
     @property
     def advice(self) -> str:
-        """What the vertical gap leaves out at these slopes; empty below 10 degrees."""
-        worst = max(self.object_deg, self.finger_deg)
-        if worst <= _MUCH_DEG:
+        """What a gap measured along one direction leaves out at these slopes; empty up to 10 degrees of the object.
+
+        The finger's slope does not matter: such a gap is exact where the object is flat, for any finger.
+        """
+        if self.object_deg <= _MUCH_DEG:
             return ""
-        which = "object" if self.object_deg >= self.finger_deg else "finger"
-        angle = math.radians(min(worst, 89.9))
+        angle = math.radians(min(self.object_deg, 89.9))
         return (
-            f"the {which}'s surface slopes up to {worst:.0f} deg where it touches, and the gap is measured vertically: "
-            f"it overstates the distance there by up to {100.0 * (1.0 / math.cos(angle) - 1.0):.2g} %, and leaves out "
-            f"a push sideways of up to {math.tan(angle):.2g} of the local pressure; [effects.large_deformation] "
-            "follows the surface"
+            f"the object's surface slopes up to {self.object_deg:.0f} deg where it touches, and the gap is measured "
+            f"vertically: it overstates the distance there by up to {100.0 * (1.0 / math.cos(angle) - 1.0):.2g} %, and "
+            f"leaves out a sideways force of up to {math.tan(angle):.2g} of the local pressure"
         )
 
 

@@ -66,7 +66,7 @@ class _Pressed:
 
 def _whole(model: Model) -> bool:
     """Whether gauges are read in the body's own way, so that a gauge moved is a press of its own."""
-    return model.inclusions is not None or not model.kinematics.small_strain
+    return model.inclusions is not None or model.kinematics.finite_strain
 
 
 class _Bench:

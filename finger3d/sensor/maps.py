@@ -42,7 +42,7 @@ _NEWTON = 6
 
 def check(model: Model) -> None:
     """Refuse a body whose gauges do not read the small strain of a displacement field."""
-    if not model.kinematics.small_strain:
+    if model.kinematics.finite_strain:
         name = dict(model.filled).get("kinematics", "kinematics")
         raise Finger3dError(f"--map: not with effects.{name}; take the effect out, or the map")
 

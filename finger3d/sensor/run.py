@@ -217,7 +217,7 @@ def _condensed(
 
 
 def _press(problem: Problem, sweep: Sweep, report: Report) -> None:
-    if not problem.model.kinematics.small_strain:
+    if problem.model.kinematics.finite_strain:
         name = dict(problem.model.filled).get("kinematics", "this body")
         report.say(f"{name}: its compliance changes on the way, so that every one of {len(sweep.mus)} mu is a full "
                    "march, and so is every tolerance")  # fmt: skip
@@ -238,7 +238,7 @@ def _press(problem: Problem, sweep: Sweep, report: Report) -> None:
 
 def _few(problem: Problem, count: int) -> NDArray[np.int64]:
     """Numbers, among `count` values of mu, of those at which tolerances are tried."""
-    wanted = _SLOPES[problem.model.kinematics.small_strain]
+    wanted = _SLOPES[not problem.model.kinematics.finite_strain]
     return np.unique(np.linspace(0, count - 1, wanted).round().astype(int))
 
 
