@@ -119,7 +119,7 @@ def _size(model: Model, zone: tuple[float, float, float, float], axes: tuple[str
         d, vertices = mesh.dim, len(mesh.vertices)
         points, cells = report.points, report.cells
         length = zone[1] - zone[0]
-        touching = length / h * ((zone[3] - zone[2]) / (2.0 * h) + 1.0 if d == 3 else 1.0)
+        touching = length / h * ((zone[3] - zone[2]) / h + 1.0 if d == 3 else 1.0)
     else:
         from finger3d.design.sizing import forecast as count_cells
         from finger3d.design.sizing import sizing

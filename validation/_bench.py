@@ -35,10 +35,10 @@ from finger3d.solve import build, contact_zone, march, symmetry
 from finger3d.study import Row
 from finger3d.versions import cores
 
-LARGE, MIDDLE, QUICK = 0.85, 1.0, 2.5  # mm: 150 000, 42 000 and 6 000 unknowns
+LARGE, MIDDLE, QUICK = 1.1, 1.25, 3.0  # mm: 150 000, 47 000 and 8 000 unknowns
 MUS = (0.06, 0.125, 0.25, 0.5, 1.0)
 MU = 0.25
-GRADING = {LARGE: 2.06}  # how much longer edges are far from the contact, else 4: the large one has 1 150 contact rows
+GRADING = {LARGE: 2.0}  # how much longer edges are far from the contact, else 4: the large one has 1 400 contact rows
 SCENE = """
 [finger]
 geometry = "clipped_cylinder"

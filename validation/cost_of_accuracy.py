@@ -91,10 +91,10 @@ def _sizes(body: str, quick: bool) -> dict[str, Any]:
             "ratios": (1, 2, 4, 8, 16),
             "slow": [0.2, 0.1, 0.05],
         }
-    down = [4.0, 3.0, 2.0, 1.5, 1.0, 0.75, 0.6, 0.5]
+    down = [4.0, 3.0, 2.0, 1.5, 1.0, 0.75, 0.6]
     memory = memory_bytes()
     if memory and memory[1] / 1e9 > NEED_GB:
-        down.append(0.4)
+        down.append(0.5)
     return {"mixed": down, "quadratic": down[:6], "linear": [*down[2:6], 0.5], "ladder": 1.5, "ratios": (2, 4, 8),
             "slow": [4.0, 3.0], "pytetwild": [5.0, 4.0, 3.0, 2.0, 1.5]}  # fmt: skip
 

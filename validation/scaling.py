@@ -27,9 +27,9 @@ Runs = Mapping[Size, dict[str, Any]]
 BY_NAME = True
 GOAL = "goal of this project"
 LIMITS_MB = {40_000: 2_000.0, 160_000: 5_000.0, 500_000: 20_000.0}
-UNKNOWNS = (Size(2.0, 8.0), Size(1.0, 4.0), Size(0.75, 3.0), Size(0.58, 2.32), Size(0.75, 0.98))
-ROWS = (Size(2.0, 8.0), Size(1.0, 16.0), Size(0.6, 16.0), Size(0.4, 16.0))
-SWEPT = Size(1.2, 5.0)
+UNKNOWNS = (Size(2.4, 9.6), Size(1.25, 5.0), Size(0.95, 3.8), Size(0.73, 2.92), Size(0.95, 1.25))
+ROWS = (Size(2.4, 9.6), Size(1.3, 16.0), Size(0.77, 16.0), Size(0.52, 16.0))
+SWEPT = Size(1.45, 6.0)
 WORKER_TRIES = 3
 NEED_GB = 14.0  # of free memory, for the largest
 COLOURS = dict(zip(STAGES, ("C7", "C0", "C1", "C3", "C2", "#c5b0d5"), strict=True))
