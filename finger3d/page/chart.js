@@ -30,13 +30,16 @@
     const legend = several ? LINE * (0.5 + title.length + Math.ceil(chart.lines.length / abreast)) : 0;
     return { height: 290 + ABOVE + legend, margin: { l: 60, r: 12, t: ABOVE, b: BELOW + legend },
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", showlegend: several,
+      modebar: { bgcolor: "rgba(0,0,0,0)", color: style.color, activecolor: style.color },
       font: { color: style.color, size: 12, family: style.fontFamily }, xaxis: axis(chart.x), yaxis: axis(chart.y),
       legend: { orientation: "h", yref: "container", y: 0, yanchor: "bottom", x: 0,
         title: { text: title.map(plain).join("<br>"), side: "top" } } };
   }
   function draw() {
     return Promise.all(boxes.map((box, i) => Plotly.react(box, traces(charts[i]), layout(charts[i], box), {
-      responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"],
+      responsive: true, displaylogo: false,
+      // The last one would upload the chart.
+      modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d", "sendChartToCloud"],
       toImageButtonOptions: { filename: charts[i].caption, scale: 2 } })));
   }
   dark.addEventListener("change", draw);
