@@ -159,8 +159,8 @@ def test_the_charts_of_a_sweep_are_drawn_with_their_points_and_no_text_covers_an
 _PLACES = """[...document.querySelectorAll(".chart > div")].map((box) => {
     const place = (e) => { const b = e.getBoundingClientRect(); return [b.left, b.top, b.right, b.bottom]; };
     return { box: place(box), bar: place(box.querySelector(".modebar")),
-        tools: [...box.querySelectorAll(".modebar-btn")].map((e) => e.dataset.title), axes: place(box.querySelector(".nsewdrag")),
-        points: [...box.querySelectorAll(".point")].map(place) };
+        tools: [...box.querySelectorAll(".modebar-btn")].map((e) => e.dataset.title),
+        axes: place(box.querySelector(".nsewdrag")), points: [...box.querySelectorAll(".point")].map(place) };
 })"""
 
 
