@@ -7,6 +7,7 @@ import json
 import math
 import os
 import secrets
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
@@ -115,7 +116,7 @@ def claimed(folder: str | Path, command: str = "") -> Iterator[Path]:
 
 _DAMAGED = (
     ValueError, TypeError, KeyError, AttributeError, EOFError, MemoryError, NotImplementedError, OverflowError,
-    RuntimeError, SyntaxError, zipfile.BadZipFile, zlib.error,
+    RuntimeError, SyntaxError, tokenize.TokenError, zipfile.BadZipFile, zlib.error,
 )  # fmt: skip
 """What NumPy raises for an .npz file that is cut short, changed, or of another kind."""
 

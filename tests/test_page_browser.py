@@ -156,6 +156,30 @@ def test_the_charts_of_a_sweep_are_drawn_with_their_points_and_no_text_covers_an
     visit.page.close()
 
 
+_PLACES = """[...document.querySelectorAll(".chart > div")].map((box) => {
+    const place = (e) => { const b = e.getBoundingClientRect(); return [b.left, b.top, b.right, b.bottom]; };
+    return { box: place(box), bar: place(box.querySelector(".modebar")),
+        tools: [...box.querySelectorAll(".modebar-btn")].map((e) => e.dataset.title),
+        axes: place(box.querySelector(".nsewdrag")), points: [...box.querySelectorAll(".point")].map(place) };
+})"""
+
+
+@pytest.mark.parametrize("width", [1280, 400])
+def test_the_tool_bar_of_a_chart_covers_neither_its_axes_nor_a_point(browser: Any, tmp_path: Path, width: int) -> None:
+    rising = [Line(f"{i}", (0.0, 1.0, 2.0), (0.0, 1.0, 2.0 - 0.1 * i)) for i in range(2)]  # points at the top right
+    write_page(tmp_path, "tools", charts=[Chart("a chart", "x", "y", rising, "a key")] * 2)
+    visit = Visit(browser, tmp_path, width)
+    for chart in visit.page.evaluate(_PLACES):
+        assert len(chart["tools"]) >= 4
+        assert not [name for name in chart["tools"] if "Share" in name]  # which uploads the chart
+        left, top, right, bottom = chart["bar"]
+        assert chart["box"][0] <= left < right <= chart["box"][2]
+        assert chart["box"][1] <= top
+        assert bottom <= chart["axes"][1]
+        assert all(bottom <= high for _, high, _, _ in chart["points"])
+    visit.page.close()
+
+
 def test_charts_of_long_names_and_of_any_text_are_drawn_within_their_boxes(browser: Any, tmp_path: Path) -> None:
     text = "<!--<script>"  # leaves a script open, unless it is escaped
     legend = ", ".join(["material.E_MPa", "finger.edge_height_mm", "object.radius_mm", text])

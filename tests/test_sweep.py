@@ -233,6 +233,16 @@ def test_a_damaged_sweep_json_is_one_line(scene, tmp_path, capsys):
         assert path.read_bytes() == data
 
 
+@pytest.mark.parametrize("data", [b"point\n\xe9", b'point\n"' + b"a" * 200_000])
+def test_a_damaged_table_is_one_line(data, tmp_path, capsys):
+    (tmp_path / "sweep.json").write_text('{"vary": {"friction.mu": ["0.1", "0.2"]}}')
+    (tmp_path / "results.csv").write_bytes(data)
+    assert main(["show", str(tmp_path), "--png", str(tmp_path / "a.png")]) == 2
+    err = capsys.readouterr().err
+    assert len(err.splitlines()) == 1
+    assert str(tmp_path / "results.csv") in err
+
+
 def test_a_folder_of_another_sweep_is_refused(scene, tmp_path, capsys):
     with Kept(points_of(scene, "friction.mu=0.06,1"), tmp_path).open():
         pass

@@ -4,7 +4,8 @@
   const boxes = [...document.querySelectorAll(".chart > div")];
   const dark = window.matchMedia("(prefers-color-scheme: dark)");
   const plain = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;");  // plotly takes tags for its own
-  const LINE = 18, BELOW = 48, WIDE = 7.5;  // pixels of a line of the legend, below the axes, and of a letter
+  // Pixels of a line of the legend, above the axes (where plotly's tool bar is), below the axes, and of a letter.
+  const LINE = 18, ABOVE = 34, BELOW = 48, WIDE = 7.5;
 
   // The names in a legend's title, in lines of so many letters.
   function broken(text, most) {
@@ -27,15 +28,18 @@
     const abreast = Math.max(1, Math.floor((box.clientWidth - 20) / (45 + WIDE * longest)));
     const title = broken(chart.legend, (box.clientWidth - 90) / WIDE);
     const legend = several ? LINE * (0.5 + title.length + Math.ceil(chart.lines.length / abreast)) : 0;
-    return { height: 300 + legend, margin: { l: 60, r: 12, t: 10, b: BELOW + legend },
+    return { height: 290 + ABOVE + legend, margin: { l: 60, r: 12, t: ABOVE, b: BELOW + legend },
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", showlegend: several,
+      modebar: { bgcolor: "rgba(0,0,0,0)", color: style.color, activecolor: style.color },
       font: { color: style.color, size: 12, family: style.fontFamily }, xaxis: axis(chart.x), yaxis: axis(chart.y),
       legend: { orientation: "h", yref: "container", y: 0, yanchor: "bottom", x: 0,
         title: { text: title.map(plain).join("<br>"), side: "top" } } };
   }
   function draw() {
     return Promise.all(boxes.map((box, i) => Plotly.react(box, traces(charts[i]), layout(charts[i], box), {
-      responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"],
+      responsive: true, displaylogo: false,
+      // The last one would upload the chart.
+      modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d", "sendChartToCloud"],
       toImageButtonOptions: { filename: charts[i].caption, scale: 2 } })));
   }
   dark.addEventListener("change", draw);
