@@ -200,7 +200,7 @@ class Condensed:
             header = json.loads(arrays["header"].tobytes())
         except FileNotFoundError:
             raise Finger3dError(f"{path}: there is no such file") from None
-        except (OSError, ValueError, KeyError, AttributeError, EOFError, zipfile.BadZipFile, zlib.error):
+        except (OSError, ValueError, KeyError, AttributeError, TypeError, EOFError, zipfile.BadZipFile, zlib.error):
             raise Finger3dError(f"{path}: no condensed body, or cut short; condense the scene again") from None
         if not isinstance(header, dict) or header.get("format") != FORMAT:
             raise Finger3dError(f"{path}: no condensed body; `finger3d calibrate` writes one, reduced.npz")
@@ -209,12 +209,44 @@ class Condensed:
                 f"{path}: version {header.get('version')}, this finger3d reads version {VERSION}; condense it again"
             )
         try:
+            _check_arrays(arrays)
             model = _model(header, arrays)
             axes = tuple(header["axes"])
             problem = _assembled(model, arrays, float(header["touch_mm"]), axes)
             return cls(problem, _face("other", arrays, problem.dim), header["about"])
-        except (KeyError, TypeError, ValueError, IndexError):
-            raise Finger3dError(f"{path}: parts of the condensed body are missing; condense the scene again") from None
+        except (KeyError, TypeError, ValueError, IndexError, AttributeError):
+            raise Finger3dError(
+                f"{path}: parts of the condensed body are missing or damaged; condense the scene again"
+            ) from None
+
+
+def _check_arrays(arrays: Mapping[str, Any]) -> None:
+    """Raise ValueError unless the arrays of a file fit together, and all numbers are finite.
+
+    An index out of range would otherwise be met in the middle of a press, or by SciPy, which reads past the array.
+    """
+    sign, parent, count = arrays["sign"], arrays["parent"], len(arrays["face_nodes"])
+    d = sign.shape[1]
+    if d not in (2, 3):
+        raise ValueError("dimension")
+    whole, rows = len(parent), arrays["gauge_rows"].size
+    sizes = {
+        "compliance": (count * d) ** 2, "sign": whole * d, "share": whole, "nodes": whole, "points": whole * 3,
+        "area": whole, "band": 2, "face_points": count * d, "face_area": count, "gauge_rows": rows,
+        "bare_compliance": (count * d) ** 2, "bare_gauge_rows": rows,
+    }  # fmt: skip
+    for name, size in sizes.items():
+        if (name in arrays or not name.startswith("bare")) and arrays[name].size != size:
+            raise ValueError(name)
+    for name, array in arrays.items():
+        if array.dtype.kind not in "iufb" or not np.isfinite(array).all():
+            raise ValueError(name)
+    if rows % max(count * d, 1) or not ((parent >= 0) & (parent < count)).all():
+        raise ValueError("parent")
+    if "object_faces" in arrays and not 0 <= arrays["object_faces"].min() <= arrays["object_faces"].max() < len(
+        arrays["object_points"]
+    ):
+        raise ValueError("object_faces")
 
 
 def friction_at(law: FrictionLaw, mu: float) -> FrictionLaw:
@@ -253,6 +285,7 @@ def _face(name: str, arrays: Mapping[str, Any], dim: int) -> Surface:
     samples, nodes = arrays[f"{name}_samples"].reshape(-1, dim), arrays[f"{name}_nodes"]
     parts = (arrays[f"{name}_mean"], arrays[f"{name}_mean_at"], arrays[f"{name}_mean_rows"])
     mean = sp.csr_matrix(parts, shape=(len(nodes), len(samples)))
+    mean.check_format(full_check=True)
     points = arrays[f"{name}_points"].reshape(-1, dim)
     none = sp.csr_matrix((len(nodes), 0)), sp.csr_matrix((len(samples), 0))
     return Surface(nodes, points, arrays[f"{name}_area"], none[0], samples, mean, none[1])

@@ -32,7 +32,7 @@ Kind = Literal["verification", "validation", "sensitivity", "statement"]
 Measure = Literal["relative", "absolute", "at most", "at least"]
 
 _COLUMNS = ("what", "kind", "reference", "wanted", "got", "measure", "error", "tolerance", "reason", "verdict")
-_NO_NUMBERS = ("cli/*", "page/*", "show/*", "*/picture.py")
+_NO_NUMBERS: tuple[str, ...] = ("cli/*", "page/*", "show/*", "*/picture.py")
 _NO_NUMBERS += tuple(f"{name}.py" for name in "__main__ camera drawing lazy marks notebook outlines panels".split())
 _NO_NUMBERS += ("render.py", "report.py", "view.py")
 """Files of the package that only draw, write pages, report progress or parse commands. A change of any other one makes

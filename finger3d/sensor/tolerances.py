@@ -26,6 +26,7 @@ from finger3d.kinematics import SmallStrain
 from finger3d.model import Gauge, Leg, MeshOptions, Model
 from finger3d.objects import Plane
 from finger3d.problem import Problem, at_points, targets
+from finger3d.ranges import LARGEST_SD
 from finger3d.sensor.curve import Tolerance
 from finger3d.sensor.presses import Like, presses
 from finger3d.solve import build
@@ -60,8 +61,8 @@ def chosen(given: Mapping[str, float] | None) -> dict[str, float]:
         if name not in TOLERANCES:
             near = get_close_matches(name, TOLERANCES, n=1, cutoff=0.0)[0]
             raise Finger3dError(f'tolerance {name}: there is none; did you mean "{near}"? ({", ".join(TOLERANCES)})')
-        if not (math.isfinite(sd) and sd >= 0.0):
-            raise Finger3dError(f"tolerance {name} = {sd}: must be a finite number from 0 up")
+        if not 0.0 <= sd <= LARGEST_SD:
+            raise Finger3dError(f"tolerance {name} = {sd}: must be a finite number from 0 up to {LARGEST_SD:g}")
         found[name] = float(sd)
     return {name: sd for name, sd in found.items() if sd > 0.0}
 
