@@ -50,6 +50,7 @@ def one_line(text: str) -> bool:
 
 
 Name = Annotated[str, MinLen(1), MaxLen(200), Predicate(one_line)]
+Title = Annotated[str, MaxLen(200), Predicate(one_line)]
 PathName = Annotated[str, MinLen(1), Predicate(one_line)]
 
 

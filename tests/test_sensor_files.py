@@ -210,8 +210,8 @@ def test_mistakes_in_readings(text: str, options: list[str], told: str, tmp_path
 @pytest.mark.parametrize(
     ("place", "value"),
     [(("noise",), 1e300), (("resolution_limit",), 1e300), (("curve", "strain", 3), -1e300),
-     (("curve", "mu", 24), 1e300), (("tolerances", "nu", "sd"), 1e300), (("tolerances", "nu", "strain_per_unit", 2), 1e300),
-     (("tolerances", "nu", "strain_sd", 2), 1e300)],
+     (("curve", "mu", 24), 1e300), (("tolerances", "nu", "sd"), 1e300),
+     (("tolerances", "nu", "strain_per_unit", 2), 1e300), (("tolerances", "nu", "strain_sd", 2), 1e300)],
 )  # fmt: skip
 def test_a_number_that_would_overflow_is_refused(place: tuple[Any, ...], value: float, tmp_path: Path, capsys: Any):
     one = Tolerance("nu", "1", 0.003, np.ones(25), np.ones(25))
@@ -252,6 +252,12 @@ def test_calibrate_prints_json_alone(tmp_path: Path, scene_file: Path, capsys: A
 def test_a_folder_takes_one_calibration_at_a_time(tmp_path: Path) -> None:
     with claimed(tmp_path), pytest.raises(Finger3dError, match="another finger3d is writing there"):
         calibrate(scene(), "g36", tmp_path)
+
+
+def test_the_help_names_every_tolerance(capsys: Any) -> None:
+    assert run("calibrate", "--help") == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert ", ".join(TOLERANCES) in said
 
 
 def test_values_of_mu_are_spread_evenly() -> None:

@@ -30,22 +30,10 @@ from finger3d.ranges import LARGEST_SD
 from finger3d.sensor.curve import Tolerance
 from finger3d.sensor.presses import Like, presses
 from finger3d.solve import build
+from finger3d.tolerances import TOLERANCES
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
-
-TOLERANCES: dict[str, tuple[float, str]] = {
-    "depth_mm": (0.1, "mm"),
-    "E_percent": (5.0, "%"),
-    "nu": (0.003, "1"),
-    "tilt_deg": (0.5, "degree"),
-    "gauge_x_mm": (0.3, "mm"),
-    "gauge_y_mm": (0.3, "mm"),
-    "gauge_angle_deg": (2.0, "degree"),
-    "mesh": (1.0, "error bar"),
-}
-"""Standard deviations assumed unless others are given: a careful laboratory set-up and a hand-laid gauge; of the mesh
-its error bar, from a coarser companion."""
 
 _ENOUGH = {2: 150, 3: 500}  # contact points that make a coarser body's differences good to a fifth of the largest
 _LEFT = {2: 100, 3: 500}  # contact points that a tilted body is left with
