@@ -17,7 +17,8 @@ SMALLEST_MM, LARGEST_MM = 1e-2, 1e4
 LONGEST_SLIDE = 100.0
 """Largest slide, in half lengths of the finger: the path is searched for walls every sixtieth of one."""
 
-_ASIDE = 1e6
+FARTHEST_MM = 1e6
+"""Largest coordinate of anything."""
 
 Zero = Annotated[float, Ge(0), Le(0)]
 Modulus = Annotated[float, Ge(1e-9), Le(1e9)]  # MPa
@@ -25,7 +26,7 @@ Poisson = Annotated[float, Ge(0), Le(0.5)]
 Friction = Annotated[float, Ge(0), Le(1e6)]
 Dimension = Annotated[float, Ge(SMALLEST_MM), Le(LARGEST_MM)]  # of a finger
 Length = Annotated[float, Ge(1e-6), Le(1e6)]  # mm
-Place = Annotated[float, Ge(-_ASIDE), Le(_ASIDE)]  # mm
+Place = Annotated[float, Ge(-FARTHEST_MM), Le(FARTHEST_MM)]  # mm
 Angle = Annotated[float, Ge(-360), Le(360)]  # degrees
 Edge = Annotated[float, Ge(1e-4), Le(LARGEST_MM)]  # mm, of a mesh
 Seconds = Annotated[float, Ge(1e-9), Le(1e12)]  # on a press's own clock
@@ -35,12 +36,21 @@ Fraction = Annotated[float, Gt(0), Lt(1)]
 Count = Annotated[int, Ge(1), Le(10_000)]
 
 
+LARGEST_STRAIN, LARGEST_SD = 1e3, 1e6
+"""Largest magnitude of a strain (its standard deviation too), and of any other standard deviation of a calibration."""
+
+Strain = Annotated[float, Ge(-LARGEST_STRAIN), Le(LARGEST_STRAIN)]
+StrainSd = Annotated[float, Ge(0), Le(LARGEST_STRAIN)]
+Noise = Annotated[float, Ge(1e-12), Le(LARGEST_STRAIN)]  # standard deviation of a strain reading
+
+
 def one_line(text: str) -> bool:
     """Whether a text is one line of printable characters: no line breaks, no control characters."""
     return text.isprintable()
 
 
 Name = Annotated[str, MinLen(1), MaxLen(200), Predicate(one_line)]
+Title = Annotated[str, MaxLen(200), Predicate(one_line)]
 PathName = Annotated[str, MinLen(1), Predicate(one_line)]
 
 

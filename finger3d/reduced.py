@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import json
 import math
+import zipfile
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
@@ -199,7 +201,17 @@ class Condensed:
             header = json.loads(arrays["header"].tobytes())
         except FileNotFoundError:
             raise Finger3dError(f"{path}: there is no such file") from None
-        except (OSError, ValueError, KeyError, RecursionError):
+        except (
+            OSError,
+            ValueError,
+            KeyError,
+            AttributeError,
+            TypeError,
+            EOFError,
+            RecursionError,
+            zipfile.BadZipFile,
+            zlib.error,
+        ):
             raise Finger3dError(f"{path}: no condensed body, or cut short; condense the scene again") from None
         if not isinstance(header, dict) or header.get("format") != FORMAT:
             raise Finger3dError(f"{path}: no condensed body; `finger3d calibrate` writes one, reduced.npz")
@@ -215,7 +227,7 @@ class Condensed:
             return cls(problem, _face("other", arrays, problem.dim), header["about"])
         except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError):
             raise Finger3dError(
-                f"{path}: parts of the condensed body are missing or do not fit; condense the scene again"
+                f"{path}: parts of the condensed body are missing or damaged; condense the scene again"
             ) from None
 
 
@@ -421,3 +433,8 @@ def _check_arrays(arrays: Mapping[str, Any], d: int, gauges: int) -> None:
         kinds = "iu" if name.endswith(whole) else "f"
         if values.shape != shape or values.dtype.kind not in kinds or not np.isfinite(values).all():
             raise ValueError(f"{name} does not fit")
+    if not ((arrays["parent"] >= 0) & (arrays["parent"] < c)).all():
+        raise ValueError("parent is out of range")
+    faces = arrays.get("object_faces", np.zeros(0))
+    if faces.size and not 0 <= faces.min() <= faces.max() < len(arrays["object_points"]):
+        raise ValueError("object_faces is out of range")

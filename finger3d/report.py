@@ -8,6 +8,8 @@ import time
 from types import TracebackType
 from typing import Any, TextIO
 
+from finger3d.ranges import printable
+
 
 class Report:
     """What a job calls while it works. This one is silent, and serves as the default.
@@ -47,7 +49,7 @@ class PlainReport(Report):
         self.start = time.perf_counter()
 
     def _line(self, text: str) -> None:
-        print(f"[{time.perf_counter() - self.start:7.1f} s] {text}", file=self.stream, flush=True)
+        print(f"[{time.perf_counter() - self.start:7.1f} s] {printable(text)}", file=self.stream, flush=True)
 
     def stage(self, text: str) -> None:
         """Print the stage."""
@@ -96,16 +98,16 @@ class BarReport(Report):
 
     def stage(self, text: str) -> None:
         """Name the stage and let the bar pulse."""
-        self.progress.update(self.task, description=text, total=None, count="", remark="")
+        self.progress.update(self.task, description=printable(text), total=None, count="", remark="")
 
     def step(self, done: int, total: int, text: str = "") -> None:
         """Move the bar."""
         super().step(done, total, text)
-        self.progress.update(self.task, completed=done, total=total, count=f"{done}/{total}", remark=text)
+        self.progress.update(self.task, completed=done, total=total, count=f"{done}/{total}", remark=printable(text))
 
     def say(self, text: str) -> None:
         """Print a line above the bar."""
-        self.console.print(text, markup=False)
+        self.console.print(printable(text), markup=False)
 
 
 def reporter(stream: TextIO | None = None) -> Report:

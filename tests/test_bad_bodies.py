@@ -179,7 +179,7 @@ def test_shapes_beside_the_finger(table: str, text: str, tmp_path: Path, capsys:
 # what crashes or hangs pytetwild, as far as a scene can ask for it; the rest, as arrays, is in test_design_tetwild.py
 @pytest.mark.parametrize(
     ("size", "text"),
-    [(100.0, "larger than the finger"), (0.02, "tetrahedra"), (0.0, "above 0"), (-1.0, "above 0")],
+    [(100.0, "larger than the finger"), (0.02, "tetrahedra"), (0.0, "from 0.0001"), (-1.0, "from 0.0001")],
 )
 def test_sizes_that_hang_the_mesher(size: float, text: str, tmp_path: Path, capsys: Any) -> None:
     assert text in refused(capsys, tmp_path, PAD, 'shape = "plane"', size)
@@ -195,6 +195,25 @@ def test_a_finger_without_base_or_through_itself(tmp_path: Path, capsys: Any) ->
     write_stl(tmp_path / "leaf.stl", box(8.0, 1e-3, 4.0))  # its size can be asked for, its tetrahedra cannot
     thin = ("--set", "press.depth_mm=1e-4")
     assert "tetrahedra" in refused(capsys, tmp_path, '"leaf.stl"', 'shape = "plane"', 1e-3, thin)
+
+
+def test_a_point_at_the_end_of_single_precision_is_told(tmp_path: Path, capsys: Any) -> None:
+    # a triangle with three equal corners is left out of the surface, its corner is not
+    body = moved(lambda p: p)
+    far = Triangles(np.vstack([body.points, [[3e38] * 3]]), np.vstack([body.faces, [[8, 8, 8]]]))
+    write_stl(tmp_path / "far.stl", far)
+    for said in (refused(capsys, tmp_path, '"far.stl"', 'shape = "plane"'),
+                 refused(capsys, tmp_path, PAD, 'shape = "mesh"\npath = "far.stl"')):  # fmt: skip
+        assert "a point at 3e+38" in said
+
+
+def test_too_many_triangles_are_told_before_they_are_checked(tmp_path: Path, capsys: Any) -> None:
+    from finger3d.design.files import MOST_TRIANGLES
+
+    body = moved(lambda p: p)
+    many = Triangles(body.points, np.tile(body.faces, (MOST_TRIANGLES // len(body.faces) + 1, 1)))
+    write_stl(tmp_path / "many.stl", many)
+    assert f"must be at most {MOST_TRIANGLES}" in refused(capsys, tmp_path, '"many.stl"', 'shape = "plane"')
 
 
 def test_a_finger_drawn_far_away_is_none_the_worse(tmp_path: Path, capsys: Any) -> None:

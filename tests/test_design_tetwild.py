@@ -130,7 +130,7 @@ def test_the_cache_returns_what_was_stored(stored: tuple[Path, Mesh]) -> None:
     assert found[1] == 250.0
 
 
-@pytest.mark.parametrize("damage", ["cut", "empty", "noise", "text", "absent", "changed"])
+@pytest.mark.parametrize("damage", ["cut", "empty", "noise", "text", "absent", "changed", "array"])
 def test_a_damaged_cache_file_is_not_trusted(stored: tuple[Path, Mesh], damage: str) -> None:
     path, mesh = stored
     data = path.read_bytes()
@@ -141,6 +141,9 @@ def test_a_damaged_cache_file_is_not_trusted(stored: tuple[Path, Mesh], damage: 
             arrays = {name: whole[name] for name in whole.files}
         arrays["facets_base"] = arrays["facets_base"][:-1]
         np.savez(path, **arrays)
+    elif damage == "array":  # np.load gives the array itself, which is no archive
+        with path.open("wb") as stream:
+            np.save(stream, np.zeros(3))
     else:
         middle = len(data) // 2
         noise = data[:middle] + bytes(b ^ 255 for b in data[middle : middle + 64]) + data[middle + 64 :]

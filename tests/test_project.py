@@ -160,3 +160,13 @@ def test_code_stays_short(root: Path) -> None:
             if isinstance(node, ast.FunctionDef) and node.end_lineno - node.lineno >= 80:
                 long.append(f"{path.name}: {node.name}")
     assert long == []
+
+
+def test_the_layers_of_imports_are_modules_that_exist(root):
+    layers = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]["contracts"][
+        0
+    ]
+    names = {name.strip("() ") for layer in layers["layers"] for name in layer.split("|")}
+    there = {p.stem for p in (root / "finger3d").glob("*.py")}
+    there |= {p.parent.name for p in (root / "finger3d").glob("*/__init__.py")}
+    assert names == there - {"__init__", "__main__"}

@@ -219,6 +219,32 @@ def test_damaged_files_are_one_line(tmp_path: Path) -> None:
         "; `finger3d calibrate` writes one": with_header(format="a cake"),
         "parts of the condensed body are missing": missing.getvalue(),
     }
+
+    def with_array(name: str, change: Any) -> bytes:
+        stream = io.BytesIO()
+        np.savez(stream, **{**arrays, name: change(arrays[name].copy())})
+        return stream.getvalue()
+
+    def put(index: int, value: float) -> Any:
+        def changed(array: Any) -> Any:
+            array.flat[index] = value
+            return array
+
+        return changed
+
+    single = io.BytesIO()
+    np.save(single, np.zeros(3))
+    damaged = [
+        with_array("parent", put(0, 10**6)), with_array("parent", put(0, -1)), with_array("share", lambda a: a[:-1]),
+        with_array("face_mean_at", put(0, 10**6)), with_array("compliance", put(0, np.nan)),
+        with_array("gauge_rows", put(0, np.inf)), with_array("sign", lambda a: a[:, :1]),
+        with_array("face_area", lambda a: a.astype(object).astype(str)),
+    ]  # fmt: skip
+    for content in damaged:
+        (tmp_path / "bad.npz").write_bytes(content)
+        with pytest.raises(Finger3dError, match="missing or damaged"):
+            Condensed.load(tmp_path / "bad.npz")
+    cases["condensed body, or cut"] = single.getvalue()
     turned = bytearray(data)
     turned[len(data) // 2] ^= 0xFF
     cases["no condensed body, or cut short"] = bytes(turned)

@@ -340,3 +340,35 @@ def test_the_reference_names_every_key_with_its_meaning() -> None:
         "angle_deg",
         "prony",
     } <= keys
+
+
+def test_an_object_without_a_shape_is_a_plane():
+    placed = parse({**SMALL, "object": {"x_mm": 1.0, "tilt_deg": 2.0}})
+    assert placed == parse({**SMALL, "object": {"shape": "plane", "x_mm": 1.0, "tilt_deg": 2.0}})
+    assert parse({**SMALL, "object": {}}) == parse(SMALL)
+
+
+def test_the_template_names_every_design_shape_and_key_of_an_object():
+    from importlib import resources
+
+    from finger3d.design import designs
+    from finger3d.scene.tables import SHAPES, table_of
+
+    text = resources.files("finger3d").joinpath("new_scene.toml").read_text(encoding="utf-8")
+    words = set(re.findall(r"\w+", text))
+    assert {*designs(), *SHAPES} <= words
+    assert {key for table in SHAPES.values() for key in table.model_fields} <= words
+    assert {key for design in designs().values() for key in table_of(design).model_fields} <= words
+
+
+def test_the_title_of_a_file_with_escapes_in_its_name_is_printable(tmp_path, capsys):
+    from finger3d.cli import main
+
+    path = tmp_path / "a\x1b[31mred\nline.toml"
+    path.write_text(parse(SMALL).to_toml().replace('title = "Fig. 9"\n', ""), encoding="utf-8")
+    assert load(path).title.isprintable()
+    assert main(["plan", str(path), "--set", "mesh.mesher=swept"]) == 0
+    assert main(["plan", str(path), "--set", "friction.mu=-1"]) == 2
+    out, err = capsys.readouterr()
+    assert "\x1b" not in out + err
+    assert len(err.splitlines()) == 1

@@ -131,7 +131,15 @@ MISTAKES = {
     "mesh that is not there": ('"plane"', '"mesh"\npath = "gear.stl"', ["gear.stl: there is no such file"]),
     "mesh of another kind": ('"plane"', '"mesh"\npath = "gear.obj"', ["gear.obj: must be a file named .stl"]),
     "mesh as a shape": ('"plane"', '"gear.stl"', ['object.shape = "gear.stl"', '"mesh", and the file its path']),
-    "object without shape": ('shape = "plane"', "x_mm = 1.0", ["object.shape is missing", '"wedge"']),
+    "misspelt shape": ("shape =", "shap =", ["object.shap", 'did you mean "shape"?']),
+    "object of another shape": ('shape = "plane"', "radius_mm = 1.0", ["object.radius_mm = 1.0", "no such key"]),
+    "escape in the title": ('title = "test"', 'title = "\\u001b[31mred"', ["title = ", "one line of printable text"]),
+    "line break in a gauge's name": ('"g36"', '"g\\n36"', ["gauge.0.name = ", "one line of printable text"]),
+    "separator in the title": ('title = "test"', 'title = "a\\u2028b"', ["title = ", "one line of printable text"]),
+    "escape in a path": ('"plane"', '"mesh"\npath = "\\u001b[31m.stl"', ["object.path = ", "one line"]),
+    "escape in a geometry": ('"clipped_cylinder"', '"\\u001b[31m.stl"', ["finger.geometry = ", "one line"]),
+    "escape in an effect": (PRESS, PRESS + '[effects."\\u001b[31m"]\n', ["no such effect"]),
+    "escape in a key": ("mu = 0.25", '"\\u001b[31mmu" = 0.25', ["no such key"]),
     "sphere without radius": ('"plane"', '"sphere"', ["object.radius_mm is missing"]),
     "tilt": ('"plane"', '"plane"\ntilt_deg = 90.0', ["object.tilt_deg = 90.0", "above -90 and below 90"]),
     "axis": ('"plane"', '"cylinder"\nradius_mm = 1.0\naxis = "y"', ['object.axis = "y"', '"x" or "z"']),
@@ -193,6 +201,7 @@ def refused(capsys, *arguments: str) -> str:
     assert err.endswith("\n")
     assert len(err.splitlines()) == 1, err
     assert "Traceback" not in err
+    assert err.rstrip("\n").isprintable()
     assert "pydantic" not in err.lower()
     return err
 

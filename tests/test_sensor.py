@@ -223,7 +223,7 @@ def test_coverage_with_a_depth_that_is_off_by_presses_of_the_real_body() -> None
     [
         (math.nan, None, "strain = nan: must be a finite number"),
         ([0.01, math.inf], None, "reading 2 of 2"),
-        (0.01, -1e-4, "std = -0.0001: must be a finite number from 0 up"),
+        (0.01, -1e-4, "std = -0.0001: must be a finite number from 0 to 1000"),
         (0.01, math.nan, "std = nan"),
         ([0.01, 0.02, 0.03], [1e-4, 1e-4], "2 of them for 3 strains"),
     ],

@@ -141,7 +141,7 @@ def test_calibration_files_that_are_none(tmp_path: Path) -> None:
         "version 1, this finger3d reads version 2": json.dumps({**data, "version": 1}),
         "no calibration": json.dumps([1, 2]),
         "curve: field required": json.dumps({k: v for k, v in data.items() if k != "curve"}),
-        "noise: input should be greater than 0": json.dumps({**data, "noise": 0.0}),
+        "noise: input should be greater than or equal to 0.0": json.dumps({**data, "noise": 0.0}),
         "curve: mu must ascend": json.dumps(short),
         "curve.mu.0: input should be": json.dumps({**data, "curve": {**data["curve"], "mu": ["a", 1.0, 2.0, 3.0]}}),
     }
@@ -167,7 +167,10 @@ def test_calibration_files_that_are_none(tmp_path: Path) -> None:
         (["--gauge", "g36", "--mu", "0,0,0,0"], "1 different value; a calibration needs at least 4"),
         (["--gauge", "g36", "--mu", "a:b"], "must be first:last:count"),
         (["--gauge", "g36", "--mu", "0:1:100000000"], "must be first:last:count"),
-        (["--gauge", "g36", "--noise", "0"], "--noise 0: must be a finite number above 0"),
+        (["--gauge", "g36", "--noise", "0"], "--noise 0: must be a finite number from 1e-12 to 1000"),
+        (["--gauge", "g36", "--noise", "1e300"], "--noise 1e+300: must be a finite number from 1e-12 to 1000"),
+        (["--gauge", "g36", "--mu", "0.1,0.2,0.3,1e300"], "--mu: 1e+300"),
+        (["--gauge", "g36", "--tolerance", "depth_mm=1e300"], "from 0 up to 1e+06"),
         (["--gauge", "g36", "--resolution", "nan"], "--resolution nan"),
         (["--gauge", "g36", "--tolerance", "deep_mm=1"], 'did you mean "depth_mm"?'),
         (["--gauge", "g36", "--tolerance", "depth_mm"], "must be NAME=NUMBER"),
@@ -205,6 +208,33 @@ def test_mistakes_in_readings(text: str, options: list[str], told: str, tmp_path
     assert len(err.splitlines()) == 1
 
 
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [(("noise",), 1e300), (("resolution_limit",), 1e300), (("curve", "strain", 3), -1e300),
+     (("curve", "mu", 24), 1e300), (("tolerances", "nu", "sd"), 1e300),
+     (("tolerances", "nu", "strain_per_unit", 2), 1e300), (("tolerances", "nu", "strain_sd", 2), 1e300)],
+)  # fmt: skip
+def test_a_number_that_would_overflow_is_refused(place: tuple[Any, ...], value: float, tmp_path: Path, capsys: Any):
+    one = Tolerance("nu", "1", 0.003, np.ones(25), np.ones(25))
+    data = json.loads(save(curve(straight, tolerances=(one,)), tmp_path / "calibration.json").read_text())
+    node = data
+    for key in place[:-1]:
+        node = node[key]
+    node[place[-1]] = value
+    (tmp_path / "calibration.json").write_text(json.dumps(data))
+    assert run("estimate", tmp_path / "calibration.json", "--strain", "0.01") == 2
+    err = capsys.readouterr().err
+    assert ".".join(map(str, place)) in err
+    assert len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("options", [["--strain", "1e300"], ["--strain", "0.01", "--std", "1e300"]])
+def test_a_reading_that_would_overflow_is_refused(options: list[str], tmp_path: Path, capsys: Any) -> None:
+    kept = save(curve(straight), tmp_path / "calibration.json")
+    assert run("estimate", kept, *options) == 2
+    assert "1e+300: must be" in capsys.readouterr().err
+
+
 def test_estimate_of_nan_and_of_nothing(tmp_path: Path, capsys: Any) -> None:
     kept = save(curve(straight), tmp_path / "calibration.json")
     assert run("estimate", kept, "--strain", "nan") == 2
@@ -223,6 +253,12 @@ def test_calibrate_prints_json_alone(tmp_path: Path, scene_file: Path, capsys: A
 def test_a_folder_takes_one_calibration_at_a_time(tmp_path: Path) -> None:
     with claimed(tmp_path), pytest.raises(Finger3dError, match="another finger3d is writing there"):
         calibrate(scene(), "g36", tmp_path)
+
+
+def test_the_help_names_every_tolerance(capsys: Any) -> None:
+    assert run("calibrate", "--help") == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert ", ".join(TOLERANCES) in said
 
 
 def test_values_of_mu_are_spread_evenly() -> None:

@@ -15,6 +15,7 @@ from cyclopts import App, Parameter
 import finger3d
 from finger3d.errors import Finger3dError
 from finger3d.lazy import loading, postpone
+from finger3d.ranges import printable
 from finger3d.report import Report, reporter
 
 if TYPE_CHECKING:
@@ -113,7 +114,7 @@ def kept(out: Path, total: int) -> str:
 
 
 def complain(text: str) -> None:
-    print(f"finger3d: {' '.join(text.split())}", file=sys.stderr)
+    print(f"finger3d: {printable(' '.join(text.split()))}", file=sys.stderr)
 
 
 def print_rows(title: str, rows: Iterable[tuple[str, Any]]) -> None:
@@ -122,11 +123,11 @@ def print_rows(title: str, rows: Iterable[tuple[str, Any]]) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    table = Table(title=Text(title, style="bold"), title_justify="left", box=box.SIMPLE, show_header=False)
+    table = Table(title=Text(printable(title), style="bold"), title_justify="left", box=box.SIMPLE, show_header=False)
     table.add_column(no_wrap=True)
     table.add_column(overflow="fold")
     for key, value in rows:
-        table.add_row(Text(key), Text(str(value)))
+        table.add_row(Text(printable(key)), Text(printable(str(value))))
     # In a pipe nothing limits the width: a folded path could not be copied.
     width = None if sys.stdout.isatty() else 500
     Console(file=sys.stdout, highlight=False, width=width).print(table)
@@ -142,5 +143,5 @@ def print_columns(head: Sequence[str], lines: Iterable[Sequence[str]]) -> None:
     for name in head:
         table.add_column(name, overflow="fold")
     for line in lines:
-        table.add_row(*(Text(cell.replace("**", "")) for cell in line))
+        table.add_row(*(Text(printable(cell.replace("**", ""))) for cell in line))
     Console(file=sys.stdout, highlight=False, width=None if sys.stdout.isatty() else 240).print(table)

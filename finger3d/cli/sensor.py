@@ -13,6 +13,7 @@ from cyclopts import Parameter
 from finger3d.cli.common import Json, Set, app, check_writable, complain, load, print_json, print_rows, reporting
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.lazy import loading
+from finger3d.tolerances import TOLERANCES
 
 if TYPE_CHECKING:
     from finger3d.sensor import Estimate
@@ -23,7 +24,7 @@ Tolerances = Annotated[
         name="--tolerance",
         negative=(),
         help="Standard deviation of something not known exactly, for instance depth_mm=0.05; 0 leaves it out; may be "
-        "repeated. Of depth_mm, E_percent, nu, tilt_deg, gauge_x_mm, gauge_y_mm, gauge_angle_deg, mesh, increments.",
+        f"repeated. Of {', '.join(TOLERANCES)}.",
     ),
 ]
 

@@ -8,6 +8,7 @@ import hashlib
 import inspect
 import json
 import os
+import struct
 import tempfile
 import zipfile
 import zlib
@@ -24,6 +25,12 @@ FORMAT = 1
 """Raise this when meshes made by an older finger3d must not be used any more."""
 
 _PACKAGES = ("pytetwild", "build123d")
+
+# What np.load and Mesh raise for a file that is cut short, no archive, a single array (.npy), or of other arrays.
+_DAMAGED = (
+    OSError, EOFError, AttributeError, IndexError, KeyError, NotImplementedError, RuntimeError, TypeError, ValueError,
+    struct.error, zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
 
 
 def folder() -> Path:
@@ -80,7 +87,7 @@ def load(path: Path) -> tuple[Mesh, float] | None:
             if str(data["hash"]) != _sealed(mesh):
                 return None
             return mesh, float(data["cad_volume_mm3"])
-    except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile, zlib.error):
+    except _DAMAGED:
         return None
 
 

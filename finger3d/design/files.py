@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.errors import Finger3dError
+from finger3d.ranges import number
 from finger3d.triangles import Triangles, mistake
 
 Float = NDArray[np.float64]
@@ -16,8 +17,12 @@ Float = NDArray[np.float64]
 STL, STEP = (".stl",), (".step", ".stp")
 SUFFIXES = (*STL, *STEP)
 
+MOST_TRIANGLES = 300_000
+"""Of a body from an STL file: its checks take some 25 us a triangle."""
+
 _TESSELLATION = 5e-5  # of the diagonal: a curved CAD face comes this near
 _ANGLE = 0.2
+_FARTHEST_MM = 1e12  # even of a body drawn far away, or of a triangle that is left out since it vanishes
 _WELD = 1e-6  # of the diagonal: gaps that single precision leaves between triangles that touch
 
 
@@ -37,7 +42,7 @@ def read_surface(path: str | Path, scale: float = 1.0) -> Triangles:
     if path.suffix.lower() in STEP:
         surface = tessellated(read_solid(path))
     elif path.suffix.lower() in STL:
-        surface = _stl(path)
+        surface = _stl(path, scale)
     else:
         raise Finger3dError(f"{path}: must be a file named {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}")
     surface = Triangles(surface.points * scale, surface.faces)
@@ -62,7 +67,7 @@ def content(path: Path) -> str:
     return hashlib.sha256(_bytes(path)).hexdigest()
 
 
-def _stl(path: Path) -> Triangles:
+def _stl(path: Path, scale: float) -> Triangles:
     import io
 
     import trimesh
@@ -73,7 +78,19 @@ def _stl(path: Path) -> Triangles:
         mesh = None
     if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
         raise Finger3dError(f"{path}: this is no STL mesh, or an empty one")
-    return welded(np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int64))
+    if len(mesh.faces) > MOST_TRIANGLES:
+        raise Finger3dError(
+            f"{path}: {len(mesh.faces)} triangles; must be at most {MOST_TRIANGLES}: triangles much smaller than "
+            "mesh.size_mm tell the mesh nothing; export it coarser, or simplify it"
+        )
+    points = np.asarray(mesh.vertices, dtype=float)
+    far = np.isfinite(points) & (np.abs(points) * scale > _FARTHEST_MM)
+    if far.any():
+        raise Finger3dError(
+            f"{path}: a point at {points[far].flat[0]:g}: coordinates must be numbers from -{number(_FARTHEST_MM)} to "
+            f"{number(_FARTHEST_MM)} mm; mend it where it was drawn"
+        )
+    return welded(points, np.asarray(mesh.faces, dtype=np.int64))
 
 
 def welded(points: Float, faces: NDArray[np.int64]) -> Triangles:

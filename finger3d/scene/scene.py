@@ -18,9 +18,10 @@ from finger3d.design.files import SUFFIXES
 from finger3d.errors import Finger3dError
 from finger3d.model import Domain, Gauge, Leg, Material, MeshOptions, Model
 from finger3d.objects import RigidObject, approach
+from finger3d.ranges import PathName, one_line, printable
 from finger3d.scene import bodies, checks, tree
 from finger3d.scene.lookup import effect_names, effect_type
-from finger3d.scene.mistakes import Place, choose, dotted, listed, nearest, shown, unknown, worded
+from finger3d.scene.mistakes import Place, choose, described, dotted, listed, nearest, shown, unknown, worded
 from finger3d.scene.tables import (
     SHAPES,
     FileTable,
@@ -62,7 +63,7 @@ class Scene:
     @property
     def title(self) -> str:
         """The title, or the file's name."""
-        return self.tables.title or (self.path.stem if self.path else "scene")
+        return self.tables.title or (printable(self.path.stem) if self.path else "scene")
 
     def __repr__(self) -> str:
         """One line: title, body, domain, effects."""
@@ -161,7 +162,7 @@ def parse(
     tables = _checked(SceneTable, given, (), found)
     geometry, dimensions = _named(given, "finger", "geometry", designs(), found)
     design = _design(geometry, dimensions, found)
-    shape, placed = _named({"object": {"shape": "plane"}, **given}, "object", "shape", SHAPES, found)
+    shape, placed = _named({**given, "object": _shaped(given.get("object", {}))}, "object", "shape", SHAPES, found)
     rigid = _object(placed, found)
     press = _press(given, found)
     effects = _effects(given, found)
@@ -276,6 +277,13 @@ def _object(placed: Table | None, found: dict[Place, str]) -> RigidObject | None
         return None
 
 
+def _shaped(table: Any) -> Any:
+    """The [object] table with the default shape, a plane, where it names none."""
+    if not isinstance(table, Mapping) or "shape" in table or any(nearest(k, ("shape",)) for k in table):
+        return table
+    return {"shape": "plane", **table}
+
+
 def _named(
     given: Mapping[str, Any], name: str, key: str, known: Mapping[str, type], found: dict[Place, str]
 ) -> tuple[str, Table | None]:
@@ -293,6 +301,9 @@ def _named(
         found[name, misspelt or key] = line
         return "", None
     value = given_table[key]
+    if isinstance(value, str) and not one_line(value):
+        found[name, key] = f"{name}.{key} = {shown(value)}: must be {described(PathName)}"
+        return "", None
     if name == "finger" and bodies.is_file(value):
         if not Path(value).exists():
             # Told alone: the other keys may well be those of the design that the file was to replace.

@@ -27,6 +27,7 @@ from finger3d.ranges import (
     Poisson,
     Scale,
     Seconds,
+    Title,
     Zero,
 )
 
@@ -158,7 +159,7 @@ class GaugeTable(Table):
 class SceneTable(Table):
     """The whole file. Tables whose keys depend on a name are checked afterwards, against that name's own table."""
 
-    title: Name | None = None
+    title: Title | None = None
     finger: dict[str, Any]
     material: MaterialTable
     object: dict[str, Any] | None = None

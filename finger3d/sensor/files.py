@@ -7,14 +7,17 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from annotated_types import Ge, Gt, MinLen
+from annotated_types import Ge, Gt, Le, MinLen
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from finger3d.errors import Finger3dError
 from finger3d.export import write_csv, write_json
+from finger3d.ranges import LARGEST_SD, Friction, Noise, Strain, StrainSd
 from finger3d.sensor.curve import FEWEST, Calibration, Tolerance
 
 FORMAT, VERSION = "finger3d calibration", 2
+
+_STEEPEST = 1e12  # strain per unit of what is not known exactly
 
 
 class _Part(BaseModel):
@@ -22,15 +25,15 @@ class _Part(BaseModel):
 
 
 class _Curve(_Part):
-    mu: Annotated[list[float], MinLen(FEWEST)]
-    strain: Annotated[list[float], MinLen(FEWEST)]
+    mu: Annotated[list[Friction], MinLen(FEWEST)]
+    strain: Annotated[list[Strain], MinLen(FEWEST)]
 
 
 class _Tolerance(_Part):
     unit: str
-    sd: Annotated[float, Ge(0.0)]
-    strain_per_unit: list[float]
-    strain_sd: list[Annotated[float, Ge(0.0)]]
+    sd: Annotated[float, Ge(0.0), Le(LARGEST_SD)]
+    strain_per_unit: list[Annotated[float, Ge(-_STEEPEST), Le(_STEEPEST)]]
+    strain_sd: list[StrainSd]
 
 
 class _Failed(_Part):
@@ -41,8 +44,8 @@ class _Failed(_Part):
 class _File(_Part):
     gauge: str
     curve: _Curve
-    noise: Annotated[float, Gt(0.0)]
-    resolution_limit: Annotated[float, Gt(0.0)]
+    noise: Noise
+    resolution_limit: Annotated[float, Gt(0.0), Le(1e6)]
     tolerances: dict[str, _Tolerance]
     failed: list[_Failed]
     scene: dict[str, Any]

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from finger3d.errors import Finger3dError
+from finger3d.ranges import LARGEST_STRAIN
 from finger3d.sensor.curve import Calibration, Shape
 
 Float = NDArray[np.float64]
@@ -102,11 +103,12 @@ def estimate(
         raise Finger3dError(
             f"std: {given.size} of them for {readings.size} strains; give one for all, or each"
         ) from None
-    for name, values, bad in (("strain", readings, ~np.isfinite(readings)),
-                              ("std", noise, ~(np.isfinite(noise) & (noise >= 0.0)))):  # fmt: skip
+    far = LARGEST_STRAIN
+    for name, values, bad in (("strain", readings, ~(np.abs(readings) <= far)),
+                              ("std", noise, ~((noise >= 0.0) & (noise <= far)))):  # fmt: skip
         if bad.any():
             i = int(np.argmax(bad))
-            wanted = "a finite number" if name == "strain" else "a finite number from 0 up"
+            wanted = f"a finite number from {-far if name == 'strain' else 0:g} to {far:g}"
             where = f" (reading {i + 1} of {len(readings)})" if len(readings) > 1 else ""
             raise Finger3dError(f"{name} = {values[i]}{where}: must be {wanted}")
     calibration = calibration if tolerances else replace(calibration, tolerances=())

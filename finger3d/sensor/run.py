@@ -21,6 +21,7 @@ from finger3d.history import Frame
 from finger3d.model import Gauge, Model
 from finger3d.page import calibrate_page
 from finger3d.problem import Problem
+from finger3d.ranges import LARGEST_STRAIN, number
 from finger3d.reduced import Condensed
 from finger3d.report import Report
 from finger3d.sensor.curve import FEWEST, NOISE, RESOLUTION, Calibration, Range, Tolerance
@@ -34,6 +35,7 @@ from finger3d.versions import versions
 if TYPE_CHECKING:
     from finger3d.scene import Scene
 
+_LARGEST_MU = 1e6
 Float = NDArray[np.float64]
 
 MUS = tuple(float(mu) for mu in np.linspace(0.02, 1.2, 25).round(10))
@@ -176,17 +178,17 @@ def found_gauge(model: Model, name: str) -> Gauge:
 
 def _checked(mus: Sequence[float], noise: float, limit: float) -> tuple[float, ...]:
     for mu in mus:
-        if not (math.isfinite(mu) and mu >= 0.0):
-            raise Finger3dError(f"--mu: {mu:g}: must be finite numbers from 0 up, for instance 0.02:1.2:25")
+        if not 0.0 <= mu <= _LARGEST_MU:
+            raise Finger3dError(f"--mu: {mu:g}: must be finite numbers from 0 up to 1e6, for instance 0.02:1.2:25")
     found = tuple(sorted({float(mu) for mu in mus}))
     if len(found) < FEWEST:
         raise Finger3dError(
             f"--mu: {len(found)} different value{'s' if len(found) != 1 else ''}; a calibration needs at least "
             f"{FEWEST}, for instance 0.02:1.2:25"
         )
-    for name, value in (("--noise", noise), ("--resolution", limit)):
-        if not (math.isfinite(value) and value > 0.0):
-            raise Finger3dError(f"{name} {value:g}: must be a finite number above 0")
+    for name, value, low, high in (("--noise", noise, 1e-12, LARGEST_STRAIN), ("--resolution", limit, 1e-12, 1e6)):
+        if not low <= value <= high:
+            raise Finger3dError(f"{name} {value:g}: must be a finite number from {number(low)} to {number(high)}")
     return found
 
 

@@ -26,27 +26,15 @@ from finger3d.history import Frame
 from finger3d.model import Gauge, Leg, MeshOptions, Model
 from finger3d.objects import Plane
 from finger3d.problem import Problem, at_points, targets
+from finger3d.ranges import LARGEST_SD
 from finger3d.sensor.curve import Tolerance
 from finger3d.sensor.increments import Increments, increment_error
 from finger3d.sensor.presses import Like, presses
 from finger3d.solve import build
+from finger3d.tolerances import TOLERANCES
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
-
-TOLERANCES: dict[str, tuple[float, str]] = {
-    "depth_mm": (0.1, "mm"),
-    "E_percent": (5.0, "%"),
-    "nu": (0.003, "1"),
-    "tilt_deg": (0.5, "degree"),
-    "gauge_x_mm": (0.3, "mm"),
-    "gauge_y_mm": (0.3, "mm"),
-    "gauge_angle_deg": (2.0, "degree"),
-    "mesh": (1.0, "error bar"),
-    "increments": (1.0, "error bar"),
-}
-"""Standard deviations assumed unless others are given: a careful laboratory set-up and a hand-laid gauge; of the mesh
-its error bar, from a coarser companion, and of the increments theirs, from presses of more or fewer."""
 
 _ENOUGH = {2: 150, 3: 500}  # contact points that make a coarser body's differences good to a fifth of the largest
 _LEFT = {2: 100, 3: 500}  # contact points that a tilted body is left with
@@ -62,8 +50,8 @@ def chosen(given: Mapping[str, float] | None) -> dict[str, float]:
         if name not in TOLERANCES:
             near = get_close_matches(name, TOLERANCES, n=1, cutoff=0.0)[0]
             raise Finger3dError(f'tolerance {name}: there is none; did you mean "{near}"? ({", ".join(TOLERANCES)})')
-        if not (math.isfinite(sd) and sd >= 0.0):
-            raise Finger3dError(f"tolerance {name} = {sd}: must be a finite number from 0 up")
+        if not 0.0 <= sd <= LARGEST_SD:
+            raise Finger3dError(f"tolerance {name} = {sd}: must be a finite number from 0 up to {LARGEST_SD:g}")
         found[name] = float(sd)
     return {name: sd for name, sd in found.items() if sd > 0.0}
 
