@@ -34,7 +34,7 @@ from ._paper import columns, said
 NU, NOISE, LIMIT = 0.49, 1.5e-4, 0.1
 TURN = math.radians(30.0)
 FOIL = Effect(3000.0, 0.02, 3.0)
-SIZES: dict[Domain, tuple[float, float]] = {"plane-strain": (0.8, 3.0), "solid": (2.0, 6.0)}
+SIZES: dict[Domain, tuple[float, float]] = {"plane-strain": (0.8, 3.0), "solid": (1.4, 5.0)}
 QUICK: dict[Domain, tuple[float, float]] = {"plane-strain": (3.0, 10.0), "solid": (5.0, 12.0)}
 NAMES = {"plane-strain": "plane strain", "solid": "20 mm wide"}
 FREE, READ = "free strain", "as a foil reads it"
