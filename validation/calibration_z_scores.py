@@ -75,7 +75,7 @@ def model(nu: float, size: float, steps: Steps) -> Model:
 def run(quick: bool) -> Result:
     """Quick: one nu, three gauges, 10 increments."""
     random = np.random.default_rng(20261123)
-    nus, counts, size = ((0.45,), (10,), 0.3) if quick else ((0.3, 0.49), (10, 20, 40, "auto"), 0.2)
+    nus, counts, size = ((0.45,), (10,), 0.3) if quick else ((0.3, 0.49), (10, 20, 40, "auto"), 0.1)
     found: list[Reading] = []
     bare: dict[tuple[float, float, int], Float] = {}
     for nu in nus:
@@ -139,17 +139,10 @@ def _rows(found: list[Reading]) -> Iterator[Row]:
         for mesh in (SAME, FINER):
             some = [r for r in found if r.steps == steps and r.mesh == mesh]
             what = f"calibrated with {steps} increments, read with more, {mesh}, {len(some)} readings"
-            z = np.array([r.z for r in some])
-            yield Row(
-                f"z of the strain, rms: {what}", "1 if the errors are as told", 0.9, _rms(z), 0.4,
-                "0.5 to 1.3: the error of a body is one draw", "sensitivity", "absolute",
-            )  # fmt: skip
+            yield from _near_one(f"z of the strain, rms: {what}", np.array([r.z for r in some]))
             z_mu = np.array([r.z_mu for r in some if math.isfinite(r.z_mu)])
             if len(z_mu) > 10:
-                yield Row(
-                    f"z of mu, rms: {what}, {len(z_mu)} of which tell mu", "1 if the errors are as told", 0.9,
-                    _rms(z_mu), 0.4, "0.5 to 1.3, as above", "sensitivity", "absolute",
-                )  # fmt: skip
+                yield from _near_one(f"z of mu, rms: {what}, {len(z_mu)} of which tell mu", z_mu)
             share = float(np.mean([r.inside for r in some]))
             yield Row(
                 f"share of 68 % sets that hold the true mu: {what}", "erf(1/sqrt 2)", 0.683, share, 0.0,
@@ -160,6 +153,15 @@ def _rows(found: list[Reading]) -> Iterator[Row]:
                 f"largest z of the strain without the tolerance of the increments: {what}", "no reference", 3.0, worst,
                 0.0, "a reading off by more than three standard deviations", "statement", "at least",
             )  # fmt: skip
+
+
+def _near_one(what: str, z: Float) -> Iterator[Row]:
+    """Not overconfident, which must be; nor told much too large, which is a finding where the mesh has its part."""
+    why = "the error of a body is one draw for all of its readings"
+    yield Row(what, "1 if the errors are as told", 1.3, _rms(z), 0.0, why, "sensitivity", "at most")
+    yield Row(
+        f"{what}; not less than half", "1 if the errors are as told", 0.5, _rms(z), 0.0, why, "statement", "at least"
+    )
 
 
 def _rms(z: Float) -> float:
