@@ -213,7 +213,7 @@ class Body:
         try:
             problem = self.problem_of(variant)
             if variant.legs != self.problem.model.legs:  # the body was built, and its mesh checked, for another path
-                check(problem.model, problem.surface, problem.touch_mm, problem.axes)
+                check(problem.model, problem.surface, problem.touch_mm, problem.place_mm, problem.axes)
             frames = _frames(problem)
         except TROUBLE as error:
             frames = error.with_traceback(None)  # which would keep all arrays on the way

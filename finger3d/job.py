@@ -44,6 +44,8 @@ class _Output:
     """The files of a press that grow with its steps."""
 
     def __init__(self, scene: Scene, problem: Problem, out: Path, started: float, before: int) -> None:
+        from finger3d import resolution
+
         self.scene, self.problem, self.out, self.started = scene, problem, out, started
         self.factorizations_before = before
         self.factorizations: int | None = None  # of the press alone, once it is done: the estimate makes its own
@@ -54,7 +56,7 @@ class _Output:
         self.coupling = problem.coupling()
         self.advice: list[str] = []
         self.warnings = [*problem.model.warnings, *_coupling_warning(self.coupling), *_depth_warning(problem)]
-        self.warnings += _resolution_warning(problem)
+        self.warnings += resolution.warnings(problem)
         self.seconds = {"cad": 0.0, "mesh": 0.0, **problem.seconds, "contact": 0.0, "output": 0.0}
         self._written = -math.inf
 
@@ -239,20 +241,12 @@ def _depth_warning(problem: Problem) -> list[str]:
     ]
 
 
-def _resolution_warning(problem: Problem) -> list[str]:
-    """Whether the contact points see the object's details."""
-    from finger3d.resolution import hidden, warnings
-
-    model, face, touch = problem.model, problem.surface, problem.touch_mm
-    return warnings(model, hidden(model, face, touch, problem.axes), touch)
-
-
 def _unseen_warning(problem: Problem, frames: list[Frame]) -> list[str]:
     """Increments of positive depth that no contact point sees, as their averaged gaps are still open."""
-    from finger3d.resolution import unseen
+    from finger3d import resolution
 
     apart = [f.target for f in frames if f.outcome.ok and (f.state.status == OPEN).all()]
-    missed = unseen(problem.model, problem.surface, problem.touch_mm, apart)
+    missed = resolution.unseen(problem.model, problem.surface, problem.touch_mm, apart)
     if not missed:
         return []
     return [

@@ -145,7 +145,7 @@ class Condensed:
         problem = replace(self.problem, model=replace(model, friction=law, legs=tuple(legs or model.legs)))
         if legs is not None:
             self._check(problem)
-            check(problem.model, problem.surface, problem.touch_mm, problem.axes)
+            check(problem.model, problem.surface, problem.touch_mm, problem.place_mm, problem.axes)
         return History(problem.points, tuple(march(problem)))
 
     def _check(self, problem: Problem) -> None:

@@ -20,9 +20,9 @@ from scipy.spatial import KDTree
 from finger3d.errors import UnresolvedError
 from finger3d.fem.surface import Surface
 from finger3d.history import Target
-from finger3d.model import Model
+from finger3d.model import Leg, Model
 from finger3d.objects import Cylinder, Sphere, Wave, Wedge, approach
-from finger3d.problem import rigid_gap, targets
+from finger3d.problem import Problem, rigid_gap, targets
 
 Float = NDArray[np.float64]
 Box = tuple[float, float, float, float]
@@ -33,7 +33,7 @@ REFUSED = 0.5
 _WARNED = 0.1
 _AIM = 0.05  # of the edge length that is named, as meshes are not regular
 _STATIONS = 4  # along each leg, as for the approach
-_BESIDE = {2: 2, 3: 4}  # contact points that are beside a place
+_BESIDE = {2: 4, 3: 16}  # contact points beside a place: with two rings, some lie all under the foot of a step
 _PER_WAVE, _PER_RADIUS = 4.0, 2.0  # edges that a wavelength, and a radius, must have at least
 _FINER, _TRIES = 0.8, 80  # down to 2e-8 of the edge length
 _PATCH = 3  # edges on either side of a place
@@ -48,49 +48,66 @@ class Hidden:
     ----------
     share : largest hidden depth over the depth of the press
     seen : whether any contact point is reached
-    depth_mm, target : hidden depth, and the target where it is largest
+    depth_mm, target, place : hidden depth, the target where it is largest, and where (2,) along x and z
     """
 
     share: float
     seen: bool
     depth_mm: float
     target: Target
+    place: Float
 
 
-def hidden(model: Model, face: Surface, touch_mm: float, axes: tuple[str, ...] = (), box: Box | None = None) -> Hidden:
+def hidden(model: Model, face: Surface, touch_mm: float, tips: Float | None, axes: tuple[str, ...] = ()) -> Hidden:
     """Largest hidden depth over a model's path.
 
     Parameters
     ----------
     face : contact points of the meshed part
     touch_mm : height of the object's lowest point at first touch
+    tips : (k, 2) mm, places along x and z to look at, which the object carries along, see `tips_of`; None: not known
     axes : symmetry planes of the meshed part
-    box : corners and tips of the object that count; None: all
     """
     d = face.points.shape[1]
     upright = -float(model.object.frame(d)[0, 1])
-    beside = KDTree(_flat(face.points)).query(_flat(face.samples), k=min(_BESIDE[d], len(face.points)))[1]
+    tree, count = KDTree(_flat(face.points)), min(_BESIDE[d], len(face.points))
+    beside = tree.query(_flat(face.samples), k=count)[1].reshape(-1, count)
     path = targets(tuple(replace(leg, steps=_STATIONS) for leg in model.legs))
     deepest = max(t.depth_mm for t in path)
-    found = Hidden(0.0, deepest <= 0.0, 0.0, path[-1])
+    found = Hidden(0.0, deepest <= 0.0, 0.0, path[-1], np.zeros(2))
     # at one place nothing that was hidden comes into sight by pressing less
     deepest_at = {(t.slide_x_mm, t.slide_z_mm): t for t in sorted(path, key=lambda t: t.depth_mm) if t.depth_mm > 0.0}
-    for target in deepest_at.values():
+    for slide, target in deepest_at.items():
         seen = np.maximum(-rigid_gap(model, face, touch_mm, target), 0.0)
-        best = seen[beside].reshape(len(face.samples), -1).max(axis=1)
-        missed = [0.0, float((_overlap(model, face.samples, touch_mm, target) * upright - best).max())]
-        if not target.slide_x_mm and not target.slide_z_mm:  # the place of first touch is the deepest
-            missed.append(target.depth_mm * upright - float(seen.max()))
-        missed.append(_at_tips(model, face, (touch_mm, upright), axes, target, seen, box))
-        reached = found.seen or bool(seen.any())
-        found = replace(found, seen=reached)
-        if max(missed) > found.depth_mm * upright:
-            depth = max(missed) / upright
-            found = Hidden(depth / deepest, reached, depth, target)
+        found = replace(found, seen=found.seen or bool(seen.any()))
+        at = np.zeros((0, d)) if tips is None else _on_finger(model, tips + slide, d)
+        near = tree.query(np.where([a in axes for a in "xz"[: d - 1]], np.abs(_flat(at)), _flat(at)), k=count)[1]
+        places, around = np.vstack([face.samples, at]), np.vstack([beside, near.reshape(-1, count)])
+        missed = _overlap(model, places, touch_mm, target) - seen[around].max(axis=1) / upright
+        worst = int(missed.argmax())
+        depth = float(missed[worst])
+        if tips is None and not any(slide):  # the place of first touch, wherever it is, is the deepest
+            depth = max(depth, target.depth_mm - float(seen.max()) / upright)
+        if depth > found.depth_mm:
+            place = np.append(_flat(places[worst]), np.zeros(3 - d))
+            found = Hidden(depth / deepest, found.seen, depth, target, place)
     return found
 
 
-def check(model: Model, face: Surface, touch_mm: float, axes: tuple[str, ...] = ()) -> None:
+def tips_of(model: Model, place: tuple[float, float] | None) -> Float | None:
+    """Places (k, 2) mm that a search could step over: the object's corners and tips, and that of first touch.
+
+    None where the finger's surface is not known between its samples.
+    """
+    if place is None or not hasattr(model.design, "top"):
+        return None
+    at = np.vstack([model.object.landmarks(), [place]])
+    return at if model.domain == "solid" else at * [1.0, 0.0]
+
+
+def check(
+    model: Model, face: Surface, touch_mm: float, place: tuple[float, float] | None, axes: tuple[str, ...] = ()
+) -> None:
     """Refuse a press whose object passes between the contact points.
 
     Raises
@@ -98,30 +115,38 @@ def check(model: Model, face: Surface, touch_mm: float, axes: tuple[str, ...] = 
     UnresolvedError
         With the edge length that resolves the object.
     """
-    found = hidden(model, face, touch_mm, axes)
+    tips = tips_of(model, place)
+    found = hidden(model, face, touch_mm, tips, axes)
     if found.share > REFUSED or not found.seen:
-        size = needed_mm(model, touch_mm, found.target)
+        size = needed_mm(model, touch_mm, found, tips)
         raise UnresolvedError(_sentence(model, found, size), size)
 
 
-def warnings(model: Model, found: Hidden, touch_mm: float) -> list[str]:
+def warnings(problem: Problem) -> list[str]:
     """What to tell of a press whose contact points see less than all of the object."""
-    told = _details(model)
-    if found.share > _WARNED or not found.seen:
-        told.append(_sentence(model, found, needed_mm(model, touch_mm, found.target)))
-    return told
+    model, touch = problem.model, problem.touch_mm
+    tips = tips_of(model, problem.place_mm)
+    return _told(model, touch, tips, hidden(model, problem.surface, touch, tips, problem.axes))
 
 
 def foreseen(model: Model, axes: tuple[str, ...]) -> list[str]:
     """The same before there is a mesh, for regular contact points around first touch, as far apart as its edges."""
     way, size = approach(*model.approach), model.mesh.size_mm
     reach = _FORESEEN * size
-    box = [f(way.zone[2 * k + i], way.place[k] + s * reach) for k in (0, 1) for i, f, s in ((0, max, -1), (1, min, 1))]
+    (x0, x1, z0, z1), (x, z) = way.zone, way.place
+    box = (max(x0, x - reach), min(x1, x + reach), max(z0, z - reach), min(z1, z + reach))
     # a mesh has points on its symmetry planes
     at = np.array([0.5 * size if axis in axes else place for axis, place in zip("xz", way.place, strict=True)])
-    around: Box = (box[0], box[1], box[2], box[3])
-    found = hidden(model, regular(model, around, size, at), way.touch_mm, box=around)
-    return warnings(model, found, way.touch_mm)
+    tips = tips_of(model, way.place)
+    tips = None if tips is None else _within(tips, box)
+    return _told(model, way.touch_mm, tips, hidden(model, regular(model, box, size, at), way.touch_mm, tips))
+
+
+def _told(model: Model, touch_mm: float, tips: Float | None, found: Hidden) -> list[str]:
+    told = _details(model)
+    if found.share > _WARNED or not found.seen:
+        told.append(_sentence(model, found, needed_mm(model, touch_mm, found, tips)))
+    return told
 
 
 def unseen(model: Model, face: Surface, touch_mm: float, path: list[Target]) -> list[Target]:
@@ -136,23 +161,29 @@ def unseen(model: Model, face: Surface, touch_mm: float, path: list[Target]) -> 
     return found
 
 
-def needed_mm(model: Model, touch_mm: float, target: Target) -> float | None:
-    """Edge length at which regular contact points around the deepest place of a target see enough of the object.
+def needed_mm(model: Model, touch_mm: float, found: Hidden, tips: Float | None) -> float | None:
+    """Edge length at which regular contact points, around the place where most was hidden, see enough of the object.
 
-    None where no length of use does, or the design's surface is not known.
+    None where no length of use does, or the finger's surface is not known.
     """
-    if not hasattr(model.design, "top"):
+    if tips is None:
         return None
-    at = _deepest_place(model, touch_mm, target)
-    pressed = replace(model, legs=_single(target))
-    size = model.mesh.size_mm
+    at, end, size = found.place, found.target, model.mesh.size_mm
+    # the object stays where it is, so that what counts is beside it
+    there = replace(model, legs=(Leg(end.depth_mm, end.slide_x_mm, end.slide_z_mm, steps=1),))
     for _ in range(_TRIES):
         size *= _FINER
         reach = _PATCH * size
         box = (at[0] - reach, at[0] + reach, at[1] - reach, at[1] + reach)
-        if hidden(pressed, regular(model, box, size, at), touch_mm, box=box).share <= _AIM:
+        tips = _within(tips + [end.slide_x_mm, end.slide_z_mm], box) - [end.slide_x_mm, end.slide_z_mm]
+        if hidden(there, regular(model, box, size, at), touch_mm, tips).share <= _AIM:
             return _rounded(min(size, _detail(model.object)[1]))
     return None
+
+
+def _within(places: Float, box: Box) -> Float:
+    low, high = np.array([box[0], box[2]]), np.array([box[1], box[3]])
+    return places[np.all((places >= low) & (places <= high), axis=1)]
 
 
 def regular(model: Model, box: Box, size_mm: float, at: Float | None = None) -> Surface:
@@ -202,8 +233,8 @@ def _hats(line: Float) -> tuple[Float, sp.csr_matrix]:
 
 
 def _flat(points: Float) -> Float:
-    """Places (n, 1 | 2) along x and z."""
-    return points[:, ::2] if points.shape[1] == 3 else points[:, :1]
+    """Places (..., d - 1) along x and z."""
+    return points[..., ::2] if points.shape[-1] == 3 else points[..., :1]
 
 
 def _overlap(model: Model, at: Float, touch: float, target: Target) -> Float:
@@ -213,52 +244,12 @@ def _overlap(model: Model, at: Float, touch: float, target: Target) -> Float:
     return np.nan_to_num(at[:, 1] - (height + touch - target.depth_mm), nan=-np.inf)
 
 
-def _tips(model: Model, target: Target, solid: bool) -> Float:
-    """Corners and tips (n, d) of object and finger, mm, on the finger's surface."""
-    design = model.design
-    at = model.object.landmarks() + [target.slide_x_mm, target.slide_z_mm]
-    half = np.array([design.half_length_mm, 0.5 * design.width_mm if solid else 0.0])
-    at = at if solid else at * [1.0, 0.0]
-    at = at[np.all(np.abs(at) <= half, axis=1)]
-    y = design.top(at[:, 0], at[:, 1])
-    return np.stack([at[:, 0], y, at[:, 1]], axis=1)[np.isfinite(y)][:, : 3 if solid else 2]
-
-
-def _at_tips(
-    model: Model, face: Surface, heights: tuple[float, float], axes: tuple[str, ...], target: Target, seen: Float,
-    box: Box | None,
-) -> float:  # fmt: skip
-    """Largest hidden depth at the object's corners and tips, mm along the normal."""
-    touch, upright = heights
-    d = face.points.shape[1]
-    at = _tips(model, target, d == 3) if hasattr(model.design, "top") else np.zeros((0, d))
-    if box is not None:
-        flat = _flat(at)
-        at = at[np.all((flat >= box[0 : 2 * d - 2 : 2]) & (flat <= box[1 : 2 * d - 2 : 2]), axis=1)]
-    deep = _overlap(model, at, touch, target)
-    at, deep = at[deep > 0.0], deep[deep > 0.0]
-    if not len(at):
-        return 0.0
-    flat = np.where([a in axes for a in "xz"[: d - 1]], np.abs(_flat(at)), _flat(at))
-    near = KDTree(_flat(face.points)).query(flat, k=min(_BESIDE[d], len(face.points)))[1].reshape(len(at), -1)
-    return float((deep * upright - seen[near].max(axis=1)).max())
-
-
-def _deepest_place(model: Model, touch: float, target: Target) -> Float:
-    """Where (2,) along x and z the object reaches deepest into the finger at rest."""
-    solid = model.domain == "solid"
-    if not target.slide_x_mm and not target.slide_z_mm:
-        return np.array(approach(*model.approach).place)
-    way = approach(*model.approach)
-    at = np.vstack([_tips(model, target, solid), regular(model, way.zone, model.mesh.size_mm).samples])
-    best = at[int(np.argmax(_overlap(model, at, touch, target)))]
-    return np.array([best[0], best[2] if solid else 0.0])
-
-
-def _single(target: Target) -> Any:
-    from finger3d.model import Leg
-
-    return (Leg(target.depth_mm, target.slide_x_mm, target.slide_z_mm, steps=1),)
+def _on_finger(model: Model, places: Float, dim: int) -> Float:
+    """Points (n, d) mm of the finger's surface at places (k, 2) along x and z, less those beside it."""
+    half = np.array([model.design.half_length_mm, 0.5 * model.design.width_mm])
+    at = places[np.all(np.abs(places) <= half, axis=1)]
+    y = model.design.top(at[:, 0], at[:, 1])
+    return np.stack([at[:, 0], y, at[:, 1]], axis=1)[np.isfinite(y)][:, :dim]
 
 
 def _sentence(model: Model, found: Hidden, size: float | None) -> str:

@@ -91,7 +91,7 @@ def build(model: Model, say: Callable[[str], None] = lambda text: None, margin: 
         mesh, report = mesh_section(design, model.mesh, zone, axes)
     thickness = 1.0 if mesh.dim == 3 else design.width_mm
     everywhere = surface(mesh, "contact", thickness)
-    check(model, everywhere, touch, axes)
+    check(model, everywhere, touch, way.place, axes)
     say("assembling")
     start = time.perf_counter()
     elastic = Elasticity.of(model.material.E_MPa, model.material.nu, model.domain == "plane-stress")
@@ -110,7 +110,7 @@ def build(model: Model, say: Callable[[str], None] = lambda text: None, margin: 
     bare = Problem(
         model, mesh, report, elastic, matrix, face, condensed, compliance,
         gauge_rows, kept, held, thickness, touch, axes, points, parent, sign, share,
-        {**report.seconds, "assembly": assembly, "condensation": condensed.seconds},
+        {**report.seconds, "assembly": assembly, "condensation": condensed.seconds}, place_mm=way.place,
     )  # fmt: skip
     yields: Float | float = 0.0
     if model.object_compliance:

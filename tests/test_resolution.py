@@ -20,7 +20,8 @@ from finger3d.errors import UnresolvedError
 from finger3d.history import measure
 from finger3d.model import Leg, Material, MeshOptions, Model
 from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
-from finger3d.resolution import foreseen, hidden
+from finger3d.problem import Problem
+from finger3d.resolution import Hidden, foreseen, hidden, tips_of
 from finger3d.solve import build, march, symmetry
 
 FIG9 = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
@@ -60,9 +61,9 @@ def fig9(obj: RigidObject, depth: float, size: float, **changes: object) -> Mode
     return replace(model, **changes)
 
 
-def share(model: Model) -> float:
-    problem = build(model)
-    return hidden(problem.model, problem.surface, problem.touch_mm, problem.axes).share
+def unseen(problem: Problem) -> Hidden:
+    tips = tips_of(problem.model, problem.place_mm)
+    return hidden(problem.model, problem.surface, problem.touch_mm, tips, problem.axes)
 
 
 @pytest.mark.parametrize(
@@ -87,7 +88,7 @@ def test_what_touches_no_point_is_refused_with_the_size_that_resolves_it(
     assert f"mesh.size_mm = {finer:g}" in str(refused.value)
     resolved = fig9(obj, depth, finer)
     problem = build(resolved)
-    assert hidden(resolved, problem.surface, problem.touch_mm, problem.axes).share <= 0.1
+    assert unseen(problem).share <= 0.1
     *_, end = march(problem)
     assert end.outcome.ok
     assert measure(problem.points, end)["normal_force_N"] > 0.0
@@ -105,14 +106,16 @@ def test_needles_are_refused(obj: RigidObject, domain: str) -> None:
 
 
 def test_a_point_beside_a_blunt_bump_does_not_hide_a_needle(tmp_path: Path) -> None:
-    bump, needle = box(30.0, 2.0, 40.0, (0.0, 1.0, 0.0)), box(0.2, 2.0, 0.2, (9.0, -0.1, 5.1))
+    bump, needle = box(30.0, 2.0, 40.0, (0.0, 1.0, 0.0)), box(0.2, 2.0, 0.2, (9.1, 0.5, 5.1))
     both = replace(
         bump, points=np.vstack([bump.points, needle.points]), faces=np.vstack([bump.faces, needle.faces + 8])
     )
     block = designs()["block"](half_length_mm=20.0, height_mm=10.0, width_mm=20.0)
-    model = fig9(MeshObject(surface=both), 1.2, 2.0, design=block, domain="solid")
-    with pytest.raises(UnresolvedError):  # it is 1.1 of 1.2 mm deeper than the bump
+    model = fig9(MeshObject(surface=both), 0.7, 2.0, design=block, domain="solid")
+    with pytest.raises(UnresolvedError) as refused:  # it is 0.5 mm below the bump, so 0.5 of 0.7 mm are not seen
         build(replace(model, mesh=MeshOptions(2.0, 5.0, "swept")))
+    assert refused.value.size_mm is not None
+    assert 0.02 < refused.value.size_mm < 0.2
 
 
 @pytest.mark.parametrize(
@@ -132,7 +135,7 @@ def test_what_points_see_well_is_neither_refused_nor_warned_of(
     obj: RigidObject, depth: float, size: float, domain: str
 ) -> None:
     model = fig9(obj, depth, size, domain=domain, legs=(Leg(depth, steps=2), Leg(0.5 * depth, steps=1)))
-    assert share(model) < 0.1
+    assert unseen(build(model)).share < 0.1
     assert not foreseen(model, symmetry(model))
 
 
@@ -142,7 +145,7 @@ def test_what_is_hidden_is_the_sagitta_of_the_hats() -> None:
     for size in (4.0, 2.0, 1.0):
         problem = build(fig9(Plane(), 0.5, size))
         spacing = np.diff(np.sort(problem.surface.points[:, 0]))[0]
-        found = hidden(problem.model, problem.surface, problem.touch_mm, problem.axes)
+        found = unseen(problem)
         assert found.depth_mm == pytest.approx(spacing**2 / (12.0 * 100.0), rel=0.02)
         assert found.share == found.depth_mm / 0.5
 
