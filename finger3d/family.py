@@ -206,10 +206,12 @@ class Body:
                     yield replace(waiting[len(proved)], frames=error.with_traceback(None))
 
     def _run(self, variant: Variant, before: Sequence[_Run]) -> _Run:
+        from finger3d.increments import marched
+
         start = time.perf_counter()
         frames: tuple[Frame, ...] | Exception
         try:
-            frames = _frames(self.problem_of(variant))
+            frames = marched(self.problem_of(variant))[0]
         except TROUBLE as error:
             frames = error.with_traceback(None)  # which would keep all arrays on the way
         return _Run(self.problem, frames, time.perf_counter() - start)
@@ -281,18 +283,6 @@ def _proved(problem: Problem, runs: Sequence[_Run]) -> list[_Run]:
 def _press_of(variant: Variant) -> tuple[Any, ...]:
     """What of a variant makes a press: all but its gauges."""
     return variant.friction, variant.legs, variant.rule
-
-
-def _frames(problem: Problem) -> tuple[Frame, ...]:
-    from finger3d.increments import automatic, refine
-    from finger3d.solve import march
-
-    if not automatic(problem):
-        return tuple(march(problem))
-    frames: tuple[Frame, ...] = ()
-    for finer, _ in refine(problem):
-        frames = finer
-    return frames
 
 
 def shared_legs(variants: Sequence[Variant]) -> tuple[Leg, ...]:

@@ -193,7 +193,7 @@ def _by_steps(case: Case) -> list[Judged]:
         half = 0.5 * Grain.of(p, ends[TRUE_STEPS]).spacing_mm
         exact = told.pop(TRUE_STEPS)
         for n, numbers in told.items():
-            bars = step_error(runs[n], numbers)
+            bars = step_error(runs[n], numbers, main_numbers)
             # a length is printed with half the distance of points beside, below which no increment can be judged
             bars = {k: bar + (half if k.endswith("_length_mm") else 0.0) for k, bar in bars.items()}
             found += [

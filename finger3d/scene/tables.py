@@ -56,14 +56,14 @@ class LegTable(Table):
     ----------
     depth_mm : of the object below the first touch, less than the finger's height
     slide_x_mm, slide_z_mm : where the object then is, from where it was at first
-    steps : equal increments; "auto": halved until friction sum and dissipation stay
+    steps : equal increments; "auto": as many as their estimated error asks for, 1 % of forces and strains
     duration_s : read only with viscosity
     """
 
     depth_mm: NotNegative
     slide_x_mm: float = 0.0
     slide_z_mm: float = 0.0
-    steps: Steps = 10
+    steps: Steps = "auto"
     duration_s: Positive | None = None
 
 

@@ -196,7 +196,7 @@ def _condensed(model: Model, gauge: Gauge, wanted: Mapping[str, float], sweep: S
         problem = build(model, report.say, margin)
         sweep.seconds["build"] = time.perf_counter() - start
         start = time.perf_counter()
-        if automatic(problem):
+        if automatic(model):
             report.stage("increments by step halving")
             middle = friction_at(model.friction, sweep.mus[len(sweep.mus) // 2])
             *_, (frames, estimate) = refine(replace(problem, model=replace(model, friction=middle)))
