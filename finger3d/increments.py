@@ -79,8 +79,8 @@ class StepEstimate:
         return (
             f"automatic increments stopped at {self.steps} a leg, with estimated errors of "
             f"{100 * self.normal_force:.2g} % in the normal force, {100 * self.friction_sum:.2g} % in the friction "
-            f"sum, {100 * self.gauges:.2g} % of the largest strain and {100 * self.dissipation:.2g} % in the dissipation; "
-            "give press.steps for more"
+            f"sum, {100 * self.gauges:.2g} % of the largest strain and {100 * self.dissipation:.2g} % in the "
+            "dissipation; give press.steps for more"
         )
 
     @property
@@ -180,7 +180,7 @@ def limits(model: Model, dofs: float, contact_points: float) -> tuple[int, int]:
     return _FIRST, steps
 
 
-WORTH_S = {2: 2.0, 3: 4.0}
+WORTH_S = {2: 4.0, 3: 4.0}
 """Seconds that automatic increments may take besides those of the condensation: less than the rest of a press."""
 
 
