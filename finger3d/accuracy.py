@@ -4,8 +4,8 @@ The companion has about twice the edge lengths, so at best an eighth of the cell
 section; what it changes is taken to the mesh at hand by the order of convergence (Richardson).  A mesh than which none
 is coarser is small, and gets a finer companion.  The order is that of quadratic elements with a bonded corner, 2 lambda
 (Williams 1952), for smooth data it would be higher.  `finger3d.point_resolution` bounds the bars of lengths
-and areas from below.  An object that yields is meshed anew with the finger, so a bar covers both.  ``validation/error_bars.py`` says
-how far the estimates may be trusted.
+and areas from below.  An object that yields is meshed anew with the finger, so a bar covers both.
+``validation/error_bars.py`` says how far the estimates may be trusted.
 """
 
 from __future__ import annotations
@@ -24,11 +24,12 @@ from finger3d.errors import Finger3dError, UnresolvedError
 from finger3d.export import AREAS, MAIN
 from finger3d.fem.surface import surface
 from finger3d.history import Frame, measure
-from finger3d.model import Leg, MeshOptions, Model
+from finger3d.increments import TIMES, as_solved, error_by_count, last_frame, other_counts, step_error
+from finger3d.model import MeshOptions, Model
 from finger3d.objects import Sphere
 from finger3d.objects.mesh import MeshObject
 from finger3d.point_resolution import Grain
-from finger3d.solve import AUTO_START, Problem, build, contact_zone, march, symmetry
+from finger3d.solve import Problem, build, contact_zone, symmetry
 
 Float = NDArray[np.float64]
 Say = Callable[[str], None]
@@ -50,7 +51,6 @@ _FACTOR_WHERE_STEPS_FACTOR = 2.5
 ORDER = 1.2
 """Of the corners of the base at nu = 0.49, the lowest of all (validation/bonded_layer.py)."""
 
-STEP_ORDER = 1.0
 _LEAST_RATIO = 1.25
 _STEPS_SHARE, _STEPS_S = 0.15, 0.2
 """More increments may take this share of the time so far, or so many seconds."""
@@ -99,6 +99,12 @@ def main_numbers(problem: Problem, frame: Frame) -> dict[str, float]:
     """The numbers that get an error bar, by name."""
     told = measure(problem.points, frame)
     return {name: told[name] for name in (*MAIN, *AREAS)} | {f"gauge_{k}": v for k, v in told["gauges"].items()}
+
+
+def press_numbers(problem: Problem, frame: Frame) -> dict[str, float]:
+    """Those of a press that get an error bar: the main numbers and both energies."""
+    energies = {"external_work_mJ": frame.external_work_mJ, "dissipation_mJ": frame.dissipation_mJ}
+    return main_numbers(problem, frame) | energies
 
 
 def coarser(model: Model, factor: float = FACTOR) -> Model:
@@ -254,35 +260,15 @@ def strain_error(problem: Problem, frame: Frame, beside: Problem, fine: Float, c
     return np.array([found.get(name, math.nan) for name in told])
 
 
-def step_error(
-    problem: Problem, numbers: Mapping[str, float], times: float = 4.0, told: Told = main_numbers
-) -> dict[str, float]:
-    """Error by increments, by name: what `times` as many change, on the same condensation.
-
-    Four times as many bound the error in 97 % of the cases of ``validation/error_bars.py``, twice in 94 %, half in
-    85 %: few increments and half of them often agree by chance.
-    """
-    counts = [leg.steps if isinstance(leg.steps, int) else AUTO_START for leg in problem.model.legs]
-    others = [max(1, round(times * n)) for n in counts]
-    if others == counts:
-        raise Finger3dError("a single increment cannot be halved")
-    legs = tuple(replace(leg, steps=n) for leg, n in zip(problem.model.legs, others, strict=True))
-    trial = replace(problem, model=replace(problem.model, legs=legs))
-    other = told(trial, last_frame(trial))
-    ratio = sum(counts) / sum(others)
-    by = abs(ratio**STEP_ORDER - 1.0)
-    found = {name: abs(value - other[name]) / by for name, value in numbers.items()}
-    return {k: float(v) for k, v in found.items() if math.isfinite(v)}
-
-
 def estimate(
     problem: Problem,
     frames: Sequence[Frame],
     spent: Mapping[str, float],
     say: Say = lambda text: None,
     told: Told = main_numbers,
+    levels: Sequence[tuple[int, Frame]] = (),
 ) -> ErrorEstimate:
-    """Estimate the errors of the last frame by another mesh, coarser if there is one, and by more increments.
+    """Estimate the errors of the last frame by another mesh, coarser if there is one, and by other increments.
 
     Parameters
     ----------
@@ -290,6 +276,7 @@ def estimate(
     spent : seconds by stage, which say how many more increments are affordable, and on which mesh
     say : told what is being done, where it may take long
     told : the numbers by name of a problem's frame; see `mesh_error` for the names
+    levels : number of increments and last frame of every run by which automatic increments were chosen, if all are
 
     Returns
     -------
@@ -298,34 +285,41 @@ def estimate(
     """
     start = time.perf_counter()
     try:
-        found = _estimated(problem, frames, spent, say, told)
+        found = _estimated(problem, frames, spent, say, told, levels)
     except (Finger3dError, RuntimeError, ValueError, np.linalg.LinAlgError, MemoryError) as error:
         found = ErrorEstimate({}, {}, f"no estimate: {error}")
     return replace(found, seconds=time.perf_counter() - start)
 
 
 def _estimated(
-    problem: Problem, frames: Sequence[Frame], spent: Mapping[str, float], say: Say, told: Told
-) -> ErrorEstimate:
+    problem: Problem, frames: Sequence[Frame], spent: Mapping[str, float], say: Say, told: Told,
+    levels: Sequence[tuple[int, Frame]],
+) -> ErrorEstimate:  # fmt: skip
     if not frames or not frames[-1].outcome.ok:
         raise Finger3dError("the last step did not converge")
     # increments chosen by halving are numbers by now
-    model = replace(problem.model, legs=_as_solved(problem.model.legs, len(frames)))
+    model = replace(problem.model, legs=as_solved(problem.model.legs, len(frames)))
     own = replace(problem, model=model)
     beside = companion(own, say)
     begin = time.perf_counter()
     last = last_frame(beside)
     beside_s = time.perf_counter() - begin
     mesh = compared(own, frames[-1], beside, last, told)
-    here, times = _finer_steps(spent["contact"], beside_s, max(_STEPS_SHARE * sum(spent.values()), _STEPS_S))
-    where = (own, frames[-1]) if here else (beside, last)
-    steps = step_error(where[0], told(*where), times, told)
-    count = {4.0: "four times", 2.0: "twice", 0.5: "half"}[times]
     ratio = _ratio(own, beside)
     kind = "coarse" if ratio > 1.0 else "finer"
-    place = "" if here else f" on the {kind} mesh"
-    method = f"{_on_mesh(beside, kind)}; steps: {count} as many{place}, order {STEP_ORDER:g}"
-    return ErrorEstimate(mesh, steps, method, beside=told(beside, last), ratio=ratio)
+    if len(levels) > 1 and all(leg.steps == "auto" for leg in problem.model.legs):
+        used = levels[-4:]
+        steps = error_by_count({count: told(own, frame) for count, frame in used}, used[-1][0])
+        by = ", ".join(str(count) for count, _ in used)
+    else:
+        here, way = other_counts(spent["contact"], beside_s, max(_STEPS_SHARE * sum(spent.values()), _STEPS_S))
+        where = (own, frames[-1]) if here else (beside, last)
+        steps = step_error(where[0], told(*where), told, way)
+        by = " and ".join({0.25: "a quarter", 0.5: "half", 2: "twice", 4: "four times"}[t] for t in TIMES[way])
+        by += " as many" + ("" if here else f" on the {kind} mesh")
+    return ErrorEstimate(
+        mesh, steps, f"{_on_mesh(beside, kind)}; steps: {by}, order 1", beside=told(beside, last), ratio=ratio
+    )
 
 
 def _on_mesh(beside: Problem, kind: str) -> str:
@@ -345,35 +339,3 @@ def _unstructured(model: Model) -> bool:
     """Whether pytetwild meshes the finger or the object."""
     soft = model.object_compliance is not None and isinstance(model.object, Sphere | MeshObject)
     return model.domain == "solid" and (soft or model.mesh.mesher != "swept")
-
-
-def _finer_steps(fine_s: float, coarse_s: float, budget: float) -> tuple[bool, float]:
-    """Whether the increments are judged on the mesh at hand or beside it, and how many times as many are afforded."""
-    choices = [(True, 4.0), (False, 4.0), (True, 2.0), (False, 2.0)]
-    cost = {True: fine_s, False: coarse_s}
-    return next(((here, times) for here, times in choices if times * cost[here] <= budget), (False, 0.5))
-
-
-def last_frame(problem: Problem) -> Frame:
-    """March to the end.
-
-    Raises
-    ------
-    Finger3dError
-        Where an increment does not converge.
-    """
-    frame = None
-    for frame in march(problem):
-        if not frame.outcome.ok:
-            raise Finger3dError(f"a run with {problem.model.mesh.size_mm:.4g} mm did not converge ({frame.outcome})")
-    if frame is None:
-        raise Finger3dError("there are no increments to march")
-    return frame
-
-
-def _as_solved(legs: tuple[Leg, ...], count: int) -> tuple[Leg, ...]:
-    """The legs with their automatic increments as many as `count` frames in all tell."""
-    free = [leg for leg in legs if leg.steps == "auto"]
-    fixed = sum(leg.steps for leg in legs if isinstance(leg.steps, int))
-    each = (count - fixed) // max(1, len(free))
-    return tuple(replace(leg, steps=each) if leg.steps == "auto" else leg for leg in legs)

@@ -19,24 +19,17 @@ _STRAIN = 0.1
 _QUANTILE = 0.99  # the clamped corners are singular, their strain says nothing
 _AGAINST_FINITE_STRAIN = ("kinematics", "inclusions", "object_compliance")  # slots whose effects need linear elasticity
 
-# errors of N equal increments, times N: validation/REFERENCES.md, 2.4 (line contact, nu = 0.3)
-_DISSIPATION, _STICK = 7.0, 0.3
-_ENOUGH = 50
 
-
-def advise(problem: Problem, frame: Frame, strain: Float, free_increments: bool) -> list[str]:
+def advise(problem: Problem, frame: Frame, strain: Float) -> list[str]:
     """Advice for a finished press.
 
     Parameters
     ----------
     frame : the last good one
     strain : (n, 3, 3) at the nodes
-    free_increments : whether the increments were chosen by their error already
     """
     model = problem.model
     found = [] if model.kinematics.finite_strain else [*_strain(model, strain), *_slopes(problem, frame)]
-    if not free_increments and model.friction.static > 0.0:
-        found += _increments(model)
     return found + _width(model)
 
 
@@ -69,17 +62,6 @@ def _slopes(problem: Problem, frame: Frame) -> list[str]:
     slide = (frame.target.slide_x_mm, frame.target.slide_z_mm)
     text = slope_of(problem.model.object, problem.model.design.top, x, z, slide, problem.dim).advice
     return [f"{text}; {_finite_strain(problem.model)}"] if text else []
-
-
-def _increments(model: Any) -> list[str]:
-    counts = [leg.steps for leg in model.legs if isinstance(leg.steps, int)]
-    if not counts or min(counts) >= _ENOUGH:
-        return []
-    n = min(counts)
-    return [
-        f"{n} equal increments leave the dissipation about {100.0 * _DISSIPATION / n:.0f} % high and the stick length "
-        f"about {100.0 * _STICK / n:.0f} % low (error ~ 1/steps); steps = 'auto' chooses them by their error"
-    ]
 
 
 def _width(model: Any) -> list[str]:

@@ -206,6 +206,7 @@ class Body:
                     yield replace(waiting[len(proved)], frames=error.with_traceback(None))
 
     def _run(self, variant: Variant, before: Sequence[_Run]) -> _Run:
+        from finger3d.increments import marched
         from finger3d.resolution import check
 
         start = time.perf_counter()
@@ -214,7 +215,7 @@ class Body:
             problem = self.problem_of(variant)
             if variant.legs != self.problem.model.legs:  # the body was built, and its mesh checked, for another path
                 check(problem.model, problem.surface, problem.touch_mm, problem.place_mm, problem.axes)
-            frames = _frames(problem)
+            frames = marched(problem)[0]
         except TROUBLE as error:
             frames = error.with_traceback(None)  # which would keep all arrays on the way
         return _Run(self.problem, frames, time.perf_counter() - start)
@@ -286,18 +287,6 @@ def _proved(problem: Problem, runs: Sequence[_Run]) -> list[_Run]:
 def _press_of(variant: Variant) -> tuple[Any, ...]:
     """What of a variant makes a press: all but its gauges."""
     return variant.friction, variant.legs, variant.rule
-
-
-def _frames(problem: Problem) -> tuple[Frame, ...]:
-    from finger3d.increments import automatic, refine
-    from finger3d.solve import march
-
-    if not automatic(problem):
-        return tuple(march(problem))
-    frames: tuple[Frame, ...] = ()
-    for finer, _ in refine(problem):
-        frames = finer
-    return frames
 
 
 def shared_legs(variants: Sequence[Variant]) -> tuple[Leg, ...]:

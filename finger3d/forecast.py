@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from finger3d.fem.assembly import MIXED_FROM
+from finger3d.increments import automatic, condensation_s, contact_s, limits
 from finger3d.model import Model
 from finger3d.solve import AUTO_START, contact_zone, symmetry
 
@@ -46,11 +47,13 @@ def forecast(model: Model) -> dict[str, Any]:
     zone = contact_zone(model)
     mixed = model.domain != "plane-stress" and model.material.nu >= MIXED_FROM
     size = _size(model, zone, axes, mixed)
-    count = sum(leg.steps if isinstance(leg.steps, int) else 8 * AUTO_START for leg in model.legs)
+    runs, free = _runs(model, size, d), sum(leg.steps == "auto" for leg in model.legs)
+    fixed = sum(leg.steps for leg in model.legs if isinstance(leg.steps, int))
+    marched = len(runs) * fixed + sum(runs) * free
     tetwild = d == 3 and model.mesh.mesher == "ftetwild"
-    seconds = _seconds(size, d, count, tetwild)
+    seconds = _seconds(size, d, marched, tetwild)
     memory = max(_memory(size, d), _TETWILD_MB if tetwild else 0.0)
-    costs = {name: _costs(name, model, size, seconds, count) for _, name in model.filled}
+    costs = {name: _costs(name, model, size, seconds, marched, len(runs)) for _, name in model.filled}
     return {
         "domain": model.domain,
         "formulation": "mixed quadratic/linear" if mixed else "quadratic displacement",
@@ -58,12 +61,27 @@ def forecast(model: Model) -> dict[str, Any]:
         "cells": round(size.cells),
         "dofs": round(size.dofs),
         "contact_points": round(size.contact_points),
-        "steps": count,
+        "steps": fixed + runs[-1] * free,
+        **({"steps_of_all_runs": marched} if len(runs) > 1 else {}),
         **{f"{stage}_s": round(s, 2) for stage, s in seconds.items()},
         **{name: f"costs {cost.why}" for name, cost in costs.items()},
         "total_s": round(sum(seconds.values()) + sum(cost.seconds for cost in costs.values()), 1),
         "memory_MB": round(memory + sum(cost.memory_mb for cost in costs.values())),
     }
+
+
+_USUAL = 80  # the median of automatic increments over the cases of validation/error_bars.py
+
+
+def _runs(model: Model, size: _Size, d: int) -> list[int]:
+    """Increments of an automatic leg in every run that chooses them; the last is reported."""
+    if not automatic(model):
+        return [AUTO_START]
+    first, last = limits(model, size.dofs, size.contact_points)
+    runs = [first]
+    while runs[-1] < min(_USUAL, last):
+        runs.append(2 * runs[-1])
+    return runs
 
 
 @dataclass(frozen=True)
@@ -80,7 +98,7 @@ class _Cost:
         return f"about {self.seconds:.2g} s and {self.memory_mb:.2g} MB: {self.reason}"
 
 
-def _costs(name: str, model: Model, size: _Size, seconds: dict[str, float], steps: int) -> _Cost:
+def _costs(name: str, model: Model, size: _Size, seconds: dict[str, float], steps: int, runs: int) -> _Cost:
     d = 3 if model.domain == "solid" else 2
     condensation, assembly = seconds["condensation"], seconds["assembly"]
     factor_mb = _memory(size, d) - _BASE_MB
@@ -90,7 +108,8 @@ def _costs(name: str, model: Model, size: _Size, seconds: dict[str, float], step
         return _Cost(steps * each + pressed, factor_mb, f"about {_NEWTON} factorisations in each of {steps} steps")
     if name == "viscosity" and not getattr(model.kinematics, "bulk", True):
         lengths = {leg.duration_s / leg.steps for leg in model.legs if leg.duration_s and leg.steps != "auto"}
-        more = max(len(lengths), 1)
+        lengths_in_all = len(lengths) + runs * len({leg.duration_s for leg in model.legs if leg.steps == "auto"})
+        more = max(lengths_in_all, 1)
         text = f"{more} more factorisation{'s' * (more > 1)}, one for each length of step"
         return _Cost(more * condensation + assembly, more * factor_mb, text)
     if name == "elastic_object":
@@ -133,14 +152,12 @@ def _size(model: Model, zone: tuple[float, float, float, float], axes: tuple[str
 
 
 def _seconds(size: _Size, d: int, steps: int, tetwild: bool) -> dict[str, float]:
-    points = size.contact_points
-    dense = 0.065 * (points / 680.0) ** 2.4 if d == 3 else 0.038 * (points / 700.0) ** 2.75
     return {
         "start": _IMPORT_S,
         "mesh": 3.0 + 3.5e-4 * size.cells if tetwild else 3e-7 * size.dofs,
         "assembly": 8e-6 * size.dofs if d == 3 else 0.005 + 3e-6 * size.dofs,
-        "condensation": 6.0 * (size.dofs / 85_000.0) ** 1.75 if d == 3 else 0.004 + 8e-6 * size.dofs,
-        "contact": steps * (0.0025 + dense),
+        "condensation": condensation_s(size.dofs, d),
+        "contact": steps * contact_s(size.contact_points, d),
         "output": _FIGURES_S[d],
     }
 

@@ -173,7 +173,7 @@ def press(
 def _pressed(
     scene: Scene, folder: Path, report: Report, started: float, artist: Artist | None, ahead: Ahead | None
 ) -> tuple[History, dict[str, Any]]:
-    from finger3d.accuracy import estimate
+    from finger3d.accuracy import estimate, press_numbers
     from finger3d.solve import covers
 
     _clear(folder)
@@ -197,7 +197,8 @@ def _pressed(
         output.factorizations = problem.factorizations
         report.stage("estimating the error")
         ahead.wait()
-        output.error = estimate(problem, output.frames, output.seconds, report.say)
+        levels = [(count, ends[-1]) for count, ends in output.estimate.levels] if output.estimate else []
+        output.error = estimate(problem, output.frames, output.seconds, report.say, press_numbers, levels)
         summary = output.write(_told(history), tables=False)
     if artist:
         report.stage("drawing")
@@ -297,7 +298,7 @@ def _solve(
         report.say(f"warning: {warning}")
     output.write("incomplete: no step was finished")
     try:
-        if automatic(problem):
+        if automatic(problem.model):
             _press_automatically(problem, output, report)
         else:
             _press_steps(problem, output, report)
@@ -322,7 +323,7 @@ def _press_automatically(problem: Problem, output: _Output, report: Report) -> N
     """Refine the increments; every finer run takes the place of the one before, also on disk."""
     from finger3d.increments import refine
 
-    report.stage("pressing, increments chosen by step halving")
+    report.stage("pressing, increments chosen by their error")
     begin = time.perf_counter()
     for frames, estimate in refine(problem):
         output.seconds["contact"] += time.perf_counter() - begin
@@ -330,11 +331,8 @@ def _press_automatically(problem: Problem, output: _Output, report: Report) -> N
         output.write(_INCOMPLETE)
         report.step(len(frames), len(frames), _remark(problem, frames[-1]))
         begin = time.perf_counter()
-    if estimate is not None and not estimate.met:
-        output.warnings.append(
-            f"steps = 'auto' stopped at {estimate.steps} increments a leg; the friction sum still changes by "
-            f"{100 * estimate.friction_sum:.2g} %, the dissipation by {100 * estimate.dissipation:.2g} %"
-        )
+    if estimate is not None and estimate.warning:
+        output.warnings.append(estimate.warning)
 
 
 def _remark(problem: Problem, frame: Frame) -> str:
@@ -353,7 +351,9 @@ def _fields(problem: Problem, output: _Output, folder: Path, artist: Artist | No
         return
     frame, points = good[-1], problem.points
     u, strain, sigma = problem.model.kinematics.fields(problem, frame.part)
-    output.advice = advise(problem, frame, strain, output.estimate is not None)
+    output.advice = advise(problem, frame, strain)
+    if output.estimate and output.estimate.advice:
+        output.advice.append(output.estimate.advice)
     mesh, parent, sign = unfold(problem.mesh, tuple("xyz".index(a) for a in problem.axes))
     flip = np.ones((len(parent), 3))
     flip[:, : problem.dim] = sign

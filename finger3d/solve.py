@@ -251,7 +251,6 @@ def march(problem: Problem, near: Sequence[Float] = ()) -> Iterator[Frame]:
     state = kinematics.start(problem)
     pace: tuple[Target, Float] | None = None
     work = dissipation = 0.0
-    pull = problem.world_force(state)
     # what the gauges would read if nothing were embedded: the same path in the same body without
     beside = march(replace(problem.bare, model=problem.model)) if problem.bare else None
     for number, target in enumerate(targets(problem.model.legs)):
@@ -260,8 +259,7 @@ def march(problem: Problem, near: Sequence[Float] = ()) -> Iterator[Frame]:
         guess = near[number] if number < len(near) else _guess(state, at, target, pace)
         found, done = _increment(problem, state, at, target, 0 if literal else _CUTS, guess)
         for before, after, a, b in done:
-            last, pull = pull, problem.world_force(after)
-            work += _work(0.5 * (last + pull), a, b)
+            work += _work(problem, before, after, a, b)
             dissipation += _dissipated(problem, before, after)
         pace = at, state.force
         state, at = found.state, target
@@ -356,14 +354,41 @@ def _increment(
     ), done + more
 
 
-def _work(force: Float, a: Target, b: Target) -> float:
-    """Work (mJ) of the object on the finger, by the mean of the forces (m, 3) N over the increment."""
+def _work(problem: Problem, before: ContactState, after: ContactState, a: Target, b: Target) -> float:
+    """Work (mJ) of the object on the finger in an increment: mean contact force times the displacement it acts through.
+
+    A point that comes into contact, or leaves it, has its force for a part of the increment only; the change of its
+    gap is no path of the force.  In small strain the sum is exactly the change of stored energy plus the trapezoidal
+    sum of friction times slip.
+    """
     moved = np.array([b.slide_x_mm - a.slide_x_mm, a.depth_mm - b.depth_mm, b.slide_z_mm - a.slide_z_mm])
-    return float(force.sum(axis=0) @ moved)
+    mean = 0.5 * (problem.world_force(before) + problem.world_force(after))
+    normal = 0.5 * (before.force[:, 0] + after.force[:, 0])
+    if not problem.model.kinematics.finite_strain:
+        closed = after.gap - before.gap
+        if moved[0] or moved[2]:
+            # the object's profile moves under a point: its force does work where the finger follows the profile
+            n = problem.model.object.frame(problem.dim)[0]
+            closed -= problem.gap(b) - problem.gap(a) + n @ moved[: problem.dim]
+    else:
+        # beside the object a gap is arbitrary; none is closed by more than the object moves
+        reach = float(np.linalg.norm(moved))
+        closed = np.minimum(after.gap, reach) - np.minimum(before.gap, reach)
+    return float(mean.sum(axis=0) @ moved) + _summed(problem, normal * closed)
 
 
 def _dissipated(problem: Problem, before: ContactState, after: ContactState) -> float:
-    """Frictional dissipation (mJ): end force times slip, never negative at any point."""
+    """Frictional dissipation (mJ) in an increment: slip times the friction under the mean normal force; never negative.
+
+    The direction of friction, and the coefficient, are those at the end of the increment.
+    """
     slips = after.status == SLIP
     lost = -np.sum(after.force[:, 1:] * (after.slip - before.slip), axis=1) * slips
-    return float((lost[problem.parent] * problem.share).sum())
+    end = after.force[:, 0]
+    share = np.divide(0.5 * (before.force[:, 0] + end), end, out=np.ones_like(end), where=end > 0.0)
+    return _summed(problem, lost * share)
+
+
+def _summed(problem: Problem, values: Float) -> float:
+    """Sum over the points of the whole finger of values (c,) of the meshed part."""
+    return float((values[problem.parent] * problem.share).sum())

@@ -159,7 +159,7 @@ def test_energy_goes_into_both_bodies() -> None:
     part = np.zeros((len(problem.surface.nodes), 3))
     part[problem.parent[own]] = frames[-1].state.force[own] / problem.share[own, None]
     stored = 0.5 * 4.0 * np.einsum("id,idje,je->", part, problem.compliance, part)
-    assert frames[-1].external_work_mJ == pytest.approx(stored, rel=0.01)
+    assert frames[-1].external_work_mJ == pytest.approx(stored, rel=1e-10)
 
 
 def half_ball(radius: float) -> Triangles:

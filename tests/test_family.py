@@ -266,7 +266,7 @@ def test_a_press_that_fails_takes_no_other_along(threads, monkeypatch):
             raise MemoryError("none left")
         return march(problem)
 
-    monkeypatch.setattr("finger3d.solve.march", failing)
+    monkeypatch.setattr("finger3d.increments.march", failing)
     first, second, third = body.presses([Variant.of(m) for m in models])
     assert isinstance(second, MemoryError)
     assert first.outcome == third.outcome == "converged"
@@ -287,7 +287,7 @@ def test_presses_that_cannot_be_proved_fail_and_what_failed_before_keeps_its_rea
     def unproved(problem, frames):
         raise MemoryError("no proof")
 
-    monkeypatch.setattr("finger3d.solve.march", failing)
+    monkeypatch.setattr("finger3d.increments.march", failing)
     monkeypatch.setattr("finger3d.solve.covered", unproved)
     assert [str(p) for p in body.presses(variants)] == ["no proof", "its own"]
 

@@ -67,10 +67,24 @@ def test_presses_took_what_is_foretold(root: Path) -> None:
     assert {row["series"] for row in measured} == {"unknowns", "contact rows"}
     for row in measured:
         sizes = [f"mesh.{key}={row[key]}" for key in ("size_mm", "base_size_mm")]
-        told = forecast(load(root / "geometries" / "fig9.toml", [*sizes, "mesh.mesher=swept"]).model())
+        told = forecast(
+            load(root / "geometries" / "fig9.toml", [*sizes, "mesh.mesher=swept", "press.steps=10"]).model()
+        )
         assert 0.5 < told["total_s"] / float(row["seconds"]) < 2.0, row
         assert 0.5 < told["memory_MB"] / float(row["peak_MB"]) < 2.0, row
         assert 0.5 < told["dofs"] / float(row["dofs"]) < 2.0, row
+
+
+@pytest.mark.parametrize("domain", ["plane-strain", "solid"])
+def test_automatic_increments_are_foretold_with_all_the_runs_that_choose_them(domain: Domain) -> None:
+    # 5 + 10 + 20 + 40 + 80 increments where the last is usual
+    legs = (Leg(10.0, steps="auto"),)
+    told, fixed = (forecast(replace(baseline(domain), legs=x)) for x in (legs, (Leg(10.0, steps=155),)))
+    assert (told["steps"], told["steps_of_all_runs"]) == (80, 155)
+    assert told["contact_s"] == fixed["contact_s"]
+    assert "steps_of_all_runs" not in fixed
+    large = effect_type("large_deformation")().apply(replace(baseline(domain), legs=legs))
+    assert forecast(large)["steps_of_all_runs"] == 3 + 6 + 12
 
 
 @pytest.mark.slow

@@ -124,7 +124,7 @@ def test_the_demo_scene_is_the_papers_finger(root: Path) -> None:
     finger = {"radius_mm": 100.0, "half_length_mm": 50.0, "edge_height_mm": 36.6, "width_mm": 20.0}
     assert scene["finger"] == {"geometry": "clipped_cylinder", **finger}
     assert (scene["material"]["nu"], scene["friction"]["mu"]) == (0.49, 0.25)
-    assert scene["press"] == {"depth_mm": 10.0, "steps": 10}
+    assert scene["press"] == {"depth_mm": 10.0}
 
 
 def test_heavy_packages_are_imported_inside_functions(root: Path) -> None:

@@ -44,7 +44,7 @@ def test_the_least_scene_is_frictionless_on_a_plane_as_a_solid():
     assert model.object == Plane()
     assert model.domain == "solid"
     assert model.rule == "projection"
-    assert model.legs == (Leg(10.0, steps=10),)
+    assert model.legs == (Leg(10.0, steps="auto"),)
     assert model.gauges == ()
     assert model.material == Material(1.0, 0.49)
     assert model.design.height_mm == pytest.approx(HEIGHT)
@@ -148,7 +148,7 @@ def test_every_design_loads(finger):
 def test_legs_press_slide_and_release():
     legs = [{"depth_mm": 10.0}, {"depth_mm": 10.0, "slide_x_mm": 2.0, "steps": "auto"}, {"depth_mm": 0.0, "steps": 5}]
     model = parse({**SMALL, "press": {"leg": legs}}).model()
-    assert model.legs == (Leg(10.0), Leg(10.0, slide_x_mm=2.0, steps="auto"), Leg(0.0, steps=5))
+    assert model.legs == (Leg(10.0, steps="auto"), Leg(10.0, slide_x_mm=2.0, steps="auto"), Leg(0.0, steps=5))
 
 
 def test_whole_numbers_serve_as_numbers():
@@ -179,7 +179,7 @@ def test_overrides_are_applied_before_checking(tmp_path):
 def test_an_override_reaches_into_a_list(tmp_path):
     legs = {"leg": [{"depth_mm": 5.0}, {"depth_mm": 0.0}]}
     path = write(tmp_path, parse({**SMALL, "press": legs}).to_toml())
-    assert load(path, ["press.leg.1.depth_mm=2.5"]).legs == (Leg(5.0), Leg(2.5))
+    assert load(path, ["press.leg.1.depth_mm=2.5"]).legs == (Leg(5.0, steps="auto"), Leg(2.5, steps="auto"))
 
 
 def test_the_file_is_not_changed_by_an_override(tmp_path):
@@ -236,7 +236,7 @@ def test_as_dict_is_json_with_every_default():
     assert json.loads(json.dumps(tree)) == tree
     assert tree["friction"] == {"mu": 0.0}
     assert tree["object"] == {"shape": "plane", "x_mm": 0.0, "z_mm": 0.0, "tilt_deg": 0.0}
-    assert tree["press"]["steps"] == 10
+    assert tree["press"]["steps"] == "auto"
     assert tree["mesh"]["mesher"] == "ftetwild"
     assert tree["effects"] == {}
 

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from finger3d.accuracy import FACTOR, estimate
 from finger3d.errors import Outcome
 from finger3d.history import ContactPoints, Frame, contact_table, measure
-from finger3d.increments import automatic, refine
+from finger3d.increments import marched
 from finger3d.model import Model
-from finger3d.solve import Problem, build, march
+from finger3d.solve import Problem, build
 
 Float = NDArray[np.float64]
 
@@ -100,10 +100,10 @@ def widened(model: Model, width_mm: float) -> Model:
 def solved(name: str, model: Model) -> Case:
     """Press the model, with error bars from `finger3d.accuracy.estimate`, the same that a press gets."""
     start = time.perf_counter()
-    problem, frames, case = _pressed(name, model)
+    problem, frames, levels, case = _pressed(name, model)
     if case.ok:
         spent = {**problem.seconds, "contact": case.seconds - sum(problem.seconds.values())}
-        found = estimate(problem, frames, spent, told=lambda p, f: measured(p.points, f))
+        found = estimate(problem, frames, spent, told=lambda p, f: measured(p.points, f), levels=levels)
         errors = {key: error for key in case.numbers if (error := found.of(key)) is not None}
         case = replace(case, errors=errors, companion=found.beside, ratio=found.ratio, method=found.method)
     return replace(case, seconds=time.perf_counter() - start)
@@ -111,29 +111,21 @@ def solved(name: str, model: Model) -> Case:
 
 def measured_on(name: str, model: Model) -> Case:
     """The model pressed on its own mesh only: numbers without error bars."""
-    return _pressed(name, model)[2]
+    return _pressed(name, model)[-1]
 
 
-def _pressed(name: str, model: Model) -> tuple[Problem, tuple[Frame, ...], Case]:
+def _pressed(name: str, model: Model) -> tuple[Problem, tuple[Frame, ...], list[tuple[int, Frame]], Case]:
     start = time.perf_counter()
     # all of the contact face: how far contact reaches differs from model to model
     problem = build(model, margin=math.inf)
-    frames = _frames(problem)
+    frames, increments = marched(problem)
+    levels = [(count, ends[-1]) for count, ends in increments.levels] if increments else []
     frame = frames[-1]
     mesher = "swept" if problem.dim == 2 else model.mesh.mesher
     case = Case(name, model.design.width_mm, model.mesh.size_mm, mesher, frame.outcome)
     if frame.outcome.ok:
         case = replace(case, numbers=measured(problem.points, frame), lines=lines_along_x(problem.points, frame))
-    return problem, frames, replace(case, seconds=time.perf_counter() - start)
-
-
-def _frames(problem: Problem) -> tuple[Frame, ...]:
-    if not automatic(problem):
-        return tuple(march(problem))
-    frames: tuple[Frame, ...] = ()
-    for finer, _ in refine(problem):
-        frames = finer
-    return frames
+    return problem, frames, levels, replace(case, seconds=time.perf_counter() - start)
 
 
 def measured(points: ContactPoints, frame: Frame) -> dict[str, float]:

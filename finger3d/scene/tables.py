@@ -73,14 +73,14 @@ class LegTable(Table):
     ----------
     depth_mm : of the object below the first touch, less than the finger's height
     slide_x_mm, slide_z_mm : where the object then is, from where it was at first
-    steps : equal increments; "auto": halved until friction sum and dissipation stay
+    steps : equal increments; "auto": as many as their estimated error asks for, 1 % of forces and strains
     duration_s : read only with viscosity
     """
 
     depth_mm: Zero | Length
     slide_x_mm: Place = 0.0
     slide_z_mm: Place = 0.0
-    steps: Steps = 10
+    steps: Steps = "auto"
     duration_s: Seconds | None = None
 
 

@@ -87,7 +87,7 @@ def found_increments(problem: Problem, strain: Callable[[Problem], Float], noise
     """
     model, wanted = problem.model, SHARE * noise
     legs = model.legs
-    if not automatic(problem):
+    if not automatic(problem.model):
         return Increments(legs, legs, False, math.nan, wanted)
     most, steps = _MOST_FACTORED if model.kinematics.finite_strain else _MOST[model.domain], AUTO_START
     strains: dict[float, Float] = {}

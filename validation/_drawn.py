@@ -1,0 +1,51 @@
+"""Sections drawn at random, on which the error that increments leave is judged: none of them chose the rule."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from finger3d.contact.law import Coulomb
+from finger3d.design import designs
+from finger3d.model import Gauge, Leg, Material, MeshOptions, Model
+from finger3d.objects import Cylinder, Plane, Wave, Wedge
+
+NEAR = (Gauge("a", 1.5, 4.0, angle=0.5), Gauge("b", 3.0, 3.0, angle=0.7), Gauge("c", 0.0, 3.5))
+FAR = (Gauge("a", 36.0, 40.0, angle=0.5), Gauge("b", 20.0, 44.0, angle=0.2), Gauge("c", 5.0, 40.0))
+UNDER = (Gauge("a", 0.5, 7.5, angle=0.5), Gauge("b", 0.0, 7.0), Gauge("c", 3.0, 6.0, angle=0.3))
+
+
+def drawn(count: int, seed: int = 2026) -> Iterator[tuple[str, Model]]:
+    """Names and models: eight shapes in turn; nu, mu, plane state, depth and edge length at random."""
+    random = np.random.default_rng(seed)
+    half = designs()["half_cylinder"](radius_mm=5.0, width_mm=1.0)
+    fig9 = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
+    block = designs()["block"](half_length_mm=8.0, height_mm=8.0, width_mm=16.0)
+    for number in range(count):
+        u = random.uniform(size=7)
+        nu = (0.5 * u[0], 0.4 + 0.1 * u[0], 0.49, 0.5)[int(4 * u[1])]
+        plane: Any = ("plane-stress", "plane-strain")[int(2 * u[2])]
+        mu, part, size = 0.03 * 40.0 ** u[3], 0.3 + 0.7 * u[4], 0.6 + 0.8 * u[5]
+        shapes: tuple[tuple[Any, Any, tuple[Gauge, ...], float, float], ...] = (
+            (fig9, Plane(), FAR, 10.0, 1.5),
+            (half, Plane(), NEAR, 1.0, 0.15),
+            (half, Wedge(angle=math.radians(10.0 + 30.0 * u[6]), tip_radius_mm=0.3), NEAR, 1.0, 0.15),
+            (fig9, Wave(wavelength_mm=8.0 + 17.0 * u[6], amplitude_mm=0.5), FAR, 6.0, 1.2),
+            (block, Cylinder(radius_mm=5.0 + 25.0 * u[6]), UNDER, 0.8, 0.15),
+            (fig9, Plane(tilt=math.radians(2.0 + 10.0 * u[6])), FAR, 6.0, 1.5),
+            (half, Plane(), NEAR, 1.0, 0.15),
+            (half, Cylinder(radius_mm=3.0 + 17.0 * u[6]), NEAR, 1.0, 0.15),
+        )
+        kind = number % len(shapes)
+        design, rigid, gauges, depth, edge = shapes[kind]
+        path: tuple[Leg, ...] = (Leg(part * depth),)
+        if kind == 6:
+            path += (Leg(part * depth, slide_x_mm=(0.02 + 0.48 * u[6]) * part * depth),)
+        model = Model(
+            design, Material(1.0, nu), MeshOptions(size * edge, 4.0 * size * edge), path, object=rigid,
+            friction=Coulomb(mu), gauges=gauges, domain=plane,
+        )  # fmt: skip
+        yield f"{number}: {type(rigid).__name__} on {design.name}, {plane}, nu = {nu:.3g}, mu = {mu:.3g}", model
