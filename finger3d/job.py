@@ -342,6 +342,7 @@ def _remark(problem: Problem, frame: Frame) -> str:
 
 def _fields(problem: Problem, output: _Output, folder: Path, artist: Artist | None) -> None:
     """fields.vtu and the pictures, from the last good step; the field is recovered with the factor at hand."""
+    from finger3d import resolution
     from finger3d.advice import advise
     from finger3d.mesh import unfold
     from finger3d.page.states import states_of, write_states
@@ -351,6 +352,7 @@ def _fields(problem: Problem, output: _Output, folder: Path, artist: Artist | No
         return
     frame, points = good[-1], problem.points
     u, strain, sigma = problem.model.kinematics.fields(problem, frame.part)
+    output.warnings += resolution.inside(problem, frame, u)
     output.advice = advise(problem, frame, strain)
     if output.estimate and output.estimate.advice:
         output.advice.append(output.estimate.advice)

@@ -19,9 +19,9 @@ from scipy.spatial import KDTree
 
 from finger3d.errors import UnresolvedError
 from finger3d.fem.surface import Surface
-from finger3d.history import Target
+from finger3d.history import Frame, Target
 from finger3d.model import Leg, Model
-from finger3d.objects import Cylinder, Sphere, Wave, Wedge, approach
+from finger3d.objects import Cylinder, MeshObject, Sphere, Wave, Wedge, approach
 from finger3d.problem import Problem, rigid_gap, targets
 
 Float = NDArray[np.float64]
@@ -37,6 +37,7 @@ _BESIDE = {2: 4, 3: 16}  # contact points beside a place: with two rings, some l
 _PER_WAVE, _PER_RADIUS = 4.0, 2.0  # edges that a wavelength, and a radius, must have at least
 _FINER, _TRIES = 0.8, 80  # down to 2e-8 of the edge length
 _PATCH = 3  # edges on either side of a place
+_SLOPE_STEP = 1e-6  # of the finger's height
 _FORESEEN = 50  # the same before there is a mesh, at most
 
 
@@ -159,6 +160,59 @@ def unseen(model: Model, face: Surface, touch_mm: float, path: list[Target]) -> 
         if not slid or (_overlap(model, face.samples, touch_mm, target) > 0.0).any():
             found.append(target)
     return found
+
+
+def penetration(problem: Problem, frame: Frame, u: Float) -> tuple[float, Float]:
+    """How deep (mm) the displaced contact face is inside a rigid object anywhere between its contact points, and where.
+
+    In small strain displacements count along the normal only, as in the gap.
+
+    Parameters
+    ----------
+    u : (n, d) mm, nodal displacement of the meshed part
+    """
+    model, face, target, d = problem.model, problem.surface, frame.target, problem.dim
+    moved = face.interpolate @ u
+    if not model.kinematics.finite_strain:
+        normal = model.object.frame(d)[0]
+        moved = np.outer(moved @ normal, normal)
+    at = face.samples + moved
+    over = _overlap(model, at, problem.touch_mm, target)
+    at, over = at[over > 0.0], over[over > 0.0]
+    if not len(at):
+        return 0.0, np.zeros(d)
+    if isinstance(model.object, MeshObject):  # beside a wall the vertical overlap says little
+        there = np.zeros((len(at), 3))
+        there[:, :d] = at
+        there -= [target.slide_x_mm, problem.touch_mm - target.depth_mm, target.slide_z_mm]
+        over = np.minimum(over, -model.object.signed_distance(there)[0])
+    else:
+        over = over * _upright(model, at, target)
+    worst = int(over.argmax())
+    return max(float(over[worst]), 0.0), at[worst]
+
+
+def inside(problem: Problem, frame: Frame, u: Float) -> list[str]:
+    """What to tell of a press at whose end the object is inside the finger between the contact points."""
+    if problem.model.object_compliance is not None:  # its surface has moved as well
+        return []
+    depth, at = penetration(problem, frame, u)
+    if depth <= _WARNED * max(leg.depth_mm for leg in problem.model.legs):
+        return []
+    where = ", ".join(f"{axis} = {value:.3g}" for axis, value in zip("xyz", at, strict=False))
+    return [
+        f"at the end the finger's surface is up to {depth:.2g} mm inside the object between the contact points "
+        f"({where} mm); lower mesh.size_mm"
+    ]
+
+
+def _upright(model: Model, at: Float, target: Target) -> Float:
+    """Cosine (n,) of the object's slope over points (n, d)."""
+    x = at[:, 0] - target.slide_x_mm
+    z = at[:, 2] - target.slide_z_mm if at.shape[1] == 3 else np.zeros(len(at))
+    step = _SLOPE_STEP * model.design.height_mm
+    slopes = [model.object.height(x + a, z + b) - model.object.height(x - a, z - b) for a, b in ((step, 0), (0, step))]
+    return 1.0 / np.sqrt(1.0 + sum((slope / (2.0 * step)) ** 2 for slope in slopes[: at.shape[1] - 1]))
 
 
 def needed_mm(model: Model, touch_mm: float, found: Hidden, tips: Float | None) -> float | None:
