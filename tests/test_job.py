@@ -164,7 +164,7 @@ def test_a_scene_beyond_what_can_be_trusted_is_warned_of(tmp_path: Path, key: st
 
 
 def test_interruption_keeps_every_finished_step(tmp_path: Path) -> None:
-    scene = written(tmp_path, changed(SECTION, steps=100000))
+    scene = written(tmp_path, changed(SECTION, steps=10000))
     out = tmp_path / "out"
     command = [sys.executable, "-m", "finger3d", "press", str(scene), "--out", str(out)]
     # its lines go nowhere: a pipe that nobody reads is full after some 750 of them, and stops it
