@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from enum import Enum
 
 
@@ -30,6 +31,23 @@ class UnresolvedError(Finger3dError):
     def __init__(self, text: str, size_mm: float | None = None) -> None:
         super().__init__(text)
         self.size_mm = size_mm
+
+
+OUT_OF_MEMORY = (
+    "out of memory; steps that were finished are kept; `finger3d plan` forecasts the memory, a larger mesh.size_mm or "
+    "fewer steps and gauges need less"
+)
+"""What a user reads when memory runs out. Exit code 3."""
+
+
+def out_of_memory(error: BaseException) -> bool:
+    """Whether an exception says that memory ran out: of Python and NumPy, of the system, or of its loader."""
+    if isinstance(error, MemoryError):
+        return True
+    if isinstance(error, OSError):
+        return error.errno == errno.ENOMEM or "cannot allocate memory" in str(error).lower()
+    texts = ("cannot allocate memory", "failed to map segment", "can't start new thread")
+    return isinstance(error, ImportError | RuntimeError) and any(text in str(error).lower() for text in texts)
 
 
 class Outcome(Enum):

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from finger3d.design.limits import check_memory, rows_gb
 from finger3d.fem.assembly import MIXED_FROM
 from finger3d.increments import automatic, condensation_s, contact_s, limits
 from finger3d.model import Model
@@ -18,6 +19,7 @@ _BASE_MB = 170.0
 _TETWILD_MB = 500.0  # while it meshes, however little
 _IMPORT_S = 0.4
 _FIGURES_S = {2: 1.0, 3: 4.5}
+_GAUGE_S, _GAUGE_CELL_S = 3e-3, 7e-7  # a gauge, and for every cell that is searched for it
 _NEWTON = 3  # factorisations in a step at finite strain
 _NUMERIC = 0.8  # of a condensation, once the ordering is known; with two solutions
 _TANGENT = 0.8  # assemblies of the linear stiffness
@@ -52,8 +54,11 @@ def forecast(model: Model) -> dict[str, Any]:
     marched = len(runs) * fixed + sum(runs) * free
     tetwild = d == 3 and model.mesh.mesher == "ftetwild"
     seconds = _seconds(size, d, marched, tetwild)
-    memory = max(_memory(size, d), _TETWILD_MB if tetwild else 0.0)
+    seconds["assembly"] += len(model.gauges) * (_GAUGE_S + _GAUGE_CELL_S * size.cells)
+    memory = max(_memory(size, d, len(model.gauges)), _TETWILD_MB if tetwild else 0.0)
+    memory += _kept_mb(model, size, axes)
     costs = {name: _costs(name, model, size, seconds, marched, len(runs)) for _, name in model.filled}
+    check_memory((memory + sum(cost.memory_mb for cost in costs.values())) / 1e3, "this press")
     return {
         "domain": model.domain,
         "formulation": "mixed quadratic/linear" if mixed else "quadratic displacement",
@@ -61,6 +66,8 @@ def forecast(model: Model) -> dict[str, Any]:
         "cells": round(size.cells),
         "dofs": round(size.dofs),
         "contact_points": round(size.contact_points),
+        **({"gauges": len(model.gauges)} if model.gauges else {}),
+        **_triangles(model),
         "steps": fixed + runs[-1] * free,
         **({"steps_of_all_runs": marched} if len(runs) > 1 else {}),
         **{f"{stage}_s": round(s, 2) for stage, s in seconds.items()},
@@ -162,6 +169,26 @@ def _seconds(size: _Size, d: int, steps: int, tetwild: bool) -> dict[str, float]
     }
 
 
-def _memory(size: _Size, d: int) -> float:
+def _triangles(model: Model) -> dict[str, int]:
+    """Triangles of a finger and of an object from files."""
+    bodies = {"finger_triangles": model.design, "object_triangles": model.object}
+    return {name: len(body.surface.faces) for name, body in bodies.items() if hasattr(body, "surface")}
+
+
+def _kept_mb(model: Model, size: _Size, axes: tuple[str, ...]) -> float:
+    """Memory of the states of all increments, MB: the part's, the whole finger's, and what an effect keeps."""
+    d = 3 if model.domain == "solid" else 2
+    steps = sum(leg.steps if isinstance(leg.steps, int) else 8 * AUTO_START for leg in model.legs)
+    each = 8.0 * (3 * d) * size.contact_points * (1 + 2 ** len(axes))
+    effects = {name for _, name in model.filled}
+    if "large_deformation" in effects:
+        each += 8.0 * size.dofs
+    if "viscosity" in effects:
+        branches = 1 + len(getattr(model.kinematics, "prony", ()))
+        each += 8.0 * branches * (d * size.contact_points if getattr(model.kinematics, "bulk", True) else size.dofs)
+    return steps * each / 1e6
+
+
+def _memory(size: _Size, d: int, gauges: int = 0) -> float:
     per_dof = 3.0 * (size.dofs / 85_000.0) ** 0.3 * 4e-3 if d == 3 else 2.5e-3
-    return _BASE_MB + per_dof * size.dofs + 40e-6 * (d * size.contact_points) ** 2
+    return _BASE_MB + per_dof * size.dofs + 1e3 * rows_gb(d * size.contact_points + gauges)

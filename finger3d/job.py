@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from finger3d.solve import Problem
 
 _WRITE_EVERY_S = 0.5
+_WRITE_SHARE = 10.0  # a file tells of all increments so far: of thousands it takes seconds, so it is written less often
 _DEEP = 0.3  # the Fig. 9 finger is pressed by a fifth, the half cylinder too
 _FEW_POINTS = {2: 6, 3: 100}  # six along a line; ten by ten on a face
 _INCOMPLETE = "incomplete: the press was still running, or was interrupted; the steps written are good"
@@ -59,11 +60,12 @@ class _Output:
         self.warnings += resolution.warnings(problem)
         self.seconds = {"cad": 0.0, "mesh": 0.0, **problem.seconds, "contact": 0.0, "output": 0.0}
         self._written = -math.inf
+        self._write_s = 0.0
 
     def add(self, frame: Frame, seconds: float) -> None:
         self.frames.append(frame)
         self.seconds["contact"] += seconds
-        if time.perf_counter() - self._written > _WRITE_EVERY_S:
+        if time.perf_counter() - self._written > max(_WRITE_EVERY_S, _WRITE_SHARE * self._write_s):
             self.write(_INCOMPLETE)
 
     def write(self, outcome: str, tables: bool = True) -> dict[str, Any]:
@@ -78,7 +80,8 @@ class _Output:
             last = next((f for f in reversed(self.frames) if f.outcome.ok), self.frames[-1])
             write_csv(self.out / "contact.csv", contact_table(self.problem.points, last.state))
         self._written = time.perf_counter()
-        self.seconds["output"] += self._written - begin
+        self._write_s = self._written - begin
+        self.seconds["output"] += self._write_s
         return summary
 
     def _summary(self, steps: list[dict[str, Any]], outcome: str) -> dict[str, Any]:

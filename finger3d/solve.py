@@ -20,6 +20,7 @@ from finger3d.contact.law import SLIP
 from finger3d.contact.state import ContactState, Increment
 from finger3d.contact.threads import one_thread
 from finger3d.design import mesh_section, mesh_solid
+from finger3d.design.limits import check_rows
 from finger3d.fem.assembly import Elasticity, stiffness
 from finger3d.fem.condense import condense, stiffened
 from finger3d.fem.surface import Surface, displacement_row, local_rows, restrict, strain_row, surface
@@ -52,6 +53,7 @@ __all__ = [
 
 MARGIN = 0.3  # candidate points reach to a rigid gap of this share of the depth; checked after the solution
 _CUTS = 6
+_MANY = 100  # gauges: each takes some milliseconds
 _WORTH = 1000  # contact rows from which presses at once are quicker than in turn
 _LOOKS = 20  # and where rigid gaps are, for the candidate points
 _NEARLY = 0.95  # of the face: so many candidates, and all are: a few more rows cost less than to check every press
@@ -98,6 +100,9 @@ def build(model: Model, say: Callable[[str], None] = lambda text: None, margin: 
     matrix = stiffness(mesh, elastic, thickness)
     face = _candidates(model, everywhere, touch, margin)
     kept = _kept_rows(face, axes)
+    check_rows(len(kept), len(model.gauges))
+    if len(model.gauges) >= _MANY:
+        say(f"placing {len(model.gauges)} gauges")
     rows = local_rows(face, model.object.frame(mesh.dim))[kept]
     inlay = model.inclusions.lay(model, mesh, axes) if model.inclusions else None
     read = [inlay.reads @ inlay.rows, inlay.rows] if inlay else [gauge_row(mesh, g, axes) for g in model.gauges]

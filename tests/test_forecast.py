@@ -12,6 +12,7 @@ import pytest
 
 from finger3d.contact.law import Coulomb
 from finger3d.design import designs
+from finger3d.errors import Finger3dError
 from finger3d.forecast import forecast
 from finger3d.model import Domain, Gauge, Leg, Material, MeshOptions, Model
 from finger3d.scene import load
@@ -52,6 +53,47 @@ def test_every_effect_says_what_it_costs(name: str, domain: Domain) -> None:
 def test_bulk_viscosity_costs_nothing_more() -> None:
     model = baseline("solid")
     assert "no factorisation" in forecast(effect_type("viscosity")(((0.3, 0.5),), bulk=True).apply(model))["viscosity"]
+
+
+def test_gauges_and_increments_are_counted() -> None:
+    plain = baseline("plane-strain")
+    many = tuple(Gauge(f"g{i}", 30.0, 38.0) for i in range(10_000))
+    without, with_them = forecast(plain), forecast(replace(plain, gauges=many))
+    # 10 000 gauges took over 40 s before condensing, in a compliance of 10 000 rows: 0.8 GB, and copies of it
+    assert with_them["total_s"] > without["total_s"] + 20.0
+    assert with_them["memory_MB"] > without["memory_MB"] + 800.0
+    assert with_them["gauges"] == 10_000
+    long = forecast(replace(plain, legs=(Leg(10.0, steps=10_000, duration_s=1.0),)))
+    # every increment keeps force, gap, position and slip of all points, 8 bytes each
+    kept = 10_000 * 2 * 8 * 6 * without["contact_points"] / 1e6
+    assert long["memory_MB"] - without["memory_MB"] > kept
+    assert long["total_s"] > without["total_s"] + 20.0
+
+
+@pytest.mark.parametrize("many", [{"gauges": tuple(Gauge(f"g{i}", 30.0, 38.0) for i in range(10_000))},
+                                  {"legs": (Leg(10.0, steps=10_000, duration_s=1.0),)}])  # fmt: skip
+def test_what_memory_cannot_hold_is_refused(many: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    from finger3d.design import limits
+
+    plain = replace(baseline("plane-strain"), gauges=())
+    few, lot = (1e6 * forecast(model)["memory_MB"] for model in (plain, replace(plain, **many)))
+    # four fifths of the memory may be used: as much as lies between the two forecasts
+    memory = round(0.5 * (few + lot) / 0.8)
+    monkeypatch.setattr(limits, "memory_bytes", lambda: (memory, memory))
+    assert forecast(plain)["memory_MB"] > 0
+    with pytest.raises(Finger3dError, match="forecast"):
+        forecast(replace(plain, **many))
+
+
+def test_a_condensation_that_memory_cannot_hold_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    from finger3d.design import limits
+
+    model = replace(baseline("plane-strain"), gauges=())
+    build(model)
+    many = tuple(Gauge(f"g{i}", 30.0, 38.0) for i in range(10_000))
+    monkeypatch.setattr(limits, "memory_bytes", lambda: (300_000_000, 300_000_000))
+    with pytest.raises(Finger3dError, match="fewer gauges"):
+        build(replace(model, gauges=many))
 
 
 def test_step_lengths_are_counted() -> None:

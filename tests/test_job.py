@@ -204,7 +204,7 @@ def test_a_deep_press_at_finite_strain_is_not_warned_of_small_strain(tmp_path: P
 
 
 def test_interruption_keeps_every_finished_step(tmp_path: Path) -> None:
-    scene = written(tmp_path, changed(SECTION, steps=100000))
+    scene = written(tmp_path, changed(SECTION, steps=10000))
     out = tmp_path / "out"
     command = [sys.executable, "-m", "finger3d", "press", str(scene), "--out", str(out)]
     # its lines go nowhere: a pipe that nobody reads is full after some 750 of them, and stops it

@@ -106,7 +106,7 @@ def test_forces_are_proportional_to_the_modulus_from_end_to_end(domain: str, eff
     [
         "material.E_MPa=1e200", "material.E_MPa=5e-324", "material.E_MPa=1e-160", "material.E_MPa=1e154",
         "finger.radius_mm=1e300", "press.duration_s=1e300", "press.slide_x_mm=1e300", "press.slide_x_mm=600.0",
-        "effects.viscosity={prony=[[1e308, 1.0]]}", "mesh.size_mm=1e-300", "mesh.size_mm=1e-4", "friction.mu=1e308",
+        "effects.viscosity={prony=[[1e308, 1.0]]}", "mesh.size_mm=1e-300", "friction.mu=1e308",
         "press.steps=100000000", "object.radius_mm=1e300", "object.x_mm=1e300", "press.depth_mm=1e-300",
     ],
 )  # fmt: skip

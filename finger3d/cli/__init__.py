@@ -10,7 +10,7 @@ from cyclopts import CycloptsError
 from finger3d.cli import design, output, press, project, sensor, show, sweep  # noqa: F401
 from finger3d.cli.common import app, complain
 from finger3d.cli.terminal import safe_streams, termination_interrupts
-from finger3d.errors import Finger3dError
+from finger3d.errors import OUT_OF_MEMORY, Finger3dError, MissingError, out_of_memory
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -34,7 +34,15 @@ def _run(arguments: Sequence[str] | None) -> int:
     except KeyboardInterrupt:
         complain("interrupted; nothing was written")
         return 130
+    except (MemoryError, OSError, RuntimeError) as error:
+        if not out_of_memory(error):
+            raise
+        complain(OUT_OF_MEMORY)
+        return MissingError.exit_code
     except ImportError as error:
+        if out_of_memory(error):
+            complain(OUT_OF_MEMORY)
+            return MissingError.exit_code
         # Ctrl-C while OCP or VTK initialise: their loaders turn it into an ImportError.
         if not isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
             raise

@@ -46,9 +46,7 @@ def check_sizes(design: Any, options: Any, dim: int) -> None:
 
 def check_count(cells: float, dim: int, options: Any, cap: float = math.inf) -> None:
     """Refuse a mesh forecast to need more than most of this machine's memory, or more than `cap` cells."""
-    need = memory_gb(cells, dim)
-    total = memory_bytes()
-    have = total[0] / 1e9 if total else math.inf
+    need, have = memory_gb(cells, dim), _machine_gb()
     if need <= _SHARE * have and cells <= cap:
         return
     kind = "triangles" if dim == 2 else "tetrahedra"
@@ -57,3 +55,34 @@ def check_count(cells: float, dim: int, options: Any, cap: float = math.inf) -> 
         f"mesh.size_mm = {options.size_mm:g} with base_size_mm = {options.base_size_mm:g} gives about "
         f"{cells:.2g} {kind}, forecast {need:.2g} GB; allowed: {limit}; choose larger sizes"
     )
+
+
+def rows_gb(rows: float) -> float:
+    """Forecast of the memory of the dense compliance of `rows` condensed rows and its copies, GB."""
+    return 40e-9 * rows**2
+
+
+def check_rows(contact: int, gauges: int) -> None:
+    """Refuse a condensation to more rows than most of this machine's memory holds as a dense matrix."""
+    need, have = rows_gb(contact + gauges), _machine_gb()
+    if need > _SHARE * have:
+        cure = "fewer gauges" if gauges > contact else "a larger mesh.size_mm"
+        raise Finger3dError(
+            f"mesh.size_mm: {contact} rows of contact points and {gauges} of gauges are condensed to, forecast "
+            f"{need:.2g} GB; allowed: at most {_SHARE * have:.1f} GB of {have:.1f} GB; choose {cure}"
+        )
+
+
+def check_memory(need_gb: float, what: str) -> None:
+    """Refuse a press forecast to need more than most of this machine's memory."""
+    have = _machine_gb()
+    if need_gb > _SHARE * have:
+        raise Finger3dError(
+            f"{what}: forecast {need_gb:.2g} GB; allowed: at most {_SHARE * have:.1f} GB of {have:.1f} GB; choose a "
+            "larger mesh.size_mm, fewer steps or fewer gauges"
+        )
+
+
+def _machine_gb() -> float:
+    total = memory_bytes()
+    return total[0] / 1e9 if total else math.inf

@@ -13,10 +13,13 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from finger3d.errors import OUT_OF_MEMORY, MissingError
+
 Float = NDArray[np.float64]
 
 _MTYPE = ctypes.c_int32(-2)  # real, symmetric, indefinite
 _INT32_MAX = 2**31 - 1
+_NO_MEMORY = -2
 
 
 def _library() -> Any:
@@ -27,7 +30,16 @@ def _library() -> Any:
             os.environ["PYPARDISO_MKL_RT"] = str(found[0])
     from pypardiso.pardiso_wrapper import PyPardisoSolver
 
-    return PyPardisoSolver().libmkl.pardiso
+    library = PyPardisoSolver().libmkl
+    library.mkl_set_exit_handler(_EXIT)
+    return library.pardiso
+
+
+@ctypes.CFUNCTYPE(None, ctypes.c_int)
+def _EXIT(code: int) -> None:
+    """End the process as a lack of memory does: MKL would exit with 2, which stands for a mistake of the user."""
+    os.write(2, f"finger3d: {OUT_OF_MEMORY}\n".encode())
+    os._exit(MissingError.exit_code)
 
 
 def available() -> bool:
@@ -39,7 +51,7 @@ def available() -> bool:
     return True
 
 
-class PardisoError(RuntimeError):
+class PardisoError(MissingError):
     """PARDISO refused the matrix; carries its error number."""
 
 
@@ -132,8 +144,10 @@ def _run(
         a.ctypes.data_as(ctypes.c_void_p), pointer(ia), pointer(ja), pointer(perm), i32(nrhs), pointer(iparm), i32(0),
         b.ctypes.data_as(ctypes.c_void_p), x.ctypes.data_as(ctypes.c_void_p), ctypes.byref(error),
     )  # fmt: skip
+    if error.value == _NO_MEMORY:
+        raise MemoryError(f"PARDISO phase {phase}")
     if error.value:
-        reason = {-1: "inconsistent input", -2: "not enough memory", -3: "reordering", -4: "zero pivot"}
+        reason = {-1: "inconsistent input", -3: "reordering", -4: "zero pivot"}
         raise PardisoError(f"PARDISO phase {phase}: error {error.value} ({reason.get(error.value, 'see MKL manual')})")
 
 

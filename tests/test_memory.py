@@ -1,0 +1,90 @@
+"""Memory that runs out: one line and exit 3, by whatever part of the program finds it out."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from finger3d import cli
+from finger3d.errors import OUT_OF_MEMORY, out_of_memory
+from finger3d.fem import pardiso
+
+SCENE = """
+[finger]
+geometry = "clipped_cylinder"
+radius_mm = 100.0
+half_length_mm = 50.0
+edge_height_mm = 36.6
+width_mm = 20.0
+[material]
+E_MPa = 1.0
+nu = 0.49
+[press]
+depth_mm = 10.0
+steps = 1
+[mesh]
+size_mm = 1.5
+base_size_mm = 6.0
+mesher = "swept"
+"""
+
+LIMITED = """
+import resource, sys
+import finger3d.cli, finger3d.job, finger3d.scene
+resource.setrlimit(resource.RLIMIT_AS, ({limit}, resource.getrlimit(resource.RLIMIT_AS)[1]))
+sys.exit(finger3d.cli.main(sys.argv[1:]))
+"""
+
+
+# bytes of address space that are left to 19 000 unknowns: too few for arrays, for MKL's own libraries, for its factor
+@pytest.mark.parametrize("limit", [210_000_000, 300_000_000, 450_000_000])
+def test_one_line_and_exit_3(limit: int, tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(SCENE, encoding="utf-8")
+    command = ["press", str(scene), "--out", str(tmp_path / "out"), "--no-figures", "--no-error"]
+    run = subprocess.run(
+        [sys.executable, "-c", LIMITED.format(limit=limit), *command], capture_output=True, text=True, timeout=100
+    )
+    assert run.returncode == 3, run.stderr
+    assert run.stderr == f"finger3d: {OUT_OF_MEMORY}\n"
+
+
+@pytest.mark.parametrize(
+    ("error", "memory"),
+    [
+        (MemoryError("Unable to allocate 6 GiB"), True), (OSError(12, "Cannot allocate memory"), True),
+        (RuntimeError("can't start new thread"), True), (ImportError("x.so: failed to map segment"), True),
+        (OSError(2, "No such file"), False), (RuntimeError("other"), False),
+        (ValueError("cannot allocate memory"), False),
+    ],
+)  # fmt: skip
+def test_what_says_that_memory_ran_out(error: BaseException, memory: bool, monkeypatch, capsys) -> None:
+    assert out_of_memory(error) is memory
+
+    def fails(*args: object, **kwargs: object) -> int:
+        raise error
+
+    monkeypatch.setattr(cli, "app", fails)
+    if memory:
+        assert cli.main(["info"]) == 3
+        assert capsys.readouterr().err == f"finger3d: {OUT_OF_MEMORY}\n"
+    else:
+        with pytest.raises(type(error)):
+            cli.main(["info"])
+
+
+@pytest.mark.skipif(not pardiso.available(), reason="no MKL")
+def test_a_factor_without_memory_is_a_lack_of_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    import numpy as np
+    import scipy.sparse as sp
+
+    def refuses(*arguments: object) -> None:
+        phase = arguments[4]._obj.value
+        arguments[-1]._obj.value = -2 if phase == 22 else 0  # PARDISO's number for it
+
+    monkeypatch.setattr(pardiso, "_library", lambda: refuses)
+    with pytest.raises(MemoryError):
+        pardiso.SchurFactor(sp.csr_matrix(np.eye(3)), 1)
