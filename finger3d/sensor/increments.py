@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.increments import automatic, with_steps
+from finger3d.increments import with_steps
 from finger3d.model import Leg
 from finger3d.problem import AUTO_START, Problem
 
@@ -87,7 +87,7 @@ def found_increments(problem: Problem, strain: Callable[[Problem], Float], noise
     """
     model, wanted = problem.model, SHARE * noise
     legs = model.legs
-    if not automatic(problem):
+    if all(isinstance(leg.steps, int) for leg in legs):
         return Increments(legs, legs, False, math.nan, wanted)
     most, steps = _MOST[model.domain] if model.kinematics.small_strain else _MOST_FACTORED, AUTO_START
     strains: dict[float, Float] = {}
