@@ -20,7 +20,7 @@ _QUANTILE = 0.99  # the clamped corners are singular, their strain says nothing
 # change of force by large_deformation over depth/height, Fig. 9 finger, nu = 0.45: validation/what_each_effect_does.py
 _FINITE = {"plane-strain": 1.35, "plane-stress": 1.0, "solid": 1.0}
 
-# errors of N equal increments, times N: references.md sec. 2 (line contact, nu = 0.3), design.md sec. 4
+# errors of N equal increments, times N: validation/REFERENCES.md, 2.4 (line contact, nu = 0.3)
 _DISSIPATION, _STICK = 7.0, 0.3
 _ENOUGH = 50
 

@@ -111,7 +111,7 @@ def _half_extent(x: Float) -> float:
 
 
 def measure(points: ContactPoints, frame: Frame) -> dict[str, Any]:
-    """The entry of `steps` in summary.json for one frame (contract.md)."""
+    """The entry of `steps` in summary.json for one frame."""
     state, target = frame.state, frame.target
     points = points.seen_in(state)
     world = points.world(state.force)

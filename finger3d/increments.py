@@ -11,7 +11,7 @@ from finger3d.solve import AUTO_START, Problem, march
 
 FRICTION_TOLERANCE = 0.01
 DISSIPATION_TOLERANCE = 0.05
-"""The error of both falls as 1 / increments, and the dissipation's is about ten times larger (references.md sec. 2)."""
+"""The error of both falls as 1 / increments; that of the dissipation is larger (validation/REFERENCES.md, 2.4)."""
 
 _LARGEST = 640
 # dissipation below this share of the work is round-off of a press that hardly slips

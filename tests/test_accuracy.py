@@ -83,7 +83,7 @@ def test_a_length_is_never_better_than_half_the_distance_of_points() -> None:
 
 
 def test_the_true_error_of_every_number_is_below_twice_the_estimate() -> None:
-    # the factor 2 is issue 8's; 90 % of all cases are judged by validation/error_bars.py, these are typical ones
+    # error bars claim a factor 2 in 90 % of cases, which validation/error_bars.py judges; these are typical ones
     problem, frames = pressed(half_cylinder(0.2))
     found = estimate(problem, frames, FAST)
     truth = last_of(half_cylinder(0.05))
@@ -153,7 +153,7 @@ def test_a_mesh_than_which_none_is_coarser_is_judged_by_a_finer_one() -> None:
     told, truth = main_numbers(problem, frames[-1]), last_of(half_cylinder(0.05))
     assert set(found.discretisation) == set(told)
     for name, value in told.items():
-        # twice the estimate is issue 8's, as above; the increments are the same in both
+        # twice the estimate, as above; the increments are the same in both
         assert abs(value - truth[name]) <= 2.0 * found.discretisation[name], name
     # the bar is no more than several times the truth's worth: the force is known within its own size
     assert found.discretisation["normal_force_N"] < 0.5 * told["normal_force_N"]

@@ -1,4 +1,4 @@
-"""Issue 5's list of bad input, every item as a user meets it: the command ends with code 2 and one line, at once."""
+"""Bad bodies as a user meets them: the command ends with code 2 and one line, at once."""
 
 from __future__ import annotations
 
@@ -176,8 +176,7 @@ def test_shapes_beside_the_finger(table: str, text: str, tmp_path: Path, capsys:
     assert re.search(text, refused(capsys, tmp_path, PAD, table))
 
 
-# geometry.md's table of what crashes or hangs pytetwild, as far as a scene can ask for it; the rest, as arrays, is in
-# test_design_tetwild.py
+# what crashes or hangs pytetwild, as far as a scene can ask for it; the rest, as arrays, is in test_design_tetwild.py
 @pytest.mark.parametrize(
     ("size", "text"),
     [(100.0, "larger than the finger"), (0.02, "tetrahedra"), (0.0, "above 0"), (-1.0, "above 0")],

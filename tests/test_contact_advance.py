@@ -200,7 +200,7 @@ def test_a_number_that_is_none_shows_wherever_it_is_between_points_that_touch(
 
 
 def test_one_point_coulomb_is_unique_below_its_critical_coefficient() -> None:
-    # references.md sec. 8: stiffness [[1, .8], [.8, 2]] in (t, n), critical at K_tt / |K_tn| = 1.25
+    # validation/REFERENCES.md, 8.1: stiffness [[1, .8], [.8, 2]] in (t, n), critical at K_tt / |K_tn| = 1.25
     stiffness = np.array([[2.0, 0.8], [0.8, 1.0]])  # (n, t)
     compliance = np.linalg.inv(stiffness).reshape(1, 2, 1, 2)
     assert uniqueness(np.array([1.25]), compliance.reshape(2, 2), 2) == pytest.approx(1.0, rel=1e-12)

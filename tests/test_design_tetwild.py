@@ -221,7 +221,7 @@ def test_a_zone_narrower_than_the_finger_is_refined_along_z_too() -> None:
 
 def test_the_forecast_of_tets_matches_what_was_measured() -> None:
     low, high = np.array([-50.0, 0.0, -10.0]), np.array([50.0, FIG9.height_mm, 10.0])
-    for size, measured in ((2.0, 17_000), (1.0, 50_725), (0.5, 218_607)):  # geometry.md sec. 4
+    for size, measured in ((2.0, 17_000), (1.0, 50_725), (0.5, 218_607)):  # tets that pytetwild made
         field = sizing(FIG9, SimpleNamespace(size_mm=size, base_size_mm=10.0), (-44, 44, -10, 10), low, high)
         assert 0.9 < forecast(FIG9, field) / measured < 2.0  # too high where the grading is steep, never low
 

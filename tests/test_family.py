@@ -140,7 +140,7 @@ def test_chosen_sizes_follow_the_depth_and_are_shared():
 
 
 def test_a_step_that_fails_is_named():
-    """The paper's rule, which does not exclude friction that helps slip (design.md sec. 3)."""
+    """The paper's rule, which does not exclude friction that helps slip."""
     model = scene("contact.rule=paper", "material.nu=0.45", "mesh.size_mm=0.1", "press.depth_mm=0.6").model()
     pressed = Body(model, [Variant.of(model)]).press(Variant.of(model))
     assert pressed.outcome.startswith("step ")

@@ -1,4 +1,4 @@
-"""Elements and assembly: exactness, rates and published values (references.md sec. 5)."""
+"""Elements and assembly: exactness, rates and published values (validation/REFERENCES.md, 5)."""
 
 from __future__ import annotations
 
@@ -161,7 +161,7 @@ def cook(n: int, elastic: Elasticity, force: float) -> float:
     ids=["stress", "0.3", "0.49", "0.4999", "0.5"],
 )
 def test_cook_membrane(elastic: Elasticity, force: float, want: float) -> None:
-    # references.md sec. 5.  The clamped corner's singularity governs: error ~ h^1.1 to h^1.3; extrapolated as seen
+    # validation/REFERENCES.md, 5.4.  The clamped corner governs: error ~ h^1.1 to h^1.3; extrapolated as seen
     a, b, c = (cook(n, elastic, force) for n in (12, 24, 48))
     ratio = (c - b) / (b - a)
     assert 0.35 < ratio < 0.5

@@ -1,4 +1,4 @@
-"""Neo-Hookean law: closed forms (references.md sec. 5), tangent = finite difference, small-strain limit."""
+"""Neo-Hookean law: closed forms (validation/REFERENCES.md, 5.7), tangent = finite difference, small-strain limit."""
 
 from __future__ import annotations
 

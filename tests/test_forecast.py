@@ -76,7 +76,7 @@ def test_presses_took_what_is_foretold(root: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("domain", ["plane-strain", "solid"])
 def test_large_deformation_takes_what_was_foretold(domain: Domain) -> None:
-    # processor time of this process; a factor 2 each way is what issue 6 asks for
+    # processor time of this process; the forecast is meant to hold within a factor 2 either way
     plain = baseline(domain)
     large = effect_type("large_deformation")().apply(plain)
     took = []

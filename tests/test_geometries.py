@@ -68,7 +68,7 @@ def test_dimensions_that_do_not_fit_together_name_key_value_and_limit(changes: d
 
 
 def test_the_papers_finger_is_50_mm_high() -> None:
-    # contract.md: 36.6 = 50 - (100 - sqrt(100^2 - 50^2)), to the digits the paper gives.
+    # Maeno 2004, Sec. III: 36.6 = 50 - (100 - sqrt(100^2 - 50^2)), to the digits the paper gives.
     assert make("clipped_cylinder").height_mm == pytest.approx(50.0, abs=0.003)
 
 

@@ -1,4 +1,4 @@
-"""The main job through the command line: files, keys, cost, interruption (contract.md)."""
+"""The main job through the command line: files, keys, cost, interruption."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ def fig9(nu: float, size: float = 2.0, **changes: object) -> Model:
 
 
 def test_fig9_agrees_with_calculix() -> None:
-    # design.md: 28.5 N per mm by CalculiX (28.4 by the throw-away solver), stick zone 33 mm; small strain gives 22.35
+    # validation/REFERENCES.md, 6.5: 28.5 N per mm by CalculiX, and 22.35 in small strain; stick zone 33 mm
     problem = build(fig9(0.45, 1.0))
     *_, end = march(problem)
     got = measure(problem.points, end)

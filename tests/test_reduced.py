@@ -106,7 +106,7 @@ def test_ten_steps_with_a_hundred_points_take_less_than_50_ms(tmp_path: Path) ->
         start = time.process_time()
         assert loaded.press(mu).outcome.ok
         spent.append(time.process_time() - start)
-    # issue 7: 50 ms.  Processor time, which a busy machine stretches to about twice that
+    # aim: 50 ms.  Processor time, which a busy machine stretches to about twice that
     assert min(spent) < 0.1
 
 

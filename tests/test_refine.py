@@ -57,7 +57,7 @@ def test_it_refines_until_the_estimate_is_met_and_says_every_round() -> None:
     assert found.mesh.size_mm == found.rounds[-1].size_mm
     assert found.problem is not None
     assert found.problem.stiffness.upper.shape[0] == found.rounds[-1].dofs
-    # and it is true: against five times the edge lengths' fineness, twice the tolerance at most (issue 8)
+    # and it is true: against five times the edge lengths' fineness, twice the tolerance at most
     truth = build(replace(section(0.4), mesh=MeshOptions(0.02, 0.1, "swept")))
     force = [-f.state.force[:, 0].sum() for p in (found.problem, truth) for f in [list(march(p))[-1]]]
     assert force[0] == pytest.approx(force[1], rel=2 * 0.03)

@@ -1,4 +1,4 @@
-"""The paper's finger, pressed: the numbers of references.md and design.md, and what is always true."""
+"""The paper's finger, pressed: reference values (validation/REFERENCES.md, 2.6) and properties that hold exactly."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_points_that_touch_come_first(domain: str) -> None:
     assert len(touching) < 0.9 * len(problem.surface.nodes)
 
 
-# references.md sec. 2, the paper's half cylinder; P within 1 %, lengths within .013 plus half a contact point
+# validation/REFERENCES.md, 2.6, the paper's half cylinder; P within 1 %, lengths within .013 plus half a contact point
 @pytest.mark.parametrize(
     ("depth", "force", "a", "c"),
     [(0.2, 0.12668, 0.862, 0.639), (0.5, 0.40495, 1.508, 1.376), (1.0, 1.01932, 2.297, 2.230)],
@@ -85,7 +85,7 @@ def test_half_cylinder_in_plane_stress(depth: float, force: float, a: float, c: 
 def test_fig9_in_plane_strain_gives_26_4_newton_per_millimetre() -> None:
     got = last(fig9(domain="plane-strain", mesh=MeshOptions(1.0, 4.0)))
     assert got["normal_force_N"] / 20.0 == pytest.approx(26.4, rel=0.005)
-    assert 74.0 <= 2.0 * got["contact_half_length_mm"] <= 78.0  # design.md, at rest
+    assert 74.0 <= 2.0 * got["contact_half_length_mm"] <= 78.0  # at rest
 
 
 def test_fig9_as_a_solid_and_with_held_ends() -> None:

@@ -21,7 +21,7 @@ def test_study_quick(study: Study, tmp_path: Path) -> None:
     assert not [row for row in result.rows if not row.passed]
     if result.figure is not None:
         draw(result.figure, tmp_path / "figure.png")
-    # issue 4: 5 s at most.  Own processor time, which a busy machine stretches to about twice that
+    # aim: 5 s at most.  Own processor time, which a busy machine stretches to about twice that
     assert seconds < 10.0, f"{study.name} takes {seconds:.1f} s"
 
 

@@ -1,11 +1,11 @@
 """How much does a press cost beside the one factorisation it cannot do without, and what does Python add?
 
-Source: the ratios of issue 8, all taken in one run on the Fig. 9 finger, 20 mm wide, nu = .49, ten increments.  Solids
-are swept, so that every run has the same mesh; each is solved in a process of its own, twice, and the shorter time of
-each stage counts; of whole sweeps it is the median of pairs.  The plain factorisation is PARDISO's, called by pypardiso
-on the same matrix with the same settings (parallel METIS, Bunch-Kaufman).  A time says little where others compute
-beside: the load stands in every row, and none of them can fail.  Not a study: what it says is of one machine at one
-time, and nothing of it is kept.
+The ratios are all taken in one run on the Fig. 9 finger, 20 mm wide, nu = .49, ten increments.  Solids are swept, so
+that every run has the same mesh; each is solved in a process of its own, twice, and the shorter time of each stage
+counts; of whole sweeps it is the median of pairs.  The plain factorisation is PARDISO's, called by pypardiso on the
+same matrix with the same settings (parallel METIS, Bunch-Kaufman).  A time says little where others compute beside: the
+load stands in every row, and none of them can fail.  Not a study: what it says is of one machine at one time, and
+nothing of it is kept.
 
 Run by ``make bench``; ``python -m validation._bench --quick`` takes some seconds and means nothing.
 """
@@ -258,10 +258,10 @@ def _ratios(best: dict[str, float], load: float) -> list[Row]:
     ]
 
 
-def _row(what: str, most: float, got: float, load: float, reason: str = "the issue's") -> Row:
+def _row(what: str, most: float, got: float, load: float, reason: str = "a bound") -> Row:
     busy = "" if load <= 1.3 * cores() else ", BUSY"
     reason = f"{reason}; load {load:.1f} on {cores()} cores{busy}"
-    return Row(what, "issue 8", most, got, 0.0, reason, "statement", "at most")
+    return Row(what, "goal of this project", most, got, 0.0, reason, "statement", "at most")
 
 
 def main(arguments: Sequence[str]) -> None:

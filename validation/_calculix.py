@@ -1,4 +1,4 @@
-"""The Fig. 9 finger as an input deck of CalculiX, and its answers read back."""
+"""The Fig. 9 finger as an input deck of CalculiX, and the reader of its results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What element and contact studies share: graded boxes, consistent loads, a full solution, error norms, rates, axes."""
+"""Tools of element and contact studies: graded boxes, consistent loads, full solutions, error norms, rates, axes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Singularities at the rim of a clamped or bonded face, which set the rate of convergence there."""
+"""Corner singularities at clamped or bonded faces (validation/REFERENCES.md, 5.3), and extrapolation."""
 
 from __future__ import annotations
 

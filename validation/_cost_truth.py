@@ -1,8 +1,8 @@
-"""From runs to errors: the truth by extrapolation in the mesh and in the increments, and the cheapest way to a target.
+"""Errors of the runs of cost_of_accuracy: reference values by extrapolation, and the cheapest run within a tolerance.
 
-The error of a run is taken as that of its mesh, at ten increments, plus that of its increments, on one mesh.  A target
-is met by a mesh if it and all finer ones of its series are within it: an error that happens to pass zero counts for
-nothing.
+The reference is extrapolated in the mesh and in the increments.  The error of a run is taken as that of its mesh, at
+ten increments, plus that of its increments, on one mesh.  A mesh meets a tolerance only if all finer meshes of its
+series meet it too, so that an error that passes through zero by chance does not count.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The paper's way as a reference solver: one factorisation of the whole body in every iteration of the contact."""
+"""Reference solver as in Maeno 2004: one factorisation of the whole body in every contact iteration."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""A foil in a stretched body without end: what it reads of the strain, by Prandtl's equation and by graded meshes.
+"""Strain read by a foil bonded into a stretched infinite body: Prandtl's equation in the plane, graded meshes in 3D.
 
-In a plane a foil that hands N' to the body obeys ``N/EA = e0 - K int N'(t)/(s - t) dt``, K = (1+nu')(3-nu')/(4 pi E'),
-E' and nu' of plane stress: Prandtl's equation of a wing, by its sine series (Glauert 1926).
+In the plane a foil with the axial force N obeys ``N/EA = e0 - K int N'(t)/(s - t) dt``, K = (1+nu')(3-nu')/(4 pi E'),
+with E' and nu' of plane stress.  This is Prandtl's lifting-line equation, solved by its sine series (Glauert 1926).
 """
 
 from __future__ import annotations

@@ -30,12 +30,12 @@ def compliance(nu: float) -> float:
 
 
 def hertz(nu: float, a: Float) -> Float:
-    """Force (N) of a frictionless cylinder with contact half-width a (mm) on a width of 1 mm (Johnson 1985, ch. 4)."""
+    """Force (N) of a frictionless cylinder, contact half-width a (mm), on a width of 1 mm (Johnson 1985, sec. 4.2)."""
     return np.pi * a**2 / (2.0 * RADIUS * compliance(nu))
 
 
 def depth(a: Float, height: float) -> Float:
-    """Depth (mm) that gives about the half-width a: a^2/2R ln(2h/a), as the bonded layer of references.md sec. 1."""
+    """Depth (mm) for about the half-width a: a^2/2R ln(2h/a), validation/REFERENCES.md, 1.7."""
     return a**2 / (2.0 * RADIUS) * np.log(2.0 * height / a)
 
 

@@ -1,11 +1,11 @@
 """Frictionless indentation of a bonded elastic layer, in closed form but for one smooth integral equation.
 
-The surface moves by C M(k h)/k under a pressure's Fourier (line) or Hankel (point) transform, C = 2/E*, with
-M(z) = [2K sinh 2z - 4z]/[2K cosh 2z + 4z^2 + 1 + K^2], K = 3 - 4 nu (references.md sec. 1).  A contact of half-width or
-radius a under a parabola x^2/2R is found from a function phi on (0, a): the transform of the pressure is
-int phi(t) J0(k t) dt (line, so that phi = pi t/(C R) on a half-plane) or int phi(t) cos(k t) dt (point: phi =
-2 (d - t^2/R)/(pi C)), which turns the mixed problem into an equation of the second kind whose kernel has 1 - M, which
-decays as exp(-2z) (Lebedev and Ufliand 1958; Gladwell 1980, ch. 5).  Lengths in units of h, 1/E* = 1.
+The surface moves by C M(k h)/k under a pressure's Fourier (line) or Hankel (point) transform, C = 2/E*, with M(z) as in
+validation/REFERENCES.md, 1.7.  A contact of half-width or radius a under a parabola x^2/2R is found from a function phi
+on (0, a): the transform of the pressure is int phi(t) J0(k t) dt (line; phi = pi t/(C R) on a half-plane) or int phi(t)
+cos(k t) dt (point; phi = 2 (d - t^2/R)/(pi C) on a half-space).  This turns the mixed problem into an equation of the
+second kind, whose kernel contains 1 - M and decays as exp(-2z) (Lebedev and Ufliand 1958; Gladwell 1980, ch. 5).
+Lengths are in units of h, 1/E* = 1.
 """
 
 from __future__ import annotations

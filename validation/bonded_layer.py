@@ -1,13 +1,15 @@
 """Is a bonded layer as stiff against a cylinder and a ball as its integral equation says, from thick to thin?
 
-The finger is such a layer: soft, near-incompressible, glued to a base.  Exact force and depth at a contact half-width a
-are those of references.md sec. 1, recomputed here from the layer's compliance (Lebedev and Ufliand 1958; Gladwell
-1980), nu = 0.3 and 1/2, thickness h, a/h = 0.1 to 2.  The indenter is pressed to the exact depth; forces are compared.
+The finger is such a layer: soft, nearly incompressible and bonded to a base.  Source: the force and the depth at a
+contact half-width or radius a follow from an integral equation, validation/REFERENCES.md, 1.7, which `_layer.py`
+solves; nu = 0.3 and 1/2, thickness h, a/h = 0.1 to 2.  The indenter is pressed to the exact depth, and the forces are
+compared.
 
-Theory of the rate: the energy's error is h^3 (Brezzi, Hager and Raviart 1977, quadratic elements), times a function of
-where the contact's edge lies between two points; the force is its derivative by depth, h^2, and swings about zero.  So
-the root of the mean square over many depths is what is measured; its rate is 2, and more in 3D, where the edge crosses
-many points at once.  The layer is wide: beyond a it needs 4 h more at nu = 0.3 and 8 h more at nu = 1/2.
+Expected rate: the energy has an error of third order in the cell size (Brezzi, Hager and Raviart 1977, quadratic
+elements), times a function of the position of the contact edge between two points.  The force is its derivative with
+respect to depth: second order, oscillating about zero.  The root mean square over many depths is used; its rate is 2,
+and higher in 3D, where the edge crosses many points at once.  The layer extends beyond a by 4 h at nu = 0.3 and by 8 h
+at nu = 1/2, where it counts as infinite.
 """
 
 from __future__ import annotations
@@ -29,8 +31,11 @@ from ._layer import line, point
 
 Float = NDArray[np.float64]
 RADIUS = 1000.0  # of the indenter, in thicknesses: a circle is a parabola to 1e-6
-_LAYER = "Gladwell 1980; references.md sec. 1"
-TABLE = {  # references.md sec. 1, nu = 0.3: a/h -> P/P_Hertz, depth R/a^2
+_LAYER = "Gladwell 1980; REFERENCES.md, 1.7"
+_ONE = (
+    "second order in the point spacing; 0.08 % or less measured at 5 to 40 points to a, and coarse meshes must pass too"
+)
+TABLE = {  # REFERENCES.md, 1.7, nu = 0.3: a/h -> P/P_Hertz, depth R/a^2
     "line": {0.1: (1.0071, 1.4960), 0.5: (1.1661, 0.8199), 1.0: (1.5556, 0.6540), 2.0: (2.5184, 0.5711)},
     "point": {0.1: (1.0005, 0.9421), 0.5: (1.0516, 0.7588), 1.0: (1.2589, 0.6476), 2.0: (1.8789, 0.5730)},
 }
@@ -110,9 +115,7 @@ def run(quick: bool) -> Result:
                 table += [(kind, nu, a, round(1 / h), *e) for h, e in zip(sizes, found, strict=True)]
                 wanted = exact(a, nu).force
                 what = f"P/P_Hertz(a), {kind}, a/h = {a:g}, nu = {nu:g}"
-                rows.append(
-                    Row(what, _LAYER, wanted, wanted * (1.0 + found[-1][0]), 0.01, "issue 4: layer rows within 1 %")
-                )
+                rows.append(Row(what, _LAYER, wanted, wanted * (1.0 + found[-1][0]), 0.01, _ONE))
                 # a/h = 0.1: the mesher's growth of 0.25 governs, which does not shrink; depth < a^2/2R: the edge lies
                 # beyond where the rigid indenter would overlap, in coarser cells
                 fair = kind == "point" or (a >= 0.5 and exact(a, nu).depth > 0.5)
@@ -122,7 +125,7 @@ def run(quick: bool) -> Result:
             if not slopes:
                 continue
             what = f"rate of the force, {kind}, nu = {nu:g}, lowest over a/h"
-            why = "the edge's place between points is sampled, not averaged exactly; more is welcome"
+            why = "the depths sample the position of the edge between two points; a higher rate passes"
             rows.append(Row(what, "Brezzi, Hager, Raviart 1977", 2.0, min(slopes), 0.15, why, measure="at least"))
     if not quick:
         rows.append(_own_path())
@@ -132,7 +135,7 @@ def run(quick: bool) -> Result:
 
 
 def _table_row() -> Row:
-    """The integral equation solved here against the table of references.md."""
+    """The integral equation solved by `_layer.py` against the table of REFERENCES.md, 1.7."""
     pairs = [
         (got, want)
         for kind, exact in (("line", line), ("point", point))
@@ -141,7 +144,7 @@ def _table_row() -> Row:
     ]
     worst = max(abs(got / want - 1.0) for got, want in pairs)
     what = "integral equation of this study against the table, nu = 0.3, 16 values: largest relative difference"
-    return Row(what, "references.md sec. 1", 0.0, worst, 2e-4, "the table has four digits", measure="absolute")
+    return Row(what, "REFERENCES.md, 1.7", 0.0, worst, 2e-4, "the table has four decimals", measure="absolute")
 
 
 def _own_path() -> Row:
@@ -151,7 +154,7 @@ def _own_path() -> Row:
     got = forces(_model(a, nu, (0.2, 0.8), Sphere(radius_mm=RADIUS), "ftetwild", legs))[-1]
     hertz = 4.0 / 3.0 * a**3 / (RADIUS * (1.0 - nu**2))
     what = "P/P_Hertz(a), point, a/h = 1, nu = 0.3, ftetwild, 5 points to a"
-    return Row(what, _LAYER, point(a, nu).force, float(got / hertz), 0.01, "issue 4: layer rows within 1 %")
+    return Row(what, _LAYER, point(a, nu).force, float(got / hertz), 0.01, _ONE)
 
 
 def draw(figure: Any, curves: dict[str, dict[str, Any]]) -> None:

@@ -1,9 +1,11 @@
 """Are strips and discs bonded between plates as stiff as they should be, where rubber is stiff by its shape alone?
 
-Apparent modulus E_a/E = force x thickness/(area x approach x E) of a bonded strip (plane strain, half-width/height 1)
-and disc (radius/(2 thickness) 1): references.md sec. 5, computed there by two methods; the problem is that of Gent and
-Lindley 1959.  At the rim of the bond the displacement goes as r^e (Williams 1952, 90 degrees, clamped and free), so the
-force converges as h^(2e), 1.19 at nu = 1/2; the gated value is extrapolated with that rate.
+Source: the problem of Gent and Lindley 1959, with the values of validation/REFERENCES.md, 5.5: the apparent modulus
+E_a/E = force x thickness/(area x approach x E) of a bonded strip (plane strain, half-width/thickness 1) and of a disc
+(radius/(2 thickness) 1).
+
+Expected rate: at the rim of the bond the displacement goes as r^e (Williams 1952, 90 degrees between a clamped and a
+free side), so the force converges as h^(2e), 1.19 at nu = 1/2.  The value compared is extrapolated with that rate.
 """
 
 from __future__ import annotations
@@ -21,7 +23,8 @@ from ._common import box, convergence, held_at, mapped, nodes_of, solve
 from ._corner import clamped_free, extrapolated, observed
 
 Float = NDArray[np.float64]
-_BOND = "Gent and Lindley 1959; references.md sec. 5"
+_WILLIAMS = "2e of the rim, Williams 1952; REFERENCES.md, 5.3"
+_BOND = "Gent and Lindley 1959; REFERENCES.md, 5.5"
 WANTED = {("strip", 0.5): 2.6695, ("strip", 0.49): 2.448, ("disc", 0.5): 2.955, ("disc", 0.49): 2.6337}
 
 
@@ -69,16 +72,14 @@ def run(quick: bool) -> Result:
         errors[body][f"nu = {nu:g}"] = [v / limit - 1.0 for v in found]
         table += [(body, nu, n, v) for n, v in zip(counts[body], found, strict=True)]
         why = (
-            "four digits are given, and the last may be off by one"
+            "the reference has four digits, and the last may be off by one"
             if body == "strip"
-            else "the same, on a coarser mesh"
+            else "the last digit of the reference, and a coarser mesh"
         )
         rows.append(Row(f"E_a/E of a {body}, nu = {nu:g}", _BOND, wanted, limit, 5e-4, why))
-        why = "the smooth part of the error, of fourth order, is still seen on the coarsest mesh"
+        why = "on the coarsest mesh the smooth part of the error, of fourth order, still contributes"
         what, got = f"rate of E_a, {body}, nu = {nu:g}", observed(sizes, found)
-        rows.append(
-            Row(what, "Williams 1952: 2 e", theory, got, 0.05 if body == "strip" else 0.15, why, measure="absolute")
-        )
+        rows.append(Row(what, _WILLIAMS, theory, got, 0.05 if body == "strip" else 0.15, why, measure="absolute"))
     names = ("body", "nu", "cells", "apparent_modulus_over_E")
     columns = dict(zip(names, map(list, zip(*table, strict=True)), strict=True))
     return Result(tuple(rows), columns, lambda figure: draw(figure, counts, errors))

@@ -8,7 +8,7 @@ press reports, which move from point to point; their truth is the edge between p
 linear there).
 
 Rates: a corner of 90 degrees between a clamped and a free side gives a displacement r^e (Williams 1952), and the work
-of the load converges as h^(2 e); the friction sum as 1/N with N increments (references.md sec. 2).
+of the load converges as h^(2 e); the friction sum as 1/N with N increments (validation/REFERENCES.md, 2.4).
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ from ._cost_runs import MODULE
 from ._cost_truth import LENGTHS, Advice, Truth, advise, mesh_errors, seconds, step_errors, truth, value
 
 BY_NAME = True
+WILLIAMS = "2e of the base's edge, Williams 1952; REFERENCES.md, 5.3"
 ALL = (1, 2, 5, 10, 20, 50, 100, 200)
 TARGETS = (0.05, 0.01, 0.001)
 BEST = {SECTION: "mixed", SOLID: "mixed", HALF: "quadratic"}
@@ -192,7 +193,7 @@ def _rate_rows(body: str, series: Groups, runs: Runs) -> list[Row]:
             rate = math.nan
         why = "three meshes, and a contact that grows from point to point"
         rows.append(
-            Row(f"rate of the force, {BEST[body]} elements, {body}", "Williams 1952: 2 e", wanted, rate, 0.35, why,
+            Row(f"rate of the force, {BEST[body]} elements, {body}", WILLIAMS, wanted, rate, 0.35, why,
                 measure="absolute")
         )  # fmt: skip
     if body == HALF:
@@ -200,7 +201,7 @@ def _rate_rows(body: str, series: Groups, runs: Runs) -> list[Row]:
         rate = float(np.log2((told[0] - told[1]) / (told[1] - told[2])))
         why = "the edge of the stick zone moves from point to point"
         rows.append(
-            Row(f"rate of the friction sum in the increments, {body}", "1/N, references.md sec. 2", 1.0, rate, 0.2, why,
+            Row(f"rate of the friction sum in the increments, {body}", "1/N; REFERENCES.md, 2.4", 1.0, rate, 0.2, why,
                 measure="at least")
         )  # fmt: skip
     return rows
@@ -234,7 +235,9 @@ def _slower_row(body: str, series: Groups, runs: Runs) -> list[Row]:
         f"time of {runs[case]['factorizations']} factorisations over that of one condensation, {own['dofs']} unknowns"
     )
     why = "the contact itself costs some factorisations of so small a body"
-    return [Row(f"{what}, {body}", "design.md sec. 1", 5.0, times, 0.0, why, "sensitivity", "at least")]
+    return [
+        Row(f"{what}, {body}", "a factorisation each iteration saved", 5.0, times, 0.0, why, "sensitivity", "at least")
+    ]
 
 
 def _locking_rows(body: str, series: Groups, errors: Mapping[Case, Mapping[str, float]]) -> list[Row]:
@@ -279,8 +282,8 @@ def _float_rows(floats: Runs) -> list[Row]:
         rows += [
             Row(f"largest change of force, friction sum and strain, {here}", "double precision", 0.0, found["change"],
                 1e-5, "its last digit is 6e-8", "sensitivity", "absolute"),
-            Row(f"violation of the gaps, over the depth, {here}", "contract.md: a step must reach 1e-8", 1e-9,
-                found["residual"], 0.0, "less than a digit from the limit, so it does not do", "sensitivity",
+            Row(f"violation of the gaps, over the depth, {here}", "a step converges at a residual of 1e-8", 1e-9,
+                found["residual"], 0.0, "less than a digit below that, which is too close", "sensitivity",
                 "at least"),
         ]  # fmt: skip
     return rows

@@ -1,8 +1,8 @@
 """How does the half cylinder deform under 1 mm, and how much of that hangs on the Poisson's ratio that is not given?
 
-Source: Maeno 2004, Fig. 2 and Sec. II-A: R = 5 mm, E = 1 MPa, plane stress, base held, 1 mm in 10 increments, mu = .25.
-The text gives no number for Fig. 2.  Poisson's ratio is not given, so that the paper tacitly says it does not matter;
-how far it does is measured here, in plane stress and in plane strain.
+Source: Maeno 2004, Fig. 2 and Sec. II-A: R = 5 mm, E = 1 MPa, plane stress, base held, 1 mm in 10 increments, mu =
+0.25. The text gives no number for Fig. 2 and no Poisson's ratio, which implies that it does not matter.  How much it
+does is measured here, in plane stress and in plane strain.
 """
 
 from __future__ import annotations

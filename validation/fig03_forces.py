@@ -1,9 +1,10 @@
 """Are the normal forces semi-circular at every depth, and the friction one minimum and one maximum that sum to zero?
 
-Source: Maeno 2004, Fig. 3 and Sec. II-B: R = 5 mm, mu = .25, depths .2 to 1 mm in steps of .1 mm.  The forces at
-nu = .3 in plane stress are compared with references.md sec. 2, where CalculiX agrees on them.  The paper draws nodal
-forces; here they are tractions, which do not depend on the mesh.  Nothing is mirrored: net friction zero is a result.
-Each increment leaves a tooth in f_t where it found its first points; extrema are counted in finer increments.
+Source: Maeno 2004, Fig. 3 and Sec. II-B: R = 5 mm, mu = 0.25, depths 0.2 to 1 mm in steps of 0.1 mm.  The forces at nu
+= 0.3 in plane stress are compared with validation/REFERENCES.md, 2.6.  The paper draws nodal forces; tractions are used
+here, because they do not depend on the mesh.  No symmetry is used, so that zero net friction is a result.  Each
+increment leaves a small peak in f_t at the points that came into contact first; extrema are counted with finer
+increments.
 """
 
 from __future__ import annotations
@@ -21,8 +22,8 @@ from ._paper import STRAIN, STRESS, Profile, columns, half_cylinder, said, under
 
 CASES = ((STRESS, 0.0), (STRESS, 0.3), (STRESS, 0.45), (STRESS, 0.49), (STRAIN, 0.3), (STRAIN, 0.45), (STRAIN, 0.49))
 JUDGED = ((STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.49))
-KNOWN = {0.2: (0.12668, 0.862, 0.639), 0.5: (0.40495, 1.508, 1.376), 1.0: (1.01932, 2.297, 2.230)}  # references.md
-REFERENCE = "references.md sec. 2 (half cylinder; CalculiX agrees on P)"
+KNOWN = {0.2: (0.12668, 0.862, 0.639), 0.5: (0.40495, 1.508, 1.376), 1.0: (1.01932, 2.297, 2.230)}
+REFERENCE = "half cylinder, one method; REFERENCES.md, 2.6"
 
 
 def run(quick: bool) -> Result:
@@ -55,9 +56,9 @@ def _reference(size: float) -> list[Row]:
         frame = min(frames, key=lambda f: abs(f.target.depth_mm - depth))
         profile = Profile.of(problem, frame)
         here = f"at {depth:g} mm, plane stress, nu = .3, mu = .25"
-        rows.append(Row(f"P, N per mm, {here}", REFERENCE, force, profile.force, 0.005, "five digits there; mesh here"))
+        rows.append(Row(f"P, N per mm, {here}", REFERENCE, force, profile.force, 0.005, "mesh; 0.01 % measured"))
         for name, want, got in (("a", a, profile.a), ("c", c, profile.c)):
-            reason = "a point spacing here, .013 mm there"
+            reason = "one point spacing here, 0.013 mm in the reference"
             tolerance = 2.0 * profile.edge_error() + 0.013
             rows.append(Row(f"{name}, mm, {here}", REFERENCE, want, got, tolerance, reason, measure="absolute"))
     return rows

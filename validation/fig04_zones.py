@@ -1,8 +1,9 @@
 """Does the finger slip at both edges and stick in the middle, and do the slip zones grow with the depth?
 
-Source: Maeno 2004, Fig. 4 and Sec. II-B: R = 5 mm, mu = .25, plane stress, 1 mm in steps of .1 mm: "two slip regions at
-the edge and a stick region at the center"; "when the indentation is increased, the partial incipient slip regions at
-both edges increase".  In a half-plane c/a is constant while loading (Spence 1968); what changes it is the finite body.
+Source: Maeno 2004, Fig. 4 and Sec. II-B: R = 5 mm, mu = 0.25, plane stress, 1 mm in steps of 0.1 mm: "two slip regions
+at the edge and a stick region at the center"; "when the indentation is increased, the partial incipient slip regions at
+both edges increase".  In a half-plane c/a is constant while loading (Spence 1968; validation/REFERENCES.md, 2.1); only
+the finite size of the body changes it.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
 """As the finger is pressed, does the shear strain inside it change while the normal strains do not noticeably?
 
-Source: Maeno 2004, Fig. 5 and Sec. II-B: R = 5 mm, mu = .25, plane stress: "the distribution of the shear strain
+Source: Maeno 2004, Fig. 5 and Sec. II-B: R = 5 mm, mu = 0.25, plane stress: "the distribution of the shear strain
 changes as a function of the change in the tangential contact force, whereas the distribution of normal strains do not
-change noticeably".  Read to the letter: the largest change along the line of nodes between .2 and 1 mm, of each normal
-strain against the shear.  The line's depth is not told; half as deep and twice as deep are in the table.
+change noticeably".  Taken literally: the largest change along the line of nodes between 0.2 and 1 mm of each normal
+strain is compared with that of the shear.  The paper does not give the depth of the line; half and twice the depth
+assumed here are in the table.
 """
 
 from __future__ import annotations

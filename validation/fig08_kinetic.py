@@ -1,11 +1,12 @@
 """Does a kinetic friction coefficient below the static one change the shear strain much?
 
-Source: Maeno 2004, Fig. 8 and Sec. II-B: R = 5 mm, 1 mm, static mu = .25, ratios .7, .5 and .1: "the shear strain does
-not vary greatly when the ratio is over 0.5"; the same for other static coefficients; "hence we can estimate the static
-friction coefficient ... when the ratio is larger than 0.5".  The first is judged against the largest shear strain, as
-an eye on the figure does; the conclusion against what a change of mu from .06 to 1 does, which is a sensor's signal.
-mu_k < mu_s needs a rule: `keep` (a slipping point keeps slipping at mu_k until it would reverse) and `paper` (every
-increment starts all stuck); the paper's depends on mesh and increments.
+Source: Maeno 2004, Fig. 8 and Sec. II-B: R = 5 mm, 1 mm, static mu = 0.25, ratios 0.7, 0.5 and 0.1: "the shear strain
+does not vary greatly when the ratio is over 0.5"; the same for other static coefficients; "hence we can estimate the
+static friction coefficient ... when the ratio is larger than 0.5".  The first statement is judged against the largest
+shear strain, as one would judge the figure; the conclusion against the change that mu from 0.06 to 1 causes, which is
+the signal of a sensor.  mu_k < mu_s needs a rule: `keep` (a slipping point keeps slipping at mu_k until its slip would
+reverse) and `paper` (every increment starts with all points sticking); the result of the second depends on the mesh and
+on the increments.
 """
 
 from __future__ import annotations

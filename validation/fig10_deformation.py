@@ -1,8 +1,9 @@
 """Is the contact of the Fig. 9 finger about 79 mm wide at 10 mm, as the paper reads off its Fig. 10?
 
 Source: Maeno 2004, Fig. 10 and Sec. III-B: R = 100 mm, H = 36.6 mm, plane strain, 10 mm: "the contact width is
-approximately 79 mm".  Neither nu nor mu of the figure nor the half length (50 mm, geometries/fig9.toml) is given; the
-width is taken at rest and as deformed, for nu from 0 to .5, under mu = .06, .25 and 1.
+approximately 79 mm".  The paper gives neither nu nor mu of the figure nor the half length (50 mm here, as in
+geometries/fig9.toml).  The width is measured in the undeformed and in the deformed state, for nu from 0 to 0.5 and
+mu = 0.06, 0.25 and 1.
 """
 
 from __future__ import annotations

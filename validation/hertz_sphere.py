@@ -1,13 +1,14 @@
 """Does a ball on a deep block show Hertz's force, pressure and contact radius, and how fast do they converge in 3D?
 
-Hertz 1882, Johnson 1985 ch. 4: P = 4 E* a^3/(3R), p = p0 sqrt(1 - r^2/a^2).  The block is 10 a high, which changes P(a)
-by 0.05 % and the force at a depth by 10 %: force is compared at equal a.  That is read off the second moment of the
-forces, a^2 = 5/2 of the mean of r^2 under p, since the points that touch are h apart and p^2 over r^2, the line that
-serves in 2D, needs more than the 8 points to a that are affordable here (it is 10 % off).
+Source: Hertz's solution (validation/REFERENCES.md, 1.1).  The block is 10 a high, which changes P(a) by 0.05 % and the
+force at equal depth by 10 %, so forces are compared at equal a.  a is found from the second moment of the forces, a^2 =
+(5/2) times the mean of r^2 weighted with p.  The linear fit of p^2 over r^2 that serves in 2D needs more than the 8
+points to a that are affordable here (its error is 10 %).
 
-Theory of the rates: pressures are piecewise linear, and the best of these misses a square-root edge by h in L2; moments
-of the pressure follow the force, h^2 (see bonded_layer), or better where the edge crosses many cells.  The root of the
-mean square over 12 depths is taken.  A quarter of a graded box; in full once through CAD, pytetwild and symmetry.
+Expected rates: pressures are piecewise linear, and the best approximation of the square-root edge has an error of first
+order in the point spacing h in L2; moments of the pressure converge like the force, with second order (see
+bonded_layer), or faster where the edge crosses many cells.  The root mean square over 12 depths is used.  The body is a
+quarter of a graded box; one case of the full study goes through CAD, pytetwild and symmetry.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ Float = NDArray[np.float64]
 RADIUS = 1000.0  # a = 1
 HEIGHT = 10.0
 PLACES = np.linspace(0.7, 1.0, 12)
-_HERTZ = "Johnson 1985 ch. 4"
-_ONE = "issue 4: Hertz rows within 1 %"
+_HERTZ = "Johnson 1985, sec. 4.2; REFERENCES.md, 1.1"
+_ONE = "second order in the point spacing; 0.08 % or less measured, and coarse meshes must pass too"
 
 
 def depth(a: float, nu: float) -> float:
@@ -96,9 +97,9 @@ def run(quick: bool) -> Result:
         errors = np.array([np.sqrt([np.mean((e[:, 0] - 1.0) ** 2), np.mean(e[:, 1] ** 2)]) for e in levels])
         table += [(nu, n, *e) for n, e in zip(counts, errors, strict=True)]
         curves[nu] = (sizes, errors)
-        why = "the edge's place between points is sampled; more is welcome"
+        why = "12 depths sample the position of the edge between points; a higher rate passes"
         for column, kind, source, theory in (
-            (0, "P(a), rms", "as the force, h^2", 2.0),
+            (0, "P(a), rms", "h^2, as the force", 2.0),
             (1, "the pressure in L2", "square-root edge", 1.0),
         ):
             got = rate(sizes, errors[:, column])

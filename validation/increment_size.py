@@ -3,7 +3,7 @@
 Source: Maeno 2004, Sec. II-A: "the value 0.1 was small enough for our model because the change in result was
 sufficiently small even when the increment value was made smaller".  The half cylinder under 1 mm, mu = .25, in 1 to 320
 increments; each result against the one with 320, and the rate at which its error falls (1 in a half-plane,
-references.md sec. 2).
+validation/REFERENCES.md, 2.4).
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def _statements(plane: str, nu: float, found: dict[Any, np.ndarray], counts: lis
     reason = "about 1; c moves from point to point"
     return [
         *rows,
-        Row(what, "1 in a half-plane, references.md sec. 2", 0.8, rate, 0.0, reason, "sensitivity", "at least"),
+        Row(what, "1 in a half-plane; REFERENCES.md, 2.4", 0.8, rate, 0.0, reason, "sensitivity", "at least"),
     ]
 
 

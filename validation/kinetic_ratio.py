@@ -1,13 +1,13 @@
 """With mu_k below mu_s, does a press have one answer?
 
-Source: references.md sec. 2, last lines; Maeno 2004, Sec. II-A and Fig. 8.  A cylinder on a half-plane, nu = .3,
-mu_s = .25.  Two rules for a point that slipped in the increment before:
+Source: validation/REFERENCES.md, 2.5; Maeno 2004, Sec. II-A and Fig. 8.  A cylinder on a half-plane, nu = 0.3,
+mu_s = 0.25.  Two rules for a point that slipped in the previous increment are compared.
 
-keep: it keeps slipping at mu_k until its slip would reverse (the default of effects.kinetic_friction).  In a press
-every point outside the stick zone slips from its first touch on, so the answer must be that of one coefficient mu_k.
+keep: the point keeps slipping at mu_k until its slip would reverse (the default of effects.kinetic_friction).  In a
+press every point outside the stick zone slips from its first touch on, so the solution is that with mu_k alone.
 
-paper: every increment starts all stuck, so that the point is asked for mu_s again.  Its answer must be expected to
-depend on mesh and increments; the table shows how much.
+paper: every increment starts with all points sticking, so the point may carry mu_s again.  The result is expected to
+depend on the mesh and on the increments; the table shows how much.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from finger3d.study import Kind, Result, Row
 from ._halfplane import compliance, line, loading, under
 
 NU, STATIC = 0.3, 0.25
-SOURCE = "references.md sec. 2, integral equations with mu_k"
+SOURCE = "Spence 1968 with mu_k; REFERENCES.md, 2.5"
 COLUMNS = "branch ratio points_per_a increments q_over_P D_over_AP2 c_over_a iterations".split()
 Key = tuple[str, float, int, int]
 
@@ -70,25 +70,27 @@ def _rows(found: dict[Key, np.ndarray], meshes: Any, counts: Any, ratios: Any) -
     here = f"{fine} points to a, {many} increments"
     near = f"half a point spacing, a/{fine}"
     rows = [
-        Row(f"keep, ratio .7: int_0^a q/P, {here}", SOURCE, 0.0773, got[0], 0.03, "issue 4: integrals within 3 %"),
+        Row(f"keep, ratio .7: int_0^a q/P, {here}", SOURCE, 0.0773, got[0], 0.03, "0.3 % measured at this mesh"),
         Row(f"keep, ratio .7: c/a, {here}", SOURCE, 0.263, got[2], 0.5 / fine, near, measure="absolute"),
     ]
     for ratio in ratios:
         one, two = found["one coefficient", ratio, fine, many], found["keep", ratio, fine, many]
         alike = f"over that of one coefficient mu_k, ratio {ratio:g}"
-        rows.append(Row(f"keep: int_0^a q/P {alike}", "Coulomb, same mesh", 1.0, two[0] / one[0], 1e-9, "same states"))
-        rows.append(Row(f"keep: dissipation {alike}", "Coulomb, same mesh", 1.0, two[1] / one[1], 1e-9, "same states"))
+        rows.append(Row(f"keep: int_0^a q/P {alike}", "Coulomb, mu_k alone", 1.0, two[0] / one[0], 1e-9, "same states"))
+        rows.append(Row(f"keep: dissipation {alike}", "Coulomb, mu_k alone", 1.0, two[1] / one[1], 1e-9, "same states"))
     literal = found["paper", 0.7, fine, many]
     kind: Kind = "sensitivity"
     away = abs(literal[2] - 0.263)
     what = f"paper, ratio .7: distance of c/a from the exact one, {here}"
-    rows.append(Row(what, SOURCE, 0.1, away, 0.0, "a bound: it goes elsewhere", kind, "at least"))
+    rows.append(Row(what, SOURCE, 0.1, away, 0.0, "a bound: this rule does not converge to it", kind, "at least"))
     values = [found["paper", 0.7, fine, n][2] for n in counts]
     what = f"paper, ratio .7: change of c/a from {counts[0]} to {many} increments, {fine} points to a"
-    why = "a bound: it depends on the increments"
-    rows.append(Row(what, "design.md sec. 4", 0.1, float(np.ptp(values)), 0.0, why, kind, "at least"))
+    why = "a bound: the result depends on the increments"
+    rows.append(
+        Row(what, "no unique solution; REFERENCES.md, 2.5", 0.1, float(np.ptp(values)), 0.0, why, kind, "at least")
+    )
     what = f"paper, ratio .7: int_0^a q/P over the exact one, {here}"
-    why = "not to be relied on; seen within 10 %"
+    why = "4 % measured; not to be relied on"
     rows.append(Row(what, SOURCE, 1.0, literal[0] / 0.0773, 0.1, why, kind))
     return rows
 

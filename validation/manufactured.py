@@ -1,9 +1,10 @@
 """Do displacement and pressure converge at the rates of quadratic elements for every Poisson's ratio, 1/2 included?
 
-Manufactured solutions, free of divergence so that they hold for every nu: in 3D u = (sin py sin pz, sin pz sin px,
-sin px sin py), p = pi, under b = 2 p^2 G u; in 2D u = (sin py, sin px) under b = p^2 G u.  In the mixed form a pressure
-sin 2px cos py is added through b at nu = 1/2.  Theory: Ciarlet 1978 (L2 3, H1 2 for quadratic elements), Boffi, Brezzi
-and Fortin 2013 sec. 8.8 (Taylor-Hood: the same, pressure 2).  Reference: references.md sec. 5.
+Source: the manufactured solutions of validation/REFERENCES.md, 5.2, free of divergence so that they hold for every nu.
+In the mixed form a pressure sin 2px cos py, p = pi, is added through the body force at nu = 1/2.
+
+Expected rates: Ciarlet 1978 (3 in L2 and 2 in H1 for quadratic elements); Boffi, Brezzi and Fortin 2013, sec. 8.8
+(Taylor-Hood: the same, and 2 for the pressure).
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from ._common import body_load, convergence, cube, error_norms, held_at, pressur
 Float = NDArray[np.float64]
 PI = np.pi
 NUS = (0.3, 0.49, 0.4999, 0.5)
-_SOURCE = "Ciarlet 1978; Boffi, Brezzi, Fortin 2013"
+_SOURCE = "Ciarlet 1978; Boffi, Brezzi, Fortin 2013; REFERENCES.md, 5.2"
 
 
 def exact(p: Float) -> Float:
@@ -91,7 +92,7 @@ def run(quick: bool) -> Result:
     for d in (2, 3):
         sizes = 1.0 / np.array(counts[d])
         slopes = np.array([[rate(sizes[-2:], e) for e in found[d, nu][-2:].T] for nu in nus[d]])
-        why = f"the rate is that of the limit, here from {counts[d][-2]} to {counts[d][-1]} cells; more is welcome"
+        why = f"a rate of the limit, measured from {counts[d][-2]} to {counts[d][-1]} cells; a higher one passes"
         for column, name, wanted in ((0, "displacement, L2", 3.0), (1, "gradient, L2", 2.0), (2, "pressure, L2", 2.0)):
             # at nu < 1/2 the exact pressure is 0, and its error that of the displacement's divergence
             got = slopes[:, column].min() if column < 2 else slopes[-1, 2]
@@ -99,7 +100,7 @@ def run(quick: bool) -> Result:
             rows.append(Row(what, _SOURCE, wanted, float(got), 0.1, why, measure="at least"))
         growth = max(found[d, nu][-1, 0] / found[d, 0.3][-1, 0] for nu in nus[d])
         what = f"L2 error over that at nu = 0.3, {d}D, largest over nu"
-        why = "a constant that grew with nu would mean locking; the pressure's own error adds a share"
+        why = "a constant that grew with nu would mean locking; the error of the pressure contributes a little"
         rows.append(Row(what, "no locking", 1.0, float(growth), 0.05, why, measure="at most"))
     flat = [(d, nu, n, *values) for (d, nu), e in found.items() for n, values in zip(counts[d], e, strict=True)]
     names = ("dim", "nu", "cells_per_side", "displacement_L2", "gradient_L2", "pressure_L2")

@@ -1,9 +1,10 @@
 """What did the paper's coarse mesh and its literal swap rule get right, and what wrong?
 
-Source: Maeno 2004, Sec. II-A and Fig. 1: 96 nodes, 108 elements, nodes held in contact, every node that violates
-Eqs. (1)-(4) changed and solved again.  96 nodes and 108 elements are neither all triangles (about 150) nor all
-quadrilaterals (about 75), and Fig. 1 is not described in the text, so this is a mesh of linear triangles with 96 nodes
-or as near as it gets.  Contact is node by node, as in the paper.  Judged by quadratic elements of .05 mm.
+Source: Maeno 2004, Sec. II-A and Fig. 1: 96 nodes, 108 elements, nodes held in contact; every node that violates Eqs.
+(1)-(4) is changed, and the system is solved again.  96 nodes and 108 elements fit neither triangles alone (about 150
+elements) nor quadrilaterals alone (about 75), and the text does not describe Fig. 1.  This study uses linear triangles
+with 96 nodes or the nearest possible number, and contact node by node, as in the paper.  The reference is a mesh of
+quadratic elements of 0.05 mm.
 """
 
 from __future__ import annotations

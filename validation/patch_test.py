@@ -1,9 +1,10 @@
 """Do irregular patches reproduce the fields that quadratic elements hold, and does a flat press give a flat pressure?
 
-A displacement field that the elements contain must come out exactly (Irons and Razzaque 1972; Taylor, Simo, Zienkiewicz
-and Chan 1986): linear fields on any patch; on straight cells also u = (x^2 + yz, y^2 - xz, z^2 + xy) under
-b = -(4G + 2 lam)(1, 1, 1).  Contact has its own patch test (Crisfield 2000): a block between flat plates must show a
-uniform pressure.  There is no rate: the error is round-off at every size of cell.  Reference: references.md sec. 5.
+Source: validation/REFERENCES.md, 5.1.  A displacement field that the elements contain must be reproduced exactly (Irons
+and Razzaque 1972; Taylor, Simo, Zienkiewicz and Chan 1986): linear fields on any patch; on cells with straight edges
+also u = (x^2 + yz, y^2 - xz, z^2 + xy) under b = -(4G + 2 lam)(1, 1, 1).  Contact has its own patch test (Crisfield
+2000): a block between flat plates must have a uniform pressure.  There is no rate: the error is round-off at every cell
+size.
 """
 
 from __future__ import annotations
@@ -25,14 +26,14 @@ from finger3d.study import Result, Row
 from ._common import body, body_load, cube, held_at, shuffled, solve
 
 Float = NDArray[np.float64]
-_PATCH = "Irons and Razzaque 1972"
-_CONTACT = "Crisfield 2000"
-_ROUND = "references.md sec. 5: 1e-12, round-off of some thousand unknowns"
-_NEAR = "round-off, grown by lam/G = 5000"
-_PRESS = "references.md sec. 5: 1e-10"
+_PATCH = "Irons and Razzaque 1972; REFERENCES.md, 5.1"
+_CONTACT = "Crisfield 2000; REFERENCES.md, 5.1"
+_ROUND = "round-off of some thousand unknowns"
+_NEAR = "round-off, multiplied by lam/G = 5000"
+_PRESS = "round-off of the condensation; 3e-12 or less measured"
 _FLOOR = (
-    "not the 1e-10 of references.md: with PARDISO round-off was seen to grow with lam/G (here 1e7) on few cells, with "
-    "SuperLU not (the row above); 1e-7 is what cutting lam off at nu = 1/2 costs anyway"
+    "with PARDISO round-off grows with lam/G (here 1e7) on few cells, with SuperLU it does not (the row above); "
+    "limiting lam at nu = 1/2 changes results by 1e-7 anyway"
 )
 SHEAR_AND_STRETCH = np.array([[0.7, -0.3, 0.2], [0.5, 0.4, -0.6], [-0.1, 0.8, -0.9]])
 

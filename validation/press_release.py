@@ -1,12 +1,13 @@
 """When a press is released, is the area of the force-depth loop the work lost, and does friction reverse at once?
 
-Source: references.md sec. 3, last line; Spence 1975 and Turner 1979 for unloading.  An elastic body gives back what it
-stored, so after release the work done on it is what friction took: exactly in time, within O(1/N) for N increments,
-because the forces at their ends stand for those within.  The rest force and the second cycle follow from it.
+Source: validation/REFERENCES.md, 2.7; Spence 1975 and Turner 1979 for unloading.  An elastic body gives back what it
+stored, so after release the work done on it equals the dissipation.  With N increments this holds within O(1/N),
+because the forces at the end of an increment represent those within it.  The force at rest and the second cycle follow
+from it.
 
-On unloading, friction at the very edge reverses while the inner points still slip outward under their smaller limit.
-The edge point of a mesh stands for one spacing, so the drop of load at which it slips back must vanish with the mesh.
-The work lost while releasing falls slowly with the mesh (see the table): points leave contact one by one.
+On unloading, friction at the very edge reverses while the inner points still slip outward under their decreasing limit.
+The edge point of a mesh represents one spacing, so the drop of load at which it slips back must vanish with the mesh.
+The dissipation during release converges slowly with the mesh (see the table), because points leave contact one by one.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ from . import _halfspace
 from ._halfplane import Profile, compliance, line, loading, under
 
 MU = 0.25
-REST = "a released body is at rest"
-BALANCE = "energy balance of an elastic body"
+REST = "an elastic body released; REFERENCES.md, 2.7"
+BALANCE = "energy balance of an elastic body; REFERENCES.md, 2.7"
 COLUMNS = "body nu points_per_a increments work lost_pressing lost_releasing work_over_lost second_over_first".split()
 """Work of the cylinder in A P^2, of the ball in P depth."""
 
@@ -85,13 +86,15 @@ def run(quick: bool) -> Result:
         rows += _cycle_rows(nu, table, counts, found)
     table.append(ball(0.3, 4 if quick else 6, 20.0, 40))
     what = f"work over work lost, ball, nu = 0.3, {table[-1][2]} points to a, 40 increments"
-    rows.append(Row(what, BALANCE, 1.0, table[-1][7], 0.05, "2/N, the error being ~ 1/N"))
+    rows.append(Row(what, BALANCE, 1.0, table[-1][7], 0.05, "2/N: the error is of first order in 1/N"))
     rate = float(np.log(drops[meshes[0]] / drops[meshes[-1]]) / np.log(meshes[-1] / meshes[0]))
     what = "rate at which the drop of load that reverses the edge point falls with the mesh, cylinder, nu = 0.3"
-    rows.append(Row(what, "at once, so ~ spacing at least", 1.0, rate, 0.0, "a bound", measure="at least"))
+    rows.append(
+        Row(what, "at once: at least first order in the spacing", 1.0, rate, 0.0, "a bound", measure="at least")
+    )
     what = f"drop of load that reverses the edge point, cylinder, nu = 0.3, {meshes[-1]} points to a"
     why = "the drop that moves the edge by a point is 2 spacings/a"
-    rows.append(Row(what, "at once", 2.0 / meshes[-1], drops[meshes[-1]], 0.0, why, measure="at most"))
+    rows.append(Row(what, "it reverses at once", 2.0 / meshes[-1], drops[meshes[-1]], 0.0, why, measure="at most"))
     columns = dict(zip(COLUMNS, map(list, zip(*table, strict=True)), strict=True))
     return Result(tuple(rows), columns, lambda figure: _draw(figure, columns, found, shown))
 
@@ -104,15 +107,17 @@ def _cycle_rows(nu: float, table: list[tuple[Any, ...]], counts: tuple[int, ...]
     extrapolated = at[many][7] + (at[many][7] - at[few][7]) * few / (many - few)
     released = found[2 * many - 1]
     rows = [
-        Row(f"work over work lost, {here}, {many} increments", BALANCE, 1.0, at[many][7], 0.01, "error ~ 1/N"),
+        Row(f"work over work lost, {here}, {many} increments", BALANCE, 1.0, at[many][7], 0.01, "0.3 % measured"),
         Row(f"work lost in the second cycle over the first, {here}", REST, 1.0, at[many][8], 1e-9, "round-off"),
         Row(f"force after release, N, {here}", REST, 0.0, released.force, 1e-12, "round-off", measure="absolute"),
     ]
     if many == 400:
         what = f"work over work lost, {here}, extrapolated in 1/N from {few} and {many}"
-        rows.append(Row(what, BALANCE, 1.0, extrapolated, 0.001, "terms beyond 1/N"))
+        rows.append(Row(what, BALANCE, 1.0, extrapolated, 0.001, "terms of higher order in 1/N"))
         what = f"rate at which the excess of the work falls with N, {here}"
-        rows.append(Row(what, "~ 1/N", 1.0, rate, 0.3, "points change state one by one", measure="at least"))
+        rows.append(
+            Row(what, "first order in 1/N", 1.0, rate, 0.3, "points change state one by one", measure="at least")
+        )
     return rows
 
 

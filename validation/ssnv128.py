@@ -1,11 +1,11 @@
 """Does a square that loads push along a rigid plane stick and slip as in Code_Aster's SSNV128?
 
-Source: Code_Aster V6.04.128 (GRECO benchmark); numbers of references.md sec. 6.  Plane strain, 40 x 40 mm,
-E = 130 GPa, nu = .2, mu = 1, a rigid plane under the foot y = 0.  150 MPa push on the left side, 50 MPa on the top; the
-right side is held along x, and its foot also along y.  Both loads grow together.
+Source: Code_Aster V6.04.128, a benchmark of the GRECO (validation/REFERENCES.md, 6.1).  Plane strain, 40 x 40 mm, E =
+130 GPa, nu = 0.2, mu = 1, a rigid plane under the foot y = 0.  A pressure of 150 MPa acts on the left side and one of
+50 MPa on the top; the right side is held along x, and its foot also along y.  Both loads grow together.
 
-Nothing is pressed by an object here: the body is condensed to the contact points of its foot and the loads' own row,
-and the increments go to `advance` directly, `free` being what the loads alone would do.
+No object is pressed on this body.  It is condensed to the contact points of its foot and to one row for the loads, and
+the increments are passed to `advance` directly; `free` is the displacement that the loads alone would cause.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ PLACES = np.array([0.0, 1.25, 5.0, 7.5, 11.25])  # mm
 ASTER = np.array([28.6, 27.2, 22.8, 19.8, 15.0])  # um
 NEWTON_96 = np.array([28.60, 27.22, 22.87, 19.81, 15.41])  # um
 FRICTIONLESS = 40.62  # um, at x = 0
-SOURCE = "Code_Aster SSNV128; references.md sec. 6"
+SOURCE = "Code_Aster SSNV128; REFERENCES.md, 6.1"
+CRITERION = "convergence criterion of finger3d: residual <= 1e-8"
 COLUMNS = (
     "cells_per_side increments mu rule ux_0 ux_1.25 ux_5 ux_7.5 ux_11.25 iterations residual settled_increments".split()
 )
@@ -98,26 +99,30 @@ def _rows(table: list[tuple[Any, ...]], meshes: tuple[int, ...], states: list[Co
     got = np.array(next(r for r in table if r[:4] == (fine, 5, 1.0, "projection"))[4:9], dtype=float)
     rows = []
     for k, x in enumerate(PLACES):
-        rows.append(Row(f"u_x at {x:g} mm, um", SOURCE, ASTER[k], got[k], 0.05, "5 % of the benchmark"))
+        rows.append(Row(f"u_x at {x:g} mm, um", SOURCE, ASTER[k], got[k], 0.05, "a mean over several codes, uncertain"))
     for k, x in enumerate(PLACES):
-        what, why = f"u_x at {x:g} mm, um, {fine} cells a side", "its last digit, and another element"
-        rows.append(Row(what, "96 x 96 Newton; references.md sec. 6", NEWTON_96[k], got[k], 0.005, why))
+        what, why = f"u_x at {x:g} mm, um, {fine} cells a side", "last digit of the reference, and different elements"
+        rows.append(Row(what, "96 x 96 elements, Newton; REFERENCES.md, 6.1", NEWTON_96[k], got[k], 0.005, why))
     smooth = next(r for r in table if r[:4] == (fine, 1, 0.0, "projection"))[4]
-    rows.append(Row("u_x at 0 mm, um, mu = 0", SOURCE, FRICTIONLESS, smooth, 0.001, "four digits given"))
+    rows.append(Row("u_x at 0 mm, um, mu = 0", SOURCE, FRICTIONLESS, smooth, 0.001, "the reference has four digits"))
     force = max(float(np.abs(s.force).max()) for s in states)
     apart = max(float(np.abs(s.force - states[0].force).max()) for s in states) / force
     what = "forces after 1, 5 and 20 increments, largest difference over the largest"
-    rows.append(Row(what, "one answer; references.md sec. 6", 0.0, apart, 1e-8, "the residual", measure="absolute"))
+    rows.append(
+        Row(what, "one solution; REFERENCES.md, 6.1", 0.0, apart, 1e-8, "convergence criterion", measure="absolute")
+    )
     worst = max(r[10] for r in table if r[3] == "projection")
-    rows.append(Row("largest residual", "contract.md", 1e-8, worst, 0.0, "a bound", measure="at most"))
+    rows.append(Row("largest residual", CRITERION, 1e-8, worst, 0.0, "a bound", measure="at most"))
     values = [next(r for r in table if r[:4] == (n, 5, 1.0, "projection"))[4] for n in meshes]
     steps = np.abs(np.diff(values))
     rate = float(np.log2(steps[0] / steps[-1]) / (len(steps) - 1))
-    what, why = "rate at which u_x at 0 mm settles with the mesh", "the stick zone ends at a point"
-    rows.append(Row(what, "stress jumps where stick ends: 1", 1.0, rate, 0.0, why, measure="at least"))
+    what, why = "rate at which u_x at 0 mm settles with the mesh", "a bound"
+    rows.append(
+        Row(what, "first order: stress is not smooth where stick ends", 1.0, rate, 0.0, why, measure="at least")
+    )
     literal = next(r for r in table if r[:4] == (fine, 5, 1.0, "paper"))
     what = f"increments of 5 that the paper's rule settles, {fine} cells a side"
-    rows.append(Row(what, SOURCE, 0.0, literal[11], 0.0, "it cycles in every step", "sensitivity", "absolute"))
+    rows.append(Row(what, "the rule repeats states here", 0.0, literal[11], 0.0, "a count", "sensitivity", "absolute"))
     return rows
 
 

@@ -1,16 +1,16 @@
 """Does friction hold a block at 99 % of mu N and let it go at 101 %, however the scene is turned?
 
-Source: Code_Aster SSNV503; references.md secs. 6 and 8.  The block lies on a rigid plane turned by 30 degrees, in 2D
-and 3D (there the shear is turned by another 30 degrees about the normal).
+Source: Code_Aster SSNV503 (validation/REFERENCES.md, 6.3 and 8.2).  A block lies on a rigid plane that is turned by 30
+degrees, in 2D and 3D; in 3D the shear is turned by another 30 degrees about the normal.
 
-A block held by friction alone has no stiffness against gliding, and finger3d refuses such a body: it wants a fixed
-base.  So soft springs tie it down, weak enough to take less than 1e-4 of the load while the block is held; once it
-glides they carry what friction does not, and the slip is that over their stiffness.  The loads are the tractions of a
-uniform stress (pressure p, then shear up to 1.01 mu p) on every face but the foot.  At nu = 0 a held block is then in
-simple shear, and every point reaches its limit at once, which is the sharpest test.  At nu = .3 friction hinders the
-bulging, so that edges creep before the block glides, by the size of its own strain.
+A block held by friction alone can glide as a rigid body, and finger3d refuses a body without a fixed base.  So soft
+springs tie it down.  They carry less than 1e-4 of the load while the block sticks; once it glides they carry what
+friction does not, and the slip is that force over their stiffness.  The loads are the tractions of a uniform stress
+(pressure p, then shear up to 1.01 mu p) on every face but the foot.  At nu = 0 a sticking block is in simple shear and
+all points reach their limit together, which is the sharpest test.  At nu = 0.3 friction resists the lateral expansion,
+so that the edges slip before the block glides, by an amount of the order of its own strain.
 
-Last, with finger3d's own base: a plate that slides on a block until all of it slips pulls with mu N and no more.
+Finally, with a fixed base: a plate that slides on a block until all points slip transmits mu N and no more.
 """
 
 from __future__ import annotations
@@ -39,7 +39,8 @@ from ._common import cube, side_load
 MU, PRESSURE, SPRINGS = 0.3, 0.01, 2e-5  # p/E, and the springs' stiffness over E, of a block of side 1
 TURN = np.pi / 6.0
 SHARES = (0.5, 0.9, 0.99, 1.01)
-SOURCE = "Code_Aster SSNV503; references.md sec. 6"
+SOURCE = "Code_Aster SSNV503; REFERENCES.md, 6.3"
+CRITERION = "convergence criterion of finger3d: residual <= 1e-8"
 COLUMNS = "dim nu shear_over_muN sticking slipping friction_over_muN mean_slip largest_slip iterations residual".split()
 """Slips over the block's side."""
 
@@ -133,8 +134,10 @@ def run(quick: bool) -> Result:
     for dim, nu, share, stick, slip, friction, mean, largest, _, _ in table:
         here = f"{dim}D, nu = {nu:g}, shear {share:g} mu N"
         if share == 0.99:
-            rows.append(Row(f"friction over mu N, {here}", SOURCE, 0.99, friction, 1e-4, "what the springs take"))
-            own = "the block's own strain p/E over the glide"
+            rows.append(
+                Row(f"friction over mu N, {here}", SOURCE, 0.99, friction, 1e-4, "the springs carry up to 1e-4")
+            )
+            own = "a bound: the block's own strain p/E over the glide"
             what = f"mean slip over the glide (1.01 - 1) mu N/springs, {here}"
             rows.append(Row(what, SOURCE, PRESSURE / glide, mean / glide, 0.0, own, measure="at most"))
         if share == 0.99 and nu == 0.0:
@@ -149,17 +152,21 @@ def run(quick: bool) -> Result:
                 Row(what, "equilibrium", 1.0, mean / glide, PRESSURE / glide, "the block's own strain over the glide")
             )
     worst = max(r[9] for r in table)
-    rows.append(Row("largest residual", "contract.md", 1e-8, worst, 0.0, "a bound", measure="at most"))
+    rows.append(Row("largest residual", CRITERION, 1e-8, worst, 0.0, "a bound", measure="at most"))
     curves = {}
     for dim, size in ((2, 0.5), (3, 2.5 if quick else 1.25)):
         curves[dim], slipping = plate(dim, size)
         peak, last = max(q for _, q, _ in curves[dim]), curves[dim][-1][1]
         rows.append(Row(f"plate, {dim}D: largest Q/(mu P)", SOURCE, 1.0, peak, 1e-9, "round-off", measure="at most"))
-        wide, why = (1e-3, "round-off") if dim == 2 else (0.01, "points slip sideways too as the block bulges")
+        wide, why = (
+            (1e-3, "round-off") if dim == 2 else (0.01, "some friction points sideways, because the block expands")
+        )
         rows.append(Row(f"plate, {dim}D: Q/(mu P) when all slips", SOURCE, 1.0, last, wide, why))
         rows.append(Row(f"plate, {dim}D: share of points that slip at last", SOURCE, 1.0, slipping, 0.0, "all"))
-    what, why = "plate, 3D: direction of Q, degrees from x", "the mesh is no mirror image about 30 degrees"
-    rows.append(Row(what, "references.md sec. 8", 30.0, curves[3][-1][2], 0.1, why, measure="absolute"))
+    what, why = "plate, 3D: direction of Q, degrees from x", "the mesh is not symmetric about this direction"
+    rows.append(
+        Row(what, "isotropic friction; REFERENCES.md, 7.2", 30.0, curves[3][-1][2], 0.1, why, measure="absolute")
+    )
     columns = dict(zip(COLUMNS, map(list, zip(*table, strict=True)), strict=True))
     return Result(tuple(rows), columns, lambda figure: _draw(figure, columns, curves))
 

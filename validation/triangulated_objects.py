@@ -1,11 +1,13 @@
 """Does a triangulated ball or bar press like the exact one, and are distances right at its edges and corners?
 
-Exact: the height of a ball and a bar in closed form; the distance from a box, sqrt(sum max(|x| - b, 0)^2) outside and
-the largest |x| - b inside.  Facets of a curved body lie inside of it by the sagitta s^2/8R of their edges s, so gaps,
-first touch and force err by O(s^2): the rate is gated at 2.  A sign at edges and corners is right only with
-angle-weighted normals (Baerentzen and Aanaes 2005); the nearest triangle's own normal is counted beside.
+References: the height of a ball and of a bar in closed form; the distance from a box, sqrt(sum max(|x| - b, 0)^2)
+outside and the largest |x| - b inside.  The facets of a curved body lie inside it by the sagitta s^2/8R of their edges
+s, so gaps, first touch and force have errors of O(s^2), and a rate of 2 is required.  The sign of the distance at edges
+and corners is right only with angle-weighted normals (Baerentzen and Aanaes 2005); the errors of the nearest triangle's
+own normal are counted for comparison.
 
-Finger: a block, 3D, swept, the same mesh for all.  Bodies are made here, as STL would hold them, moved off the origin.
+The finger is a block, 3D, swept, with the same mesh for all objects.  The triangulated objects are made here, as an STL
+file would hold them, and moved off the origin.
 """
 
 from __future__ import annotations

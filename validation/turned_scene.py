@@ -1,8 +1,9 @@
 """Does turning the object, its place and its slide by any angle about the press axis turn the result?
 
-Exactly, if the mesh turns too: the same tetrahedra of a half ball, turned by 17, 45 and other degrees, under a
-triangulated oval body, pressed off the middle and dragged.  Coulomb's cone is round, so nothing may prefer x or z.  To
-the mesh's own error, if the mesh stays: the same scene on the finger that a user has, turned against its tetrahedra.
+If the mesh turns too, exactly: the same tetrahedra of a half ball, turned by 17, 45 and other degrees, under a
+triangulated oval body that is pressed off the middle and dragged.  Coulomb's cone is circular, so no direction in the
+x-z plane is preferred.  If the mesh stays, up to the error of the mesh: the same scene on a user's finger, turned
+against its tetrahedra.  Source: validation/REFERENCES.md, 7.2.
 """
 
 from __future__ import annotations

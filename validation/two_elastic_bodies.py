@@ -1,16 +1,15 @@
 """Do two elastic bodies with friction behave as Hertz, Dundurs and Spence say, and does it matter which is the finger?
 
-Two half-planes in contact act on each other only through A = A1 + A2, A_i = 2 (1 - nu_i^2) / E_i, and Dundurs' beta
-(Johnson 1985 sec. 5.1 and ch. 4).  So a finger of nu = 0 on an object of nu = 0 that is r times stiffer must stick and
-slip like a finger of nu' on a rigid object when (r - 1) / (2 (r + 1)) = (1 - 2 nu') / (2 (1 - nu')): the pair r = 11/3
-has the numbers of nu' = 0.3 (Spence 1975; references.md sec. 2).  Equal half-planes do
-not rub at all (beta = 0; how unlike ones do: Goodman 1962, Spence 1975); equal bodies of finite size do, a little, and
-the less the smaller a/h, unless they are mirror images.
+Source: validation/REFERENCES.md, 1.3.  Two half-planes in contact act on each other only through A = A1 + A2, A_i = 2
+(1 - nu_i^2)/E_i, and Dundurs' beta (Johnson 1985, secs. 4.2 and 5.1).  A finger with nu = 0 on an object with nu = 0
+that is r = 11/3 times stiffer has the beta of nu' = 0.3 on a rigid object, and therefore its values of
+validation/REFERENCES.md, 2.1.  Equal half-planes have no friction (beta = 0); equal bodies of finite size have a
+little, which falls with a/h, unless they are mirror images.  For unlike bodies see Goodman 1962 and Spence 1975.
 
-Finger: a block on its base; object: [effects.elastic_object], the lower half of a cylinder held on its cut, its own
-mesh, 1.3 times coarser than the finger's, whose nodes do not meet the finger's.  Both are 100 and 200 a thick, and the
-gated values are extrapolated linearly in a/h to 0, as in press_line.  NAFEMS CGS-1 (references.md sec. 6) is pressed
-through the same command that users run.
+The finger is a block on its base; the object is that of [effects.elastic_object], the lower half of a cylinder held on
+its cut.  It has its own mesh, 1.3 times coarser than the finger's, with nodes in other places.  Both bodies are 100 and
+200 a thick, and the values are extrapolated linearly in a/h to 0, as in press_line.  NAFEMS CGS-1
+(validation/REFERENCES.md, 6.4) is pressed with the same effect.
 """
 
 from __future__ import annotations
@@ -37,10 +36,11 @@ from finger3d.study import Result, Row
 from ._common import held_at, solve
 from ._halfplane import Profile, under
 
-SPENCE = "Spence 1975 with Dundurs' beta; references.md sec. 2"
-HERTZ = "Johnson 1985 ch. 4"
-NAFEMS = "NAFEMS CGS-1; references.md sec. 6"
-ONE = "issue 4: Hertz rows within 1 %"
+SPENCE = "Spence 1975 with Dundurs' beta; REFERENCES.md, 1.3 and 2.1"
+STEPPED = "Spence 1975 with 200 increments; REFERENCES.md, 2.4"
+HERTZ = "Johnson 1985, sec. 4.2; REFERENCES.md, 1.3"
+NAFEMS = "NAFEMS CGS-1; REFERENCES.md, 6.4"
+ONE = "0.4 % or less measured at 25 and 30 points to a; coarser meshes must pass too"
 P_OVER_HERTZ, Q_OVER_P, C_OVER_A, D_OVER_AP2 = 1.04269, 0.09348, 0.54321, 4.3e-4  # nu' = .3, mu = .25, N = 200
 SPENCE_Q = (0.0, 0.0955, 0.1500, 0.1872, 0.2103, 0.2184, 0.2031, 0.1788, 0.1480, 0.1054, 0.0)  # at x/a = 0, .1, ...
 RATIO = 11.0 / 3.0
@@ -98,19 +98,19 @@ def run(quick: bool) -> Result:
     rows += [
         Row("P/P_Hertz(a), E = 1 and 2, nu = .3 and .2, mu = 0", HERTZ, 1.0, found["unlike"][0], 0.01, ONE),
         Row("P/P_Hertz(a), nu = 0 on nu = 0, r = 11/3, mu = .25", SPENCE, P_OVER_HERTZ, pair[0], 0.01, ONE),
-        Row("int_0^a q/P, the same pair", SPENCE, Q_OVER_P, pair[1], 0.03, "issue 4: Spence integrals within 3 %"),
+        Row("int_0^a q/P, the same pair", SPENCE, Q_OVER_P, pair[1], 0.03, "c lies between two points; 0.1 % measured"),
         Row(
             "c/a, the same pair", SPENCE, C_OVER_A, pair[2], 0.5 / points + 0.3 / steps,
-            "half a point, and the increments' 0.3/N", measure="absolute",
+            "half a point spacing, and 0.3/N for N increments", measure="absolute",
         ),
         Row(
-            "int_0^a q/P, bodies alike, mu = .25", "Johnson 1985 sec. 5.1: beta = 0", 0.0, found["alike"][1], 1e-3,
-            "bodies of finite size rub by a/h", measure="absolute",
+            "int_0^a q/P, bodies alike, mu = .25", "beta = 0; Johnson 1985, sec. 5.1", 0.0, found["alike"][1], 1e-3,
+            "bodies of finite size have friction of the order of a/h", measure="absolute",
         ),
     ]  # fmt: skip
     if not quick:
         rows.append(
-            Row("D/(A P^2), the same pair, N = 200", SPENCE, D_OVER_AP2, pair[3], 0.03, "references.md: 4.3e-4")
+            Row("D/(A P^2), the same pair, N = 200", STEPPED, D_OVER_AP2, pair[3], 0.03, "two digits there; 0.2 % here")
         )
     rows += _mirror_rows()
     rows += _third_law_rows()
@@ -154,9 +154,9 @@ def _mirror_rows() -> list[Row]:
             1.0,
             plane,
             1e-7,
-            "their arcs' chords",
+            "chords for arcs",
         ),
-        Row("force with E2 = 1e12 E1, by the rigid object's", "issue 5: the limit", 1.0, limit, 1e-9, "1e-12 is left"),
+        Row("force with E2 = 1e12 E1, by the rigid object's", "a rigid object", 1.0, limit, 1e-9, "1e-12 is left"),
     ]
 
 
@@ -170,7 +170,7 @@ def _swapped_rows(quick: bool) -> list[Row]:
     third = "Newton's third law"
     return [
         Row("force with finger and object in each other's place", third, 1.0, force, 0.005, "the meshes differ"),
-        Row("friction, likewise", third, 1.0, friction, 0.05, "small, and it hangs on the contact's edge"),
+        Row("friction, likewise", third, 1.0, friction, 0.05, "friction is small, and lies at the contact's edge"),
     ]
 
 
@@ -201,7 +201,7 @@ def _third_law_rows() -> list[Row]:
     third = "Newton's third law"
     what = f"bases' forces, finger's less object's over finger's, {c} points, dragged"
     return [
-        Row(what, third, 0.0, np.abs(ends[0] - ends[1]).max() / total, 1e-10, "issue 5", measure="absolute"),
+        Row(what, third, 0.0, np.abs(ends[0] - ends[1]).max() / total, 1e-10, "round-off", measure="absolute"),
         Row(
             "the surfaces' approach by two whole solutions, over the condensed one, less 1",
             "the sum of both compliances", 0.0, np.abs(moved - condensed).max() / np.abs(condensed).max(), 1e-10,
@@ -236,7 +236,7 @@ def _nafems_rows(quick: bool) -> list[Row]:
 
 
 def _draw(figure: Any, curves: dict[str, Profile]) -> None:
-    """Tractions over those of Hertz's peak, a/(A R); Spence's friction from references.md."""
+    """Tractions over those of Hertz's peak, a/(A R); Spence's friction from REFERENCES.md, 2.1."""
     left, right = figure.subplots(1, 2)
     names = {"unlike": "E 1 on 2, nu .3 on .2, mu = 0", "alike": "E 1 on 1, nu .3 on .3, mu = .25"}
     names["beta of nu = .3"] = "E 1 on 11/3, nu 0 on 0, mu = .25"

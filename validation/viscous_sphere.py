@@ -1,14 +1,13 @@
 """Does a ball pressed into a relaxing body, held and drawn back, follow Lee and Radok, and Ting?
 
-Source: Lee and Radok 1960, Ting 1966; references.md sec. 4.  Depth d = t (in units of the depth at which a = 1) up to
-t = 1, held until 1.5, then drawn back at the same speed; G relaxes to half with 1 s; no friction.  While a grows
-P = k int G(t - s) d(d^1.5) and a^2 = R d; later a(t) = a(t1), P = k int_0^t1 G(t - s) d(d^1.5), where
-int_t1^t G(t - s) d' ds = 0.
+Source: Lee and Radok 1960 and Ting 1966, validation/REFERENCES.md, 4.1 and 4.2.  The depth is d = t (in units of the
+depth at which a = 1) up to t = 1, held until 1.5, then drawn back at the same speed; G relaxes to one half with a time
+of 1 s; no friction.
 
-Twice: the contact solution alone, on rings over the exact half-space; and quadratic tets under a quarter of a block
-50 a high, where the force is divided by the elastic one at the same depth on the same mesh, which takes out the block's
-own yielding.  With ``bulk = false`` k follows E* = 4G (3K + G)/(3K + 4G), G relaxing and K not (the correspondence
-principle).
+Two computations: the contact solution alone, on rings over the exact half-space; and quadratic tetrahedra under a
+quarter of a block 50 a high, where the force is divided by the elastic one at the same depth on the same mesh, which
+removes the compliance of the block.  With ``bulk = false`` the reference uses E* = 4G (3K + G)/(3K + 4G), where G
+relaxes and K does not (correspondence principle).
 """
 
 from __future__ import annotations
@@ -47,9 +46,9 @@ DEPTH = 1.0 / RADIUS  # a = 1 mm
 PRONY = ((0.5, 1.0),)
 TABLE = {0.1: 0.0310080, 0.25: 0.1191727, 0.5: 0.3227350, 1.0: 0.8464404, 1.5: 0.7101267, 4.0: 0.5172483}
 HELD, RELEASED = 1.5, 0.8  # s; the ball is drawn back for so long
-LEE = "Lee and Radok 1960; references.md sec. 4"
-TING = "Ting 1966"
-HALF = "issue 6: closed forms within 0.5 %"
+LEE = "Lee and Radok 1960; REFERENCES.md, 4.1"
+TING = "Ting 1966; REFERENCES.md, 4.2"
+HALF = "0.01 % or less measured on rings of a/100, 0.2 % or less on tetrahedra of a/10"
 COLUMNS = "body nu bulk resolution steps_per_s t P_over_k theory a".split()
 
 
@@ -242,8 +241,8 @@ def run(quick: bool) -> Result:
     rows += _ring_rows(curves, count, quick)
     orders = {n: _at(march(body, viscous, long_hold(n)[:n])[0] / k, np.arange(1, n + 1) / n, 1.0) for n in (5, 10, 20)}
     rate = float(np.log2((orders[5] - orders[10]) / (orders[10] - orders[20])))
-    rows.append(Row("rate at which the force settles with the step, 5, 10, 20 a second", "linear within a step: 2", 2.0,
-                    rate, 0.25, "points join one by one", measure="absolute"))  # fmt: skip
+    rows.append(Row("rate at which the force settles with the step, 5, 10, 20 a second", "second order",
+                    2.0, rate, 0.25, "points come into contact one by one", measure="absolute"))  # fmt: skip
     rows += _tet_rows(meshes, table, quick)
     columns = dict(zip(COLUMNS, map(list, zip(*table, strict=True)), strict=True))
     return Result(tuple(rows), columns, lambda figure: _draw(figure, curves, columns))
@@ -256,7 +255,7 @@ def _at(values: Float, t: Float, when: float) -> float:
 def _ring_rows(curves: dict[str, Any], count: int, quick: bool) -> list[Row]:
     t, force, radius = curves["hold"]
     worst = 0.01 if quick else 0.005
-    why = "quick: coarse rings and steps" if quick else HALF
+    why = "coarse rings and increments of the quick version" if quick else HALF
     rows = [
         Row(f"P/k at t = {when:g} s, rings", LEE, want, _at(force, t, when), worst, why)
         for when, want in TABLE.items()
@@ -269,7 +268,7 @@ def _ring_rows(curves: dict[str, Any], count: int, quick: bool) -> list[Row]:
     for when in (1.6, 1.75):
         want, a = ting(when)
         rows.append(Row(f"P/k at t = {when:g} s, drawn back, rings", TING, want, _at(force, t, when), 2 * worst,
-                        "the force has fallen; of its largest value the error is a quarter of that"))  # fmt: skip
+                        "relative to a force that has fallen; smaller relative to its maximum"))  # fmt: skip
         rows.append(Row(f"a at t = {when:g} s, drawn back (mm), rings", TING, a, _at(radius, t, when), 1.0 / count,
                         f"one ring, a/{count}", measure="absolute"))  # fmt: skip
     gone = float(t[(t > HELD) & (force <= 0.0)][0])
@@ -297,18 +296,18 @@ def _tet_rows(meshes: tuple[int, ...], table: list[tuple[Any, ...]], quick: bool
         rows.append(
             Row(
                 f"distance from the convolution of the elastic force, over it, tets a/{points}", LEE, 0.0, away, 1e-10,
-                "round-off: both are linear within a step", measure="absolute",
+                "round-off: both are linear within an increment", measure="absolute",
             )
         )  # fmt: skip
     for bulk in (True, False):
         for when in (0.4, 1.0) if quick else (0.1, 0.25, 0.5, 1.0, 1.5, 4.0):
-            source, kind = (LEE, "") if bulk else ("E*(s) and Lee and Radok 1960", ", K constant")
+            source, kind = (LEE, "") if bulk else ("Lee and Radok 1960 with E*(s); REFERENCES.md, 4.1", ", K constant")
             rows.append(
                 Row(
                     f"P/P_elastic(depth) at t = {when:g} s{kind}, tets a/{meshes[-1]}", source,
                     lee_radok(when, modulus if bulk else contact_modulus(0.3)) / min(when, 1.0) ** 1.5,
                     _at(found[meshes[-1], bulk], times, when), 0.02 if quick else 0.005,
-                    "quick: three points to a" if quick else HALF,
+                    "three points to a in the quick version" if quick else HALF,
                 )
             )  # fmt: skip
     return rows

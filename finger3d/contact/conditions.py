@@ -18,7 +18,7 @@ from finger3d.contact.law import OPEN, SLIP, STICK
 Float = NDArray[np.float64]
 
 TOLERANCE = 1e-8
-"""Largest residual at which a step may call itself converged (contract.md)."""
+"""Largest residual at which a step may call itself converged."""
 
 _CACHED = 30_000
 """Numbers that are gathered at once."""

@@ -49,7 +49,7 @@ def sound(shape: Any, name: str) -> Any:
 
 
 def labelled_faces(solid: Any) -> list[Any]:
-    """Faces of a solid, each with its `label`, told from where it lies and looks: see contract.md on axes.
+    """Faces of a solid, each with its `label`, told from its place and normal; y is up, z the width.
 
     base: plane on y = 0 looking down. ends: planes looking along z. walls: planes looking along x, and whatever looks
     down. symmetry_x, symmetry_z: the cuts on x = 0, z = 0. contact: the rest.

@@ -139,7 +139,7 @@ def _body(design: Any, symmetry: tuple[str, ...], field: Sizing) -> tuple[Body, 
 
 
 def check_surface(points: Float, triangles: Int) -> None:
-    """Refuse a surface that makes pytetwild crash, hang, or mesh something else (geometry.md sec. 2)."""
+    """Refuse a surface that makes pytetwild crash, hang, or mesh something else."""
     reason = _mistake(points, triangles)
     if reason:
         raise Finger3dError(f"the finger's surface cannot be meshed: {reason}; mend the design or the file")

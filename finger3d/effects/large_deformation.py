@@ -1,6 +1,6 @@
 """Finite strain: neo-Hookean body, gap and directions that follow the moved points.
 
-Newton around the same contact solution (design.md sec. 6): linearise elasticity and gap at the current state, condense,
+Newton around the same contact solution: linearise elasticity and gap at the current state, condense,
 let the contact rule solve contact exactly, repeat.  The multipliers are total: with internal forces R and tangent K,
 ``u + K^-1 (B^T f - R)`` is the next state, and the contact rule sees its part without f as the free motion.
 """

@@ -22,8 +22,8 @@ Int = NDArray[np.int64]
 AnyInt = NDArray[np.int32] | NDArray[np.int64]
 
 MIXED_FROM = 0.48
-"""Poisson's ratio from which the mixed form is used (linear elements lock, and the pressure of quadratic ones
-oscillates, design.md sec. 5)."""
+"""Poisson's ratio from which the mixed form is used: near 1/2 linear elements lock (validation/cook.py), and the
+pressure of quadratic ones oscillates."""
 
 # The compressibility 1/lam never falls below this share of 1/G: it keeps every pivot away from zero at nu = 0.5,
 # where it changes results by about 1e-7 (relative), below any mesh error.

@@ -1,7 +1,7 @@
 """Condensation of a body to a few rows of interest: one factorisation, one small dense compliance.
 
-PARDISO returns ``R K^-1 R^T`` as a Schur complement for about the price of factoring K (design.md sec. 1); where there
-is no MKL, SuperLU factors K and solves for every row, behind the same interface.
+PARDISO returns ``R K^-1 R^T`` as a Schur complement for about the price of factoring K; where there is
+no MKL, SuperLU factors K and solves for every row, behind the same interface.
 """
 
 from __future__ import annotations
