@@ -34,7 +34,7 @@ Steps = int | Literal["auto"]
 NOISE, RANGE = 1.5e-4, (0.05, 1.2)
 ON = {**dict.fromkeys(TOLERANCES, 0.0), "mesh": 1.0, "increments": 1.0}
 SAME, FINER = "same mesh", "finer mesh"
-LEVELS = (10, 20, 40, 80, 160, 320)
+LEVELS = (10, 20, 40, 80, 160)
 
 
 @dataclass(frozen=True)
