@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import shlex
 import shutil
@@ -66,8 +65,7 @@ def test_the_python_example_runs(root: Path, folder: Path) -> None:
     (example,) = python(root, "From Python")
     names: dict = {}
     execute(example, names)
-    summary = json.loads(Path("out/summary.json").read_text(encoding="utf-8"))
-    assert len(names["frame"]) == summary["step_estimate"]["steps"]
+    assert len(names["frame"]) == names["result"].summary()["step_estimate"]["steps"]
     assert names["grid"].n_cells > 0
     assert Path("out/contact.png").is_file()
 
