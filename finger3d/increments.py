@@ -33,6 +33,9 @@ FLOOR = 1e-4
 _PAIRS = 3
 """Pairs of successive counts that make the estimate, at most."""
 
+_LEAST_RUNS = {2: 4, 3: 3}
+"""Runs before a tolerance may be met; three still agree by chance now and then, and in a section one more is cheap."""
+
 _FIRST, _LARGEST = 5, 640
 _FIRST_IF_FACTORED, _LARGEST_IF_FACTORED = 3, 12
 """Where every increment factors the stiffness anew: 3, 6 and 12 take twice as long as 10 alone."""
@@ -128,7 +131,7 @@ def remaining(counts: Sequence[int], values: Sequence[float], at: int) -> float:
 
 
 def refine(problem: Problem) -> Iterator[tuple[tuple[Frame, ...], StepEstimate | None]]:
-    """Frames and estimate of ever more increments; none after the first run, and none is met before the third.
+    """Frames and estimate of ever more increments; none after the first run, and none is met too early.
 
     Ends when the estimate is met or the limit is reached.  A run that fails is left out if one with fewer increments
     succeeded or one with twice as many does.
@@ -222,10 +225,11 @@ def _estimate(problem: Problem, levels: Sequence[tuple[int, tuple[Frame, ...]]])
     lost = [(numbers["dissipation_mJ"], leg["dissipation_mJ"]) for numbers, leg in zip(finest, errors, strict=True)]
     above = [error / max(value, floor) for value, error in lost if value + error > floor]
     left = (worst("normal_force_N"), worst("friction_sum_N"), worst(*strains), max(above, default=0.0))
+    enough = len(levels) >= _LEAST_RUNS[problem.dim]
     return StepEstimate(
         counts[-1], *left,
         dissipation_floor_mJ=floor, dissipation_resolved=sum(lost[-1]) > floor or not any(lost[-1]),
-        met=len(levels) > 2 and max(left[:3]) <= TOLERANCE and left[3] <= DISSIPATION_TOLERANCE, levels=tuple(levels),
+        met=enough and max(left[:3]) <= TOLERANCE and left[3] <= DISSIPATION_TOLERANCE, levels=tuple(levels),
     )  # fmt: skip
 
 
