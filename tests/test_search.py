@@ -18,7 +18,7 @@ from finger3d.search import Free, Problem, Table, search, sensitivity
 from finger3d.solve import build, march
 from tests.test_page import words
 
-SETS = ["model.domain=plane-strain", "mesh.size_mm=4", "mesh.base_size_mm=16"]
+SETS = ["model.domain=plane-strain", "mesh.size_mm=4", "mesh.base_size_mm=16", "press.steps=10"]
 COARSE = [option for text in SETS for option in ("--set", text)]
 ANGLE = Free("gauge.g36.angle_deg", 0.0, 90.0)
 MUS = (0.1, 0.5, 1.0)
