@@ -1,8 +1,8 @@
 """How many increments a calibration takes, and the error that they leave in the strain of its gauge.
 
 The error of N equal increments falls about as 1/N, on the way to which N and 2N, or N and 4N, often agree by chance.
-So it is told by several pairs of levels, each scaled to N, of which the largest counts.  Extrapolation in 1/N would
-leave 0.4 to 0.65 of the error (validation/calibration_z_scores.py), which is less than one doubling gains.
+So it is told by several pairs of levels, each scaled to N, of which the largest counts.  Extrapolation in 1/N
+would leave 0.4 to 1.9 of the error (validation/calibration_z_scores.py), so it is not worth its price.
 """
 
 from __future__ import annotations
