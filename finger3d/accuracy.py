@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.design import mesh_section, mesh_solid
-from finger3d.errors import Finger3dError
+from finger3d.errors import Finger3dError, UnresolvedError
 from finger3d.export import MAIN
 from finger3d.fem.surface import surface
 from finger3d.history import Frame, measure
@@ -217,13 +217,19 @@ def companions(model: Model, unknowns: float) -> tuple[list[MeshOptions], list[M
 
 
 def _built_if(problem: Problem, model: Model, enough: Callable[[float], bool], say: Say) -> Problem | None:
-    """A companion, condensed, if the ratio of edges is enough; a structured mesh is looked at first."""
+    """A companion, condensed, if the ratio of edges is enough and the object does not pass between its points.
+
+    A structured mesh is looked at first.
+    """
     if model.domain != "solid" or model.mesh.mesher == "swept":
         made = mesh_solid if model.domain == "solid" else mesh_section
         mesh = made(model.design, model.mesh, contact_zone(model), symmetry(model))[0]
         if not enough((problem.mesh.points.size / mesh.points.size) ** (1.0 / problem.dim)):
             return None
-    beside = built_like(problem, model, say if _unstructured(model) else lambda text: None)
+    try:
+        beside = built_like(problem, model, say if _unstructured(model) else lambda text: None)
+    except UnresolvedError:
+        return None
     return beside if enough(_ratio(problem, beside)) else None
 
 

@@ -17,6 +17,21 @@ class MissingError(Finger3dError):
     exit_code = 3
 
 
+class UnresolvedError(Finger3dError):
+    """The mesh is too coarse for the object. Exit code 3.
+
+    Attributes
+    ----------
+    size_mm : edge length that resolves it; None if none is known
+    """
+
+    exit_code = 3
+
+    def __init__(self, text: str, size_mm: float | None = None) -> None:
+        super().__init__(text)
+        self.size_mm = size_mm
+
+
 class Outcome(Enum):
     """How a step ended. The value of a member is the text a user reads: what failed, and what to try."""
 
@@ -37,6 +52,7 @@ class Outcome(Enum):
     )
     NEWTON = "large deformation did not settle; the steps before are good; try more steps or a shallower press"
     INDEFINITE = "the compliance is not positive: the body is not held; fix its base, or check the mesh"
+    UNRESOLVED = "the object passes between the contact points; try a smaller mesh.size_mm"
     NOT_FINITE = "the compliance or the gap contains NaN or infinity; check the mesh and the material"
 
     @property

@@ -206,10 +206,15 @@ class Body:
                     yield replace(waiting[len(proved)], frames=error.with_traceback(None))
 
     def _run(self, variant: Variant, before: Sequence[_Run]) -> _Run:
+        from finger3d.resolution import check
+
         start = time.perf_counter()
         frames: tuple[Frame, ...] | Exception
         try:
-            frames = _frames(self.problem_of(variant))
+            problem = self.problem_of(variant)
+            if variant.legs != self.problem.model.legs:  # the body was built, and its mesh checked, for another path
+                check(problem.model, problem.surface, problem.touch_mm, problem.place_mm, problem.axes)
+            frames = _frames(problem)
         except TROUBLE as error:
             frames = error.with_traceback(None)  # which would keep all arrays on the way
         return _Run(self.problem, frames, time.perf_counter() - start)

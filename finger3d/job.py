@@ -44,6 +44,8 @@ class _Output:
     """The files of a press that grow with its steps."""
 
     def __init__(self, scene: Scene, problem: Problem, out: Path, started: float, before: int) -> None:
+        from finger3d import resolution
+
         self.scene, self.problem, self.out, self.started = scene, problem, out, started
         self.factorizations_before = before
         self.factorizations: int | None = None  # of the press alone, once it is done: the estimate makes its own
@@ -54,6 +56,7 @@ class _Output:
         self.coupling = problem.coupling()
         self.advice: list[str] = []
         self.warnings = [*problem.model.warnings, *_coupling_warning(self.coupling), *_depth_warning(problem)]
+        self.warnings += resolution.warnings(problem)
         self.seconds = {"cad": 0.0, "mesh": 0.0, **problem.seconds, "contact": 0.0, "output": 0.0}
         self._written = -math.inf
 
@@ -170,6 +173,7 @@ def press(
 def _pressed(
     scene: Scene, folder: Path, report: Report, started: float, artist: Artist | None, ahead: Ahead | None
 ) -> tuple[History, dict[str, Any]]:
+    from finger3d import resolution
     from finger3d.accuracy import estimate
     from finger3d.solve import covers
 
@@ -187,7 +191,7 @@ def _pressed(
     report.stage("writing fields")
     _fields(problem, output, folder, artist)
     output.seconds["output"] += time.perf_counter() - begin
-    output.warnings += _coarse_warning(problem, output.frames)
+    output.warnings += _coarse_warning(problem, output.frames) + resolution.unseen(problem, output.frames)
     history = History(problem.points, tuple(output.frames))
     summary = output.write(_told(history), tables=False)
     if ahead:
@@ -327,6 +331,7 @@ def _remark(problem: Problem, frame: Frame) -> str:
 
 def _fields(problem: Problem, output: _Output, folder: Path, artist: Artist | None) -> None:
     """fields.vtu and the pictures, from the last good step; the field is recovered with the factor at hand."""
+    from finger3d import resolution
     from finger3d.advice import advise
     from finger3d.mesh import unfold
     from finger3d.page.states import states_of, write_states
@@ -336,6 +341,7 @@ def _fields(problem: Problem, output: _Output, folder: Path, artist: Artist | No
         return
     frame, points = good[-1], problem.points
     u, strain, sigma = problem.model.kinematics.fields(problem, frame.part)
+    output.warnings += resolution.inside(problem, frame, u)
     output.advice = advise(problem, frame, strain, output.estimate is not None)
     mesh, parent, sign = unfold(problem.mesh, tuple("xyz".index(a) for a in problem.axes))
     flip = np.ones((len(parent), 3))

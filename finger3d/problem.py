@@ -75,6 +75,7 @@ class Problem:
     beyond : (g + s, g + s)
         What the last rows of `condensed`, gauges and inclusions, yield more than the mesh says.
     bare : the same without inclusions, if there are any
+    place_mm : (x, z) of first touch, if the finger's surface is known
     later : what is made of the problem after its build
     """
 
@@ -100,6 +101,7 @@ class Problem:
     springs: Float = field(default_factory=lambda: np.zeros(0))
     beyond: Float = field(default_factory=lambda: np.zeros((0, 0)))
     bare: Problem | None = None
+    place_mm: tuple[float, float] | None = None
     later: Later = field(default_factory=Later, compare=False)
 
     @property

@@ -33,6 +33,7 @@ from finger3d.mesh import Mesh
 from finger3d.model import Gauge, Leg, Material, MeshOptions, Model
 from finger3d.objects import Cylinder, MeshObject, Plane, Sphere, Wave, Wedge
 from finger3d.problem import Problem, rigid_gap
+from finger3d.resolution import check
 from finger3d.solve import MARGIN, march, targets
 from finger3d.versions import versions
 
@@ -135,7 +136,7 @@ class Condensed:
         Raises
         ------
         Finger3dError
-            If a number is out of range, or the path leaves what was condensed.
+            If a number is out of range, the path leaves what was condensed, or the object passes between its points.
         """
         model = self.problem.model
         law = model.friction if mu is None else friction_at(model.friction, mu)
@@ -144,6 +145,7 @@ class Condensed:
         problem = replace(self.problem, model=replace(model, friction=law, legs=tuple(legs or model.legs)))
         if legs is not None:
             self._check(problem)
+            check(problem.model, problem.surface, problem.touch_mm, problem.place_mm, problem.axes)
         return History(problem.points, tuple(march(problem)))
 
     def _check(self, problem: Problem) -> None:

@@ -14,7 +14,7 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from finger3d.accuracy import FACTOR, ORDER, companion, compared, is_length, last_frame, main_numbers
-from finger3d.errors import Finger3dError
+from finger3d.errors import Finger3dError, UnresolvedError
 from finger3d.model import MeshOptions, Model
 from finger3d.solve import Problem, build
 
@@ -125,6 +125,11 @@ def refined(
         problem = None  # two factors at once would halve the mesh that memory allows
         try:
             problem, done, wanted = _round(replace(model, mesh=options), tolerance)
+        except UnresolvedError as error:
+            if error.size_mm is None or error.size_mm >= options.size_mm:
+                raise
+            options = replace(options, size_mm=error.size_mm)
+            continue
         except (Finger3dError, MemoryError) as error:
             if not rounds:
                 raise

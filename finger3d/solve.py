@@ -28,6 +28,7 @@ from finger3d.mesh import Mesh, unfold
 from finger3d.model import Gauge, Inlay, Leg, Model
 from finger3d.objects import approach
 from finger3d.problem import AUTO_START, Problem, at_points, between, folded, rigid_gap, targets, values_of
+from finger3d.resolution import check
 from finger3d.versions import cores
 
 Float = NDArray[np.float64]
@@ -74,7 +75,13 @@ def contact_zone(model: Model) -> tuple[float, float, float, float]:
 
 
 def build(model: Model, say: Callable[[str], None] = lambda text: None, margin: float = MARGIN) -> Problem:
-    """Mesh, assemble and condense a model."""
+    """Mesh, assemble and condense a model.
+
+    Raises
+    ------
+    UnresolvedError
+        If the object passes between the contact points.
+    """
     design = model.design
     way = approach(*model.approach)
     touch, zone, axes = way.touch_mm, way.zone, symmetry(model)
@@ -82,12 +89,14 @@ def build(model: Model, say: Callable[[str], None] = lambda text: None, margin: 
         mesh, report = mesh_solid(design, model.mesh, zone, axes, say)
     else:
         mesh, report = mesh_section(design, model.mesh, zone, axes)
+    thickness = 1.0 if mesh.dim == 3 else design.width_mm
+    everywhere = surface(mesh, "contact", thickness)
+    check(model, everywhere, touch, way.place, axes)
     say("assembling")
     start = time.perf_counter()
     elastic = Elasticity.of(model.material.E_MPa, model.material.nu, model.domain == "plane-stress")
-    thickness = 1.0 if mesh.dim == 3 else design.width_mm
     matrix = stiffness(mesh, elastic, thickness)
-    face = _candidates(model, surface(mesh, "contact", thickness), touch, margin)
+    face = _candidates(model, everywhere, touch, margin)
     kept = _kept_rows(face, axes)
     rows = local_rows(face, model.object.frame(mesh.dim))[kept]
     inlay = model.inclusions.lay(model, mesh, axes) if model.inclusions else None
@@ -101,7 +110,7 @@ def build(model: Model, say: Callable[[str], None] = lambda text: None, margin: 
     bare = Problem(
         model, mesh, report, elastic, matrix, face, condensed, compliance,
         gauge_rows, kept, held, thickness, touch, axes, points, parent, sign, share,
-        {**report.seconds, "assembly": assembly, "condensation": condensed.seconds},
+        {**report.seconds, "assembly": assembly, "condensation": condensed.seconds}, place_mm=way.place,
     )  # fmt: skip
     yields: Float | float = 0.0
     if model.object_compliance:

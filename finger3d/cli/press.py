@@ -83,15 +83,22 @@ def plan(scene: Path, /, *, set_: Set = None, json_: Json = False) -> int:
     """
     loaded = load(scene, set_)
     from finger3d.forecast import forecast
+    from finger3d.resolution import foreseen
+    from finger3d.solve import symmetry
 
-    expected = forecast(loaded.model())
+    model = loaded.model()
+    expected, warnings = forecast(model), foreseen(model, symmetry(model))
     if loaded.tables.mesh.tolerance is not None:
         expected = {"mesh": f"the first of those refined to tolerance = {loaded.tables.mesh.tolerance:g}"} | expected
     if json_:
-        print_json({"title": loaded.title, "effects": loaded.as_dict()["effects"], "forecast": expected})
+        print_json(
+            {"title": loaded.title, "effects": loaded.as_dict()["effects"], "forecast": expected, "warnings": warnings}
+        )
         return 0
     print_rows("effects", effect_rows(loaded))
     print_rows(loaded.title, [(key.replace("_", " "), value) for key, value in expected.items()])
+    for text in warnings:
+        print(f"warning: {text}")
     return 0
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from finger3d.compare.cases import Case, solved, widened
 from finger3d.compare.verdict import WITHIN, passage, reached, sentences
-from finger3d.errors import Finger3dError, Outcome
+from finger3d.errors import Finger3dError, Outcome, UnresolvedError
 from finger3d.export import atomic, claimed, write_csv, write_json
 from finger3d.model import Model
 from finger3d.report import Report
@@ -96,7 +96,7 @@ def _compared(solid: Scene, model: Model, asked: list[float], folder: Path, repo
     cases: list[Case] = []
     for done, (name, variant) in enumerate(plan, start=1):
         report.stage(f"{name}, {variant.design.width_mm:g} mm wide")
-        cases.append(solved(name, variant))
+        cases.append(_solved(name, variant, model))
         report.step(done, len(plan), _remark(cases[-1]))
         _write(folder, solid, model, cases, _INCOMPLETE if done < len(plan) else None)
     from finger3d.compare.picture import draw
@@ -155,6 +155,17 @@ def _plan(model: Model, widths: Sequence[float]) -> Iterator[tuple[str, Model]]:
         yield "plane strain", replace(wide, domain="plane-strain")
         yield "plane stress", replace(wide, domain="plane-stress")
         yield "solid", wide
+
+
+def _solved(name: str, variant: Model, scene: Model) -> Case:
+    """A case; of another width than the scene's it may be too coarse for the object without failing the others."""
+    try:
+        return solved(name, variant)
+    except UnresolvedError:
+        if variant.design.width_mm == scene.design.width_mm:
+            raise
+        mesher = "swept" if variant.domain != "solid" else variant.mesh.mesher
+        return Case(name, variant.design.width_mm, variant.mesh.size_mm, mesher, Outcome.UNRESOLVED)
 
 
 def _remark(case: Case) -> str:

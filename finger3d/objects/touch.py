@@ -33,10 +33,12 @@ class Approach:
     Attributes
     ----------
     zone : (x_min, x_max, z_min, z_max) mm over which the rigid object would overlap the finger at rest on its way
+    place : (x, z) mm of first touch
     """
 
     touch_mm: float
     zone: tuple[float, float, float, float]
+    place: tuple[float, float]
 
 
 def _grid(half_length: float, half_width: float, count: tuple[int, int] = _GRID) -> Float:
@@ -128,7 +130,7 @@ def approach(
             "never touches; change x_mm, z_mm"
         )
     if isinstance(obj, Plane):  # it has no end that could hang down, and its gap is measured along its own normal
-        return Approach(touch, _box(top, obj, half_length, half_width, touch, place, path))
+        return Approach(touch, _box(top, obj, half_length, half_width, touch, place, path), _pair(place))
     deepest = float(path[:, 0].max())
     if touch <= deepest:
         raise Finger3dError(
@@ -138,7 +140,11 @@ def approach(
     zone = _box(top, obj, half_length, half_width, touch, place, path)
     _not_a_wall(obj, place, half_length, half_width)
     _no_side(top, obj, touch, path, half_length, half_width)
-    return Approach(touch, zone)
+    return Approach(touch, zone, _pair(place))
+
+
+def _pair(place: Float) -> tuple[float, float]:
+    return float(place[0]), float(place[1])
 
 
 def _box(
