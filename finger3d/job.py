@@ -176,6 +176,7 @@ def press(
 def _pressed(
     scene: Scene, folder: Path, report: Report, started: float, artist: Artist | None, ahead: Ahead | None
 ) -> tuple[History, dict[str, Any]]:
+    from finger3d import resolution
     from finger3d.accuracy import estimate, press_numbers
     from finger3d.solve import covers
 
@@ -193,7 +194,7 @@ def _pressed(
     report.stage("writing fields")
     _fields(problem, output, folder, artist)
     output.seconds["output"] += time.perf_counter() - begin
-    output.warnings += _coarse_warning(problem, output.frames) + _unseen_warning(problem, output.frames)
+    output.warnings += _coarse_warning(problem, output.frames) + resolution.unseen(problem, output.frames)
     history = History(problem.points, tuple(output.frames))
     summary = output.write(_told(history), tables=False)
     if ahead:
@@ -242,20 +243,6 @@ def _depth_warning(problem: Problem) -> list[str]:
     return [
         f"the press reaches {100.0 * share:.0f} % of the finger's height of {height:.4g} mm: small strain is a poor "
         "model there, whatever the residual says; press less, or read the numbers as trends"
-    ]
-
-
-def _unseen_warning(problem: Problem, frames: list[Frame]) -> list[str]:
-    """Increments of positive depth that no contact point sees, as their averaged gaps are still open."""
-    from finger3d import resolution
-
-    apart = [f.target for f in frames if f.outcome.ok and (f.state.status == OPEN).all()]
-    missed = resolution.unseen(problem.model, problem.surface, problem.touch_mm, apart)
-    if not missed:
-        return []
-    return [
-        f"{len(missed)} of {len(frames)} increments reach no contact point and have no force, at depths up to "
-        f"{max(t.depth_mm for t in missed):.3g} mm; lower mesh.size_mm"
     ]
 
 

@@ -9,6 +9,7 @@ largest overlap that a contact point beside the place sees.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,6 +18,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
+from finger3d.contact.law import OPEN
 from finger3d.errors import UnresolvedError
 from finger3d.fem.surface import Surface
 from finger3d.history import Frame, Target
@@ -150,16 +152,24 @@ def _told(model: Model, touch_mm: float, tips: Float | None, found: Hidden) -> l
     return told
 
 
-def unseen(model: Model, face: Surface, touch_mm: float, path: list[Target]) -> list[Target]:
-    """Targets at which the object reaches into the finger at rest, and no contact point sees it."""
-    found = []
-    for target in path:
-        if target.depth_mm <= 0.0 or (rigid_gap(model, face, touch_mm, target) < 0.0).any():
+def unseen(problem: Problem, frames: Sequence[Frame]) -> list[str]:
+    """What to tell of increments at which the object reaches into the finger at rest, and no contact point sees it."""
+    model, face, touch, missed = problem.model, problem.surface, problem.touch_mm, list[float]()
+    for frame in frames:
+        end = frame.target
+        if end.depth_mm <= 0.0 or not frame.outcome.ok or (frame.state.status != OPEN).any():
             continue
-        slid = target.slide_x_mm or target.slide_z_mm
-        if not slid or (_overlap(model, face.samples, touch_mm, target) > 0.0).any():
-            found.append(target)
-    return found
+        slid = end.slide_x_mm or end.slide_z_mm
+        if (rigid_gap(model, face, touch, end) < 0.0).any():  # the finger has not followed yet
+            continue
+        if not slid or (_overlap(model, face.samples, touch, end) > 0.0).any():
+            missed.append(end.depth_mm)
+    if not missed:
+        return []
+    return [
+        f"{len(missed)} of {len(frames)} increments reach no contact point and have no force, at depths up to "
+        f"{max(missed):.3g} mm; lower mesh.size_mm"
+    ]
 
 
 def penetration(problem: Problem, frame: Frame, u: Float) -> tuple[float, Float]:
