@@ -399,6 +399,15 @@ def test_in_solids_a_tolerance_leaves_out_the_stick_zone() -> None:
     assert not {"stick_half_length_mm", "stick_area_mm2"} & set(judged(build(fig9(8.0)), names))
 
 
+def test_friction_in_a_section_is_not_known_better_than_its_points_allow() -> None:
+    # a companion may agree by chance; a quarter of the spacing over the half-length covers that, see the constant
+    problem, frames = pressed(replace(half_cylinder(0.2), domain="plane-stress"))
+    told, grain = main_numbers(problem, frames[-1]), Grain.of(problem, frames[-1])
+    same = mesh_error(told, told, 2.0, (grain, grain))
+    share = grain.spacing_mm / told["contact_half_length_mm"]
+    assert same["friction_sum_N"] == pytest.approx(0.25 * share * told["friction_sum_N"], rel=1e-9)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["ball", "soft_ball"])
 def test_scenes_that_pytetwild_meshes_get_bars_that_tell_something(name: str) -> None:
