@@ -273,7 +273,11 @@ GOOD = {"name": "g", "x_mm": 0.0, "y_mm": 3.0, "length_mm": 2.0}
         ({**FOIL_TABLE, "thickness_mm": 1.0}, (GOOD,), r"thickness_mm = 1\.0: thicker than an element; must be"),
         ({**FOIL_TABLE, "width_mm": 4.5}, (GOOD,), r"width_mm = 4\.5: gauge \"g\" would stick out .* at most 4 there"),
         (FOIL_TABLE, ({**GOOD, "z_mm": 1.0},), r"width_mm = 3\.0: gauge \"g\" would stick out .* at most 2 there"),
-        ({**FOIL_TABLE, "E_MPa": 0.0}, (GOOD,), r"effects\.embedded_gauge\.E_MPa = 0\.0: must be a number above 0"),
+        (
+            {**FOIL_TABLE, "E_MPa": 0.0},
+            (GOOD,),
+            r"effects\.embedded_gauge\.E_MPa = 0\.0: must be a number from 1e-9 to 1e9",
+        ),
         ({"E_MPa": 1.0, "width_mm": 1.0}, (GOOD,), r"effects\.embedded_gauge\.thickness_mm is missing"),
         (FOIL_TABLE, (GOOD, {**GOOD, "name": "g_free"}), r"gauge\.name = \"g_free\": effects\.embedded_gauge gives"),
     ],

@@ -7,7 +7,7 @@ import math
 from typing import Any
 
 from finger3d.errors import Finger3dError
-from finger3d.ranges import LARGEST_MM, SMALLEST_MM
+from finger3d.ranges import LARGEST_MM, SMALLEST_MM, at_most
 
 
 def check_dimensions(design: Any, *, zero_allowed: tuple[str, ...] = ()) -> None:
@@ -28,4 +28,6 @@ def check_at_most(design: Any, key: str, other: str) -> None:
     """Refuse a design whose dimension `key` is larger than its dimension `other`."""
     value, limit = getattr(design, key), getattr(design, other)
     if value > limit:
-        raise Finger3dError(f"{design.name}: {key} = {value:g} is too large; allowed: at most {other} = {limit:g}")
+        raise Finger3dError(
+            f"{design.name}: {key} = {value:g} is too large; allowed: at most {other} = {at_most(limit)}"
+        )
