@@ -23,45 +23,45 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from finger3d.lazy import from_home
+from finger3d._lazy import from_home
 
 if TYPE_CHECKING:
-    from finger3d.contact.law import Coulomb
-    from finger3d.design import designs
+    from finger3d.analyses.press import press
+    from finger3d.analyses.reduced import Condensed
+    from finger3d.analyses.result import PressResult
+    from finger3d.contact.friction import Coulomb
     from finger3d.errors import Finger3dError, MissingError, Outcome
-    from finger3d.job import press
-    from finger3d.mesh import Mesh
-    from finger3d.model import Gauge, Leg, Material, MeshOptions, Model
+    from finger3d.fem.simplex import Mesh
+    from finger3d.geometry.registry import designs
+    from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
     from finger3d.objects import Cylinder, Plane, Sphere, Wave, Wedge
-    from finger3d.reduced import Condensed
-    from finger3d.result import PressResult
     from finger3d.scene import Scene, load, parse
 
     __version__: str
 
 _HOME = {
-    "Condensed": "reduced",
-    "Coulomb": "contact.law",
+    "Condensed": "analyses.reduced",
+    "Coulomb": "contact.friction",
     "Cylinder": "objects",
     "Finger3dError": "errors",
-    "Gauge": "model",
-    "Leg": "model",
-    "Material": "model",
-    "Mesh": "mesh",
-    "MeshOptions": "model",
+    "Gauge": "mechanics.model",
+    "Leg": "mechanics.model",
+    "Material": "mechanics.model",
+    "Mesh": "fem.simplex",
+    "MeshOptions": "mechanics.model",
     "MissingError": "errors",
-    "Model": "model",
+    "Model": "mechanics.model",
     "Outcome": "errors",
     "Plane": "objects",
-    "PressResult": "result",
+    "PressResult": "analyses.result",
     "Scene": "scene",
     "Sphere": "objects",
     "Wave": "objects",
     "Wedge": "objects",
-    "designs": "design",
+    "designs": "geometry.registry",
     "load": "scene",
     "parse": "scene",
-    "press": "job",
+    "press": "analyses.press",
 }
 
 __all__ = [

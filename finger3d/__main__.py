@@ -7,7 +7,7 @@ import sys
 def main() -> int:
     """Load the command line and run it."""
     try:
-        from finger3d.lazy import loading
+        from finger3d._lazy import loading
 
         with loading():
             from finger3d.cli import main as run

@@ -6,9 +6,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.design.rules import check_at_most, check_dimensions
-from finger3d.design.section import Section, cylinder_section
-from finger3d.ranges import Dimension, Zero
+from finger3d._ranges import Dimension, Zero
+from finger3d.geometry.rules import check_at_most, check_dimensions
+from finger3d.geometry.section import Section, cylinder_section
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class ClippedCylinder:
 
     def solid(self) -> Any:
         """The build123d solid."""
-        from finger3d.design.cad import extruded
+        from finger3d.geometry.cad import extruded
 
         return extruded(self.section(), self.width_mm, self.name)
 

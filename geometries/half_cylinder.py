@@ -6,9 +6,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.design.rules import check_dimensions
-from finger3d.design.section import Section, cylinder_section
-from finger3d.ranges import Dimension
+from finger3d._ranges import Dimension
+from finger3d.geometry.rules import check_dimensions
+from finger3d.geometry.section import Section, cylinder_section
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class HalfCylinder:
 
     def solid(self) -> Any:
         """The build123d solid."""
-        from finger3d.design.cad import extruded
+        from finger3d.geometry.cad import extruded
 
         return extruded(self.section(), self.width_mm, self.name)
 

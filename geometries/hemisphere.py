@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.design.rules import check_dimensions
-from finger3d.ranges import Dimension
+from finger3d._ranges import Dimension
+from finger3d.geometry.rules import check_dimensions
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Hemisphere:
         """The build123d solid."""
         from build123d import Rot, Sphere
 
-        from finger3d.design.cad import sound
+        from finger3d.geometry.cad import sound
 
         return sound(Rot(-90, 0, 0) * Sphere(self.radius_mm, arc_size1=0, arc_size2=90, align=None), self.name)
 

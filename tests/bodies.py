@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.triangles import Triangles
+from finger3d.geometry.surface import Triangles
 
 
 def box(x: float, y: float, z: float, middle: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Triangles:

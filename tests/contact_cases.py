@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from finger3d.contact.law import OPEN, SLIP, STICK
+from finger3d.contact.friction import OPEN, SLIP, STICK
 from finger3d.contact.state import ContactState
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from finger3d.fem.elements import physical_gradients, quadrature, shape, surface_measure
-from finger3d.mesh import Mesh, boundary, quadratic, signed_volumes
+from finger3d.fem.simplex import Mesh, boundary, quadratic, signed_volumes
 
 
 def grid(counts: tuple[int, ...], shuffle: float = 0.0, seed: int = 0) -> Mesh:

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from finger3d.analyses.calibrate.tolerances import TOLERANCES
 from finger3d.scene import parse
-from finger3d.sensor import TOLERANCES, Calibration
+from finger3d.sensor import Calibration
 
 SCENE: dict[str, Any] = {
     "finger": {

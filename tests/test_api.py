@@ -14,11 +14,18 @@ import numpy as np
 import pytest
 
 import finger3d
+from finger3d.analyses.result import PressResult
 from finger3d.errors import Finger3dError
-from finger3d.result import PressResult, grid
-from tests.test_page import SECTION, SOLID
+from finger3d.results.vtu import grid
+from tests.test_report import SECTION, SOLID
 
-EXAMPLES = ("finger3d", "finger3d.job", "finger3d.result", "finger3d.page.build", "finger3d.page.states")
+EXAMPLES = (
+    "finger3d",
+    "finger3d.analyses.press",
+    "finger3d.analyses.result",
+    "finger3d.report.build",
+    "finger3d.results.states",
+)
 
 
 @pytest.fixture(scope="module")
@@ -85,11 +92,11 @@ def test_a_notebook_shows_numbers_and_the_picture(solid: PressResult, tmp_path: 
 def test_what_a_notebook_prints_of_the_other_objects_is_short_and_its_html_is_whole(
     solid: PressResult, tmp_path: Path
 ) -> None:
-    from finger3d.compare import Comparison
-    from finger3d.compare.cases import Case
-    from finger3d.notebook import card
+    from finger3d._notebook import card
+    from finger3d.analyses.compare.run import Comparison
+    from finger3d.mechanics.solve import build
+    from finger3d.results.comparison import Case
     from finger3d.sensor.curve import Calibration
-    from finger3d.solve import build
 
     scene = finger3d.load(_written(tmp_path))
     mu = np.linspace(0.1, 1.0, 5)

@@ -12,10 +12,10 @@ from types import SimpleNamespace
 import pytest
 
 import finger3d
-import finger3d.job
+import finger3d.analyses.press
 from finger3d.cli import app, main
 from finger3d.errors import MissingError, Outcome
-from finger3d.model import MeshOptions
+from finger3d.mechanics.model import MeshOptions
 from finger3d.scene import load
 
 HEAVY = ("OCP", "build123d", "vtk", "vtkmodules", "pyvista", "pytetwild", "trimesh", "scipy", "numpy", "pydantic")
@@ -65,7 +65,7 @@ def fake_press(monkeypatch):
             raise calls.end
         return SimpleNamespace(summary=lambda: summary, outcome=calls.end, out=out)
 
-    monkeypatch.setattr(finger3d.job, "press", press)
+    monkeypatch.setattr(finger3d.analyses.press, "press", press)
     return calls
 
 
@@ -153,7 +153,7 @@ def test_an_interruption_before_the_first_step(scene, tmp_path, monkeypatch, cap
     def press(scene, out, report, figures=True, error=True, artist=None):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(finger3d.job, "press", press)
+    monkeypatch.setattr(finger3d.analyses.press, "press", press)
     assert run("press", scene, "--out", tmp_path / "out") == 130
     assert capsys.readouterr().err == "finger3d: interrupted; no step was finished, none is kept\n"
 
@@ -284,7 +284,7 @@ def test_what_a_job_prints_does_not_spoil_the_json(scene, tmp_path, monkeypatch,
         summary = {"outcome": "converged", "warnings": ["Wärme"]}
         return SimpleNamespace(summary=lambda: summary, outcome=Outcome.CONVERGED)
 
-    monkeypatch.setattr(finger3d.job, "press", press)
+    monkeypatch.setattr(finger3d.analyses.press, "press", press)
     assert run("press", scene, "--out", tmp_path / "out", "--json") == 0
     out, err = capsys.readouterr()
     assert json.loads(out)["warnings"] == ["Wärme"]
@@ -311,7 +311,7 @@ def test_plan_info_and_validate_as_json(scene, tmp_path, capsys):
 
 
 def test_compare_as_json_prints_its_file(scene, tmp_path, monkeypatch, capsys):
-    import finger3d.compare
+    import finger3d.analyses.compare.run
 
     def compare(scene, out, widths, report):
         report.stage("plane strain")
@@ -319,7 +319,7 @@ def test_compare_as_json_prints_its_file(scene, tmp_path, monkeypatch, capsys):
         (out / "compare.json").write_text(json.dumps({"verdict": ["2D would do"], "outcome": "converged"}))
         return SimpleNamespace(verdict=("2D would do",), outcome=Outcome.CONVERGED, cases=())
 
-    monkeypatch.setattr(finger3d.compare, "compare", compare)
+    monkeypatch.setattr(finger3d.analyses.compare.run, "compare", compare)
     assert run("compare", scene, "--out", tmp_path / "out", "--json") == 0
     out, err = capsys.readouterr()
     assert json.loads(out) == {"verdict": ["2D would do"], "outcome": "converged"}

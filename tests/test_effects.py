@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finger3d.contact.law import Coulomb
-from finger3d.design import designs
+from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
-from finger3d.model import Gauge, Leg, Material, MeshOptions, Model
-from finger3d.scene.lookup import effect_names, effect_type
-from finger3d.solve import build, march
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.solve import build, march
+from finger3d.scene.registry import effect_names, effect_type
 
 TYPICAL: dict[str, dict[str, Any]] = {
     "elastic_object": {"E_MPa": 2.0, "nu": 0.4},
@@ -101,7 +101,7 @@ def test_two_effects_in_one_slot_are_named(name: str) -> None:
 
 def test_an_absent_effect_is_not_imported() -> None:
     code = (
-        "import sys; from finger3d.scene import load; load(sys.argv[1]).model(); import finger3d.solve; "
+        "import sys; from finger3d.scene import load; load(sys.argv[1]).model(); import finger3d.mechanics.solve; "
         "print([m for m in sys.modules if m.startswith('finger3d.effects.')])"
     )
     done = subprocess.run(
@@ -111,8 +111,8 @@ def test_an_absent_effect_is_not_imported() -> None:
 
 
 def test_a_point_that_slips_keeps_the_kinetic_limit_until_it_sticks() -> None:
-    from finger3d.contact.advance import advance
-    from finger3d.contact.law import SLIP, STICK
+    from finger3d.contact.friction import SLIP, STICK
+    from finger3d.contact.solve import advance
     from finger3d.contact.state import ContactState
     from finger3d.effects.kinetic_friction import TwoCoefficients
 
@@ -135,7 +135,7 @@ def test_only_the_effects_a_scene_names_are_imported(name: str, tmp_path: Any) -
     code = (
         "import sys; from finger3d.scene import load; from pathlib import Path; load(Path(sys.argv[1]), "
         "(f'effects.{sys.argv[2]}={sys.argv[3]}', 'press.duration_s=1.0', "
-        "'gauge=[{name=\"g\", x_mm=20.0, y_mm=40.0, length_mm=4.0}]')).model(); import finger3d.solve; "
+        "'gauge=[{name=\"g\", x_mm=20.0, y_mm=40.0, length_mm=4.0}]')).model(); import finger3d.mechanics.solve; "
         "print([m for m in sorted(sys.modules) if m.startswith('finger3d.effects.')])"
     )
     scene, table = "geometries/fig9.toml", "{" + settings + "}"

@@ -12,8 +12,8 @@ import scipy.sparse as sp
 from finger3d.fem.assembly import Elasticity, stiffness
 from finger3d.fem.condense import condense
 from finger3d.fem.pardiso import available
-from finger3d.fem.surface import displacement_row, local_rows, strain_row, surface
-from finger3d.mesh import quadratic
+from finger3d.fem.simplex import quadratic
+from finger3d.fem.traces import displacement_row, local_rows, strain_row, surface
 from finger3d.objects import vertical_frame
 from tests.meshes import grid
 

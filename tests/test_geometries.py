@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finger3d.design import designs
-from finger3d.design.cad import cut, labelled_faces
 from finger3d.errors import Finger3dError
+from finger3d.geometry.cad import cut, labelled_faces
+from finger3d.geometry.registry import designs
 
 GOOD: dict[str, dict[str, float]] = {
     "half_cylinder": {"radius_mm": 5.0, "width_mm": 10.0},

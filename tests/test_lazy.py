@@ -8,12 +8,12 @@ import sys
 
 import pytest
 
-from finger3d.lazy import loading
+from finger3d._lazy import loading
 
 
 def test_a_postponed_module_is_loaded_when_something_of_it_is_used() -> None:
     code = (
-        "import sys; from finger3d.lazy import postpone\n"
+        "import sys; from finger3d._lazy import postpone\n"
         "postpone('numpy.f2py', 'numpy.testing', 'numpy.no_such')\n"
         "import numpy, scipy.sparse\n"
         "parts = 'numpy.f2py.f2py2e', 'numpy.testing._private.utils'\n"
@@ -46,7 +46,7 @@ def test_while_loading_nothing_is_garbage(on: bool) -> None:
 
 def test_what_was_loaded_is_not_looked_through_again() -> None:
     code = (
-        "import gc; from finger3d.lazy import loading\nwith loading(): import csv\nprint(gc.get_freeze_count() > 1000)"
+        "import gc; from finger3d._lazy import loading\nwith loading(): import csv\nprint(gc.get_freeze_count() > 1000)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "True\n"

@@ -33,7 +33,7 @@ mesher = "swept"
 
 LIMITED = """
 import resource, sys
-import finger3d.cli, finger3d.job, finger3d.scene
+import finger3d.cli, finger3d.analyses.press, finger3d.scene
 resource.setrlimit(resource.RLIMIT_AS, ({limit}, resource.getrlimit(resource.RLIMIT_AS)[1]))
 sys.exit(finger3d.cli.main(sys.argv[1:]))
 """

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from bodies import ball, box, channel
 
-from finger3d.contact.law import OPEN, Coulomb
-from finger3d.design import designs
+from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.errors import Finger3dError
-from finger3d.history import measure
-from finger3d.model import Leg, Material, MeshOptions, Model
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.history import measure
+from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+from finger3d.mechanics.solve import build, march
 from finger3d.objects import (
     Cylinder,
     MeshObject,
@@ -26,7 +27,6 @@ from finger3d.objects import (
     first_touch,
     slope_of,
 )
-from finger3d.solve import build, march
 
 FIG9 = designs()["clipped_cylinder"](100.0, 50.0, 36.6, 20.0)
 TOP = 36.6 + 100.0 - math.sqrt(100.0**2 - 50.0**2)

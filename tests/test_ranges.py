@@ -10,12 +10,13 @@ import annotated_types as at
 import numpy as np
 import pytest
 
+from finger3d._ranges import Modulus, at_least, at_most
 from finger3d.cli import main
-from finger3d.design import designs
 from finger3d.errors import Finger3dError
-from finger3d.ranges import Modulus, at_least, at_most
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.solve import build, march
 from finger3d.scene import parse
-from finger3d.scene.lookup import effect_names, effect_type
+from finger3d.scene.registry import effect_names, effect_type
 from finger3d.scene.tables import (
     SHAPES,
     FrictionTable,
@@ -27,7 +28,6 @@ from finger3d.scene.tables import (
     Table,
     table_of,
 )
-from finger3d.solve import build, march
 
 OF_DESIGNS = [table_of(design) for design in designs().values()]
 OF_EFFECTS = [table_of(effect_type(name)) for name in effect_names()]

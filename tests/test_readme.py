@@ -71,8 +71,8 @@ def test_the_python_example_runs(root: Path, folder: Path) -> None:
 
 
 def test_the_examples_of_adding_work_and_are_short(root: Path, folder: Path) -> None:
-    from finger3d.model import Leg, Material, MeshOptions, Model
-    from finger3d.solve import build, march
+    from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+    from finger3d.mechanics.solve import build, march
 
     geometry, effect, study = python(root, "How to add")
     assert all(len(example.splitlines()) < 20 for example in (geometry, effect, study))

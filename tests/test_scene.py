@@ -15,9 +15,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import finger3d.effects
-from finger3d.contact.law import Coulomb
+from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
-from finger3d.model import Leg, Material, MeshOptions
+from finger3d.mechanics.model import Leg, Material, MeshOptions
 from finger3d.objects import Cylinder, Plane, Sphere, Wave, Wedge
 from finger3d.scene import load, parse
 
@@ -351,7 +351,7 @@ def test_an_object_without_a_shape_is_a_plane():
 def test_the_template_names_every_design_shape_and_key_of_an_object():
     from importlib import resources
 
-    from finger3d.design import designs
+    from finger3d.geometry.registry import designs
     from finger3d.scene.tables import SHAPES, table_of
 
     text = resources.files("finger3d").joinpath("new_scene.toml").read_text(encoding="utf-8")

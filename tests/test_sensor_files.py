@@ -12,15 +12,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+from finger3d.analyses.calibrate import presses as pressing
+from finger3d.analyses.calibrate import run as runs
+from finger3d.analyses.calibrate.run import calibrate, parsed_mus
+from finger3d.analyses.calibrate.tolerances import TOLERANCES
+from finger3d.analyses.reduced import Condensed
 from finger3d.cli import main
 from finger3d.errors import Finger3dError, MissingError, Outcome
-from finger3d.export import claimed
-from finger3d.reduced import Condensed
+from finger3d.io import claimed
 from finger3d.scene import load as load_scene
-from finger3d.sensor import TOLERANCES, Tolerance, calibrate, estimate, load, save
-from finger3d.sensor import presses as pressing
-from finger3d.sensor import run as runs
-from finger3d.sensor.run import parsed_mus
+from finger3d.sensor import Tolerance, estimate, load, save
 from tests.sensor_cases import FEW, NONE, curve, saturating, scene, straight
 
 

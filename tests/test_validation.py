@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from finger3d.study import Study, draw, kept_rows, studies, write_index
+from finger3d.analyses.validate import Study, draw, kept_rows, studies, write_index
 
 STUDIES = studies()
 

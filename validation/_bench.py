@@ -26,14 +26,15 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.contact.law import Coulomb
-from finger3d.design import designs, mesh_solid
-from finger3d.model import Domain, Leg, Material, MeshOptions, Model
-from finger3d.problem import Problem
-from finger3d.sensor.presses import presses
-from finger3d.solve import build, contact_zone, march, symmetry
-from finger3d.study import Row
-from finger3d.versions import cores
+from finger3d._machine import cores
+from finger3d.analyses.calibrate.presses import presses
+from finger3d.analyses.validate import Row
+from finger3d.contact.friction import Coulomb
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.model import Domain, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.solve import build, contact_zone, march, symmetry
+from finger3d.meshing.generate import mesh_solid
 
 LARGE, MIDDLE, QUICK = 1.1, 1.25, 3.0  # mm: 150 000, 47 000 and 8 000 unknowns
 MUS = (0.06, 0.125, 0.25, 0.5, 1.0)
@@ -269,8 +270,8 @@ def main(arguments: Sequence[str]) -> None:
     if arguments and not arguments[0].startswith("-"):
         print(json.dumps(measured(json.loads(arguments[0]))))
         return
+    from finger3d.analyses.validate import table
     from finger3d.cli.common import print_columns
-    from finger3d.study import table
 
     begin = time.perf_counter()
     print_columns(

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.mesh import Mesh
+from finger3d.fem.simplex import Mesh
 
 from ._calculix import faces, program
 

@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from finger3d.contact.advance import advance
-from finger3d.contact.law import Coulomb
+from finger3d.contact.friction import Coulomb
+from finger3d.contact.solve import advance
 from finger3d.contact.state import ContactState, Increment
 from finger3d.fem.assembly import Elasticity, stiffness
 from finger3d.fem.condense import condense
 from finger3d.fem.elements import physical_gradients, quadrature, shape, surface_measure
-from finger3d.fem.surface import Surface, local_rows, restrict, surface
-from finger3d.mesh import Mesh, boundary, quadratic, signed_volumes
+from finger3d.fem.simplex import Mesh, boundary, quadratic, signed_volumes
+from finger3d.fem.traces import Surface, local_rows, restrict, surface
 from finger3d.objects import vertical_frame
 
 Float = NDArray[np.float64]

@@ -15,28 +15,22 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from finger3d.contact.law import OPEN, STICK, Coulomb
-from finger3d.design import MeshReport, designs, mesh_section, mesh_solid
+from finger3d.contact.friction import OPEN, STICK, Coulomb
 from finger3d.fem.assembly import Elasticity, Stiffness, stiffness
 from finger3d.fem.condense import condense
-from finger3d.fem.surface import Surface, local_rows, surface
-from finger3d.history import ContactPoints, Frame, measure
-from finger3d.mesh import Mesh
-from finger3d.model import Gauge, Leg, Material, MeshOptions, Model
-from finger3d.objects import approach
-from finger3d.problem import Problem, at_points
+from finger3d.fem.simplex import Mesh
+from finger3d.fem.traces import Surface, local_rows, surface
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.history import ContactPoints, Frame, measure
+from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.problem import Problem, at_points
 
 # The steps of `build`, not public, since the product has no other elements.
-from finger3d.solve import (
-    MARGIN,
-    _candidates,
-    _held,
-    _kept_rows,
-    _unfolded,
-    gauge_row,
-    march,
-    symmetry,
-)
+from finger3d.mechanics.solve import MARGIN, _candidates, _held, _kept_rows, _unfolded, gauge_row, march, symmetry
+from finger3d.meshing.generate import mesh_solid
+from finger3d.meshing.report import MeshReport
+from finger3d.meshing.swept import mesh_section
+from finger3d.objects import approach
 
 Float = NDArray[np.float64]
 

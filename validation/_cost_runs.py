@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.contact.law import OPEN
-from finger3d.design import designs
+from finger3d.contact.friction import OPEN
+from finger3d.geometry.registry import designs
 
 from ._cost import Case, assembled, condensed, in_steps, model_of, numbers
 from ._each_iteration import EachIteration

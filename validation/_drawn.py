@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.contact.law import Coulomb
-from finger3d.design import designs
-from finger3d.model import Gauge, Leg, Material, MeshOptions, Model
+from finger3d.contact.friction import Coulomb
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
 from finger3d.objects import Cylinder, Plane, Wave, Wedge
 
 NEAR = (Gauge("a", 1.5, 4.0, angle=0.5), Gauge("b", 3.0, 3.0, angle=0.7), Gauge("c", 0.0, 3.5))

@@ -10,9 +10,9 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from finger3d.contact.conditions import TOLERANCE, Increments, project, residual
-from finger3d.contact.law import SLIP, STICK
+from finger3d.contact.friction import SLIP, STICK
 from finger3d.contact.state import ContactState, next_state
-from finger3d.problem import Problem, targets
+from finger3d.mechanics.problem import Problem, targets
 
 from ._cost import MU, Parts
 

@@ -17,9 +17,9 @@ from scipy import sparse
 from finger3d.effects.embedded_gauge import Strips
 from finger3d.fem.assembly import Elasticity, stiffness
 from finger3d.fem.condense import condense, stiffened
-from finger3d.fem.surface import displacement_row
-from finger3d.mesh import Mesh, quadratic
-from finger3d.model import Gauge, Material
+from finger3d.fem.simplex import Mesh, quadratic
+from finger3d.fem.traces import displacement_row
+from finger3d.mechanics.model import Gauge, Material
 
 from ._common import box, graded, held_at, side_load
 

@@ -10,12 +10,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.contact.law import OPEN, SLIP, STICK, Coulomb, FrictionLaw
-from finger3d.design import designs
-from finger3d.history import Frame
-from finger3d.model import Leg, Material, MeshOptions, Model
+from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb, FrictionLaw
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.history import Frame
+from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+from finger3d.mechanics.solve import Problem, build, march
 from finger3d.objects import Cylinder
-from finger3d.solve import Problem, build, march
 
 Float = NDArray[np.float64]
 

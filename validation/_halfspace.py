@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.contact.advance import advance
-from finger3d.contact.law import OPEN, SLIP, STICK, Coulomb
+from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
+from finger3d.contact.solve import advance
 from finger3d.contact.state import ContactState
 from finger3d.fem.assembly import Elasticity
-from finger3d.mesh import quadratic
+from finger3d.fem.simplex import quadratic
 from finger3d.objects import Sphere
 
 from ._common import Body, body, box, graded, held_at

@@ -11,20 +11,20 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.contact.advance import advance
-from finger3d.contact.law import OPEN, Coulomb
+from finger3d.analyses.press import press
+from finger3d.analyses.validate import Row
+from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.contact.newton import uniqueness
+from finger3d.contact.solve import advance
 from finger3d.contact.state import ContactState
-from finger3d.design import designs
 from finger3d.effects.kinetic_friction import TwoCoefficients
 from finger3d.errors import Finger3dError, Outcome
-from finger3d.history import measure
-from finger3d.job import press
-from finger3d.model import Leg, Material, MeshOptions, Model
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.history import measure
+from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+from finger3d.mechanics.solve import Problem, build, march, targets
 from finger3d.objects import Plane
 from finger3d.scene import load
-from finger3d.solve import Problem, build, march, targets
-from finger3d.study import Row
 
 POINT = "Klarbring 1990; REFERENCES.md, 8.1"
 ROBUST = "what a robust method does; REFERENCES.md, 8.2"

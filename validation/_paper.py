@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.contact.law import OPEN, STICK, Coulomb, FrictionLaw
-from finger3d.design import designs
+from finger3d.analyses.validate import Measure, Row
+from finger3d.contact.friction import OPEN, STICK, Coulomb, FrictionLaw
 from finger3d.fem.recover import displacement
-from finger3d.history import Frame, contact_table
-from finger3d.model import Gauge, Leg, Material, MeshOptions, Model
-from finger3d.solve import Problem, build, march
-from finger3d.study import Measure, Row
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.history import Frame, contact_table
+from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.solve import Problem, build, march
 
 Float = NDArray[np.float64]
 

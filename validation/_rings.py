@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ellipe, ellipkm1
 
-from finger3d.contact.advance import advance
-from finger3d.contact.law import OPEN, SLIP, STICK, Coulomb
+from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
+from finger3d.contact.solve import advance
 from finger3d.contact.state import ContactState
 
 Float = NDArray[np.float64]

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from finger3d.job import press
-from finger3d.report import Report
+from finger3d.analyses.press import press
+from finger3d.progress import Report
 from finger3d.scene import Scene, parse
 
 from ._child import HOME, peak_mb, reset_peak

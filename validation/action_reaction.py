@@ -19,12 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from finger3d.contact.law import Coulomb
-from finger3d.design import designs
-from finger3d.history import Frame
-from finger3d.model import Leg, Material, MeshOptions, Model
-from finger3d.solve import Problem, build, march
-from finger3d.study import Result, Row
+from finger3d.analyses.validate import Result, Row
+from finger3d.contact.friction import Coulomb
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.history import Frame
+from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+from finger3d.mechanics.solve import Problem, build, march
 
 from ._common import convergence, rate
 

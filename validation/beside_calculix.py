@@ -21,11 +21,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from finger3d.design import mesh_section, mesh_solid
+from finger3d._machine import versions
+from finger3d.analyses.validate import Result, Row
 from finger3d.errors import MissingError
-from finger3d.solve import contact_zone, symmetry
-from finger3d.study import Result, Row
-from finger3d.versions import versions
+from finger3d.mechanics.solve import contact_zone, symmetry
+from finger3d.meshing.generate import mesh_solid
+from finger3d.meshing.swept import mesh_section
 
 from ._calculix import program
 from ._ccx import PENALTY, STICK_SLOPE, Answer, Pressed, version

@@ -16,13 +16,13 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.contact.law import Coulomb
-from finger3d.design import designs
+from finger3d.analyses.validate import Result, Row
+from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect
-from finger3d.history import measure
-from finger3d.model import Leg, Material, MeshOptions, Model
-from finger3d.solve import Problem, build, march
-from finger3d.study import Result, Row
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.history import measure
+from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+from finger3d.mechanics.solve import Problem, build, march
 
 from ._calculix import deck, program, solve
 

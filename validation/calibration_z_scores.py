@@ -17,14 +17,14 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.design import designs
-from finger3d.model import Gauge, Leg, Material, MeshOptions, Model
-from finger3d.sensor import TOLERANCES, Calibration, estimate
-from finger3d.sensor.increments import error_left
-from finger3d.sensor.run import calibrated
-from finger3d.sensor.tolerances import read
-from finger3d.solve import build
-from finger3d.study import Result, Row
+from finger3d.analyses.calibrate.increments import error_left
+from finger3d.analyses.calibrate.run import calibrated
+from finger3d.analyses.calibrate.tolerances import TOLERANCES, read
+from finger3d.analyses.validate import Result, Row
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.solve import build
+from finger3d.sensor import Calibration, estimate
 
 from ._paper import columns
 

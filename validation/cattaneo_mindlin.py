@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.contact.law import STICK
-from finger3d.model import Leg
-from finger3d.solve import Problem
-from finger3d.study import Result, Row
+from finger3d.analyses.validate import Result, Row
+from finger3d.contact.friction import STICK
+from finger3d.mechanics.model import Leg
+from finger3d.mechanics.solve import Problem
 
 from . import _halfplane, _halfspace
 

@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d.analyses.validate import Result, Row
 from finger3d.fem.assembly import Elasticity
-from finger3d.mesh import Mesh
-from finger3d.study import Result, Row
+from finger3d.fem.simplex import Mesh
 
 from ._common import box, convergence, held_at, mapped, side_load, solve
 from ._corner import clamped_free, extrapolated

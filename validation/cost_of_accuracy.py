@@ -22,9 +22,9 @@ from typing import Any
 
 import numpy as np
 
+from finger3d._machine import memory_bytes
+from finger3d.analyses.validate import Result, Row
 from finger3d.scene.checks import BASE_SHARE, SIZE_SHARE
-from finger3d.study import Result, Row
-from finger3d.versions import memory_bytes
 
 from ._child import Bench, best_of
 from ._corner import clamped_free, observed

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.design import designs
-from finger3d.study import Result, Row
+from finger3d.analyses.validate import Result, Row
+from finger3d.geometry.registry import designs
 
 from ._paper import BELOW_FIG9, MUS, STRAIN, Float, Profile, columns, fig9, line, said, strains, under
 from .geometry_search import CHOSEN, EDGES, RADII

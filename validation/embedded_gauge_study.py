@@ -19,12 +19,12 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.contact.law import Coulomb
-from finger3d.design import designs
+from finger3d.analyses.validate import Result, Row
+from finger3d.contact.friction import Coulomb
 from finger3d.effects.embedded_gauge import Effect, Strips
-from finger3d.model import Domain, Gauge, Leg, Material, MeshOptions, Model
-from finger3d.solve import Problem, build, march
-from finger3d.study import Result, Row
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.model import Domain, Gauge, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.solve import Problem, build, march
 
 from ._foil import alone, by_mesh, wing
 

@@ -18,17 +18,17 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.accuracy import Grain, companion, compared, main_numbers, press_numbers
-from finger3d.contact.law import Coulomb
-from finger3d.design import designs
+from finger3d.accuracy.estimate import Grain, companion, compared, main_numbers, press_numbers
+from finger3d.analyses.validate import Result, Row
+from finger3d.contact.friction import Coulomb
 from finger3d.effects.elastic_object import SoftObject
-from finger3d.export import AREAS, MAIN
-from finger3d.history import Frame
-from finger3d.increments import DISSIPATION_TOLERANCE, TOLERANCE, error_by_count, marched, step_error
-from finger3d.model import Domain, Gauge, Leg, Material, MeshOptions, Model
+from finger3d.geometry.registry import designs
+from finger3d.io import AREAS, MAIN
+from finger3d.mechanics.history import Frame
+from finger3d.mechanics.model import Domain, Gauge, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.solve import Problem, build, march
+from finger3d.mechanics.step_halving import DISSIPATION_TOLERANCE, TOLERANCE, error_by_count, marched, step_error
 from finger3d.objects import Cylinder, Plane, Sphere
-from finger3d.solve import Problem, build, march
-from finger3d.study import Result, Row
 
 from ._drawn import drawn
 from ._paper import columns

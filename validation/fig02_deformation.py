@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.mesh import unfold
-from finger3d.study import Result, Row
+from finger3d.analyses.validate import Result, Row
+from finger3d.fem.simplex import unfold
 
 from ._paper import STRAIN, STRESS, Profile, columns, half_cylinder, moved, said, under
 

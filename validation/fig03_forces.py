@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.model import Model
-from finger3d.solve import build
-from finger3d.study import Result, Row
+from finger3d.analyses.validate import Result, Row
+from finger3d.mechanics.model import Model
+from finger3d.mechanics.solve import build
 
 from ._paper import STRAIN, STRESS, Profile, columns, half_cylinder, said, under
 

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from finger3d.analyses.validate import Result, Row
 from finger3d.effects.kinetic_friction import Branch, TwoCoefficients
-from finger3d.study import Result, Row
 
 from ._paper import MUS, STRAIN, STRESS, columns, half_cylinder, line_r5, said, strains, under
 

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.model import Gauge
-from finger3d.study import Result, Row
+from finger3d.analyses.validate import Result, Row
+from finger3d.mechanics.model import Gauge
 
 from ._paper import BELOW_FIG9, STRAIN, STRESS, columns, fig9, said, settled, steps_row
 

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.design import designs
-from finger3d.history import measure
-from finger3d.solve import build
-from finger3d.study import Result, Row
+from finger3d.analyses.validate import Result, Row
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.history import measure
+from finger3d.mechanics.solve import build
 
 from ._paper import (
     BELOW_FIG9,

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d.analyses.validate import Result, Row
 from finger3d.fem.assembly import Elasticity
-from finger3d.study import Result, Row
 
 from ._common import body, box, convergence, graded, held_at, mapped, rate
 

@@ -21,11 +21,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.contact.law import Coulomb
-from finger3d.history import measure
+from finger3d.analyses.validate import Result, Row
+from finger3d.contact.friction import Coulomb
+from finger3d.mechanics.history import measure
+from finger3d.mechanics.solve import Problem, build, march
 from finger3d.scene import load
-from finger3d.solve import Problem, build, march
-from finger3d.study import Result, Row
 
 from . import _layer
 

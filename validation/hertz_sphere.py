@@ -18,12 +18,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.design import designs
+from finger3d.analyses.validate import Result, Row
 from finger3d.fem.assembly import Elasticity
-from finger3d.model import Leg, Material, MeshOptions, Model
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+from finger3d.mechanics.solve import build, march
 from finger3d.objects import Sphere
-from finger3d.solve import build, march
-from finger3d.study import Result, Row
 
 from ._common import body, contact_axis, convergence, graded, quarter_block, rate
 from ._layer import point

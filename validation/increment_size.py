@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.contact.law import Coulomb
-from finger3d.increments import DISSIPATION_TOLERANCE, TOLERANCE, marched
-from finger3d.solve import Problem
-from finger3d.study import Result, Row
+from finger3d.analyses.validate import Result, Row
+from finger3d.contact.friction import Coulomb
+from finger3d.mechanics.solve import Problem
+from finger3d.mechanics.step_halving import DISSIPATION_TOLERANCE, TOLERANCE, marched
 
 from ._paper import STRAIN, STRESS, Profile, columns, half_cylinder, line_r5, said, strains, under
 

@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.contact.law import Coulomb, FrictionLaw
+from finger3d.analyses.validate import Kind, Result, Row
+from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.effects.kinetic_friction import TwoCoefficients
-from finger3d.solve import Problem
-from finger3d.study import Kind, Result, Row
+from finger3d.mechanics.solve import Problem
 
 from ._halfplane import compliance, line, loading, under
 

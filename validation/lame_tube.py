@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d.analyses.validate import Result, Row
 from finger3d.fem.assembly import Elasticity
-from finger3d.study import Result, Row
 
 from ._common import box, convergence, error_norms, held_at, mapped, rate, side_load, solve
 

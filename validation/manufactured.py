@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d.analyses.validate import Result, Row
 from finger3d.fem.assembly import Elasticity
-from finger3d.mesh import quadratic
-from finger3d.study import Result, Row
+from finger3d.fem.simplex import quadratic
 
 from ._common import body_load, convergence, cube, error_norms, held_at, pressure_error, rate, solve
 

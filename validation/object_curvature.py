@@ -20,13 +20,13 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from finger3d.contact.law import Coulomb
-from finger3d.design import designs
-from finger3d.history import measure
-from finger3d.model import Gauge, Leg, Material, MeshOptions, Model
+from finger3d.analyses.validate import Result, Row
+from finger3d.contact.friction import Coulomb
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.history import measure
+from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.solve import Problem, build, march
 from finger3d.objects import Cylinder, Plane, RigidObject
-from finger3d.solve import Problem, build, march
-from finger3d.study import Result, Row
 
 FORCE = 200.0  # N over 20 mm: some 5 mm deep on the plane
 TRUE = 0.25

@@ -15,18 +15,18 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from finger3d.contact.advance import advance
-from finger3d.contact.law import OPEN, STICK, Coulomb
-from finger3d.contact.paper import swap
+from finger3d.analyses.validate import Result, Row
+from finger3d.contact.friction import OPEN, STICK, Coulomb
+from finger3d.contact.maeno import swap
+from finger3d.contact.solve import advance
 from finger3d.contact.state import ContactState, Increment
-from finger3d.design import designs
-from finger3d.design.grid import Sizes, rows, triangulate
 from finger3d.fem.assembly import Elasticity, stiffness
 from finger3d.fem.condense import Condensed, condense
 from finger3d.fem.recover import displacement
-from finger3d.fem.surface import strain_row
-from finger3d.mesh import Mesh, unfold
-from finger3d.study import Result, Row
+from finger3d.fem.simplex import Mesh, unfold
+from finger3d.fem.traces import strain_row
+from finger3d.geometry.registry import designs
+from finger3d.meshing.grid import Sizes, rows, triangulate
 
 from ._paper import MUS, STRAIN, STRESS, Profile, columns, half_cylinder, line_r5, said, strains, under
 

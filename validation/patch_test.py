@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.contact.law import Coulomb
-from finger3d.design import designs
+from finger3d.analyses.validate import Result, Row
+from finger3d.contact.friction import Coulomb
 from finger3d.fem.assembly import Elasticity
-from finger3d.mesh import Mesh, quadratic
-from finger3d.model import Leg, Material, MeshOptions, Model
-from finger3d.solve import build, march
-from finger3d.study import Result, Row
+from finger3d.fem.simplex import Mesh, quadratic
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+from finger3d.mechanics.solve import build, march
 
 from ._common import body, body_load, cube, held_at, shuffled, solve
 

@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.contact.law import SLIP
-from finger3d.study import Result, Row
+from finger3d.analyses.validate import Result, Row
+from finger3d.contact.friction import SLIP
 
 from ._halfplane import RADIUS, Profile, compliance, hertz, line, loading, under
 

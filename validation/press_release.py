@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.contact.law import OPEN, SLIP
-from finger3d.model import Leg
-from finger3d.solve import Problem
-from finger3d.study import Result, Row
+from finger3d.analyses.validate import Result, Row
+from finger3d.contact.friction import OPEN, SLIP
+from finger3d.mechanics.model import Leg
+from finger3d.mechanics.solve import Problem
 
 from . import _halfspace
 from ._halfplane import Profile, compliance, line, loading, under

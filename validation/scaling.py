@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.study import Result, Row
-from finger3d.versions import cores, memory_bytes
+from finger3d._machine import cores, memory_bytes
+from finger3d.analyses.validate import Result, Row
 
 from ._child import Bench, best_of
 from ._scaling import BODIES, STAGES, Size, sweep_seconds

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from finger3d.analyses.validate import Result, Row
 from finger3d.fem.assembly import Elasticity
-from finger3d.study import Result, Row
 
 from ._common import Body, body, box, contact_axis, convergence, graded, held_at, mapped, rate
 

@@ -15,15 +15,15 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from finger3d.contact.advance import advance
-from finger3d.contact.law import SLIP, STATUS_NAMES, Coulomb
-from finger3d.contact.paper import swap
+from finger3d.analyses.validate import Result, Row
+from finger3d.contact.friction import SLIP, STATUS_NAMES, Coulomb
+from finger3d.contact.maeno import swap
+from finger3d.contact.solve import advance
 from finger3d.contact.state import ContactState
 from finger3d.fem.assembly import Elasticity, stiffness
 from finger3d.fem.condense import Condensed, condense
-from finger3d.fem.surface import Surface, local_rows, surface
-from finger3d.mesh import quadratic
-from finger3d.study import Result, Row
+from finger3d.fem.simplex import quadratic
+from finger3d.fem.traces import Surface, local_rows, surface
 
 from ._common import box, held_at, nodes_of, side_load
 

@@ -21,18 +21,18 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from finger3d.contact.advance import advance
-from finger3d.contact.law import OPEN, SLIP, STICK, Coulomb
+from finger3d.analyses.validate import Result, Row
+from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
+from finger3d.contact.solve import advance
 from finger3d.contact.state import ContactState
-from finger3d.design import designs
 from finger3d.fem.assembly import Elasticity, stiffness
 from finger3d.fem.condense import condense
-from finger3d.fem.surface import local_rows, surface
-from finger3d.history import measure
-from finger3d.mesh import Mesh, quadratic
-from finger3d.model import Leg, Material, MeshOptions, Model
-from finger3d.solve import build, march
-from finger3d.study import Result, Row
+from finger3d.fem.simplex import Mesh, quadratic
+from finger3d.fem.traces import local_rows, surface
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.history import measure
+from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+from finger3d.mechanics.solve import build, march
 
 from ._common import cube, side_load
 

@@ -19,15 +19,17 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.design import designs
+from finger3d.analyses.calibrate.run import MUS, Sweep, calibrated
+from finger3d.analyses.calibrate.tolerances import TOLERANCES
+from finger3d.analyses.reduced import Condensed
+from finger3d.analyses.validate import Result, Row
 from finger3d.effects.embedded_gauge import Effect
-from finger3d.model import Domain, Gauge, Leg, Material, MeshOptions, Model
-from finger3d.reduced import Condensed
-from finger3d.sensor import TOLERANCES, Calibration, estimate
-from finger3d.sensor.maps import StrainMap, resolution_panel, slope_panel
-from finger3d.sensor.run import MUS, Sweep, calibrated
-from finger3d.solve import Problem, build
-from finger3d.study import Result, Row
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.model import Domain, Gauge, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.solve import Problem, build
+from finger3d.plotting.strain_map import resolution_panel, slope_panel
+from finger3d.sensor import Calibration, estimate
+from finger3d.sensor.maps import StrainMap
 
 from ._paper import columns, said
 

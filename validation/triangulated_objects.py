@@ -19,14 +19,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.contact.law import Coulomb
-from finger3d.design import designs
-from finger3d.history import measure
-from finger3d.model import Leg, Material, MeshOptions, Model
+from finger3d.analyses.validate import Result, Row
+from finger3d.contact.friction import Coulomb
+from finger3d.geometry.registry import designs
+from finger3d.geometry.surface import Triangles
+from finger3d.mechanics.history import measure
+from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+from finger3d.mechanics.solve import build, march
 from finger3d.objects import Cylinder, MeshObject, RigidObject, Sphere, first_touch
-from finger3d.solve import build, march
-from finger3d.study import Result, Row
-from finger3d.triangles import Triangles
 
 from ._common import convergence, rate
 

@@ -14,16 +14,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.contact.advance import advance
-from finger3d.contact.law import Coulomb
+from finger3d.analyses.validate import Result, Row
+from finger3d.contact.friction import Coulomb
+from finger3d.contact.solve import advance
 from finger3d.contact.state import ContactState
-from finger3d.design import designs, mesh_solid
 from finger3d.fem.assembly import Elasticity
-from finger3d.mesh import Mesh
-from finger3d.model import MeshOptions
+from finger3d.fem.simplex import Mesh
+from finger3d.geometry.registry import designs
+from finger3d.geometry.surface import Triangles
+from finger3d.mechanics.model import MeshOptions
+from finger3d.meshing.generate import mesh_solid
 from finger3d.objects import MeshObject, first_touch
-from finger3d.study import Result, Row
-from finger3d.triangles import Triangles
 
 from ._common import Body, body
 from .triangulated_objects import ball

@@ -21,17 +21,17 @@ import numpy as np
 from scipy import sparse
 from scipy.optimize import brentq
 
-from finger3d.contact.law import Coulomb
-from finger3d.design import designs
+from finger3d.analyses.validate import Result, Row
+from finger3d.contact.friction import Coulomb
 from finger3d.effects.elastic_object import Effect, ObjectBody
 from finger3d.fem.assembly import Elasticity
-from finger3d.fem.opposite import facing_trace
-from finger3d.fem.surface import local_rows
-from finger3d.history import measure
-from finger3d.model import Leg, Material, MeshOptions, Model
+from finger3d.fem.traces import local_rows
+from finger3d.fem.transfer import facing_trace
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.history import measure
+from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+from finger3d.mechanics.solve import Problem, build, contact_zone, march
 from finger3d.objects import Cylinder, Plane
-from finger3d.solve import Problem, build, contact_zone, march
-from finger3d.study import Result, Row
 
 from ._common import held_at, solve
 from ._halfplane import Profile, under

@@ -23,18 +23,18 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.signal import residue
 
-from finger3d.contact.law import OPEN, Coulomb
+from finger3d.analyses.validate import Result, Row
+from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.effects.viscosity import Viscoelastic
 from finger3d.fem.assembly import Elasticity, Stiffness, stiffness
 from finger3d.fem.condense import Condensed, condense
-from finger3d.fem.surface import Surface, local_rows, restrict, surface
-from finger3d.history import Target
-from finger3d.kinematics import Kinematics, SmallStrain
-from finger3d.mesh import Mesh, quadratic
-from finger3d.model import Leg
+from finger3d.fem.simplex import Mesh, quadratic
+from finger3d.fem.traces import Surface, local_rows, restrict, surface
+from finger3d.mechanics.formulation import Kinematics, SmallStrain
+from finger3d.mechanics.history import Target
+from finger3d.mechanics.model import Leg
+from finger3d.mechanics.problem import Later
 from finger3d.objects import Sphere, vertical_frame
-from finger3d.problem import Later
-from finger3d.study import Result, Row
 
 from . import _rings
 from ._common import box, graded, held_at
@@ -54,7 +54,9 @@ COLUMNS = "body nu bulk resolution steps_per_s t P_over_k theory a".split()
 
 @dataclass(frozen=True)
 class StandIn:
-    """As much of `finger3d.problem.Problem` as a press needs, over a surface that no design has; gap (c,) at rest."""
+    """As much of `finger3d.mechanics.problem.Problem` as a press needs, over a surface that no design has; gap (c,) at
+    rest.
+    """
 
     rest: Float
     area: Float
@@ -129,7 +131,7 @@ def _rest(face: Surface) -> Float:
 
 
 def _widened(small: Condensed, kept: NDArray[np.int64], count: int) -> Float:
-    from finger3d.problem import at_points
+    from finger3d.mechanics.problem import at_points
 
     return at_points(small.compliance, kept, count, 3)
 

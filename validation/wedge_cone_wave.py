@@ -19,12 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from finger3d.design import designs
+from finger3d.analyses.validate import Result, Row
 from finger3d.fem.assembly import Elasticity
-from finger3d.model import Leg, Material, MeshOptions, Model
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+from finger3d.mechanics.solve import build, march
 from finger3d.objects import Wave, Wedge
-from finger3d.solve import build, march
-from finger3d.study import Result, Row
 
 from ._common import Body, body, box, contact_axis, convergence, graded, halved, held_at, mapped, quarter_block, rate
 

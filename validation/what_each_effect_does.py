@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.history import measure
+from finger3d.analyses.validate import Result, Row
+from finger3d.mechanics.history import measure
+from finger3d.mechanics.solve import build, march
 from finger3d.scene import parse
-from finger3d.scene.lookup import effect_names
-from finger3d.solve import build, march
-from finger3d.study import Result, Row
+from finger3d.scene.registry import effect_names
 
 SETTINGS: dict[str, dict[str, Any]] = {
     "large_deformation": {},

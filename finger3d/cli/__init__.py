@@ -7,7 +7,21 @@ from collections.abc import Sequence
 from cyclopts import CycloptsError
 
 # importing registers the commands
-from finger3d.cli import design, output, press, project, sensor, show, sweep  # noqa: F401
+from finger3d.cli import (  # noqa: F401
+    calibrate,
+    compare,
+    completion,
+    estimate,
+    export,
+    info,
+    new,
+    optimise,
+    plan,
+    press,
+    show,
+    sweep,
+    validate,
+)
 from finger3d.cli.common import app, complain
 from finger3d.cli.terminal import safe_streams, termination_interrupts
 from finger3d.errors import OUT_OF_MEMORY, Finger3dError, MissingError, out_of_memory

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import App, Parameter
 
 import finger3d
+from finger3d._lazy import loading, postpone
+from finger3d._ranges import printable
 from finger3d.errors import Finger3dError
-from finger3d.lazy import loading, postpone
-from finger3d.ranges import printable
-from finger3d.report import Report, reporter
+from finger3d.progress import Report, reporter
 
 if TYPE_CHECKING:
     from finger3d.scene import Scene
@@ -65,7 +65,7 @@ def reporting(json_: bool) -> tuple[Report, AbstractContextManager[Any]]:
 
 def print_json(data: Any) -> None:
     """Print for a script; what the terminal cannot encode is escaped."""
-    from finger3d.export import json_text
+    from finger3d.io import json_text
 
     text = json_text(data)
     try:

@@ -31,7 +31,7 @@ def show(
     """
     if (folder / "sweep.json").is_file():
         return _show_sweep(folder, png, gif, step)
-    from finger3d import show as run
+    from finger3d.plotting import show as run
 
     if png is None and gif is None:
         if step is not None:
@@ -54,7 +54,7 @@ def _show_sweep(folder: Path, png: Path | None, gif: Path | None, step: int | No
         look = f"open {page}" if page.exists() else "it is not finished, and the same command goes on"
         raise Finger3dError(f"show: {folder} holds a sweep: {look}, or give --png alone")
     _check(png, ".png")
-    from finger3d.sweep.picture import picture
+    from finger3d.report.sweep_figure import picture
 
     picture(folder, png)
     print(f"{png} written")

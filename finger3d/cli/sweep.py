@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from finger3d._lazy import loading
 from finger3d.cli.common import (
     Json,
     Set,
@@ -20,10 +21,9 @@ from finger3d.cli.common import (
     reporting,
 )
 from finger3d.errors import Finger3dError, MissingError
-from finger3d.lazy import loading
 
 if TYPE_CHECKING:
-    from finger3d.sweep import Kept
+    from finger3d.analyses.sweep.store import Kept
 
 _SHOWN, _GAUGES = 10, 3  # points and gauges
 _SHARED = ("friction.", "press.", "contact.", "gauge.")  # keys that leave one body, which is pressed without workers
@@ -63,12 +63,12 @@ def sweep(
     if workers is not None and scheduler is not None:
         raise Finger3dError("--workers and --scheduler: give one of them; a cluster has its own workers")
     with loading():
-        from finger3d.sweep.cluster import prepare
+        from finger3d.analyses.sweep.cluster import prepare
 
         if scheduler is None and any("," in text and not text.strip().startswith(_SHARED) for text in vary):
             prepare()  # workers load what they need while the points are checked
-        from finger3d.sweep import combinations
-        from finger3d.sweep import sweep as run
+        from finger3d.analyses.sweep.points import combinations
+        from finger3d.analyses.sweep.run import sweep as run
 
     report, aside = reporting(json_)
     try:
@@ -119,8 +119,8 @@ def _as_dict(kept: Kept, out: Path) -> dict[str, Any]:
 
 def _print_points(kept: Kept) -> None:
     """The varied keys and the main numbers of the first points."""
-    from finger3d.export import MAIN
-    from finger3d.page.build import number
+    from finger3d.io import MAIN
+    from finger3d.report.build import number
 
     def cell(value: Any) -> str:
         return "" if isinstance(value, float) and math.isnan(value) else number(value)

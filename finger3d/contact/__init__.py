@@ -1,0 +1,1 @@
+"""Frictional contact of one load increment: the conditions, the friction law and the solvers."""

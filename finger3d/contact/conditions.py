@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.contact.law import OPEN, SLIP, STICK
+from finger3d.contact.friction import OPEN, SLIP, STICK
 
 Float = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.contact.conditions import Increments
-from finger3d.contact.law import OPEN, SLIP, STICK
+from finger3d.contact.friction import OPEN, SLIP, STICK
 
 Float = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.contact.conditions import PRECISION, Increments, lengths, project, residual
-from finger3d.contact.law import SLIP, STICK
+from finger3d.contact.friction import SLIP, STICK
 
 Float = NDArray[np.float64]
 

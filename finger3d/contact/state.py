@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.contact.law import OPEN
+from finger3d.contact.friction import OPEN
 from finger3d.errors import Outcome
 
 Float = NDArray[np.float64]

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from finger3d.errors import Finger3dError
-from finger3d.model import Model
+from finger3d.mechanics.model import Model
 
 
 def fill(model: Model, slot: str, value: Any, effect: str) -> Model:

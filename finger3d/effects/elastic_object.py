@@ -3,7 +3,7 @@
 The object is meshed and condensed like the finger, in small strain, and held where it is gripped: the lower half of a
 cylinder or ball on its cut; behind a plane, wedge or wave a block as long and wide as the finger, on its far face; a
 body from a file on its highest plane.  Its surface is read at the finger's own contact points, as the same weighted
-means (`finger3d.fem.opposite`), so the two meshes need not match and each force acts on both bodies undiminished.
+means (`finger3d.fem.transfer`), so the two meshes need not match and each force acts on both bodies undiminished.
 """
 
 from __future__ import annotations
@@ -17,17 +17,19 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from finger3d.design import designs, mesh_section, mesh_solid
+from finger3d._ranges import Length, Modulus, Poisson
 from finger3d.effects.base import fill, warn
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import Elasticity, stiffness
 from finger3d.fem.condense import condense
-from finger3d.fem.opposite import facing_trace
-from finger3d.mesh import Mesh, reflected
-from finger3d.model import MeshOptions, Model
+from finger3d.fem.simplex import Mesh, reflected
+from finger3d.fem.transfer import facing_trace
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.model import MeshOptions, Model
+from finger3d.mechanics.problem import Problem
+from finger3d.meshing.generate import mesh_solid
+from finger3d.meshing.swept import mesh_section
 from finger3d.objects import Cylinder, MeshObject, Plane, Sphere
-from finger3d.problem import Problem
-from finger3d.ranges import Length, Modulus, Poisson
 
 Float = NDArray[np.float64]
 Zone = tuple[float, float, float, float]
@@ -202,7 +204,7 @@ class ObjectBody:
 
     def _file(self, obj: MeshObject) -> Mesh:
         """A body from a file, held on its highest plane."""
-        from finger3d.design.imported import imported, of_surface
+        from finger3d.geometry.imported import imported, of_surface
 
         body = imported(obj.path, True, obj.scale) if obj.path else of_surface(obj.surface, "object", True)
         # Turned about z by half a turn, measured from the middle of the plane it is held on.

@@ -20,14 +20,14 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from finger3d._ranges import Length, Modulus, at_most
 from finger3d.effects.base import fill
 from finger3d.errors import Finger3dError
 from finger3d.fem.kelvin import Endless, Foil
-from finger3d.fem.surface import displacement_row
-from finger3d.mesh import Mesh
-from finger3d.model import Gauge, Inlay, Model
-from finger3d.problem import folded
-from finger3d.ranges import Length, Modulus, at_most
+from finger3d.fem.simplex import Mesh
+from finger3d.fem.traces import displacement_row
+from finger3d.mechanics.model import Gauge, Inlay, Model
+from finger3d.mechanics.problem import folded
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]

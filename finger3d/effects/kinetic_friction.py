@@ -15,9 +15,9 @@ import numpy as np
 from annotated_types import Ge, Le
 from numpy.typing import NDArray
 
-from finger3d.contact.law import SLIP
+from finger3d.contact.friction import SLIP
 from finger3d.effects.base import fill, warn
-from finger3d.model import Model
+from finger3d.mechanics.model import Model
 
 Float = NDArray[np.float64]
 Branch = Literal["keep", "paper"]

@@ -22,14 +22,14 @@ from finger3d.effects.base import fill
 from finger3d.errors import Outcome
 from finger3d.fem.assembly import Pattern, Stiffness, on_places, pressure_scale
 from finger3d.fem.condense import Condensed, condense
-from finger3d.fem.deformed import DeformedContact, deformed_contact
-from finger3d.fem.hyperelastic import InvertedError, NeoHooke, assemble, nodal_fields, stretch
+from finger3d.fem.finite_contact import DeformedContact, deformed_contact
+from finger3d.fem.neo_hooke import InvertedError, NeoHooke, assemble, nodal_fields, stretch
 from finger3d.fem.recover import displacement
-from finger3d.fem.surface import Surface
-from finger3d.kinematics import RULES, length_scale
-from finger3d.mesh import Mesh
-from finger3d.model import Model
-from finger3d.problem import at_points, folded
+from finger3d.fem.simplex import Mesh
+from finger3d.fem.traces import Surface
+from finger3d.mechanics.formulation import RULES, length_scale
+from finger3d.mechanics.model import Model
+from finger3d.mechanics.problem import at_points, folded
 
 Float = NDArray[np.float64]
 
@@ -247,7 +247,7 @@ def _violation(
 def _moved(mesh: Mesh, u: Float, place: Float, axes: tuple[str, ...]) -> Float:
     """Where a material point (3,) went (d,), seen in the whole finger."""
     from finger3d.fem.elements import shape
-    from finger3d.fem.surface import locate
+    from finger3d.fem.traces import locate
 
     d = mesh.dim
     inside, ones = folded(place, np.ones(3), axes, d)

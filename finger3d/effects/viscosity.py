@@ -24,16 +24,16 @@ from annotated_types import MinLen
 from numpy.typing import NDArray
 from scipy.special import exprel
 
+from finger3d._ranges import Fraction, Seconds
 from finger3d.contact.state import ContactState, Increment
 from finger3d.effects.base import fill
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import Elasticity, Stiffness, stiffness
 from finger3d.fem.condense import Condensed, spring_forces, stiffened
 from finger3d.fem.recover import across, displacement, nodal_strain, pressure, stress
-from finger3d.kinematics import RULES, SmallStrain, length_scale
-from finger3d.model import Model
-from finger3d.problem import at_points
-from finger3d.ranges import Fraction, Seconds
+from finger3d.mechanics.formulation import RULES, SmallStrain, length_scale
+from finger3d.mechanics.model import Model
+from finger3d.mechanics.problem import at_points
 
 Float = NDArray[np.float64]
 Prony = tuple[tuple[float, float], ...]

@@ -1,0 +1,1 @@
+"""Finite elements on simplices: assembly, static condensation, recovery of fields."""

@@ -15,7 +15,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from finger3d.fem.elements import physical_gradients, quadrature, shape
-from finger3d.mesh import Mesh
+from finger3d.fem.simplex import Mesh
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.mesh import EDGES
+from finger3d.fem.simplex import EDGES
 
 Float = NDArray[np.float64]
 

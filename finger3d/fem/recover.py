@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from finger3d.fem.assembly import Elasticity, Stiffness
 from finger3d.fem.elements import physical_gradients
-from finger3d.mesh import EDGES, Mesh
+from finger3d.fem.simplex import EDGES, Mesh
 
 Float = NDArray[np.float64]
 

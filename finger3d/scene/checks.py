@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.model import MeshOptions, Model
+from finger3d._ranges import LONGEST_SLIDE, at_least, at_most
+from finger3d.mechanics.model import MeshOptions, Model
 from finger3d.objects import Plane, Wave
-from finger3d.ranges import LONGEST_SLIDE, at_least, at_most
-from finger3d.scene.mistakes import dotted, shown
+from finger3d.scene.messages import dotted, shown
 from finger3d.scene.tables import GaugeTable, LegTable, MeshTable, SceneTable
 
 SIZE_SHARE, BASE_SHARE = 1 / 25, 1 / 6.25

@@ -7,9 +7,9 @@ import re
 import typing
 from collections.abc import Iterator
 
-from finger3d.design import designs
-from finger3d.scene.lookup import effect_names, effect_type
-from finger3d.scene.mistakes import described, listed, shown
+from finger3d.geometry.registry import designs
+from finger3d.scene.messages import described, listed, shown
+from finger3d.scene.registry import effect_names, effect_type
 from finger3d.scene.tables import (
     SHAPES,
     ContactTable,

@@ -12,16 +12,16 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
-from finger3d.contact.law import Coulomb
-from finger3d.design import designs
-from finger3d.design.files import SUFFIXES
+from finger3d._ranges import PathName, one_line, printable
+from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
-from finger3d.model import Domain, Gauge, Leg, Material, MeshOptions, Model
+from finger3d.geometry.files import SUFFIXES
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.model import Domain, Gauge, Leg, Material, MeshOptions, Model
 from finger3d.objects import RigidObject, approach
-from finger3d.ranges import PathName, one_line, printable
-from finger3d.scene import bodies, checks, tree
-from finger3d.scene.lookup import effect_names, effect_type
-from finger3d.scene.mistakes import Place, choose, described, dotted, listed, nearest, shown, unknown, worded
+from finger3d.scene import checks, files, tree
+from finger3d.scene.messages import Place, choose, described, dotted, listed, nearest, shown, unknown, worded
+from finger3d.scene.registry import effect_names, effect_type
 from finger3d.scene.tables import (
     SHAPES,
     FileTable,
@@ -72,7 +72,7 @@ class Scene:
 
     def _repr_html_(self) -> str:
         """The tables with every default filled in."""
-        from finger3d.notebook import card
+        from finger3d._notebook import card
 
         rows = [
             (name, ", ".join(f"{k} = {v}" for k, v in settings.items()) if isinstance(settings, Mapping) else "")
@@ -157,7 +157,7 @@ def parse(
     path : the file it came from, for messages
     set_keys : keys that came from the command line, for messages; with the option that gave them if not ``--set``
     """
-    given = tree.frozen(bodies.absolute(given, path))
+    given = tree.frozen(files.absolute(given, path))
     found: dict[Place, str] = {}
     tables = _checked(SceneTable, given, (), found)
     geometry, dimensions = _named(given, "finger", "geometry", designs(), found)
@@ -172,7 +172,7 @@ def parse(
         raise _refusal([found[p] for p in places], path, set_keys)
     legs = press.leg if isinstance(press, LegsTable) else (press,)
     lines = checks.check(tables, legs, design)
-    lines += [line for line in [bodies.unit_mistake(design, rigid)] if line]
+    lines += [line for line in [files.unit_mistake(design, rigid)] if line]
     if lines:
         raise _refusal(lines, path, set_keys)
     try:
@@ -256,10 +256,10 @@ def _design(geometry: str, dimensions: Table | None, found: dict[Place, str]) ->
     """Build the finger from a design, or read it from a file."""
     if dimensions is None:
         return None
-    if not bodies.is_file(geometry):
+    if not files.is_file(geometry):
         return _built(designs()[geometry], dimensions, ("finger",), found)
     try:
-        return bodies.finger(geometry)
+        return files.finger(geometry)
     except Finger3dError as error:
         found["finger", "geometry"] = f"finger.geometry: {error}"
         return None
@@ -304,7 +304,7 @@ def _named(
     if isinstance(value, str) and not one_line(value):
         found[name, key] = f"{name}.{key} = {shown(value)}: must be {described(PathName)}"
         return "", None
-    if name == "finger" and bodies.is_file(value):
+    if name == "finger" and files.is_file(value):
         if not Path(value).exists():
             # Told alone: the other keys may well be those of the design that the file was to replace.
             found[name, key] = (

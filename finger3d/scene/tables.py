@@ -12,9 +12,7 @@ from typing import Annotated, Any, Literal
 from annotated_types import Ge, Gt, Interval, Le, Lt, MinLen
 from pydantic import BaseModel, ConfigDict, create_model
 
-from finger3d.model import Domain
-from finger3d.objects import Axis, Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
-from finger3d.ranges import (
+from finger3d._ranges import (
     Angle,
     Count,
     Edge,
@@ -30,6 +28,8 @@ from finger3d.ranges import (
     Title,
     Zero,
 )
+from finger3d.mechanics.model import Domain
+from finger3d.objects import Axis, Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
 
 Steps = Count | Literal["auto"]
 LARGEST = 1e12
@@ -290,7 +290,7 @@ class MeshObjectTable(ObjectTable):
 
     def build(self) -> RigidObject:
         """Return the object; reads and checks its file."""
-        from finger3d.design.files import read_surface
+        from finger3d.geometry.files import read_surface
 
         surface = read_surface(self.path, self.scale)
         return MeshObject(self.x_mm, self.z_mm, surface=surface, path=self.path, scale=self.scale)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from finger3d.errors import Finger3dError
-from finger3d.scene.mistakes import shown
+from finger3d.scene.messages import shown
 
 Tree = dict[str, Any]
 

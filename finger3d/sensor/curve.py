@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal
@@ -14,6 +14,7 @@ from scipy.interpolate import PchipInterpolator
 from finger3d.errors import MissingError
 
 Float = NDArray[np.float64]
+
 Shape = Literal["interpolation", "fit"]
 
 NOISE = 1.5e-4
@@ -23,7 +24,9 @@ RESOLUTION = 0.1
 """The paper's error of mu, and the limit beyond which a gauge is called blind here."""
 
 FEWEST = 4  # points: three make the second-order fit, one more its residual
+
 _CUTS = 32  # grid points between two calibrated mu
+
 _SHARPER = 4.0  # halving the spacing divides the error of an interpolation of second order, where PCHIP is at extrema
 
 
@@ -103,8 +106,8 @@ class Calibration:
         return f"<Calibration of gauge {self.gauge}: {len(self.mu)} values of mu, {self.mu[0]:g} to {self.mu[-1]:g}>"
 
     def _repr_html_(self) -> str:
-        from finger3d.notebook import card
-        from finger3d.sensor.run import summary
+        from finger3d._notebook import card
+        from finger3d.sensor.curve import summary
 
         rows = [(name.strip(), str(said)) for name, said in summary(self)]
         return card(f"Gauge {self.gauge}", f"{len(self.mu)} values of mu", rows, [self.verdict()])
@@ -262,3 +265,34 @@ class Calibration:
             f". With all that is not known exactly mu is found to {self.limit:g} or better {within}; to +- "
             f"{spread.min():.2g} at best (mu = {at:.2g}; {100.0 * share:.0f} % of the variance from {name})"
         )
+
+
+def _ranges(stretches: Sequence[Range]) -> str:
+    return ", ".join(f"mu = {r.low:.3g} to {r.high:.3g}" for r in stretches) or "nowhere"
+
+
+def summary(calibration: Calibration) -> list[tuple[str, Any]]:
+    """The closing table of a calibration."""
+    c = calibration
+    at = float(c.mu[np.argmin(np.abs(c.mu - 0.5))]) if c.mu[0] <= 0.5 <= c.mu[-1] else float(c.mu[len(c.mu) // 2])
+    shares = sorted(c.shares(at).items(), key=lambda item: -item[1])
+    sd = float(c.mu_sd([at])[0])
+    rows = [
+        ("strain", f"{c.strain[0]:.4g} at mu = {c.mu[0]:g} to {c.strain[-1]:.4g} at mu = {c.mu[-1]:g}"),
+        (
+            f"mu within {c.limit:g}",
+            f"{_ranges(c.trusted)}, with all tolerances; {_ranges(c.usable)} from strain noise alone",
+        ),
+        (f"resolution at mu = {at:.3g}", f"{float(c.resolution(at)):.2g} from a strain noise of {c.noise:g}"),
+        ("second-order fit", f"residual {c.fit.rms:.2g} rms, {c.fit.largest:.2g} at most"),
+        (f"mu +- at mu = {at:.3g}", f"{sd:.2g} with all tolerances; shares of the variance below"),
+        *((f"  {name}", f"{100.0 * share:.1f} %") for name, share in shares),
+    ]
+    left = next((t for t in c.tolerances if t.name == "increments"), None)
+    if left is not None:
+        steps = ", ".join(str(n) for n in c.about.get("increments", {}).get("steps", ()))
+        said = f"leave an error of up to {left.spread.max():.2g} in the strain"
+        rows.insert(1, (f"increments {steps}".strip(), said))
+    if c.failed:
+        rows.append(("failed", ", ".join(f"mu = {mu:.4g}" for mu, _ in c.failed)))
+    return rows

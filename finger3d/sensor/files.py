@@ -10,9 +10,9 @@ import numpy as np
 from annotated_types import Ge, Gt, Le, MinLen
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from finger3d._ranges import LARGEST_SD, Friction, Noise, Strain, StrainSd
 from finger3d.errors import Finger3dError
-from finger3d.export import write_csv, write_json
-from finger3d.ranges import LARGEST_SD, Friction, Noise, Strain, StrainSd
+from finger3d.io import write_csv, write_json
 from finger3d.sensor.curve import FEWEST, Calibration, Tolerance
 
 FORMAT, VERSION = "finger3d calibration", 2

@@ -20,8 +20,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from finger3d._ranges import LARGEST_STRAIN
 from finger3d.errors import Finger3dError
-from finger3d.ranges import LARGEST_STRAIN
 from finger3d.sensor.curve import Calibration, Shape
 
 Float = NDArray[np.float64]

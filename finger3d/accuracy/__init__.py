@@ -1,0 +1,1 @@
+"""Discretisation errors, mesh refinement, predicted cost and advice."""

@@ -1,0 +1,195 @@
+"""What a press will take, before anything is solved: size, time and memory from a calibrated model.
+
+Calibrated on the Fig. 9 finger on 2 cores, by the runs of validation/cost_of_accuracy.py and scaling.py: up to 386 000
+unknowns in 2D and 509 000 in 3D; good to a factor 2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from finger3d.fem.assembly import MIXED_FROM
+from finger3d.mechanics.model import Model
+from finger3d.mechanics.solve import AUTO_START, contact_zone, symmetry
+from finger3d.mechanics.step_halving import automatic, condensation_s, contact_s, limits
+from finger3d.meshing.limits import check_memory, rows_gb
+
+_BASE_MB = 170.0
+_TETWILD_MB = 500.0  # while it meshes, however little
+_IMPORT_S = 0.4
+_FIGURES_S = {2: 1.0, 3: 4.5}
+_GAUGE_S, _GAUGE_CELL_S = 3e-3, 7e-7  # a gauge, and for every cell that is searched for it
+_NEWTON = 3  # factorisations in a step at finite strain
+_NUMERIC = 0.8  # of a condensation, once the ordering is known; with two solutions
+_TANGENT = 0.8  # assemblies of the linear stiffness
+_NEWTON_S = {2: 0.008, 3: 0.12}  # besides, in each step
+_FOIL_ROWS = {2: 16, 3: 96}  # of a foil, mirror images together
+_FOIL_S = {2: 0.02, 3: 0.2}
+
+
+@dataclass(frozen=True)
+class _Size:
+    cells: float
+    points: float
+    dofs: float
+    contact_points: float
+
+
+def forecast(model: Model) -> dict[str, Any]:
+    """Size, seconds and memory of a press.
+
+    Returns
+    -------
+    dict
+        Printable values by name: domain, symmetry, cells, dofs, contact points, steps, seconds of each stage, memory.
+    """
+    d = 3 if model.domain == "solid" else 2
+    axes = symmetry(model)
+    zone = contact_zone(model)
+    mixed = model.domain != "plane-stress" and model.material.nu >= MIXED_FROM
+    size = _size(model, zone, axes, mixed)
+    runs, free = _runs(model, size, d), sum(leg.steps == "auto" for leg in model.legs)
+    fixed = sum(leg.steps for leg in model.legs if isinstance(leg.steps, int))
+    marched = len(runs) * fixed + sum(runs) * free
+    tetwild = d == 3 and model.mesh.mesher == "ftetwild"
+    seconds = _seconds(size, d, marched, tetwild)
+    seconds["assembly"] += len(model.gauges) * (_GAUGE_S + _GAUGE_CELL_S * size.cells)
+    memory = max(_memory(size, d, len(model.gauges)), _TETWILD_MB if tetwild else 0.0)
+    memory += _kept_mb(model, size, axes)
+    costs = {name: _costs(name, model, size, seconds, marched, len(runs)) for _, name in model.filled}
+    check_memory((memory + sum(cost.memory_mb for cost in costs.values())) / 1e3, "this press")
+    return {
+        "domain": model.domain,
+        "formulation": "mixed quadratic/linear" if mixed else "quadratic displacement",
+        "symmetry": " and ".join(axes) if axes else "none",
+        "cells": round(size.cells),
+        "dofs": round(size.dofs),
+        "contact_points": round(size.contact_points),
+        **({"gauges": len(model.gauges)} if model.gauges else {}),
+        **_triangles(model),
+        "steps": fixed + runs[-1] * free,
+        **({"steps_of_all_runs": marched} if len(runs) > 1 else {}),
+        **{f"{stage}_s": round(s, 2) for stage, s in seconds.items()},
+        **{name: f"costs {cost.why}" for name, cost in costs.items()},
+        "total_s": round(sum(seconds.values()) + sum(cost.seconds for cost in costs.values()), 1),
+        "memory_MB": round(memory + sum(cost.memory_mb for cost in costs.values())),
+    }
+
+
+_USUAL = 80  # the median of automatic increments over the cases of validation/error_bars.py
+
+
+def _runs(model: Model, size: _Size, d: int) -> list[int]:
+    """Increments of an automatic leg in every run that chooses them; the last is reported."""
+    if not automatic(model):
+        return [AUTO_START]
+    first, last = limits(model, size.dofs, size.contact_points)
+    runs = [first]
+    while runs[-1] < min(_USUAL, last):
+        runs.append(2 * runs[-1])
+    return runs
+
+
+@dataclass(frozen=True)
+class _Cost:
+    """What an effect adds, and by what."""
+
+    seconds: float
+    memory_mb: float
+    reason: str
+
+    @property
+    def why(self) -> str:
+        """For a reader."""
+        return f"about {self.seconds:.2g} s and {self.memory_mb:.2g} MB: {self.reason}"
+
+
+def _costs(name: str, model: Model, size: _Size, seconds: dict[str, float], steps: int, runs: int) -> _Cost:
+    d = 3 if model.domain == "solid" else 2
+    condensation, assembly = seconds["condensation"], seconds["assembly"]
+    factor_mb = _memory(size, d) - _BASE_MB
+    if name == "large_deformation":
+        each = _NEWTON * _NUMERIC * condensation + (_NEWTON + 1) * _TANGENT * assembly + _NEWTON_S[d]
+        pressed = (_NEWTON - 1) * seconds["contact"]
+        return _Cost(steps * each + pressed, factor_mb, f"about {_NEWTON} factorisations in each of {steps} steps")
+    if name == "viscosity" and not getattr(model.kinematics, "bulk", True):
+        lengths = {leg.duration_s / leg.steps for leg in model.legs if leg.duration_s and leg.steps != "auto"}
+        lengths_in_all = len(lengths) + runs * len({leg.duration_s for leg in model.legs if leg.steps == "auto"})
+        more = max(lengths_in_all, 1)
+        text = f"{more} more factorisation{'s' * (more > 1)}, one for each length of step"
+        return _Cost(more * condensation + assembly, more * factor_mb, text)
+    if name == "elastic_object":
+        return _Cost(
+            condensation + assembly + seconds["mesh"], 0.5 * factor_mb,
+            "the object is meshed and condensed like the finger; taken to be of its size",
+        )  # fmt: skip
+    if name == "embedded_gauge":
+        rows = _FOIL_ROWS[d] * len(model.gauges)
+        share = rows / max(d * size.contact_points, 1.0)
+        return _Cost(
+            min(share, 1.0) * condensation + seconds["contact"] + _FOIL_S[d] * len(model.gauges), 40e-6 * rows**2,
+            f"{rows} more rows, and every step once more without the foils",
+        )  # fmt: skip
+    return _Cost(0.0, 0.0, "no factorisation and no further step")
+
+
+def _size(model: Model, zone: tuple[float, float, float, float], axes: tuple[str, ...], mixed: bool) -> _Size:
+    """Structured meshes are counted by making them, which is quick; pytetwild's by the integral of its size field."""
+    from finger3d.meshing.generate import mesh_solid
+    from finger3d.meshing.swept import mesh_section
+
+    h = model.mesh.size_mm
+    if model.domain != "solid" or model.mesh.mesher == "swept":
+        make = mesh_solid if model.domain == "solid" else mesh_section
+        mesh, report = make(model.design, model.mesh, zone, axes)
+        d, vertices = mesh.dim, len(mesh.vertices)
+        points, cells = report.points, report.cells
+        length = zone[1] - zone[0]
+        touching = length / h * ((zone[3] - zone[2]) / h + 1.0 if d == 3 else 1.0)
+    else:
+        from finger3d.meshing.sizing import forecast as count_cells
+        from finger3d.meshing.sizing import sizing
+        from finger3d.meshing.tetwild import box
+
+        low, high = box(model.design, axes)
+        d, cells = 3, int(count_cells(model.design, sizing(model.design, model.mesh, zone, low, high)))
+        points, vertices = int(1.55 * cells), int(0.24 * cells)
+        touching = (zone[1] - zone[0]) * (zone[3] - zone[2]) / (0.87 * h**2)
+    return _Size(cells, points, d * points + (vertices if mixed else 0), touching / 2 ** len(axes))
+
+
+def _seconds(size: _Size, d: int, steps: int, tetwild: bool) -> dict[str, float]:
+    return {
+        "start": _IMPORT_S,
+        "mesh": 3.0 + 3.5e-4 * size.cells if tetwild else 3e-7 * size.dofs,
+        "assembly": 8e-6 * size.dofs if d == 3 else 0.005 + 3e-6 * size.dofs,
+        "condensation": condensation_s(size.dofs, d),
+        "contact": steps * contact_s(size.contact_points, d),
+        "output": _FIGURES_S[d],
+    }
+
+
+def _triangles(model: Model) -> dict[str, int]:
+    """Triangles of a finger and of an object from files."""
+    bodies = {"finger_triangles": model.design, "object_triangles": model.object}
+    return {name: len(body.surface.faces) for name, body in bodies.items() if hasattr(body, "surface")}
+
+
+def _kept_mb(model: Model, size: _Size, axes: tuple[str, ...]) -> float:
+    """Memory of the states of all increments, MB: the part's, the whole finger's, and what an effect keeps."""
+    d = 3 if model.domain == "solid" else 2
+    steps = sum(leg.steps if isinstance(leg.steps, int) else 8 * AUTO_START for leg in model.legs)
+    each = 8.0 * (3 * d) * size.contact_points * (1 + 2 ** len(axes))
+    effects = {name for _, name in model.filled}
+    if "large_deformation" in effects:
+        each += 8.0 * size.dofs
+    if "viscosity" in effects:
+        branches = 1 + len(getattr(model.kinematics, "prony", ()))
+        each += 8.0 * branches * (d * size.contact_points if getattr(model.kinematics, "bulk", True) else size.dofs)
+    return steps * each / 1e6
+
+
+def _memory(size: _Size, d: int, gauges: int = 0) -> float:
+    per_dof = 3.0 * (size.dofs / 85_000.0) ** 0.3 * 4e-3 if d == 3 else 2.5e-3
+    return _BASE_MB + per_dof * size.dofs + 1e3 * rows_gb(d * size.contact_points + gauges)

@@ -1,0 +1,110 @@
+"""How finely the contact points resolve the zones of contact and stick: the least error bars of lengths and areas."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.contact.friction import OPEN, STICK
+from finger3d.mechanics.history import ContactPoints, Frame, measure
+from finger3d.mechanics.problem import Problem
+
+_ALONG_Z = 0.5
+"""Friction along z has a relative error of about this times (h/b)^2, h the spacing of points along z, b the half extent
+of contact: 11, 5.3, 1.6 and 0.4 % were found at 5, 3.3, 2 and 1 mm on Fig. 9 (b = 10 mm, nu = 0.49, mu = 0.25)."""
+
+_IN_SECTIONS = 0.25
+"""Friction in a section has a relative error of about this times h/a, h the spacing of points, a the half-length of
+contact, even where its companion agrees by chance: in plane stress 93 % of validation/error_bars.py then lie within two
+bars, and 89 % with 0.1."""
+
+
+@dataclass(frozen=True)
+class Grain:
+    """How finely the contact points tell: their distance (mm) along x, and the larger of that over the half-length of
+    the contact and of their distance along z over the half width.
+
+    `alone`: contact with friction has no length, so that it tells nothing of the friction.
+    `least`: by name, lower bounds of the error bars of lengths, areas and friction; see `least_bars`.
+    """
+
+    spacing_mm: float
+    share: float
+    alone: bool = False
+    least: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, problem: Problem, frame: Frame) -> Grain:
+        """Of a frame; medians where points touch."""
+        points, reach = problem.points, measure(problem.points, frame)["contact_half_length_mm"]
+        alone = reach == 0.0 and problem.model.friction.static > 0.0
+        half_width = points.half_width_mm
+        if points.dim == 3 and problem.model.mesh.mesher != "swept":
+            step = float(np.sqrt(np.median(points.area)))
+            along_z = _edge_length(points, frame.state.status != OPEN)
+            return cls(step, _share(step, reach, step, half_width), alone, least_bars(points, frame, along_z))
+        at = np.round(points.points, 9)
+        line = np.unique(at[at[:, 2] == 0.0, 0])
+        near = line[np.abs(line - frame.lowest[0]) <= 1.2 * reach]
+        steps = np.diff(near if len(near) > 1 else line)
+        step = float(np.median(steps)) if len(steps) else problem.model.mesh.size_mm
+        rows = np.diff(np.unique(at[:, 2]))
+        along_z = float(np.median(rows)) if len(rows) else 0.0
+        share = _share(step, reach, along_z, half_width)
+        least = least_bars(points, frame, along_z)
+        if points.dim == 2:
+            friction = float(np.linalg.norm(points.seen_in(frame.state).friction(frame.state.force), axis=1).sum())
+            least["friction_sum_N"] = _IN_SECTIONS * share * friction
+            least["friction_sum_N_per_mm"] = least["friction_sum_N"] / (2.0 * half_width)
+        return cls(step, share, alone, least)
+
+
+def _share(along: float, reach: float, across: float, half_width: float) -> float:
+    return min(1.0, max(along / max(reach, along), across / half_width))
+
+
+def _edge_length(points: ContactPoints, touching: NDArray[np.bool_]) -> float:
+    """Median length (mm) of the edges between points that touch, of all edges where there is none."""
+    i, j = points.edges.T
+    length = np.linalg.norm(points.points[i] - points.points[j], axis=1)
+    both = touching[i] & touching[j]
+    return float(np.median(length[both] if both.any() else length)) if len(length) else 0.0
+
+
+def least_bars(points: ContactPoints, frame: Frame, along_z_mm: float) -> dict[str, float]:
+    """Lower bounds of error bars that follow from the size of the zones in points, by name (mm, mm2, N, N/mm).
+
+    An area is uncertain by half the area of the points along the border of its zone, the mean of those on either side
+    of it and of one point at least.  In a solid, a half-length is uncertain
+    by half of its part along which the zone is less than three points wide: a zone that thin may be absent, or longer
+    than it seems.  Friction along z is uncertain as the points are far apart along z.
+
+    Parameters
+    ----------
+    along_z_mm : spacing of the points along z
+    """
+    touching = frame.state.status != OPEN
+    line, nearest = points.middle_line()
+    reach = measure(points, frame)["contact_half_length_mm"]
+    one = float(np.median(points.area[touching])) if touching.any() else 0.0
+    found: dict[str, float] = {}
+    for name, zone in (("contact", touching), ("stick", frame.state.status == STICK)):
+        border = [float(points.area[points.rim(side)].sum()) for side in (zone, ~zone)]
+        found[f"{name}_area_mm2"] = 0.5 * max(0.5 * sum(border), one)
+        on = zone[nearest]
+        if points.dim == 3 and on.any():
+            half = 0.5 * float(np.ptp(line[on]))
+            thin = 1.0 - float(np.mean(points.resolved(zone)[nearest[on]]))
+            found[f"{name}_half_length_mm"] = 0.5 * thin * max(half, reach - half)
+            found[f"{name}_length_mm"] = 2.0 * found[f"{name}_half_length_mm"]
+    if points.dim == 3 and touching.any():
+        extent = max(0.5 * float(np.ptp(points.points[touching, 2])), along_z_mm)
+        friction = float(np.abs(points.seen_in(frame.state).friction(frame.state.force)[:, 2]).sum())
+        force = _ALONG_Z * (along_z_mm / extent) ** 2 * friction if extent > 0.0 else 0.0
+        width = 2.0 * points.half_width_mm
+        found["friction_sum_N"] = force
+        found["friction_sum_N_per_mm"] = found["friction_along_z_N_per_mm"] = force / width
+    return found

@@ -1,0 +1,263 @@
+"""Edge lengths for a tolerance: refined where it pays, until the estimated error of every main number is met.
+
+Two lengths are free, that of the contact (its edge, the border of stick and slip, what a gauge below it reads) and that
+of the body far from it (the corners of the base).  A second coarse run, coarse at the contact only, tells which of them
+the error comes from.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+from finger3d.accuracy.estimate import FACTOR, ORDER, companion, compared, is_length, last_frame, main_numbers
+from finger3d.errors import Finger3dError, UnresolvedError
+from finger3d.io import AREAS
+from finger3d.mechanics.model import MeshOptions, Model
+from finger3d.mechanics.solve import Problem, build
+
+MOST_ROUNDS = 8
+_PART = 0.3  # of the change: a length that makes less of it is left alone
+_STEP = (0.4, 0.85)  # a round changes an edge length at least and at most by these factors
+_AIM = 0.9  # of the tolerance, so that the last round does not just miss it
+_AFTER = 1.3  # a press takes so many times its last round, whose contact it marches again and draws
+_GROWTH = {2: 1.2, 3: 1.6}  # seconds grow with this power of the unknowns (measured from 161 000 to 523 000 in 3D)
+
+
+@dataclass(frozen=True)
+class Round:
+    """One mesh of the refinement.
+
+    Attributes
+    ----------
+    error, number : largest estimated error, relative (see `relative`), and the number that has it
+    seconds : of this round, estimate included
+    """
+
+    size_mm: float
+    base_size_mm: float
+    dofs: int
+    error: float
+    number: str
+    seconds: float
+
+    def line(self, count: int) -> str:
+        """For people."""
+        return (
+            f"round {count}: size {self.size_mm:.4g} mm, base {self.base_size_mm:.4g} mm, {self.dofs} dofs, "
+            f"error {100 * self.error:.2g} % ({self.number}), {self.seconds:.1f} s"
+        )
+
+
+@dataclass(frozen=True)
+class Refined:
+    """What the refinement came to.
+
+    Attributes
+    ----------
+    mesh : edge lengths of the best round
+    problem : condensed on them, if that was the last round; memory is not kept for others
+    stopped : why it ended: the tolerance is met, or the time, the memory, the rounds are used up
+    """
+
+    tolerance: float
+    mesh: MeshOptions
+    rounds: tuple[Round, ...]
+    stopped: str
+    problem: Problem | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def best(self) -> Round:
+        """The round with the smallest error."""
+        return min(self.rounds, key=lambda r: r.error)
+
+    @property
+    def met(self) -> bool:
+        """Whether the estimate is below the tolerance."""
+        return self.best.error <= self.tolerance
+
+    @property
+    def warning(self) -> str:
+        """One line where the tolerance was not met, else empty."""
+        if self.met:
+            return ""
+        return (
+            f"mesh.tolerance = {self.tolerance:g} was not met ({self.stopped}): the best mesh leaves an estimated "
+            f"error of {self.best.error:.2g} in {self.best.number}"
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """For summary.json."""
+        return {
+            "tolerance": self.tolerance,
+            "met": self.met,
+            "stopped": self.stopped,
+            "rounds": [asdict(r) for r in self.rounds],
+        }
+
+
+def refined(
+    model: Model,
+    tolerance: float,
+    max_seconds: float | None = None,
+    say: Callable[[str], None] = lambda text: None,
+) -> Refined:
+    """Refine a model's edge lengths, from those it has, until its estimated errors are below a tolerance.
+
+    Parameters
+    ----------
+    model : with the edge lengths of the first round
+    tolerance : relative, see `relative`
+    max_seconds : no round is begun that is forecast to end later, output included
+    say : told one line a round
+
+    Raises
+    ------
+    Finger3dError
+        Where not even the first mesh can be made or pressed.
+    """
+    start, rounds = time.perf_counter(), list[Round]()
+    options, problem = model.mesh, None
+    stopped = f"{MOST_ROUNDS} rounds"
+    while len(rounds) < MOST_ROUNDS:
+        problem = None  # two factors at once would halve the mesh that memory allows
+        try:
+            problem, done, wanted = _round(replace(model, mesh=options), tolerance)
+        except UnresolvedError as error:
+            if error.size_mm is None or error.size_mm >= options.size_mm:
+                raise
+            options = replace(options, size_mm=error.size_mm)
+            continue
+        except (Finger3dError, MemoryError) as error:
+            if not rounds:
+                raise
+            stopped = f"no finer mesh: {error or 'out of memory'}"
+            break
+        rounds.append(done)
+        say(done.line(len(rounds)))
+        if done.error <= tolerance:
+            stopped = "met"
+            break
+        left = math.inf if max_seconds is None else max_seconds - (time.perf_counter() - start)
+        found = _affordable(options, wanted, done.seconds, left, 3 if model.domain == "solid" else 2)
+        if found is None:
+            stopped = f"max_seconds = {max_seconds:g}"
+            break
+        options = found
+    best = min(rounds, key=lambda r: r.error)
+    mesh = replace(model.mesh, size_mm=best.size_mm, base_size_mm=best.base_size_mm)
+    return Refined(tolerance, mesh, tuple(rounds), stopped, problem if best is rounds[-1] else None)
+
+
+def relative(numbers: Mapping[str, float], errors: Mapping[str, float]) -> dict[str, float]:
+    """Errors as shares: of a force, of itself; of a length, of the contact's; of a strain, of the largest read."""
+    strain = max((abs(v) for k, v in numbers.items() if k.startswith("gauge_")), default=0.0)
+    found = {}
+    for name, error in errors.items():
+        if is_length(name):
+            scale = numbers["contact_half_length_mm"]
+        else:
+            scale = strain if name.startswith("gauge_") else abs(numbers[name])
+        found[name] = error / scale if scale > 0.0 else (math.inf if error > 0.0 else 0.0)
+    return found
+
+
+def worst(numbers: Mapping[str, float], errors: Mapping[str, float]) -> tuple[str, float]:
+    """The number with the largest relative error, and that error."""
+    shares = relative(numbers, errors)
+    name = max(shares, key=lambda k: shares[k])
+    return name, shares[name]
+
+
+def judged(problem: Problem, names: Iterable[str]) -> list[str]:
+    """The numbers that a tolerance bounds: forces, strains and lengths, but in solids not the length of stick.
+
+    The stick zone of a solid is often less than three points wide on any affordable mesh, and then of unknown length.
+    Areas have bars of the same kind as lengths.
+    """
+    left_out = {*AREAS, *(["stick_half_length_mm"] if problem.dim == 3 else [])}
+    return [name for name in names if name not in left_out]
+
+
+def _round(model: Model, tolerance: float) -> tuple[Problem, Round, MeshOptions]:
+    """Press on one mesh; the edge lengths to try next."""
+    start = time.perf_counter()
+    problem = build(model)
+    frame = last_frame(problem)
+    numbers = main_numbers(problem, frame)
+    beside = companion(problem)
+    last = last_frame(beside)
+    errors = compared(problem, frame, beside, last)
+    number, error = worst(numbers, {name: errors[name] for name in judged(problem, errors)})
+    # a finer companion, beside the coarsest of meshes, does not tell the two lengths apart
+    coarse = main_numbers(beside, last) if beside.model.mesh.base_size_mm >= model.mesh.base_size_mm else None
+    sizes = _next(problem, number, error, tolerance, numbers, coarse)
+    seconds = time.perf_counter() - start
+    options = model.mesh
+    dofs = int(problem.stiffness.upper.shape[0])
+    return problem, Round(options.size_mm, options.base_size_mm, dofs, error, number, seconds), sizes
+
+
+def _next(
+    problem: Problem,
+    number: str,
+    error: float,
+    tolerance: float,
+    fine: Mapping[str, float],
+    coarse: Mapping[str, float] | None,
+) -> MeshOptions:
+    """Smaller edge lengths, of the contact, of the base, or both, as the worst number asks for."""
+    options = problem.model.mesh
+    if error <= tolerance:
+        return options
+    shares = (1.0, 0.0) if number.endswith("_length_mm") else _shares(problem, number, fine, coarse)
+    power = 1.0 if number.endswith("_length_mm") else ORDER
+    factor = min(max((_AIM * tolerance / error) ** (1.0 / power), _STEP[0]), _STEP[1])
+    size = options.size_mm * (factor if shares[0] >= _PART else 1.0)
+    base = options.base_size_mm * (factor if shares[1] >= _PART else 1.0)
+    return replace(options, size_mm=_rounded(size), base_size_mm=_rounded(max(size, base)))
+
+
+def _shares(
+    problem: Problem, number: str, fine: Mapping[str, float], coarse: Mapping[str, float] | None
+) -> tuple[float, float]:
+    """What part of the change to the companion comes from the contact's edge length, and from the base's."""
+    options = problem.model.mesh
+    size = min(FACTOR * options.size_mm, options.base_size_mm)
+    if coarse is None or size < 1.1 * options.size_mm:
+        return 1.0, 1.0
+    third = build(replace(problem.model, mesh=replace(_swept(problem, options), size_mm=size)))
+    middle = main_numbers(third, last_frame(third))[number]
+    contact, base = abs(fine[number] - middle), abs(middle - coarse[number])
+    total = contact + base
+    return (contact / total, base / total) if total > 0.0 else (1.0, 0.0)
+
+
+def _swept(problem: Problem, options: MeshOptions) -> MeshOptions:
+    return replace(options, mesher="swept") if hasattr(problem.model.design, "section") else options
+
+
+def _affordable(now: MeshOptions, wanted: MeshOptions, seconds: float, left: float, dim: int) -> MeshOptions | None:
+    """The edge lengths wanted, or less of a step where time asks for it; None where not even the least step fits."""
+    left /= _AFTER
+    factor = min(wanted.size_mm / now.size_mm, wanted.base_size_mm / now.base_size_mm)
+    power = dim * _GROWTH[dim]
+    if seconds * factor**-power <= left:
+        return wanted
+    least = (seconds / left) ** (1.0 / power) if left > 0.0 else 1.0
+    if least > _STEP[1]:
+        return None
+    # as far as the time allows, each length in proportion
+    part = math.log(least) / math.log(factor)
+    size, base = (
+        b * (w / b) ** part
+        for b, w in ((now.size_mm, wanted.size_mm), (now.base_size_mm, wanted.base_size_mm))
+    )  # fmt: skip
+    return replace(now, size_mm=_rounded(size), base_size_mm=_rounded(max(size, base)))
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.4g}")

@@ -1,0 +1,1 @@
+"""What a user asks for: press, compare, calibrate, sweep, optimise and validate."""

@@ -1,0 +1,1 @@
+"""Gauge strain as a function of the friction coefficient, with its tolerances."""

@@ -1,0 +1,65 @@
+"""Presses of one condensed body under one coefficient of friction after another, each started from those before.
+
+Where mu changes by 0.1 at most, forces at the mu before take up to half off the time of a press, whose increments
+then need no other start.  They decide nothing: what is found is proved as always.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.analyses.reduced import friction_at
+from finger3d.mechanics.history import Frame
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.solve import each, march
+
+Float = NDArray[np.float64]
+
+_FARTHEST = 2.0  # times the distance of the last two mu: forces are not continued beyond
+_NEAR = 0.1  # of mu: from one farther off a press takes longer than from its own path
+
+
+@dataclass(frozen=True)
+class Press:
+    """A press with one mu: its last increment, and the forces (c, d) N on the meshed part at the end of every one."""
+
+    mu: float
+    frame: Frame
+    forces: tuple[Float, ...]
+
+
+Like = Mapping[float, Press]
+"""Presses of a body much like another, by mu."""
+
+
+def press(problem: Problem, mu: float, near: Sequence[Press] = ()) -> Press:
+    """Press the condensed body with this mu, started from the last two presses of `near`."""
+    law, forces, frame = friction_at(problem.model.friction, mu), [], None
+    start = _start(problem, mu, near)
+    for frame in march(replace(problem, model=replace(problem.model, friction=law)), start):
+        forces.append(frame.part.force)
+    assert frame is not None  # a path has an increment
+    return Press(mu, frame, tuple(forces))
+
+
+def presses(problem: Problem, mus: Sequence[float], like: Like | None = None) -> Iterator[Press]:
+    """Presses with ascending mu; where `like` has a press with the same mu, that is what it starts from."""
+    known = like or {}
+    return each(problem, lambda mu, before: press(problem, mu, [known[mu]] if mu in known else before), mus)
+
+
+def _start(problem: Problem, mu: float, near: Sequence[Press]) -> list[Float]:
+    """Forces of the last press near, continued at the pace of the two; none of a body with other points."""
+    shape = problem.compliance.shape[:2]
+    good = [p for p in near if p.forces[0].shape == shape]
+    if not good or abs(good[-1].mu - mu) > _NEAR:
+        return []
+    first, last = good[0], good[-1]
+    if first.mu == last.mu:
+        return list(last.forces)
+    share = min((mu - last.mu) / (last.mu - first.mu), _FARTHEST)
+    return [b + share * (b - a) for a, b in zip(first.forces, last.forces, strict=False)]

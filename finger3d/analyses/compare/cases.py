@@ -1,0 +1,118 @@
+"""One scene as different models: pressed, measured per width, and with the error bars of a press."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.accuracy.estimate import FACTOR, estimate
+from finger3d.mechanics.history import ContactPoints, Frame, contact_table, measure
+from finger3d.mechanics.model import Model
+from finger3d.mechanics.solve import Problem, build
+from finger3d.mechanics.step_halving import marched
+from finger3d.results.comparison import Case
+
+Float = NDArray[np.float64]
+
+_POINTS = 600
+"""Contact points of the meshed part up to which a solid of another width is quick (a few seconds)."""
+
+LINES = ("z = 0", "end")
+
+
+def resized(model: Model, size_mm: float) -> Model:
+    """The model on another mesh, all edge lengths scaled alike."""
+    base = model.mesh.base_size_mm * size_mm / model.mesh.size_mm
+    return replace(model, mesh=replace(model.mesh, size_mm=size_mm, base_size_mm=base))
+
+
+def widened(model: Model, width_mm: float) -> Model:
+    """A solid of another width: structured, no finer than the scene's, and coarse enough to be quick."""
+    design = replace(model.design, width_mm=width_mm)
+    free = 4 // 2 ** len(set(model.object.mirrors()) & {"x", "z"})
+    size = min(model.mesh.size_mm, width_mm / FACTOR)
+    largest = min(min(design.height_mm, design.half_length_mm) / 4.0, width_mm) / FACTOR
+
+    def points(size_mm: float) -> float:
+        layers = max(2, math.ceil(width_mm / (2.0 * size_mm)))
+        return free * (design.half_length_mm / size_mm + 1) * (layers + 1)
+
+    while points(size) > _POINTS and 1.2 * size <= largest:
+        size *= 1.2
+    return resized(replace(model, design=design, mesh=replace(model.mesh, mesher="swept")), size)
+
+
+def solved(name: str, model: Model) -> Case:
+    """Press the model, with error bars from `finger3d.accuracy.estimate.estimate`, the same that a press gets."""
+    start = time.perf_counter()
+    problem, frames, levels, case = _pressed(name, model)
+    if case.ok:
+        spent = {**problem.seconds, "contact": case.seconds - sum(problem.seconds.values())}
+        found = estimate(problem, frames, spent, told=lambda p, f: measured(p.points, f), levels=levels)
+        errors = {key: error for key in case.numbers if (error := found.of(key)) is not None}
+        case = replace(case, errors=errors, companion=found.beside, ratio=found.ratio, method=found.method)
+    return replace(case, seconds=time.perf_counter() - start)
+
+
+def measured_on(name: str, model: Model) -> Case:
+    """The model pressed on its own mesh only: numbers without error bars."""
+    return _pressed(name, model)[-1]
+
+
+def _pressed(name: str, model: Model) -> tuple[Problem, tuple[Frame, ...], list[tuple[int, Frame]], Case]:
+    start = time.perf_counter()
+    # all of the contact face: how far contact reaches differs from model to model
+    problem = build(model, margin=math.inf)
+    frames, increments = marched(problem)
+    levels = [(count, ends[-1]) for count, ends in increments.levels] if increments else []
+    frame = frames[-1]
+    mesher = "swept" if problem.dim == 2 else model.mesh.mesher
+    case = Case(name, model.design.width_mm, model.mesh.size_mm, mesher, frame.outcome)
+    if frame.outcome.ok:
+        case = replace(case, numbers=measured(problem.points, frame), lines=lines_along_x(problem.points, frame))
+    return problem, frames, levels, replace(case, seconds=time.perf_counter() - start)
+
+
+def measured(points: ContactPoints, frame: Frame) -> dict[str, float]:
+    """Numbers of a frame that a section and a solid share: N per mm of width, mm, MPa, strains."""
+    numbers = measure(points, frame)
+    width = 2.0 * points.half_width_mm
+    friction = np.abs(points.friction(frame.state.force)).sum(axis=0)
+    out = {
+        "force_N_per_mm": numbers["normal_force_N"] / width,
+        "friction_sum_N_per_mm": numbers["friction_sum_N"] / width,
+        "friction_along_x_N_per_mm": float(friction[0]) / width,
+        "friction_along_z_N_per_mm": float(friction[2]) / width,
+        "outward_friction_x_N_per_mm": numbers["outward_friction_x_N"] / width,
+        "contact_length_mm": 2.0 * numbers["contact_half_length_mm"],
+        "stick_length_mm": 2.0 * numbers["stick_half_length_mm"],
+    }
+    if "contact_half_length_end_mm" in numbers:
+        out["contact_length_end_mm"] = 2.0 * numbers["contact_half_length_end_mm"]
+    middle = lines_along_x(points, frame)["z = 0"]
+    out["peak_pressure_MPa"] = float(np.max(middle["pressure_MPa"], initial=0.0))
+    return out | {f"gauge_{name}": float(strain) for name, strain in numbers["gauges"].items()}
+
+
+def lines_along_x(points: ContactPoints, frame: Frame) -> dict[str, dict[str, Any]]:
+    """Tractions along x at z = 0, and for a solid at its end; points in the band stand in where none is on the line."""
+    table = contact_table(points, frame.state)
+    z = table["z_mm"]
+    exact = 1e-6 * points.half_width_mm
+    middle = np.flatnonzero(np.abs(z) <= exact)
+    if len(middle) < 5:
+        middle = np.flatnonzero(np.abs(z) <= points.band_mm)
+    chosen = {"z = 0": middle}
+    if points.dim == 3:
+        chosen["end"] = np.flatnonzero(np.abs(z - points.half_width_mm) <= exact)
+    keys = ("x_mm", "pressure_MPa", "shear_x_MPa", "shear_z_MPa", "status")
+    out = {}
+    for name, on in chosen.items():
+        on = on[np.argsort(table["x_mm"][on], kind="stable")]
+        out[name] = {k: np.asarray(table[k])[on].tolist() for k in keys}
+    return out

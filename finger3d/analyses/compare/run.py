@@ -1,0 +1,243 @@
+"""The 2D assumption held to the light: one scene as plane stress, plane strain and solid, and the verdict in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from finger3d._machine import versions
+from finger3d.analyses.compare.cases import solved, widened
+from finger3d.analyses.compare.verdict import WITHIN, passage, reached, sentences
+from finger3d.errors import Finger3dError, Outcome, UnresolvedError
+from finger3d.io import atomic, claimed, write_csv, write_json
+from finger3d.mechanics.model import Model
+from finger3d.progress import Report
+from finger3d.results.comparison import Case
+
+if TYPE_CHECKING:
+    from finger3d.scene import Scene
+
+
+_WIDTHS = (1.0, 4.0, 12.0, 24.0)
+"""Widths, in heights of the finger, that are solved if none are asked for."""
+
+_INCOMPLETE = "incomplete: the comparison was still running, or was interrupted; the cases written are good"
+
+
+@dataclass(frozen=True, repr=False)
+class Comparison:
+    """The cases solved, the verdict on them in sentences, and where everything was written."""
+
+    cases: tuple[Case, ...]
+    verdict: tuple[str, ...]
+    out: Path
+
+    def __repr__(self) -> str:
+        """One line."""
+        return f"<Comparison of {len(self.cases)} cases: {self.outcome}; {self.out}>"
+
+    def _repr_html_(self) -> str:
+        from finger3d._notebook import card
+        from finger3d.report.build import number
+        from finger3d.results.comparison import FORCE
+
+        rows = [
+            (c.model, f"{c.width_mm:g}", number(c.numbers[FORCE], c.errors.get(FORCE)) if c.ok else str(c.outcome))
+            for c in self.cases
+        ]
+        said = f"{self.outcome}, {len(self.cases)} cases"
+        return card("2D against 3D", said, rows, self.verdict, head=("model", "width (mm)", "force per width (N/mm)"))
+
+    @property
+    def outcome(self) -> Outcome:
+        """CONVERGED if every case is."""
+        return next((c.outcome for c in self.cases if not c.ok), Outcome.CONVERGED)
+
+
+def compare(
+    scene: Scene | str | Path, out: str | Path, widths: Sequence[float] | None = None, report: Report | None = None
+) -> Comparison:
+    """Solve a scene as plane stress, plane strain and solid, and tell how far 2D is from 3D.
+
+    Parameters
+    ----------
+    scene : a loaded scene, or the path of a TOML file; its own domain does not matter
+    out : folder for compare.csv, compare.json, lines.csv, compare.png, report.html and scene.toml
+    widths : further widths (mm) of the solid; None chooses some from the finger's height, () leaves them out
+    report : told about every case
+
+    Returns
+    -------
+    Comparison
+        Also of a run in which some cases did not converge; the verdict names them.
+    """
+    from finger3d.scene import load
+
+    report = report or Report()
+    solid = _as_solid(load(scene) if isinstance(scene, str | Path) else scene)
+    model = solid.model()
+    asked = _widths(model, widths)
+    _check(model, asked)
+    with claimed(out, "compare") as folder:
+        return _compared(solid, model, asked, folder, report)
+
+
+def _compared(solid: Scene, model: Model, asked: list[float], folder: Path, report: Report) -> Comparison:
+    for name in ("compare.csv", "compare.json", "lines.csv", "compare.png", "report.html"):
+        (folder / name).unlink(missing_ok=True)
+    with atomic(folder / "scene.toml") as path:
+        path.write_text(solid.to_toml(), encoding="utf-8")
+    plan = list(_plan(model, asked))
+    report.steps_total = len(plan)
+    cases: list[Case] = []
+    for done, (name, variant) in enumerate(plan, start=1):
+        report.stage(f"{name}, {variant.design.width_mm:g} mm wide")
+        cases.append(_solved(name, variant, model))
+        report.step(done, len(plan), _remark(cases[-1]))
+        _write(folder, solid, model, cases, _INCOMPLETE if done < len(plan) else None)
+    from finger3d.plotting.comparison import draw
+    from finger3d.report.compare import compare_page
+
+    draw(folder / "compare.png", cases, model.design.width_mm, solid.title)
+    compare_page(folder)
+    return Comparison(tuple(cases), tuple(_verdict(model, cases)), folder)
+
+
+def _as_solid(scene: Scene) -> Scene:
+    """The scene as a solid: mesh sizes left open are then those of a solid, for the sections too."""
+    from finger3d.scene import parse
+
+    if scene.domain == "solid":
+        return scene
+    return parse({**scene.given, "model": {"domain": "solid"}}, path=scene.path)
+
+
+def _widths(model: Model, widths: Sequence[float] | None) -> list[float]:
+    own = model.design.width_mm
+    height = model.design.height_mm
+    chosen = [float(f"{w * height:.2g}") for w in _WIDTHS] if widths is None else [float(w) for w in widths]
+    for width in chosen:
+        if not (np.isfinite(width) and width > 0.0):
+            raise Finger3dError(f"--widths {width:g}: must be positive numbers of mm, for instance 5,20,50,200")
+    return sorted({w for w in chosen if w != own})
+
+
+def _check(model: Model, widths: Sequence[float]) -> None:
+    """What a section cannot stand for is refused before any work."""
+    if not hasattr(model.design, "section"):
+        raise Finger3dError(
+            f'compare: finger.geometry = "{model.design.name}" has no constant section, so there is no 2D model of it; '
+            "take an extruded design"
+        )
+    if any(leg.slide_z_mm for leg in model.legs):
+        raise Finger3dError("compare: press.slide_z_mm must be 0.0; a section cannot slide along its width")
+    for gauge in model.gauges:
+        if beyond := [w for w in widths if 2.0 * abs(gauge.z_mm) > w]:
+            raise Finger3dError(
+                f'compare: gauge "{gauge.name}" at z_mm = {gauge.z_mm:g} is outside a finger {beyond[0]:g} mm wide; '
+                "ask for larger widths, or move it"
+            )
+
+
+def _plan(model: Model, widths: Sequence[float]) -> Iterator[tuple[str, Model]]:
+    """Models by name, the quick and the telling ones first; every solid has sections on its own in-plane mesh."""
+    strain, stress = replace(model, domain="plane-strain"), replace(model, domain="plane-stress")
+    yield "plane strain", strain
+    yield "plane stress", stress
+    yield "solid", model
+    yield "solid, ends held", replace(model, held_ends=True, mesh=replace(model.mesh, mesher="swept"))
+    for width in widths:
+        wide = widened(model, width)
+        yield "plane strain", replace(wide, domain="plane-strain")
+        yield "plane stress", replace(wide, domain="plane-stress")
+        yield "solid", wide
+
+
+def _solved(name: str, variant: Model, scene: Model) -> Case:
+    """A case; of another width than the scene's it may be too coarse for the object without failing the others."""
+    try:
+        return solved(name, variant)
+    except UnresolvedError:
+        if variant.design.width_mm == scene.design.width_mm:
+            raise
+        mesher = "swept" if variant.domain != "solid" else variant.mesh.mesher
+        return Case(name, variant.design.width_mm, variant.mesh.size_mm, mesher, Outcome.UNRESOLVED)
+
+
+def _remark(case: Case) -> str:
+    if not case.ok:
+        return f"{case.model}, {case.width_mm:g} mm wide: {case.outcome}"
+    force = case.numbers["force_N_per_mm"]
+    return f"{case.model}, {case.width_mm:g} mm wide, edges of {case.size_mm:.3g} mm: {force:.4g} N per mm"
+
+
+def _verdict(model: Model, cases: Sequence[Case]) -> list[str]:
+    lines = sentences(cases, model.design.width_mm, model.design.height_mm)
+    if _varies_along_width(model):
+        lines.append("The object changes along the width; the plane models see only its section at z = 0.")
+    return [*lines, *(f"Warning: {w}." for w in model.warnings)]
+
+
+def _varies_along_width(model: Model) -> bool:
+    half = 0.5 * model.design.width_mm
+    x, z = np.meshgrid(np.linspace(-1.0, 1.0, 21) * model.design.half_length_mm, np.linspace(-half, half, 21))
+    height = model.object.height(x.ravel(), z.ravel()).reshape(x.shape)
+    return bool(np.ptp(height, axis=0).max() > 1e-9 * model.design.height_mm)
+
+
+def _write(folder: Path, scene: Scene, model: Model, cases: Sequence[Case], outcome: str | None) -> None:
+    """All files but the picture, after every case."""
+    rows = [_row(case, model.design.height_mm) for case in cases]
+    names = list(dict.fromkeys(key for row in rows for key in row))
+    write_csv(folder / "compare.csv", {key: [row.get(key, "") for row in rows] for key in names})
+    _write_lines(folder, cases)
+    failed = next((str(c.outcome) for c in cases if not c.ok), str(Outcome.CONVERGED))
+    reach = {}
+    for name in ("plane strain", "plane stress"):
+        found = passage(name, cases)
+        at = reached(found, narrow=name == "plane stress") if len(found) > 1 else None
+        reach[name] = None if at is None else dict(zip(("width_mm", "low_mm", "high_mm"), at, strict=True))
+    write_json(
+        folder / "compare.json",
+        {
+            "scene": scene.as_dict(),
+            "outcome": outcome or failed,
+            "verdict": _verdict(model, cases),
+            "within": WITHIN,
+            "width_within": reach,
+            "deviation_of_force": {
+                name: [{"width_mm": d.width_mm, "value": d.value, "error": d.error} for d in passage(name, cases)]
+                for name in reach
+            },
+            "cases": [case.as_dict() for case in cases],
+            "versions": versions(),
+        },
+    )
+
+
+def _row(case: Case, height: float) -> dict[str, Any]:
+    row: dict[str, Any] = {
+        "model": case.model, "width_mm": case.width_mm, "width_over_height": case.width_mm / height,
+        "size_mm": case.size_mm, "mesher": case.mesher, "outcome": str(case.outcome),
+    }  # fmt: skip
+    for key, value in case.numbers.items():
+        row[key] = value
+        row[f"{key}_error"] = case.errors.get(key, "")
+    return row | {"seconds": case.seconds}
+
+
+def _write_lines(folder: Path, cases: Sequence[Case]) -> None:
+    columns: dict[str, list[Any]] = {}
+    for case in cases:
+        for line, values in case.lines.items():
+            count = len(values["x_mm"])
+            same = {"model": case.model, "width_mm": case.width_mm, "size_mm": case.size_mm, "line": line}
+            for key, value in same.items():
+                columns.setdefault(key, []).extend([value] * count)
+            for key, column in values.items():
+                columns.setdefault(key, []).extend(column)
+    write_csv(folder / "lines.csv", columns)

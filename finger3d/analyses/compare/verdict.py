@@ -1,0 +1,236 @@
+"""What the comparison comes to, in sentences: how far each plane model is from the solid, and from which width on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.accuracy.estimate import FACTOR, gain
+from finger3d.results.comparison import FORCE, Case
+
+Float = NDArray[np.float64]
+
+WITHIN = 0.05
+"""Deviation from the solid up to which a plane model counts as good enough."""
+
+_ASYMPTOTIC = 0.25
+"""Deviation from plane strain below which it falls as 1/width: two ends of one kind on an ever longer middle."""
+
+_COMMON = 0.25
+"""Share of its bar that a deviation keeps where the errors of plane model and solid are seen to cancel."""
+
+_SURE = 2.0
+"""Bars away from the limit from which a deviation counts as told apart from it (validation/error_bars.py)."""
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """A plane model against the solid of the same width: (plane - solid)/solid of a quantity, and its error bar."""
+
+    width_mm: float
+    value: float
+    error: float
+
+    def text(self) -> str:
+        """For instance ``overstates ... by 74 +- 1 %``, without the quantity."""
+        return f"{rounded(100 * abs(self.value))} % (± {rounded(100 * self.error, 1)})"
+
+
+def rounded(value: float, digits: int = 2, signed: bool = False) -> str:
+    """A number to so many significant digits, without an exponent."""
+    return f"{float(f'{value:.{digits}g}'):{'+' if signed else ''}g}"
+
+
+def deviation(plane: Case, solid: Case, key: str = FORCE) -> Deviation:
+    """How far `plane` is from `solid` in one quantity."""
+    p, s = plane.numbers[key], solid.numbers[key]
+    ratio = p / s
+    relative = math.hypot(plane.errors.get(key, 0.0) / max(abs(p), 1e-300), solid.errors.get(key, 0.0) / abs(s))
+    return Deviation(solid.width_mm, ratio - 1.0, abs(ratio) * relative)
+
+
+def matched(plane: Case, solid: Case) -> Deviation:
+    """Deviation of the forces; on swept meshes the in-plane error is common to both, so their ratio is known better.
+
+    A share of the bar stays, for changes that agree by chance: of 32 deviations of the Fig. 9 finger (nu = 0.3 and
+    0.49, 10 to 200 mm wide, edges of 3.6 and 5 mm) 31 are within twice the bar with it, 24 without.
+    """
+    found = deviation(plane, solid)
+    both = plane.companion and solid.companion and (plane.ratio > 1.0) == (solid.ratio > 1.0)
+    # edges longer than the width are cut to it in the solid's companion, and not in the section's
+    if solid.mesher != "swept" or not both or FACTOR * solid.size_mm > solid.width_mm:
+        return found
+    change = abs(found.value - (plane.companion[FORCE] / solid.companion[FORCE] - 1.0))
+    told = change / min(gain(plane.ratio), gain(solid.ratio))
+    return Deviation(found.width_mm, found.value, min(found.error, max(told, _COMMON * found.error)))
+
+
+def reached(found: Sequence[Deviation], narrow: bool, limit: float = WITHIN) -> tuple[float, float, float] | None:
+    """Width (mm) at which the deviation comes within `limit`, with the ends of its error bar; None if never.
+
+    Parameters
+    ----------
+    found : deviations at several widths
+    narrow : the model is good for narrow fingers (plane stress), not for wide ones (plane strain)
+    """
+    ordered = sorted(found, key=lambda d: d.width_mm)
+    width = np.array([d.width_mm for d in ordered])
+    value, error = np.array([abs(d.value) for d in ordered]), np.array([d.error for d in ordered])
+    # the ends' share of a wide body falls as 1/width; a narrow one departs from plane stress in proportion to its width
+    scale = width if narrow else 1.0 / width
+    at = [_crossing(scale, v, limit) for v in (value, np.maximum(value - error, 0.0), value + error)]
+    if at[0] is None:
+        return None
+    sizes = [float("nan") if a is None else (a if narrow else 1.0 / a) for a in at]
+    return sizes[0], sizes[1], sizes[2]
+
+
+def _crossing(scale: Float, value: Float, limit: float) -> float | None:
+    """Largest scale up to which `value` stays below `limit`, seen from scale 0, linear in between."""
+    order = np.argsort(scale)
+    scale, value = scale[order], value[order]
+    if value[0] > limit:
+        return None
+    for a, b, fa, fb in zip(scale[:-1], scale[1:], value[:-1], value[1:], strict=True):
+        if fb > limit:
+            return float(a + (b - a) * (limit - fa) / (fb - fa))
+    return float(scale[-1])
+
+
+def sentences(cases: Sequence[Case], own_width_mm: float, height_mm: float) -> list[str]:
+    """The verdict on the cases there are; what is missing or did not converge is said."""
+    failed = [c for c in cases if not c.ok]
+    out = [f"{c.model}, {c.width_mm:g} mm wide, gave no numbers: {c.outcome}." for c in failed]
+    own = {c.model: c for c in cases if c.ok and c.width_mm == own_width_mm and c.model != "solid"}
+    solid = next((c for c in cases if c.ok and c.model == "solid" and c.width_mm == own_width_mm), None)
+    planes = [own[name] for name in ("plane strain", "plane stress") if name in own]
+    if solid is None or not planes:
+        return [*out, "No verdict: the solid and a plane model are needed."]
+    out.append(_force(planes, solid, height_mm))
+    out += _ends(own)
+    out += [_passage(name, cases) for name in ("plane strain", "plane stress")]
+    out += _others(planes, solid)
+    out.append(_would_have_done(planes, solid))
+    return out
+
+
+def _force(planes: Sequence[Case], solid: Case, height: float) -> str:
+    parts: list[str] = []
+    for plane in planes:
+        d = deviation(plane, solid)
+        verb = "overstates" if d.value > 0.0 else "understates"
+        parts.append(f"{plane.model} {verb} {'it' if parts else 'the force'} by {d.text()}")
+    numbers = ", ".join(f"{c.model} {_with_error(c, FORCE)}" for c in (solid, *planes))
+    text = " and ".join(parts)
+    return (
+        f"At width/height {solid.width_mm / height:.2g} ({solid.width_mm:g} mm wide, {height:.4g} mm high) {text}: "
+        f"{numbers} N per mm of width."
+    )
+
+
+def _with_error(case: Case, key: str, unit: str = "") -> str:
+    value, error = case.numbers[key], case.errors.get(key, math.nan)
+    if not math.isfinite(error):
+        return f"{value:.4g}{unit}"
+    digits = 2 if error == 0.0 else max(0, 1 - math.floor(math.log10(error)))
+    return f"{value:.{digits}f} ± {error:.{digits}f}{unit}"
+
+
+def _ends(own: dict[str, Case]) -> list[str]:
+    held, strain = own.get("solid, ends held"), own.get("plane strain")
+    if held is None or strain is None:
+        return []
+    away = 100 * (held.numbers[FORCE] / strain.numbers[FORCE] - 1.0)
+    return [
+        f"With its end faces held along z the solid gives {held.numbers[FORCE]:.4g} N per mm, {abs(away):.1g} % from "
+        "plane strain: the difference is the free ends', not the mesh's."
+    ]
+
+
+def passage(model: str, cases: Sequence[Case]) -> list[Deviation]:
+    """Deviations of a plane model from the solids of all widths, each on the same in-plane mesh."""
+    found = []
+    for solid in cases:
+        plane = next((c for c in cases if c.ok and c.model == model and _matches(c, solid)), None)
+        if solid.ok and solid.model == "solid" and plane is not None:
+            found.append(matched(plane, solid))
+    return sorted(found, key=lambda d: d.width_mm)
+
+
+def _matches(plane: Case, solid: Case) -> bool:
+    return plane.width_mm == solid.width_mm and plane.size_mm == solid.size_mm
+
+
+def _passage(name: str, cases: Sequence[Case]) -> str:
+    found = passage(name, cases)
+    narrow = name == "plane stress"
+    goal, side = f"within {100 * WITHIN:g} % of the solid's force", "up to" if narrow else "from"
+    if len(found) < 2:
+        return f"From which width on it comes {goal} was not asked: give --widths."
+    nearest = found[0] if narrow else found[-1]
+    reach = reached(found, narrow)
+    widest = f"{rounded(100 * nearest.value, signed=True)} % at {nearest.width_mm:g} mm"
+    if reach is None:
+        far = "the narrowest" if narrow else "the widest"
+        more = ""
+        if not narrow and abs(nearest.value) < _ASYMPTOTIC:
+            guess = nearest.width_mm * abs(nearest.value) / WITHIN
+            more = f"; falling on as 1/width it would be at about {rounded(guess)} mm"
+        return f"{name.capitalize()} does not come {goal} within the widths asked ({widest}, {far} asked){more}."
+    at, low, high = reach
+    widths = [d.width_mm for d in found]
+    if at == (max(widths) if narrow else min(widths)):
+        return f"{name.capitalize()} is {goal} at every width asked, {min(widths):g} to {max(widths):g} mm."
+    bar = [f"{v:.3g}" for v in sorted((low, high)) if math.isfinite(v)]
+    between = f" (error bar {' to '.join(bar)})" if len(bar) == 2 else ""
+    if len(bar) == 1:
+        ends = f"below the narrowest asked to {bar[0]}" if narrow else f"{bar[0]} to beyond the widest asked"
+        between = f" (error bar {ends})"
+    return f"{name.capitalize()} comes {goal} {side} a width of {at:.3g} mm{between}."
+
+
+def _others(planes: Sequence[Case], solid: Case) -> list[str]:
+    out = []
+    for key, what in (("contact_length_mm", "Contact length at z = 0"), ("stick_length_mm", "Stick length at z = 0")):
+        told = ", ".join(f"{c.model} {_with_error(c, key, ' mm')}" for c in (solid, *planes))
+        out.append(f"{what}: {told}.")
+    total, across = (solid.numbers[k] for k in ("friction_sum_N_per_mm", "friction_along_z_N_per_mm"))
+    if total > 0.0:
+        along = ", ".join(f"{c.model} {_with_error(c, 'friction_along_x_N_per_mm')}" for c in (solid, *planes))
+        out.append(f"Sum of |friction along x|: {along} N per mm.")
+        out.append(
+            f"Friction along the width, which no section has, sums up to {across:.3g} N per mm in the solid, "
+            f"{100 * across / total:.0f} % of its sum of |friction|."
+        )
+    for key in solid.numbers:
+        if key.startswith("gauge_"):
+            told = ", ".join(f"{c.model} {_with_error(c, key)}" for c in (solid, *planes))
+            out.append(f"Gauge {key.removeprefix('gauge_')}: {told}.")
+    return out
+
+
+def _would_have_done(planes: Sequence[Case], solid: Case) -> str:
+    """Which quantities each plane model has within the limit, or within the error bars where those are wider."""
+    names = {
+        FORCE: "force", "contact_length_mm": "contact length", "stick_length_mm": "stick length",
+        "friction_sum_N_per_mm": "friction sum", "peak_pressure_MPa": "peak pressure",
+    }  # fmt: skip
+    names |= {k: f"gauge {k.removeprefix('gauge_')}" for k in solid.numbers if k.startswith("gauge_")}
+    parts = []
+    for plane in planes:
+        sides: dict[str, list[str]] = {"off by more than": [], "within": [], "by this mesh not told from": []}
+        for key, name in names.items():
+            if solid.numbers[key] == 0.0:
+                continue
+            d = deviation(plane, solid, key)
+            clear = abs(abs(d.value) - WITHIN) >= _SURE * d.error
+            side = "within" if abs(d.value) < WITHIN else "off by more than"
+            side = side if clear else "by this mesh not told from"
+            sides[side].append(f"{name} ({rounded(100 * d.value, signed=True)} %)")
+        told = [f"{side} {100 * WITHIN:g} % in {', '.join(found)}" for side, found in sides.items() if found]
+        parts.append(f"{plane.model.capitalize()} in place of the solid is {'; '.join(told)}.")
+    return " ".join(parts)

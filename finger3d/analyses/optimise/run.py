@@ -1,0 +1,382 @@
+"""The search itself: designs are judged one by one, and every one is kept at once."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from finger3d.analyses.calibrate.increments import found_increments, increment_error
+from finger3d.analyses.optimise.task import METHODS, Float, Free, Objective, Problem, Table, checked_start, objective_of
+from finger3d.analyses.reduced import friction_at
+from finger3d.analyses.shared_body import Body, Variant, body_key
+from finger3d.errors import Finger3dError
+from finger3d.io import atomic, claimed, write_json
+from finger3d.mechanics.history import Frame, measure
+from finger3d.mechanics.model import Gauge, Leg, Model
+from finger3d.mechanics.solve import gauge_row
+from finger3d.plotting.optimise import draw
+from finger3d.progress import Report
+from finger3d.report.optimise import design_page
+from finger3d.scene import Scene
+
+_INNER = 60  # readings of gauges in one body
+_WORST = 1e30  # stands for what cannot be built: finite, as annealing asks
+_KEPT = 4
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """One design: values of the free keys, the objective (NaN where it has none) and why."""
+
+    values: tuple[float, ...]
+    value: float
+    outcome: str
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a search came to; `scene` is the best design, ready to be pressed.
+
+    `evaluations` are in the order asked for, some more than once; `judged` designs are in evaluations.csv.
+    """
+
+    best: Evaluation
+    start: Evaluation
+    evaluations: tuple[Evaluation, ...]
+    judged: int
+    bodies: int
+    scene: Scene
+
+
+@dataclass(frozen=True)
+class _Pressed:
+    """A body at every mu: what gauges are read from, or why there is nothing to read."""
+
+    steps: tuple[dict[str, float], ...] = ()
+    read: Callable[[Gauge], Float] | None = None
+    outcome: str = "converged"
+
+
+def _whole(model: Model) -> bool:
+    """Whether gauges are read in the body's own way, so that a gauge moved is a press of its own."""
+    return model.inclusions is not None or model.kinematics.finite_strain
+
+
+class _Bench:
+    """A design's body, built once and pressed under several mu."""
+
+    def __init__(self, model: Model, mus: Sequence[float], say: Callable[[str], None]) -> None:
+        self._model, self._apart = model, _whole(model)
+        variants = self._variants(mus, model.legs)
+        self.body = Body(model, variants if self._apart else [replace(v, gauges=()) for v in variants], say)
+
+    def _variants(self, mus: Sequence[float], legs: tuple[Leg, ...]) -> list[Variant]:
+        laws = [friction_at(self._model.friction, mu) for mu in mus]
+        return [Variant.of(replace(self._model, friction=law, legs=legs)) for law in laws]
+
+    def ends(self, mus: Sequence[float], legs: tuple[Leg, ...]) -> list[Frame]:
+        """The last frame under every mu."""
+        return [frames[-1] for frames in self.body.frames(self._variants(mus, legs))]
+
+    def reader(self, ends: Sequence[Frame]) -> Callable[[Gauge], Float]:
+        """Gauge -> strain (m,) of frames (m,)."""
+        body = self.body
+        if self._apart:
+            (variant,) = self._variants((0.0,), self._model.legs)
+            strains = [body.strains(variant, frame.gauges) for frame in ends]
+            return lambda g: np.array([strain[g.name] for strain in strains])
+        mesh, axes = body.problem.mesh, body.problem.axes
+        fields = body.problem.model.kinematics.all_unknowns(body.problem, [f.part for f in ends])
+        u = np.array([x[: mesh.points.size] for x in fields])
+        return lambda g: np.asarray(gauge_row(mesh, g, axes)[:, : mesh.points.size] @ u.T).ravel()
+
+    def strain(self, gauge: Gauge, mus: Sequence[float], legs: tuple[Leg, ...]) -> Float:
+        """Strain (m,) of a gauge under mus (m,), nan where a press failed."""
+        ends = self.ends(mus, legs)
+        return np.where([f.outcome.ok for f in ends], self.reader(ends)(gauge), math.nan)
+
+
+class _Spent(Exception):
+    """The budget is used up."""
+
+
+@dataclass
+class _Search:
+    problem: Problem
+    folder: Path
+    report: Report
+    judge: Objective
+    known: dict[tuple[float, ...], Evaluation] = field(default_factory=dict)
+    done: list[Evaluation] = field(default_factory=list)
+    bodies: int = 0
+    spent: int = 0
+    chosen: tuple[int | Literal["auto"], ...] | None = None
+    _pressed: dict[str, _Pressed] = field(default_factory=dict)
+
+    def evaluate(self, values: Sequence[float] | Float) -> Evaluation:
+        """Judge a design, or remember it; every new one is a line of evaluations.csv at once."""
+        place = tuple(float(v) for v in values)
+        if place not in self.known:
+            found = self._judged(place)
+            self.known[place] = found
+            self._write(found)
+        found = self.known[place]
+        self.done.append(found)
+        return found
+
+    def _judged(self, place: tuple[float, ...]) -> Evaluation:
+        try:
+            scene = self.problem.scene(place)
+        except Finger3dError as error:
+            return Evaluation(place, math.nan, " ".join(str(error).split()))
+        pressed = self._press(scene)
+        if pressed.read is None:
+            return Evaluation(place, math.nan, pressed.outcome)
+        strain = {g.name: pressed.read(g) for g in scene.model().gauges}
+        gauge = self.problem.gauge or next(iter(strain))
+        table = Table(np.array(self.problem.mus), strain, pressed.steps, self.problem.noise, gauge, scene)
+        value = self.judge(table)
+        return Evaluation(place, value, "converged" if math.isfinite(value) else "the objective is no finite number")
+
+    def _press(self, scene: Scene) -> _Pressed:
+        key = json.dumps([body_key(scene), scene.as_dict()["press"], scene.as_dict()["contact"]])
+        model = scene.model()
+        if _whole(model):
+            key += repr(model.gauges)
+        if key not in self._pressed:
+            while len(self._pressed) >= _KEPT:
+                self._pressed.pop(next(iter(self._pressed)))
+            self._pressed[key] = self._pressed_new(model)
+            self.bodies += 1
+        return self._pressed[key]
+
+    def _pressed_new(self, model: Model) -> _Pressed:
+        mus = self.problem.mus
+        try:
+            bench = _Bench(model, mus, self.report.say)
+            ends = bench.ends(mus, self._legs(bench, model))
+        except Finger3dError as error:
+            return _Pressed(outcome=" ".join(str(error).split()))
+        for mu, frame in zip(mus, ends, strict=True):
+            if not frame.outcome.ok:
+                return _Pressed(outcome=f"mu = {mu:g}: {frame.outcome}")
+        return _Pressed(tuple(measure(bench.body.problem.points, frame) for frame in ends), bench.reader(ends))
+
+    def _gauge(self, model: Model) -> Gauge | None:
+        """The gauge that is designed, if the scene has one."""
+        return next((g for g in model.gauges if self.problem.gauge in (None, g.name)), None)
+
+    def _legs(self, bench: _Bench, model: Model) -> tuple[Leg, ...]:
+        """The path with as many increments as the first design asked for: errors are then alike."""
+        gauge = self._gauge(model)
+        if gauge is None or all(isinstance(leg.steps, int) for leg in model.legs):
+            return model.legs
+        if self.chosen is None:
+            mus, noise = _three(self.problem.mus), self.problem.noise
+            found = found_increments(bench.body.problem, lambda p: bench.strain(gauge, mus, p.model.legs), noise)
+            self.report.say(str(found))
+            self.chosen = tuple(leg.steps for leg in found.legs)
+        return tuple(replace(leg, steps=n) for leg, n in zip(model.legs, self.chosen, strict=True))
+
+    def begin(self, start: Sequence[float]) -> None:
+        """Let the start choose the increments where its own press is remembered and would not."""
+        try:
+            model = self.problem.scene(start).model()
+            if any(leg.steps == "auto" for leg in model.legs):
+                self._legs(_Bench(model, _three(self.problem.mus), self.report.say), model)
+        except Finger3dError:
+            pass  # as at first: the first design that can be built chooses
+
+    def increments(self, values: Sequence[float]) -> dict[str, Any]:
+        """The increments of a design, and the error that they leave in its strain, by presses of more or fewer."""
+        model = self.problem.scene(values).model()
+        gauge, mus = self._gauge(model), _three(self.problem.mus)
+        if gauge is None:
+            return {}
+        bench = _Bench(model, mus, self.report.say)
+        legs = self._legs(bench, model)
+        problem = replace(bench.body.problem, model=replace(bench.body.problem.model, legs=legs))
+
+        def strain(other: Any) -> Float:
+            return bench.strain(gauge, mus, other.model.legs)
+
+        left = increment_error(problem, strain(problem), legs != model.legs, strain)
+        return {"steps": [leg.steps for leg in legs], "chosen": legs != model.legs, "strain_error": float(left.max())}
+
+    def _write(self, found: Evaluation) -> None:
+        path = self.folder / "evaluations.csv"
+        try:
+            with path.open("a", newline="", encoding="utf-8") as file:
+                writer = csv.writer(file, lineterminator="\n")
+                if file.tell() == 0:
+                    writer.writerow([*(f.key for f in self.problem.free), "objective", "outcome"])
+                writer.writerow([*found.values, found.value, found.outcome])
+        except OSError as error:
+            raise Finger3dError(f"cannot write {path}: {error.strerror}; choose another place with --out") from None
+
+    def load(self) -> None:
+        """Remember what an earlier run has judged; a line that was cut short is left out, and the file mended."""
+        path, count = self.folder / "evaluations.csv", len(self.problem.free)
+        if not path.exists():
+            return
+        with path.open(newline="", encoding="utf-8") as file:
+            lines = list(csv.reader(file))
+        kept = [line for line in lines[1:] if len(line) == count + 2 and line[-1]]
+        for line in kept:
+            numbers = tuple(float(v) for v in line[: count + 1])
+            self.known[numbers[:-1]] = Evaluation(numbers[:-1], numbers[-1], line[-1])
+        with atomic(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+            csv.writer(file, lineterminator="\n").writerows([*lines[:1], *kept])
+
+    def best(self) -> Evaluation | None:
+        """The largest objective so far."""
+        return max((e for e in self.done if math.isfinite(e.value)), key=lambda e: e.value, default=None)
+
+    def run(self, start: Sequence[float]) -> None:
+        """Search until the optimiser settles or the budget is spent."""
+        p = self.problem
+        gauges = [i for i, key in enumerate(p.keys()) if key.startswith("gauge.")]
+        body = [i for i in range(len(p.free)) if i not in gauges]
+        outer = body if body and gauges else list(range(len(p.free)))
+        inner = gauges if body and gauges else []
+        x = np.array(start)
+
+        def cost(values: Float) -> float:
+            if self.spent >= p.budget:
+                raise _Spent
+            self.spent += 1
+            here = x.copy()
+            here[outer] = values
+            value = self._inner(here, inner) if inner else self.evaluate(here).value
+            best = self.best()
+            said = f"best {best.value:.4g}" if best else "none can be built yet"
+            self.report.step(self.spent, p.budget, said)
+            return -value if math.isfinite(value) else _WORST
+
+        try:
+            _minimise(p.method, cost, [p.free[i] for i in outer], x[outer], p.seed)
+        except _Spent:
+            pass
+
+    def _inner(self, here: Float, inner: list[int]) -> float:
+        """The best objective over the gauges' keys in one body."""
+        count, values = 0, []
+
+        def cost(chosen: Float) -> float:
+            nonlocal count
+            if count >= _INNER:
+                raise _Spent
+            count += 1
+            at = here.copy()
+            at[inner] = chosen
+            value = self.evaluate(at).value
+            values.append(value if math.isfinite(value) else -_WORST)
+            return -values[-1]
+
+        try:
+            free = [self.problem.free[i] for i in inner]
+            _minimise(METHODS[0], cost, free, here[inner], self.problem.seed)
+        except _Spent:
+            pass
+        best = max(values)
+        return best if best > -_WORST else math.nan
+
+
+def _three(mus: Sequence[float]) -> tuple[float, ...]:
+    """The first, the middle and the last."""
+    return tuple(dict.fromkeys((mus[0], mus[len(mus) // 2], mus[-1])))
+
+
+def _minimise(method: str, cost: Callable[[Float], float], free: Sequence[Free], start: Float, seed: int) -> None:
+    from scipy import optimize
+
+    bounds = [(f.low, f.high) for f in free]
+    if method == "nelder-mead":
+        options = {"maxfev": 10**6, "xatol": 1e-3 * min(h - lo for lo, h in bounds), "fatol": 1e-6}
+        optimize.minimize(cost, start, method="Nelder-Mead", bounds=bounds, options=options)
+    elif method == "dual-annealing":
+        optimize.dual_annealing(cost, bounds, x0=start, rng=seed, no_local_search=True, maxiter=10**4)
+    else:
+        optimize.differential_evolution(cost, bounds, x0=start, rng=seed, popsize=max(5, 12 // len(free)), polish=False)
+
+
+def search(problem: Problem, out: str | Path, report: Report | None = None) -> Found:
+    """Search within the bounds for the largest objective; every design judged is kept at once.
+
+    Parameters
+    ----------
+    out : folder for evaluations.csv, best.toml, design.json, design.png and report.html; that of the same search is
+        gone on with
+
+    Raises
+    ------
+    Finger3dError
+        For a mistake in the problem, or if no design within the bounds could be built.
+    """
+    report = report or Report()
+    judge = objective_of(problem.objective)
+    start = checked_start(problem)
+    with claimed(out, "design") as folder:
+        return _searched(problem, folder, report, judge, start)
+
+
+def _searched(problem: Problem, folder: Path, report: Report, judge: Objective, start: tuple[float, ...]) -> Found:
+    _same(problem, folder)
+    for name in ("design.png", "report.html"):
+        (folder / name).unlink(missing_ok=True)
+    run = _Search(problem, folder, report, judge)
+    run.load()
+    if run.known:
+        report.say(f"{len(run.known)} designs are kept from before")
+        run.begin(start)
+    report.stage("searching")
+    first = run.evaluate(start)
+    try:
+        run.run(start)
+    finally:
+        best = run.best()
+        if best is not None:
+            _write_best(problem, folder, best, first, run)
+    if best is None:
+        raise Finger3dError(f"design: no design within the bounds gives a number; the first: {first.outcome}")
+    report.stage("increments of the best")
+    _write_best(problem, folder, best, first, run, run.increments(best.values))
+    judged = tuple(run.known.values())
+    draw(
+        folder / "design.png", [f.key for f in problem.free], [e.values for e in judged], [e.value for e in judged],
+        first.values, Path(problem.objective).stem,
+    )  # fmt: skip
+    design_page(folder)
+    return Found(best, first, tuple(run.done), len(judged), run.bodies, problem.scene(best.values))
+
+
+def _same(problem: Problem, folder: Path) -> None:
+    wanted = json.loads(json.dumps(problem.identity()))
+    path = folder / "search.json"
+    if path.exists() and json.loads(path.read_text(encoding="utf-8")) != wanted:
+        raise Finger3dError(f"--out {folder}: holds another search; name another folder")
+    write_json(path, wanted)
+
+
+def _write_best(
+    problem: Problem, folder: Path, best: Evaluation, first: Evaluation, run: _Search,
+    increments: Mapping[str, Any] | None = None,
+) -> None:  # fmt: skip
+    with atomic(folder / "best.toml") as path:
+        path.write_text(problem.scene(best.values).to_toml(defaults=False), encoding="utf-8")
+    names = [f.key for f in problem.free]
+    write_json(
+        folder / "design.json",
+        {
+            "objective": problem.objective, "best": best.value, "values": dict(zip(names, best.values, strict=True)),
+            "start": first.value, "start_values": dict(zip(names, first.values, strict=True)),
+            "designs": len(run.done), "bodies": run.bodies, "increments": increments or {},
+        },
+    )  # fmt: skip

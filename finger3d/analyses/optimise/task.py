@@ -1,0 +1,193 @@
+"""What is searched: free keys and their bounds, the objective, and what is refused before any work."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.analyses.sweep.points import numbered
+from finger3d.errors import Finger3dError
+from finger3d.scene import Scene, parse, tree
+from finger3d.scene.messages import shown
+
+Float = NDArray[np.float64]
+Objective = Callable[["Table"], float]
+
+MUS = tuple(float(v) for v in np.round(np.linspace(0.05, 1.0, 9), 5))
+METHODS = ("differential-evolution", "dual-annealing", "nelder-mead")
+_MISTAKES = (ArithmeticError, AttributeError, LookupError, NameError, TypeError, ValueError)
+
+
+@dataclass(frozen=True)
+class Free:
+    """A key of the scene, and the bounds within which it may be chosen."""
+
+    key: str
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, text: str) -> Free:
+        """From ``KEY=LOW:HIGH``."""
+        key, equals, bounds = text.partition("=")
+        try:
+            low, high = (float(part) for part in bounds.split(":"))
+        except ValueError:
+            low = high = math.nan
+        if not equals or not key.strip() or not (math.isfinite(low) and math.isfinite(high) and low < high):
+            raise Finger3dError(
+                f"--free {shown(text)}: must be KEY=LOW:HIGH with LOW below HIGH, for instance finger.radius_mm=60:200"
+            )
+        return cls(key.strip(), low, high)
+
+
+@dataclass(frozen=True)
+class Table:
+    """What an objective judges: one design, pressed at several mu.
+
+    Attributes
+    ----------
+    mu : (n,)
+    strain : gauge name -> (n,)
+    steps : (n,) the contract's numbers of the last step at each mu
+    noise : standard deviation of a strain reading
+    gauge : name of the gauge that is designed
+    scene : as it was pressed; its own friction.mu does not matter
+    """
+
+    mu: Float
+    strain: Mapping[str, Float]
+    steps: Sequence[Mapping[str, float]]
+    noise: float
+    gauge: str
+    scene: Scene
+
+
+def sensitivity(table: Table) -> float:
+    """The paper's criterion (Sec. III-B): sensitive to mu throughout a large range.
+
+    The least change of strain per mu between neighbouring mu, in units of noise: the inverse of the worst resolution of
+    mu.  Negative where the strain turns back, for there it tells two mu.
+    """
+    strain = table.strain[table.gauge]
+    slope = np.diff(strain) / np.diff(table.mu)
+    return float((slope * np.sign(strain[-1] - strain[0])).min() / table.noise)
+
+
+NAMED: dict[str, Objective] = {"sensitivity": sensitivity}
+
+
+def objective_of(text: str) -> Objective:
+    """A named objective, or the function ``objective`` of a Python file."""
+    if text in NAMED:
+        return NAMED[text]
+    path = Path(text)
+    if path.suffix != ".py" or not path.is_file():
+        raise Finger3dError(f"--objective {text}: must be {' or '.join(NAMED)}, or a Python file that is there")
+    spec = importlib.util.spec_from_file_location("finger3d_objective", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except (*_MISTAKES, ImportError, SyntaxError) as error:
+        raise Finger3dError(f"--objective {text}: {type(error).__name__}: {error}") from None
+    found = getattr(module, "objective", None)
+    if not callable(found):
+        raise Finger3dError(f"--objective {text}: has no function objective(table) -> number, the larger the better")
+
+    def judged(table: Table) -> float:
+        try:
+            return float(found(table))
+        except _MISTAKES as error:
+            raise Finger3dError(f"--objective {text}: objective(table): {type(error).__name__}: {error}") from None
+
+    return judged
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What is searched.
+
+    Attributes
+    ----------
+    given : the scene as written, overrides included
+    gauge : name of the gauge that is designed; None: the first
+    budget : designs, or bodies where keys of both body and gauges are free
+    """
+
+    given: Mapping[str, Any]
+    free: tuple[Free, ...]
+    objective: str = "sensitivity"
+    path: Path | None = None
+    gauge: str | None = None
+    mus: tuple[float, ...] = MUS
+    noise: float = 1.5e-4
+    budget: int = 60
+    method: str = METHODS[0]
+    seed: int = 0
+
+    def keys(self) -> tuple[str, ...]:
+        """Keys as they are set, gauges by number."""
+        return tuple(numbered(f.key, self.given, "--free") for f in self.free)
+
+    def scene(self, values: Sequence[float]) -> Scene:
+        """The scene with the free keys at these values."""
+        keys = self.keys()
+        changes = [f"{key}={value!r}" for key, value in zip(keys, values, strict=True)]
+        changed = tree.override(dict(self.given), changes, "--free")
+        return parse(changed, path=self.path, set_keys=dict.fromkeys(keys, "--free"))
+
+    def identity(self) -> dict[str, Any]:
+        """What two runs must share for one to go on with the other's evaluations; more budget is no other search."""
+        path = Path(self.objective)
+        judged = hashlib.sha256(path.read_bytes()).hexdigest()[:16] if path.is_file() else self.objective
+        return {
+            "scene": tree.plain(self.given), "free": [[f.key, f.low, f.high] for f in self.free], "objective": judged,
+            "gauge": self.gauge, "mu": list(self.mus), "noise": self.noise, "method": self.method, "seed": self.seed,
+        }  # fmt: skip
+
+
+def checked_start(problem: Problem) -> tuple[float, ...]:
+    """The scene's own values where they are within the bounds, else the middle."""
+    if problem.method not in METHODS:
+        raise Finger3dError(f"--method {problem.method}: must be one of {', '.join(METHODS)}")
+    if problem.budget < 1:
+        raise Finger3dError(f"--budget {problem.budget}: must be at least 1")
+    keys = problem.keys()
+    if not keys:
+        raise Finger3dError("design: nothing is free; give at least one --free, such as finger.radius_mm=60:200")
+    if len(set(keys)) < len(keys):
+        raise Finger3dError(f"--free {next(k for i, k in enumerate(keys) if k in keys[:i])}: given twice")
+    if len(problem.mus) < 2 or any(b <= a for a, b in zip(problem.mus, problem.mus[1:], strict=False)):
+        raise Finger3dError("--mu: must be at least two numbers, ascending")
+    if not (math.isfinite(problem.noise) and problem.noise > 0.0):
+        raise Finger3dError(f"--noise {problem.noise}: must be above 0")
+    names = [g.name for g in parse(problem.given, problem.path).tables.gauge]
+    if problem.objective == "sensitivity" and not names:
+        raise Finger3dError("design: the objective reads a gauge, and the scene has no [[gauge]]; add one")
+    if problem.gauge is not None and problem.gauge not in names:
+        raise Finger3dError(f"--gauge {problem.gauge}: no such gauge; the scene has {', '.join(names) or 'none'}")
+    values = []
+    for key, free in zip(keys, problem.free, strict=True):
+        own: Any = problem.given
+        for part in key.split("."):
+            own = own[int(part)] if isinstance(own, tuple | list) else (own or {}).get(part)
+        inside = isinstance(own, int | float) and free.low <= own <= free.high
+        values.append(float(own) if inside else 0.5 * (free.low + free.high))
+    # a key that no scene has is refused now, a design that cannot be built is a line of the table
+    probe = tree.override(dict(problem.given), [f"{k}={v!r}" for k, v in zip(keys, values, strict=True)], "--free")
+    try:
+        parse(probe, problem.path, dict.fromkeys(keys, "--free"))
+    except Finger3dError as error:
+        if "no such key" in str(error) or "must be a " in str(error):
+            raise
+    return tuple(values)

@@ -1,0 +1,152 @@
+"""What `finger3d.press` returns: numbers, tables, pictures and fields of one press, for a script or a notebook."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, Literal
+
+from finger3d.errors import Finger3dError, Outcome
+from finger3d.io import atomic
+from finger3d.mechanics.history import History, contact_table
+
+if TYPE_CHECKING:
+    import pandas
+    import pyvista
+from finger3d.results.vtu import grid
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A PNG picture; a notebook shows it, `save` writes it."""
+
+    png: bytes = field(repr=False)
+
+    def _repr_png_(self) -> bytes:
+        return self.png
+
+    def save(self, path: str | Path) -> None:
+        """Write the picture."""
+        with atomic(path) as temporary:
+            temporary.write_bytes(self.png)
+
+
+@dataclass(frozen=True, repr=False)
+class PressResult:
+    """A finished press, also one that stopped at a step that did not converge.
+
+    Attributes
+    ----------
+    history : the contact state of every increment, with all digits
+    out : folder of the files; a temporary one, which goes with this object, if none was asked for
+
+    Examples
+    --------
+    >>> import finger3d
+    >>> result = finger3d.press("scene.toml")
+    >>> result.outcome.ok
+    True
+    >>> last = result.summary()["steps"][-1]
+    >>> f"{last['normal_force_N']:.2f} N"
+    '0.81 N'
+    >>> result.to_dataframe()[["depth_mm", "normal_force_N"]].shape
+    (4, 2)
+    >>> set(result.to_dataframe("contact")["status"]) <= {"open", "stick", "slip"}
+    True
+    >>> result.plot_contact().save("contact.png")
+    >>> grid = result.to_pyvista()
+    >>> grid.warp_by_vector("displacement").bounds.y_max < 5.0
+    True
+    """
+
+    history: History
+    out: Path
+    _numbers: dict[str, Any]
+    _folder: TemporaryDirectory[str] | None = field(default=None, compare=False)
+
+    @property
+    def outcome(self) -> Outcome:
+        """CONVERGED if every increment is."""
+        return self.history.outcome
+
+    def summary(self) -> dict[str, Any]:
+        """Return what summary.json holds: scene, effects, steps, mesh, cost, versions, errors, warnings."""
+        return self._numbers
+
+    def to_dataframe(self, table: Literal["history", "contact"] = "history") -> pandas.DataFrame:
+        """Return a table as pandas has them.
+
+        Parameters
+        ----------
+        table : ``"history"``, a row a step, as in history.csv; or ``"contact"``, a row a contact point in the last
+            good step, as in contact.csv
+        """
+        import pandas
+
+        if table == "contact":
+            return pandas.DataFrame(self._contact())
+        if table != "history":
+            raise Finger3dError(f'to_dataframe({table!r}): must be "history" or "contact"')
+        gauges = [{f"gauge_{name}": strain for name, strain in s["gauges"].items()} for s in self._numbers["steps"]]
+        flat = [{**s, **g} for s, g in zip(self._numbers["steps"], gauges, strict=True)]
+        return pandas.DataFrame(flat).drop(columns="gauges", errors="ignore")
+
+    def plot_contact(self) -> Picture:
+        """Draw pressure, friction and its limit along x in the last good step, with the zones that stick and slip."""
+        from finger3d.plotting.figures import contact_figure
+
+        points = self.history.points
+        half_width = points.half_width_mm if points.dim == 3 else None
+        with TemporaryDirectory(prefix="finger3d-") as folder:
+            path = Path(folder) / "contact.png"
+            mu = (self._numbers["scene"].get("friction") or {}).get("mu", 0.0)
+            contact_figure(path, self._contact(), mu, points.band_mm, half_width)
+            return Picture(path.read_bytes())
+
+    def to_pyvista(self, step: int | None = None) -> pyvista.UnstructuredGrid:
+        """Return the finger at rest with its fields; ``warp_by_vector("displacement")`` deforms it.
+
+        Parameters
+        ----------
+        step : number of a step that steps.npz holds (from 1); None: the last good one, with strain and stress
+        """
+        return grid(self.out, step)
+
+    def _contact(self) -> dict[str, Any]:
+        frames = self.history.frames
+        if not frames:
+            raise Finger3dError(f"{self.out}: no step was finished, so there is no contact to show")
+        last = next((f for f in reversed(frames) if f.outcome.ok), frames[-1])
+        return contact_table(self.history.points, last.state)
+
+    def __repr__(self) -> str:
+        """One line: title, outcome, force and depth of the last good step."""
+        return f"<PressResult {self._title}: {self._said()}>"
+
+    @property
+    def _title(self) -> str:
+        from finger3d.results.summary import title_of
+
+        return title_of(self._numbers["scene"])
+
+    def _good(self) -> list[dict[str, Any]]:
+        return [step for step in self._numbers["steps"] if step["outcome"] == "converged"]
+
+    def _said(self) -> str:
+        good = self._good()
+        last = f", {good[-1]['normal_force_N']:.5g} N at {good[-1]['depth_mm']:.4g} mm" if good else ""
+        return f"{self.outcome}, {len(good)} steps{last}"
+
+    def _repr_html_(self) -> str:
+        from finger3d._notebook import card
+        from finger3d.report.build import number
+        from finger3d.report.press import headline
+        from finger3d.results.summary import errors_of
+
+        good = self._good()
+        rows = [
+            (row.name, f"{number(row.value, row.error)} {row.unit}".strip())
+            for row in (headline(good[-1], errors_of(self._numbers)) if good else ())
+        ]
+        return card(self._title, self._said(), rows, self._numbers["warnings"], self._numbers["advice"])

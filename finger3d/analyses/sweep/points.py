@@ -1,0 +1,195 @@
+"""The points of a sweep: every combination of the values, each a checked scene, before anything is solved."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from finger3d.analyses.shared_body import Variant, body_key, finest
+from finger3d.errors import Finger3dError
+from finger3d.mechanics.model import MeshOptions
+from finger3d.scene import Scene, parse, tree
+from finger3d.scene import files as bodies
+from finger3d.scene.messages import listed, nearest, shown
+
+MOST = 100_000
+"""Points of one sweep; every one is checked before the first is pressed, which takes some 5 to 20 ms."""
+
+_EXAMPLE = "--vary friction.mu=0.06,0.25,1"
+
+
+@dataclass(frozen=True)
+class Vary:
+    """A key of the scene and the values it takes, as texts in TOML."""
+
+    key: str
+    texts: tuple[str, ...]
+
+    @classmethod
+    def of(cls, text: str) -> Vary:
+        """From ``KEY=VALUE,VALUE``; commas within brackets and quotes belong to a value."""
+        key, equals, values = text.partition("=")
+        key = key.strip()
+        if not equals or not key:
+            raise Finger3dError(f"--vary {shown(text)}: must be KEY=VALUE,VALUE,..., for instance {_EXAMPLE}")
+        texts = tuple(part.strip() for part in _split(values))
+        if not all(texts):
+            raise Finger3dError(f"--vary {key}: a value is empty; give values and commas, for instance {_EXAMPLE}")
+        twice = next((t for i, t in enumerate(texts) if t in texts[:i]), None)
+        if twice is not None:
+            raise Finger3dError(f"--vary {key}: the value {shown(twice)} is given twice; leave one out")
+        return cls(key, texts)
+
+    @property
+    def values(self) -> tuple[Any, ...]:
+        """The values as the scene reads them."""
+        return tuple(tree.parsed(text) for text in self.texts)
+
+
+def _split(values: str) -> list[str]:
+    parts, depth, quote = [""], 0, ""
+    for sign in values:
+        if quote:
+            quote = "" if sign == quote else quote
+        elif sign in "\"'":
+            quote = sign
+        else:
+            depth += (sign in "[{") - (sign in "]}")
+        if sign == "," and depth == 0 and not quote:
+            parts.append("")
+        else:
+            parts[-1] += sign
+    return parts
+
+
+def varied(texts: Iterable[str]) -> tuple[Vary, ...]:
+    """What ``--vary`` says; no key twice."""
+    found = tuple(Vary.of(text) for text in texts)
+    if not found:
+        raise Finger3dError(f"sweep: nothing varies; give at least one key, for instance {_EXAMPLE}")
+    keys = [v.key for v in found]
+    for i, key in enumerate(keys):
+        if key in keys[:i]:
+            raise Finger3dError(f"--vary {key}: given twice; put all its values into one list")
+    return found
+
+
+def numbered(key: str, given: Mapping[str, Any], option: str) -> str:
+    """The key with a gauge's name replaced by its number: ``gauge.g36.x_mm`` is ``gauge.0.x_mm``."""
+    parts = key.split(".")
+    gauges = given.get("gauge", ())
+    if parts[0] != "gauge" or len(parts) < 3 or parts[1].isdecimal() or not isinstance(gauges, tuple | list):
+        return key
+    names = [str(g.get("name")) for g in gauges if isinstance(g, Mapping)]
+    if parts[1] not in names:
+        near = nearest(parts[1], names)
+        hint = f'did you mean "{near}"? ' if near else ""
+        known = f"must be {listed(names)}, or its number from 0" if names else "the scene has no [[gauge]]"
+        raise Finger3dError(f"{option} {key}: no gauge {shown(parts[1])}; {hint}{known}")
+    return ".".join(["gauge", str(names.index(parts[1])), *parts[2:]])
+
+
+@dataclass(frozen=True)
+class Point:
+    """One combination.
+
+    Attributes
+    ----------
+    number : from 0, the last key varying fastest
+    values : by key, as the scene reads them
+    body : key of its body
+    variant : what it is of that body
+    """
+
+    number: int
+    values: dict[str, Any]
+    body: str
+    variant: Variant
+
+
+@dataclass(frozen=True)
+class Body:
+    """What a worker is sent to build a body: a scene of the family, and the mesh that all share."""
+
+    given: Mapping[str, Any]
+    mesh: MeshOptions
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """All points, and the bodies they share.
+
+    Attributes
+    ----------
+    given : the scene that is varied, as written, overrides included, paths absolute
+    """
+
+    given: Mapping[str, Any]
+    vary: tuple[Vary, ...]
+    points: tuple[Point, ...]
+    bodies: dict[str, Body]
+    title: str
+
+    def identity(self) -> dict[str, Any]:
+        """What makes two sweeps the same; bodies stand for the contents of files too."""
+        return {
+            "scene": tree.plain(self.given),
+            "vary": {v.key: list(v.texts) for v in self.vary},
+            "points": len(self.points),
+            "bodies": list(self.bodies),
+        }
+
+
+def combinations(
+    path: Path,
+    overrides: Sequence[str],
+    texts: Sequence[str],
+    say: Callable[[int, int], None] = lambda done, total: None,
+) -> Sweep:
+    """Read a scene and check every point of a sweep.
+
+    Parameters
+    ----------
+    overrides : as for ``--set``
+    texts : as for ``--vary``, such as ``friction.mu=0.06,0.25,1``
+    say : told how many points are checked
+
+    Raises
+    ------
+    Finger3dError
+        For the first mistake, in one line that names the key and the value.
+    """
+    vary = varied(texts)
+    count = math.prod(len(v.texts) for v in vary)
+    if count > MOST:
+        raise Finger3dError(f"--vary: {count} combinations; at most {MOST} in one sweep, split it")
+    base = tree.override(tree.read(path), overrides)
+    keys = [numbered(v.key, base, "--vary") for v in vary]
+    if len(set(keys)) < len(keys):
+        both = next(v.key for i, v in enumerate(vary) if keys[i] in keys[:i])
+        raise Finger3dError(f"--vary {both}: given twice; put all its values into one list")
+    options = {o.partition("=")[0].strip(): "--set" for o in overrides} | dict.fromkeys(keys, "--vary")
+    scenes: list[Scene] = []
+    for texts_here in itertools.product(*(v.texts for v in vary)):
+        changes = [f"{key}={text}" for key, text in zip(keys, texts_here, strict=True)]
+        scene = parse(tree.override(base, changes, "--vary"), path=path, set_keys=options)
+        if scene.tables.mesh.tolerance is not None:
+            raise Finger3dError(
+                f"{path}: mesh.tolerance chooses a mesh for one press; give a sweep mesh.size_mm, for instance what "
+                "finger3d press has chosen, in its summary.json"
+            )
+        scenes.append(scene)
+        say(len(scenes), count)
+    values = itertools.product(*(v.values for v in vary))
+    points, members = [], dict[str, list[Scene]]()
+    for number, (scene, here) in enumerate(zip(scenes, values, strict=True)):
+        body = body_key(scene)
+        members.setdefault(body, []).append(scene)
+        named = {v.key: value for v, value in zip(vary, here, strict=True)}
+        points.append(Point(number, named, body, Variant.of(scene.model())))
+    shared = {key: Body(s[0].given, finest([m.model() for m in s])) for key, s in members.items()}
+    return Sweep(bodies.absolute(base, path), vary, tuple(points), shared, scenes[0].title)

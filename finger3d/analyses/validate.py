@@ -1,0 +1,363 @@
+"""Studies: one question each, put to the code and judged against a reference; and the index of their verdicts.
+
+A study is a file validation/<name>.py: its docstring is the question and the source, ``run(quick) -> Result`` the
+answer.  Results are kept as tables in validation/results/, and the index is made from those.
+"""
+
+from __future__ import annotations
+
+import ast
+import csv
+import hashlib
+import importlib
+import json
+import math
+import re
+import sys
+import time
+import types
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any, Literal
+
+from numpy.typing import ArrayLike
+
+from finger3d.errors import Finger3dError, MissingError
+from finger3d.io import atomic, write_csv, write_json
+from finger3d.progress import Report
+
+Kind = Literal["verification", "validation", "sensitivity", "statement"]
+Measure = Literal["relative", "absolute", "at most", "at least"]
+
+_COLUMNS = ("what", "kind", "reference", "wanted", "got", "measure", "error", "tolerance", "reason", "verdict")
+_NO_NUMBERS = ("cli/*", "plotting/*", "report/*", "__main__.py", "_lazy.py", "_notebook.py", "progress.py")
+"""Files of the package that only draw, write pages, report progress or parse commands. A change of any other one makes
+the results of all studies old."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One number, judged.
+
+    Attributes
+    ----------
+    what : what was measured, with its unit
+    reference : page, formula or code that `wanted` comes from
+    tolerance, reason : largest error that passes, and why that much is right
+    kind : of a statement it is told whether it holds; that it does not is a finding, and fails nothing
+    measure : what the error is: |got - wanted| over |wanted|, or as it is, or how far `got` is beyond a bound `wanted`
+    """
+
+    what: str
+    reference: str
+    wanted: float
+    got: float
+    tolerance: float
+    reason: str
+    kind: Kind = "verification"
+    measure: Measure = "relative"
+
+    @property
+    def error(self) -> float:
+        """The error in the sense of `measure`; never negative."""
+        away = self.got - self.wanted
+        if self.measure == "relative":
+            return abs(away) / abs(self.wanted)
+        # in this order max hands NaN on; adding 0 turns -0.0 into 0.0
+        return {"absolute": abs(away), "at most": max(away, 0.0), "at least": max(-away, 0.0) + 0.0}[self.measure]
+
+    @property
+    def within(self) -> bool:
+        """Whether the error is within the tolerance; never for NaN."""
+        return self.error <= self.tolerance
+
+    @property
+    def passed(self) -> bool:
+        """Whether the study may stand: the error is within the tolerance, or a statement was measured at all."""
+        return self.within or (self.kind == "statement" and math.isfinite(self.error))
+
+    @property
+    def verdict(self) -> str:
+        """One or two words."""
+        if self.kind == "statement" and self.passed:
+            return "holds" if self.within else "does not hold"
+        return "pass" if self.passed else "FAIL"
+
+    def columns(self) -> dict[str, Any]:
+        """The row as it is kept."""
+        return {k: getattr(self, k) for k in _COLUMNS}
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a study found: judged numbers, a table of all else worth keeping, and a drawing on a matplotlib Figure."""
+
+    rows: tuple[Row, ...]
+    table: Mapping[str, ArrayLike] | None = None
+    figure: Callable[[Any], None] | None = None
+
+    @property
+    def passed(self) -> bool:
+        """Whether every row passes."""
+        return all(row.passed for row in self.rows)
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study by its file, not yet imported."""
+
+    name: str
+    path: Path
+
+    @property
+    def question(self) -> str:
+        """First paragraph of the file's docstring, on one line."""
+        text = ast.get_docstring(ast.parse(self.path.read_text(encoding="utf-8"))) or ""
+        return " ".join(text.split("\n\n")[0].split())
+
+    @property
+    def by_name(self) -> bool:
+        """Whether it runs only when it is named, in full: it times this machine, and says so by ``BY_NAME = True``."""
+        return bool(re.search(r"^BY_NAME = True$", self.path.read_text(encoding="utf-8"), flags=re.MULTILINE))
+
+    def run(self, quick: bool) -> Result:
+        """Import the file and answer its question."""
+        package = types.ModuleType("finger3d_validation")
+        package.__path__ = [str(self.path.parent)]
+        known = sys.modules.setdefault(package.__name__, package)
+        if list(known.__path__) != list(package.__path__):
+            sys.modules[package.__name__] = package
+            sys.modules.pop(f"{package.__name__}.{self.name}", None)
+        result: Result = importlib.import_module(f"{package.__name__}.{self.name}").run(quick)
+        return result
+
+    def stamp(self) -> str:
+        """Hash of the sources that shape the study's numbers."""
+        package = Path(__file__).resolve().parents[1]
+        folders = (package / "geometries", package.parent / "geometries")
+        scenes = [p for f in folders for suffix in ("py", "toml", "stl") for p in sorted(f.glob(f"*.{suffix}"))]
+        digest = hashlib.sha256()
+        for path in [*sources(package), *scenes, *_with_helpers(self.path)]:
+            digest.update(path.read_bytes())
+        return digest.hexdigest()[:16]
+
+
+def sources(package: Path) -> list[Path]:
+    """Return the Python files of a package that can change a study's numbers: all but those that only draw or tell."""
+
+    def counts(path: Path) -> bool:
+        name = path.relative_to(package).as_posix()
+        return not any(fnmatchcase(name, pattern) for pattern in _NO_NUMBERS)
+
+    return [path for path in sorted(package.rglob("*.py")) if counts(path) and "geometries" not in path.parts]
+
+
+def _with_helpers(path: Path) -> list[Path]:
+    """A study's file and those beside it that it imports (``from ._name import``), and those that these import."""
+    found = [path]
+    for file in found:
+        names = re.findall(r"^from \.(\w+) import", file.read_text(encoding="utf-8"), flags=re.MULTILINE)
+        found += [p for n in names if (p := path.with_name(f"{n}.py")) not in found and p.is_file()]
+    return found
+
+
+def studies(folder: Path | None = None) -> dict[str, Study]:
+    """Studies by name; validation/ of the checkout unless another folder is given."""
+    where = folder or Path(__file__).resolve().parents[2] / "validation"
+    found = {p.stem: Study(p.stem, p) for p in sorted(where.glob("[a-z]*.py"))}
+    if not found:
+        raise MissingError(
+            f"{where}: no studies there; an installed finger3d has none, run `finger3d validate` from a checkout"
+        )
+    return found
+
+
+def chosen(names: Sequence[str], known: Mapping[str, Study], quick: bool = False) -> list[Study]:
+    """The studies of these names; without names all, in full less those that run only by name.
+
+    Raises
+    ------
+    Finger3dError
+        For a name that is unknown, with the nearest one.
+    """
+    from difflib import get_close_matches
+
+    for name in names:
+        if name not in known:
+            near = get_close_matches(name, known, n=1, cutoff=0.0)
+            raise Finger3dError(f"validate: no study {name!r}; did you mean {near[0]!r}? known: {', '.join(known)}")
+    if not names:
+        return [study for study in known.values() if quick or not study.by_name]
+    return [known[name] for name in dict.fromkeys(names)]
+
+
+def validate(
+    selected: Sequence[Study],
+    quick: bool,
+    out: Path,
+    report: Report | None = None,
+    resume: bool = False,
+    known: Mapping[str, Study] | None = None,
+) -> dict[str, tuple[Row, ...]]:
+    """Run studies and keep their results as they come.
+
+    Parameters
+    ----------
+    quick : small meshes and few steps
+    out : folder for results/ and figures/; with `known` given also for README.md, the index of all results there
+    report : told about every study
+    resume : leave out studies whose results in `out` were made by the sources as they are now
+
+    Returns
+    -------
+    dict
+        Rows by study, of those that ran and those left out.
+    """
+    report = report or Report()
+    found: dict[str, tuple[Row, ...]] = {}
+    for done, study in enumerate(selected, start=1):
+        stamp = study.stamp()
+        kept = _about(out, study).get("stamp") if resume else None
+        if kept == stamp:
+            found[study.name] = kept_rows(out, study)
+            remark = "up to date"
+        else:
+            report.stage(study.name)
+            start = time.perf_counter()
+            result = study.run(quick)
+            found[study.name] = result.rows
+            _keep(out, study, result, stamp, time.perf_counter() - start)
+            failed = sum(not row.passed for row in result.rows)
+            remark = f"{len(result.rows) - failed} of {len(result.rows)} rows pass, {time.perf_counter() - start:.1f} s"
+        if known is not None:
+            write_index(out, known)
+        report.step(done, len(selected), f"{study.name}: {remark}")
+    return found
+
+
+def _keep(out: Path, study: Study, result: Result, stamp: str, seconds: float) -> None:
+    """Write the files of one study; the stamp last, so that an interruption between files leaves the study undone."""
+    results, about = out / "results", _place(out, study)
+    about.unlink(missing_ok=True)
+    rows = [row.columns() for row in result.rows]
+    write_csv(results / f"{study.name}.csv", {k: [r[k] for r in rows] for k in _COLUMNS})
+    if result.table is not None:
+        write_csv(results / f"{study.name}_table.csv", result.table)
+    if result.figure is not None:
+        draw(result.figure, out / "figures" / f"{study.name}.png")
+    write_json(about, {"question": study.question, "seconds": round(seconds, 1), "stamp": stamp})
+
+
+def draw(figure: Callable[[Any], None], path: Path) -> None:
+    """Let a study draw on a fresh Figure, and save that without a display."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    canvas = FigureCanvasAgg(Figure(figsize=(10.0, 4.5), layout="constrained", dpi=110))
+    figure(canvas.figure)
+    with atomic(path) as temporary:
+        canvas.figure.savefig(temporary)
+
+
+def _place(out: Path, study: Study) -> Path:
+    return out / "results" / f"{study.name}.json"
+
+
+def _about(out: Path, study: Study) -> dict[str, Any]:
+    try:
+        return dict(json.loads(_place(out, study).read_text(encoding="utf-8")))
+    except (OSError, ValueError):
+        return {}
+
+
+def kept_rows(out: Path, study: Study) -> tuple[Row, ...]:
+    """Rows of a study as they were kept; none if it has not run."""
+    path = out / "results" / f"{study.name}.csv"
+    if not path.is_file():
+        return ()
+    with path.open(newline="", encoding="utf-8") as stream:
+        return tuple(map(_row, csv.DictReader(stream)))
+
+
+def _row(kept: Mapping[str, Any]) -> Row:
+    wanted, got, tolerance = (float(kept[k]) for k in ("wanted", "got", "tolerance"))
+    return Row(
+        kept["what"], kept["reference"], wanted, got, tolerance, kept["reason"], kept["kind"], kept["measure"]
+    )  # fmt: skip
+
+
+def number(value: float) -> str:
+    """A number for a reader: four digits, no more zeros than needed."""
+    if not math.isfinite(value) or value == 0.0 or 1e-3 <= abs(value) < 1e5:
+        return f"{value:.5g}"
+    return f"{value:.3e}"
+
+
+def _shown(row: Row) -> list[str]:
+    sign = {"at most": "<= ", "at least": ">= "}.get(row.measure, "")
+    relative = row.measure == "relative"
+    error, tolerance = (f"{100 * v:.2g} %" if relative else number(v) for v in (row.error, row.tolerance))
+    return [
+        row.what, row.kind, row.reference, sign + number(row.wanted), number(row.got), error,
+        f"{tolerance}: {row.reason}", row.verdict if row.passed else "**FAIL**",
+    ]  # fmt: skip
+
+
+def table(found: Mapping[str, Sequence[Row]]) -> list[list[str]]:
+    """Lines of text of all rows: study, what, kind, reference, wanted, got, error, tolerance, verdict."""
+    return [[name, *_shown(row)] for name, rows in found.items() for row in rows]
+
+
+_HEAD = """# What to trust: the verification index
+
+Generated by `finger3d validate` from results/; do not edit.  *Verification*: the equations are solved right, against a
+closed form or an independent computation.  *Validation*: they are the right equations, against a measurement or the
+paper.  *Sensitivity*: how far an answer moves with what is not known.  *Statement*: what the paper says, measured: it
+holds or it does not, and neither fails.  The error is relative to what was wanted unless
+that is a bound or the error is a plain number.  To rebuild everything: `finger3d validate`; one study:
+`finger3d validate NAME`.
+"""
+
+
+def write_index(out: Path, known: Mapping[str, Study]) -> None:
+    """Write README.md from the results that are kept in `out`."""
+    lines = [_HEAD]
+    kept = {name: kept_rows(out, study) for name, study in known.items()}
+    seconds = sum(_about(out, study).get("seconds", 0.0) for study in known.values() if not study.by_name)
+    timed = [name for name, study in known.items() if study.by_name]
+    total = _score([row for rows in kept.values() for row in rows])
+    missing = [name for name, rows in kept.items() if not rows]
+    lines.append(f"{total}; {len(kept) - len(missing)} studies, {seconds / 60.0:.1f} minutes.")
+    if timed:
+        lines.append(f"Not in these minutes, as they time the machine and run only by name: {', '.join(timed)}.")
+    if missing:
+        lines.append(f"Not run yet: {', '.join(missing)}.")
+    lines += ["", "| study | question | found | seconds |", "|---|---|---|---|"]
+    for name, rows in kept.items():
+        if rows:
+            about = _about(out, known[name])
+            picture = f", [figure](figures/{name}.png)" if (out / "figures" / f"{name}.png").is_file() else ""
+            more = f", [table](results/{name}_table.csv)" if (out / "results" / f"{name}_table.csv").is_file() else ""
+            links = f"[{name}]({name}.py){picture}{more}"
+            lines.append(f"| {links} | {_cell(known[name].question)} | {_score(rows)} | {about.get('seconds', '')} |")
+    lines += ["", "| study | what | kind | reference | wanted | got | error | tolerance and its reason | verdict |"]
+    lines.append("|---|---|---|---|---|---|---|---|---|")
+    lines += ["| " + " | ".join(map(_cell, line)) + " |" for line in table(kept)]
+    with atomic(out / "README.md") as temporary:
+        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _score(rows: Sequence[Row]) -> str:
+    """How many rows pass, and apart from them how many of the paper's statements hold."""
+    judged = [row for row in rows if row.kind != "statement"]
+    said = [row for row in rows if row.kind == "statement"]
+    parts = [f"{sum(row.passed for row in judged)} of {len(judged)} rows pass"] if judged or not said else []
+    if said:
+        parts.append(f"{sum(row.within for row in said)} of {len(said)} statements hold")
+    return ", ".join(parts)
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")

@@ -1,0 +1,25 @@
+"""completion: a script for the shell."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from finger3d.cli.common import app
+
+
+@app.command
+def completion(shell: Literal["bash", "zsh", "fish"], /) -> int:
+    """Print a script that lets a shell complete commands and options.
+
+    For bash, add the line of the example to ~/.bashrc. For zsh, write the script to a file _finger3d in a folder of
+    $fpath; for fish, to ~/.config/fish/completions/finger3d.fish.
+
+    Example: source <(finger3d completion bash)
+
+    Parameters
+    ----------
+    shell
+        The shell.
+    """
+    print(app.generate_completion(shell=shell), end="")
+    return 0

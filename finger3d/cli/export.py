@@ -1,0 +1,67 @@
+"""export: files to print, to pour, and for other CAD."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from finger3d.cli.common import Json, Set, app, check_folder, complain, load, print_json, print_rows, reporting
+from finger3d.errors import Finger3dError
+from finger3d.mold.options import MoldOptions
+
+
+@app.command
+def export(
+    scene: Path,
+    /,
+    *,
+    out: Annotated[Path, Parameter(help="Folder for the files.")],
+    mold: Annotated[bool, Parameter(negative=(), help="Also a printable mold: two halves and a lid.")] = False,
+    ascii_: Annotated[bool, Parameter(name="--ascii", negative=(), help="STL as text instead of binary.")] = False,
+    tolerance_mm: Annotated[float, Parameter(help="Largest distance of triangles from the surface.")] = 0.05,
+    options: Annotated[MoldOptions | None, Parameter(name="*", group="Mold (with --mold)")] = None,
+    set_: Set = None,
+    json_: Json = False,
+) -> int:
+    """Write the finger as STEP and STL, and with --mold everything to cast it: parts, plate, sheet, picture.
+
+    Example: finger3d export scene.toml --out print --mold --shrinkage 0.001 --bed 180x180x180
+
+    Parameters
+    ----------
+    scene
+        The scene file (TOML).
+    """
+    chosen = options or MoldOptions()
+    if not mold and chosen != MoldOptions():
+        raise Finger3dError("export: options of a mold are given without --mold; add it, or take them out")
+    loaded = load(scene, set_)
+    check_folder(out)
+    from finger3d.mold.export import export as run
+
+    report, aside = reporting(json_)
+    try:
+        with aside, report:
+            done = run(loaded, out, chosen if mold else None, ascii_, tolerance_mm, report)
+    except KeyboardInterrupt:
+        complain(f"interrupted; the files that are in {out} are whole")
+        return 130
+    if json_:
+        print_json({"results": out, **asdict(done)})
+        return 0
+    off = done.stl_volume_mm3 / done.volume_mm3 - 1.0
+    rows = [
+        ("volume", f"{done.volume_mm3:.6g} mm3; finger.stl {off:+.1e} of it"),
+        ("tolerance", f"{done.tolerance_mm:.3g} mm"),
+    ]
+    if done.silicone_ml is not None:
+        rows.append(("silicone", f"{done.silicone_ml:.1f} ml in the cavity; see sheet.txt"))
+    rows.append(("results", str(out)))
+    rows += [("", file.name) for file in done.files]
+    print_rows(loaded.title, rows)
+    for text in done.remarks:
+        print(f"remark: {text}")
+    return 0

@@ -1,0 +1,42 @@
+"""info: versions, machine and folders."""
+
+from __future__ import annotations
+
+from finger3d.cli.common import Json, app, print_json, print_rows
+
+
+@app.command
+def info(*, json_: Json = False) -> int:
+    """Print versions, machine and folders: what a bug report needs.
+
+    Example: finger3d info --json
+    """
+    import platform
+
+    from finger3d._machine import cores, memory_bytes, versions
+    from finger3d.fem import pardiso
+    from finger3d.meshing.cache import folder
+
+    memory = memory_bytes()
+    if json_:
+        machine = {
+            "platform": platform.platform(),
+            "cores": cores(),
+            "memory_bytes": memory[0] if memory else None,
+            "mesh_cache": folder(),
+            "pardiso": pardiso.available(),
+        }
+        print_json({"versions": versions(), "machine": machine})
+        return 0
+    print_rows("versions", versions().items())
+    print_rows(
+        "machine",
+        [
+            ("platform", platform.platform()),
+            ("cores", cores()),
+            ("memory", f"{memory[0] / 1e9:.1f} GB" if memory else "unknown"),
+            ("mesh cache", folder()),
+            ("PARDISO", "available" if pardiso.available() else "not available; SuperLU is used, which is slower"),
+        ],
+    )
+    return 0

@@ -1,0 +1,32 @@
+"""new: a commented scene to start from."""
+
+from __future__ import annotations
+
+from importlib import resources
+from pathlib import Path
+
+from finger3d.cli.common import app
+from finger3d.errors import Finger3dError
+
+
+@app.command
+def new(file: Path = Path("scene.toml"), /) -> int:
+    """Write a commented scene to start from: the paper's Fig. 9 finger.
+
+    Example: finger3d new my_scene.toml
+
+    Parameters
+    ----------
+    file
+        Where to write; a file that is there already is left alone.
+    """
+    text = resources.files("finger3d").joinpath("new_scene.toml").read_text(encoding="utf-8")
+    try:
+        with file.open("x", encoding="utf-8") as stream:
+            stream.write(text.replace("scene.toml", str(file)))
+    except FileExistsError:
+        raise Finger3dError(f"{file}: there already; give another name") from None
+    except OSError as error:
+        raise Finger3dError(f"{file}: cannot be written: {error.strerror}") from None
+    print(f"{file} written; next: finger3d press {file} --out out")
+    return 0

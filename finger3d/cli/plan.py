@@ -1,0 +1,56 @@
+"""plan: what solving a scene will take."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from finger3d.cli.common import Json, Set, app, load, print_json, print_rows
+
+if TYPE_CHECKING:
+    from finger3d.scene import Scene
+
+
+@app.command
+def plan(scene: Path, /, *, set_: Set = None, json_: Json = False) -> int:
+    """Tell which effects are on, how large the model is, and what time and memory it will take; solve nothing.
+
+    Example: finger3d plan scene.toml --set mesh.size_mm=1
+
+    Parameters
+    ----------
+    scene
+        The scene file (TOML).
+    """
+    loaded = load(scene, set_)
+    from finger3d.accuracy.cost import forecast
+    from finger3d.mechanics.resolution import foreseen
+    from finger3d.mechanics.solve import symmetry
+
+    model = loaded.model()
+    expected, warnings = forecast(model), foreseen(model, symmetry(model))
+    if loaded.tables.mesh.tolerance is not None:
+        expected = {"mesh": f"the first of those refined to tolerance = {loaded.tables.mesh.tolerance:g}"} | expected
+    if json_:
+        print_json(
+            {"title": loaded.title, "effects": loaded.as_dict()["effects"], "forecast": expected, "warnings": warnings}
+        )
+        return 0
+    print_rows("effects", effect_rows(loaded))
+    print_rows(loaded.title, [(key.replace("_", " "), value) for key, value in expected.items()])
+    for text in warnings:
+        print(f"warning: {text}")
+    return 0
+
+
+def effect_rows(scene: Scene) -> list[tuple[str, str]]:
+    """Return each known effect with why it is on or off."""
+    from finger3d.scene.registry import effect_names
+
+    def why(name: str) -> str:
+        if name not in scene.effects:
+            return f"off: the scene has no [effects.{name}]"
+        settings = ", ".join(f"{k} = {v}" for k, v in scene.tables.effects[name].items())
+        return f"on: [effects.{name}] {settings}"
+
+    return [(name, why(name)) for name in effect_names()]

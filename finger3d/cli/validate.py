@@ -1,0 +1,68 @@
+"""validate: run the studies of validation/."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from finger3d.cli.common import Json, app, check_folder, complain, print_columns, print_json, reporting
+from finger3d.errors import Finger3dError, MissingError
+
+
+@app.command
+def validate(
+    studies: Annotated[list[str] | None, Parameter(negative=())] = None,
+    /,
+    *,
+    quick: Annotated[bool, Parameter(negative=())] = False,
+    out: Annotated[Path | None, Parameter(help="Folder for the results instead of validation/.")] = None,
+    json_: Json = False,
+) -> int:
+    """Run studies of validation/: does the code reproduce closed forms, other codes, and the paper?
+
+    Without names all studies run whose results were made by other sources than those that are there now; but those
+    that time the machine (cost_of_accuracy, scaling, beside_calculix) run in full only by name.
+
+    Example: finger3d validate press_line --quick
+
+    Parameters
+    ----------
+    studies
+        Names of studies.
+    quick
+        Small meshes and few steps; the committed results are left alone.
+    """
+    from finger3d.analyses import validate as study
+
+    known = study.studies()
+    selected = study.chosen(studies or [], known, quick)
+    home = next(iter(known.values())).path.parent
+    if quick and out is not None and out.resolve() == home:
+        raise Finger3dError(f"--out {out}: quick results would overwrite the full ones there; name another folder")
+    folder = out or (Path(tempfile.mkdtemp(prefix="finger3d-validate-")) if quick else home)
+    check_folder(folder)
+    report, aside = reporting(json_)
+    try:
+        with aside, report:
+            found = study.validate(selected, quick, folder, report, resume=not studies and not quick, known=known)
+    except KeyboardInterrupt:
+        complain(f"interrupted; {report.steps_done} of {len(selected)} studies are kept in {folder}")
+        return 130
+    if json_:
+        rows = {
+            name: [{**asdict(row), "error": row.error, "passed": row.passed} for row in rows]
+            for name, rows in found.items()
+        }
+        print_json({"results": folder, "studies": rows})
+    else:
+        print_columns("study what kind reference wanted got error tolerance verdict".split(), study.table(found))
+        print(f"results: {folder}")
+    failed = [name for name, rows in found.items() if not all(row.passed for row in rows)]
+    if not failed:
+        return 0
+    complain(f"validate: outside the tolerance: {', '.join(failed)} (see the rows marked FAIL)")
+    return MissingError.exit_code

@@ -1,0 +1,151 @@
+"""Contact of a surface in its deformed place: gaps as means over the deformed area, and their derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from finger3d.fem.traces import Surface
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class DeformedContact:
+    """Contact of a face in a deformed place.
+
+    Attributes
+    ----------
+    gap : (c,) mm
+    rows : (c d, n d) displacement of every point along its directions
+    frames : (c, d, d)
+    growth : (q,) deformed over initial area at the face's samples
+    approach, spread : (q, n d) derivatives of the gap and of `growth` at the samples
+    seen : (q,) mm, gap at the samples
+    bend : (q,) weights -> (n d, n d), the weighted sum of the second derivatives of `growth`
+    """
+
+    gap: Float
+    rows: sp.csr_matrix
+    frames: Float
+    growth: Float
+    approach: sp.csr_matrix
+    spread: sp.csr_matrix
+    seen: Float
+    bend: Callable[[Float], sp.csr_matrix]
+
+    def softening(self, face: Surface, force: Float) -> sp.csr_matrix:
+        """Second derivative (n d, n d) of the gaps under normal forces (c,) N; what the moving area takes from K.
+
+        The pressure acts on the deformed area, without which the surface's own pressure would push its middle nodes
+        along it: from pressures of a few G on, K would lose its definiteness there.
+        """
+        per_area = sp.diags_array(force / (face.average @ self.growth))
+        pressure = sp.diags_array(face.average.T @ per_area.diagonal())
+        normal = self.rows[:: self.frames.shape[1]]
+        half = self.approach.T @ pressure @ self.spread - normal.T @ per_area @ face.average @ self.spread
+        uneven = self.seen * pressure.diagonal() - face.average.T @ (per_area @ self.gap)
+        return sp.csr_matrix(half + half.T + self.bend(uneven))
+
+
+def deformed_contact(
+    face: Surface, moved: tuple[Float, Float], seen: tuple[Float, Float], axes: tuple[str, ...]
+) -> DeformedContact:
+    """Contact of a face with something seen from its samples.
+
+    Parameters
+    ----------
+    moved : nodes at rest and their displacement, (n, d) mm
+    seen : gap (q,) mm at the samples, and unit normals (q, d) into the body along which it is measured
+    axes : symmetry planes, on which directions do not lean out
+    """
+    (points, u), (sampled, normal) = moved, seen
+    d = u.shape[1]
+    growth, spread, bend = _growth(face, points, u)
+    size = face.average @ growth
+    mean = (face.average @ (normal * growth[:, None])) / size[:, None]
+    gap = (face.average @ (sampled * growth)) / size
+    for axis in axes:
+        k = "xyz".index(axis)
+        mean[face.points[:, k] == 0.0, k] = 0.0
+    frames = _frames(mean)
+    approach = _rows([sp.diags_array(normal[:, k]) @ face.interpolate for k in range(d)])
+    # d(mean gap) = mean of d(gap) and of (gap - mean gap) d(area)
+    weight = sp.diags_array(1.0 / size) @ face.average
+    uneven = weight @ sp.diags_array(sampled) - sp.diags_array(gap) @ weight
+    blocks = [weight @ sp.diags_array(growth) @ approach + uneven @ spread]
+    blocks += [_rows([sp.diags_array(frames[:, t, k]) @ face.trace for k in range(d)]) for t in range(1, d)]
+    rows = sp.vstack(blocks, format="csr")[np.arange(len(gap) * d).reshape(d, -1).T.ravel()]
+    return DeformedContact(gap, sp.csr_matrix(rows), frames, growth, approach, spread, sampled, bend)
+
+
+def _rows(parts: list[Any]) -> sp.csr_matrix:
+    """Rows (m, n d) on displacements from rows (m, n) on each of their components."""
+    d, n = len(parts), parts[0].shape[1]
+    return sp.csr_matrix(sp.hstack(parts, format="csr")[:, np.arange(n * d).reshape(d, n).T.ravel()])
+
+
+def _growth(face: Surface, points: Float, u: Float) -> tuple[Float, sp.csr_matrix, Callable[[Float], sp.csr_matrix]]:
+    """Deformed over initial area (q,) at the samples, its derivative (q, n d), and weighted sums of its second one."""
+    d = u.shape[1]
+    rest, moved = ([slope @ x for slope in face.along] for x in (points, points + u))
+    if d == 2:
+        vector, initial = moved[0], np.linalg.norm(rest[0], axis=1)
+    else:
+        vector, initial = np.cross(*moved), np.linalg.norm(np.cross(*rest), axis=1)
+    length = np.linalg.norm(vector, axis=1)
+    unit = vector / length[:, None]
+    turned = [unit] if d == 2 else [np.cross(moved[1], unit), np.cross(unit, moved[0])]
+    scaled = [sp.diags_array(1.0 / initial) @ slope for slope in face.along]
+    spread = _rows([sum(sp.diags_array(t[:, k]) @ x for t, x in zip(turned, scaled, strict=True)) for k in range(d)])
+
+    def bend(weights: Float) -> sp.csr_matrix:
+        parts = [_change(face, moved, i) for i in range(d)]
+        stretched = sp.diags_array(weights / (length * initial))
+        total = sum(part.T @ stretched @ part for part in parts)
+        total = total - spread.T @ sp.diags_array(weights * initial / length) @ spread
+        if d == 3:
+            cross = sp.diags_array(weights / initial)
+            for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+                along = cross @ sp.diags_array(unit[:, i])
+                first, second = ([_component(x, axis) for axis in (j, k)] for x in face.along)
+                half = first[0].T @ along @ second[1] - first[1].T @ along @ second[0]
+                total = total + half + half.T
+        return sp.csr_matrix(total)
+
+    return length / initial, spread, bend
+
+
+def _component(rows: sp.csr_matrix, axis: int) -> sp.csr_matrix:
+    """Rows (q, 3 n) on one component of displacements from rows (q, n)."""
+    return sp.csr_matrix(sp.kron(rows, np.eye(3)[[axis]], format="csr"))
+
+
+def _change(face: Surface, moved: list[Float], i: int) -> sp.csr_matrix:
+    """Derivative (q, n d) of component i of the tangent in 2D, of the tangents' cross product in 3D."""
+    d = moved[0].shape[1]
+    if d == 2:
+        return sp.csr_matrix(sp.kron(face.along[0], np.eye(2)[[i]], format="csr"))
+    j, k = (i + 1) % 3, (i + 2) % 3
+    first, second = moved
+    return sp.csr_matrix(
+        sp.diags_array(second[:, k]) @ _component(face.along[0], j)
+        - sp.diags_array(second[:, j]) @ _component(face.along[0], k)
+        + sp.diags_array(first[:, j]) @ _component(face.along[1], k)
+        - sp.diags_array(first[:, k]) @ _component(face.along[1], j)
+    )
+
+
+def _frames(normal: Float) -> Float:
+    """Directions (c, d, d) with the given normals (c, d): the first tangent is +x laid into the plane."""
+    d = normal.shape[1]
+    n = normal / np.linalg.norm(normal, axis=1)[:, None]
+    along = np.eye(d)[0] - n[:, :1] * n
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    rows = [n, along] if d == 2 else [n, along, np.cross(n, along)]
+    return np.stack(rows, axis=1)

@@ -1,0 +1,86 @@
+"""Quality of simplex meshes: angles, curved volume, curved Jacobians."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.fem.simplex import EDGES, FACETS, Mesh
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+_NODES = {  # reference coordinates of the nodes of a quadratic simplex
+    d: np.vstack([v := np.vstack([np.zeros(d), np.eye(d)]), v[EDGES[d]].mean(axis=1)]) for d in (2, 3)
+}
+# Exact for the Jacobian determinant of a quadratic simplex: degree 2 in the plane, degree 3 in space (Keast, 5 points).
+_A, _B = 1.0 / 6.0, 0.5
+_RULE = {
+    2: (np.array([[_A, _A], [4 * _A, _A], [_A, 4 * _A]]), np.full(3, 1.0 / 6.0)),
+    3: (
+        np.array([[0.25] * 3, [_A, _A, _A], [_B, _A, _A], [_A, _B, _A], [_A, _A, _B]]),
+        np.array([-2.0 / 15.0] + [3.0 / 40.0] * 4),
+    ),
+}
+
+
+def _gradients(at: Float) -> Float:
+    """Gradients (q, k, d) of the quadratic shape functions at reference points (q, d)."""
+    d = at.shape[1]
+    bary = np.hstack([1.0 - at.sum(axis=1, keepdims=True), at])
+    slope = np.vstack([-np.ones(d), np.eye(d)])
+    corners = (4.0 * bary - 1.0)[:, :, None] * slope
+    i, j = EDGES[d].T
+    mids = 4.0 * (bary[:, i, None] * slope[j] + bary[:, j, None] * slope[i])
+    return np.concatenate([corners, mids], axis=1)
+
+
+def _determinants(mesh: Mesh, at: Float) -> Float:
+    """Jacobian determinants (q, e) of a quadratic mesh at reference points (q, d)."""
+    nodes = mesh.points[mesh.cells]
+    out = np.empty((len(at), len(nodes)))
+    for q, gradient in enumerate(_gradients(at)):
+        j = np.einsum("ekx,kr->exr", nodes, gradient, optimize=True)
+        if mesh.dim == 2:
+            out[q] = j[:, 0, 0] * j[:, 1, 1] - j[:, 0, 1] * j[:, 1, 0]
+        else:
+            out[q] = np.einsum("ex,ex->e", np.cross(j[:, :, 0], j[:, :, 1]), j[:, :, 2])
+    return out
+
+
+def curved_volume(mesh: Mesh) -> float:
+    """Volume (area in 2D) of a quadratic mesh, mm^d."""
+    at, weights = _RULE[mesh.dim]
+    return float((weights @ _determinants(mesh, at)).sum())
+
+
+def curved_jacobians(mesh: Mesh) -> Float:
+    """Smallest Jacobian determinant (e,) over the nodes and the centre of each quadratic cell, mm^d."""
+    d = mesh.dim
+    return _determinants(mesh, np.vstack([_NODES[d], np.full((1, d), 1.0 / (d + 1))])).min(axis=0)
+
+
+def cell_angles_deg(points: Float, cells: Int) -> Float:
+    """Smallest angle (2D) or dihedral angle (3D) (e,) of straight cells, degrees; 0 for a flat or inverted one."""
+    d = points.shape[1]
+    p = points[cells[:, : d + 1]]
+    if d == 2:
+        edge = p[:, [1, 2, 0]] - p
+        back = -edge[:, [2, 0, 1]]
+        sine = edge[..., 0] * back[..., 1] - edge[..., 1] * back[..., 0]
+        angle = np.degrees(np.arctan2(sine, np.einsum("eix,eix->ei", edge, back)))
+        return np.maximum(angle.min(axis=1), 0.0)
+    faces = p[:, FACETS[3]]
+    normal = np.cross(faces[:, :, 1] - faces[:, :, 0], faces[:, :, 2] - faces[:, :, 0])
+    length = np.linalg.norm(normal, axis=2, keepdims=True)
+    normal = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
+    i, j = EDGES[3].T  # faces i and j meet in the edge opposite to i, j: every pair once
+    cosine = -np.einsum("eix,eix->ei", normal[:, i], normal[:, j])
+    angle = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))).min(axis=1)
+    volume = np.einsum("ex,ex->e", p[:, 1] - p[:, 0], np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 0]))
+    return np.where(volume > 0, angle, 0.0)
+
+
+def min_angle_deg(mesh: Mesh) -> float:
+    """Smallest (dihedral) angle of a mesh, degrees."""
+    return float(cell_angles_deg(mesh.points, mesh.cells).min())

@@ -1,0 +1,151 @@
+"""What the contact and the gauges read from a displacement field: weighted traces and strains, as sparse rows.
+
+Contact unknowns live at surface vertices: with phi_i the linear hats, a point's displacement is
+``int phi_i u / int phi_i`` and a nodal force f_i acts as the traction ``f_i phi_i / int phi_i``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from finger3d.errors import Finger3dError
+from finger3d.fem.elements import gradient, quadrature, shape, surface_measure
+from finger3d.fem.simplex import Mesh
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+_SURFACE_DEGREE = 5  # hats times quadratic traces are cubic, curvature adds a little
+_INSIDE = -1e-8
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Contact points of a boundary.
+
+    Attributes
+    ----------
+    nodes : (c,) vertex numbers
+    points : (c, d) mm, at rest
+    area : (c,) mm2
+        Integral of the hat: a nodal force over it is the nodal pressure.
+    trace : (c, n)
+        Weighted displacement of a point = trace @ u.
+    samples : (q, d) mm, quadrature points on the boundary at rest
+    average : (c, q)
+        Weighted mean at a point of anything sampled at `samples`.
+    interpolate : (q, n)
+        Value of a nodal field at `samples`.
+    along : d - 1 times (q, n)
+        Its derivatives along the axes of the facets' reference simplex at `samples`.
+    """
+
+    nodes: Int
+    points: Float
+    area: Float
+    trace: sp.csr_matrix
+    samples: Float
+    average: sp.csr_matrix
+    interpolate: sp.csr_matrix
+    along: tuple[sp.csr_matrix, ...] = ()
+
+
+def surface(mesh: Mesh, label: str, thickness: float = 1.0) -> Surface:
+    """Contact points of the boundary `label`; `thickness` (mm) is the width of a 2D section."""
+    d = mesh.dim
+    facets = mesh.facets[label]
+    bary, w = quadrature(d - 1, _SURFACE_DEGREE)
+    coords = mesh.points[facets]
+    weights = surface_measure(coords, bary, mesh.is_quadratic) * (w * thickness)
+    psi, phi = shape(bary, mesh.is_quadratic), shape(bary, False)
+    corners = facets[:, :d]
+    nodes, number = np.unique(corners, return_inverse=True)
+    number = number.reshape(corners.shape)
+    samples = np.einsum("qk,mkd->mqd", psi, coords).reshape(-1, d)
+    hat = weights[:, :, None] * phi  # (m, q, corner)
+    m, q = weights.shape
+    area: Float = np.bincount(number.ravel(), hat.sum(axis=1).ravel(), minlength=len(nodes)).astype(np.float64)
+    which = np.broadcast_to(number[:, None, :], hat.shape)
+    at = np.broadcast_to(np.arange(m * q).reshape(m, q, 1), hat.shape)
+    average = sp.csr_matrix(((hat / area[which]).ravel(), (which.ravel(), at.ravel())), shape=(len(nodes), m * q))
+    spread = np.broadcast_to(facets[:, None, :], (m, q, facets.shape[1]))
+    sample = np.repeat(np.arange(m * q), facets.shape[1])
+
+    def sampled(nodal: Float) -> sp.csr_matrix:
+        data = np.broadcast_to(nodal, spread.shape).ravel()
+        return sp.csr_matrix((data, (sample, spread.ravel())), shape=(m * q, len(mesh.points)))
+
+    values, slopes = sampled(psi), gradient(bary, mesh.is_quadratic)
+    along = tuple(sampled(slopes[:, :, k]) for k in range(d - 1))
+    return Surface(nodes, mesh.points[nodes], area, (average @ values).tocsr(), samples, average, values, along)
+
+
+def restrict(surface: Surface, keep: NDArray[np.bool_] | Int) -> Surface:
+    """The contact points where `keep` (c,) holds, or those of the numbers `keep` in this order."""
+    return replace(
+        surface,
+        nodes=surface.nodes[keep],
+        points=surface.points[keep],
+        area=surface.area[keep],
+        trace=surface.trace[keep],
+        average=surface.average[keep],
+    )
+
+
+def local_rows(surface: Surface, frame: Float) -> sp.csr_matrix:
+    """Rows (c d, n d) that read the points' displacements in the frame (d, d), order point * d + direction."""
+    return sp.kron(surface.trace, frame, format="csr")
+
+
+def locate(mesh: Mesh, point: Float) -> list[tuple[int, Float]]:
+    """Cells that hold a point (d,), with its barycentric coordinates; several on a shared facet, none outside."""
+    d = mesh.dim
+    corners = mesh.points[mesh.cells]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    slack = 0.05 * (high - low).max(axis=1, keepdims=True)
+    near = np.flatnonzero(np.all((low - slack <= point) & (point <= high + slack), axis=1))
+    bary = np.full((len(near), d + 1), 1.0 / (d + 1))
+    for _ in range(8):  # Newton on the isoparametric map, exact at once in a straight cell
+        n = shape(bary, mesh.is_quadratic)
+        g = gradient(bary, mesh.is_quadratic)
+        nodes = corners[near]
+        miss = point - np.einsum("ek,ekd->ed", n, nodes)
+        jacobian = np.einsum("ekD,ekd->eDd", nodes, g)
+        step = np.linalg.solve(jacobian, miss[:, :, None])[:, :, 0]
+        step = np.clip(step, -1.0, 1.0)
+        bary = bary + np.hstack([-step.sum(axis=1, keepdims=True), step])
+    inside = bary.min(axis=1) >= _INSIDE
+    return [(int(cell), b) for cell, b in zip(near[inside], bary[inside], strict=True)]
+
+
+def strain_row(mesh: Mesh, point: Float, direction: Float) -> sp.csr_matrix:
+    """Row (1, n d) of the normal strain at `point` (d,) along a unit `direction` (d,), mean over cells that hold it."""
+    found = _holding(mesh, point)
+    row = np.zeros(mesh.points.shape)
+    for cell, bary in found:
+        nodes = mesh.cells[cell]
+        reference = gradient(bary[None], mesh.is_quadratic)[0]
+        slope = reference @ np.linalg.inv(mesh.points[nodes].T @ reference)
+        np.add.at(row, nodes, np.outer(slope @ direction, direction) / len(found))
+    return sp.csr_matrix(row.reshape(1, -1))
+
+
+def displacement_row(mesh: Mesh, point: Float, direction: Float) -> sp.csr_matrix:
+    """Row (1, n d) of the displacement at `point` (d,) along `direction` (d,)."""
+    found = _holding(mesh, point)
+    row = np.zeros(mesh.points.shape)
+    for cell, bary in found:
+        values = shape(bary[None], mesh.is_quadratic)[0]
+        np.add.at(row, mesh.cells[cell], np.outer(values, direction) / len(found))
+    return sp.csr_matrix(row.reshape(1, -1))
+
+
+def _holding(mesh: Mesh, point: Float) -> list[tuple[int, Float]]:
+    found = locate(mesh, point)
+    if not found:
+        raise Finger3dError(f"gauge: the point {tuple(round(float(x), 6) for x in point)} mm lies outside the body")
+    return found

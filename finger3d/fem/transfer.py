@@ -1,0 +1,80 @@
+"""What points of one surface read from a displacement field on another that lies over them; the two need not match."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from finger3d.fem.elements import gradient, shape
+from finger3d.fem.simplex import Mesh
+from finger3d.fem.traces import Surface
+from finger3d.geometry.surface import Triangles
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+_NEWTON = 6
+_BEYOND = 0.25  # a curved facet's border bulges at most this far, in barycentric coordinates
+_COVERED = 0.5  # least share of a point's hat that must be under the other surface
+
+
+def facing_trace(surface: Surface, mesh: Mesh, label: str) -> sp.csr_matrix:
+    """Weighted mean (c, n) at the points of a surface of what lies straight over it on the facets `label` of a mesh.
+
+    The weights are those of the surface's own trace, so that forces on its points reach the other mesh undiminished:
+    every row sums to 1, or to 0 where less than half of the point's hat has something over it.
+    """
+    values, there = values_over(mesh, label, surface.samples)
+    share = np.asarray(surface.average @ there.astype(float))
+    scale = np.where(share >= _COVERED, 1.0 / np.maximum(share, _COVERED), 0.0)
+    return sp.csr_matrix(sp.diags_array(scale) @ surface.average @ values)
+
+
+def values_over(mesh: Mesh, label: str, places: Float) -> tuple[sp.csr_matrix, NDArray[np.bool_]]:
+    """Rows (q, n) that interpolate a field on the lowest facets over places (q, d), and where there are any."""
+    facets = mesh.facets[label]
+    d = mesh.dim
+    across = [0] if d == 2 else [0, 2]
+    face, bary = _edges_over(mesh.points[facets], places[:, 0]) if d == 2 else _triangles_over(mesh, facets, places)
+    there = face >= 0
+    nodes = mesh.points[facets[face[there]]][:, :, across]
+    bary = _curved(nodes, bary[there], places[there][:, across], mesh.is_quadratic)
+    values = shape(bary, mesh.is_quadratic)
+    row = np.repeat(np.flatnonzero(there), values.shape[1])
+    column = facets[face[there]].ravel()
+    return sp.csr_matrix((values.ravel(), (row, column)), shape=(len(places), len(mesh.points))), there
+
+
+def _triangles_over(mesh: Mesh, facets: Int, places: Float) -> tuple[Int, Float]:
+    return Triangles(mesh.points, facets[:, :3]).hits(places[:, 0], places[:, 2], lowest=True)
+
+
+def _edges_over(coords: Float, x: Float) -> tuple[Int, Float]:
+    """Edge (q,) over every x, -1 for none, and barycentric coordinates (q, 2) on its chord."""
+    start, stop = coords[:, 0, 0], coords[:, 1, 0]
+    low, high = np.minimum(start, stop), np.maximum(start, stop)
+    slack = 1e-12 * float(np.ptp(coords[:, :, 0]))
+    order = np.argsort(low)
+    at = np.clip(np.searchsorted(low[order], x, side="right") - 1, 0, len(low) - 1)
+    face = order[at]
+    t = np.clip((x - start[face]) / (stop - start)[face], 0.0, 1.0)
+    face = np.where((x < low[face] - slack) | (x > high[face] + slack), -1, face)
+    return face, np.stack([1.0 - t, t], axis=1)
+
+
+def _curved(nodes: Float, bary: Float, at: Float, quadratic: bool) -> Float:
+    """Barycentric coordinates on curved facets (q, k, d - 1), seen from below, from those on the straight ones."""
+    if not quadratic or not len(bary):
+        return bary
+    found = bary.copy()
+    for _ in range(_NEWTON):
+        miss = at - np.einsum("qk,qkd->qd", shape(found, True), nodes)
+        jacobian = np.einsum("qkd,qkr->qdr", nodes, gradient(found, True))
+        upright = np.abs(np.linalg.det(jacobian)) > 1e-12 * np.abs(jacobian).max(axis=(1, 2)) ** jacobian.shape[1]
+        step = np.zeros_like(miss)
+        step[upright] = np.linalg.solve(jacobian[upright], miss[upright][:, :, None])[:, :, 0]
+        found = found + np.hstack([-step.sum(axis=1, keepdims=True), step])
+    lost = ~np.isfinite(found).all(axis=1) | (found.min(axis=1) < -_BEYOND)
+    found[lost] = bary[lost]
+    return found

@@ -1,0 +1,1 @@
+"""Shapes: designs, CAD solids, sections and triangulated surfaces."""

@@ -1,0 +1,85 @@
+"""CAD of a design: extruded and cut solids, and the labels of their faces. build123d is imported inside functions."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from finger3d.errors import Finger3dError
+from finger3d.geometry.section import Arc, Section
+
+LABELS = ("contact", "base", "ends", "walls", "symmetry_x", "symmetry_z")
+
+_ON = 1e-7  # mm; CAD's own tolerance
+_UPRIGHT = 1e-6  # a round wall's normal is level but for round-off
+
+
+def extruded(section: Section, width_mm: float, name: str) -> Any:
+    """Extrude the whole section along z from -width/2 to width/2, with labelled faces."""
+    from build123d import Line, Polyline, ThreePointArc, extrude, make_face
+
+    length, edge = section.half_length_mm, section.edge_height_mm
+    if isinstance(section.contact, Arc):
+        # A half cylinder's wall has no height; CAD refuses edges shorter than its tolerance.
+        edges: list[Any] = [ThreePointArc((length, edge), (0.0, section.height_mm), (-length, edge))]
+    else:
+        edges = [Line((length, edge), (-length, edge))]
+    if edge > _ON:
+        edges.append(Polyline((-length, edge), (-length, 0.0), (length, 0.0), (length, edge)))
+    else:
+        edges.append(Line((-length, 0.0), (length, 0.0)))
+    return sound(extrude(make_face(edges), amount=0.5 * width_mm, both=True), name)
+
+
+def sound(shape: Any, name: str) -> Any:
+    """The one valid solid in a shape, or an error; its faces carry labels (see :func:`labelled_faces`)."""
+    solids = shape.solids()
+    if len(solids) != 1 or not solids[0].is_valid or not solids[0].volume > 0.0:
+        raise Finger3dError(
+            f"{name}: CAD made {len(solids)} solids, or an invalid one, of these dimensions; change them"
+        )
+    solid = solids[0]
+    solid.label = name
+    found = {face.label for face in labelled_faces(solid)}
+    if not {"contact", "base"} <= found:
+        raise Finger3dError(f"{name}: the solid has faces {sorted(found)}; it needs a base on y = 0 and a contact face")
+    return solid
+
+
+def labelled_faces(solid: Any) -> list[Any]:
+    """Faces of a solid, each with its `label`, told from its place and normal; y is up, z the width.
+
+    base: plane on y = 0 looking down. ends: planes looking along z. walls: planes looking along x, and whatever looks
+    down. symmetry_x, symmetry_z: the cuts on x = 0, z = 0. contact: the rest.
+    """
+    faces = list(solid.faces())
+    for face in faces:
+        centre = np.array([*face.center()])
+        normal = np.array([*face.normal_at(face.center())])
+        face.label = _label(centre, normal, face.is_planar)
+    return faces
+
+
+def _label(centre: np.ndarray, normal: np.ndarray, planar: Any) -> str:
+    along = int(np.argmax(np.abs(normal)))
+    if planar and abs(normal[along]) > 1.0 - 1e-9:
+        down = normal[along] < 0.0
+        if along == 1:
+            return "base" if down and abs(centre[1]) < _ON else "walls" if down else "contact"
+        cut = down and abs(centre[along]) < _ON
+        return ("symmetry_x" if cut else "walls") if along == 0 else ("symmetry_z" if cut else "ends")
+    return "contact" if normal[1] > _UPRIGHT else "walls"
+
+
+def cut(solid: Any, symmetry: tuple[str, ...]) -> Any:
+    """The part x >= 0 and/or z >= 0 of a solid."""
+    if not symmetry:
+        return solid
+    from build123d import Align, Box
+
+    box = solid.bounding_box()
+    reach = 4.0 * math.dist([*box.min], [*box.max])
+    x, z = (Align.MIN if axis in symmetry else Align.CENTER for axis in ("x", "z"))
+    return sound(solid & Box(reach, reach, reach, align=(x, Align.CENTER, z)), solid.label)

@@ -1,0 +1,201 @@
+"""Bodies given by triangles alone: smooth patches stand for CAD faces, and the creases between them for edges."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.geometry.surface import Triangles
+from finger3d.geometry.surface_checks import mistake
+from finger3d.geometry.tessellate import Body, CadFace
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+_CREASE = math.cos(math.radians(35.0))
+_MOST = 150  # patches; beyond, a texture's patches are taken together by label
+_UP = 1e-3
+_FLAT = 1e-6
+_BENT = math.radians(0.3)  # below, neighbours lie in one plane but for round-off
+_MANY = 2000  # triangles; fTetWild took 3 minutes over 34 000 of them
+_RARE = 0.1  # of a smooth patch's area
+
+
+@dataclass(frozen=True, eq=False)
+class Network:
+    """A closed surface and the patch (m,) that every triangle belongs to."""
+
+    surface: Triangles
+    patch: Int
+
+    @cached_property
+    def _sides(self) -> tuple[Int, Int]:
+        """Edges (e, 2), and the patches (e, 2) on their two sides, the smaller one first."""
+        a, b, edges = _neighbours(self.surface)
+        return edges, np.sort(np.stack([self.patch[a], self.patch[b]], axis=1), axis=1)
+
+    @cached_property
+    def at_point(self) -> list[set[int]]:
+        """Patches that meet in every point."""
+        found: list[set[int]] = [set() for _ in range(len(self.surface.points))]
+        pairs = np.stack([self.surface.faces.ravel(), np.repeat(self.patch, 3)], axis=1)
+        for v, p in np.unique(pairs, axis=0):
+            found[v].add(int(p))
+        return found
+
+    def meeting(self, patches: tuple[int, ...], points: Float) -> Float | None:
+        """The closest points (n, 3) in which all these patches meet; None if they do not meet."""
+        if len(patches) == 2:
+            edges, sides = self._sides
+            shared = edges[np.all(sides == sorted(patches), axis=1)]
+            if len(shared):
+                return _on_segments(points, self.surface.points[shared])
+        corners = [v for v, at in enumerate(self.at_point) if at.issuperset(patches)]
+        if not corners:
+            return None
+        known = self.surface.points[corners]
+        return known[np.argmin(np.linalg.norm(points[:, None] - known, axis=2), axis=1)]
+
+
+def _on_segments(points: Float, segments: Float) -> Float:
+    """Closest points (n, 3) of segments (s, 2, 3)."""
+    out, best = np.zeros_like(points), np.full(len(points), np.inf)
+    for start, stop in segments:
+        along = stop - start
+        t = np.clip((points - start) @ along / max(float(along @ along), 1e-300), 0.0, 1.0)
+        at = start + t[:, None] * along
+        distance = np.linalg.norm(points - at, axis=1)
+        closer = distance < best
+        out[closer], best[closer] = at[closer], distance[closer]
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class Faceted:
+    """One patch of a network, as a surface with a border."""
+
+    network: Network
+    number: int
+
+    @cached_property
+    def triangles(self) -> Triangles:
+        """The patch's own triangles."""
+        return Triangles(self.network.surface.points, self.network.surface.faces[self.network.patch == self.number])
+
+    @cached_property
+    def radius(self) -> float:
+        """A small radius of curvature on the patch, mm: from the angles between neighbours; inf where it is flat."""
+        a, b, edge = _neighbours(self.triangles)
+        angle = np.arccos(np.clip(np.einsum("ij,ij->i", self.triangles.normals[a], self.triangles.normals[b]), -1, 1))
+        bent = (angle > _BENT) & (angle < math.acos(_CREASE))
+        if not bent.any():
+            return math.inf
+        area = np.linalg.norm(self.triangles.area_vectors, axis=1)
+        across = (area[a] + area[b]) / np.linalg.norm(
+            self.triangles.points[edge[:, 1]] - self.triangles.points[edge[:, 0]], axis=1
+        )
+        return float(np.quantile(across[bent] / angle[bent], 0.05))
+
+    def distance(self, points: Float) -> tuple[Float, Float]:
+        """Distance (n,) from the patch, mm, signed by the side, and the normal (n, 3) of the nearest triangle."""
+        near, face, _ = self.triangles.closest(points)
+        normal = self.triangles.normals[face]
+        out = points - near
+        side = np.where(np.einsum("ij,ij->i", out, normal) < 0.0, -1.0, 1.0)
+        return side * np.linalg.norm(out, axis=1), normal
+
+
+def moved_onto(surfaces: list[Faceted], points: Float) -> Float | None:
+    """Points moved to where they belong: onto one patch, or to where several meet; None if these do not meet."""
+    if len(surfaces) == 1:
+        return surfaces[0].triangles.closest(points)[0]
+    return surfaces[0].network.meeting(tuple(s.number for s in surfaces), points)
+
+
+def body(surface: Triangles) -> Body:
+    """A closed surface with its base on y = 0 as a body of labelled patches."""
+    base = (surface.corners[:, :, 1] == 0.0).all(axis=1)
+    up = _looks_up(surface, base)
+    patch = _joined(surface, 2 * base + up)
+    if patch.max() + 1 > _MOST:
+        patch = np.unique(2 * base + up, return_inverse=True)[1].reshape(-1)
+    network = Network(surface, patch)
+    faces = []
+    for number in range(int(patch.max()) + 1):
+        mine = surface.corners[patch == number].reshape(-1, 3)
+        along_z = np.abs(surface.normals[patch == number, 2]).min() > 1.0 - _FLAT
+        first = int(np.argmax(patch == number))
+        label = "base" if base[first] else "contact" if up[first] else "ends" if along_z else "walls"
+        faces.append(CadFace(label, Faceted(network, number), mine.min(axis=0), mine.max(axis=0), 1.0))
+    many = [v for v, at in enumerate(network.at_point) if len(at) >= 3]
+    corner_faces = tuple(tuple(sorted(network.at_point[v])) for v in many)
+    return Body(surface.points, surface.faces, patch, tuple(faces), surface.points[many], corner_faces)
+
+
+def _looks_up(surface: Triangles, base: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Mask (m,) of contact triangles: those that look up, less the few that differ from the smooth patch around."""
+    up = (surface.normals[:, 1] > _UP) & ~base
+    smooth = _joined(surface, base.astype(np.int64))
+    area = np.linalg.norm(surface.area_vectors, axis=1)
+    share = np.bincount(smooth, area * up) / np.maximum(np.bincount(smooth, area), 1e-300)
+    up[(share > 1.0 - _RARE)[smooth]] = True
+    up[(share < _RARE)[smooth]] = False
+    return up
+
+
+def _joined(surface: Triangles, kind: Int) -> Int:
+    """Number (m,) of the patch of every triangle: those of one kind that join without a crease."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    a, b, _ = _neighbours(surface)
+    joined = (kind[a] == kind[b]) & (np.einsum("ij,ij->i", surface.normals[a], surface.normals[b]) > _CREASE)
+    links = coo_matrix((np.ones(int(joined.sum())), (a[joined], b[joined])), shape=(len(kind), len(kind)))
+    return connected_components(links, directed=False)[1].astype(np.int64)
+
+
+def _neighbours(surface: Triangles) -> tuple[Int, Int, Int]:
+    """Triangles a (e,) and b (e,) on both sides of every edge (e, 2) that has two."""
+    edges = np.sort(surface.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    order = np.lexsort(edges.T)
+    edges, owner = edges[order], np.repeat(np.arange(len(surface.faces)), 3)[order]
+    pair = np.flatnonzero((edges[1:] == edges[:-1]).all(axis=1))
+    return owner[pair], owner[pair + 1], edges[pair]
+
+
+def coarser(body: Body, tolerance: float) -> Body:
+    """The body with fewer triangles for the mesher, which is slow on many; its patches, for snapping, stay as fine.
+
+    `tolerance` (mm) is what one removal may move the surface; removals add up to some twenty times that. A surface
+    that does not come out closed is made again with less, and left as it was in the end.
+    """
+    if len(body.triangles) <= _MANY:
+        return body
+    for share in (1.0, 0.5, 0.2, 0.1):
+        found = _decimated(body, share * tolerance)
+        if not mistake(found):
+            nearest = Triangles(body.points, body.triangles).closest(found.corners.mean(axis=1))[1]
+            return replace(body, points=found.points, triangles=found.faces, face=body.face[nearest])
+    return body
+
+
+def _decimated(body: Body, tolerance: float) -> Triangles:
+    from pyvista import PolyData, wrap
+    from vtkmodules.vtkFiltersCore import vtkDecimatePro
+
+    decimate = vtkDecimatePro()
+    decimate.SetInputData(PolyData(body.points, np.insert(body.triangles, 0, 3, axis=1).ravel()))
+    decimate.SetTargetReduction(1.0 - 0.25 * _MANY / len(body.triangles))
+    decimate.PreserveTopologyOn()
+    decimate.SplittingOff()
+    decimate.AccumulateErrorOn()
+    decimate.SetFeatureAngle(20.0)
+    decimate.SetErrorIsAbsolute(1)
+    decimate.SetAbsoluteError(tolerance)
+    decimate.Update()
+    made = wrap(decimate.GetOutput())
+    return Triangles(np.asarray(made.points, dtype=float), np.asarray(made.regular_faces, dtype=np.int64))

@@ -1,0 +1,183 @@
+"""Bodies from files: STL and STEP as closed triangles, every defect told in one line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d._ranges import number
+from finger3d.errors import Finger3dError
+from finger3d.geometry.surface import Triangles
+from finger3d.geometry.surface_checks import mistake
+
+Float = NDArray[np.float64]
+
+STL, STEP = (".stl",), (".step", ".stp")
+SUFFIXES = (*STL, *STEP)
+
+MOST_TRIANGLES = 300_000
+"""Of a body from an STL file: its checks take some 25 us a triangle."""
+
+_TESSELLATION = 5e-5  # of the diagonal: a curved CAD face comes this near
+_ANGLE = 0.2
+_FARTHEST_MM = 1e12  # even of a body drawn far away, or of a triangle that is left out since it vanishes
+_WELD = 1e-6  # of the diagonal: gaps that single precision leaves between triangles that touch
+
+
+def read_surface(path: str | Path, scale: float = 1.0) -> Triangles:
+    """Read a closed body from an STL file (its numbers are mm) or a STEP file (its own unit, turned into mm).
+
+    Parameters
+    ----------
+    scale : what every coordinate is multiplied with, for instance 1000 for an STL drawn in metres
+
+    Raises
+    ------
+    Finger3dError
+        If there is no such file, or not one closed body with triangles facing outward in it.
+    """
+    path = Path(path)
+    if path.suffix.lower() in STEP:
+        surface = tessellated(read_solid(path))
+    elif path.suffix.lower() in STL:
+        surface = _stl(path, scale)
+    else:
+        raise Finger3dError(f"{path}: must be a file named {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}")
+    surface = Triangles(surface.points * scale, surface.faces)
+    if reason := mistake(surface):
+        raise Finger3dError(f"{path}: the body {reason}")
+    return surface
+
+
+def _bytes(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise Finger3dError(f"{path}: there is no such file") from None
+    except OSError as error:
+        raise Finger3dError(f"{path}: cannot be read: {error.strerror}") from None
+
+
+def content(path: Path) -> str:
+    """SHA-256 of a file."""
+    import hashlib
+
+    return hashlib.sha256(_bytes(path)).hexdigest()
+
+
+def _stl(path: Path, scale: float) -> Triangles:
+    import io
+
+    import trimesh
+
+    try:
+        mesh = trimesh.load(io.BytesIO(_bytes(path)), file_type="stl", process=False)
+    except (ValueError, IndexError, KeyError, TypeError, AttributeError, OverflowError, MemoryError):
+        mesh = None
+    if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
+        raise Finger3dError(f"{path}: this is no STL mesh, or an empty one")
+    if len(mesh.faces) > MOST_TRIANGLES:
+        raise Finger3dError(
+            f"{path}: {len(mesh.faces)} triangles; must be at most {MOST_TRIANGLES}: triangles much smaller than "
+            "mesh.size_mm tell the mesh nothing; export it coarser, or simplify it"
+        )
+    points = np.asarray(mesh.vertices, dtype=float)
+    far = np.isfinite(points) & (np.abs(points) * scale > _FARTHEST_MM)
+    if far.any():
+        raise Finger3dError(
+            f"{path}: a point at {points[far].flat[0]:g}: coordinates must be numbers from -{number(_FARTHEST_MM)} to "
+            f"{number(_FARTHEST_MM)} mm; mend it where it was drawn"
+        )
+    return welded(points, np.asarray(mesh.faces, dtype=np.int64))
+
+
+def welded(points: Float, faces: NDArray[np.int64]) -> Triangles:
+    """Join equal points, and near ones where a gap would stay open; triangles that vanish are left out."""
+    _, first, number = np.unique(points, axis=0, return_index=True, return_inverse=True)
+    points, faces = points[first], number.reshape(-1)[faces]
+    surface = Triangles(points, _proper(faces))
+    edges = np.sort(surface.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    unique, count = np.unique(edges, axis=0, return_counts=True)
+    loose = np.unique(unique[count == 1])
+    if not len(loose) or not np.isfinite(points).all():
+        return surface
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    near = loose[cKDTree(points[loose]).query_pairs(_WELD * surface.size, output_type="ndarray")]
+    joined = coo_matrix((np.ones(len(near)), (near[:, 0], near[:, 1])), shape=(len(points), len(points)))
+    _, number = connected_components(joined, directed=False)
+    _, first = np.unique(number, return_index=True)
+    return Triangles(points[first], _proper(number[faces].astype(np.int64)))
+
+
+def _proper(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    a, b, c = faces.T
+    return faces[(a != b) & (b != c) & (c != a)]
+
+
+def read_solid(path: Path) -> Any:
+    """The one build123d solid of a STEP file, mm."""
+    return read_named(path)[0]
+
+
+def read_named(path: Path) -> tuple[Any, dict[str, list[Any]]]:
+    """The one build123d solid of a STEP file, mm, and its faces by the names CAD gave them, in lower case.
+
+    Raises
+    ------
+    Finger3dError
+        If this is no STEP file, or has not exactly one valid solid.
+    """
+    _bytes(path)
+    from build123d import Compound
+    from OCP.IFSelect import IFSelect_RetDone
+    from OCP.Message import Message, Message_PrinterOStream
+    from OCP.Standard import Standard_Failure
+    from OCP.STEPControl import STEPControl_Reader
+
+    # CAD writes its complaints past Python onto the terminal.
+    Message.DefaultMessenger_s().RemovePrinters(Message_PrinterOStream.get_type_descriptor_s())
+    reader = STEPControl_Reader()
+    try:
+        done = reader.ReadFile(str(path)) == IFSelect_RetDone and reader.TransferRoots() > 0
+        shape = reader.OneShape() if done else None
+    except Standard_Failure:
+        shape = None
+    if shape is None or shape.IsNull():
+        raise Finger3dError(f"{path}: this is no STEP file that can be read")
+    solids = Compound(shape).solids()
+    if len(solids) != 1:
+        what = f"has {len(solids)} solids" if solids else "has no solid, only faces or curves"
+        raise Finger3dError(f"{path}: the file {what}; give one solid body")
+    if not solids[0].is_valid:
+        raise Finger3dError(f"{path}: CAD calls its solid invalid; mend it where it was drawn")
+    return solids[0], _named_faces(solids[0], reader)
+
+
+def _named_faces(solid: Any, reader: Any) -> dict[str, list[Any]]:
+    """Faces by the name in their ADVANCED_FACE entity: XCAF and build123d keep names of parts, but not of faces."""
+    from OCP.StepRepr import StepRepr_RepresentationItem
+    from OCP.TopLoc import TopLoc_Location
+
+    transferred = reader.WS().TransferReader()
+    found: dict[str, list[Any]] = {}
+    for face in solid.faces():
+        drawn = face.wrapped.Located(TopLoc_Location())  # the entity knows nothing of where an assembly puts its part
+        entity = transferred.EntityFromShapeResult(drawn, 1)
+        if isinstance(entity, StepRepr_RepresentationItem) and entity.Name() is not None:
+            found.setdefault(entity.Name().ToCString().strip().lower(), []).append(face)
+    return found
+
+
+def tessellated(solid: Any) -> Triangles:
+    """A CAD solid as triangles, within 5e-5 of its diagonal."""
+    from finger3d.geometry.tessellate import tessellate
+
+    box = solid.bounding_box()
+    body = tessellate(solid, _TESSELLATION * box.diagonal, _ANGLE)
+    return Triangles(body.points, body.triangles)

@@ -1,0 +1,280 @@
+"""Triangulated surfaces: heights along vertical lines, closest points, and signed distances."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.geometry.bvh import Tree, puck_distance
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+_SLACK = 1e-12  # of the surface's size: a vertical line through a shared edge must not slip between its triangles
+_EDGES = ((0, 1), (1, 2), (2, 0))
+
+
+@dataclass(frozen=True, eq=False)
+class Triangles:
+    """A triangulated surface; equal to another one with the same points and triangles.
+
+    Attributes
+    ----------
+    points : (n, 3) mm
+    faces : (m, 3) outward where the surface is closed
+    """
+
+    points: Float
+    faces: Int
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Triangles) and self.digest == other.digest
+
+    def __hash__(self) -> int:
+        return hash(self.digest)
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of points and faces."""
+        text = hashlib.sha256(np.ascontiguousarray(self.points, dtype=np.float64).tobytes())
+        text.update(np.ascontiguousarray(self.faces, dtype=np.int64).tobytes())
+        return text.hexdigest()
+
+    @cached_property
+    def corners(self) -> Float:
+        """Corners (m, 3, 3) of the triangles, mm."""
+        return self.points[self.faces]
+
+    @cached_property
+    def area_vectors(self) -> Float:
+        """Normals (m, 3) as long as the area, mm2."""
+        a, b, c = self.corners.transpose(1, 0, 2)
+        return 0.5 * np.cross(b - a, c - a)
+
+    @cached_property
+    def normals(self) -> Float:
+        """Unit normals (m, 3); 0 for a triangle without area."""
+        return _unit(self.area_vectors)
+
+    @property
+    def volume(self) -> float:
+        """Enclosed volume of a closed surface, mm3; negative if it is inside out."""
+        # About the middle of the box: a body far from the origin would cancel to nothing.
+        a = self.corners[:, 0] - 0.5 * (self.low + self.high)
+        return float(np.einsum("ij,ij->", a, self.area_vectors) / 3.0)
+
+    @property
+    def low(self) -> Float:
+        """Smallest coordinates (3,) of the triangles, mm."""
+        return self.corners.min(axis=(0, 1))
+
+    @property
+    def high(self) -> Float:
+        """Largest coordinates (3,) of the triangles, mm."""
+        return self.corners.max(axis=(0, 1))
+
+    @cached_property
+    def size(self) -> float:
+        """Diagonal of the box around the triangles, mm."""
+        return float(np.linalg.norm(self.high - self.low))
+
+    @cached_property
+    def tree(self) -> Tree:
+        """Boxes around the triangles."""
+        return Tree.over(self.corners)
+
+    @cached_property
+    def _facing_down(self) -> tuple[Int, Tree]:
+        """Triangles that look down, the only ones that a line from below meets first, and a tree over them."""
+        facing = np.flatnonzero(self.area_vectors[:, 1] < 0.0)
+        return facing, Tree.over(self.corners[facing])
+
+    @cached_property
+    def _facing_up(self) -> tuple[Int, Tree]:
+        facing = np.flatnonzero(self.area_vectors[:, 1] > 0.0)
+        return facing, Tree.over(self.corners[facing])
+
+    @cached_property
+    def _pucks(self) -> tuple[Float, ...]:
+        return self.tree.pucks(self.corners, self.area_vectors)
+
+    @cached_property
+    def _discs(self) -> Float:
+        """Every triangle as a puck (m, 8) without thickness."""
+        middle = self.corners.mean(axis=1)
+        radius = np.linalg.norm(self.corners - middle[:, None], axis=2).max(axis=1)
+        # without area there is no axis, and nothing lies off the middle's plane
+        return np.hstack([middle, self.normals, radius[:, None], np.zeros((len(radius), 1))])
+
+    @cached_property
+    def _corner_normals(self) -> tuple[Float, Float]:
+        """Pseudonormals of every triangle's edges (m, 3, 3) and corners (m, 3, 3), which tell inside from outside.
+
+        A vertex weighs the normals around it with their angles (Baerentzen and Aanaes 2005); an edge, by halves.
+        """
+        n = len(self.points)
+        ends = self.faces[:, _EDGES]
+        key = np.sort(ends, axis=2) @ [n, 1]
+        _, number = np.unique(key, return_inverse=True)
+        number = number.reshape(key.shape)
+        edge = np.zeros((number.max() + 1, 3))
+        np.add.at(edge, number, self.normals[:, None, :])
+        vertex = np.zeros((n, 3))
+        for i in range(3):
+            along = self.corners[:, (i + 1) % 3] - self.corners[:, i]
+            back = self.corners[:, (i + 2) % 3] - self.corners[:, i]
+            sine = np.linalg.norm(np.cross(along, back), axis=1)
+            angle = np.arctan2(sine, np.einsum("ij,ij->i", along, back))
+            np.add.at(vertex, self.faces[:, i], angle[:, None] * self.normals)
+        return _unit(edge)[number], _unit(vertex)[self.faces]
+
+    def hits(self, x: Float, z: Float, lowest: bool = True) -> tuple[Int, Float]:
+        """Where vertical lines meet a surface with outward triangles first, from below or from above.
+
+        Returns
+        -------
+        face : (n,) triangle, -1 where the line misses the surface
+        bary : (n, 3) barycentric coordinates in it
+        """
+        at = np.stack([x, z], axis=1).astype(float)
+        slack = _SLACK * self.size
+
+        facing, tree = self._facing_down if lowest else self._facing_up
+        boxes = [b[:, [0, 2, 3, 5]] + np.array([-slack, -slack, slack, slack]) for b in tree.boxes]
+
+        def inside(query: Int, level: int, node: Int) -> NDArray[np.bool_]:
+            p, box = at[query], boxes[level][node]
+            return (box[:, 0] <= p[:, 0]) & (box[:, 1] <= p[:, 1]) & (p[:, 0] <= box[:, 2]) & (p[:, 1] <= box[:, 3])
+
+        face = np.full(len(at), -1, dtype=np.int64)
+        bary = np.zeros((len(at), 3))
+        best = np.full(len(at), np.inf)
+        flat = self.corners[:, :, ::2]
+        for query, number in tree.pairs(len(at), inside):
+            item = facing[number]
+            weight, met = _in_triangle(at[query], flat[item], slack)
+            query, item, weight = query[met], item[met], weight[met]
+            y = np.einsum("ij,ij->i", weight, self.corners[item, :, 1]) * (1.0 if lowest else -1.0)
+            order = np.lexsort((item, y, query))  # the number breaks ties, so that a result can be repeated
+            first = order[np.unique(query[order], return_index=True)[1]]
+            face[query[first]], bary[query[first]], best[query[first]] = item[first], weight[first], y[first]
+        return face, bary
+
+    def height(self, x: Float, z: Float, lowest: bool = True) -> Float:
+        """Height (mm) of the surface's lowest or highest point over x, z, exact on its triangles; nan beside it."""
+        x, z = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(z, dtype=float))
+        face, bary = self.hits(x.ravel(), z.ravel(), lowest)
+        found = np.where(face < 0, np.nan, np.einsum("ij,ij->i", bary, self.corners[face, :, 1]))
+        return found.reshape(x.shape)
+
+    def closest(self, points: Float) -> tuple[Float, Int, Int]:
+        """Closest points of the surface.
+
+        Returns
+        -------
+        closest : (n, 3) mm
+        face : (n,) a triangle it lies on
+        feature : (n,) 0 inside the triangle, 1 to 3 on its edge 01, 12, 20, 4 to 6 at its corner
+        """
+        reach = self._bound(points)
+        closest, face = np.zeros_like(points), np.full(len(points), -1, dtype=np.int64)
+        feature, best = np.zeros(len(points), dtype=np.int64), np.full(len(points), np.inf)
+
+        def near(query: Int, level: int, node: Int) -> NDArray[np.bool_]:
+            return puck_distance(points[query], self._pucks[level][node]) <= reach[query]
+
+        for query, item in self.tree.pairs(len(points), near):
+            close = puck_distance(points[query], self._discs[item]) <= reach[query]
+            query, item = query[close], item[close]
+            p, which = _on_triangle(points[query], self.corners[item], self.normals[item])
+            distance = np.linalg.norm(points[query] - p, axis=1)
+            order = np.lexsort((item, distance, query))
+            first = order[np.unique(query[order], return_index=True)[1]]
+            closest[query[first]], face[query[first]] = p[first], item[first]
+            feature[query[first]], best[query[first]] = which[first], distance[first]
+        return closest, face, feature
+
+    def _bound(self, points: Float) -> Float:
+        """An upper bound (n,) of the distance: that of the nearest corner, or of what a walk down the tree finds."""
+        from scipy.spatial import cKDTree
+
+        vertices = self.points[np.unique(self.faces)]
+        reach = cKDTree(vertices, balanced_tree=False, compact_nodes=False).query(points)[0]
+        # A large triangle has no corner near: what its leaf of the tree holds bounds the distance better.
+        node = np.zeros(len(points), dtype=np.int64)
+        for puck in self._pucks[1:]:
+            children = np.stack([puck_distance(points, puck[4 * node + i]) for i in range(4)])
+            node = 4 * node + np.argmin(children, axis=0)
+        for column in range(self.tree.items.shape[1]):
+            item = self.tree.items[node, column]
+            there = item >= 0
+            p = _on_triangle(points[there], self.corners[item[there]], self.normals[item[there]])[0]
+            reach[there] = np.minimum(reach[there], np.linalg.norm(points[there] - p, axis=1))
+        return reach * (1.0 + 1e-9) + 1e-12 * self.size
+
+    def signed_distance(self, points: Float) -> tuple[Float, Float]:
+        """Distance (n,) mm of points (n, 3), negative inside, and its gradient (n, 3), the outward unit normal.
+
+        Right at edges and vertices too, where the normal of the nearest triangle alone may take outside for inside.
+        """
+        closest, face, feature = self.closest(points)
+        edge, vertex = self._corner_normals
+        normal = self.normals[face].copy()
+        on_edge, on_corner = (feature >= 1) & (feature <= 3), feature >= 4
+        normal[on_edge] = edge[face[on_edge], feature[on_edge] - 1]
+        normal[on_corner] = vertex[face[on_corner], feature[on_corner] - 4]
+        out = points - closest
+        length = np.linalg.norm(out, axis=1)
+        sign = np.where(np.einsum("ij,ij->i", out, normal) < 0.0, -1.0, 1.0)
+        far = length > 1e-9 * self.size
+        normal[far] = out[far] * (sign[far] / length[far])[:, None]
+        return sign * length, normal
+
+
+def _unit(vectors: Float) -> Float:
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0)
+
+
+def _in_triangle(p: Float, corner: Float, slack: float) -> tuple[Float, NDArray[np.bool_]]:
+    """Barycentric coordinates (n, 3) of points (n, 2) in triangles (n, 3, 2) of the plane; whether they lie inside."""
+    weight = np.empty((len(p), 3))
+    inside = np.ones(len(p), dtype=bool)
+    edges = corner[:, [2, 0, 1]] - corner[:, [1, 2, 0]]
+    area = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
+    turn = np.where(area < 0.0, -1.0, 1.0)
+    for i in range(3):
+        from_start = p - corner[:, (i + 1) % 3]
+        weight[:, i] = turn * (edges[:, i, 0] * from_start[:, 1] - edges[:, i, 1] * from_start[:, 0])
+        inside &= weight[:, i] >= -slack * np.linalg.norm(edges[:, i], axis=1)
+    total = np.abs(area)
+    longest = np.linalg.norm(edges, axis=2).max(axis=1)
+    inside &= total > slack * longest  # edge-on
+    weight = np.clip(weight, 0.0, None)
+    return weight / np.maximum(weight.sum(axis=1), 1e-300)[:, None], inside
+
+
+def _on_triangle(p: Float, corner: Float, normal: Float) -> tuple[Float, Int]:
+    """Closest points (n, 3) of triangles (n, 3, 3) with unit normals (n, 3), and the feature they lie on."""
+    out = np.zeros_like(p)
+    feature = np.zeros(len(p), dtype=np.int64)
+    best = np.full(len(p), np.inf)
+    inside = np.any(normal != 0.0, axis=1)
+    for k, (i, j) in enumerate(_EDGES):
+        along, start = corner[:, j] - corner[:, i], p - corner[:, i]
+        square = np.einsum("ij,ij->i", along, along)
+        t = np.clip(np.einsum("ij,ij->i", start, along) / np.maximum(square, 1e-300), 0.0, 1.0)
+        q = corner[:, i] + t[:, None] * along
+        distance = np.einsum("ij,ij->i", p - q, p - q)
+        closer = distance < best
+        best[closer], out[closer] = distance[closer], q[closer]
+        feature[closer] = np.where(t <= 0.0, 4 + i, np.where(t >= 1.0, 4 + j, 1 + k))[closer]
+        inside &= np.einsum("ij,ij->i", np.cross(along, start), normal) > 0.0
+    height = np.einsum("ij,ij->i", p - corner[:, 0], normal)
+    out[inside] = (p - height[:, None] * normal)[inside]
+    feature[inside] = 0
+    return out, feature

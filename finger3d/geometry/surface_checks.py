@@ -1,0 +1,103 @@
+"""Why a triangulated surface is no body: holes, flipped triangles, several pieces, no volume, crossing itself."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.geometry.surface import Triangles
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+_FLAT = 1e-9  # thickness over length
+
+
+def mistake(surface: Triangles) -> str:
+    """What keeps a surface from being one closed body with triangles facing outward; empty if nothing does."""
+    points, faces = surface.points, surface.faces
+    if len(faces) < 4:
+        return f"has {len(faces)} triangles, which enclose nothing"
+    if not np.isfinite(points).all():
+        return "has a point that is not a number (NaN or infinite)"
+    edges = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    owner = np.repeat(np.arange(len(faces)), 3)
+    key = np.sort(edges, axis=1) @ [len(points), 1]
+    _, number, owners = np.unique(key, return_inverse=True, return_counts=True)
+    sides = owners[number]
+    if surface.size == 0.0 or _flat(surface):
+        return "has no volume: it is flat"
+    if (sides == 1).any():
+        where = _place(points[edges[np.argmax(sides == 1)]])
+        count = int((sides == 1).sum())
+        return f"is not closed: {count} edges border a hole or a missing triangle, the first at {where}"
+    if (sides > 2).any():
+        where = _place(points[edges[np.argmax(sides > 2)]])
+        return f"is no body: more than two triangles meet in {int((owners > 2).sum())} edges, the first at {where}"
+    forward = np.bincount(number, edges[:, 0] < edges[:, 1])
+    if (forward != 1).any():
+        first = edges[np.argmax((forward != 1)[number])]
+        return (
+            f"has flipped triangles: neighbours face opposite ways along {int((forward != 1).sum())} edges, the first "
+            f"at {_place(points[first])}"
+        )
+    pieces = _pieces(owner, number, len(faces))
+    if pieces > 1:
+        return f"is in {pieces} pieces (or hollow); give one solid body"
+    if surface.volume < 0.0:
+        return "is inside out: its triangles face inward"
+    return ""
+
+
+def _flat(surface: Triangles) -> bool:
+    used = surface.points[np.unique(surface.faces)]
+    spread = np.linalg.svd(used - used.mean(axis=0), compute_uv=False)
+    return bool(spread[-1] <= _FLAT * spread[0])
+
+
+def _place(points: Float) -> str:
+    return "({:.4g}, {:.4g}, {:.4g}) mm".format(*points.mean(axis=0))
+
+
+def _pieces(owner: Int, edge: Int, count: int) -> int:
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    order = np.argsort(edge, kind="stable")
+    a, b = owner[order[0::2]], owner[order[1::2]]  # every edge has two owners here
+    return int(connected_components(coo_matrix((np.ones(len(a)), (a, b)), shape=(count, count)), directed=False)[0])
+
+
+def crossings(surface: Triangles) -> Int:
+    """Triangles (k,) that an edge of another triangle, which shares no point with it, passes through."""
+    ends = np.unique(np.sort(surface.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
+    start, stop = surface.points[ends[:, 0]], surface.points[ends[:, 1]]
+    low, high = np.minimum(start, stop), np.maximum(start, stop)
+
+    def overlap(query: Int, level: int, node: Int) -> NDArray[np.bool_]:
+        box = surface.tree.boxes[level][node]
+        return np.all((box[:, :3] <= high[query]) & (low[query] <= box[:, 3:]), axis=1)
+
+    found = []
+    for query, item in surface.tree.pairs(len(ends), overlap):
+        apart = ~np.any(surface.faces[item][:, :, None] == ends[query][:, None, :], axis=(1, 2))
+        query, item = query[apart], item[apart]
+        found.append(item[_pierced(start[query], stop[query], surface.corners[item], 1e-9 * surface.size)])
+    return np.unique(np.concatenate(found))
+
+
+def _pierced(start: Float, stop: Float, corner: Float, slack: float) -> NDArray[np.bool_]:
+    """Whether segments pass through triangles (n, 3, 3), by more than `slack` (mm) on every side."""
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    length = np.linalg.norm(normal, axis=1)
+    normal = normal / np.maximum(length, 1e-300)[:, None]
+    a = np.einsum("ij,ij->i", start - corner[:, 0], normal)
+    b = np.einsum("ij,ij->i", stop - corner[:, 0], normal)
+    through = (np.minimum(a, b) < -slack) & (np.maximum(a, b) > slack) & (length > 0.0)
+    at = start + (a / np.where(through, a - b, 1.0))[:, None] * (stop - start)
+    for i, j in ((0, 1), (1, 2), (2, 0)):
+        along = corner[:, j] - corner[:, i]
+        inward = np.cross(normal, along)
+        inward /= np.maximum(np.linalg.norm(inward, axis=1), 1e-300)[:, None]
+        through &= np.einsum("ij,ij->i", at - corner[:, i], inward) > slack
+    return through

@@ -1,0 +1,175 @@
+"""Files for others to read: CSV and JSON, each written whole or not at all."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import os
+import secrets
+import tokenize
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from finger3d.errors import Finger3dError
+
+MAIN = ("normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm")
+"""The numbers of a press that short tables show, and that get an error bar, beside every gauge."""
+
+AREAS = ("contact_area_mm2", "stick_area_mm2")
+"""Those that get an error bar besides."""
+
+
+@contextmanager
+def atomic(path: str | Path) -> Iterator[Path]:
+    """Give the name of a temporary file beside `path`; it takes the place of `path` when the block ends well.
+
+    The temporary name keeps the ending of `path`, for writers that go by it. An error in the block removes the
+    temporary file and leaves an older `path` as it was. Missing folders are made.
+
+    Raises
+    ------
+    Finger3dError
+        If the file cannot be written.
+    """
+    target = Path(path)
+    temporary = target.with_name(f".{target.stem}.{secrets.token_hex(4)}{target.suffix}")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        yield temporary
+        os.replace(temporary, target)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise Finger3dError(f"cannot write {target}: {reason}; choose another place with --out") from error
+    finally:
+        # Usually it is gone by now, or was never made; and a folder that refuses has been reported above.
+        with suppress(OSError):
+            temporary.unlink()
+
+
+_LOCK = ".finger3d.lock"
+
+
+_RESULTS = {
+    "press": "summary.json", "compare": "compare.json", "calibrate": "calibration.json", "sweep": "sweep.json",
+    "design": "search.json",
+}  # fmt: skip
+"""By command, the file that tells its results."""
+
+
+@contextmanager
+def claimed(folder: str | Path, command: str = "") -> Iterator[Path]:
+    """Make a folder and keep every other finger3d from writing there while the block runs.
+
+    A folder that this made, and into which nothing was written, is removed.
+
+    Parameters
+    ----------
+    command : what is going to write there; its own older results may be replaced, those of another command may not
+
+    Raises
+    ------
+    Finger3dError
+        If another run holds it, it holds what another command wrote, or it cannot be written.
+    """
+    from filelock import FileLock, Timeout
+
+    path = Path(folder)
+    for other, file in _RESULTS.items():
+        if command not in ("", other) and (path / file).exists():
+            raise Finger3dError(f"--out {path}: holds the results of a {other}; name another folder, or remove it")
+    made = [p for p in (path, *path.parents) if not p.exists()]
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        lock = FileLock(path / _LOCK, blocking=False)
+        lock.acquire()
+    except Timeout:
+        raise Finger3dError(
+            f"{path}: another finger3d is writing there; wait for it, or name another folder with --out"
+        ) from None
+    except OSError as error:
+        raise Finger3dError(f"--out {path}: cannot be written: {error.strerror or error}") from None
+    try:
+        yield path
+    finally:
+        if made and os.listdir(path) == [_LOCK]:
+            with suppress(OSError):  # of a folder that another run has found in the meantime
+                (path / _LOCK).unlink()
+                for folder in made:
+                    folder.rmdir()
+        lock.release()
+
+
+_DAMAGED = (
+    ValueError, TypeError, KeyError, AttributeError, EOFError, MemoryError, NotImplementedError, OverflowError,
+    RuntimeError, SyntaxError, tokenize.TokenError, zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
+"""What NumPy raises for an .npz file that is cut short, changed, or of another kind."""
+
+
+def read_arrays(path: str | Path) -> dict[str, NDArray[Any]]:
+    """Read all arrays of an .npz file.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read.
+    ValueError
+        If it is damaged.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            return {name: stored[name] for name in stored.files}
+    except _DAMAGED as error:
+        raise ValueError(f"no .npz file, or damaged: {error}") from error
+
+
+def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> None:
+    """Write one line of names and a line for each entry; numbers keep every digit (``repr``).
+
+    Parameters
+    ----------
+    columns : name (with its unit) -> (n,) numbers, or texts; all of one length
+    """
+    arrays = [np.asarray(column) for column in columns.values()]
+    shapes = {a.shape for a in arrays}
+    if len(shapes) > 1 or any(len(s) != 1 for s in shapes):
+        raise ValueError(f"columns of {path} differ in shape: { {k: np.shape(v) for k, v in columns.items()} }")
+    with atomic(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(zip(*(a.tolist() for a in arrays), strict=True))
+
+
+def write_json(path: str | Path, data: Any) -> None:
+    """Write nested dicts, lists, arrays and numbers; NaN and infinity, which JSON lacks, become null."""
+    text = json_text(data)
+    with atomic(path) as temporary:
+        temporary.write_text(text + "\n", encoding="utf-8")
+
+
+def json_text(data: Any) -> str:
+    """JSON of nested dicts, lists, arrays and numbers; NaN and infinity become null."""
+    return json.dumps(_plain(data), indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    if isinstance(value, Enum | Path):
+        return str(value)
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

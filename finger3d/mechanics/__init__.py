@@ -1,0 +1,1 @@
+"""The model, its formulation and the solution along a load path."""

@@ -1,0 +1,214 @@
+"""What a press leaves behind: frames, and the numbers of the contract measured on them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.contact.friction import OPEN, STATUS_NAMES, STICK
+from finger3d.contact.state import ContactState
+from finger3d.errors import Outcome
+
+Float = NDArray[np.float64]
+
+_ON_LINE = 1e-9
+"""Distance from the line z = 0, in half widths, below which a vertex lies on it: round-off of its coordinates."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """Where the object is: pressed down by a depth, slid along x and z, at a time (s)."""
+
+    depth_mm: float
+    slide_x_mm: float = 0.0
+    slide_z_mm: float = 0.0
+    time_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class ContactPoints:
+    """The contact points of the whole finger, mirrored halves included.
+
+    Attributes
+    ----------
+    nodes : (m,) numbers in the whole mesh
+    points : (m, 3) mm at rest, z = 0 in a section
+    area : (m,) mm2
+    frame : (d, d), or (m, d, d) where each point has its own: normal into the finger, then tangents
+    half_width_mm, band_mm : float
+        Where no point lies on the line z = 0, figures show the points within `band_mm` of it.
+    edges : (e, 2)
+        Pairs of points that an edge of the surface mesh joins.
+    """
+
+    nodes: NDArray[np.int64]
+    points: Float
+    area: Float
+    frame: Float
+    half_width_mm: float
+    band_mm: float
+    edges: NDArray[np.int64]
+
+    @property
+    def dim(self) -> int:
+        """2 for a section, 3 for a solid."""
+        return self.frame.shape[-1]
+
+    def seen_in(self, state: ContactState) -> ContactPoints:
+        """The points with the directions of a state, where they turn with the motion."""
+        return self if state.frames is None else replace(self, frame=state.frames)
+
+    def middle_line(self) -> tuple[Float, NDArray[np.int64]]:
+        """Where the surface mesh meets the line z = 0: x (k,) mm, and the number (k,) of the point nearest on the edge.
+
+        The vertices on the line, and the intersections of edges that cross it; all points of a section.
+        """
+        x, z = self.points[:, 0], self.points[:, 2]
+        z = np.where(np.abs(z) <= _ON_LINE * self.half_width_mm, 0.0, z)
+        on = np.flatnonzero(z == 0.0)
+        i, j = self.edges[z[self.edges[:, 0]] * z[self.edges[:, 1]] < 0.0].T
+        share = z[i] / (z[i] - z[j])
+        crossing = x[i] + share * (x[j] - x[i])
+        return np.concatenate([x[on], crossing]), np.concatenate([on, np.where(share <= 0.5, i, j)])
+
+    def rim(self, inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Points (m,) of a zone that an edge joins with a point outside it."""
+        i, j = self.edges.T
+        out = np.zeros(len(inside), dtype=bool)
+        out[i[inside[i] & ~inside[j]]] = True
+        out[j[inside[j] & ~inside[i]]] = True
+        return out
+
+    def resolved(self, inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Points (m,) of a zone where it is at least three points wide: inner ones, and their neighbours in it."""
+        inner = inside & ~self.rim(inside)
+        i, j = self.edges.T
+        out = inner.copy()
+        out[i[inner[j] & inside[i]]] = True
+        out[j[inner[i] & inside[j]]] = True
+        return out
+
+    def world(self, local: Float) -> Float:
+        """Vectors (m, 3) in x, y, z from vectors (m, d) in the frame."""
+        out = np.zeros((len(local), 3))
+        own = self.frame if self.frame.ndim == 3 else self.frame[None]
+        out[:, : self.dim] = np.einsum("ma,mak->mk", local, np.broadcast_to(own, (len(local), self.dim, self.dim)))
+        return out
+
+    def friction(self, force: Float) -> Float:
+        """Tangential part (m, 3) of forces (m, d), in x, y, z."""
+        tangential = force.copy()
+        tangential[:, 0] = 0.0
+        return self.world(tangential)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One increment as reported: whole contact state (m points), gauge strains, work, and how it was settled.
+
+    `part` is the state of the meshed part (c points), from which fields are recovered.
+    """
+
+    target: Target
+    state: ContactState
+    part: ContactState
+    lowest: tuple[float, float]
+    gauges: dict[str, float]
+    external_work_mJ: float
+    dissipation_mJ: float
+    outcome: Outcome
+    residual: float
+    iterations: int
+    method: str
+
+
+@dataclass(frozen=True, repr=False)
+class History:
+    """Frames of one press, with the points they speak of."""
+
+    points: ContactPoints
+    frames: tuple[Frame, ...]
+
+    def __repr__(self) -> str:
+        """One line: the arrays would fill pages."""
+        return f"<History of {len(self.frames)} frames, {len(self.points.nodes)} contact points: {self.outcome}>"
+
+    @property
+    def outcome(self) -> Outcome:
+        """CONVERGED if every increment is."""
+        return next((f.outcome for f in self.frames if not f.outcome.ok), Outcome.CONVERGED)
+
+
+def _half_extent(x: Float) -> float:
+    return float(np.ptp(x) / 2.0) if len(x) else 0.0
+
+
+def measure(points: ContactPoints, frame: Frame) -> dict[str, Any]:
+    """The entry of `steps` in summary.json for one frame.
+
+    ``contact_half_length_mm`` and ``stick_half_length_mm`` are half the distance along x between the first and the last
+    point of the line z = 0 that touch or stick.  The line has the vertices of the surface mesh on it and the
+    intersections of its edges with it, each with the state of the nearer end of the edge.
+    """
+    state, target = frame.state, frame.target
+    points = points.seen_in(state)
+    world = points.world(state.force)
+    friction = points.friction(state.force)
+    touching, sticking = state.status != OPEN, state.status == STICK
+    x, z = points.points[:, 0], points.points[:, 2]
+    line, nearest = points.middle_line()
+    outward_x = friction[:, 0] * np.sign(x - frame.lowest[0])
+    outward_z = friction[:, 2] * np.sign(z - frame.lowest[1])
+    numbers: dict[str, Any] = {
+        "depth_mm": target.depth_mm,
+        "slide_x_mm": target.slide_x_mm,
+        "slide_z_mm": target.slide_z_mm,
+        "time_s": target.time_s,
+        "normal_force_N": -float(world[:, 1].sum()),
+        "tangential_force_x_N": float(friction[:, 0].sum()),
+        "tangential_force_z_N": float(friction[:, 2].sum()),
+        "friction_sum_N": float(np.linalg.norm(friction, axis=1).sum()),
+        "outward_friction_x_N": float(outward_x.sum()),
+        "outward_friction_z_N": float(outward_z.sum()),
+        "contact_area_mm2": float(points.area[touching].sum()),
+        "stick_area_mm2": float(points.area[sticking].sum()),
+        "contact_half_length_mm": _half_extent(line[touching[nearest]]),
+        "stick_half_length_mm": _half_extent(line[sticking[nearest]]),
+    }
+    if points.dim == 3:
+        end = np.abs(z - points.half_width_mm) <= 1e-6 * points.half_width_mm
+        numbers["contact_half_length_end_mm"] = _half_extent(x[touching & end])
+    return numbers | {
+        "external_work_mJ": frame.external_work_mJ,
+        "dissipation_mJ": frame.dissipation_mJ,
+        "gauges": dict(frame.gauges),
+        "iterations": frame.iterations,
+        "residual": frame.residual,
+        "method": frame.method,
+        "outcome": str(frame.outcome),
+    }
+
+
+def contact_table(points: ContactPoints, state: ContactState) -> dict[str, Any]:
+    """Columns of contact.csv; pressure and shear are the traction on the finger, slip is in x and z."""
+    points = points.seen_in(state)
+    friction = points.friction(state.force)
+    padded = np.zeros((len(state.slip), points.dim))
+    padded[:, 1:] = state.slip
+    slip = points.world(padded)
+    return {
+        "x_mm": points.points[:, 0],
+        "y_mm": points.points[:, 1],
+        "z_mm": points.points[:, 2],
+        "area_mm2": points.area,
+        "pressure_MPa": state.force[:, 0] / points.area,
+        "shear_x_MPa": friction[:, 0] / points.area,
+        "shear_z_MPa": friction[:, 2] / points.area,
+        "gap_mm": state.gap,
+        "slip_x_mm": slip[:, 0],
+        "slip_z_mm": slip[:, 2],
+        "status": [STATUS_NAMES[s] for s in state.status],
+    }

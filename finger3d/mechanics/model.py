@@ -1,0 +1,175 @@
+"""The model: what is pressed, on what, how. The baseline is the paper; effects fill slots."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.contact.friction import Coulomb, FrictionLaw
+from finger3d.mechanics.formulation import Kinematics, SmallStrain
+from finger3d.objects import Plane, RigidObject
+
+Float = NDArray[np.float64]
+Domain = Literal["solid", "plane-strain", "plane-stress"]
+
+
+@dataclass(frozen=True)
+class Material:
+    """Isotropic elasticity: Young's modulus (MPa) and Poisson's ratio, 0 <= nu <= 0.5."""
+
+    E_MPa: float
+    nu: float
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A target reached from the one before, in equal steps; "auto": as many as `finger3d.mechanics.step_halving`
+    chooses.
+
+    A scene's default is "auto"; a leg made in Python has 10.
+    """
+
+    depth_mm: float
+    slide_x_mm: float = 0.0
+    slide_z_mm: float = 0.0
+    steps: int | Literal["auto"] = 10
+    duration_s: float | None = None
+
+
+@dataclass(frozen=True)
+class Gauge:
+    """Normal strain at a point along a direction in the x-y plane; over `length_mm` its mean. Angle in radians."""
+
+    name: str
+    x_mm: float
+    y_mm: float
+    z_mm: float = 0.0
+    angle: float = 0.0
+    length_mm: float = 0.0
+
+    @property
+    def middle(self) -> Float:
+        """Place (3,) mm."""
+        return np.array([self.x_mm, self.y_mm, self.z_mm])
+
+    @property
+    def direction(self) -> Float:
+        """Unit vector (3,)."""
+        return np.array([np.cos(self.angle), np.sin(self.angle), 0.0])
+
+    @property
+    def ends(self) -> tuple[Float, Float]:
+        """Both ends (3,) mm."""
+        half = 0.5 * self.length_mm * self.direction
+        return self.middle - half, self.middle + half
+
+
+@dataclass(frozen=True)
+class MeshOptions:
+    """Edge lengths at the contact and far from it (mm), and the mesher (solids only; sections are structured).
+
+    `layers` is the least number of layers of a swept mesh over half the width; one layer cannot follow the bulge of a
+    free end.
+    """
+
+    size_mm: float
+    base_size_mm: float
+    mesher: Literal["ftetwild", "swept"] = "ftetwild"
+    layers: int = 2
+
+    def as_table(self) -> dict[str, Any]:
+        """The keys of ``[mesh]`` in a scene."""
+        return {"size_mm": self.size_mm, "base_size_mm": self.base_size_mm, "mesher": self.mesher}
+
+
+@dataclass(frozen=True)
+class Inlay:
+    """Stiff things laid into a meshed part, cut into bars.
+
+    Attributes
+    ----------
+    rows : (s, n d) sparse
+        Strain of every bar from displacements.
+    springs : (s,) N mm, their stiffness in the part
+    reads : (g, s) what each of the model's gauges reads of them
+    alone : (s, s) 1/(N mm)
+        How the bars unload themselves and each other, in a body without end; in place of what the mesh says.
+    """
+
+    rows: Any
+    springs: Float
+    reads: Float
+    alone: Float
+
+    def beyond(self, compliance: Float) -> Float:
+        """What rows of gauges and bars yield (g + s, g + s) beyond the mesh, from its compliance (s, s) of bars."""
+        both = np.vstack([self.reads, np.eye(len(self.springs))])
+        return both @ (self.alone - compliance) @ both.T
+
+
+class Inclusions(Protocol):
+    """Stiff things in the body that need no mesh of their own."""
+
+    def mirrors(self, model: Any) -> frozenset[str]:
+        """Planes, "x" and "z", about which they are mirror images."""
+        ...
+
+    def lay(self, model: Any, mesh: Any, axes: tuple[str, ...]) -> Inlay:
+        """Cut them into bars."""
+        ...
+
+
+class ObjectCompliance(Protocol):
+    """An object that yields."""
+
+    def at_points(self, problem: Any, zone: tuple[float, float, float, float], say: Any) -> Float:
+        """Compliance (c, d, c, d) mm/N of the object at the contact points of a problem; 0 in directions left out."""
+        ...
+
+
+@dataclass(frozen=True)
+class Model:
+    """Everything that determines the numbers.
+
+    Attributes
+    ----------
+    design : a frozen dataclass from geometries/
+    domain : solid, or a 2D section; forces are always N, for the design's width
+    held_ends : both end faces held in z (plane strain realised in 3D; Python only)
+    symmetry : planes used, "x" and "z"; None finds them
+    filled : (slot, effect) of the slots that an effect has set
+    warnings : for the summary
+    """
+
+    design: Any
+    material: Material
+    mesh: MeshOptions
+    legs: tuple[Leg, ...]
+    object: RigidObject = field(default_factory=Plane)
+    friction: FrictionLaw = field(default_factory=Coulomb)
+    kinematics: Kinematics = field(default_factory=SmallStrain)
+    gauges: tuple[Gauge, ...] = ()
+    inclusions: Inclusions | None = None
+    object_compliance: ObjectCompliance | None = None
+    domain: Domain = "solid"
+    rule: Literal["projection", "paper"] = "projection"
+    held_ends: bool = False
+    symmetry: tuple[str, ...] | None = None
+    filled: tuple[tuple[str, str], ...] = ()
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def approach(self) -> tuple[Any, ...]:
+        """What `finger3d.objects.approach` takes: top, object, half extents, path, the finger's corners."""
+        at, path = np.zeros(3), []
+        for leg in self.legs:
+            end = np.array([leg.depth_mm, leg.slide_x_mm, leg.slide_z_mm])
+            path += [at + share * (end - at) for share in (0.25, 0.5, 0.75, 1.0)]
+            at = end
+        design = self.design
+        half_width = design.width_mm / 2.0 if self.domain == "solid" else 0.0
+        marks = design.landmarks() if hasattr(design, "landmarks") else None
+        return design.top, self.object, design.half_length_mm, half_width, np.array(path), marks

@@ -1,0 +1,248 @@
+"""A condensed body over its contact points, and the path that the object takes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.contact.newton import uniqueness
+from finger3d.contact.state import ContactState
+from finger3d.fem.assembly import Elasticity, Stiffness
+from finger3d.fem.condense import Condensed, spring_forces
+from finger3d.fem.simplex import Mesh
+from finger3d.fem.traces import Surface
+from finger3d.mechanics.history import ContactPoints, Target
+from finger3d.mechanics.model import Leg, Model
+from finger3d.meshing.report import MeshReport
+
+Float = NDArray[np.float64]
+Made = TypeVar("Made")
+
+AUTO_START = 10
+"""Increments that ``steps = "auto"`` begins with."""
+
+_COVERED = 0.5  # least share of a point's hat that must be under the object
+_BESIDE = 2.0  # gap beside an object, in heights of the finger: finite, and never closed
+_AT_ONCE = 8_000_000  # unknowns of fields that are solved for together: 64 MB, and as much again a few times on the way
+_KEPT = 5  # a factor is what takes the memory; a path rarely has more than four lengths of increments
+
+
+@dataclass
+class Later:
+    """What is made of a problem after its build, once for each key; the last few are kept, factorisations counted.
+
+    `last` is what an increment may leave for the one that goes on from it.
+    """
+
+    factorizations: int = 0
+    last: Any = None
+    _kept: dict[Hashable, object] = field(default_factory=dict)
+
+    def once(self, key: Hashable, make: Callable[[], Made]) -> Made:
+        """Return what `make` gave for the key, now or before."""
+        found = self._kept.pop(key) if key in self._kept else self._counted(make())
+        self._kept[key] = found
+        while len(self._kept) > _KEPT:
+            self._kept.pop(next(iter(self._kept)))
+        return found  # type: ignore[return-value]
+
+    def _counted(self, made: object) -> object:
+        if isinstance(made, Condensed):
+            self.factorizations += made.factorizations
+        return made
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A condensed body over its contact points (of the meshed part; symmetry unfolds them).
+
+    Attributes
+    ----------
+    compliance : (c, d, c, d) mm/N, in the object's frame
+    gauge_rows : (g, c d) strain per N
+    kept : (r,) directions among c d that the condensed rows stand for
+    touch_mm : height of the object's lowest point at first touch
+    held : numbers of the unknowns that are zero
+    thickness : mm, the width of a section, 1 for a solid
+    parent, sign, share : (m,), (m, d), (m,)
+        Whole point -> part point, its mirror signs in the frame, and how often the part's force and area count there.
+    springs : (s,) N mm
+        Stiffness of the last s condensed rows, which inclusions add to the body; `condensed` is the body without.
+    beyond : (g + s, g + s)
+        What the last rows of `condensed`, gauges and inclusions, yield more than the mesh says.
+    bare : the same without inclusions, if there are any
+    place_mm : (x, z) of first touch, if the finger's surface is known
+    later : what is made of the problem after its build
+    """
+
+    model: Model
+    mesh: Mesh
+    report: MeshReport
+    elastic: Elasticity
+    stiffness: Stiffness
+    surface: Surface
+    condensed: Condensed
+    compliance: Float
+    gauge_rows: Float
+    kept: NDArray[np.int64]
+    held: NDArray[np.int64]
+    thickness: float
+    touch_mm: float
+    axes: tuple[str, ...]
+    points: ContactPoints
+    parent: NDArray[np.int64]
+    sign: Float
+    share: Float
+    seconds: dict[str, float]
+    springs: Float = field(default_factory=lambda: np.zeros(0))
+    beyond: Float = field(default_factory=lambda: np.zeros((0, 0)))
+    bare: Problem | None = None
+    place_mm: tuple[float, float] | None = None
+    later: Later = field(default_factory=Later, compare=False)
+
+    @property
+    def factorizations(self) -> int:
+        """All so far: that of the build, and those that followed."""
+        return self.condensed.factorizations + self.later.factorizations
+
+    @property
+    def origin(self) -> Target:
+        """Where every path begins: first touch."""
+        return Target(0.0)
+
+    @property
+    def dim(self) -> int:
+        """Space dimensions."""
+        return self.mesh.dim
+
+    def gap(self, target: Target, surface: Surface | None = None) -> Float:
+        """Weighted gap (c,) mm at rest under a target, from the exact object at the surface's quadrature points."""
+        where = surface or self.surface
+        return rigid_gap(self.model, where, self.touch_mm, target)
+
+    def free(self, target: Target) -> Float:
+        """Gap and tangential position (c, d) mm of every point under no contact force."""
+        frame = self.model.object.frame(self.dim)
+        moved = np.array([target.slide_x_mm, -target.depth_mm, target.slide_z_mm])[: self.dim]
+        out = np.empty((len(self.surface.nodes), self.dim))
+        out[:, 0] = self.gap(target)
+        out[:, 1:] = -(frame[1:] @ moved)
+        return out
+
+    def whole(self, state: ContactState) -> ContactState:
+        """The state of the whole finger's points from that of the part's."""
+        p = self.parent
+        tangent = self.sign[:, 1:]
+        return ContactState(
+            state.status[p],
+            state.force[p] * self.sign * self.share[:, None],
+            state.gap[p],
+            state.position[p] * tangent,
+            state.slip[p] * tangent,
+            self._whole_frames(state.frames),
+        )
+
+    def _whole_frames(self, frames: Float | None) -> Float | None:
+        if frames is None:
+            return None
+        world = self.sign[:, [1, 0, 2][: self.dim]]
+        return frames[self.parent] * self.sign[:, :, None] * world[:, None, :]
+
+    def world_force(self, state: ContactState) -> Float:
+        """Forces (m, 3) N on the whole finger's points in x, y, z, from the part's state."""
+        whole = self.whole(state)
+        return self.points.seen_in(whole).world(whole.force)
+
+    def coupling(self) -> float:
+        """Largest mu |K_tt^-1 K_tn| over points; above 1 a contact state need not be the only one."""
+        c, d = self.compliance.shape[:2]
+        return uniqueness(np.full(c, self.model.friction.static), self.compliance.reshape(c * d, c * d), d)
+
+    def gauge_strains(self, force: Float) -> dict[str, float]:
+        """Strain by gauge name under contact forces (c, d), through the condensed rows."""
+        names = [g.name for g in self.model.gauges]
+        return dict(zip(names, map(float, self.gauge_rows @ force.ravel()), strict=True))
+
+    def row_forces(self, force: Float) -> Float:
+        """Forces on the condensed rows from contact forces (c, d); none on the rows of gauges and inclusions."""
+        rows = np.zeros(len(self.condensed.compliance))
+        rows[: len(self.kept)] = force.ravel()[self.kept]
+        return rows
+
+    def unknowns(self, force: Float) -> Float:
+        """All unknowns (N,) of the part's body under contact forces (c, d)."""
+        return self._unknowns(self.row_forces(force))
+
+    def unknowns_of(self, forces: Sequence[Float]) -> Iterator[Float]:
+        """The same for each of several forces (c, d): as many at once as fit into some memory."""
+        at_once = max(1, _AT_ONCE // self.stiffness.upper.shape[0])
+        for first in range(0, len(forces), at_once):
+            rows = np.stack([self.row_forces(force) for force in forces[first : first + at_once]], axis=1)
+            yield from self._unknowns(rows).T
+
+    def _unknowns(self, rows: Float) -> Float:
+        """All unknowns (N, ...) under forces (r, ...) on the condensed rows; springs add theirs."""
+        compliance = self.condensed.compliance
+        if len(self.springs):
+            rows[-len(self.springs) :] = spring_forces(compliance, self.springs, compliance @ rows)
+        return self.condensed.unknowns(rows)
+
+
+def rigid_gap(model: Model, where: Surface, touch: float, target: Target) -> Float:
+    """Weighted gap (c,) mm between the object under a target and a surface at rest, along the object's normal."""
+    x, y = where.samples[:, 0], where.samples[:, 1]
+    z = where.samples[:, 2] if where.samples.shape[1] == 3 else np.zeros_like(x)
+    height = model.object.height(x - target.slide_x_mm, z - target.slide_z_mm)
+    vertical = height + touch - target.depth_mm - y
+    upright = -model.object.frame(where.samples.shape[1])[0, 1]
+    there = np.isfinite(vertical)
+    if there.all():
+        return np.asarray(where.average @ vertical) * upright
+    # Beside the object there is no gap: a point's mean is over what the object covers, if that is half of its hat.
+    share = np.asarray(where.average @ there)
+    mean = np.asarray(where.average @ np.where(there, vertical, 0.0)) / np.maximum(share, _COVERED)
+    return np.where(share < _COVERED, _BESIDE * model.design.height_mm, mean * upright)
+
+
+def at_points(rows: Float, kept: NDArray[np.int64], count: int, dim: int) -> Float:
+    """Compliance (c, d, c, d) of contact points from that of the condensed rows (r, r), of which they are the first.
+
+    A point on a symmetry plane cannot move across it: that direction is left uncoupled, and never sees a force.
+    """
+    own = rows[: len(kept), : len(kept)]
+    out = np.diag(np.full(count * dim, np.diagonal(own).max()))
+    out[np.ix_(kept, kept)] = own
+    return out.reshape(count, dim, count, dim)
+
+
+def folded(point: Float, direction: Float, axes: tuple[str, ...], dim: int) -> tuple[Float, Float]:
+    """A place and a direction (3,) in the meshed part (d,), reflected back where they lie in a mirror image."""
+    sign = np.array([-1.0 if a in axes and v < 0.0 else 1.0 for a, v in zip("xyz", point, strict=True)])
+    return (point * sign)[:dim], (direction * sign)[:dim]
+
+
+def targets(legs: tuple[Leg, ...]) -> list[Target]:
+    """Every increment of the legs, the start not among them."""
+    out: list[Target] = []
+    at = Target(0.0)
+    for leg in legs:
+        count = leg.steps if isinstance(leg.steps, int) else AUTO_START
+        end = Target(leg.depth_mm, leg.slide_x_mm, leg.slide_z_mm, at.time_s + (leg.duration_s or 0.0))
+        out += [between(at, end, k / count) for k in range(1, count)] + [end]
+        at = end
+    return out
+
+
+def between(a: Target, b: Target, share: float) -> Target:
+    """The target a share of the way from a to b."""
+    values = [u + share * (v - u) for u, v in zip(values_of(a), values_of(b), strict=True)]
+    return Target(*values)
+
+
+def values_of(t: Target) -> tuple[float, float, float, float]:
+    """Depth, slides and time."""
+    return t.depth_mm, t.slide_x_mm, t.slide_z_mm, t.time_s

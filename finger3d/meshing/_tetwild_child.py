@@ -1,0 +1,56 @@
+"""The child process that calls pytetwild, which crashes or hangs on bad input: python -m ... PARENT_PID.
+
+It reads an .npz from standard input and writes one to standard output. It leaves no file behind, however it ends. On
+Linux it ends with its parent.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import sys
+import tempfile
+
+import numpy as np
+
+from finger3d._process import end_with
+
+
+def main() -> None:
+    """Read points, triangles, background and settings; write points (n, 3) and positive tets (m, 4)."""
+    # pytetwild prints to descriptor 1
+    output = os.dup(1)
+    os.dup2(2, 1)
+    import pytetwild
+
+    with np.load(io.BytesIO(sys.stdin.buffer.read()), allow_pickle=False) as given:
+        _leave_no_files()
+        points, tets = pytetwild.tetrahedralize(
+            given["points"],
+            given["triangles"].astype(np.int32),
+            edge_length_abs=float(given["edge_length"]),
+            epsilon=float(given["epsilon"]),
+            stop_energy=float(given["stop_energy"]),
+            num_threads=1,
+            quiet=True,
+            vtk_ordering=True,
+            bg_vertices=given["bg_points"],
+            bg_tets=given["bg_tets"].astype(np.int32),
+            bg_values=given["bg_values"],
+        )
+    result = io.BytesIO()
+    np.savez(result, points=np.asarray(points, dtype=np.float64), tets=np.asarray(tets, dtype=np.int64))
+    with os.fdopen(output, "wb") as stream:
+        stream.write(result.getbuffer())
+
+
+def _leave_no_files() -> None:
+    """Work in a folder that is removed already: pytetwild writes files into the working folder, which then fails."""
+    folder = tempfile.mkdtemp(prefix="finger3d_")
+    os.chdir(folder)
+    os.rmdir(folder)
+
+
+if __name__ == "__main__":
+    end_with(int(sys.argv[1]))
+    main()

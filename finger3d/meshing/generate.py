@@ -1,0 +1,40 @@
+"""From a design to a mesh, by the mesher that the options name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from finger3d.fem.simplex import Mesh
+from finger3d.meshing.report import MeshReport
+from finger3d.meshing.swept import mesh_swept
+
+
+def mesh_solid(
+    design: Any,
+    options: Any,
+    zone: tuple[float, float, float, float],
+    symmetry: tuple[str, ...] = (),
+    say: Callable[[str], None] = lambda text: None,
+) -> tuple[Mesh, MeshReport]:
+    """Mesh a design with quadratic tets.
+
+    Parameters
+    ----------
+    design : from geometries/
+    options : size_mm in the zone, base_size_mm far from it, mesher "ftetwild" or "swept"
+    zone : (x_min, x_max, z_min, z_max) mm where contact is predicted
+    symmetry : "x", "z": mesh only x >= 0, z >= 0
+    say : told what is being done
+
+    Returns
+    -------
+    mesh : quadratic, facets labelled contact, base, ends, walls, symmetry_x, symmetry_z
+    report : size and quality
+    """
+    if options.mesher == "swept":
+        say("meshing (swept)")
+        return mesh_swept(design, options, zone, symmetry)
+    from finger3d.meshing.tetwild import mesh_tetwild
+
+    return mesh_tetwild(design, options, zone, symmetry, say)

@@ -1,0 +1,101 @@
+"""Where CAD faces run into each other smoothly: there a node belongs on one of them, not on the line where they meet.
+
+Two faces without a crease between them, a fillet and the flat it starts from, define no line that a node near it could
+be put on: a node of an edge length h beside the seam lies up to h^2/8R off the one or the other surface, and moved onto
+both it would slide along them, over its neighbours.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.geometry.faceted import Faceted
+from finger3d.geometry.implicit import Plane
+from finger3d.geometry.surface import Triangles
+from finger3d.geometry.tessellate import Body
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+Bool = NDArray[np.bool_]
+
+SMOOTH = np.cos(np.radians(6.0))
+"""Creases below 6 degrees count as none: an edge of length h that cuts across one misses it by h/80 at most, and a node
+put onto two surfaces at a smaller angle moves by more than ten times what it was off them."""
+
+_PINNED = ("base", "symmetry_x", "symmetry_z")  # exactly planar, whatever runs into them
+
+
+class Seams:
+    """The seams of a body, sampled where its tessellation has points on them."""
+
+    def __init__(self, body: Body) -> None:
+        self.faces = body.faces
+        self.pinned = np.array([f.label in _PINNED and isinstance(f.surface, Plane) for f in body.faces])
+        self._triangles = [Triangles(body.points, body.triangles[body.face == i]) for i in range(len(body.faces))]
+        self._samples: dict[tuple[int, int], tuple[Float, Bool]] = {}
+        if any(isinstance(f.surface, Faceted) for f in body.faces):
+            return  # patches of an STL body are smooth themselves, and end at creases
+        used = [np.unique(t.faces) for t in self._triangles]
+        for i, j in combinations(range(len(body.faces)), 2):
+            if len(shared := np.intersect1d(used[i], used[j])):
+                at = body.points[shared]
+                a, b = (body.faces[k].sign * body.faces[k].surface.distance(at)[1] for k in (i, j))
+                self._samples[i, j] = at, np.einsum("ij,ij->i", a, b) > SMOOTH
+
+    def one_of_each(self, points: Float, sets: Bool, beside: Bool | None = None) -> Bool:
+        """The sets (n, f) with one face of every smooth group: a pinned plane, or the nearest, at points (n, 3).
+
+        The faces `beside` (n, f) compete with those of the sets that they join smoothly.
+        """
+        from scipy.sparse import coo_matrix
+        from scipy.sparse.csgraph import connected_components
+        from scipy.spatial import cKDTree
+
+        count = sets.shape[1]
+        known = sets if beside is None else sets | beside
+        links = []
+        for (i, j), (at, smooth) in self._samples.items():
+            both = np.flatnonzero(known[:, i] & known[:, j])
+            if len(both) and smooth.any():
+                both = both[smooth[cKDTree(at).query(points[both])[1]]]
+                links.append(np.stack([both * count + i, both * count + j]))
+        if not links or not (pairs := np.hstack(links)).size:
+            return sets
+        joined = coo_matrix((np.ones(pairs.shape[1]), pairs), shape=(sets.size, sets.size))
+        group = connected_components(joined, directed=False)[1]
+        several = np.unique(pairs)
+        several = several[np.isin(group[several], group[several[sets.ravel()[several]]])]
+        distance = self.distance(points, several // count, several % count)
+        first = several[np.lexsort([distance, ~self.pinned[several % count], group[several]])]
+        chosen = first[np.unique(group[first], return_index=True)[1]]
+        rows = sets.copy()
+        rows.ravel()[several] = False
+        rows.ravel()[chosen] = True
+        return rows
+
+    def nearest_only(self, points: Float, sets: Bool) -> Bool:
+        """The sets (n, f) with the pinned planes and the nearest of the other faces only."""
+        others = sets & ~self.pinned
+        node, face = np.nonzero(others)
+        order = np.lexsort([self.distance(points, node, face), node])
+        node, face = node[order], face[order]
+        first = np.unique(node, return_index=True)[1]
+        rows = sets & self.pinned
+        rows[node[first], face[first]] = True
+        return rows
+
+    def pinned_only(self, points: Float, sets: Bool) -> Bool:
+        """The sets (n, f) with the pinned planes only, where there are any."""
+        planes = sets & self.pinned
+        return np.where(planes.any(axis=1)[:, None], planes, sets)
+
+    def distance(self, points: Float, node: Int, face: Int) -> Float:
+        """Distance (k,), mm, of points[node] from the triangles of the faces (k,)."""
+        out = np.empty(len(node))
+        for i in np.unique(face):
+            at = points[node[face == i]]
+            out[face == i] = np.linalg.norm(self._triangles[i].closest(at)[0] - at, axis=1)
+        return out

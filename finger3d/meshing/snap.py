@@ -1,0 +1,242 @@
+"""Put the nodes of a tetrahedral mesh back onto the CAD faces that fTetWild left by up to its envelope.
+
+A boundary facet belongs to the CAD face it is nearest to and parallel with; a node belongs to the faces of its facets,
+and goes where these surfaces meet; of faces that join smoothly there it goes onto the nearest. Mid-edge nodes likewise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.fem.quality import cell_angles_deg, curved_jacobians
+from finger3d.fem.simplex import EDGES, Mesh, boundary, quadratic
+from finger3d.geometry.faceted import Faceted, moved_onto
+from finger3d.geometry.implicit import Plane
+from finger3d.geometry.tessellate import Body, CadFace
+from finger3d.meshing.seams import Seams
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+Bool = NDArray[np.bool_]
+
+MIN_DIHEDRAL_DEG = 3.0
+"""Cells flatter than this are repaired, or the mesh is made anew. Good meshes were seen at 12 to 27 degrees."""
+
+_PARALLEL = 0.05  # singular values below this share stem from faces that are parallel: one condition, not two
+_REACH = 0.5  # of its edges' mean length: a node that would have to go farther to a crease stays beside it
+_FAR = 2.0  # of its longest edge: a facet that lies farther outside a face's box is not on it
+_REPAIRS = 100
+_FEW = 0.01  # of all cells: where a crease of the surface runs through them
+
+
+class UnusableMeshError(Exception):
+    """This mesh will not do; another attempt may."""
+
+
+def snap(points: Float, tets: Int, body: Body) -> Mesh:
+    """The quadratic mesh with labelled facets, on the CAD surfaces, made from linear tets near them.
+
+    Raises
+    ------
+    UnusableMeshError
+        The boundary is open, a node finds no place, or cells stay flat or inverted.
+    """
+    seams = Seams(body)
+    faces = boundary(tets, 3)
+    check_closed(faces)
+    sets = _node_sets(points, faces, _cad_faces(points, faces, body), body)
+    points, sets = placed(points, sets, seams, _REACH * _edge_lengths(points, faces))
+    points, tets, sets = repair(points, tets, sets)
+    faces = boundary(tets, 3)
+    check_closed(faces)
+    owner = _cad_faces(points, faces, body, sets)
+    label = np.array([f.label for f in body.faces])[owner]
+    mesh = quadratic(Mesh(points, tets, {str(name): faces[label == name] for name in np.unique(label)}))
+    mesh = _straightened(_curve(mesh, owner[np.argsort(label, kind="stable")], sets, seams))
+    if (bad := int(np.sum(curved_jacobians(mesh) <= 0.0))) > 0:
+        raise UnusableMeshError(f"{bad} curved cells turned inside out at the surface")
+    return mesh
+
+
+def _edge_lengths(points: Float, faces: Int) -> Float:
+    """Mean length (n,), mm, of the boundary edges at every node; 0 inside."""
+    edges = faces[:, EDGES[2]].reshape(-1, 2)
+    length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+    count = np.bincount(edges.ravel(), minlength=len(points))
+    return np.asarray(np.bincount(edges.ravel(), np.repeat(length, 2), len(points)) / np.maximum(count, 1))
+
+
+def _straightened(mesh: Mesh) -> Mesh:
+    """The mesh with straight edges in the cells that curved edges turned inside out, if these are few."""
+    bad = curved_jacobians(mesh) <= 0.0
+    if not bad.any() or bad.mean() > _FEW:
+        return mesh
+    cells, points = mesh.cells[bad], mesh.points.copy()
+    points[cells[:, 4:]] = points[cells[:, EDGES[3]]].mean(axis=2)
+    return replace(mesh, points=points)
+
+
+def check_closed(faces: Int) -> None:
+    """Refuse a boundary in which some edge does not belong to exactly two facets."""
+    edges = np.sort(faces[:, EDGES[2]].reshape(-1, 2), axis=1)
+    count = np.unique(edges, axis=0, return_counts=True)[1]
+    if not len(faces) or (count != 2).any():
+        raise UnusableMeshError("its boundary is not closed")
+
+
+def _cad_faces(points: Float, faces: Int, body: Body, sets: Bool | None = None) -> Int:
+    """Number of the CAD face (m,) under every boundary facet; of those all its nodes lie on, if `sets` is given."""
+    a, b, c = (points[faces[:, i]] for i in range(3))
+    normal = np.cross(b - a, c - a)
+    twice = np.linalg.norm(normal, axis=1)
+    normal /= np.maximum(twice, 1e-300)[:, None]
+    middle = (a + b + c) / 3.0
+    longest = np.max([np.linalg.norm(q - p, axis=1) for p, q in pairwise((a, b, c, a))], axis=0)
+    cost = np.empty((len(body.faces), len(faces)))
+    for i, f in enumerate(body.faces):
+        outside = np.linalg.norm(np.maximum(0.0, np.maximum(f.low - middle, middle - f.high)), axis=1) / longest
+        near = outside < _FAR
+        cost[i] = outside + 2.0
+        distance, gradient = f.surface.distance(middle[near])
+        aligned = f.sign * np.einsum("ij,ij->i", normal[near], gradient)
+        cost[i, near] = np.abs(distance) / longest[near] + outside[near] + 1.0 - aligned
+    if sets is not None:
+        shared = np.logical_and.reduce(sets[faces], axis=1)
+        none = np.logical_not(shared.any(axis=1))
+        cost += np.where(shared | none[:, None], 0.0, 1e3).T
+    return np.argmin(cost, axis=0)
+
+
+def _node_sets(points: Float, faces: Int, owner: Int, body: Body) -> Bool:
+    """Which CAD faces (n, f) every node belongs to; each CAD corner takes its nearest boundary node."""
+    sets = np.zeros((len(points), len(body.faces)), dtype=bool)
+    sets[faces.ravel(), np.repeat(owner, 3)] = True
+    nodes = np.unique(faces)
+    for corner, meeting in zip(body.corners, body.corner_faces, strict=True):
+        nearest = nodes[np.argmin(np.linalg.norm(points[nodes] - corner, axis=1))]
+        sets[nearest, list(meeting)] = True
+    return sets
+
+
+def placed(points: Float, sets: Bool, seams: Seams, reach: Float, beside: Bool | None = None) -> tuple[Float, Bool]:
+    """Points (n, 3) moved onto the CAD faces of their sets (n, f), and the faces each is on.
+
+    A point that finds no place where its faces meet, or only beyond its reach (n,), mm, goes onto the nearest of them,
+    and does not leave the base and the planes of symmetry.
+
+    Raises
+    ------
+    UnusableMeshError
+        A point finds no place there either.
+    """
+    rows = seams.one_of_each(points, sets, beside)
+    moved, missed = _moved(points, rows, seams.faces)
+    for fewer in (seams.nearest_only, seams.pinned_only):
+        lost = missed | ((rows.sum(axis=1) > 1) & (np.linalg.norm(moved - points, axis=1) > reach))
+        if lost.any():
+            rows = rows.copy()
+            rows[lost] = fewer(points[lost], rows[lost])
+            moved[lost], missed[lost] = _moved(points[lost], rows[lost], seams.faces)
+    if missed.any():
+        raise UnusableMeshError("a surface node finds no place on its CAD faces")
+    return moved, rows
+
+
+def project(points: Float, sets: Bool, faces: tuple[CadFace, ...]) -> Float:
+    """Move every point (n, 3) onto all surfaces of its set (n, f), by Newton steps of least length."""
+    moved, missed = _moved(points, sets, faces)
+    if missed.any():
+        raise UnusableMeshError("a surface node finds no place on its CAD faces")
+    return moved
+
+
+def _moved(points: Float, sets: Bool, faces: tuple[CadFace, ...]) -> tuple[Float, Bool]:
+    """As :func:`project`, and a mask (n,) of the points that did not come onto all surfaces of their sets."""
+    points, missed = points.copy(), np.zeros(len(points), dtype=bool)
+    scale = max((float((f.high - f.low).max()) for f in faces), default=0.0)
+    groups, member = np.unique(sets, axis=0, return_inverse=True)
+    member = member.reshape(-1)
+    for g, row in enumerate(groups):
+        chosen = [faces[i] for i in np.flatnonzero(row)]
+        if not chosen:
+            continue
+        at = np.flatnonzero(member == g)
+        p = points[at]
+        if faceted := [f.surface for f in chosen if isinstance(f.surface, Faceted)]:
+            found = moved_onto(faceted, p)
+            missed[at] = found is None
+            points[at] = p if found is None else found
+            continue
+        for _ in range(20):
+            pairs = [f.surface.distance(p) for f in chosen]
+            distance = np.stack([d for d, _ in pairs], axis=1)
+            normals = np.stack([n for _, n in pairs], axis=1)
+            if np.abs(distance).max() < 1e-13 * scale:
+                break
+            inverse = np.linalg.pinv(normals, rcond=_PARALLEL)
+            p = p - np.einsum("nxk,nk->nx", inverse, distance)
+        missed[at] = ~(np.abs(distance).max(axis=1) <= 1e-7 * scale)
+        for f in chosen:
+            if isinstance(f.surface, Plane) and f.surface.axis is not None:
+                p[:, f.surface.axis] = f.surface.origin[f.surface.axis]
+        points[at] = p
+    return points, missed
+
+
+def repair(points: Float, tets: Int, sets: Bool) -> tuple[Float, Int, Bool]:
+    """Collapse short edges until no cell is flat or inverted; points and sets without the nodes that went."""
+    for _ in range(_REPAIRS):
+        angles = cell_angles_deg(points, tets)
+        worst = int(np.argmin(angles))
+        if angles[worst] >= MIN_DIHEDRAL_DEG:
+            break
+        tets = _collapsed(points, tets, sets, tets[worst])
+    else:
+        raise UnusableMeshError("too many flat cells")
+    used = np.unique(tets)
+    number = np.full(len(points), -1)
+    number[used] = np.arange(len(used))
+    return points[used], number[tets], sets[used]
+
+
+def _collapsed(points: Float, tets: Int, sets: Bool, cell: Int) -> Int:
+    """The tets after the shortest edge of a cell that may go has gone."""
+    edges = cell[EDGES[3]]
+    faces = boundary(tets, 3)
+    outer = {tuple(e) for e in np.sort(faces[:, EDGES[2]].reshape(-1, 2), axis=1).tolist()}
+    for u, v in edges[np.argsort(np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1))]:
+        on_surface = sets[u].any() and sets[v].any()
+        if on_surface and (min(u, v), max(u, v)) not in outer:
+            continue
+        for gone, kept in ((u, v), (v, u)):
+            if (sets[gone] & ~sets[kept]).any():
+                continue
+            near = (tets == gone).any(axis=1)
+            moved = tets[near & ~(tets == kept).any(axis=1)]
+            moved = np.where(moved == gone, kept, moved)
+            if len(moved) and cell_angles_deg(points, moved).min() < MIN_DIHEDRAL_DEG:
+                continue
+            fewer = np.vstack([tets[~near], moved])
+            try:
+                check_closed(boundary(fewer, 3))
+            except UnusableMeshError:
+                continue
+            return fewer
+    raise UnusableMeshError("a flat cell at the surface could not be removed")
+
+
+def _curve(mesh: Mesh, owner: Int, known: Bool, seams: Seams) -> Mesh:
+    """Put the mid-edge nodes of boundary facets onto CAD faces: those that own (m,) the facets that hold the edge, or
+    what these join smoothly if that is nearer and an end of the edge, known (n, f), is on it."""
+    faces = np.vstack(list(mesh.facets.values()))
+    sets = np.zeros((len(mesh.points), len(seams.faces)), dtype=bool)
+    sets[faces[:, 3:].ravel(), np.repeat(owner, 3)] = True
+    beside, reach = np.zeros_like(sets), np.zeros(len(sets))
+    for middle, (a, b) in zip(faces[:, 3:].T, faces[:, EDGES[2]].transpose(1, 2, 0), strict=True):
+        beside[middle] = known[a] | known[b]
+        reach[middle] = 0.5 * _REACH * np.linalg.norm(mesh.points[a] - mesh.points[b], axis=1)
+    return replace(mesh, points=placed(mesh.points, sets, seams, reach, beside)[0])

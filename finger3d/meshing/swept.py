@@ -1,0 +1,135 @@
+"""The structured, deterministic mesher: quadratic triangles of a section, and tets swept from them along z."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.errors import Finger3dError
+from finger3d.fem.simplex import Mesh, boundary, quadratic, unfold
+from finger3d.geometry.section import Section
+from finger3d.meshing.grid import Grid, Sizes, folded_zone, rows, triangulate
+from finger3d.meshing.limits import check_count, check_sizes
+from finger3d.meshing.report import MeshReport, report
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+Zone = tuple[float, float, float, float]
+
+_AXIS = {"x": 0, "z": 2}
+_FLATTEST_DEG = 0.5  # flatter ones come from a wall or an edge far thinner than the mesh
+
+
+def mesh_section(design: Any, options: Any, zone: Zone, symmetry: tuple[str, ...] = ()) -> tuple[Mesh, MeshReport]:
+    """Mesh the section of an extruded design with quadratic triangles, mirror-exact about x = 0.
+
+    Parameters
+    ----------
+    design : a design with a section
+    options : size_mm, base_size_mm
+    zone : (x_min, x_max, z_min, z_max) mm where contact is predicted; z is not read
+    symmetry : ("x",) for the half x >= 0 only
+    """
+    start = time.perf_counter()
+    check_sizes(design, options, 2)
+    axes = tuple(_AXIS[a] for a in ("x",) if a not in symmetry)
+    grid, section = _grid(design, options, zone, 2, 2 ** len(axes))
+    mesh = _on_curve(quadratic(Mesh(grid.points, grid.cells, grid.facets)), section, grid.arc)
+    whole = unfold(mesh, axes)[0]
+    seconds = {"cad": 0.0, "mesh": time.perf_counter() - start}
+    multiple = design.width_mm * (2 - len(axes))
+    return whole, _fit(report(whole, multiple, section.area_mm2 * design.width_mm, seconds), design, options)
+
+
+def mesh_swept(design: Any, options: Any, zone: Zone, symmetry: tuple[str, ...] = ()) -> tuple[Mesh, MeshReport]:
+    """Mesh an extruded design with quadratic tets, mirror-exact about x = 0 and z = 0; see :func:`mesh_section`.
+
+    Layers along z are equal and at most ``size_mm`` thick; over half the width there are at least ``options.layers``.
+    """
+    start = time.perf_counter()
+    check_sizes(design, options, 3)
+    half = 0.5 * design.width_mm
+    # Friction varies along z as it does along x, so no layer is thicker than the edge length at the contact.
+    layers = max(options.layers, math.ceil(half / options.size_mm - 1e-9))
+    axes = tuple(_AXIS[a] for a in ("x", "z") if a not in symmetry)
+    grid, section = _grid(design, options, zone, 3, 3 * layers * 2 ** len(axes))
+    levels = np.linspace(0.0, half, layers + 1)
+    mesh = _on_curve(quadratic(_sweep(grid, levels)), section, np.tile(grid.arc, layers + 1))
+    whole = unfold(mesh, axes)[0]
+    seconds = {"cad": 0.0, "mesh": time.perf_counter() - start}
+    multiple = 4.0 / 2 ** len(axes)
+    return whole, _fit(report(whole, multiple, section.area_mm2 * design.width_mm, seconds), design, options)
+
+
+def _fit(made: MeshReport, design: Any, options: Any) -> MeshReport:
+    """The report, unless cells are too flat to trust."""
+    if made.min_dihedral_deg >= _FLATTEST_DEG:
+        return made
+    raise Finger3dError(
+        f"{design.name}: mesh.size_mm = {options.size_mm:g} gives cells of {made.min_dihedral_deg:.2g} deg, flatter "
+        f"than {_FLATTEST_DEG:g}; a wall or an edge is too thin for it: choose smaller sizes, or edge_height_mm = 0"
+    )
+
+
+def _grid(design: Any, options: Any, zone: Zone, dim: int, copies: int) -> tuple[Grid, Section]:
+    """Triangles of the half section, if the mesh made of `copies` cells for each of them may be afforded."""
+    if not hasattr(design, "section"):
+        what, allowed = ("model.domain", "'solid'") if dim == 2 else ("mesh.mesher = 'swept'", "'ftetwild'")
+        raise Finger3dError(f"{what}: {design.name} has no constant section to mesh; allowed: {allowed}")
+    section = design.section()
+    low, high = folded_zone(zone, section.half_length_mm)
+    layout = rows(section, Sizes(options.size_mm, options.base_size_mm, low, high))
+    check_count(2.0 * layout.count * copies, dim, options)
+    return triangulate(section, layout), section
+
+
+def _on_curve(mesh: Mesh, section: Section, arc: Float) -> Mesh:
+    """Move the mid-edge nodes of contact facets onto the contact curve; `arc` (v,) is the parameter of every vertex."""
+    d = mesh.dim
+    facets = mesh.facets["contact"]
+    pairs = ((0, 1),) if d == 2 else ((0, 1), (1, 2), (2, 0))
+    points = mesh.points.copy()
+    for k, (i, j) in enumerate(pairs):
+        ends, middle = arc[facets[:, [i, j]]], facets[:, d + k]
+        bent = ends[:, 0] != ends[:, 1]  # edges along z lie where their ends lie, to the last bit
+        points[middle[bent], :2] = section.contact.at(ends[bent].mean(axis=1))
+    points[mesh.facets["symmetry_x"].ravel(), 0] = 0.0
+    return Mesh(points, mesh.cells, mesh.facets)
+
+
+def _sweep(grid: Grid, levels: Float) -> Mesh:
+    """Sweep triangles through z levels (l + 1,) from 0, three tets a prism, and label the boundary."""
+    n, layers = len(grid.points), len(levels) - 1
+    points = np.hstack([np.tile(grid.points, (layers + 1, 1)), np.repeat(levels, n)[:, None]])
+    # Sorted corners make neighbouring prisms split their common quadrilateral along the same diagonal.
+    order = np.argsort(grid.cells, axis=1)
+    a, b, c = np.take_along_axis(grid.cells, order, axis=1).T
+    even = np.isin(order @ [9, 3, 1], [0 * 9 + 1 * 3 + 2, 1 * 9 + 2 * 3 + 0, 2 * 9 + 0 * 3 + 1])[:, None]
+    tets = [(a, b, c, c + n), (a, b, c + n, b + n), (a, b + n, c + n, a + n)]
+    one = np.vstack([_oriented(np.stack(t, axis=1), even) for t in tets])
+    cells = (one[None] + n * np.arange(layers)[:, None, None]).reshape(-1, 4)
+    return Mesh(points, cells, _labelled(grid, boundary(cells, 3), n, layers))
+
+
+def _oriented(tets: Int, even: NDArray[np.bool_]) -> Int:
+    """Swap two corners of tets over triangles whose sorted corners run clockwise."""
+    return np.where(even, tets, tets[:, [1, 0, 2, 3]])
+
+
+def _labelled(grid: Grid, faces: Int, n: int, layers: int) -> dict[str, Int]:
+    """Labels of boundary triangles: by level at the ends, by the section's edge in between."""
+    level, node = faces // n, faces % n
+    out = {
+        "symmetry_z": faces[(level == 0).all(axis=1)],
+        "ends": faces[(level == layers).all(axis=1)],
+    }
+    side = level.min(axis=1) != level.max(axis=1)
+    key = node.min(axis=1) * n + node.max(axis=1)
+    for label, edges in grid.facets.items():
+        keys = edges.min(axis=1) * n + edges.max(axis=1)
+        out[label] = faces[side & np.isin(key, keys)]
+    return out

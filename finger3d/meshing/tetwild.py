@@ -1,0 +1,222 @@
+"""Unstructured tets by pytetwild, graded, snapped to CAD, cached.
+
+pytetwild crashes or hangs on bad input and gives another mesh every time, so its input is checked first, it runs in a
+child process under a time limit, its output is checked, and it gets three attempts.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d._process import child_environment
+from finger3d.errors import Finger3dError, MissingError
+from finger3d.fem.simplex import Mesh, signed_volumes
+from finger3d.meshing import cache
+from finger3d.meshing.limits import MAX_TETS, check_count, check_sizes
+from finger3d.meshing.report import MeshReport, report
+from finger3d.meshing.sizing import Sizing, forecast, rounded_zone, sizing
+
+if TYPE_CHECKING:
+    from finger3d.geometry.tessellate import Body
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+Zone = tuple[float, float, float, float]
+
+STOP_ENERGY = 10.0
+ATTEMPTS = 3
+
+_EPSILON = (2e-4, 1e-3, 3e-3)  # envelope per diagonal: least, usual, most; tighter costs steeply, nodes are snapped
+_FINE = 0.2  # the envelope is at most this share of the contact edge length, and holds chords this much finer
+_COARSER = 0.02  # of the envelope, each triangle left out of an STL body may move the surface
+_VOLUME = 0.01
+
+
+def mesh_tetwild(
+    design: Any,
+    options: Any,
+    zone: Zone,
+    symmetry: tuple[str, ...] = (),
+    say: Callable[[str], None] = lambda text: None,
+) -> tuple[Mesh, MeshReport]:
+    """Mesh a design with quadratic tets by pytetwild, or read the mesh from the cache; see `design.mesh_solid`."""
+    check_sizes(design, options, 3)
+    zone = rounded_zone(design, options, zone)
+    path = cache.folder() / f"{cache.key(design, options, zone, symmetry)}.npz"
+    multiple = 2.0 ** len(symmetry)
+    start = time.perf_counter()
+    if (found := cache.load(path)) is not None:
+        mesh, volume = found
+        say(f"mesh from the cache, {path}")
+        seconds = {"cad": 0.0, "mesh": time.perf_counter() - start}
+        return mesh, report(mesh, multiple, volume, seconds, from_cache=True, cache_path=str(path))
+    mesh, volume, cad_seconds = _made(design, options, zone, symmetry, say)
+    stored = cache.save(path, mesh, volume)
+    if not stored:
+        say(f"the mesh could not be kept in {path.parent}; the next run will mesh again")
+    seconds = {"cad": cad_seconds, "mesh": time.perf_counter() - start - cad_seconds}
+    return mesh, report(mesh, multiple, volume, seconds, cache_path=str(path) if stored else None)
+
+
+def _made(
+    design: Any, options: Any, zone: Zone, symmetry: tuple[str, ...], say: Callable[[str], None]
+) -> tuple[Mesh, float, float]:
+    """The mesh, the CAD volume (mm3) of the whole body, and the seconds CAD took."""
+    from finger3d.meshing.snap import UnusableMeshError, snap
+
+    if find_spec("pytetwild") is None:
+        raise MissingError("mesh.mesher = 'ftetwild' needs the package pytetwild; install it, or use mesher = 'swept'")
+    start = time.perf_counter()
+    low, high = box(design, symmetry)
+    field = sizing(design, options, zone, low, high)
+    cells = forecast(design, field)
+    check_count(cells, 3, options, MAX_TETS)
+    say("building the CAD solid")
+    body, epsilon = _body(design, symmetry, field)
+    cad_seconds = time.perf_counter() - start
+    check_surface(body.points, body.triangles)
+    whole = getattr(design, "volume_mm3", body.volume_mm3 * 2 ** len(symmetry))
+    if abs(body.volume_mm3 * 2 ** len(symmetry) / whole - 1.0) > _VOLUME:
+        raise Finger3dError(
+            f"{design.name}: the solid's volume is not the volume_mm3 it states, {whole:.6g}; mend the design"
+        )
+    say(f"meshing, about {cells:.0f} tetrahedra")
+    reasons = []
+    limit = _limit_seconds(cells, len(body.triangles))
+    for _ in range(ATTEMPTS):
+        try:
+            points, tets = _child(body.points, body.triangles, field, epsilon, limit)
+            check_tets(points, tets, body.volume_mm3)
+            mesh = snap(points, tets, body)
+            return mesh, whole, cad_seconds
+        except UnusableMeshError as error:
+            reasons.append(str(error))
+            say(f"this mesh will not do: {error}; meshing again")
+    raise Finger3dError(
+        f"{design.name}: {ATTEMPTS} attempts to mesh with size_mm = {options.size_mm:g} failed, the last because "
+        f"{reasons[-1]}; try other sizes, or mesher = 'swept'"
+    )
+
+
+def box(design: Any, symmetry: tuple[str, ...]) -> tuple[Float, Float]:
+    high = np.array([design.half_length_mm, design.height_mm, 0.5 * design.width_mm])
+    low = np.array([0.0 if "x" in symmetry else -high[0], 0.0, 0.0 if "z" in symmetry else -high[2]])
+    return low, high
+
+
+def _body(design: Any, symmetry: tuple[str, ...], field: Sizing) -> tuple[Body, float]:
+    """The tessellated part, and the envelope fTetWild shall keep, per diagonal."""
+    from finger3d.geometry.cad import cut, labelled_faces
+    from finger3d.geometry.faceted import coarser
+    from finger3d.geometry.implicit import surface_of
+    from finger3d.geometry.tessellate import tessellate
+
+    faceted = design.body() if hasattr(design, "body") else None
+    solid = None if faceted else cut(design.solid(), symmetry)
+    surfaces = [f.surface for f in faceted.faces] if faceted else [surface_of(f) for f in labelled_faces(solid)]
+    radius = min(getattr(surface, "radius", math.inf) for surface in surfaces)
+    diagonal = float(np.linalg.norm(field.high - field.low))
+    # An envelope below the sagitta of the longest edge makes a hemisphere take 20 times as long, and come out too fine.
+    least, usual, most = _EPSILON
+    epsilon = min(max(usual, field.base_mm**2 / (8.0 * radius * diagonal)), most, _FINE * field.size_mm / diagonal)
+    epsilon = max(epsilon, least)
+    if faceted:
+        return coarser(faceted, _COARSER * epsilon * diagonal), epsilon
+    half_width, half_length = 0.5 * design.width_mm, design.half_length_mm
+    exact = (0.0, half_width, -half_width, half_length, -half_length, design.height_mm)
+    return tessellate(solid, _FINE * epsilon * diagonal, exact=exact), epsilon
+
+
+def check_surface(points: Float, triangles: Int) -> None:
+    """Refuse a surface that makes pytetwild crash, hang, or mesh something else."""
+    reason = _mistake(points, triangles)
+    if reason:
+        raise Finger3dError(f"the finger's surface cannot be meshed: {reason}; mend the design or the file")
+
+
+def _mistake(points: Float, triangles: Int) -> str:
+    if points.ndim != 2 or points.shape[1] != 3 or triangles.ndim != 2 or triangles.shape[1] != 3 or len(triangles) < 4:
+        return f"it needs (n, 3) points and at least 4 triangles (m, 3), and has {points.shape} and {triangles.shape}"
+    if not np.isfinite(points).all():
+        return "a point is not finite"
+    if triangles.min() < 0 or triangles.max() >= len(points):
+        return "a triangle names a point that does not exist"
+    low, high = points.min(axis=0), points.max(axis=0)
+    extent = high - low
+    diagonal = float(np.linalg.norm(extent))
+    if not 1e-2 < diagonal < 1e4:
+        return f"its diagonal is {diagonal:.3g} mm; allowed: 0.01 to 10000"
+    if extent.min() <= 1e-3 * extent.max():
+        return f"it is {extent.min():.3g} mm thin and {extent.max():.3g} mm long; allowed: at most 1:1000"
+    if np.linalg.norm(points.mean(axis=0)) > 1e3 * diagonal:
+        return "it lies farther from the origin than 1000 times its size"
+    import trimesh
+
+    surface = trimesh.Trimesh(points, triangles, process=False)
+    if not surface.is_watertight:
+        return "it is not closed"
+    if not surface.is_winding_consistent or not surface.volume > 0.0:
+        return "its triangles do not all face outward"
+    return ""
+
+
+def _limit_seconds(cells: float, triangles: int) -> float:
+    """Five times what meshing took on a busy 2-core machine: 6 s at 4 700 tets, 149 s at 219 000, the surface being
+    coarse; 27 s over 5 500 triangles, 197 s over 34 000, the tets being few."""
+    return 5.0 * (10.0 + 8e-4 * cells + 5e-3 * triangles)
+
+
+def _child(points: Float, triangles: Int, field: Sizing, epsilon: float, limit: float) -> tuple[Float, Int]:
+    """Run pytetwild in a child process."""
+    from finger3d.meshing.snap import UnusableMeshError
+
+    extent = np.ptp(points, axis=0)
+    bg_points, bg_tets, bg_values = field.background()
+    given = io.BytesIO()
+    np.savez(
+        given,
+        points=points,
+        triangles=triangles,
+        edge_length=min(field.base_mm, float(extent.min())),  # an edge longer than the body hangs it
+        epsilon=epsilon,
+        stop_energy=STOP_ENERGY,
+        bg_points=bg_points,
+        bg_tets=bg_tets,
+        bg_values=bg_values,
+    )
+    command = [sys.executable, "-P", "-m", "finger3d.meshing._tetwild_child", str(os.getpid())]
+    try:
+        done = subprocess.run(
+            command, env=child_environment(), input=given.getbuffer(), timeout=limit, capture_output=True, check=False
+        )
+    except subprocess.TimeoutExpired as error:
+        raise UnusableMeshError(f"pytetwild did not finish within {limit:.0f} s") from error
+    if done.returncode != 0:
+        said = (done.stderr.decode(errors="replace").strip().splitlines() or ["no message"])[-1]
+        raise UnusableMeshError(f"pytetwild crashed (return code {done.returncode}): {said}")
+    with np.load(io.BytesIO(done.stdout), allow_pickle=False) as result:
+        return result["points"], result["tets"]
+
+
+def check_tets(points: Float, tets: Int, volume_mm3: float) -> None:
+    """Refuse tets that are none, inverted, or do not fill the body."""
+    from finger3d.meshing.snap import UnusableMeshError
+
+    if not len(tets):
+        raise UnusableMeshError("pytetwild returned no cells")
+    volumes = signed_volumes(Mesh(points, tets, {}))
+    if not (volumes > 0.0).all():
+        raise UnusableMeshError("pytetwild returned flat or inverted cells")
+    if not math.isclose(float(volumes.sum()), volume_mm3, rel_tol=_VOLUME):
+        raise UnusableMeshError(f"its volume is {volumes.sum():.6g} mm3, the body's {volume_mm3:.6g}")

@@ -1,0 +1,147 @@
+"""From a scene to things one can hold: the finger as STEP and STL, and a printable mold of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from finger3d.errors import Finger3dError
+from finger3d.mold.options import MoldOptions
+from finger3d.progress import Report
+
+if TYPE_CHECKING:
+    from finger3d.mold.shell import Shell
+    from finger3d.scene import Scene
+
+
+_SMALLEST_MM, _LARGEST = 1e-4, 0.2
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What an export wrote.
+
+    Attributes
+    ----------
+    files : what was written, in `out`
+    volume_mm3 : of the finger, by its closed form or by CAD
+    stl_volume_mm3 : inside the triangles of finger.stl
+    tolerance_mm : largest distance of these triangles from the finger; for a body of triangles that of the file, 0
+    silicone_ml : what fills the mold's cavity; None without a mold
+    remarks : what a user should know, a line each
+    """
+
+    files: tuple[Path, ...]
+    volume_mm3: float
+    stl_volume_mm3: float
+    tolerance_mm: float
+    silicone_ml: float | None
+    remarks: tuple[str, ...]
+
+
+def export(
+    scene: Scene,
+    out: str | Path,
+    mold: MoldOptions | None = None,
+    text: bool = False,
+    tolerance_mm: float = 0.05,
+    report: Report | None = None,
+) -> Exported:
+    """Write finger.step and finger.stl and, if asked, a mold's parts, plate, sheet and picture; all in mm.
+
+    Parameters
+    ----------
+    mold : choices for a mold; None for the finger alone
+    text : STL as text instead of binary
+    tolerance_mm : largest distance of triangles from the CAD surface; less where the volume asks for it
+
+    Raises
+    ------
+    Finger3dError
+        If the tolerance makes no sense, the folder refuses, or the mold cannot be made (see `finger3d.mold.parts`).
+
+    Examples
+    --------
+    >>> import tempfile, finger3d
+    >>> from finger3d.mold.export import export
+    >>> scene = finger3d.parse({
+    ...     "finger": {"geometry": "block", "half_length_mm": 10.0, "height_mm": 8.0, "width_mm": 6.0},
+    ...     "material": {"E_MPa": 1.0, "nu": 0.4}, "press": {"depth_mm": 1.0},
+    ... })
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     done = export(scene, folder)
+    >>> [file.name for file in done.files], round(done.stl_volume_mm3, 6)
+    (['finger.step', 'finger.stl'], 960.0)
+    """
+    from finger3d.io import claimed
+    from finger3d.mold.shell import Shell, shell, write_step, write_stl
+
+    out, report, design = Path(out), report or Report(), scene.design
+    if not _SMALLEST_MM <= tolerance_mm <= _LARGEST * design.height_mm:
+        raise Finger3dError(
+            f"--tolerance-mm {tolerance_mm}: must be from {_SMALLEST_MM:g} to {_LARGEST * design.height_mm:.4g}, "
+            "a fifth of the finger's height"
+        )
+    triangles_only = getattr(design, "cad", True) is None
+    if triangles_only and mold is not None:
+        raise Finger3dError(
+            f"--mold: {design.name} holds triangles, and a mold is cut from CAD; give the finger as a STEP file"
+        )
+    source = Path(getattr(design, "path", "")).resolve()
+    if source in ((out / "finger.step").resolve(), (out / "finger.stl").resolve()):
+        raise Finger3dError(f"--out {out}: holds {source.name}, the finger's own file; name another folder")
+    report.stage("finger")
+    if triangles_only:
+        body, solid = Shell(design.surface, 0.0, 0.0), None
+    else:
+        solid = design.solid()
+        body = shell(solid, tolerance_mm, design.name)
+    made = None
+    if mold is not None:
+        report.stage("mold")
+        made = _mold(scene, solid, mold)
+    with claimed(out):
+        _clear(out)
+        files, remarks = [], []
+        if solid is None:
+            remarks.append(f"no finger.step: {design.name} holds triangles, no CAD; they are written as they are")
+        else:
+            write_step(out / "finger.step", solid)
+            files.append(out / "finger.step")
+        write_stl(out / "finger.stl", body.surface, text)
+        files.append(out / "finger.stl")
+        silicone = None
+        if made is not None:
+            from finger3d.mold.output import write_mold
+
+            written, told = write_mold(scene.title, made, body, out, text, report)
+            files, remarks, silicone = files + written, remarks + told, made.silicone_mm3 / 1e3
+    return Exported(
+        tuple(files), _volume(design, solid, body), body.surface.volume, body.tolerance_mm, silicone, tuple(remarks)
+    )
+
+
+def _clear(out: Path) -> None:
+    """Take away what an earlier export left: it may be another finger's."""
+    from finger3d.mold.output import FILES
+
+    for name in ("finger.step", "finger.stl", *FILES):
+        (out / name).unlink(missing_ok=True)
+
+
+def _mold(scene: Scene, solid: Any, options: MoldOptions) -> Any:
+    from finger3d.mold.parts import foils, mold
+
+    embedded = scene.effects.get("embedded_gauge")
+    section = (embedded.thickness_mm, embedded.width_mm) if embedded else None
+    return mold(solid, foils(scene.model().gauges, options, section), options)
+
+
+def _volume(design: Any, solid: Any, body: Shell) -> float:
+    """The finger's volume: closed form, or CAD's, or that of its triangles."""
+    from finger3d.mold.shell import volume
+
+    if not hasattr(design, "cad"):
+        return float(design.volume_mm3)
+    return body.surface.volume if solid is None else volume(solid)

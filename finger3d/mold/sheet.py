@@ -1,0 +1,124 @@
+"""The text that goes with a mold to the bench: what to print, what to pour, and in which order."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from finger3d.mold.parts import Mold
+from finger3d.mold.shell import Shell
+
+SPARE = 1.15
+"""Silicone to mix over what the cavity and the openings take."""
+
+NAMES = {"half_a": "half A (holes)", "half_b": "half B (pegs)", "lid": "lid"}
+
+
+def oversize(part: Shell, bed: Any) -> str:
+    """Why a part does not fit on a printer's bed, in words; empty if it does, turned on the bed or not."""
+    long, short = sorted(part.extent[:2], reverse=True)
+    most, least = sorted(bed[:2], reverse=True)
+    if long <= most and short <= least and part.extent[2] <= bed[2]:
+        return ""
+    return f"{_sizes(part.extent)} mm is too large for {_sizes(bed)} mm"
+
+
+def sheet(title: str, made: Mold, printed: Mapping[str, Shell], plate: Any) -> str:
+    """The sheet's text.
+
+    Parameters
+    ----------
+    printed : the parts as they lie on the bed
+    plate : length, width and height of all parts side by side, as in the 3MF file
+    """
+    o = made.options
+    ports = sum(_port_volumes(made))
+    cavity = made.silicone_mm3
+    lines = [
+        f"Mold of {title}",
+        "",
+        "Sizes are mm.",
+        "",
+        "SILICONE",
+        f"  cavity              {cavity / 1e3:.2f} ml",
+        f"  pour hole and vents {ports / 1e3:.2f} ml",
+        f"  mix about           {SPARE * (cavity + ports) / 1e3:.1f} ml ({100 * (SPARE - 1):.0f} % more than both)",
+        f"  shrinkage allowed   {100 * o.shrinkage:g} % of every length: the cavity is the sensor times {o.scale:.6g}",
+        "",
+        "PARTS",
+    ]
+    for name, part in printed.items():
+        why = oversize(part, o.bed_mm)
+        lines.append(f"  {NAMES[name]:<17} {_sizes(part.extent):<20} {f'mold_{name}.stl':<16} {why or 'fits the bed'}")
+    fits = _fits(plate, o.bed_mm)
+    lines += [
+        f"  all, in a row     {_sizes(plate):<20} {'mold.3mf':<16} "
+        + ("fit the bed together" if fits else "do not fit the bed together: print them one by one"),
+        f"  bed               {_sizes(o.bed_mm)}",
+        "",
+        "PRINT",
+        "  The files lie as they should be printed: outer faces down, pegs up, no support needed.",
+        f"  Pegs of {o.peg_mm:g} mm have {o.clearance_mm:g} mm of room all around; one of each pattern is thinner, so",
+        "  that no part fits the wrong way round.",
+        "  Printed layers leave their marks on the silicone: use thin layers, or smooth the cavity.",
+        "",
+        *_gauge_lines(made),
+        "POUR",
+        "  1. Grease the halves and the lid with a release agent; some silicones do not cure on printed resin.",
+        *_closing(made),
+        "  3. Stand the mold with the open side, the sensor's base, up. Push the lid on; it holds the halves together.",
+        f"  4. Pour the degassed silicone through the middle hole ({made.ports.pour_mm:.3g} mm) until it stands in",
+        f"     both vents ({made.ports.vent_mm:.3g} mm). Air leaves along the lid; keep the mold level.",
+        "  5. After curing cut the sprues, pull the lid off,"
+        + (" cut the strips outside the mold," if made.foils else "")
+        + f" and slide the halves apart along {o.split}.",
+        "",
+    ]  # fmt: skip
+    return "\n".join(lines)
+
+
+def _closing(made: Mold) -> list[str]:
+    if not made.foils:
+        return ["  2. Push half A onto half B's pegs."]
+    return [
+        "  2. Thread the strips through half B, push half A over them and onto the pegs, stretch the strips, and seal",
+        "     the slots with tape.",
+    ]
+
+
+def _gauge_lines(made: Mold) -> list[str]:
+    if not made.foils:
+        return ["GAUGES", "  The scene has none.", ""]
+    low, high = made.outline
+    scale, gap = made.options.scale, 2.0 * made.options.slot_gap_mm
+    lines = [
+        "GAUGES",
+        f"  A strip carries each foil through both walls: {high[2] - low[2]:.4g} mm in the mold, 20 mm at either end.",
+        "  Places are those in the mold, x and y as in the scene; z from half B's outer face to the foil's middle.",
+    ]
+    for foil in made.foils:
+        for name, z in zip(foil.names, foil.z_mm, strict=True):
+            x, y, degrees = foil.x_mm * scale, foil.y_mm * scale, np.degrees(foil.angle)
+            lines.append(
+                f"  {name:<10} x {x:.4g}, y {y:.4g}, at {degrees:.4g} deg; "
+                f"foil {foil.length_mm:g} x {foil.width_mm:g} x {foil.thickness_mm:g}, z {z * scale - low[2]:.4g}; "
+                f"slot {foil.length_mm + gap:.4g} x {foil.thickness_mm + gap:.4g}"
+            )
+    return [*lines, ""]
+
+
+def _port_volumes(made: Mold) -> tuple[float, float]:
+    """Volume, mm3, of the funnel and of both vents."""
+    p, t = made.ports, made.options.lid_mm
+    a, b = p.pour_mm / 2.0, p.funnel_mm / 2.0
+    return np.pi * t / 3.0 * (a * a + a * b + b * b), 2.0 * np.pi * t * p.vent_mm**2 / 4.0
+
+
+def _fits(size: Any, bed: Any) -> bool:
+    return bool(np.all(np.sort(size[:2]) <= np.sort(bed[:2])) and size[2] <= bed[2])
+
+
+def _sizes(size: Any) -> str:
+    return " x ".join(f"{s:.1f}".removesuffix(".0") for s in size)

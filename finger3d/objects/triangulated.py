@@ -1,0 +1,96 @@
+"""Triangulated rigid objects: any closed body, pressed on the finger with what is below it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.geometry.surface import Triangles
+from finger3d.objects.shapes import Placed
+
+Float = NDArray[np.float64]
+
+_LEVEL = 1e-6  # of the size: points this little above the lowest one count as lowest too (STL has single precision)
+_MIRROR = 1e-6
+_MOST = 2_000  # points that are compared with their mirror images
+
+
+@dataclass(frozen=True)
+class MeshObject(Placed):
+    """A closed triangulated body, y up as in the scene, moved so that its lowest point lies over (x_mm, z_mm).
+
+    Where several points are lowest, the middle of the box around them counts.
+
+    Attributes
+    ----------
+    surface : the body as it was drawn, mm; :func:`finger3d.geometry.files.read_surface` reads and checks a file
+    path, scale : the file it came from, and what its numbers were multiplied with
+    """
+
+    surface: Triangles = field(kw_only=True)
+    path: str | None = field(default=None, kw_only=True, compare=False)
+    scale: float = field(default=1.0, kw_only=True, compare=False)
+
+    @cached_property
+    def origin(self) -> Float:
+        """The lowest point (3,) in the drawing's coordinates, mm."""
+        used = self.surface.points[np.unique(self.surface.faces)]
+        low = used[used[:, 1] <= used[:, 1].min() + _LEVEL * self.surface.size]
+        middle = 0.5 * (low.min(axis=0) + low.max(axis=0))
+        return np.array([middle[0], used[:, 1].min(), middle[2]])
+
+    @cached_property
+    def moved(self) -> Triangles:
+        """The surface with its lowest point at (x_mm, 0, z_mm)."""
+        shift = np.array([self.x_mm, 0.0, self.z_mm]) - self.origin
+        return Triangles(self.surface.points + shift, self.surface.faces)
+
+    def height(self, x: Float, z: Float) -> Float:
+        """Where a vertical line from below meets the body first, exact on its triangles; nan beside the body."""
+        x, z = (np.ascontiguousarray(v, dtype=float) for v in np.broadcast_arrays(x, z))
+        # Every increment of a press asks at the same places again: the answer is kept until others are asked for.
+        key = (x.tobytes(), z.tobytes())
+        if key not in self._known:
+            self._known.clear()
+            self._known[key] = self.moved.height(x, z)
+        return self._known[key].copy()
+
+    @cached_property
+    def _known(self) -> dict[tuple[bytes, bytes], Float]:
+        return {}
+
+    def signed_distance(self, points: Float) -> tuple[Float, Float]:
+        """Distance (n,) mm of points (n, 3) from the body, negative inside, and the outward unit normal (n, 3).
+
+        The points are measured from the body's rest: lowest point at (x_mm, 0, z_mm).
+        """
+        return self.moved.signed_distance(points)
+
+    def mirrors(self) -> tuple[str, ...]:
+        """Axes along which the body is its own image about the finger's middle, tested on its points."""
+        return self._mirrors
+
+    @cached_property
+    def _mirrors(self) -> tuple[str, ...]:
+        at = self.landmarks()
+        if len(at) > _MOST:
+            at = at[:: len(at) // _MOST + 1]
+        middle = self.moved.corners.mean(axis=1)[:, ::2]
+        at = np.vstack([at, middle[:: len(middle) // _MOST + 1]])
+        height = self.height(*at.T)
+        found = []
+        for axis, sign in (("x", [-1.0, 1.0]), ("z", [1.0, -1.0])):
+            image = self.height(*(at * sign).T)
+            if np.array_equal(np.isnan(image), np.isnan(height)):
+                away = np.abs(image - height)
+                if away[np.isfinite(away)].max(initial=0.0) <= _MIRROR * self.surface.size:
+                    found.append(axis)
+        return tuple(found)
+
+    def landmarks(self) -> Float:
+        """The corners of the triangles that look down."""
+        down = self.surface.normals[:, 1] < 0.0
+        return self.moved.points[np.unique(self.surface.faces[down])][:, ::2]

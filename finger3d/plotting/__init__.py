@@ -1,0 +1,1 @@
+"""Figures, renderings, animations and the interactive window."""

@@ -1,0 +1,209 @@
+"""Frames of a press at one scale: contact pressure on the left, stick and slip on the right.
+
+``python -m finger3d.plotting.animation IN.npz OUT.npy`` renders solids in a child process, as `finger3d.plotting.solid`
+does.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.fem.simplex import Mesh
+from finger3d.io import atomic
+from finger3d.mechanics.model import Gauge
+from finger3d.plotting import figures as view
+from finger3d.plotting import solid
+from finger3d.plotting.camera import framed
+from finger3d.plotting.gauges import draw_marks, marks_of
+from finger3d.plotting.solid import Skin, skin_of
+from finger3d.results.states import States
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from PIL.Image import Image
+
+Array = NDArray[Any]
+
+_DPI = {"png": 120, "gif": 65}
+_FRAME_MS, _LAST_MS = 450, 1500
+
+
+def frames(states: States, numbers: Sequence[int], title: str, gauges: Sequence[Gauge] = ()) -> list[Figure]:
+    """Figures of some of the kept steps, with one camera and one scale of pressure.
+
+    Parameters
+    ----------
+    numbers : which of the kept steps, from 0
+    gauges : marked where they are in each of them
+    """
+    from finger3d.results.states import captions
+
+    names = captions(states)
+    titles = [f"{title}\n{names[k]}" for k in numbers]
+    highest = float(max(states.pressure[k].max(initial=0.0) for k in numbers)) or 1.0
+    mesh = mesh_of(states)
+    found = marks_of(mesh, gauges, near=mesh.dim == 3)
+    marks = [[(mark.label, mark.of(states.points + states.displacement[k])) for mark in found] for k in numbers]
+    if states.dim == 2:
+        return _sections(states, numbers, titles, highest, marks)
+    skins, colours = [], []
+    for k in numbers:
+        shear = np.column_stack([states.shear_x[k], states.shear_z[k]])
+        u = states.displacement[k].astype(float)
+        skin = skin_of(mesh, u, states.pressure[k], shear, states.status[k].astype(int), states.nodes, None)
+        skins.append(skin)
+        by_status = np.repeat(view.palette()[skin.status][:, None], 3, axis=1)
+        colours.append((view.pressure_colours(skin.pressure, highest), by_status))
+    return _solids(skins, colours, titles, highest, marks)
+
+
+def mesh_of(states: States) -> Mesh:
+    """The whole finger's mesh at rest, facets labelled contact and body."""
+    on = states.on_contact
+    facets = {"contact": states.facets[on].astype(int), "body": states.facets[~on].astype(int)}
+    return Mesh(states.points.astype(float), states.cells.astype(int), facets)
+
+
+def write_png(path: str | Path, figure: Figure) -> None:
+    """Write one frame."""
+    with atomic(path) as temporary:
+        figure.savefig(temporary, format="png", dpi=_DPI["png"])
+
+
+def write_gif(path: str | Path, figures: Sequence[Figure]) -> None:
+    """Write an animation that rests on its last frame."""
+    images = [_pixels(figure) for figure in figures]
+    durations = [_FRAME_MS] * (len(images) - 1) + [_LAST_MS]
+    with atomic(path) as temporary:
+        images[0].save(temporary, "GIF", save_all=True, append_images=images[1:], duration=durations, loop=0)
+
+
+def _pixels(figure: Figure) -> Image:
+    from PIL import Image
+
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=_DPI["gif"])
+    # The octree keeps small areas of a colour of their own, such as the keys.
+    return Image.open(stream).convert("RGB").quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+
+
+def _sections(
+    states: States, numbers: Sequence[int], titles: Sequence[str], highest: float, marks: Sequence[view.Marks]
+) -> list[Figure]:
+    from matplotlib.collections import LineCollection, PolyCollection
+
+    moved = states.points + states.displacement[list(numbers)]
+    everywhere = np.concatenate([states.points[None], moved]).reshape(-1, 2)
+    low, span = everywhere.min(axis=0), np.ptp(everywhere, axis=0)
+    arc, outline = states.facets[states.on_contact], states.facets[:, :2]
+    corners = states.cells[:, :3]
+    figures = []
+    for k, at, title, lines in zip(numbers, moved, titles, marks, strict=True):
+        middle = at[arc[:, 2]] if arc.shape[1] == 3 else at[arc].mean(axis=1)
+        halves = np.stack([at[arc[:, :2]], np.repeat(middle[:, None], 2, axis=1)], axis=2).reshape(-1, 2, 2)
+        pressure, status = (states.on_points(name, k)[arc[:, :2]].ravel() for name in ("pressure", "status"))
+        figure, panels = view.two_panels(1.15 * span[1] / span[0], title, ticks=True)
+        for axes, colours in zip(
+            panels, (view.pressure_colours(pressure, highest), view.palette()[status.astype(int)]), strict=True
+        ):
+            axes.add_collection(PolyCollection(list(at[corners]), facecolor=view.BODY, edgecolor=view.BODY, lw=0.3))
+            axes.add_collection(LineCollection(list(states.points[outline]), colors=view.REST, lw=0.8, linestyles=":"))
+            axes.add_collection(LineCollection(list(at[outline]), colors=view.LINE, lw=0.8))
+            axes.add_collection(LineCollection(list(halves), colors=colours, lw=5, capstyle="butt", zorder=3))
+            axes.set(xlim=low[0] + span[0] * np.array([-0.04, 1.04]), ylim=low[1] + span[1] * np.array([-0.04, 1.1]))
+            axes.set_xlabel("x (mm)", labelpad=1)
+        panels[0].set_ylabel("y (mm)")
+        draw_marks(panels[0], lines)
+        view.keys(figure, highest, {"finger at rest": view.REST})
+        figures.append(figure)
+    return figures
+
+
+def _solids(
+    skins: Sequence[Skin],
+    colours: Sequence[tuple[Array, Array]],
+    titles: Sequence[str],
+    highest: float,
+    marks: Sequence[view.Marks],
+) -> list[Figure]:
+    images, extent = _rendered(skins, colours) or (None, None)
+    flat = np.concatenate([solid.flat(skin.points) for skin in skins])
+    low, span = flat.min(axis=0), np.ptp(flat, axis=0)
+    aspect = float(span[1] / span[0]) if images is None else images.shape[2] / images.shape[3]
+    figures = []
+    for k, title in enumerate(titles):
+        figure, panels = view.two_panels(aspect, title)
+        for number, axes in enumerate(panels):
+            if images is not None:
+                axes.imshow(images[k, number], interpolation="antialiased", extent=extent)
+            else:
+                solid.draw_solid(axes, skins[k], colours[k][number], arrows=False)
+                axes.set(xlim=(low[0], low[0] + span[0]), ylim=(low[1], low[1] + span[1]))
+            axes.set_axis_off()
+        draw_marks(panels[0], [(name, solid.flat(line)) for name, line in marks[k]])
+        view.keys(figure, highest, {"finger at rest": view.REST})
+        figures.append(figure)
+    return figures
+
+
+def _rendered(
+    skins: Sequence[Skin], colours: Sequence[tuple[Array, Array]]
+) -> tuple[Array, tuple[float, float, float, float]] | None:
+    """Images (s, 2, h, w, 3) by PyVista in a child, without their common margin, and their extent in mm; or None where
+    it does not work or is not wanted.
+    """
+    wanted = os.environ.get("FINGER3D_RENDERER", "")
+    if wanted == "matplotlib":
+        return None
+    arrays = {f"{f.name}_{k}": getattr(skin, f.name) for k, skin in enumerate(skins) for f in fields(Skin)}
+    arrays |= {f"colours_{k}": np.array(both) for k, both in enumerate(colours)}
+    found = solid.rendered("finger3d.plotting.animation", arrays, must=wanted == "pyvista")
+    if found is None:
+        return None
+    images, extent = framed(found.reshape(-1, *found.shape[2:]), _frame(skins))
+    return images.reshape(-1, 2, *images.shape[1:]), extent
+
+
+def _frame(skins: Sequence[Skin]) -> tuple[Array, Array]:
+    """One frame around all of them: they must not move unless the finger does."""
+    flat = np.concatenate([solid.flat(skin.points) for skin in skins])
+    first = skins[0].frame[0]
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    shift = 0.5 * (low + high) - solid.flat(first)
+    return first + shift @ solid.AXES[:2], high - low
+
+
+def _child(source: str, target: str) -> None:
+    """Render every skin twice with one camera, and save the images (s, 2, h, w, 3)."""
+    import pyvista as pv
+
+    data = np.load(source)
+    count = sum(name.startswith("colours_") for name in data.files)
+    skins = [Skin(**{f.name: data[f"{f.name}_{k}"] for f in fields(Skin)}) for k in range(count)]
+    frame = _frame(skins)
+    images = []
+    for k, skin in enumerate(skins):
+        plotter = pv.Plotter(
+            off_screen=True, window_size=[1600, 1200] if count == 1 else [1000, 750], lighting="three lights"
+        )
+        contact = solid.stage(plotter, skin, frame)
+        for colours in data[f"colours_{k}"]:
+            contact["colour"] = np.round(255.0 * colours.reshape(-1, 3)).astype(np.uint8)
+            plotter.render()  # a screenshot alone repeats the picture before
+            images.append(plotter.screenshot(return_img=True))
+        plotter.close()
+    stack = np.array(images)
+    np.save(target, stack.reshape(count, 2, *stack.shape[1:]))
+
+
+if __name__ == "__main__":
+    _child(*sys.argv[1:])

@@ -1,0 +1,371 @@
+"""Pictures of a result, drawn without a display: the pressed finger, the contact forces, the force against depth.
+
+Solids are rendered by PyVista in a child process, because VTK ends the whole process where no OpenGL driver works;
+then, and with ``FINGER3D_RENDERER=matplotlib``, matplotlib draws them.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
+from finger3d.fem.simplex import Mesh
+from finger3d.plotting.gauges import Mark, draw_marks
+from finger3d.plotting.layout import WIDEST, blank, cells, save, sheet
+from finger3d.plotting.outlines import edges_of, outline_of
+from finger3d.plotting.solid import BODY, COLOURS, LINE, OBJECT, REST, Skin, draw_solid, flat, render_solid, skin_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+Marks = Sequence[tuple[str, Float]]
+"""Label of a gauge, and its start, middle and end (3, d) mm."""
+
+_CMAP = "viridis"
+_SHADES = {STICK: "#c9d9ee", SLIP: "#fde3c4"}
+
+
+def finger_picture(
+    path: str | Path,
+    mesh: Mesh,
+    displacement: Float,
+    table: Mapping[str, ArrayLike],
+    contact_nodes: ArrayLike,
+    title: str = "",
+    profile: Float | None = None,
+    marks: Sequence[Mark] = (),
+) -> str:
+    """Draw the deformed finger at true scale: contact pressure on the left, stick and slip on the right.
+
+    Parameters
+    ----------
+    mesh : the whole finger at rest (unfolded, if symmetry was used), mm
+    displacement : (n, d) mm
+    table : columns of contact.csv, of which pressure_MPa, shear_x_MPa, shear_z_MPa and status are read, each (c,)
+    contact_nodes : (c,) numbers of the contact points in `mesh`
+    profile : (k, 2) x and y in mm of the object's surface, drawn as a line (2D) or an outline (solid)
+    marks : of gauges (`finger3d.plotting.gauges.marks_of`), drawn where they lie, with name and angle
+
+    Returns
+    -------
+    str
+        What drew it: ``pyvista`` or ``matplotlib``.
+    """
+    nodes, status = np.asarray(contact_nodes, dtype=np.int64), _status(table)
+    pressure = _column(table, "pressure_MPa")
+    lines = [(mark.label, mark.of(mesh.points + displacement)) for mark in marks]
+    if mesh.dim == 2:
+        figure, renderer = _section(mesh, displacement, pressure, status, nodes, profile, title, lines), "matplotlib"
+    else:
+        shear = np.column_stack([_column(table, "shear_x_MPa"), _column(table, "shear_z_MPa")])
+        skin = skin_of(mesh, displacement, pressure, shear, status, nodes, profile)
+        figure, renderer = _solid(skin, title, lines)
+    top = 0.4 / figure.get_figheight() if title else 0.0
+    names = ("Contact pressure on the deformed finger, at true scale", "The zones that stick and slip")
+    save(figure, path, dict(zip(names, cells(1, 2, top), strict=True)))
+    return renderer
+
+
+def contact_figure(
+    path: str | Path,
+    table: Mapping[str, ArrayLike],
+    mu: float,
+    band_mm: float | None = None,
+    half_width_mm: float | None = None,
+    title: str = "",
+) -> None:
+    """Draw f_n, f_t and mu f_n along x with the zones that stick and slip, as in the paper's Fig. 4.
+
+    Parameters
+    ----------
+    table : columns of contact.csv, of which x_mm, z_mm, pressure_MPa, shear_x_MPa, shear_z_MPa and status are read
+    mu : friction coefficient
+    band_mm : how far from z = 0 a point may lie if none are on that line; default 0.4 of the points' distance
+    half_width_mm : of a solid, whose line at the end z = half_width_mm is a second panel; None for a section
+    """
+    x, z, status = _column(table, "x_mm"), _column(table, "z_mm"), _status(table)
+    lines = [("", np.arange(len(x)))]
+    if half_width_mm is not None:
+        band = 0.4 * _spacing(x, z) if band_mm is None else band_mm
+        # A mesh has points exactly on the end, and on the middle if that is a symmetry plane; else those near it serve.
+        exact = 1e-6 * half_width_mm
+        middle, end = np.flatnonzero(np.abs(z) <= exact), np.flatnonzero(np.abs(z - half_width_mm) <= exact)
+        lines = [("in the middle, z = 0", middle if len(middle) >= 5 else np.flatnonzero(np.abs(z) <= band))]
+        lines += [(f"at the end, z = {half_width_mm:g} mm", end)] if len(end) else []
+    fn, fx, fz = (_column(table, name) for name in ("pressure_MPa", "shear_x_MPa", "shear_z_MPa"))
+    made = sheet(len(lines), 1, (WIDEST, 4.4), (0.95, 0.15, 1.25, 0.35), title)
+    for axes, (where, points) in zip(made.axes, lines, strict=True):
+        on = points[np.argsort(x[points], kind="stable")]
+        _contact_line(axes, x[on], fn[on], fx[on], fz[on], status[on], mu)
+        axes.set_title(where, fontsize=10, loc="left")
+        axes.set_ylabel("traction on the finger (MPa)")
+        axes.set_xlabel("x at rest (mm)")
+    reach = max(axes.get_xlim()[1] for axes in made.axes)
+    for axes in made.axes:
+        axes.set_xlim(-reach, reach)
+    made.save(
+        path, [f"Traction along x{', ' if where else ''}{where}, with the limit of friction" for where, _ in lines]
+    )
+
+
+def force_figure(path: str | Path, steps: Sequence[Mapping[str, Any]], title: str = "") -> None:
+    """Draw forces (N) and the half lengths of contact and stick zone (mm) against depth (mm), a point a step.
+
+    Where the object slides, its way from first touch (mm) takes the place of the depth, which stands still then.
+
+    Parameters
+    ----------
+    steps : entries of summary.json's ``steps``
+    """
+    depth, normal, friction, contact, stick = (
+        [float(step[key]) for step in steps]
+        for key in (
+            "depth_mm", "normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm",
+        )
+    )  # fmt: skip
+    at = np.array([[step["depth_mm"], step.get("slide_x_mm", 0.0), step.get("slide_z_mm", 0.0)] for step in steps])
+    slides = bool(np.any(at[:, 1:] != 0.0))
+    if slides:
+        depth = list(np.cumsum(np.linalg.norm(np.diff(at, axis=0, prepend=0.0), axis=1)))
+    made = sheet(1, 2, (WIDEST, 4.4), (0.8, 0.15, 0.55, 0.15), title)
+    left, right = made.axes
+    left.plot(depth, normal, "o-", color="#222222", ms=4, label="normal force")
+    left.plot(depth, friction, "s-", color="#c0392b", ms=4, label="sum of |friction|")
+    left.set_ylabel("force (N)")
+    right.plot(depth, contact, "o-", color="#555555", ms=4, label="contact")
+    right.plot(depth, stick, "s-", color=COLOURS[STICK], ms=4, label="stick")
+    right.set_ylabel("half length along x, z = 0 (mm)")
+    for axes in (left, right):
+        axes.set_xlabel("way of the object, pressed and slid (mm)" if slides else "depth (mm)")
+        axes.set_xlim(left=min(0.0, *depth))
+        axes.set_ylim(bottom=0.0, top=1.15 * axes.get_ylim()[1])  # room for the legend
+        _plain(axes)
+        axes.legend(frameon=False, loc="upper left")
+    way = "way of the object" if slides else "depth"
+    made.save(path, (f"Forces against {way}", f"Half lengths of contact and stick zone against {way}"))
+
+
+# --- shared -------------------------------------------------------------------------------------------------------
+
+
+def _column(table: Mapping[str, ArrayLike], name: str) -> Float:
+    return np.asarray(table[name], dtype=np.float64)
+
+
+def _status(table: Mapping[str, ArrayLike]) -> Int:
+    """Status (c,) as numbers, from names."""
+    return np.array([STATUS_NAMES.index(name) for name in np.asarray(table["status"]).tolist()], dtype=np.int64)
+
+
+def _plain(axes: Axes) -> None:
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(True, color="#e4e4e4", lw=0.6)
+    axes.set_axisbelow(True)
+
+
+def _spacing(x: Float, z: Float) -> float:
+    """Typical distance of neighbouring points in the x-z plane, mm."""
+    from scipy.spatial import KDTree
+
+    points = np.column_stack([x, z])
+    return float(np.median(KDTree(points).query(points, k=2)[0][:, 1])) if len(points) > 1 else 0.0
+
+
+def _patches(colours: dict[int, str], states: Sequence[int]) -> list[Any]:
+    from matplotlib.patches import Patch
+
+    return [Patch(facecolor=colours[s], edgecolor="#888888", lw=0.5, label=STATUS_NAMES[s]) for s in states]
+
+
+def two_panels(aspect: float, title: str, ticks: bool = False) -> tuple[Figure, list[Axes]]:
+    """Two panels of this height over width, with room for a key below each, and for ticks."""
+    width, panel, below = 2.0 * WIDEST, WIDEST - (0.8 if ticks else 0.2), 1.4 if ticks else 0.95
+    above = 0.85 if title else 0.45
+    high = panel * aspect
+    figure = blank(width, below + high + above)
+    total = below + high + above
+    panels = []
+    for left, name in ((width / 2 - panel - 0.1, "contact pressure"), (width - panel - 0.1, "stick and slip")):
+        axes = figure.add_axes((left / width, below / total, panel / width, high / total))
+        axes.set_title(name, fontsize=11)
+        axes.set_aspect("equal")
+        panels.append(axes)
+    if title:
+        figure.suptitle(title, fontsize=13, y=1.0 - 0.12 / total, va="top")
+    return figure, panels
+
+
+def keys(figure: Figure, highest: float, lines: dict[str, str]) -> None:
+    """The colour bar below the left panel, zones and lines (name -> colour) below the right one."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+    from matplotlib.lines import Line2D
+
+    inch = 1.0 / figure.get_figheight()
+    bar = figure.add_axes((0.10, 0.62 * inch, 0.3, 0.16 * inch))
+    figure.colorbar(ScalarMappable(Normalize(0.0, highest), _CMAP), cax=bar, orientation="horizontal")
+    bar.set_xlabel("contact pressure (MPa)")
+    handles = _patches(COLOURS, (STICK, SLIP, OPEN)) + [Line2D([], [], color=c, label=n) for n, c in lines.items()]
+    figure.legend(
+        handles=handles,
+        loc="center",
+        bbox_to_anchor=(0.75, 0.6 * inch),
+        ncols=len(handles),
+        frameon=False,
+        fontsize=11,
+        columnspacing=1.4,
+    )
+
+
+def palette() -> Float:
+    """Colours (3, 3) of open, stick, slip."""
+    from matplotlib.colors import to_rgb
+
+    return np.array([to_rgb(COLOURS[s]) for s in (OPEN, STICK, SLIP)])
+
+
+def pressure_colours(values: Float, highest: float) -> Float:
+    """Colours (..., 3) for pressures; the body's own where there is none."""
+    import matplotlib
+    from matplotlib.colors import to_rgb
+
+    colours = matplotlib.colormaps[_CMAP](values / highest)[..., :3]
+    return np.where((values > 0.0)[..., None], colours, np.array(to_rgb(BODY)))
+
+
+def _highest(pressure: Float) -> float:
+    # A finger that does not touch has no pressure; any scale will do.
+    return float(pressure.max(initial=0.0)) or 1.0
+
+
+# --- the line of contact ------------------------------------------------------------------------------------------
+
+
+def zones(x: Float, status: Int) -> list[tuple[float, float, int]]:
+    """Intervals (from, to, status) of equal status along ascending x; they meet halfway between two points."""
+    if len(x) == 0:
+        return []
+    change = np.flatnonzero(np.diff(status))
+    middle = 0.5 * (x[change] + x[change + 1])
+    ends = np.concatenate([[x[0]], middle, [x[-1]]])
+    first = np.concatenate([[0], change + 1])
+    return [(float(a), float(b), int(status[i])) for a, b, i in zip(ends[:-1], ends[1:], first, strict=True)]
+
+
+def _contact_line(axes: Axes, x: Float, fn: Float, fx: Float, fz: Float, status: Int, mu: float) -> None:
+    from matplotlib.lines import Line2D
+
+    for start, end, state in zones(x, status):
+        if state in _SHADES:
+            axes.axvspan(start, end, color=_SHADES[state], lw=0)
+    axes.axhline(0.0, color="#999999", lw=0.8)
+    axes.plot(x, fn, "-", color="#222222", lw=1.6)
+    axes.plot(x, mu * fn, "--", color="#777777", lw=1.2)
+    axes.plot(x, -mu * fn, "--", color="#777777", lw=1.2)
+    axes.plot(x, fx, "o-", color="#c0392b", lw=1.2, ms=3)
+    handles = [
+        Line2D([], [], color="#222222", lw=1.6, label="fₙ, pressure"),
+        Line2D([], [], color="#777777", ls="--", lw=1.2, label=f"± μ fₙ, μ = {mu:g}"),
+        Line2D([], [], color="#c0392b", marker="o", ms=3, lw=1.2, label="fₜ along x"),
+    ]
+    shown = [fn, fx]
+    if np.any(np.abs(fz) > 1e-6 * np.abs(fn).max(initial=0.0)):
+        axes.plot(x, fz, ".:", color="#8e44ad", lw=1.0, ms=4)
+        handles.append(Line2D([], [], color="#8e44ad", marker=".", ls=":", label="fₜ along z"))
+        shown.append(fz)
+    # The limit lines of a large mu would flatten everything else, so they may leave the picture.
+    high = max([float(v.max(initial=0.0)) for v in shown] + [1e-12])
+    low = min([float(v.min(initial=0.0)) for v in shown] + [-min(mu, 0.5) * high])
+    axes.set_ylim(1.12 * low, 1.12 * high)
+    touching = np.flatnonzero(status != OPEN)
+    if len(touching):
+        reach = 1.15 * float(np.abs(x[touching]).max()) or float(np.abs(x).max()) or 1.0
+        axes.set_xlim(-reach, reach)
+    handles += _patches(_SHADES, [s for s in (STICK, SLIP) if np.any(status == s)])
+    axes.legend(
+        handles=handles, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=3, columnspacing=1.4
+    )  # fmt: skip
+    _plain(axes)
+    axes.grid(False, axis="x")
+
+
+# --- a section ----------------------------------------------------------------------------------------------------
+
+
+def _section(
+    mesh: Mesh,
+    u: Float,
+    pressure: Float,
+    status: Int,
+    nodes: Int,
+    profile: Float | None,
+    title: str,
+    marks: Marks,
+) -> Figure:
+    from matplotlib.collections import LineCollection
+    from matplotlib.patches import PathPatch
+
+    moved = mesh.points + u
+    value, state = np.zeros(len(moved)), np.full(len(moved), OPEN)
+    value[nodes], state[nodes] = pressure, status
+    arc = mesh.facets["contact"]
+    middle = moved[arc[:, 2]] if mesh.is_quadratic else moved[arc].mean(axis=1)
+    # Each facet in two halves, one for each end: pressure is the mean over a half, status that of its end.
+    halves = np.stack([moved[arc[:, :2]], np.repeat(middle[:, None], 2, axis=1)], axis=2).reshape(-1, 2, 2)
+    of_half = (0.75 * value[arc[:, :2]] + 0.25 * value[arc[:, 1::-1]]).ravel()
+    highest = _highest(pressure)
+    low, span = moved.min(axis=0), np.ptp(moved, axis=0)
+    limits = low - 0.04 * span, low + 1.08 * span
+    figure, panels = two_panels(span[1] / span[0], title, ticks=True)
+    by_status = palette()[state[arc[:, :2]].ravel()]
+    outline, edges = outline_of(mesh, moved), edges_of(mesh, moved)
+    for axes, colours in zip(panels, (pressure_colours(of_half, highest), by_status), strict=True):
+        axes.add_artist(PathPatch(outline, facecolor=BODY, edgecolor=LINE, lw=0.5))
+        axes.add_artist(PathPatch(edges, facecolor="none", edgecolor=LINE, lw=0.25))
+        if profile is not None:
+            axes.plot(*profile.T, color=OBJECT, lw=1.5, zorder=2)
+        axes.add_collection(LineCollection(list(halves), colors=colours, lw=5, capstyle="butt", zorder=3))
+        axes.set(xlim=(limits[0][0], limits[1][0]), ylim=(limits[0][1], limits[1][1]))
+        axes.set_xlabel("x (mm)", labelpad=1)
+        axes.spines[["top", "right"]].set_visible(False)
+    panels[0].set_ylabel("y (mm)")
+    draw_marks(panels[0], marks)
+    keys(figure, highest, {} if profile is None else {"object": OBJECT})
+    return figure
+
+
+# --- a solid ------------------------------------------------------------------------------------------------------
+
+
+def _solid(skin: Skin, title: str, marks: Marks) -> tuple[Figure, str]:
+    highest = _highest(skin.pressure)
+    by_pressure = pressure_colours(skin.pressure, highest)
+    by_status = np.repeat(palette()[skin.status][:, None], 3, axis=1)
+    wanted = os.environ.get("FINGER3D_RENDERER", "")
+    found = None if wanted == "matplotlib" else render_solid(skin, [by_pressure, by_status], must=wanted == "pyvista")
+    images, extent = found or (None, None)
+    aspect = skin.aspect if images is None else images[0].shape[0] / images[0].shape[1]
+    figure, panels = two_panels(aspect, title)
+    for number, (axes, colours) in enumerate(zip(panels, (by_pressure, by_status), strict=True)):
+        if images is not None:
+            axes.imshow(images[number], interpolation="antialiased", extent=extent)
+        else:
+            draw_solid(axes, skin, colours, arrows=number == 1)
+        axes.set_axis_off()
+    draw_marks(panels[0], [(label, flat(line)) for label, line in marks])
+    if marks:
+        panels[0].set_title("contact pressure; gauges inside are marked on the near face", fontsize=11)
+    if skin.largest_shear > 0.0:
+        text = f"stick and slip; arrows: friction on the finger, at most {skin.largest_shear:.3g} MPa"
+        panels[1].set_title(text, fontsize=11)
+    keys(figure, highest, {"finger at rest": REST} | ({"object": OBJECT} if len(skin.outline) else {}))
+    return figure, "matplotlib" if images is None else "pyvista"

@@ -1,0 +1,193 @@
+"""A mold, taken apart: rendered by PyVista in a child process, or drawn by matplotlib where that does not work.
+
+``python -m finger3d.plotting.mold IN.npz OUT.npy`` is the child.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.errors import MissingError
+from finger3d.geometry.surface import Triangles
+from finger3d.io import atomic
+from finger3d.plotting.solid import run_child
+
+Float = NDArray[np.float64]
+
+COLOURS = {"half_a": "#9db4c8", "half_b": "#c9d9ee", "lid": "#8d8a84", "sensor": "#f28e2b", "strips": "#222222"}
+OPACITY = {"half_b": 0.35}
+"""The half in front hides its own pegs, the strips and the sensor."""
+
+LABELS = {"half_a": "half A", "half_b": "half B", "lid": "lid", "sensor": "sensor", "strips": "gauge strips"}
+
+_VIEW = np.array([0.55, 0.5, 1.0])
+_POUR = np.diag([1.0, -1.0, -1.0])  # dome down, lid on top, as it is poured
+_APART = 0.45  # of the largest size
+_MARGIN = 1.08
+_WIDE, _TITLE, _DPI = 10.0, 0.5, 130  # inches
+_SIDES = 1.6  # of the parts' width, for the labels
+_PIXELS = round(_WIDE * _DPI / _SIDES)
+
+
+@dataclass(frozen=True)
+class Scenery:
+    """Parts where they are drawn, mm, and what the viewer sees: rows of `axes` are right, up, towards the viewer."""
+
+    parts: dict[str, Triangles]
+    axes: Float
+    middle: Float
+    half: Float
+
+    def flat(self, points: Float) -> Float:
+        """Points (..., 3) as the viewer sees them, (..., 2), mm from the middle."""
+        return (points - self.middle) @ self.axes[:2].T
+
+
+def exploded(assembled: Mapping[str, Triangles]) -> Scenery:
+    """Move the parts of an assembled mold apart: the halves along z, the lid up; the sensor stays."""
+    size = max(float(np.ptp(part.points, axis=0).max()) for part in assembled.values())
+    thick = np.ptp(np.vstack([assembled["half_a"].points, assembled["half_b"].points])[:, 2])
+    step = max(_APART * size, 0.8 * float(thick))
+    shift = {"half_a": [0, 0, -step], "half_b": [0, 0, step], "lid": [0, 0.9 * _APART * size, 0]}
+    parts = {
+        name: Triangles(part.points @ _POUR.T + np.array(shift.get(name, [0, 0, 0]), dtype=float), part.faces)
+        for name, part in assembled.items()
+    }
+    towards = _VIEW / np.linalg.norm(_VIEW)
+    right = np.cross([0.0, 1.0, 0.0], towards)
+    right /= np.linalg.norm(right)
+    axes = np.array([right, np.cross(towards, right), towards])
+    seen = np.vstack([part.points for part in parts.values()]) @ axes.T
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    return Scenery(parts, axes, 0.5 * (low + high) @ axes, _MARGIN * 0.5 * (high - low)[:2])
+
+
+def picture(path: Path, assembled: Mapping[str, Triangles], title: str, sizes: Mapping[str, str]) -> str:
+    """Draw a mold taken apart, lid up as it is poured; returns what drew it, ``pyvista`` or ``matplotlib``.
+
+    Parameters
+    ----------
+    assembled : half_a, half_b, lid, sensor and, if there are any, strips, in the mold's axes
+    sizes : a remark on each part for its label
+
+    Raises
+    ------
+    MissingError
+        If FINGER3D_RENDERER asks for pyvista, which does not work.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    scenery = exploded(assembled)
+    image = _rendered(scenery)
+    width, height = scenery.half
+    high = _WIDE * height / (_SIDES * width) + _TITLE
+    figure = Figure(figsize=(_WIDE, high), dpi=_DPI)
+    FigureCanvasAgg(figure)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0 - _TITLE / high))
+    if image is None:
+        _draw(axes, scenery)
+    else:
+        axes.imshow(image, extent=(-width, width, -height, height), interpolation="nearest")
+    for name, part in scenery.parts.items():
+        if name in sizes:
+            _label(axes, scenery, name, part, sizes[name])
+    axes.set(xlim=(-_SIDES * width, _SIDES * width), ylim=(-height, height), aspect="equal")
+    axes.set_axis_off()
+    figure.text(0.5, 1.0 - 0.5 * _TITLE / high, title, fontsize=11, ha="center", va="center")
+    with atomic(path) as temporary:
+        figure.savefig(temporary)
+    return "matplotlib" if image is None else "pyvista"
+
+
+def _label(axes: Any, scenery: Scenery, name: str, part: Triangles, remark: str) -> None:
+    """Name a part beside its outline: what lies left of the middle to its left, the rest to its right."""
+    seen = scenery.flat(part.points)
+    left = name == "half_b"
+    low = name == "strips"  # its front end, where nothing hides it
+    at = seen[np.argmin(seen[:, 1] if low else seen[:, 0]) if left or low else np.argmax(seen[:, 0])]
+    shift = (-14, -4) if left else (30, -40) if low else (14, -4)
+    line = {"arrowstyle": "-", "color": "#777777", "lw": 0.8}
+    axes.annotate(
+        f"{LABELS[name]}\n{remark}".strip(), at, shift, textcoords="offset points", fontsize=8.5, va="center",
+        ha="right" if left else "left", arrowprops=line, annotation_clip=False,
+    )  # fmt: skip
+
+
+def _draw(axes: Any, scenery: Scenery) -> None:
+    """Draw with matplotlib: the parts one behind the other, and within each the far triangles first."""
+    from matplotlib.collections import PolyCollection
+    from matplotlib.colors import to_rgb
+
+    order = sorted(scenery.parts, key=lambda n: float((scenery.parts[n].points @ scenery.axes[2]).mean()))
+    light = np.array([0.2, 0.9, 0.5]) / np.linalg.norm([0.2, 0.9, 0.5])
+    for layer, name in enumerate(order):
+        part = scenery.parts[name]
+        seen = part.normals @ scenery.axes[2] > 0.0
+        corners, normals = part.corners[seen], part.normals[seen]
+        far = np.argsort(corners.mean(axis=1) @ scenery.axes[2], kind="stable")
+        shade = 0.6 + 0.4 * np.clip(normals @ light, 0.0, 1.0)
+        fill = np.clip(np.array(to_rgb(COLOURS[name])) * shade[:, None], 0.0, 1.0)[far]
+        alpha = OPACITY.get(name)
+        # An edge in the face's colour closes fine seams; through a transparent face it would show.
+        edge = fill if alpha is None else "none"
+        faces = PolyCollection(list(scenery.flat(corners)[far]), facecolors=fill, edgecolors=edge, lw=0.3, alpha=alpha)
+        faces.set(zorder=2 + layer, antialiased=alpha is None)
+        axes.add_collection(faces)
+
+
+def _rendered(scenery: Scenery) -> NDArray[np.uint8] | None:
+    """The picture by PyVista, or None where it does not work."""
+    wanted = os.environ.get("FINGER3D_RENDERER", "")
+    if wanted == "matplotlib":
+        return None
+    with tempfile.TemporaryDirectory(prefix="finger3d-") as folder:
+        source, target = Path(folder) / "parts.npz", Path(folder) / "image.npy"
+        arrays: dict[str, Any] = {"axes": scenery.axes, "middle": scenery.middle, "half": scenery.half}
+        for name, part in scenery.parts.items():
+            arrays |= {f"points {name}": part.points, f"faces {name}": part.faces}
+        np.savez(source, **arrays)
+        why = run_child([sys.executable, "-P", "-m", "finger3d.plotting.mold", str(source), str(target)])
+        if why is None and target.exists():
+            return np.asarray(np.load(target), dtype=np.uint8)
+    if wanted == "pyvista":
+        raise MissingError(f"PyVista cannot render here: {why}; unset FINGER3D_RENDERER to use matplotlib")
+    return None
+
+
+def _child(source: str, target: str) -> None:
+    """Render the parts and save the image (h, w, 3)."""
+    import pyvista as pv
+
+    with np.load(source, allow_pickle=False) as data:
+        half, middle, axes = data["half"], data["middle"], data["axes"]
+        parts = {n[7:]: (data[n], data[f"faces {n[7:]}"]) for n in data.files if n.startswith("points ")}
+    shape = [_PIXELS, max(int(_PIXELS * half[1] / half[0]), 1)]
+    plotter = pv.Plotter(off_screen=True, window_size=shape, lighting="three lights")
+    plotter.set_background("white")
+    shine = {"ambient": 0.25, "diffuse": 0.8, "specular": 0.1}
+    for name, (points, faces) in parts.items():
+        mesh = pv.PolyData(points, np.hstack([np.full((len(faces), 1), 3), faces]).ravel())
+        plotter.add_mesh(mesh, color=COLOURS[name], opacity=OPACITY.get(name, 1.0), **shine)
+        edges = mesh.extract_feature_edges(25.0, boundary_edges=False, non_manifold_edges=False, manifold_edges=False)
+        if edges.n_points:
+            plotter.add_mesh(edges, color="#333333", line_width=1.5)
+    plotter.enable_anti_aliasing("ssaa")
+    plotter.enable_parallel_projection()
+    plotter.camera_position = [tuple(middle + 10.0 * half.max() * axes[2]), tuple(middle), tuple(axes[1])]
+    plotter.camera.parallel_scale = float(half[1])
+    plotter.reset_camera_clipping_range()
+    np.save(target, plotter.screenshot(return_img=True)[..., :3])
+
+
+if __name__ == "__main__":
+    _child(*sys.argv[1:])

@@ -1,0 +1,64 @@
+"""design.png: the best design so far against the designs judged, and the objective against every free key."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from finger3d.plotting.layout import sheet
+
+_MOST_KEYS = 5
+_ROWS = 2
+_JUDGED, _BEST, _START = "#9db7d5", "#c0392b", "#222222"
+
+
+def draw(
+    path: Path,
+    keys: Sequence[str],
+    places: Sequence[Sequence[float]],
+    values: Sequence[float],
+    start: Sequence[float],
+    objective: str,
+) -> None:
+    """Draw the designs that have a number.
+
+    Parameters
+    ----------
+    places, values : free keys and objective (NaN where there is none) of every design, in the order they were judged
+    start : the free keys of the first design
+    """  # fmt: skip
+    good = np.isfinite(values)
+    at, value = np.array(places, dtype=float)[good], np.array(values, dtype=float)[good]
+    best, shown = int(np.argmax(value)), list(keys[:_MOST_KEYS])
+    columns = math.ceil((1 + len(shown)) / _ROWS)
+    rows = math.ceil((1 + len(shown)) / columns)
+    made = sheet(rows, columns, (5.4, 3.9), (0.95, 0.2, 0.6, 0.45))
+    first, *others = made.axes
+    count = 1 + np.flatnonzero(good)
+    first.plot(count, value, "o", ms=3, color=_JUDGED, label="each design")
+    first.step(count, np.maximum.accumulate(value), where="post", color=_BEST, lw=1.5, label="best so far")
+    first.set_xlabel("designs judged")
+    for column, (key, axes) in enumerate(zip(shown, others, strict=False)):
+        axes.plot(at[:, column], value, "o", ms=3, color=_JUDGED, label="each design")
+        begin = np.flatnonzero(np.all(at == np.array(start), axis=1))[:1]
+        axes.plot(at[begin, column], value[begin], "s", ms=6, mfc="none", color=_START, label="start")
+        axes.plot(at[best, column], value[best], "*", ms=11, color=_BEST, label="best")
+        axes.set_xlabel(key)
+    for axes in made.axes[: 1 + len(shown)]:
+        _finish(axes, objective)
+    for axes in made.axes[1 + len(shown) :]:
+        axes.set_axis_off()
+    names = ["The best design so far", *(f"Every design against {key}" for key in shown)]
+    made.save(path, names)
+
+
+def _finish(axes: Any, objective: str) -> None:
+    axes.set_ylabel(objective)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(True, color="#e4e4e4", lw=0.6)
+    axes.set_axisbelow(True)
+    axes.legend(frameon=False, fontsize=9, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)

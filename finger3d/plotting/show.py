@@ -1,0 +1,101 @@
+"""Look at a result: a window with fields, steps and a clip plane, or a picture and an animation where there is none."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from finger3d.errors import Finger3dError, MissingError
+from finger3d.mechanics.model import Gauge
+from finger3d.results.states import States, load_states
+from finger3d.results.summary import gauges_of, read_json
+
+
+def found(folder: str | Path) -> tuple[States, str, list[Gauge]]:
+    """The steps kept in a folder of results, and the title and the gauges of its scene.
+
+    Raises
+    ------
+    Finger3dError
+        If the folder holds no results of a press, or damaged ones.
+    MissingError
+        If its press was interrupted, so that there are numbers but no fields.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise Finger3dError(f"{folder}: there is no such folder; give the --out of a press")
+    if not (folder / "summary.json").exists():
+        raise Finger3dError(f"{folder}: holds no results of a press (no summary.json); give the --out of a press")
+    summary = read_json(folder / "summary.json")
+    if not (folder / "steps.npz").exists():
+        why = " ".join(str(summary.get("outcome", "unknown")).split())
+        raise MissingError(f"{folder}: has no fields to show; its outcome is: {why}; press {folder}/scene.toml again")
+    states = load_states(folder / "steps.npz")
+    try:
+        scene = summary["scene"]
+        title, gauges = scene.get("title") or folder.name, gauges_of(scene)
+        if not isinstance(title, str):
+            raise TypeError(title)
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
+        raise Finger3dError(
+            f"{folder / 'summary.json'}: its scene is not as a press wrote it; press {folder}/scene.toml again"
+        ) from None
+    return states, title, gauges
+
+
+def show(
+    folder: str | Path, png: str | Path | None = None, gif: str | Path | None = None, step: int | None = None
+) -> None:
+    """Draw a result without a display.
+
+    Parameters
+    ----------
+    folder : what a press wrote
+    png : picture of one step: contact pressure, stick and slip
+    gif : animation of all steps that are kept, at one scale
+    step : number of the step in the picture (from 1); None: the last
+
+    Raises
+    ------
+    Finger3dError
+        If the folder or the step is not there, or a file cannot be written.
+    """
+    from finger3d.plotting.animation import frames, write_gif, write_png
+
+    states, title, gauges = found(folder)
+    if png is not None:
+        write_png(png, frames(states, [_number(folder, states, step)], title, gauges)[0])
+    if gif is not None:
+        write_gif(gif, frames(states, range(len(states.step)), title, gauges))
+
+
+def _number(folder: str | Path, states: States, step: int | None) -> int:
+    kept: Sequence[int] = states.step.tolist()
+    if step is None:
+        return len(kept) - 1
+    if step not in kept:
+        raise Finger3dError(f"{folder}: step {step} is not among those kept: {', '.join(map(str, kept))}")
+    return kept.index(step)
+
+
+def show_window(folder: str | Path) -> None:
+    """Open a window and return when it is closed; it runs in a child, which OpenGL may crash.
+
+    Raises
+    ------
+    MissingError
+        If there is no display, or no window can be opened on it.
+    """
+    from finger3d.plotting import solid
+
+    found(folder)
+    linux = sys.platform.startswith("linux")
+    if linux and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise MissingError("show: there is no display here; add --png FILE for a picture, or --gif FILE for the steps")
+    why = solid.run_child(
+        [sys.executable, "-P", "-m", "finger3d.plotting.window", str(Path(folder).resolve())], window=True
+    )
+    if why is not None:
+        raise MissingError(f"show: no window could be opened: {why}; add --png FILE for a picture")

@@ -1,0 +1,380 @@
+"""The surface of a pressed solid, and the two ways to draw it: PyVista in a child process, or matplotlib.
+
+``python -m finger3d.plotting.solid IN.npz OUT.npy`` is the child; nothing else calls it.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d._process import child_environment
+from finger3d.contact.friction import OPEN, SLIP, STICK
+from finger3d.errors import MissingError
+from finger3d.fem.simplex import EDGES, Mesh
+from finger3d.plotting.camera import AXES, WINDOW, flat, framed, half_height
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+BODY, LINE, REST, OBJECT = "#d9d6cf", "#8d8a84", "#777777", "#222222"
+COLOURS = {OPEN: "#c4c4c4", STICK: "#1f3f77", SLIP: "#f28e2b"}
+ARROWS = {STICK: "#ffffff", SLIP: "#000000"}
+"""Colour of a friction arrow, by the status of its point."""
+
+_ARROW = 0.045  # Length of the longest arrow, as a share of the finger's,
+_ARROW_STEPS = 1.6  # and at most so many distances between arrows.
+
+_TIME_LIMIT_S = 180.0
+# A quadratic facet in six triangles around its centre (node 6): two for each corner, so that a corner's status
+# covers the area that is nearest to it.
+_SIX = np.array([[0, 3, 6], [3, 1, 6], [1, 4, 6], [4, 2, 6], [2, 5, 6], [5, 0, 6]])
+_OWNER = np.array([0, 1, 1, 2, 2, 0])
+_RING = np.array([0, 3, 1, 4, 2, 5])
+_FOUR = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
+_SIDES = np.array([[0, 3, 1], [1, 4, 2], [2, 5, 0]])
+
+
+@dataclass(frozen=True)
+class Skin:
+    """What is drawn of a solid, deformed, mm.
+
+    Attributes
+    ----------
+    body : (b, 6, 3) facets that are not part of the contact surface, VTK's order of nodes
+    contact : (t, 3, 3) triangles of the contact surface
+    pressure : (t, 3) MPa at their corners
+    status : (t,) of the contact point each belongs to
+    lines : (k, 3, 3) edges of the body's facets: end, middle, end
+    features : (k, 3, 3) edges between faces of the body
+    rest : (k, 3, 3) edges of the contact surface, at rest
+    outline : (o, 3) closed line around the object's surface, or none
+    arrow_at, arrow, arrow_status : (a, 3), (a, 3), (a,) friction on the finger at some contact points; the longest
+        has length 1
+    largest_shear : MPa, of the longest arrow
+    """
+
+    body: Float
+    contact: Float
+    pressure: Float
+    status: Int
+    lines: Float
+    features: Float
+    rest: Float
+    outline: Float
+    arrow_at: Float
+    arrow: Float
+    arrow_status: Int
+    largest_shear: float
+
+    @property
+    def size(self) -> float:
+        """Largest extent, mm."""
+        return float(np.ptp(self.points, axis=0).max())
+
+    @property
+    def aspect(self) -> float:
+        """Height over width as the viewer sees it."""
+        width, height = self.frame[1]
+        return float(height / width)
+
+    @property
+    def arrow_length(self) -> float:
+        """Length of the longest arrow, mm: shorter where they stand close together."""
+        across = np.ptp(self.arrow_at[:, [0, 2]], axis=0) if len(self.arrow_at) else np.zeros(2)
+        apart = max(np.sqrt(across.prod() / max(len(self.arrow_at), 1)), across.max() / max(len(self.arrow_at), 1))
+        return min(_ARROW * self.size, _ARROW_STEPS * float(apart) or np.inf)
+
+    @property
+    def frame(self) -> tuple[Float, Float]:
+        """Middle (3,) of what the viewer sees, and its width and height (2,), mm."""
+        seen = flat(self.points)
+        low, high = seen.min(axis=0), seen.max(axis=0)
+        deep = self.points.mean(axis=0) @ AXES[2]
+        return np.append(0.5 * (low + high), deep) @ AXES, high - low
+
+    @property
+    def points(self) -> Float:
+        """All points (p, 3) that are drawn, mm."""
+        parts = (self.body, self.contact, self.rest, self.outline)
+        return np.concatenate([part.reshape(-1, 3) for part in parts])
+
+
+def skin_of(
+    mesh: Mesh, u: Float, pressure: Float, shear: Float, status: Int, nodes: Int, profile: Float | None
+) -> Skin:
+    """Collect what is drawn; arguments as in `finger3d.plotting.figures.finger_picture`."""
+    moved = mesh.points + u
+    arc = mesh.facets["contact"]
+    others = [f for label, f in mesh.facets.items() if label != "contact" and len(f)]
+    value, state = np.zeros(len(moved)), np.full(len(moved), OPEN)
+    value[nodes], state[nodes] = pressure, status
+
+    corner = value[arc[:, :3]]
+    middle = 0.5 * (corner + np.roll(corner, -1, axis=1))
+    seven = np.hstack([corner, middle, corner.mean(axis=1, keepdims=True)])
+    rings = _six_nodes(arc, moved)
+    # The middle of a curved facet is where its quadratic shape functions put it.
+    centre = (4.0 * rings[:, 3:].sum(axis=1) - rings[:, :3].sum(axis=1)) / 9.0
+    points = np.concatenate([rings, centre[:, None]], axis=1)
+
+    body = np.concatenate([_six_nodes(f, moved) for f in others]) if others else np.zeros((0, 6, 3))
+    features = np.concatenate([_edge_points(_rim(f), moved) for f in (arc, *others)])
+    chosen, arrow, largest = _arrows(moved[nodes], shear, status)
+    return Skin(
+        body=body,
+        contact=points[:, _SIX].reshape(-1, 3, 3),
+        pressure=seven[:, _SIX].reshape(-1, 3),
+        status=state[arc[:, _OWNER]].ravel(),
+        lines=body[:, _SIDES].reshape(-1, 3, 3),
+        features=features,
+        rest=_edge_points(_rim(arc), mesh.points),
+        outline=_outline(profile, moved),
+        arrow_at=moved[nodes[chosen]],
+        arrow=arrow,
+        arrow_status=status[chosen],
+        largest_shear=largest,
+    )
+
+
+def _six_nodes(facets: Int, points: Float) -> Float:
+    """Points (m, 6, 3) of facets, with chord middles where the facets are linear."""
+    corners = points[facets[:, :3]]
+    if facets.shape[1] == 6:
+        return points[facets]
+    return np.concatenate([corners, 0.5 * (corners + np.roll(corners, -1, axis=1))], axis=1)
+
+
+def _rim(facets: Int) -> Int:
+    """Edges (k, 2 or 3) that belong to one of these facets only."""
+    ends = facets[:, EDGES[2]].reshape(-1, 2)
+    middles = facets[:, 3:].reshape(len(ends), -1)
+    _, first, count = np.unique(np.sort(ends, axis=1), axis=0, return_index=True, return_counts=True)
+    return np.hstack([ends, middles])[first[count == 1]]
+
+
+def _edge_points(edges: Int, points: Float) -> Float:
+    ends = points[edges[:, :2]]
+    middle = points[edges[:, 2]] if edges.shape[1] == 3 else ends.mean(axis=1)
+    return np.stack([ends[:, 0], middle, ends[:, 1]], axis=1)
+
+
+def _outline(profile: Float | None, points: Float) -> Float:
+    if profile is None:
+        return np.zeros((0, 3))
+    z = points[:, 2].min(), points[:, 2].max()
+    front, back = (np.column_stack([profile, np.full(len(profile), at)]) for at in z)
+    return np.concatenate([front, back[::-1], front[:1]])
+
+
+def _arrows(points: Float, shear: Float, status: Int) -> tuple[Int, Float, float]:
+    """About a hundred arrows, spread evenly: the contact point nearest to the middle of each square of a grid.
+
+    Numbers of the points (a,), arrows (a, 3) of which the longest has length 1, and its shear in MPa.
+    """
+    on = np.flatnonzero(status != OPEN)
+    largest = float(np.linalg.norm(shear[on], axis=1).max(initial=0.0))
+    if largest == 0.0:
+        return on[:0], np.zeros((0, 3)), 0.0
+    flat = points[on][:, [0, 2]]
+    low, extent = flat.min(axis=0), np.ptp(flat, axis=0)
+    step = max(float(np.sqrt(extent.prod() / 100.0)), 1e-9)
+    square = np.floor((flat - low) / step)
+    order = np.argsort(np.linalg.norm((flat - low) / step - square - 0.5, axis=1), kind="stable")
+    _, first = np.unique(square[order], axis=0, return_index=True)
+    chosen = on[order[first]]
+    return chosen, np.column_stack([shear[chosen, 0], np.zeros(len(chosen)), shear[chosen, 1]]) / largest, largest
+
+
+# --- matplotlib ---------------------------------------------------------------------------------------------------
+
+
+def draw_solid(axes: Axes, skin: Skin, colours: Float, arrows: bool) -> None:
+    """Draw on flat axes, far faces first; `colours` (t, 3, 3) at the corners of the contact triangles."""
+    from matplotlib.collections import LineCollection, PolyCollection
+    from matplotlib.colors import to_rgb
+
+    body = _shaded(skin.body[:, _RING], np.tile(to_rgb(BODY), (len(skin.body), 1)))
+    contact = _shaded(skin.contact, colours.mean(axis=1))
+    depth = np.concatenate([faces.mean(axis=1) @ AXES[2] for faces, _ in (body, contact)])
+    polygons = [*flat(body[0]), *flat(contact[0])]
+    fill = np.concatenate([body[1], contact[1]])
+    # The mesh is drawn on the body only; elsewhere an edge in the face's colour closes fine white seams.
+    edge = np.concatenate([np.tile(to_rgb(LINE), (len(body[1]), 1)), contact[1]])
+    order = np.argsort(depth, kind="stable")
+    axes.add_collection(LineCollection(list(flat(skin.rest)), colors=REST, lw=0.8, linestyles="dotted", zorder=1))
+    axes.add_collection(
+        PolyCollection([polygons[i] for i in order], facecolors=fill[order], edgecolors=edge[order], lw=0.25, zorder=2)
+    )
+    if len(skin.outline):
+        axes.plot(*flat(skin.outline).T, color=OBJECT, lw=1.0, zorder=3)
+    if arrows and len(skin.arrow):
+        for state, colour in ARROWS.items():
+            on = skin.arrow_status == state
+            at, by = flat(skin.arrow_at[on]), flat(skin.arrow_length * skin.arrow[on])
+            axes.quiver(*at.T, *by.T, color=colour, pivot="mid", angles="xy", scale_units="xy", scale=1.0,
+                        width=0.002, zorder=4)  # fmt: skip
+    axes.autoscale_view()
+
+
+def _shaded(faces: Float, colours: Float) -> tuple[Float, Float]:
+    """The faces that look at the viewer, and their colours under a light above the viewer's shoulder."""
+    third = faces.shape[1] // 3
+    normal = np.cross(faces[:, third] - faces[:, 0], faces[:, 2 * third] - faces[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    seen = normal @ AXES[2] > 0.0
+    light = np.array([-0.2, 0.9, 0.5])
+    brightness = 0.62 + 0.38 * np.clip(normal[seen] @ (light / np.linalg.norm(light)), 0.0, 1.0)
+    return faces[seen], np.clip(colours[seen] * brightness[:, None], 0.0, 1.0)
+
+
+# --- PyVista, in a child process ----------------------------------------------------------------------------------
+
+
+# Why the child failed in this process, once it did: a driver that crashed does not mend itself.
+_failure: list[str] = []
+
+
+def render_solid(
+    skin: Skin, colours: list[Float], must: bool = False
+) -> tuple[list[NDArray[np.uint8]], tuple[float, float, float, float]] | None:
+    """Render a picture for each set of colours (t, 3, 3), or None where rendering does not work.
+
+    Returns
+    -------
+    images : the pictures
+    extent : their left, right, lower and upper end, mm as `flat` gives them
+
+    Raises
+    ------
+    MissingError
+        If rendering does not work and `must` is set.
+    """
+    arrays = {f.name: getattr(skin, f.name) for f in fields(skin)}
+    found = rendered("finger3d.plotting.solid", {"colours": np.array(colours), **arrays}, must)
+    if found is None:
+        return None
+    images, extent = framed(found, skin.frame)
+    return list(images), extent
+
+
+def rendered(module: str, arrays: Mapping[str, Any], must: bool = False) -> NDArray[np.uint8] | None:
+    """What ``python -m MODULE IN.npz OUT.npy`` makes of arrays in a child, or None where rendering does not work."""
+    if not _failure:
+        with tempfile.TemporaryDirectory(prefix="finger3d-") as folder:
+            source, target = Path(folder) / "arrays.npz", Path(folder) / "image.npy"
+            np.savez(source, allow_pickle=False, **arrays)
+            why = run_child([sys.executable, "-P", "-m", module, str(source), str(target)])
+            if why is None and target.exists():
+                return np.asarray(np.load(target))
+            _failure.append(why or "it wrote no picture")
+    if must:
+        raise MissingError(f"PyVista cannot render here: {_failure[0]}; unset FINGER3D_RENDERER to use matplotlib")
+    return None
+
+
+def run_child(command: list[str], window: bool = False) -> str | None:
+    """Run a command that renders, where a crash does no harm; why it failed, in one line, or None.
+
+    There is a time limit, unless it opens a window.
+    """
+    # EGL needs no display; asking for it first spares VTK's warning about a missing X server.
+    hidden = {} if window else {"VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow"}
+    env = {**hidden, **child_environment()}
+    limit = None if window else _TIME_LIMIT_S
+    try:
+        done = subprocess.run(command, env=env, capture_output=True, text=True, timeout=limit, check=False)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        return str(error)
+    if done.returncode == 0:
+        return None
+    if done.returncode < 0:
+        return f"it crashed (signal {-done.returncode}); OpenGL may be missing (apt install libegl1 libgl1-mesa-dri)"
+    return " ".join(done.stderr.strip().splitlines()[-1:]) or f"it ended with code {done.returncode}"
+
+
+def _child(source: str, target: str) -> None:
+    """Render the skin in `source` once for each set of colours, and save the images (s, h, w, 3)."""
+    import pyvista as pv
+
+    data = np.load(source)
+    skin = Skin(**{f.name: data[f.name] for f in fields(Skin)})
+    plotter = pv.Plotter(off_screen=True, window_size=list(WINDOW), lighting="three lights")
+    contact = stage(plotter, skin, skin.frame)
+    images = []
+    for number, colours in enumerate(data["colours"]):
+        contact["colour"] = np.round(255.0 * colours.reshape(-1, 3)).astype(np.uint8)
+        if number == 1:
+            _add_arrows(plotter, skin)
+        plotter.render()  # a screenshot alone repeats the picture before
+        images.append(plotter.screenshot(return_img=True))
+    np.save(target, np.array(images))
+
+
+def stage(plotter: Any, skin: Skin, frame: tuple[Float, Float]) -> Any:
+    """Set up the body, and a camera that sees a frame as `Skin.frame` gives it; returns the contact surface."""
+    plotter.set_background("white")
+    contact = _add_body(plotter, skin)
+    plotter.enable_parallel_projection()
+    middle, size = frame
+    plotter.camera_position = [tuple(middle + 3.0 * skin.size * AXES[2]), tuple(middle), (0.0, 1.0, 0.0)]
+    plotter.camera.parallel_scale = half_height(size)
+    plotter.reset_camera_clipping_range()
+    return contact
+
+
+def _poly(points: Float, lines: bool) -> Any:
+    """PyVista's mesh of polygons, or polylines, (m, corners, 3) that share no points."""
+    import pyvista as pv
+
+    count, corners = points.shape[:2]
+    index = np.hstack([np.full((count, 1), corners), np.arange(count * corners).reshape(count, corners)]).ravel()
+    flat = np.ascontiguousarray(points.reshape(-1, 3))
+    return pv.PolyData(flat, lines=index) if lines else pv.PolyData(flat, index)
+
+
+def _add_body(plotter: Any, skin: Skin) -> Any:
+    """Add all but the arrows; returns the contact surface, whose array "colour" may be changed."""
+    shine = {"ambient": 0.25, "diffuse": 0.8, "specular": 0.1}
+    if len(skin.body):
+        plotter.add_mesh(_poly(skin.body[:, _FOUR].reshape(-1, 3, 3), lines=False), color=BODY, **shine)
+    contact = _poly(skin.contact, lines=False)
+    contact["colour"] = np.zeros((contact.n_points, 3), dtype=np.uint8)
+    plotter.add_mesh(contact, scalars="colour", rgb=True, **shine)
+    for edges, colour, width, opacity in (
+        (skin.lines, LINE, 1.0, 0.5),
+        (skin.features, "#444444", 2.0, 1.0),
+        (skin.rest, REST, 1.5, 0.6),
+        (skin.outline[None], OBJECT, 3.0, 1.0),
+    ):
+        if edges.size:
+            plotter.add_mesh(_poly(edges, lines=True), color=colour, line_width=width, opacity=opacity)
+    return contact
+
+
+def _add_arrows(plotter: Any, skin: Skin) -> None:
+    import pyvista as pv
+
+    shape = pv.Arrow(start=(-0.5, 0.0, 0.0), tip_length=0.4, tip_radius=0.13, shaft_radius=0.045)
+    for state, colour in ARROWS.items():
+        on = skin.arrow_status == state
+        if on.any():
+            points = pv.PolyData(skin.arrow_at[on] + [0.0, 0.004 * skin.size, 0.0])
+            points["arrow"] = skin.arrow[on]
+            glyphs = points.glyph(orient="arrow", scale="arrow", factor=skin.arrow_length, geom=shape)
+            plotter.add_mesh(glyphs, color=colour, lighting=False)
+
+
+if __name__ == "__main__":
+    _child(*sys.argv[1:])

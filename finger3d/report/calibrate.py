@@ -1,0 +1,65 @@
+"""The page of a calibration, from what is in its folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from finger3d.report.build import Code, Figure, Row, Section, Table, write_page
+from finger3d.report.scene import how_modelled
+from finger3d.results.summary import read_json, title_of
+
+
+def calibrate_page(folder: str | Path) -> Path:
+    """Write report.html of a calibration.
+
+    Raises
+    ------
+    Finger3dError
+        If there is no calibration.json to read, or the page cannot be written.
+    """
+    folder = Path(folder)
+    data = read_json(folder / "calibration.json")
+    mu, strain, sd = data["curve"]["mu"], data["curve"]["strain"], data["mu_sd"]
+    ranges = {
+        key: ", ".join(f"{s['low']:.3g} to {s['high']:.3g}" for s in data[key]) or "none"
+        for key in ("trusted", "usable")
+    }
+    known = [(i, s) for i, s in enumerate(sd) if s is not None]
+    best = min(known, key=lambda pair: pair[1], default=None)
+    headline = [
+        Row(f"mu within {data['resolution_limit']:g}, all tolerances", ranges["trusted"]),
+        Row("the same from strain noise alone", ranges["usable"]),
+        Row(f"strain at mu = {mu[0]:g}", strain[0]),
+        Row(f"strain at mu = {mu[-1]:g}", strain[-1]),
+        Row("residual of the second-order fit, rms", f"{data['fit']['residual_rms']:.2g}"),
+    ]
+    if best:
+        headline.append(Row(f"mu \u00b1 at mu = {mu[best[0]]:.3g}, all tolerances", f"{best[1]:.2g}"))
+    a, b, c = data["fit"]["coefficients"]
+    curve = Table(
+        ("mu", "strain", "resolution of mu", "sd of mu"), list(zip(mu, strain, data["resolution"], sd, strict=True))
+    )
+    causes = Table(
+        ("not known exactly", "standard deviation", "unit", "sd of mu at the best place"),
+        [(name, t["sd"], t["unit"], t["mu_sd"][best[0]] if best else "") for name, t in data["tolerances"].items()],
+    )
+    use = f"finger3d estimate {folder}/calibration.json --strain {strain[len(strain) // 2]:.4g}"
+    failed = [f"mu = {f['mu']:g}: {f['why']}" for f in data["failed"]]
+    return write_page(
+        folder,
+        f"{title_of(data['scene'])}: gauge {data['gauge']} against friction",
+        headline,
+        [
+            Section("Verdict", [data["verdict"]]),
+            Section("Curve", [f"Second order: strain = {a:.5g} {b:+.5g} mu {c:+.5g} mu\u00b2", curve, causes]),
+            Section("Scene", how_modelled(data, folder)),
+            Section("Use it", [Code(use)]),
+        ],
+        [Figure("calibration.png", "Strain and fit, resolution, and what the uncertainty of mu is made of"),
+         Figure("map.png", "Where strains follow friction")],
+        command="calibrate",
+        outcome="converged" if not failed else f"{len(failed)} values of mu gave no numbers",
+        good=not failed,
+        notes=failed,
+        versions=data["about"].get("versions"),
+    )  # fmt: skip

@@ -1,0 +1,117 @@
+"""The 3D view of a page: the deformed surface, drawn by plotly in the reader's browser from data in the page."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.fem.simplex import Mesh
+from finger3d.mechanics.model import Gauge
+from finger3d.plotting.gauges import marks_of
+from finger3d.report.html import asset, embedded
+from finger3d.results.states import States, chosen, label
+
+Array = NDArray[Any]
+
+_BUDGET = 1_500_000  # bytes of numbers in a page, beside plotly's 5 MB and the pictures
+
+
+@dataclass(frozen=True)
+class View3D:
+    """A surface at several increments, corners of its facets only.
+
+    Attributes
+    ----------
+    rest : (v, 3) mm
+    body, contact : (t, 3) triangles off and on the contact surface
+    moved : (s, v, 3) mm, where the corners are at each increment
+    pressure : (s, v) MPa
+    status : (s, v) 0 open, 1 stick, 2 slip
+    labels : (s,) what each increment is called
+    gauges : (s, g, 3, 3) mm, start, middle and end of every gauge at each increment, on the face in front (+z)
+    gauge_labels : (g,) what is written beside them
+    """
+
+    rest: Array
+    body: Array
+    contact: Array
+    moved: Array
+    pressure: Array
+    status: Array
+    labels: tuple[str, ...]
+    gauges: Array
+    gauge_labels: tuple[str, ...]
+
+    def html(self) -> str:
+        """The box it stands in, with its controls."""
+        last = len(self.labels) - 1
+        hidden = " hidden" if last == 0 else ""
+        none = "" if self.gauge_labels else " hidden"
+        return (
+            '<div class="view"><div class="controls">'
+            '<label>colour <select id="view-field"><option value="pressure">contact pressure</option>'
+            '<option value="status">stick and slip</option><option value="moved">displacement</option></select></label>'
+            f'<label{hidden}>step <input id="view-step" type="range" min="0" max="{last}" value="{last}"></label>'
+            f'<label{none}><input id="view-gauges" type="checkbox"{"" if none else " checked"}>gauges</label>'
+            '<output id="view-label"></output>'
+            '<span class="key"><span class="zone"><i style="background:#1f3f77"></i>stick</span>'
+            '<span class="zone"><i style="background:#f28e2b"></i>slip</span>'
+            '<span class="open"><i style="background:#c4c4c4"></i>open, no contact</span></span>'
+            '</div><div class="stage" id="view-stage"></div>'
+            "<p>True scale, deformed. Drag to turn, scroll or pinch to zoom; point at the contact surface to read it."
+            f"{' Gauges are inside; they are marked on the face in front.' if self.gauge_labels else ''}"
+            "<noscript> The 3D view needs JavaScript; the pictures below show the last step.</noscript></p></div>"
+        )
+
+    def script(self) -> str:
+        """The numbers, and what lets plotly draw them."""
+        data = {
+            "labels": self.labels,
+            "vertices": len(self.rest),
+            "rest": _packed(self.rest, "<f4"),
+            "moved": _packed(self.moved, "<f4"),
+            "pressure": _packed(self.pressure, "<f4"),
+            "status": _packed(self.status, "u1"),
+            "body": _packed(self.body, "<u4"),
+            "contact": _packed(self.contact, "<u4"),
+            "gauges": np.round(self.gauges, 3).tolist(),
+            "gaugeLabels": self.gauge_labels,
+        }
+        numbers = f'<script type="application/json" id="view-data">{embedded(data)}</script>\n'
+        return f"{numbers}<script>{asset('view3d.js')}</script>\n"
+
+
+def view_of(states: States, gauges: Sequence[Gauge] = (), budget: int = _BUDGET) -> View3D | None:
+    """A view of a solid; as many increments as the budget (bytes) holds, None for a section or if not one fits."""
+    if states.dim != 3:
+        return None
+    corners, index = np.unique(states.corners, return_inverse=True)
+    triangles = index.reshape(states.corners.shape)
+    each = len(corners) * (3 * 4 + 4 + 1) * 4 // 3
+    most = (budget - triangles.size * 16 // 3) // each
+    if most < 1:
+        return None
+    kept = chosen(len(states.step), most)
+    rest = states.points[corners]
+    marks = marks_of(Mesh(states.points.astype(float), states.cells, {}), gauges, near=True)
+    at = [[mark.of(states.points + states.displacement[k]) for mark in marks] for k in kept]
+    return View3D(
+        rest=rest,
+        body=triangles[~states.on_contact],
+        contact=triangles[states.on_contact],
+        moved=rest + states.displacement[kept][:, corners],
+        pressure=np.array([states.on_points("pressure", k)[corners] for k in kept]),
+        status=np.array([states.on_points("status", k)[corners] for k in kept]),
+        labels=tuple(label(int(states.step[k]), states.target[k]) for k in kept),
+        gauges=np.array(at).reshape(len(kept), len(marks), 3, 3),
+        gauge_labels=tuple(mark.label for mark in marks),
+    )
+
+
+def _packed(values: Array, kind: str) -> str:
+    return base64.b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")

@@ -1,0 +1,200 @@
+"""steps.npz: the displacement and the contact of chosen increments, for the 3D view, `finger3d show` and Python."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.errors import Finger3dError
+from finger3d.fem.simplex import Mesh, middles
+from finger3d.io import atomic, read_arrays
+from finger3d.mechanics.history import Frame, contact_table
+from finger3d.mechanics.problem import Problem
+
+Array = NDArray[Any]
+
+_LARGEST = 1e9
+"""Bound of every number in steps.npz, in mm or MPa: far above any result, and far below an overflow in a drawing."""
+
+MOST = 10
+"""Increments kept: each costs a solution with the factor at hand, and a displacement of every node on disk."""
+
+
+@dataclass(frozen=True)
+class States:
+    """Chosen increments of a press on the whole finger; numbers in single precision, the exact ones are in the CSVs.
+
+    Attributes
+    ----------
+    points : (n, d) mm at rest, in the order of fields.vtu
+    cells, facets : (e, k), (t, j) as in `finger3d.fem.simplex.Mesh`; facets of all labels together
+    on_contact : (t,) whether a facet belongs to the contact surface
+    nodes : (m,) numbers of the contact points among `points`, in the order of contact.csv
+    step : (s,) number of each increment, from 1
+    target : (s, 3) depth_mm, slide_x_mm, slide_z_mm
+    displacement : (s, n, d) mm
+    pressure, shear_x, shear_z : (s, m) MPa, traction on the finger
+    gap : (s, m) mm
+    status : (s, m) 0 open, 1 stick, 2 slip
+    """
+
+    points: Array
+    cells: Array
+    facets: Array
+    on_contact: Array
+    nodes: Array
+    step: Array
+    target: Array
+    displacement: Array
+    pressure: Array
+    shear_x: Array
+    shear_z: Array
+    gap: Array
+    status: Array
+
+    @property
+    def dim(self) -> int:
+        """2 for a section, 3 for a solid."""
+        return int(self.points.shape[1])
+
+    @property
+    def corners(self) -> Array:
+        """Corners (t, d) of the boundary's facets, oriented outward."""
+        return self.facets[:, : self.dim]
+
+    def on_points(self, name: str, k: int) -> Array:
+        """A contact field of the k-th kept increment at all points (n,), as in fields.vtu: 0 off the contact face."""
+        values = getattr(self, name)[k]
+        out = np.zeros(len(self.points), dtype=values.dtype)
+        out[self.nodes] = values
+        ends, between = middles(self.facets[self.on_contact], self.dim)
+        out[between] = out[ends].min(axis=1) if name == "status" else out[ends].mean(axis=1)
+        return out
+
+
+def chosen(count: int, most: int = MOST) -> list[int]:
+    """Numbers of at most `most` of `count` increments, spread evenly, the last among them.
+
+    >>> chosen(3), chosen(21, 5)
+    ([0, 1, 2], [0, 5, 10, 15, 20])
+    """
+    return np.unique(np.round(np.linspace(count - 1, 0, min(count, most))).astype(int)).tolist() if count else []
+
+
+def states_of(problem: Problem, frames: Sequence[Frame], mesh: Mesh, parent: Array, sign: Array, last: Array) -> States:
+    """Recover chosen increments.
+
+    Parameters
+    ----------
+    frames : those that converged, in turn
+    mesh, parent, sign : the whole finger, and where each node comes from (`finger3d.fem.simplex.unfold`)
+    last : (n, d) mm, displacement of the whole finger at the end, which is known already
+    """
+    from finger3d.fem.recover import displacement
+
+    kept = chosen(len(frames))
+    u = np.empty((len(kept), *mesh.points.shape), dtype=np.float32)
+    parts = [frames[number].part for number in kept[:-1]]
+    for k, unknowns in enumerate(problem.model.kinematics.all_unknowns(problem, parts)):
+        u[k] = displacement(problem.mesh, unknowns)[parent] * sign
+    u[-1] = last
+    tables = [contact_table(problem.points, frames[i].state) for i in kept]
+    facets = {label: f for label, f in mesh.facets.items() if len(f)}
+    at = [frames[i].target for i in kept]
+
+    def columns(name: str) -> Array:
+        return np.array([t[name] for t in tables], dtype=np.float32)
+
+    return States(
+        points=mesh.points.astype(np.float32),
+        cells=mesh.cells.astype(np.int32),
+        facets=np.concatenate(list(facets.values())).astype(np.int32),
+        on_contact=np.concatenate([np.full(len(f), label == "contact") for label, f in facets.items()]),
+        nodes=problem.points.nodes.astype(np.int32),
+        step=np.array(kept) + 1,
+        target=np.array([(t.depth_mm, t.slide_x_mm, t.slide_z_mm) for t in at]),
+        displacement=u,
+        pressure=columns("pressure_MPa"),
+        shear_x=columns("shear_x_MPa"),
+        shear_z=columns("shear_z_MPa"),
+        gap=columns("gap_mm"),
+        status=np.array([frames[i].state.status for i in kept], dtype=np.int8),
+    )
+
+
+def write_states(path: str | Path, states: States) -> None:
+    """Write steps.npz."""
+    with atomic(path) as temporary, temporary.open("wb") as file:
+        np.savez(file, allow_pickle=False, **{f.name: getattr(states, f.name) for f in fields(States)})
+
+
+def load_states(path: str | Path) -> States:
+    """Read steps.npz.
+
+    Raises
+    ------
+    Finger3dError
+        If it cannot be read, is damaged, or is of another version.
+    """
+    try:
+        data = read_arrays(path)
+        if missing := [f.name for f in fields(States) if f.name not in data]:
+            raise ValueError(f"{missing[0]} is missing")
+        states = States(**{f.name: data[f.name] for f in fields(States)})
+        _check(states)
+    except (OSError, ValueError) as error:
+        why = " ".join(str(error).split())
+        raise Finger3dError(f"{path}: cannot be read as steps of a press ({why}); press the scene again") from None
+    return states
+
+
+def _check(states: States) -> None:
+    """Raise ValueError unless types, shapes, indices and numbers of all arrays fit together."""
+    n, d = states.points.shape if states.points.ndim == 2 else (0, 0)
+    if d not in (2, 3) or not n:
+        raise ValueError(f"points has the shape {states.points.shape}")
+    s, m = len(np.atleast_1d(states.step)), len(np.atleast_1d(states.nodes))
+    e, t = len(np.atleast_1d(states.cells)), len(np.atleast_1d(states.facets))
+    wanted: dict[str, tuple[tuple[tuple[int, ...], ...], str]] = {
+        "points": (((n, d),), "f"),
+        "cells": (((e, d + 1), (e, (d + 1) * (d + 2) // 2)), "iu"),
+        "facets": (((t, d), (t, d * (d + 1) // 2)), "iu"),
+        "on_contact": (((t,),), "b"),
+        "nodes": (((m,),), "iu"),
+        "step": (((s,),), "iu"),
+        "target": (((s, 3),), "iuf"),
+        "displacement": (((s, n, d),), "f"),
+        **dict.fromkeys(("pressure", "shear_x", "shear_z", "gap"), (((s, m),), "f")),
+        "status": (((s, m),), "iu"),
+    }
+    for name, (shapes, kinds) in wanted.items():
+        values = getattr(states, name)
+        if values.shape not in shapes or not values.size or values.dtype.kind not in kinds:
+            raise ValueError(f"{name} is an array of {values.dtype}, shape {values.shape}, and does not fit the others")
+        if values.dtype.kind == "f" and not (np.abs(values) < _LARGEST).all():
+            raise ValueError(f"{name} has a number that is not finite or too large")
+    for name, low, high in (("cells", 0, n), ("facets", 0, n), ("nodes", 0, n), ("status", 0, 3), ("step", 1, 2**31)):
+        values = getattr(states, name)
+        if values.min() < low or values.max() >= high:
+            raise ValueError(f"{name} has a number out of range")
+    if (np.diff(states.step.astype(np.int64)) <= 0).any():
+        raise ValueError("step does not ascend")
+    if not states.on_contact.any() or (np.ptp(states.points, axis=0) <= 0.0).any():
+        raise ValueError("the body has no contact face, or no extent")
+
+
+def label(step: int, target: Array) -> str:
+    """What a step is called, from its number and its depth and slides (3,) mm."""
+    depth, x, z = (float(v) for v in target)
+    slid = "".join(f", slid {v:.4g} mm along {axis}" for v, axis in ((x, "x"), (z, "z")) if v)
+    return f"step {step}: {depth:.4g} mm deep{slid}"
+
+
+def captions(states: States) -> list[str]:
+    """What each kept step is called."""
+    return [label(int(s), t) for s, t in zip(states.step, states.target, strict=True)]

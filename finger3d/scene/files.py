@@ -1,0 +1,56 @@
+"""Bodies that a scene names by file: where the file is, and in which unit it was drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from finger3d.geometry.files import SUFFIXES
+from finger3d.objects import MeshObject, RigidObject
+
+if TYPE_CHECKING:
+    from finger3d.geometry.imported import Imported
+
+_APART = 200.0  # sizes of object and finger that differ more than this are in different units, or cannot be meshed
+
+
+def is_file(geometry: Any) -> bool:
+    """Whether finger.geometry names a file and not a design."""
+    return isinstance(geometry, str) and geometry.lower().endswith(SUFFIXES)
+
+
+def absolute(given: Mapping[str, Any], scene: Path | None) -> dict[str, Any]:
+    """The tree with the paths of its bodies, which are relative to the scene's file, made absolute."""
+    folder = scene.parent if scene else Path()
+    tree = dict(given)
+    for table, key in (("finger", "geometry"), ("object", "path")):
+        old = tree.get(table)
+        if isinstance(old, Mapping) and isinstance(value := old.get(key), str) and (key == "path" or is_file(value)):
+            tree[table] = {**old, key: str((folder / value).resolve())}
+    return tree
+
+
+def finger(path: str) -> Imported:
+    """The finger in a file."""
+    from finger3d.geometry.imported import imported
+
+    return imported(path)
+
+
+def unit_mistake(design: Any, obj: RigidObject) -> str:
+    """Say in one line that a triangulated object is far too large or far too small beside the finger; else nothing."""
+    if not isinstance(obj, MeshObject):
+        return ""
+    longest = max(design.height_mm, 2.0 * design.half_length_mm, design.width_mm)
+    extent = obj.surface.high - obj.surface.low
+    ratio = float(extent.max()) / longest
+    if 1.0 / _APART <= ratio <= _APART:
+        return ""
+    box = " x ".join(f"{e:.4g}" for e in extent)
+    relation = f"{ratio:.3g} times as large as" if ratio > 1.0 else f"{1.0 / ratio:.3g} times smaller than"
+    advice = "0.001 if it was drawn in micrometres" if ratio > 1.0 else "1000 if it was drawn in metres, 25.4 in inches"
+    return (
+        f"object.path: the object's box is {box} mm, {relation} the finger of {longest:.4g} mm; is its unit right? "
+        f"Give object.scale, for instance {advice}"
+    )

@@ -1,0 +1,145 @@
+"""What `finger3d plan` foretells: every effect says its cost, in 2D and 3D; and presses bear it out."""
+
+from __future__ import annotations
+
+import csv
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from finger3d.accuracy.cost import forecast
+from finger3d.contact.friction import Coulomb
+from finger3d.errors import Finger3dError
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.model import Domain, Gauge, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.solve import build, march
+from finger3d.scene import load
+from finger3d.scene.registry import effect_names, effect_type
+
+SETTINGS: dict[str, dict[str, Any]] = {
+    "elastic_object": {"E_MPa": 2.0, "nu": 0.4},
+    "embedded_gauge": {"E_MPa": 3000.0, "thickness_mm": 0.02, "width_mm": 2.0},
+    "kinetic_friction": {"ratio": 0.7},
+    "large_deformation": {},
+    "viscosity": {"prony": ((0.3, 0.5),), "bulk": False},
+}
+
+
+def baseline(domain: Domain) -> Model:
+    body = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
+    return Model(
+        body, Material(1.0, 0.45), MeshOptions(3.0, 8.0, "swept"), (Leg(10.0, steps=5, duration_s=1.0),),
+        friction=Coulomb(0.25), domain=domain, gauges=(Gauge("g", 36.0, 38.0, length_mm=4.0),),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("domain", ["plane-strain", "solid"])
+@pytest.mark.parametrize("name", effect_names())
+def test_every_effect_says_what_it_costs(name: str, domain: Domain) -> None:
+    plain = baseline(domain)
+    without, with_it = forecast(plain), forecast(effect_type(name)(**SETTINGS[name]).apply(plain))
+    assert name not in without
+    assert with_it[name].startswith("costs about ")
+    for key in ("total_s", "memory_MB"):
+        if name == "kinetic_friction":
+            assert with_it[key] == without[key]
+        else:
+            assert with_it[key] >= without[key]
+
+
+def test_bulk_viscosity_costs_nothing_more() -> None:
+    model = baseline("solid")
+    assert "no factorisation" in forecast(effect_type("viscosity")(((0.3, 0.5),), bulk=True).apply(model))["viscosity"]
+
+
+def test_gauges_and_increments_are_counted() -> None:
+    plain = baseline("plane-strain")
+    many = tuple(Gauge(f"g{i}", 30.0, 38.0) for i in range(10_000))
+    without, with_them = forecast(plain), forecast(replace(plain, gauges=many))
+    # 10 000 gauges took over 40 s before condensing, in a compliance of 10 000 rows: 0.8 GB, and copies of it
+    assert with_them["total_s"] > without["total_s"] + 20.0
+    assert with_them["memory_MB"] > without["memory_MB"] + 800.0
+    assert with_them["gauges"] == 10_000
+    long = forecast(replace(plain, legs=(Leg(10.0, steps=10_000, duration_s=1.0),)))
+    # every increment keeps force, gap, position and slip of all points, 8 bytes each
+    kept = 10_000 * 2 * 8 * 6 * without["contact_points"] / 1e6
+    assert long["memory_MB"] - without["memory_MB"] > kept
+    assert long["total_s"] > without["total_s"] + 20.0
+
+
+@pytest.mark.parametrize("many", [{"gauges": tuple(Gauge(f"g{i}", 30.0, 38.0) for i in range(10_000))},
+                                  {"legs": (Leg(10.0, steps=10_000, duration_s=1.0),)}])  # fmt: skip
+def test_what_memory_cannot_hold_is_refused(many: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    from finger3d.meshing import limits
+
+    plain = replace(baseline("plane-strain"), gauges=())
+    few, lot = (1e6 * forecast(model)["memory_MB"] for model in (plain, replace(plain, **many)))
+    # four fifths of the memory may be used: as much as lies between the two forecasts
+    memory = round(0.5 * (few + lot) / 0.8)
+    monkeypatch.setattr(limits, "memory_bytes", lambda: (memory, memory))
+    assert forecast(plain)["memory_MB"] > 0
+    with pytest.raises(Finger3dError, match="forecast"):
+        forecast(replace(plain, **many))
+
+
+def test_a_condensation_that_memory_cannot_hold_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    from finger3d.meshing import limits
+
+    model = replace(baseline("plane-strain"), gauges=())
+    build(model)
+    many = tuple(Gauge(f"g{i}", 30.0, 38.0) for i in range(10_000))
+    monkeypatch.setattr(limits, "memory_bytes", lambda: (300_000_000, 300_000_000))
+    with pytest.raises(Finger3dError, match="fewer gauges"):
+        build(replace(model, gauges=many))
+
+
+def test_step_lengths_are_counted() -> None:
+    legs = (Leg(5.0, steps=5, duration_s=1.0), Leg(10.0, steps=5, duration_s=2.0))
+    model = effect_type("viscosity")(((0.3, 0.5),), bulk=False).apply(replace(baseline("solid"), legs=legs))
+    assert "2 more factorisations" in forecast(model)["viscosity"]
+
+
+def test_presses_took_what_is_foretold(root: Path) -> None:
+    # whole presses of the Fig. 9 finger as measured last, 10 000 to 509 000 unknowns; a factor 2 is what it claims
+    with (root / "validation" / "results" / "scaling_table.csv").open(encoding="utf-8", newline="") as file:
+        measured = list(csv.DictReader(file))
+    assert {row["series"] for row in measured} == {"unknowns", "contact rows"}
+    for row in measured:
+        sizes = [f"mesh.{key}={row[key]}" for key in ("size_mm", "base_size_mm")]
+        told = forecast(
+            load(root / "geometries" / "fig9.toml", [*sizes, "mesh.mesher=swept", "press.steps=10"]).model()
+        )
+        assert 0.5 < told["total_s"] / float(row["seconds"]) < 2.0, row
+        assert 0.5 < told["memory_MB"] / float(row["peak_MB"]) < 2.0, row
+        assert 0.5 < told["dofs"] / float(row["dofs"]) < 2.0, row
+
+
+@pytest.mark.parametrize("domain", ["plane-strain", "solid"])
+def test_automatic_increments_are_foretold_with_all_the_runs_that_choose_them(domain: Domain) -> None:
+    # 5 + 10 + 20 + 40 + 80 increments where the last is usual
+    legs = (Leg(10.0, steps="auto"),)
+    told, fixed = (forecast(replace(baseline(domain), legs=x)) for x in (legs, (Leg(10.0, steps=155),)))
+    assert (told["steps"], told["steps_of_all_runs"]) == (80, 155)
+    assert told["contact_s"] == fixed["contact_s"]
+    assert "steps_of_all_runs" not in fixed
+    large = effect_type("large_deformation")().apply(replace(baseline(domain), legs=legs))
+    assert forecast(large)["steps_of_all_runs"] == 3 + 6 + 12
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("domain", ["plane-strain", "solid"])
+def test_large_deformation_takes_what_was_foretold(domain: Domain) -> None:
+    # processor time of this process; the forecast is meant to hold within a factor 2 either way
+    plain = baseline(domain)
+    large = effect_type("large_deformation")().apply(plain)
+    took = []
+    for model in (plain, large):
+        begin = time.process_time()
+        problem = build(model)
+        list(march(problem))
+        took.append(time.process_time() - begin)
+    foretold = forecast(large)["total_s"] - forecast(plain)["total_s"]
+    assert 0.5 < (took[1] - took[0]) / foretold < 2.0

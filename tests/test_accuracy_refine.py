@@ -1,0 +1,151 @@
+"""mesh.tolerance: refining until the estimate is met, or the time is over."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from finger3d.accuracy.refine import Refined, Round, _affordable, refined
+from finger3d.cli import main
+from finger3d.contact.friction import Coulomb
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+from finger3d.mechanics.solve import build, march
+from finger3d.scene import load
+
+SCENE = """
+[finger]
+geometry = "half_cylinder"
+radius_mm = 5.0
+width_mm = 4.0
+[material]
+E_MPa = 1.0
+nu = 0.45
+[friction]
+mu = 0.25
+[press]
+depth_mm = 1.0
+steps = 5
+[model]
+domain = "plane-strain"
+[mesh]
+tolerance = 0.03
+"""
+OPTIONS = MeshOptions(1.0, 4.0, "swept")
+
+
+def section(size: float) -> Model:
+    design = designs()["half_cylinder"](radius_mm=5.0, width_mm=1.0)
+    return Model(
+        design, Material(1.0, 0.45), MeshOptions(size, 4.0 * size, "swept"), (Leg(1.0, steps=5),),
+        friction=Coulomb(0.25), domain="plane-strain",
+    )  # fmt: skip
+
+
+def test_it_refines_until_the_estimate_is_met_and_says_every_round() -> None:
+    said: list[str] = []
+    found = refined(section(0.4), 0.03, say=said.append)
+    assert found.met
+    assert found.stopped == "met"
+    assert found.warning == ""
+    assert len(said) == len(found.rounds) > 1
+    assert found.rounds[0].error > 0.03 >= found.rounds[-1].error
+    assert found.rounds[-1].dofs > found.rounds[0].dofs
+    assert found.mesh.size_mm == found.rounds[-1].size_mm
+    assert found.problem is not None
+    assert found.problem.stiffness.upper.shape[0] == found.rounds[-1].dofs
+    # and it is true: against five times the edge lengths' fineness, twice the tolerance at most
+    truth = build(replace(section(0.4), mesh=MeshOptions(0.02, 0.1, "swept")))
+    force = [-f.state.force[:, 0].sum() for p in (found.problem, truth) for f in [list(march(p))[-1]]]
+    assert force[0] == pytest.approx(force[1], rel=2 * 0.03)
+
+
+def test_the_time_stops_it_with_the_best_so_far() -> None:
+    found = refined(section(0.4), 1e-4, max_seconds=0.0)
+    assert len(found.rounds) == 1
+    assert not found.met
+    assert found.warning.startswith("mesh.tolerance = 0.0001 was not met (max_seconds = 0): ")
+    assert f"{found.rounds[0].error:.2g}" in found.warning
+
+
+def test_too_large_a_mesh_stops_it_with_the_best_so_far(monkeypatch: pytest.MonkeyPatch) -> None:
+    # a machine of so little memory that the second round is refused by the forecast
+    model = section(0.4)
+    cells = len(build(model).mesh.cells)
+    # 4.1 unknowns a triangle at 2 kB, 80 % of memory may be used (finger3d/meshing/limits.py)
+    enough = int(2 * cells * 4.1 * 2e3 / 0.8)
+    monkeypatch.setattr("finger3d.meshing.limits.memory_bytes", lambda: (enough, enough))
+    found = refined(model, 1e-4)
+    assert found.rounds
+    assert found.stopped.startswith("no finer mesh: mesh.size_mm = ")
+    assert "allowed: at most" in found.warning
+
+
+@pytest.mark.parametrize(
+    ("left", "size"),
+    [
+        (1e9, 0.5),  # all of the step
+        (20.0, None),  # not even the least step, 0.85: 1.3 * 10 s * 0.85^-4.8 = 28 s
+        (60.0, (10 * 1.3 / 60.0) ** (1 / 4.8)),  # as far as the time reaches
+    ],
+)
+def test_a_step_is_as_large_as_the_time_allows(left: float, size: float | None) -> None:
+    found = _affordable(OPTIONS, replace(OPTIONS, size_mm=0.5, base_size_mm=2.0), 10.0, left, 3)
+    assert (found and found.size_mm) == (size and pytest.approx(size, rel=1e-3))
+
+
+def test_the_best_round_need_not_be_the_last() -> None:
+    rounds = (Round(1.0, 4.0, 100, 0.02, "normal_force_N", 1.0), Round(0.5, 4.0, 400, 0.03, "friction_sum_N", 2.0))
+    found = Refined(0.01, OPTIONS, rounds, "8 rounds")
+    assert found.best is rounds[0]
+    assert "estimated error of 0.02 in normal_force_N" in found.warning
+    assert found.as_dict()["rounds"][1]["dofs"] == 400
+
+
+@pytest.mark.parametrize(
+    ("domain", "mesher", "tolerance"),
+    [
+        ("plane-strain", "swept", 0.05),
+        ("solid", "swept", 0.3),
+        pytest.param("solid", "ftetwild", 0.3, marks=pytest.mark.slow),
+    ],
+)
+def test_press_with_a_tolerance(tmp_path: Path, domain: str, mesher: str, tolerance: float) -> None:
+    scene = tmp_path / "scene.toml"
+    text = SCENE.replace("plane-strain", domain).replace("0.03", f'{tolerance}\nmesher = "{mesher}"')
+    scene.write_text(text, encoding="utf-8")
+    assert main(["press", str(scene), "--out", str(tmp_path / "out"), "--no-figures"]) == 0
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    refinement = summary["refinement"]
+    assert refinement["met"]
+    assert refinement["tolerance"] == tolerance
+    last = refinement["rounds"][-1]
+    assert last["error"] <= tolerance
+    assert summary["mesh"]["dofs"] == last["dofs"]
+    assert summary["outcome"] == "converged"
+    # the scene as run has the sizes found, and loads
+    again = load(tmp_path / "out" / "scene.toml")
+    assert again.mesh == MeshOptions(last["size_mm"], last["base_size_mm"], mesher)  # type: ignore[arg-type]
+    assert again.tables.mesh.tolerance is None
+
+
+def test_the_warning_reaches_the_summary(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(SCENE.replace("0.03", "1e-4\nmax_seconds = 0.01"), encoding="utf-8")
+    assert main(["press", str(scene), "--out", str(tmp_path / "out"), "--no-figures"]) == 0
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert summary["refinement"]["stopped"] == "max_seconds = 0.01"
+    assert any("mesh.tolerance = 0.0001 was not met" in w for w in summary["warnings"])
+    assert "warning: mesh.tolerance = 0.0001 was not met" in capsys.readouterr().out
+
+
+def test_compare_wants_sizes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(SCENE, encoding="utf-8")
+    assert main(["compare", str(scene), "--out", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert "mesh.tolerance = 0.03" in error
+    assert len(error.splitlines()) == 1

@@ -1,0 +1,137 @@
+"""Increments of a calibration: how their error is told, how many are chosen, and where what is left ends up."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from finger3d.analyses.calibrate.increments import error_left, found_increments, increment_error
+from finger3d.analyses.calibrate.run import calibrate, calibrated
+from finger3d.analyses.calibrate.tolerances import read
+from finger3d.analyses.optimise.run import search
+from finger3d.analyses.optimise.task import Free
+from finger3d.analyses.optimise.task import Problem as Search
+from finger3d.mechanics.solve import build
+from finger3d.sensor import estimate, load
+from tests.sensor_cases import NONE, SCENE, scene
+
+NOISE = 1.5e-4
+
+
+def steps(count: int | str) -> Any:
+    return scene(press={"depth_mm": 10.0, "steps": count})
+
+
+def test_an_error_that_falls_as_one_over_n_is_told_exactly() -> None:
+    true, slope = np.array([0.02, 0.05]), np.array([3e-3, -1e-3])
+    strains = {n: true + slope / n for n in (10, 20, 40, 80)}
+    for n in strains:
+        assert error_left(strains, n) == pytest.approx(np.abs(slope) / n, rel=1e-9)
+
+
+def test_levels_that_agree_by_chance_do_not_hide_the_error() -> None:
+    """10, 20 and 40 increments of a section in plane stress gave these sums of friction; 80 gave 0.0212."""
+    strains = {n: np.array([v]) for n, v in ((5, 0.0272), (10, 0.0249), (20, 0.0274), (40, 0.0221))}
+    assert abs(0.0272 - 0.0274) < 3e-4  # four times as many
+    # |0.0272 - 0.0221| / (1 - 5 / 40)
+    assert error_left(strains, 5) == pytest.approx(0.0051 / 0.875, rel=1e-9)
+    assert error_left(strains, 5) >= 0.0272 - 0.0212 - 2e-4
+
+
+def test_a_press_that_failed_tells_nothing() -> None:
+    strains = {10: np.array([1.0, np.nan]), 20: np.array([2.0, np.nan]), 40: np.array([np.nan, 1.0])}
+    assert error_left(strains, 20) == pytest.approx([1.0, np.nan], nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("slope", "expected"),
+    [
+        (0.0, 40),  # two pairs of levels are asked whatever they say
+        (1e-3, 80),  # 1e-3 / n <= 1.5e-5 from n = 67 on
+        (1.0, 320),  # the limit of a section
+    ],
+)
+def test_increments_are_doubled_until_the_error_is_a_tenth_of_the_noise(slope: float, expected: int) -> None:
+    problem = build(steps("auto").model())
+    found = found_increments(problem, lambda p: np.array([slope / p.model.legs[0].steps]), NOISE)
+    assert found.chosen
+    assert [leg.steps for leg in found.legs] == [expected]
+    assert found.error == pytest.approx(slope / expected)
+    assert found.light[0].steps == 40
+
+
+def test_a_number_that_is_given_is_kept() -> None:
+    model = steps(7).model()
+    found = found_increments(build(model), lambda p: pytest.fail("nothing is to be pressed"), NOISE)
+    assert not found.chosen
+    assert found.legs == found.light == model.legs
+
+
+def test_the_error_of_given_increments_is_that_of_presses_of_many() -> None:
+    """Within a factor 2 of the true one wherever that is above the noise; of 10 increments it is over 10 noises."""
+    problem = build(steps(10).model())
+    mu = np.linspace(0.3, 1.2, 4)
+
+    def strain(other: Any) -> Any:
+        return read(other, ("g36",), mu)[0]
+
+    own = strain(problem)
+    told = increment_error(problem, own, False, strain)
+    true = np.abs(own - strain(build(steps(160).model())))
+    assert true.max() > 10.0 * NOISE
+    ratio = told[true > NOISE] / true[true > NOISE]
+    assert 0.5 < ratio.min()
+    assert ratio.max() < 2.0
+
+
+def test_what_increments_leave_is_a_tolerance_and_widens_mu(tmp_path: Path) -> None:
+    rough = steps(4)
+    found = calibrate(rough, "g36", tmp_path, (0.1, 0.4, 0.5, 0.6, 0.7, 0.9), tolerances={**NONE, "increments": 1.0})
+    data = json.loads((tmp_path / "calibration.json").read_text())
+    assert data["about"]["increments"] == {"steps": [4], "chosen": False}
+    assert (data["tolerances"]["increments"]["unit"], data["tolerances"]["increments"]["sd"]) == ("error bar", 1.0)
+    assert found.shares(0.7)["increments"] > 0.5
+    # read by a press of many: off by far more than the noise, but not by more than what is told
+    strain = float(read(build(steps(160).model()), ("g36",), np.array([0.6]))[0, 0])
+    away = abs(strain - float(found.at(0.6)))
+    assert away > 5.0 * found.noise
+    assert away < 2.0 * float(found.strain_sd([0.6])[0])
+    (sure,), (honest,) = (estimate(load(tmp_path / "calibration.json"), strain, tolerances=t) for t in (False, True))
+    assert abs(sure.mu - 0.6) > 5.0 * sure.std
+    assert abs(honest.mu - 0.6) < 2.0 * honest.std
+
+
+def test_chosen_increments_press_the_curve_and_fewer_the_differences() -> None:
+    """Where the strain hardly depends on them, 40 do, and depth is a difference of two presses of as many."""
+    calm = replace(steps("auto").model(), friction=scene().model().friction)
+    mus = (0.02, 0.03, 0.04, 0.05)
+    found, problem, sweep = calibrated(calm, "g36", mus, tolerances={**NONE, "depth_mm": 0.1, "increments": 1.0})
+    assert sweep.increments is not None
+    assert sweep.increments.chosen
+    assert problem.model.legs[0].steps == 40
+    same = calibrate(steps(40), "g36", mus=mus, tolerances={**NONE, "depth_mm": 0.1})
+    assert found.strain == pytest.approx(same.strain, rel=1e-9)
+    assert found.tolerances[0].slope == pytest.approx(same.tolerances[0].slope, rel=1e-6)
+    assert found.tolerances[1].name == "increments"
+    assert found.tolerances[1].spread.max() <= 0.1 * found.noise
+
+
+@pytest.mark.parametrize("count", [4, "auto"])
+def test_a_search_tells_the_increments_of_its_best_design(count: int | str, tmp_path: Path) -> None:
+    given = {**SCENE, "press": {"depth_mm": 2.0, "steps": count}, "mesh": {"size_mm": 6.0, "base_size_mm": 16.0}}
+    free = (Free("gauge.g36.angle_deg", 0.0, 90.0),)
+    found = search(Search(given, free, mus=(0.1, 0.5), budget=2), tmp_path)
+    told = json.loads((tmp_path / "design.json").read_text())["increments"]
+    assert told["chosen"] is (count == "auto")
+    assert told["steps"] == [4] if count == 4 else told["steps"][0] >= 40
+    assert told["strain_error"] >= 0.0
+    assert found.scene.as_dict()["press"]["steps"] == count
+    # the same number again, where the start is remembered and the search goes on
+    more = search(Search(given, free, mus=(0.1, 0.5), budget=3), tmp_path)
+    assert json.loads((tmp_path / "design.json").read_text())["increments"]["steps"] == told["steps"]
+    assert more.evaluations[: len(found.evaluations)] == found.evaluations

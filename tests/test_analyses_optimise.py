@@ -1,0 +1,159 @@
+"""Design search: what is refused, what is judged, and that gauges cost no body."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from finger3d.analyses.optimise.run import search
+from finger3d.analyses.optimise.task import Free, Problem, Table, sensitivity
+from finger3d.cli import main
+from finger3d.errors import Finger3dError
+from finger3d.mechanics.solve import build, march
+from finger3d.plotting.layout import panels_of
+from finger3d.scene import load, tree
+from tests.test_report import words
+
+SETS = ["model.domain=plane-strain", "mesh.size_mm=4", "mesh.base_size_mm=16", "press.steps=10"]
+COARSE = [option for text in SETS for option in ("--set", text)]
+ANGLE = Free("gauge.g36.angle_deg", 0.0, 90.0)
+MUS = (0.1, 0.5, 1.0)
+
+
+@pytest.fixture
+def problem(root: Path) -> Problem:
+    path = root / "geometries" / "fig9.toml"
+    return Problem(tree.override(tree.read(path), SETS), (ANGLE,), path=path, mus=MUS, budget=12)
+
+
+def table_of(strain: list[float], mu: tuple[float, ...] = MUS) -> Table:
+    return Table(np.array(mu), {"g": np.array(strain)}, (), 1e-3, "g", None)  # type: ignore[arg-type]
+
+
+def test_sensitivity_is_the_least_slope_in_units_of_noise():
+    # slopes 0.1/0.4 and 0.05/0.5 per mu, noise 1e-3
+    assert sensitivity(table_of([0.0, 0.1, 0.15])) == pytest.approx(100.0)
+    assert sensitivity(table_of([0.0, -0.1, -0.15])) == pytest.approx(100.0)
+    # it turns back: two mu share a strain
+    assert sensitivity(table_of([0.0, 0.1, 0.05])) == pytest.approx(-100.0)
+
+
+def test_gauges_are_searched_in_one_body_and_read_as_a_press_reads_them(problem, tmp_path):
+    found = search(problem, tmp_path)
+    assert found.bodies == 1
+    assert len(found.evaluations) == 13
+    assert found.best.value == max(e.value for e in found.evaluations) >= found.start.value
+    model = found.scene.model()
+    strain = []
+    for mu in MUS:
+        own = build(replace(model, friction=replace(model.friction, mu=mu)))
+        strain.append(list(march(own))[-1].gauges["g36"])
+    assert found.best.value == pytest.approx(sensitivity(replace(table_of(strain), noise=problem.noise)), rel=1e-9)
+    assert load(tmp_path / "best.toml").tables.gauge[0].angle_deg == found.best.values[0]
+
+
+@pytest.mark.parametrize("bulk", [True, False])
+def test_gauges_of_a_body_that_relaxes_are_read_as_a_press_reads_them(problem, bulk, tmp_path):
+    """Ten time constants long, so that the instantaneous field is far from the one the press ends with."""
+    visco = f"effects.viscosity={{prony = [[0.5, 0.1]], bulk = {str(bulk).lower()}}}"
+    given = tree.override(problem.given, [*SETS, visco, "press.duration_s=1.0", "press.steps=4", "material.nu=0.45"])
+    found = search(replace(problem, given=given, budget=1), tmp_path)
+    assert found.bodies == 1
+    model = found.scene.model()
+    strain = []
+    for mu in MUS:
+        own = build(replace(model, friction=replace(model.friction, mu=mu)))
+        strain.append(list(march(own))[-1].gauges["g36"])
+    assert found.best.value == pytest.approx(sensitivity(replace(table_of(strain), noise=problem.noise)), rel=1e-9)
+
+
+def test_a_search_goes_on_with_what_is_kept_and_is_the_same_every_time(problem, tmp_path):
+    whole = search(replace(problem, budget=10), tmp_path / "whole")
+    first = search(replace(problem, budget=4), tmp_path / "parts")
+    kept = tmp_path / "parts" / "evaluations.csv"
+    torn = kept.read_text()
+    kept.write_text(torn + "12.5,3")
+    second = search(replace(problem, budget=10), tmp_path / "parts")
+    assert kept.read_text() == (tmp_path / "whole" / "evaluations.csv").read_text()
+    assert [e.values for e in second.evaluations] == [e.values for e in whole.evaluations]
+    assert second.evaluations[: len(first.evaluations)] == first.evaluations
+    with pytest.raises(Finger3dError, match="holds another search"):
+        search(replace(problem, noise=1.0), tmp_path / "parts")
+
+
+def test_keys_of_the_body_search_the_gauges_anew_in_every_body(problem, tmp_path):
+    free = (Free("finger.edge_height_mm", 30.0, 40.0), ANGLE)
+    found = search(replace(problem, free=free, budget=2), tmp_path)
+    assert 2 <= found.bodies <= 3
+    assert len(found.evaluations) > 50
+
+
+def test_a_design_that_cannot_be_built_is_a_line_with_its_reason(problem, tmp_path):
+    found = search(replace(problem, free=(Free("gauge.0.y_mm", 40.0, 60.0),), budget=8), tmp_path)
+    with (tmp_path / "evaluations.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert any("outside the finger" in row["outcome"] for row in rows)
+    assert found.best.outcome == "converged"
+    assert json.loads((tmp_path / "design.json").read_text())["best"] == found.best.value
+    page, failed = words(tmp_path / "report.html"), sum(row["outcome"] != "converged" for row in rows)
+    assert f"objective (sensitivity) {found.best.value:.5g}" in page
+    assert f"gauge.0.y_mm 40 60 {found.start.values[0]:.5g} {found.best.values[0]:.5g}" in page
+    assert f"{failed} of {len(rows)} designs have no number" in page
+    assert [panel.name for panel in panels_of(tmp_path / "design.png")[1]] == [
+        "The best design so far", "Every design against gauge.0.y_mm"
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("method", ["dual-annealing", "nelder-mead"])
+def test_other_optimisers_stay_within_bounds_and_budget(method, problem, tmp_path):
+    found = search(replace(problem, method=method), tmp_path)
+    assert len(found.evaluations) <= problem.budget + 1
+    assert all(ANGLE.low <= e.values[0] <= ANGLE.high for e in found.evaluations)
+
+
+def test_an_objective_from_a_file_on_the_command_line(root, tmp_path, capsys):
+    judge = tmp_path / "judge.py"
+    judge.write_text("def objective(table):\n    return -abs(table.scene.tables.gauge[0].angle_deg - 40.0)\n")
+    scene, out = root / "geometries" / "fig9.toml", tmp_path / "out"
+    arguments = ["design", str(scene), *COARSE, "--free", "gauge.g36.angle_deg=0:90", "--out", str(out)]
+    assert main([*arguments, "--objective", str(judge), "--budget", "40", "--mu", "0.1,0.5"]) == 0
+    told = capsys.readouterr().out
+    assert "best.toml" in told
+    judged = (out / "evaluations.csv").read_text().splitlines()[1:]
+    assert f" {len(judged)} designs, " in told
+    assert load(out / "best.toml").tables.gauge[0].angle_deg == pytest.approx(40.0, abs=2.0)
+    judge.write_text("def objective(table):\n    return table.strains\n")
+    assert main([*arguments[:-1], str(tmp_path / "other"), "--objective", str(judge)]) == 2
+    err = capsys.readouterr().err
+    assert len(err.splitlines()) == 1
+    assert "AttributeError" in err
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        (["--free", "finger.radius_mm"], "must be KEY=LOW:HIGH"),
+        (["--free", "finger.radius_mm=200:60"], "with LOW below HIGH"),
+        (["--free", "finger.radius_mm=60:inf"], "must be KEY=LOW:HIGH"),
+        (["--free", "finger.radus_mm=60:200"], 'did you mean "radius_mm"?'),
+        (["--free", "gauge.g9.x_mm=1:2"], 'no gauge "g9"'),
+        (["--free", "gauge.g36.x_mm=1:2", "--free", "gauge.0.x_mm=1:3"], "given twice"),
+        (["--free", "gauge.g36.x_mm=1:2", "--gauge", "g9"], "no such gauge"),
+        (["--free", "gauge.g36.x_mm=1:2", "--objective", "best"], "must be sensitivity, or a Python file"),
+        (["--free", "gauge.g36.x_mm=1:2", "--method", "luck"], "--method luck: must be one of"),
+        (["--free", "gauge.g36.x_mm=1:2", "--budget", "0"], "must be at least 1"),
+        (["--free", "gauge.g36.x_mm=1:2", "--mu", "0.5,0.1"], "ascending"),
+        (["--free", "gauge.g36.x_mm=1:2", "--noise", "0"], "must be above 0"),
+    ],
+)
+def test_bad_input_is_one_line(options, expected, root, tmp_path, capsys):
+    scene = root / "geometries" / "fig9.toml"
+    assert main(["design", str(scene), *COARSE, *options, "--out", str(tmp_path / "out")]) == 2
+    err = capsys.readouterr().err
+    assert len(err.splitlines()) == 1
+    assert expected in err

@@ -1,0 +1,307 @@
+"""Scenes that share a body: which do, and that sharing changes no number."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from finger3d.analyses.shared_body import Body, Variant, body_key, families, finest, shared_legs
+from finger3d.contact.friction import Coulomb
+from finger3d.fem.recover import displacement
+from finger3d.fem.traces import restrict, surface
+from finger3d.mechanics.history import measure
+from finger3d.mechanics.model import Leg
+from finger3d.mechanics.solve import build, covered, covers, march, whole
+from finger3d.scene import Scene, parse, tree
+
+BLOCK = {
+    "finger": {"geometry": "block", "half_length_mm": 4.0, "height_mm": 3.0, "width_mm": 4.0},
+    "material": {"E_MPa": 1.0, "nu": 0.3},
+    "object": {"shape": "cylinder", "radius_mm": 4.0},
+    "friction": {"mu": 0.25},
+    "press": {"depth_mm": 0.3, "steps": 3},
+    "model": {"domain": "plane-strain"},
+    "mesh": {"size_mm": 0.4, "base_size_mm": 0.8},
+    "gauge": [{"name": "g", "x_mm": 1.0, "y_mm": 2.0, "angle_deg": 30.0}],
+}
+
+
+def scene(*changes: str) -> Scene:
+    return parse(tree.override(tree.frozen(BLOCK), changes))
+
+
+SHARING = [
+    ["friction.mu=1.0"],
+    ["effects.kinetic_friction.ratio=0.5"],
+    ["press.steps=5"],
+    ["gauge.0.angle_deg=80", "gauge.0.name=other"],
+    ["title=another"],
+]
+
+
+def test_a_body_pressed_as_its_variants_is_each_pressed_on_its_own():
+    scenes = [scene(), *(scene(*c) for c in SHARING)]
+    assert list(families(scenes).values()) == [list(range(len(scenes)))]
+    models = [s.model() for s in scenes]
+    body = Body(replace(models[0], mesh=finest(models)), [Variant.of(m) for m in models])
+    for model in models:
+        own = build(model)
+        alone = measure(own.points, list(march(own))[-1])
+        shared = body.press(Variant.of(model))
+        assert shared.outcome == "converged"
+        # both are exact solutions of one contact problem; one has the mirrored half meshed, too, and round-off differs
+        for key in ("normal_force_N", "friction_sum_N", "stick_area_mm2", "dissipation_mJ"):
+            assert shared.numbers[key] == pytest.approx(alone[key], rel=1e-9)
+        assert shared.gauges == pytest.approx(alone["gauges"], rel=1e-9)
+
+
+def test_a_slide_among_the_variants_costs_the_mirror_plane_only():
+    """A plane touches the same places however it slides, so the mesh is the same."""
+    level = ["object={shape='plane'}", "finger={geometry='half_cylinder', radius_mm=3.0, width_mm=1.0}"]
+    level += ["gauge.0.x_mm=0.5"]
+    models = [scene(*level).model(), scene(*level, "press.slide_x_mm=0.1").model()]
+    body = Body(models[0], [Variant.of(m) for m in models])
+    assert body.problem.axes == ()
+    for model in models:
+        own = build(model)
+        alone = measure(own.points, list(march(own))[-1])
+        assert body.press(Variant.of(model)).numbers["friction_sum_N"] == pytest.approx(
+            alone["friction_sum_N"], rel=1e-9
+        )
+
+
+def test_a_shallower_press_on_the_mesh_of_the_deepest():
+    models = [scene().model(), scene("press.depth_mm=0.15").model()]
+    body = Body(models[0], [Variant.of(m) for m in models])
+    shared = body.press(Variant.of(models[1]))
+    # other candidate points on the same mesh: open points change nothing but round-off
+    every = replace(build(models[0], margin=math.inf), model=models[1])
+    assert len(every.surface.nodes) > len(body.problem.surface.nodes)
+    same = measure(every.points, list(march(every))[-1])
+    assert shared.numbers["normal_force_N"] == pytest.approx(same["normal_force_N"], rel=1e-9)
+    # a mesh of its own is graded for its own contact: it agrees as meshes do, not to round-off
+    own = build(models[1])
+    alone = measure(own.points, list(march(own))[-1])
+    assert shared.numbers["normal_force_N"] == pytest.approx(alone["normal_force_N"], rel=0.02)
+
+
+def test_candidates_are_widened_when_contact_reaches_beyond_them(monkeypatch):
+    model = scene("friction.mu=0.0").model()
+    wide = Body(model, [Variant.of(model)]).press(Variant.of(model))
+    said = []
+    first = [lambda m, say, margin=-0.8: build(m, say, margin)]
+    monkeypatch.setattr("finger3d.mechanics.solve.build", lambda m, say, *margin: first[0](m, say, *margin))
+    narrow = Body(model, [Variant.of(model)], said.append)
+    again = narrow.press(Variant.of(model))
+    assert any("beyond" in text for text in said)
+    assert again.numbers["normal_force_N"] == pytest.approx(wide.numbers["normal_force_N"], rel=1e-9)
+
+
+def test_gauges_alone_cost_no_press():
+    models = [scene().model(), scene("gauge.0.x_mm=0.5").model()]
+    body = Body(models[0], [Variant.of(m) for m in models])
+    first, second = (body.press(Variant.of(m)) for m in models)
+    assert first.seconds > 0.0
+    assert second.seconds == 0.0
+    assert first.gauges != second.gauges
+    assert first.numbers == second.numbers
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "material.nu=0.31", "material.E_MPa=2.0", "finger.height_mm=3.1", "object.radius_mm=5.0", "mesh.size_mm=0.3",
+        "model.domain=plane-stress", "effects.large_deformation={}",
+    ],
+)  # fmt: skip
+def test_what_shapes_the_condensation_makes_another_body(change):
+    assert body_key(scene(change)) != body_key(scene())
+
+
+def test_a_gauge_that_is_stiff_shapes_the_body():
+    foil = ["effects.embedded_gauge={E_MPa=3000.0, thickness_mm=0.02, width_mm=1.0}", "gauge.0.length_mm=1.0"]
+    assert body_key(scene(*foil)) != body_key(scene(*foil, "gauge.0.x_mm=0.5"))
+    models = [scene(*foil).model(), scene(*foil, "friction.mu=1.0").model()]
+    body = Body(models[0], [Variant.of(m) for m in models])
+    own = build(models[1])
+    alone = measure(own.points, list(march(own))[-1])
+    assert body.press(Variant.of(models[1])).gauges == pytest.approx(alone["gauges"], rel=1e-9)
+
+
+def test_chosen_sizes_follow_the_depth_and_are_shared():
+    free = {k: v for k, v in BLOCK.items() if k != "mesh"}
+    scenes = [parse(tree.override(tree.frozen(free), [f"press.depth_mm={d}"])) for d in (0.004, 0.3)]
+    assert scenes[0].mesh.size_mm < scenes[1].mesh.size_mm
+    assert len(families(scenes)) == 1
+    assert finest([s.model() for s in scenes]).size_mm == scenes[0].mesh.size_mm
+
+
+def test_a_step_that_fails_is_named():
+    """The paper's rule, which does not exclude friction that helps slip."""
+    model = scene("contact.rule=paper", "material.nu=0.45", "mesh.size_mm=0.1", "press.depth_mm=0.6").model()
+    pressed = Body(model, [Variant.of(model)]).press(Variant.of(model))
+    assert pressed.outcome.startswith("step ")
+    assert pressed.numbers == {}
+    assert pressed.gauges == {}
+
+
+def variant(*legs: Leg) -> Variant:
+    return replace(Variant.of(scene().model()), legs=legs)
+
+
+def test_the_shared_path_goes_everywhere_and_nowhere_else():
+    a, b = (Leg(1.0), Leg(1.0, 2.0)), (Leg(2.0),)
+    assert shared_legs([variant(*a)]) == a
+    assert shared_legs([variant(*b), variant(Leg(1.0))]) == b
+    assert shared_legs([variant(*a), variant(*b)]) == (*a, Leg(1.0), Leg(0.0), *b)
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        [],
+        ["effects.embedded_gauge={E_MPa=3000.0, thickness_mm=0.02, width_mm=1.0}", "gauge.0.length_mm=1.0"],
+        ["effects.elastic_object={E_MPa=10.0, nu=0.3}"],
+        ["effects.viscosity={prony=[[0.3, 0.5]]}", "press.duration_s=1.0"],
+        ["effects.viscosity={prony=[[0.3, 0.5]], bulk=false}", "press.duration_s=1.0"],
+        ["effects.large_deformation={}"],
+    ],
+    ids=["paper", "embedded gauge", "elastic object", "viscosity", "shear relaxes", "large deformation"],
+)
+@pytest.mark.parametrize("at_once", [8_000_000, 1], ids=["together", "in chunks"])
+def test_several_presses_are_proved_as_each_on_its_own(effect, at_once, monkeypatch):
+    """The gaps beyond the candidates are those of a back-substitution for each press, over the whole face."""
+    monkeypatch.setattr("finger3d.mechanics.problem._AT_ONCE", at_once)
+    model = scene(*effect).model()
+    problem = build(model)
+    assert not whole(problem)
+    ends = [
+        list(
+            march(
+                replace(
+                    problem, model=replace(model, friction=Coulomb(mu), legs=(Leg(depth, steps=2, duration_s=1.0),))
+                )
+            )
+        )[-1]
+        for mu, depth in ((0.1, 0.3), (0.5, 0.2), (1.0, 0.1))
+    ]
+    face = surface(problem.mesh, "contact", problem.thickness)
+    others = ~np.isin(face.nodes, problem.surface.nodes)
+    kinematics = model.kinematics
+    together = kinematics.gaps(problem, [f.part for f in ends], [f.target for f in ends], restrict(face, others))
+    for frame, found in zip(ends, together, strict=True):
+        (alone,) = kinematics.gaps(problem, [frame.part], [frame.target], face)
+        assert np.abs(found - alone[others]).max() <= 1e-12 * frame.target.depth_mm
+        if not kinematics.finite_strain:
+            u = displacement(problem.mesh, kinematics.unknowns(problem, frame.part))
+            moved = problem.gap(frame.target, face) + (face.trace @ u) @ problem.points.frame[0]
+            assert np.abs(found - moved[others]).max() <= 1e-12 * frame.target.depth_mm
+    assert covered(problem, ends) == [covers(problem, frame) for frame in ends] == [True] * 3
+
+
+def test_one_solver_proves_as_the_other(monkeypatch):
+    problem = build(scene().model())
+    ends = [list(march(problem))[-1]] * 3
+    monkeypatch.setenv("FINGER3D_SOLVER", "superlu")
+    other = build(scene().model())
+    assert other.condensed.solver == "superlu"
+    forces = [f.part.force for f in ends]
+    for a, b in zip(problem.unknowns_of(forces), other.unknowns_of(forces), strict=True):
+        assert np.abs(a - b).max() <= 1e-12 * np.abs(b).max()
+
+
+def test_a_face_that_is_touched_nearly_everywhere_is_all_candidates():
+    """Then nothing is beyond them, and no press pays a proof."""
+    level = ["object={shape='plane'}", "finger={geometry='block', half_length_mm=4.0, height_mm=3.0, width_mm=4.0}"]
+    assert whole(build(scene(*level).model()))
+    assert not whole(build(scene().model()))
+
+
+NARROW = -0.8
+"""Margin of a body at first: its candidates reach to a fifth of the depth, where a shallow press ends."""
+
+
+def narrowed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("finger3d.mechanics.solve.build", lambda m, say, margin=NARROW: build(m, say, margin))
+
+
+@pytest.mark.parametrize("threads", [False, True], ids=["in turn", "at once"])
+def test_presses_together_are_the_presses_alone(threads, monkeypatch):
+    """Two reach beyond the candidates, one does not, two differ in their gauges only; in the order asked."""
+    monkeypatch.setattr("finger3d.mechanics.solve._WORTH", 1 if threads else 10**6)
+    monkeypatch.setattr("finger3d.mechanics.solve.cores", lambda: 2)
+    shallow = "press.depth_mm=0.03"
+    changes = [[shallow], ["friction.mu=0.1"], ["friction.mu=1.0"], ["friction.mu=0.1", "gauge.0.x_mm=0.5"]]
+    models = [scene(*change).model() for change in changes]
+    variants = [Variant.of(m) for m in models]
+    wide = Body(models[1], variants)
+    alone = [wide.press(v) for v in variants]
+    narrowed(monkeypatch)
+    said: list[str] = []
+    body = Body(models[1], variants, said.append)
+    together = list(body.presses(variants))
+    assert sum("beyond" in text for text in said) == 1
+    for one, other in zip(alone, together, strict=True):
+        assert other.numbers == pytest.approx(one.numbers, rel=1e-9)
+        assert other.gauges == pytest.approx(one.gauges, rel=1e-9)
+    assert together[1].gauges != together[3].gauges
+    assert [p.seconds > 0.0 for p in together] == [True, True, True, False]
+    # frames speak of the body as it is in the end
+    again = Body(models[1], variants)
+    assert {f[-1].part.force.shape for f in again.frames(variants)} == {(len(again.problem.surface.nodes), 2)}
+
+
+@pytest.mark.parametrize("threads", [False, True], ids=["in turn", "at once"])
+def test_a_press_that_fails_takes_no_other_along(threads, monkeypatch):
+    monkeypatch.setattr("finger3d.mechanics.solve._WORTH", 1 if threads else 10**6)
+    monkeypatch.setattr("finger3d.mechanics.solve.cores", lambda: 2)
+    models = [scene(f"friction.mu={mu}").model() for mu in (0.1, 0.5, 1.0)]
+    body = Body(models[0], [Variant.of(m) for m in models])
+
+    def failing(problem):
+        if problem.model.friction.static == 0.5:
+            raise MemoryError("none left")
+        return march(problem)
+
+    monkeypatch.setattr("finger3d.mechanics.step_halving.march", failing)
+    first, second, third = body.presses([Variant.of(m) for m in models])
+    assert isinstance(second, MemoryError)
+    assert first.outcome == third.outcome == "converged"
+    with pytest.raises(MemoryError, match="none left"):
+        body.press(Variant.of(models[1]))
+
+
+def test_presses_that_cannot_be_proved_fail_and_what_failed_before_keeps_its_reason(monkeypatch):
+    models = [scene(f"friction.mu={mu}").model() for mu in (0.1, 0.5)]
+    variants = [Variant.of(m) for m in models]
+    body = Body(models[0], variants)
+
+    def failing(problem):
+        if problem.model.friction.static == 0.5:
+            raise ArithmeticError("its own")
+        return march(problem)
+
+    def unproved(problem, frames):
+        raise MemoryError("no proof")
+
+    monkeypatch.setattr("finger3d.mechanics.step_halving.march", failing)
+    monkeypatch.setattr("finger3d.mechanics.solve.covered", unproved)
+    assert [str(p) for p in body.presses(variants)] == ["no proof", "its own"]
+
+
+def test_a_body_that_cannot_be_widened_fails_those_that_need_it_only(monkeypatch):
+    models = [scene(change).model() for change in ("friction.mu=0.1", "press.depth_mm=0.03", "friction.mu=1.0")]
+    variants = [Variant.of(m) for m in models]
+
+    def once(model, say, margin=NARROW):
+        if margin == math.inf:
+            raise MemoryError
+        return build(model, say, margin)
+
+    monkeypatch.setattr("finger3d.mechanics.solve.build", once)
+    found = list(Body(models[0], variants).presses(variants))
+    assert [isinstance(p, MemoryError) for p in found] == [True, False, True]
+    assert found[1].outcome == "converged"

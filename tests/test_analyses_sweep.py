@@ -1,0 +1,431 @@
+"""Sweeps: points and refusals, what is kept through kills and a full disk, a cluster of separate processes."""
+
+from __future__ import annotations
+
+import csv
+import errno
+import json
+import math
+import os
+import socket
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from finger3d.analyses.shared_body import _FREE
+from finger3d.analyses.sweep import run as running
+from finger3d.analyses.sweep.points import Sweep, Vary, combinations
+from finger3d.analyses.sweep.store import Kept
+from finger3d.analyses.sweep.table import write_parquet
+from finger3d.analyses.sweep.worker import press_all
+from finger3d.cli import main
+from finger3d.cli.sweep import _SHARED
+from finger3d.errors import Finger3dError, MissingError
+from finger3d.plotting.layout import panels_of
+from finger3d.scene import load
+
+COARSE = ["--set", "model.domain=plane-strain", "--set", "mesh.size_mm=4", "--set", "mesh.base_size_mm=16"]
+SETS = COARSE[1::2]
+
+
+@pytest.fixture
+def scene(root: Path) -> Path:
+    return root / "geometries" / "fig9.toml"
+
+
+def points_of(scene: Path, *vary: str) -> Sweep:
+    return combinations(scene, SETS, vary)
+
+
+def pressed_here(sweep: Sweep) -> list[dict]:
+    """Rows of all points, without Dask."""
+    rows: list[dict] = []
+    for key, body in sweep.bodies.items():
+        press_all((key, body, [(p.number, p.variant) for p in sweep.points if p.body == key]), rows.append)
+    return rows
+
+
+def lines(out: Path) -> list[dict]:
+    path = out / "points.jsonl"
+    return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+
+
+def table(out: Path) -> list[dict]:
+    with (out / "results.csv").open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_every_combination_is_a_point_and_only_the_material_makes_bodies(scene):
+    sweep = points_of(scene, "friction.mu=0.06,0.25", "material.nu=0.45,0.49", "gauge.g36.angle_deg=10,20")
+    assert [p.number for p in sweep.points] == list(range(8))
+    assert sweep.points[1].values == {"friction.mu": 0.06, "material.nu": 0.45, "gauge.g36.angle_deg": 20}
+    assert len(sweep.bodies) == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("friction.mu=0.06, 0.25,1", (0.06, 0.25, 1)),
+        ("model.domain=solid,plane-strain", ("solid", "plane-strain")),
+        ("effects.viscosity.prony=[[0.3,0.5]],[[0.1,1.0],[0.2,2.0]]", ([[0.3, 0.5]], [[0.1, 1.0], [0.2, 2.0]])),
+        ('title="a,b",c', ("a,b", "c")),
+    ],
+)
+def test_values_are_told_apart_by_commas_outside_brackets_and_quotes(text, values):
+    assert Vary.of(text).values == values
+
+
+@pytest.mark.parametrize(
+    ("vary", "expected"),
+    [
+        (["friction.mu"], "must be KEY=VALUE"),
+        (["friction.mu="], "a value is empty"),
+        (["friction.mu=0.1,,2"], "a value is empty"),
+        (["friction.mu=0.1,0.1"], 'the value "0.1" is given twice'),
+        (["friction.mu=0.1", "friction.mu=2"], "--vary friction.mu: given twice"),
+        (["gauge.g36.x_mm=1", "gauge.0.x_mm=2"], "given twice"),
+        (["material.n=0.1"], "with --vary material.n: material.n = 0.1: no such key"),
+        (["finger.radus_mm=90"], 'did you mean "radius_mm"?'),
+        (["frictoin.mu=0.1"], 'did you mean "friction"?'),
+        (["friction.mu=0.1,-2"], "friction.mu = -2: must be a number from 0 to 1e6"),
+        (["material.nu=0.3,0.6"], "material.nu = 0.6: must be a number from 0 to 0.5"),
+        (["material.nu=0.3", "friction.mu=nan"], "friction.mu = nan: must be"),
+        (["gauge.g37.x_mm=1"], 'no gauge "g37"; did you mean "g36"?'),
+        (["gauge.7.x_mm=1"], '--vary gauge.7.x_mm: no item "7"'),
+        (["mesh={tolerance=0.05}"], "give a sweep mesh.size_mm"),
+        (["gauge.g36.x_mm=1,70"], "is outside the finger"),
+        ([f"friction.mu={','.join(map(str, range(400)))}", f"material.nu={','.join(map(str, range(400)))}"], "160000"),
+    ],
+)
+def test_bad_values_are_refused_before_the_first_run(vary, expected, scene, tmp_path, capsys):
+    options = [option for text in vary for option in ("--vary", text)]
+    assert main(["sweep", str(scene), *COARSE, *options, "--out", str(tmp_path / "out")]) == 2
+    err = capsys.readouterr().err
+    assert len(err.splitlines()) == 1
+    assert expected in err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "expected"),
+    [
+        (["--workers", "0"], 2, "must be at least 1"),
+        (["--workers", "2", "--scheduler", "tcp://127.0.0.1:1"], 2, "give one of them"),
+        (["--scheduler", "here"], 2, "must be HOST:PORT"),
+        (["--scheduler", "tcp://127.0.0.1:1"], 3, "no Dask scheduler answered within"),
+    ],
+)
+def test_a_cluster_that_cannot_be_used_is_told_in_one_line(
+    options, code, expected, scene, tmp_path, capsys, monkeypatch
+):
+    monkeypatch.setattr("finger3d.analyses.sweep.cluster.CONNECT_S", 1.0)
+    arguments = ["sweep", str(scene), *COARSE, "--vary", "friction.mu=0.1", "--out", str(tmp_path / "out"), *options]
+    assert main(arguments) == code
+    err = capsys.readouterr().err
+    assert len(err.splitlines()) == 1
+    assert expected in err
+
+
+def test_a_scheduler_that_does_not_answer_is_left_after_the_time_limit(scene, tmp_path, monkeypatch):
+    monkeypatch.setattr("finger3d.analyses.sweep.cluster.CONNECT_S", 1.0)
+    with socket.socket() as deaf:
+        deaf.bind(("127.0.0.1", 0))
+        deaf.listen()
+        address = f"tcp://127.0.0.1:{deaf.getsockname()[1]}"
+        start = time.monotonic()
+        with pytest.raises(MissingError, match="no Dask scheduler answered"):
+            running.sweep(points_of(scene, "friction.mu=0.1"), tmp_path, scheduler=address)
+        assert time.monotonic() - start < 10.0
+
+
+def test_rows_become_a_table_in_the_scenes_own_names(scene, tmp_path):
+    sweep = points_of(scene, "friction.mu=0.06,1", "contact.rule=projection,paper")
+    rows = pressed_here(sweep)
+    with Kept(sweep, tmp_path).open() as kept:
+        for row in rows[:3]:
+            assert kept.add(row)
+        assert not kept.add(rows[0])
+        kept.lose(3, "its worker died")
+        kept.write()
+        assert kept.left() == [3]
+    found = pq.read_table(tmp_path / "results.parquet").to_pylist()
+    assert [row["point"] for row in found] == [0, 1, 2, 3]
+    assert found[2]["friction.mu"] == 1.0
+    assert found[1]["contact.rule"] == "paper"
+    assert found[0]["normal_force_N"] == rows[0]["normal_force_N"] > 0.0
+    assert {"gauge_g36", "outcome", "residual", "seconds"} <= set(found[0])
+    assert found[3]["outcome"] == "its worker died"
+    assert found[3]["normal_force_N"] != found[3]["normal_force_N"]
+    # the CSV keeps every digit
+    assert float(table(tmp_path)[0]["normal_force_N"]) == rows[0]["normal_force_N"]
+
+
+def test_a_torn_line_is_dropped_and_its_point_done_again(scene, tmp_path):
+    sweep = points_of(scene, "friction.mu=0.06,1")
+    rows = pressed_here(sweep)
+    with Kept(sweep, tmp_path).open() as kept:
+        kept.add(rows[0])
+    journal = tmp_path / "points.jsonl"
+    whole = journal.read_text()
+    journal.write_text(whole + json.dumps(rows[1])[:50])
+    with Kept(sweep, tmp_path).open() as kept:
+        assert kept.left() == [1]
+        kept.add(rows[1])
+    assert lines(tmp_path) == rows
+
+
+def edited(row: dict, **changes: object) -> str:
+    return json.dumps({k: v for k, v in {**row, **changes}.items() if v != "missing"})
+
+
+EDITS = [
+    {"point": p} for p in (None, "0", 0.5, True, -1, 7, [], {}, "missing", 10**400)
+] + [{"body": b} for b in (None, 5, "another", "missing")] + [{"outcome": o} for o in (None, 5, [], "missing")] + [
+    {"normal_force_N": v} for v in (None, "5", "", [], {}, True, 10**400, float("nan"), "missing")
+] + [{"gauge_g36": "5"}, {"a b": []}]  # fmt: skip
+
+
+def test_a_journal_edited_by_hand_is_one_line(scene, tmp_path, capsys):
+    sweep = points_of(scene, "friction.mu=0.06,1")
+    rows = pressed_here(sweep)
+    with Kept(sweep, tmp_path).open() as kept:
+        for row in rows:
+            kept.add(row)
+    journal, before = tmp_path / "points.jsonl", (tmp_path / "points.jsonl").read_text()
+    command = ["sweep", str(scene), *COARSE, "--vary", "friction.mu=0.06,1", "--out", str(tmp_path)]
+    for line in ["[]", "5", "null", '"a"', "[" * 100_000, *(edited(rows[1], **change) for change in EDITS)]:
+        journal.write_text(before.splitlines()[0] + "\n" + line + "\n")
+        assert main(command) == 2, line
+        err = capsys.readouterr().err
+        assert len(err.splitlines()) == 1
+        assert f"{journal}: line 2: " in err
+        assert "remove the line" in err
+        assert journal.read_text().splitlines()[1] == line  # nothing is lost
+    journal.unlink()
+    journal.mkdir()
+    assert main(command) == 2
+    assert str(journal) in capsys.readouterr().err
+
+
+def test_a_damaged_sweep_json_is_one_line(scene, tmp_path, capsys):
+    with Kept(points_of(scene, "friction.mu=0.06,1"), tmp_path).open():
+        pass
+    path = tmp_path / "sweep.json"
+    whole = json.loads(path.read_text())
+    vary = [None, 5, [], "a", {"friction.mu": 5}, {"friction.mu": [5]}, {"friction.mu": None}]
+    texts = ["", "{", "null", "5", "[]", '"a"', "{}", "[" * 100_000, *(json.dumps({**whole, "vary": v}) for v in vary)]
+    for data in [*(text.encode() for text in texts), b'{"vary": "\xe9"}']:
+        path.write_bytes(data)
+        for command in (
+            ["sweep", str(scene), *COARSE, "--vary", "friction.mu=0.06,1", "--out", str(tmp_path)],
+            ["show", str(tmp_path), "--png", str(tmp_path / "a.png")],
+        ):
+            assert main(command) == 2, data
+            err = capsys.readouterr().err
+            assert len(err.splitlines()) == 1, err
+            assert str(tmp_path) in err
+        assert path.read_bytes() == data
+
+
+@pytest.mark.parametrize("data", [b"point\n\xe9", b'point\n"' + b"a" * 200_000])
+def test_a_damaged_table_is_one_line(data, tmp_path, capsys):
+    (tmp_path / "sweep.json").write_text('{"vary": {"friction.mu": ["0.1", "0.2"]}}')
+    (tmp_path / "results.csv").write_bytes(data)
+    assert main(["show", str(tmp_path), "--png", str(tmp_path / "a.png")]) == 2
+    err = capsys.readouterr().err
+    assert len(err.splitlines()) == 1
+    assert str(tmp_path / "results.csv") in err
+
+
+def test_a_folder_of_another_sweep_is_refused(scene, tmp_path, capsys):
+    with Kept(points_of(scene, "friction.mu=0.06,1"), tmp_path).open():
+        pass
+    arguments = ["sweep", str(scene), *COARSE, "--vary", "friction.mu=0.06,2", "--out", str(tmp_path)]
+    assert main(arguments) == 2
+    err = capsys.readouterr().err
+    assert len(err.splitlines()) == 1
+    assert "holds another sweep (its friction.mu is 0.06,1)" in err
+
+
+@pytest.mark.parametrize(
+    ("vary", "expected"),
+    [
+        (["friction.mu=0.06,1", "material.nu=0.4"], "does not vary material.nu"),
+        (["material.nu=0.4"], "its friction.mu is 0.06,1"),
+    ],
+)
+def test_what_makes_it_another_sweep_is_named(vary, expected, scene, tmp_path):
+    with Kept(points_of(scene, "friction.mu=0.06,1"), tmp_path).open():
+        pass
+    with pytest.raises(Finger3dError, match=expected), Kept(points_of(scene, *vary), tmp_path).open():
+        pass
+    other = combinations(scene, [*SETS, "press.steps=3"], ["friction.mu=0.06,1"])
+    with pytest.raises(Finger3dError, match="of another scene"), Kept(other, tmp_path).open():
+        pass
+
+
+def test_one_body_is_swept_without_workers_and_its_points_are_shown(scene, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("finger3d.analyses.sweep.cluster.local", lambda *a: pytest.fail("workers were started"))
+    vary = ["--vary", "friction.mu=0.1,0.2,0.3,0.4,0.5,0.6", "--vary", "gauge.g36.angle_deg=15,30"]
+    assert main(["sweep", str(scene), *COARSE, *vary, "--out", str(tmp_path)]) == 0
+    told = capsys.readouterr().out
+    found = table(tmp_path)
+    assert len(found) == 12
+    for row in found[:10]:
+        names = ("friction.mu", "gauge.g36.angle_deg", "normal_force_N", "friction_sum_N")
+        mine = [f"{float(row[name]):.5g}" for name in names]
+        (line,) = (line.split() for line in told.splitlines() if line.split()[:4] == mine)
+        assert line[-2:] == [f"{float(row['gauge_g36']):.5g}", "converged"]
+    assert "the first 10 of 12 points" in told
+    assert str(tmp_path / "report.html") in told
+    assert main(["show", str(tmp_path), "--png", str(tmp_path / "a.png")]) == 0
+    assert main(["show", str(tmp_path)]) == 2
+    assert f"open {tmp_path / 'report.html'}, or give --png alone" in capsys.readouterr().err
+    assert [panel.name for panel in panels_of(tmp_path / "a.png")[1]] == [
+        f"{what} against {key}" for what in ("Normal force", "Strain, g36")
+        for key in ("friction.mu", "gauge.g36.angle_deg")
+    ]  # fmt: skip
+    capsys.readouterr()
+    assert main(["sweep", str(scene), *COARSE, *vary, "--out", str(tmp_path), "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert (data["points"], data["kept"], data["failed"], data["bodies"]) == (12, 12, 0, 1)
+    assert [row["gauge_g36"] for row in data["rows"]] == [float(row["gauge_g36"]) for row in found]
+
+
+def test_a_folder_in_use_is_refused(scene, tmp_path):
+    sweep = points_of(scene, "friction.mu=0.06")
+    with Kept(sweep, tmp_path).open(), pytest.raises(Finger3dError, match="another finger3d is writing there"):
+        with Kept(sweep, tmp_path).open():
+            pass
+
+
+def test_columns_without_pandas_are_what_pyarrow_makes_of_them(tmp_path):
+    columns = {
+        "point": list(range(11)),
+        "nu": [0.3, math.nan, -0.0, math.inf, 1e-300, *[0.1] * 6],
+        "kept": [True, False, False, True, True, True, False, True, False, True, True],
+        "outcome": ["converged", "", "step 3 (depth 1.5 mm): \u03bc \U0001f91a", "a\nb", *["converged"] * 7],
+    }
+    write_parquet(tmp_path / "mine.parquet", columns)
+    pq.write_table(pa.table(columns), tmp_path / "its.parquet")
+    mine, its = (pq.read_table(tmp_path / name) for name in ("mine.parquet", "its.parquet"))
+    mine.validate(full=True)
+    assert mine.schema == its.schema
+    # as texts, as nan is not equal to itself
+    assert repr(mine.to_pydict()) == repr(its.to_pydict())
+
+
+def test_a_sweep_leaves_pandas_to_others(tmp_path):
+    code = "from pathlib import Path; from finger3d.analyses.sweep.table import write_parquet; import sys; "
+    code += "write_parquet(Path(sys.argv[1]), {'a': [1.0], 'b': ['x'], 'c': [True], 'd': [1]}); "
+    code += "sys.exit('pandas' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code, str(tmp_path / "a.parquet")], timeout=60).returncode == 0
+
+
+def test_a_sweep_of_one_body_waits_for_no_plotting_library(scene, tmp_path):
+    code = "import sys; from finger3d.cli import main; main(sys.argv[1:]); "
+    code += "sys.exit(repr({'matplotlib', 'PIL', 'plotly', 'pandas', 'distributed'} & set(sys.modules)))"
+    words = ["sweep", str(scene), *COARSE, "--vary", "friction.mu=0.1,0.2", "--out", str(tmp_path)]
+    done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, timeout=120)
+    assert done.stderr.splitlines()[-1] == "set()"
+    assert 'class="chart"' in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_what_workers_are_copied_from_has_one_thread_and_what_they_need():
+    # a copy has no thread but the one that copies: locks that others held would be held for ever
+    code = "import os, sys, finger3d.analyses.sweep.preload; "
+    code += "print(len(os.listdir('/proc/self/task')), *(m in sys.modules for m in sys.argv[1:]), flush=True)"
+    env = {**os.environ, "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    command = [sys.executable, "-c", code, "distributed.worker", "finger3d.mechanics.solve", "pypardiso", "pandas"]
+    done = subprocess.run(command, env=env, capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.split() == ["1", "True", "True", "True", "False"]
+
+
+@pytest.mark.parametrize("name", ["points.jsonl", "results.parquet"])
+def test_a_full_disk_is_one_line_that_says_what_is_kept(name, scene, tmp_path, monkeypatch):
+    sweep = points_of(scene, "friction.mu=0.06,1")
+    rows = pressed_here(sweep)
+    kept = Kept(sweep, tmp_path)
+    with kept.open():
+        kept.add(rows[0])
+        if name == "results.parquet":
+            real = os.replace
+
+            def full(source: object, target: object) -> None:
+                if str(target).endswith(".parquet"):
+                    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+                real(source, target)
+
+            monkeypatch.setattr(os, "replace", full)
+            act = kept.write
+        else:
+            real_stream = kept._stream
+
+            class Full:
+                def write(self, line: bytes) -> int:
+                    # what a disk does that is nearly full: it takes a part
+                    return real_stream.write(line[:20])
+
+                close = real_stream.close
+
+            kept._stream = Full()
+            act = lambda: kept.add(rows[1])  # noqa: E731
+        with pytest.raises(MissingError, match=r"No space left on device; 1 of 2 points are kept") as told:
+            act()
+    assert name in str(told.value)
+    with Kept(sweep, tmp_path).open() as again:
+        assert again.left() == [1]
+
+
+def test_a_body_that_cannot_be_built_and_a_point_that_fails_are_rows(scene, monkeypatch):
+    sweep = points_of(scene, "friction.mu=0.06,1")
+    monkeypatch.setattr(
+        "finger3d.analyses.sweep.worker._built", lambda *a: (_ for _ in ()).throw(Finger3dError("no mesh"))
+    )
+    assert [row["outcome"] for row in pressed_here(sweep)] == ["no mesh", "no mesh"]
+
+    class Weak:
+        seconds = 0.0
+
+        def presses(self, variants: list, most: int | None) -> list:
+            return [MemoryError() for _ in variants]
+
+    monkeypatch.setattr("finger3d.analyses.sweep.worker._built", lambda *a: Weak())
+    assert [row["outcome"] for row in pressed_here(sweep)] == ["MemoryError: no further words"] * 2
+
+
+@pytest.mark.parametrize("threads", [1, None], ids=["a worker", "here"])
+def test_workers_gain_no_threads(threads, scene, monkeypatch):
+    """Two workers on two cores are as many as there is room for; a body pressed by this process takes them all."""
+    pools = []
+
+    class Pool(ThreadPoolExecutor):
+        def __init__(self, most: int, **settings: object) -> None:
+            pools.append(most)
+            super().__init__(most, **settings)
+
+    monkeypatch.setattr("finger3d.mechanics.solve.ThreadPoolExecutor", Pool)
+    monkeypatch.setattr("finger3d.mechanics.solve._WORTH", 1)
+    monkeypatch.setattr("finger3d.mechanics.solve.cores", lambda: 2)
+    sweep = points_of(scene, "friction.mu=0.06,0.3,1")
+    (body, how), rows = next(iter(sweep.bodies.items())), []
+    press_all((body, how, [(p.number, p.variant) for p in sweep.points]), rows.append, threads=threads)
+    assert [row["point"] for row in rows] == [0, 1, 2]
+    assert {row["outcome"] for row in rows} == {"converged"}
+    assert pools == ([] if threads else [2])
+
+
+def test_the_command_knows_which_keys_share_a_body():
+    """It says so before it loads what sorts scenes by body; if they part, workers are prepared for nothing."""
+    assert {key.removesuffix(".") for key in _SHARED} == set(_FREE) - {"title"}
+
+
+def test_the_scene_of_these_tests_is_small(scene):
+    assert load(scene, SETS).mesh.size_mm == 4.0

@@ -1,0 +1,208 @@
+"""Sweeps in real processes: killed, interrupted, resumed, and on a scheduler and workers of their own."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+from finger3d.analyses.sweep.points import combinations
+
+COARSE = ["--set", "model.domain=plane-strain", "--set", "mesh.size_mm=4", "--set", "mesh.base_size_mm=16"]
+
+
+@pytest.fixture
+def scene(root: Path) -> Path:
+    return root / "geometries" / "fig9.toml"
+
+
+def lines(out: Path) -> list[dict]:
+    path = out / "points.jsonl"
+    return [json.loads(line) for line in path.read_text().splitlines() if line.endswith("}")] if path.exists() else []
+
+
+def table(out: Path) -> list[dict]:
+    with (out / "results.csv").open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def environment(root: Path, cache: str) -> dict[str, str]:
+    # PYTHONPATH stands for an installation; the folder they run in does not matter
+    return {**os.environ, "PYTHONPATH": str(root), "FINGER3D_CACHE": cache, "OMP_NUM_THREADS": "1"}
+
+
+@contextmanager
+def started(command: list[str], env: dict[str, str], where: Path, log: Path) -> Iterator[subprocess.Popen]:
+    with log.open("w") as file:
+        process = subprocess.Popen(command, env=env, cwd=where, stdout=file, stderr=file, start_new_session=True)
+        try:
+            yield process
+        finally:
+            if process.poll() is None:
+                process.kill()
+            process.wait()
+
+
+def until(true: Callable[[], bool], what: str, seconds: float = 120.0) -> None:
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end, f"{what}: not within {seconds} s"
+        time.sleep(0.02)
+
+
+def free_port() -> int:
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return one.getsockname()[1]
+
+
+def sweeping(scene: Path, out: Path, mus: int, nus: int, *more: str) -> list[str]:
+    mu = ",".join(f"{0.02 + 1.0 * i / mus:.4f}" for i in range(mus))
+    nu = ",".join(f"{0.3 + 0.19 * i / nus:.4f}" for i in range(nus))
+    command = [sys.executable, "-m", "finger3d", "sweep", str(scene), *COARSE, "--out", str(out)]
+    return [*command, "--vary", f"friction.mu={mu}", "--vary", f"material.nu={nu}", *more]
+
+
+def assert_nothing_repeated_or_lost(out: Path, total: int) -> None:
+    assert sorted(row["point"] for row in lines(out)) == list(range(total))
+    found = table(out)
+    assert [int(row["point"]) for row in found] == list(range(total))
+    assert {row["outcome"] for row in found} == {"converged"}
+    assert pq.read_table(out / "results.parquet").num_rows == total
+
+
+def children(pid: int) -> list[int]:
+    """Processes that a process, or one of its threads, has started, by Linux's process table."""
+    tasks = Path(f"/proc/{pid}/task").iterdir()
+    return list(dict.fromkeys(int(n) for task in tasks for n in (task / "children").read_text().split()))
+
+
+def workers_of(pid: int) -> list[int]:
+    """Worker processes of a sweep: copies, made by the one child that loads what they need."""
+    servers = [n for n in children(pid) if "forkserver" in Path(f"/proc/{n}/cmdline").read_text()]
+    assert len(servers) == 1
+    return children(servers[0])
+
+
+def killed_and_resumed(command: list[str], out: Path, total: int, env: dict[str, str], where: Path) -> None:
+    """Kill -9 a worker, then the parent, then go on; the journal's lines are counted over both runs."""
+    log = where / "sweep.log"
+    with started(command, env, where, log) as parent:
+        until(lambda: len(lines(out)) >= total // 10, "a tenth of the points")
+        workers = workers_of(parent.pid)
+        assert len(workers) == 2
+        server = int(Path(f"/proc/{workers[0]}/stat").read_text().rpartition(")")[2].split()[1])
+        os.kill(workers[0], signal.SIGKILL)
+        count = len(lines(out))
+        until(lambda: len(lines(out)) >= count + total // 5 or parent.poll() is not None, "points after the kill")
+        parent.kill()
+        parent.wait()
+    before = lines(out)
+    assert total // 10 <= len(before) < total, log.read_text()
+    until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in [*workers, server]), "workers end with their parent")
+    with started(command, env, where, log) as parent:
+        assert parent.wait(timeout=250) == 0, log.read_text()
+    # what was kept is the beginning of what is there: none was pressed again
+    assert lines(out)[: len(before)] == before
+
+
+def test_a_sweep_survives_kill_9_of_a_worker_and_of_the_parent(root, scene, tmp_path):
+    out = tmp_path / "out"
+    env = environment(root, str(tmp_path))
+    killed_and_resumed(sweeping(scene, out, 60, 4, "--workers", "2"), out, 240, env, tmp_path)
+    assert_nothing_repeated_or_lost(out, 240)
+
+
+@pytest.mark.slow
+def test_a_thousand_points_survive_kill_9(root, scene, tmp_path):
+    out = tmp_path / "out"
+    env = environment(root, str(tmp_path))
+    killed_and_resumed(sweeping(scene, out, 50, 20, "--workers", "2"), out, 1000, env, tmp_path)
+    assert_nothing_repeated_or_lost(out, 1000)
+
+
+@contextmanager
+def dask(workers: int, env: dict[str, str], where: Path) -> Iterator[tuple[str, subprocess.Popen]]:
+    """Address and process of a scheduler with some workers."""
+    port = free_port()
+    address = f"tcp://127.0.0.1:{port}"
+    here = [sys.executable, "-m"]
+    scheduler = ["distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]
+    worker = ["distributed.cli.dask_worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard"]
+    with ExitStack() as running:
+        process = running.enter_context(started([*here, *scheduler], env, where, where / "scheduler.log"))
+        for i in range(workers):
+            running.enter_context(started([*here, *worker], env, where, where / f"worker{i}.log"))
+        yield address, process
+
+
+def test_a_scheduler_and_two_workers_of_their_own(root, scene, tmp_path):
+    env, out = environment(root, str(tmp_path)), tmp_path / "out"
+    with dask(2, env, tmp_path) as (address, _):
+        command = sweeping(scene, out, 3, 4, "--scheduler", address)
+        # the scheduler may still be on its way: the time limit is there for that, too
+        done = subprocess.run(command, env=env, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+        assert done.returncode == 0, done.stderr
+        assert done.stderr == ""
+    assert_nothing_repeated_or_lost(out, 12)
+    assert {row["body"] for row in lines(out)} == {p.body for p in load_points(scene)}
+
+
+@pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGTERM])
+def test_a_scheduler_that_dies_ends_a_sweep_with_3_and_one_line(sent, root, scene, tmp_path):
+    env, out = environment(root, str(tmp_path)), tmp_path / "out"
+    with dask(1, env, tmp_path) as (address, scheduler):
+        command = sweeping(scene, out, 500, 2, "--scheduler", address)
+        with started(command, env, tmp_path, tmp_path / "log") as parent:
+            until(lambda: len(lines(out)) >= 5, "five points")
+            scheduler.send_signal(sent)
+            assert parent.wait(timeout=60) == 3
+    said = (tmp_path / "log").read_text()
+    assert not [line for line in said.splitlines()[:-1] if not line.startswith("[")]
+    count = len(lines(out))
+    assert 5 <= count < 1000
+    assert f"{count} of 1000 points are kept in {out}" in said.splitlines()[-1]
+    assert len(table(out)) == count
+
+
+def load_points(scene: Path) -> list:
+    nu = ",".join(f"{0.3 + 0.19 * i / 4:.4f}" for i in range(4))
+    return list(combinations(scene, COARSE[1::2], ["friction.mu=0.02", f"material.nu={nu}"]).points)
+
+
+AT_ONCE = "import finger3d.mechanics.solve as s; s._WORTH = 1; s.cores = lambda: 2; from finger3d.cli import main; "
+AT_ONCE += "import sys; sys.exit(main())"
+
+
+@pytest.mark.parametrize("bodies", [1, 2, 0], ids=["here", "workers", "threads"])
+def test_ctrl_c_ends_with_130_and_one_line(bodies, root, scene, tmp_path):
+    out, threads, bodies = tmp_path / "out", bodies == 0, bodies or 1
+    # so many that none is left only after many seconds: a hundred were sometimes done before the signal came
+    command = sweeping(scene, out, 1000 // bodies, bodies, "--workers", "1")
+    if threads:
+        command[1:3] = ["-c", AT_ONCE]
+    with started(command, environment(root, str(tmp_path)), tmp_path, tmp_path / "log") as parent:
+        until(lambda: len(lines(out)) >= 5, "five points")
+        # a terminal sends it to the workers, too
+        os.killpg(parent.pid, signal.SIGINT)
+        start = time.monotonic()
+        assert parent.wait(timeout=60) == 130
+        # a second, and the tables of what is kept, on a machine that may have other work
+        assert bodies > 1 or time.monotonic() - start < 5.0
+    said = (tmp_path / "log").read_text()
+    assert "Traceback" not in said
+    count = len(lines(out))
+    assert 5 <= count < 1000
+    assert said.splitlines()[-1].startswith(f"finger3d: interrupted; {count} of 1000 points are kept in {out}")
+    assert len(table(out)) == count

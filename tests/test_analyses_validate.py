@@ -1,0 +1,225 @@
+"""The protocol of studies: judging, keeping, resuming, the index, and the command."""
+
+from __future__ import annotations
+
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+import pytest
+
+from finger3d import cli
+from finger3d.analyses import validate as study
+from finger3d.analyses.validate import Row, Study, chosen, kept_rows, studies, validate
+from finger3d.errors import Finger3dError, MissingError
+
+GOOD = '''"""Is one and a half what it was?
+
+Source: none.
+"""
+from finger3d.analyses.validate import Result, Row
+
+from ._shared import VALUE
+
+def run(quick):
+    rows = (Row("value | mm", "a page", 1.5, VALUE + (0.001 if quick else 0.0), 0.01, "so", "sensitivity"),)
+    return Result(rows, {"x": [1, 2], "y": [0.1, 1 / 3]}, lambda figure: figure.subplots().plot([1, 2]))
+'''
+BAD = '''"""Does it fail?"""
+from finger3d.analyses.validate import Result, Row
+
+def run(quick):
+    return Result((Row("bound", "a page", 1e-8, 2e-8, 0.0, "so", measure="at most"),))
+'''
+STOPS = '''"""Is it interrupted?"""
+
+def run(quick):
+    raise KeyboardInterrupt
+'''
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    home = tmp_path / "validation"
+    home.mkdir()
+    for name, text in {"good": GOOD, "bad": BAD, "_shared": "VALUE = 1.5\n"}.items():
+        (home / f"{name}.py").write_text(text)
+    return home
+
+
+def ran(home: Path, name: str) -> float:
+    return (home / "results" / f"{name}.json").stat().st_mtime_ns
+
+
+@pytest.mark.parametrize(
+    ("measure", "wanted", "got", "error"),
+    [
+        ("relative", -2.0, -2.1, 0.05), ("absolute", 0.0, -0.2, 0.2), ("at most", 1.0, 0.5, 0.0),
+        ("at most", 1.0, 1.2, 0.2), ("at least", 1.0, 1.5, 0.0), ("at least", 1.0, 0.7, 0.3),
+    ],
+)  # fmt: skip
+def test_the_error_is_what_its_measure_says(measure: str, wanted: float, got: float, error: float) -> None:
+    row = Row("w", "r", wanted, got, 0.1, "so", measure=measure)
+    assert row.error == pytest.approx(error, abs=1e-12)
+    assert row.passed == (error <= 0.1)
+
+
+@pytest.mark.parametrize("measure", ["relative", "absolute", "at most", "at least"])
+def test_nan_never_passes(measure: str) -> None:
+    assert not Row("w", "r", 1.0, float("nan"), 1e9, "so", measure=measure).passed
+
+
+def test_a_statement_that_does_not_hold_fails_nothing() -> None:
+    rows = [Row("w", "r", 79.0, got, 0.02, "about", "statement") for got in (79.5, 60.0, float("nan"))]
+    assert [row.passed for row in rows] == [True, True, False]
+    assert [row.verdict for row in rows] == ["holds", "does not hold", "FAIL"]
+
+
+def test_results_are_kept_to_the_last_digit_and_indexed(folder: Path) -> None:
+    known = studies(folder)
+    found = validate(chosen(["good"], known), False, folder, known=known)
+    assert kept_rows(folder, known["good"]) == found["good"]
+    assert (folder / "results" / "good_table.csv").read_text().splitlines()[2] == f"2,{1 / 3!r}"
+    assert (folder / "figures" / "good.png").read_bytes().startswith(b"\x89PNG")
+    index = (folder / "README.md").read_text()
+    assert "Is one and a half what it was?" in index
+    assert "| good | value \\| mm | sensitivity | a page | 1.5 | 1.5 | 0 % | 1 %: so | pass |" in index
+    assert "Not run yet: bad." in index
+    validate(chosen(["bad"], known), False, folder, known=known)
+    index = (folder / "README.md").read_text()
+    assert "| good | value" in index, "running one study keeps the rows of the others"
+    assert "**FAIL**" in index
+
+
+def test_a_run_of_all_leaves_out_what_is_up_to_date(folder: Path) -> None:
+    known = studies(folder)
+    validate(list(known.values()), False, folder, known=known)
+    before = ran(folder, "good"), ran(folder, "bad")
+    again = validate(list(known.values()), False, folder, resume=True, known=known)
+    assert (ran(folder, "good"), ran(folder, "bad")) == before
+    assert not again["bad"][0].passed, "a failure is not forgotten because it is old"
+    (folder / "bad.py").write_text(BAD + "\n")
+    validate(list(known.values()), False, folder, resume=True, known=known)
+    assert ran(folder, "good") == before[0]
+    assert ran(folder, "bad") > before[1]
+
+
+def test_a_changed_helper_makes_those_old_that_use_it(folder: Path) -> None:
+    known = studies(folder)
+    before = {name: known[name].stamp() for name in known}
+    (folder / "_shared.py").write_text("VALUE = 1.4\n")
+    assert {name for name in known if known[name].stamp() != before[name]} == {"good"}
+
+
+PACKAGE = Path(study.__file__).parents[1]
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "accuracy/estimate.py",
+        "accuracy/refine.py",
+        "analyses/reduced.py",
+        "accuracy/cost.py",
+        "io.py",
+        "analyses/validate.py",
+        "sensor/curve.py",
+        "analyses/optimise/run.py",
+        "analyses/compare/cases.py",
+        "scene/tables.py",
+        "analyses/sweep/worker.py",
+        "results/states.py",
+        "__init__.py",
+        "contact/newton.py",
+        "fem/condense.py",
+        "mechanics/solve.py",
+        "analyses/shared_body.py",
+        "effects/viscosity.py",
+        "meshing/report.py",
+    ],
+)
+def test_what_shapes_numbers_makes_results_old(name: str) -> None:
+    assert PACKAGE / name in study.sources(PACKAGE)
+
+
+def test_a_new_module_counts_unless_it_is_left_out_by_name(tmp_path: Path) -> None:
+    for name in (
+        "thermal.py",
+        "sub/solver.py",
+        "cli/press.py",
+        "report/press.py",
+        "results/states.py",
+        "plotting/figures.py",
+        "plotting/calibration.py",
+    ):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text("")
+    found = {str(p.relative_to(tmp_path)) for p in study.sources(tmp_path)}
+    assert found == {"thermal.py", "sub/solver.py", "results/states.py"}
+
+
+def test_every_exclusion_is_there() -> None:
+    left_out = set(PACKAGE.rglob("*.py")) - set(study.sources(PACKAGE))
+    for pattern in study._NO_NUMBERS:
+        assert any(fnmatchcase(path.relative_to(PACKAGE).as_posix(), pattern) for path in left_out), pattern
+
+
+def test_an_interruption_keeps_the_studies_that_are_done(folder: Path) -> None:
+    (folder / "stops.py").write_text(STOPS)
+    known = studies(folder)
+    report = study.Report()
+    with pytest.raises(KeyboardInterrupt):
+        validate(chosen(["good", "stops", "bad"], known), False, folder, report, known=known)
+    assert report.steps_done == 1
+    assert kept_rows(folder, known["good"])
+    assert not kept_rows(folder, known["bad"])
+
+
+def test_a_study_that_times_the_machine_runs_in_full_only_by_name(folder: Path) -> None:
+    (folder / "timed.py").write_text((folder / "good.py").read_text() + "\nBY_NAME = True\n")
+    known = studies(folder)
+    assert [s.name for s in chosen([], known)] == ["bad", "good"]
+    assert [s.name for s in chosen([], known, quick=True)] == ["bad", "good", "timed"]
+    assert [s.name for s in chosen(["timed"], known)] == ["timed"]
+
+
+def test_an_unknown_name_is_answered_with_the_nearest(folder: Path) -> None:
+    with pytest.raises(Finger3dError, match=r"no study 'godd'; did you mean 'good'\? known: bad, good$"):
+        chosen(["godd"], studies(folder))
+
+
+def test_a_folder_without_studies_is_missing(tmp_path: Path) -> None:
+    with pytest.raises(MissingError, match="from a checkout"):
+        studies(tmp_path)
+
+
+@pytest.fixture
+def own_studies(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setattr(study, "studies", lambda: {n: Study(n, folder / f"{n}.py") for n in ("bad", "good", "stops")})
+    (folder / "stops.py").write_text(STOPS)
+    return folder
+
+
+def test_the_command_tells_verdicts_by_its_exit_code(
+    own_studies: Path, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    assert cli.main(["validate", "good"]) == 0
+    assert "pass" in capsys.readouterr().out
+    assert cli.main(["validate", "good", "bad", "--out", str(tmp_path / "out")]) == 3
+    assert capsys.readouterr().err == "finger3d: validate: outside the tolerance: bad (see the rows marked FAIL)\n"
+    assert (tmp_path / "out" / "results" / "bad.csv").is_file()
+    assert cli.main(["validate", "goood"]) == 2
+    assert "did you mean 'good'" in capsys.readouterr().err
+
+
+def test_quick_results_never_replace_full_ones(own_studies: Path, capsys: pytest.CaptureFixture) -> None:
+    assert cli.main(["validate", "good"]) == 0
+    before = (own_studies / "results" / "good.csv").read_bytes()
+    assert cli.main(["validate", "good", "--quick"]) == 0
+    assert "1.501" in capsys.readouterr().out
+    assert cli.main(["validate", "good", "--quick", "--out", str(own_studies)]) == 2
+    assert (own_studies / "results" / "good.csv").read_bytes() == before
+
+
+def test_an_interrupted_command_says_what_is_kept(own_studies: Path, capsys: pytest.CaptureFixture) -> None:
+    assert cli.main(["validate", "good", "stops"]) == 130
+    assert capsys.readouterr().err == f"finger3d: interrupted; 1 of 2 studies are kept in {own_studies}\n"

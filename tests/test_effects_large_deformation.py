@@ -1,0 +1,140 @@
+"""Finite strain through the whole solver: the Fig. 9 finger, limits, invariances."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from finger3d.contact.friction import OPEN, Coulomb
+from finger3d.effects.large_deformation import Effect
+from finger3d.errors import Outcome
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.formulation import SmallStrain
+from finger3d.mechanics.history import measure
+from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.solve import build, march
+from finger3d.objects import Cylinder, Plane
+
+
+def fig9(nu: float, size: float = 2.0, **changes: object) -> Model:
+    finger = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
+    model = Model(
+        finger, Material(1.0, nu), MeshOptions(size, 4 * size, "swept"), (Leg(10.0, steps=10),), friction=Coulomb(0.25),
+        gauges=(Gauge("g", 36.0, 40.0, 0.0, 0.5236), Gauge("mirror", -36.0, 40.0, 0.0, np.pi - 0.5236)),
+        domain="plane-strain",
+    )  # fmt: skip
+    return Effect().apply(replace(model, **changes))
+
+
+def test_fig9_agrees_with_calculix() -> None:
+    # validation/REFERENCES.md, 6.5: 28.5 N per mm by CalculiX, and 22.35 in small strain; stick zone 33 mm
+    problem = build(fig9(0.45, 1.0))
+    *_, end = march(problem)
+    got = measure(problem.points, end)
+    assert end.outcome is Outcome.CONVERGED
+    assert got["normal_force_N"] / 20.0 == pytest.approx(28.5, rel=0.02)
+    assert 30.0 <= got["stick_half_length_mm"] <= 36.0
+    assert abs(got["tangential_force_x_N"]) < 1e-9
+    assert got["gauges"]["g"] == pytest.approx(got["gauges"]["mirror"], rel=1e-9)
+    assert problem.factorizations > 10
+
+
+@pytest.mark.parametrize("nu", [0.3, 0.49])
+def test_light_load_is_small_strain(nu: float) -> None:
+    ratios = []
+    for depth in (0.08, 0.01):
+        model = fig9(nu, legs=(Leg(depth, steps=2),), mesh=MeshOptions(0.2, 8.0))
+        problem = build(model)
+        small = list(march(replace(problem, model=replace(model, kinematics=SmallStrain()))))
+        large = list(march(problem))
+        a, b = (measure(problem.points, f[-1]) for f in (small, large))
+        ratios.append(abs(b["normal_force_N"] / a["normal_force_N"] - 1.0))
+    assert ratios[0] < 0.01
+    assert ratios[1] < 0.6 * ratios[0]  # the strain goes with the root of the depth: 0.35
+
+
+@pytest.mark.parametrize("nu", [0.45, 0.5])
+def test_newton_converges_quadratically(nu: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    from finger3d.effects import large_deformation
+
+    errors: list[float] = []
+    judge = large_deformation._violation
+    monkeypatch.setattr(large_deformation, "_violation", lambda *a: errors.append(judge(*a)) or errors[-1])
+    problem = build(fig9(nu, legs=(Leg(10.0, steps=5),)))
+    frames = list(march(problem))
+    assert all(f.outcome.ok for f in frames)
+    assert problem.later.factorizations <= 5 * len(frames)
+    # once all sets are found an error is followed by its square, times a constant of the mesh, down to round-off
+    pairs = [(a, b) for a, b in zip(errors[:-1], errors[1:], strict=True) if 1e-6 < a < 1e-3 and b < a]
+    assert pairs
+    assert all(b < max(1e3 * a**2, 1e-12) for a, b in pairs)
+
+
+def test_incompressible_plane_stress_converges_to_the_limit_of_nu() -> None:
+    forces = []
+    for nu in (0.499, 0.4999, 0.5):
+        problem = build(fig9(nu, 4.0, domain="plane-stress", legs=(Leg(3.0, steps=3),)))
+        *_, end = march(problem)
+        assert end.outcome is Outcome.CONVERGED
+        forces.append(measure(problem.points, end)["normal_force_N"])
+        assert problem.later.factorizations <= 5 * 3
+    # linear in 0.5 - nu, so extrapolation from the first two leaves the square: 1e-6 and a factor
+    assert forces[2] == pytest.approx(forces[1] + (forces[1] - forces[0]) / 9.0, rel=1e-5)
+
+
+def test_half_the_height() -> None:
+    # the contact reaches the corner of the section on the way; nu = 0.5 in the test above is the mixed form
+    problem = build(fig9(0.45, 4.0, legs=(Leg(25.0, steps=12),)))
+    frames = list(march(problem))
+    assert frames[-1].outcome.ok
+    forces = np.array([measure(problem.points, f)["normal_force_N"] for f in frames])
+    assert np.all(np.diff(forces, 2) > -0.05 * forces[-1])  # it stiffens
+
+
+def test_quarter_and_whole_agree_in_3d_and_curved_objects_are_followed() -> None:
+    body = designs()["block"](half_length_mm=4.0, height_mm=3.0, width_mm=4.0)
+    model = Model(
+        body, Material(1.0, 0.3), MeshOptions(1.0, 1.5, "swept"), (Leg(0.6, steps=3),),
+        object=Cylinder(radius_mm=3.0), friction=Coulomb(0.3),
+    )  # fmt: skip
+    ends = []
+    for axes in (("x", "z"), ()):
+        problem = build(Effect().apply(replace(model, symmetry=axes)))
+        *_, end = march(problem)
+        assert end.outcome.ok
+        ends.append(measure(problem.points, end))
+        at = problem.points.points + 0.0
+        u = np.zeros_like(at)
+        touching = end.state.status != OPEN
+        assert end.state.frames is not None
+        # where it touches the flank, the force leans outward with the cylinder's normal
+        world = problem.points.seen_in(end.state).world(end.state.force * [1.0, 0.0, 0.0])[touching]
+        lean = world[:, 0] * np.sign(at[touching, 0])
+        assert lean[np.abs(at[touching, 0]) > 0.4].min() > 0.0
+        assert u.shape == at.shape
+    for key in ("normal_force_N", "friction_sum_N", "dissipation_mJ", "external_work_mJ"):
+        assert ends[0][key] == pytest.approx(ends[1][key], rel=1e-6)
+
+
+def test_slide_of_several_contact_lengths_reaches_mu_n() -> None:
+    finger = designs()["half_cylinder"](radius_mm=5.0, width_mm=1.0)
+    model = Model(
+        finger, Material(1.0, 0.45), MeshOptions(0.3, 1.0), (Leg(0.3, steps=3), Leg(0.3, slide_x_mm=4.0, steps=20)),
+        object=Plane(), friction=Coulomb(0.3), domain="plane-strain",
+    )  # fmt: skip
+    problem = build(Effect().apply(model), margin=np.inf)
+    *_, end = march(problem)
+    got = measure(problem.points, end)
+    assert end.outcome.ok
+    assert got["tangential_force_x_N"] == pytest.approx(0.3 * got["normal_force_N"], rel=1e-8)
+
+
+def test_a_press_too_deep_ends_in_an_outcome_with_all_earlier_steps_kept() -> None:
+    problem = build(fig9(0.3, 8.0, legs=(Leg(48.0, steps=6),)))
+    frames = list(march(problem))
+    assert frames[0].outcome.ok
+    assert frames[-1].outcome in {Outcome.INVERTED, Outcome.NEWTON, Outcome.NO_CONVERGENCE}
+    assert all(f.outcome.ok for f in frames[:-1])
+    assert "try" in str(frames[-1].outcome)

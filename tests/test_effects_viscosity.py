@@ -1,0 +1,375 @@
+"""Viscosity: exact against convolutions of the elastic press, the limits of both kinds, and what an open point does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from finger3d.cli import main
+from finger3d.contact.friction import OPEN, Coulomb
+from finger3d.effects.viscosity import AllRelaxes, Effect, Memory, ShearRelaxes, Step, Viscoelastic
+from finger3d.errors import Finger3dError, Outcome
+from finger3d.geometry.registry import designs
+from finger3d.mechanics import formulation
+from finger3d.mechanics.history import Frame, measure
+from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.solve import Problem, build, march
+from finger3d.objects import Cylinder, Plane, Sphere
+from finger3d.scene import parse
+
+TWO = ((0.5, 1.0), (0.2, 0.1))
+RAMP = (Leg(0.3, steps=6, duration_s=1.0),)
+RAMP_AND_HOLD = (*RAMP, Leg(0.3, steps=5, duration_s=3.0))
+UP_AND_DOWN = (*RAMP_AND_HOLD, Leg(0.0, steps=4, duration_s=0.5), Leg(0.0, steps=2, duration_s=2.0))
+
+
+def block(**changes: object) -> Model:
+    body = designs()["block"](half_length_mm=4.0, height_mm=3.0, width_mm=4.0)
+    model = Model(
+        body, Material(1.0, 0.3), MeshOptions(0.8, 1.2, "swept"), UP_AND_DOWN, object=Sphere(radius_mm=4.0),
+        friction=Coulomb(0.25), gauges=(Gauge("g", 0.0, 1.5, 0.0, 0.0, 2.0),),
+    )  # fmt: skip
+    return replace(model, **changes)
+
+
+def viscous(problem: Problem, prony: tuple = TWO, bulk: bool = True, **changes: object) -> Problem:
+    return replace(problem, model=Effect(prony, bulk).apply(replace(problem.model, **changes)))
+
+
+def run(problem: Problem) -> list[Frame]:
+    frames = list(march(problem))
+    assert all(f.outcome.ok and f.residual <= 1e-8 for f in frames)
+    return frames
+
+
+def forces(problem: Problem, frames: list[Frame]) -> np.ndarray:
+    return np.array([measure(problem.points, f)["normal_force_N"] for f in frames])
+
+
+def relaxation(prony: tuple, t: np.ndarray) -> np.ndarray:
+    return 1.0 - sum(g * (1.0 - np.exp(-t / tau)) for g, tau in prony)
+
+
+def mean_relaxation(prony: tuple, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Mean of r from `low` to `high`."""
+    total = (1.0 - sum(g for g, _ in prony)) * (high - low)
+    total += sum(g * tau * (np.exp(-low / tau) - np.exp(-high / tau)) for g, tau in prony)
+    return total / (high - low)
+
+
+@pytest.mark.parametrize("mu", [0.0, 1e6], ids=["frictionless", "full stick"])
+def test_a_growing_contact_is_the_convolution_of_the_elastic_one_to_round_off(mu: float) -> None:
+    # Lee and Radok 1960: while contact grows, f(t) = int r(t - s) df_e; linear within a step, as the integrator has it
+    problem = build(block(legs=RAMP_AND_HOLD, friction=Coulomb(mu)))
+    elastic, slow = run(problem), run(viscous(problem))
+    t = np.array([0.0] + [f.target.time_s for f in elastic])
+    rates = np.diff(np.array([np.zeros_like(elastic[0].part.force)] + [f.part.force for f in elastic]), axis=0)
+    for n, frame in enumerate(slow, start=1):
+        weight = mean_relaxation(TWO, t[n] - t[1 : n + 1], t[n] - t[:n])
+        wanted = np.einsum("k,kcd->cd", weight, rates[:n])
+        assert np.abs(frame.part.force - wanted).max() <= 1e-12 * np.abs(wanted).max()
+
+
+def test_the_error_of_the_step_falls_with_its_square() -> None:
+    # points come into contact one by one, which makes single ratios scatter about 4: the mean of three is taken
+    section = block(
+        legs=RAMP, friction=Coulomb(0.0), domain="plane-strain", object=Cylinder(radius_mm=4.0, axis="z"),
+        mesh=MeshOptions(0.1, 1.0, "swept"), gauges=(),
+    )  # fmt: skip
+    problem = build(section)
+    counts = (5, 10, 20, 40, 80)
+    ends = [forces(problem, run(viscous(problem, legs=(replace(RAMP[0], steps=n),))))[-1] for n in counts]
+    changes = np.diff(ends)
+    assert (changes[0] / changes[-1]) ** (1.0 / 3.0) == pytest.approx(4.0, rel=0.3)
+
+
+def test_a_hold_is_exact_in_one_step() -> None:
+    problem = build(block(legs=RAMP_AND_HOLD, friction=Coulomb(0.0)))
+    many, one = run(viscous(problem)), run(viscous(problem, legs=(*RAMP, replace(RAMP_AND_HOLD[1], steps=1))))
+    assert one[-1].part.force == pytest.approx(many[-1].part.force, abs=1e-12)
+
+
+@pytest.mark.parametrize("bulk", [True, False])
+@pytest.mark.parametrize("nu", [0.3, 0.49])
+def test_quick_presses_are_instantaneous_and_slow_ones_relaxed(nu: float, bulk: bool) -> None:
+    model = block(friction=Coulomb(0.0), material=Material(1.0, nu))
+    shear, volume = 0.5 / (1.0 + nu), 1.0 / (3.0 * (1.0 - 2.0 * nu))
+    left = 1.0 - sum(g for g, _ in TWO)
+    low = left * shear
+    soft = Material(left, nu)
+    if not bulk:
+        soft = Material(
+            9.0 * volume * low / (3.0 * volume + low), (3.0 * volume - 2.0 * low) / (6.0 * volume + 2.0 * low)
+        )
+    quick, slow = ((Leg(0.3, steps=2, duration_s=s),) for s in (1e-9, 1e9))
+    problem = build(replace(model, legs=quick))
+    for legs, material in ((quick, model.material), (slow, soft)):
+        wanted = build(replace(model, legs=legs, material=material))
+        # one form for all: mixed and displacement elements differ by their mesh error
+        assert wanted.elastic.mixed == problem.elastic.mixed or not bulk
+        got, elastic = run(viscous(problem, TWO, bulk, legs=legs))[-1], run(wanted)[-1]
+        close = 1e-7 if wanted.elastic.mixed == problem.elastic.mixed else 0.01
+        assert got.part.force == pytest.approx(elastic.part.force, abs=close * elastic.part.force.max())
+        assert got.gauges["g"] == pytest.approx(elastic.gauges["g"], rel=close)
+
+
+def test_in_an_incompressible_body_both_kinds_are_one() -> None:
+    # two ways to the same numbers: row forces over the compliance, and displacements over new factors
+    problem = build(block(material=Material(1.0, 0.5)))
+    a, b = (run(viscous(problem, TWO, bulk)) for bulk in (True, False))
+    largest = max(np.abs(f.part.force).max() for f in a)
+    for f, g in zip(a, b, strict=True):
+        assert np.abs(f.part.force - g.part.force).max() <= 1e-6 * largest
+        assert f.gauges["g"] == pytest.approx(g.gauges["g"], rel=1e-6)
+    stresses = [p.model.kinematics.fields(p, f[9].part)[2] for p, f in
+                ((viscous(problem), a), (viscous(problem, TWO, False), b))]  # fmt: skip
+    assert np.abs(stresses[0] - stresses[1]).max() <= 1e-5 * np.abs(stresses[0]).max()
+
+
+def test_uniform_compression_relaxes_as_the_series_says() -> None:
+    # nu = 0 under a flat plate: a bar, stress = E int r(t - s) d'(s) ds / h
+    problem = build(block(material=Material(2.0, 0.0), object=Plane(), friction=Coulomb(0.0), legs=RAMP_AND_HOLD))
+    held = viscous(problem)
+    for frame in run(held):
+        t = frame.target.time_s
+        mean = mean_relaxation(TWO, np.array(max(t - 1.0, 0.0)), np.array(t)) * min(t, 1.0)
+        stress = 2.0 * 0.3 / 3.0 * float(mean)
+        pressure = frame.state.force[:, 0] / problem.points.area
+        assert pressure == pytest.approx(stress, rel=1e-9)
+        _, strain, sigma = held.model.kinematics.fields(held, frame.part)
+        assert sigma[:, 1, 1] == pytest.approx(-stress, rel=1e-9)
+        assert strain[:, 1, 1] == pytest.approx(-min(t, 1.0) * 0.1, rel=1e-9)
+
+
+@pytest.mark.parametrize(("domain", "nu", "bulk"), [
+    ("plane-strain", 0.3, False), ("plane-strain", 0.49, False), ("plane-strain", 0.3, True),
+    ("plane-stress", 0.3, True), ("solid", 0.3, False), ("solid", 0.49, False),
+])  # fmt: skip
+def test_stress_carries_the_force(domain: str, nu: float, bulk: bool) -> None:
+    # virtual work of y: int s_yy dV = - force * height under a flat plate without friction
+    problem = build(block(material=Material(1.0, nu), object=Plane(), friction=Coulomb(0.0), domain=domain,
+                          legs=RAMP_AND_HOLD))  # fmt: skip
+    held = viscous(problem, TWO, bulk)
+    frame = run(held)[-1]
+    sigma = held.model.kinematics.fields(held, frame.part)[2]
+    assert sigma.shape[1:] == (3, 3)
+    parts = 2 ** len(problem.axes)
+    volume = _nodal_volume(problem) * problem.thickness * parts
+    force = measure(problem.points, frame)["normal_force_N"]
+    assert -float(volume @ sigma[:, 1, 1]) == pytest.approx(3.0 * force, rel=0.01)
+    if domain == "plane-strain" and not bulk:
+        # across the section only the lateral stress of a body held there, between nu and nu of the relaxed moduli
+        ratio = (volume @ sigma[:, 2, 2]) / (volume @ (sigma[:, 0, 0] + sigma[:, 1, 1]))
+        assert nu < ratio < 0.5
+
+
+def _nodal_volume(problem: Problem) -> np.ndarray:
+    from finger3d.fem.elements import physical_gradients, quadrature, shape
+
+    mesh = problem.mesh
+    bary, w = quadrature(mesh.dim, 2)
+    _, det = physical_gradients(mesh.points[mesh.cells], bary, True)
+    out = np.zeros(len(mesh.points))
+    np.add.at(out, mesh.cells, (det * w) @ shape(bary, True))
+    return out
+
+
+@pytest.mark.parametrize("domain", ["plane-strain", "solid"])
+@pytest.mark.parametrize("nu", [0.3, 0.49])
+@pytest.mark.parametrize("kind", [AllRelaxes, ShearRelaxes])
+def test_the_compliance_of_a_step_is_the_difference_quotient_of_its_response(
+    kind: type, nu: float, domain: str
+) -> None:
+    problem = build(block(domain=domain, material=Material(1.0, nu), legs=RAMP))
+    body = kind(problem)
+    rng = np.random.default_rng(0)
+    rows = len(problem.condensed.compliance)
+    memory = Memory(np.zeros(body.size), np.zeros((2, body.size)))
+    for seconds in (0.3, 0.7):  # so that there is a past
+        step = Step(TWO, seconds)
+        response = body.respond(step, memory)
+        force = rng.normal(size=rows)
+        now = response.shape(force)
+        assert body.read(now) == pytest.approx(response.moved + response.compliance @ force, rel=1e-9, abs=1e-12)
+        change = rng.normal(size=rows)
+        moved = body.read(response.shape(force + change)) - body.read(now)
+        assert moved == pytest.approx(response.compliance @ change, rel=1e-7, abs=1e-9)
+        memory = step.after(memory, now)
+
+
+@pytest.mark.parametrize("bulk", [True, False])
+def test_quarter_and_whole_agree(bulk: bool) -> None:
+    quarter, whole = (build(block(symmetry=axes)) for axes in (("x", "z"), ()))
+    a, b = (run(viscous(p, TWO, bulk)) for p in (quarter, whole))
+    assert forces(quarter, a) == pytest.approx(forces(whole, b), abs=1e-9)
+    assert [f.gauges["g"] for f in a] == pytest.approx([f.gauges["g"] for f in b], rel=1e-8)
+
+
+@pytest.mark.parametrize("bulk", [True, False])
+def test_a_finger_let_go_creeps_back_and_is_met_later(bulk: bool) -> None:
+    again = (*UP_AND_DOWN, Leg(0.3, steps=6, duration_s=1.0))
+    problem = build(block())
+    frames = run(viscous(problem, TWO, bulk, legs=again))
+    free = frames[11:17]  # out of contact before the object is back at first touch
+    assert all((f.part.status == OPEN).all() and not f.part.force.any() for f in frames[14:17])
+    strains = np.array([f.gauges["g"] for f in free])
+    assert (strains > 0.0).all()
+    assert (np.diff(strains) < 0.0).all()
+    first, later = forces(problem, frames)[:6], forces(problem, frames)[17:]
+    assert (later < first).all()  # the dent is not yet filled
+    long = run(viscous(problem, TWO, bulk, legs=(*UP_AND_DOWN, Leg(0.0, steps=1, duration_s=1e6))))[-1]
+    assert abs(long.gauges["g"]) < 1e-6
+    assert np.abs(long.part.gap - problem.gap(problem.origin)).max() < 1e-6
+
+
+@pytest.mark.parametrize("bulk", [True, False])
+def test_an_increment_cut_in_two_starts_from_the_state_restored(monkeypatch: pytest.MonkeyPatch, bulk: bool) -> None:
+    legs = (*RAMP, Leg(0.0, steps=1, duration_s=0.5))
+    problem = build(block())
+    cut_problem = viscous(problem, TWO, bulk, legs=legs)
+    true_rule = formulation.RULES["projection"]
+    seen = SimpleNamespace(calls=0)
+
+    def timid(state, free, compliance, law, scale, guess):
+        seen.calls += 1
+        found = true_rule(state, free, compliance, law, scale, guess)
+        if seen.calls == 7:  # the release, asked for in one step
+            return replace(found, state=state, outcome=Outcome.NO_CONVERGENCE)
+        return found
+
+    monkeypatch.setitem(formulation.RULES, "projection", timid)
+    cut = list(march(cut_problem))[-1]
+    monkeypatch.undo()
+    assert seen.calls == 9
+    two = run(viscous(problem, TWO, bulk, legs=(*RAMP, Leg(0.0, steps=2, duration_s=0.5))))[-1]
+    assert cut.method == "cut back"
+    assert np.array_equal(cut.part.force, two.part.force)
+    assert cut.gauges == two.gauges
+
+
+def test_equal_steps_cost_one_factorisation_and_other_lengths_one_each_only_without_bulk() -> None:
+    problem = build(block(domain="plane-strain"))
+    run(viscous(problem))
+    assert problem.factorizations == 1
+    fresh = replace(build(block(domain="plane-strain")))
+    slow = viscous(fresh, TWO, False)
+    run(slow)
+    # 1/6 s, 3/5 s, 1/8 s and 1 s; the lengths within a leg differ by round-off of their ends
+    assert slow.factorizations == 1 + 4
+    run(slow)
+    assert slow.factorizations == 1 + 4  # all of them still there
+
+
+def test_summary_counts_the_factorisations(tmp_path: Path) -> None:
+    import json
+
+    scene = tmp_path / "scene.toml"
+    scene.write_text(
+        '[finger]\ngeometry = "half_cylinder"\nradius_mm = 5.0\nwidth_mm = 2.0\n[material]\nE_MPa = 1.0\nnu = 0.3\n'
+        '[model]\ndomain = "plane-strain"\n[mesh]\nsize_mm = 0.3\nbase_size_mm = 1.0\n'
+        "[[press.leg]]\ndepth_mm = 0.5\nsteps = 5\nduration_s = 1\n"
+        "[[press.leg]]\ndepth_mm = 0.5\nsteps = 2\nduration_s = 1\n"
+        "[effects.viscosity]\nprony = [[0.3, 0.5]]\nbulk = false\n",
+        encoding="utf-8",
+    )
+    out = tmp_path / "out"
+    assert main(["press", str(scene), "--out", str(out), "--no-figures"]) == 0
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    assert summary["effects"] == ["viscosity"]
+    assert summary["cost"]["factorizations"] == 3
+    assert [s["time_s"] for s in summary["steps"]] == pytest.approx([0.2, 0.4, 0.6, 0.8, 1.0, 1.5, 2.0])
+    top = [s["normal_force_N"] for s in summary["steps"]]
+    assert top[4] > top[5] > top[6] > 0.7 * top[4]
+
+
+def scene_of(effect: dict, domain: str = "solid", legs: tuple = ({"depth_mm": 1.0, "duration_s": 1.0},)) -> dict:
+    return {
+        "finger": {"geometry": "half_cylinder", "radius_mm": 5.0, "width_mm": 2.0},
+        "material": {"E_MPa": 1.0, "nu": 0.3}, "model": {"domain": domain}, "press": {"leg": legs},
+        "effects": {"viscosity": effect},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("effect", "domain", "legs", "says"),
+    [
+        ({"prony": ((0.6, 1.0), (0.4, 2.0))}, "solid", None, r"effects\.viscosity: prony: .* sum to 1; must be below"),
+        ({"prony": ((-0.1, 1.0),)}, "solid", None, r"effects\.viscosity\.prony = .*above 0"),
+        ({"prony": ((0.0, 1.0),)}, "solid", None, r"effects\.viscosity\.prony = .*above 0"),
+        ({"prony": ((0.1, 0.0),)}, "solid", None, r"effects\.viscosity\.prony = .*above 0"),
+        ({"prony": ()}, "solid", None, r"effects\.viscosity\.prony = \[\]: .*not empty"),
+        ({}, "solid", None, r"effects\.viscosity\.prony is missing"),
+        (
+            {"prony": ((0.1, 1.0),)}, "solid", ({"depth_mm": 1.0, "duration_s": 1.0}, {"depth_mm": 0.5}),
+            r"press\.leg\.1\.duration_s is missing: .*viscosity",
+        ),
+        ({"prony": ((0.1, 1.0),), "bulk": False}, "plane-stress", None, r"viscosity\.bulk = false: not in plane"),
+    ],
+)  # fmt: skip
+def test_mistakes_are_one_line(effect: dict, domain: str, legs: tuple | None, says: str) -> None:
+    with pytest.raises(Finger3dError, match=says) as caught:
+        parse(scene_of(effect, domain, legs) if legs else scene_of(effect, domain))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_scene_without_durations_exits_2_and_writes_nothing(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(
+        '[finger]\ngeometry = "half_cylinder"\nradius_mm = 5.0\nwidth_mm = 2.0\n[material]\nE_MPa = 1.0\nnu = 0.3\n'
+        "[press]\ndepth_mm = 0.5\n[effects.viscosity]\nprony = [[0.3, 0.5]]\n",
+        encoding="utf-8",
+    )
+    assert main(["press", str(scene), "--out", str(tmp_path / "out")]) == 2
+    assert "press.duration_s is missing" in capsys.readouterr().err
+    assert not (tmp_path / "out" / "summary.json").exists()
+
+
+def test_a_model_turned_to_plane_stress_is_refused_too() -> None:
+    model = Effect(TWO, False).apply(block())
+    with pytest.raises(Finger3dError, match="not in plane stress"):
+        next(march(build(replace(model, domain="plane-stress"))))
+
+
+def test_what_is_elastic_beside_the_body_stays_elastic() -> None:
+    # a foundation in series under every point of the object: its compliance is not divided by alpha
+    problem = build(block(object=Plane(), material=Material(1.0, 0.0), friction=Coulomb(0.0), legs=RAMP_AND_HOLD))
+    c, d = problem.compliance.shape[:2]
+    soft = 3.0 / problem.surface.area  # as soft as the bar below, of E = 1 and height 3
+    series = problem.compliance.reshape(c * d, c * d).copy()
+    series[np.arange(c) * d, np.arange(c) * d] += soft
+    frames = run(viscous(replace(problem, compliance=series.reshape(c, d, c, d)), ((0.5, 1.0),)))
+    # two springs of 1 in series, one of them relaxing, pulled by 0.1 in 1 s; in fine steps
+    t = np.linspace(0.0, 4.0, 40001)
+    pulled, stress, branch, strain = 0.1 * np.minimum(t, 1.0), np.zeros_like(t), 0.0, 0.0
+    for n in range(1, len(t)):
+        dt = t[n] - t[n - 1]
+        fade = np.exp(-dt)
+        feed = 0.5 * (1.0 - fade) / dt
+        # stress = 0.5 e + h, h = fade h + feed (e - e0), e = pulled - stress
+        new = (pulled[n] - (feed * strain - fade * branch) / (0.5 + feed)) / (1.0 / (0.5 + feed) + 1.0)
+        e = pulled[n] - new
+        branch = fade * branch + feed * (e - strain)
+        strain, stress[n] = e, new
+    for frame in frames:
+        wanted = np.interp(frame.target.time_s, t, stress)
+        assert frame.part.force[:, 0] / problem.surface.area == pytest.approx(wanted, rel=2e-3)
+
+
+def test_settings_are_kept_as_the_model_compares_them() -> None:
+    assert Effect(((0.3, 0.5),)).apply(block()) == Effect(((0.3, 0.5),)).apply(block())
+    assert Viscoelastic(((0.3, 0.5),), True) != Viscoelastic(((0.3, 0.5),), False)
+
+
+def test_an_elastic_object_does_not_relax_with_the_finger() -> None:
+    from finger3d.effects.elastic_object import Effect as ElasticObject
+
+    slow = (Leg(0.3, steps=2, duration_s=1e9),)
+    model = ElasticObject(0.5, 0.3).apply(block(friction=Coulomb(0.0), legs=slow, object=Plane()))
+    problem = build(model)
+    relaxed = viscous(problem, ((0.7, 1.0),))
+    wanted = build(replace(model, material=Material(0.3, 0.3)))
+    assert forces(problem, run(relaxed))[-1] == pytest.approx(forces(wanted, run(wanted))[-1], rel=1e-7)

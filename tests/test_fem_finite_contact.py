@@ -1,0 +1,56 @@
+"""Contact of a deformed surface: rows and second derivatives against finite differences, in 2D and 3D."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from meshes import grid
+
+from finger3d.fem.finite_contact import DeformedContact, deformed_contact
+from finger3d.fem.simplex import Mesh, quadratic
+from finger3d.fem.traces import Surface, surface
+
+
+def made(d: int) -> tuple[Mesh, Surface, np.ndarray]:
+    mesh = quadratic(grid((2,) * d))
+    return mesh, surface(mesh, "y+"), np.random.default_rng(d).normal(0.0, 0.05, mesh.points.shape)
+
+
+def contact(mesh: Mesh, face: Surface, u: np.ndarray) -> DeformedContact:
+    """With a tilted plane, whose normal does not turn."""
+    normal = np.array([0.2, -1.0, 0.1])[: mesh.dim]
+    normal = normal / np.linalg.norm(normal)
+    at = face.samples + face.interpolate @ u
+    seen = at @ normal + 1.2
+    return deformed_contact(face, (mesh.points, u), (seen, np.broadcast_to(normal, at.shape)), ())
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_rows_are_the_derivative_of_the_gap(d: int) -> None:
+    mesh, face, u = made(d)
+    way = np.random.default_rng(7).normal(size=u.shape)
+    h = 1e-6
+    slope = (contact(mesh, face, u + h * way).gap - contact(mesh, face, u - h * way).gap) / (2 * h)
+    rows = contact(mesh, face, u).rows[::d]
+    assert rows @ way.ravel() == pytest.approx(slope, rel=1e-7, abs=1e-8)  # central: error h^2
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_softening_is_the_derivative_of_the_rows(d: int) -> None:
+    mesh, face, u = made(d)
+    random = np.random.default_rng(8)
+    way, force = random.normal(size=u.shape), random.uniform(0.0, 2.0, len(face.nodes))
+    h = 1e-6
+    ends = [contact(mesh, face, u + s * h * way).rows[::d].T @ force for s in (1.0, -1.0)]
+    slope = (ends[0] - ends[1]) / (2 * h)
+    second = contact(mesh, face, u).softening(face, force)
+    assert abs(second - second.T).max() <= 1e-12 * abs(second).max()
+    assert second @ way.ravel() == pytest.approx(slope, rel=1e-6, abs=1e-7 * np.abs(slope).max())
+
+
+def test_at_rest_rows_are_the_weighted_means() -> None:
+    mesh, face, _ = made(3)
+    u = np.zeros_like(mesh.points)
+    at = contact(mesh, face, u)
+    assert at.growth == pytest.approx(1.0, rel=1e-14)
+    assert np.abs(np.asarray(at.rows[:, ::3].sum(axis=1))[0::3] - at.frames[:, 0, :1]).max() < 1e-12

@@ -1,0 +1,246 @@
+"""Structured meshes: of sections, and swept from them."""
+
+import math
+import subprocess
+import sys
+import time
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from finger3d.errors import Finger3dError
+from finger3d.fem.quality import cell_angles_deg, curved_jacobians
+from finger3d.fem.simplex import Mesh, boundary, signed_volumes, unfold
+from finger3d.geometry.registry import designs
+from finger3d.meshing.generate import mesh_solid
+from finger3d.meshing.swept import mesh_section
+
+FIG9 = designs()["clipped_cylinder"](100.0, 50.0, 36.6, 20.0)
+HALF = designs()["half_cylinder"](5.0, 10.0)
+BLOCK = designs()["block"](20.0, 20.0, 20.0)
+LENS = designs()["clipped_cylinder"](100.0, 50.0, 0.0, 20.0)
+LOW = designs()["clipped_cylinder"](100.0, 80.0, 5.0, 20.0)
+ARCH = designs()["clipped_cylinder"](10.0, 10.0, 10.0, 8.0)
+ALL = {"fig9": FIG9, "half": HALF, "block": BLOCK, "lens": LENS, "low": LOW, "arch": ARCH}
+ZONE = (-0.4, 0.4, -0.5, 0.5)
+
+
+def sizes(design: Any, share: float = 0.08, grow: float = 4.0) -> Any:
+    size = share * design.height_mm
+    return SimpleNamespace(size_mm=size, base_size_mm=grow * size, mesher="swept", layers=2)
+
+
+def zone(design: Any) -> tuple[float, float, float, float]:
+    length, width = design.half_length_mm, design.width_mm
+    return ZONE[0] * length, ZONE[1] * length, ZONE[2] * width, ZONE[3] * width
+
+
+def check_whole(mesh: Mesh) -> None:
+    """Cells positive, facets the boundary once and outward."""
+    d = mesh.dim
+    assert mesh.is_quadratic
+    assert (signed_volumes(mesh) > 0.0).all()
+    assert (curved_jacobians(mesh) > 0.0).all()
+    assert np.array_equal(np.unique(mesh.cells), np.arange(len(mesh.points)))
+    outer = {tuple(np.roll(f, -np.argmin(f))) for f in boundary(mesh.cells[:, : d + 1], d)}
+    listed = [tuple(np.roll(f[:d], -np.argmin(f[:d]))) for facets in mesh.facets.values() for f in facets]
+    assert len(listed) == len(set(listed))
+    assert set(listed) == outer
+
+
+def check_planes(mesh: Mesh, design: Any) -> None:
+    """Labelled planes are planes to the last bit, and contact nodes, mid-edge nodes too, lie on the exact surface."""
+    at = {label: mesh.points[np.unique(f)] for label, f in mesh.facets.items()}
+    assert (at["base"][:, 1] == 0.0).all()
+    if len(at.get("walls", [])):
+        np.testing.assert_array_equal(np.abs(at["walls"][:, 0]), design.half_length_mm)
+    if "ends" in at:
+        np.testing.assert_array_equal(np.abs(at["ends"][:, 2]), 0.5 * design.width_mm)
+    for axis, label in ((0, "symmetry_x"), (2, "symmetry_z")):
+        assert (at[label][:, axis] == 0.0).all() if label in at else True
+    contact = at["contact"]
+    z = contact[:, 2] if mesh.dim == 3 else np.zeros(len(contact))
+    # Heights are ill-conditioned where the curve runs into a vertical.
+    inner = np.abs(contact[:, 0]) < 0.99 * design.half_length_mm
+    np.testing.assert_allclose(contact[inner, 1], design.top(contact[inner, 0], z[inner]), rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("symmetry", [(), ("x",)])
+@pytest.mark.parametrize("name", ALL)
+def test_sections_are_sound(name: str, symmetry: tuple[str, ...]) -> None:
+    design = ALL[name]
+    mesh, report = mesh_section(design, sizes(design), zone(design), symmetry)
+    assert mesh.dim == 2
+    check_whole(mesh)
+    check_planes(mesh, design)
+    assert ("symmetry_x" in mesh.facets) == bool(symmetry)
+    assert report.volume_mm3 == pytest.approx(report.cad_volume_mm3, rel=1e-4)
+    assert report.cad_volume_mm3 == pytest.approx(design.volume_mm3, rel=1e-12)
+    assert (report.points, report.cells) == (len(mesh.points), len(mesh.cells))
+    # A lens ends in a corner of 30 degrees, 53 for the low one; others have none below 90.
+    assert report.min_dihedral_deg > (5.0 if name in ("lens", "low") else 11.0)
+
+
+@pytest.mark.parametrize("symmetry", [(), ("x",), ("z",), ("x", "z")])
+@pytest.mark.parametrize("name", ["fig9", "half", "block"])
+def test_swept_solids_are_sound(name: str, symmetry: tuple[str, ...]) -> None:
+    design = ALL[name]
+    mesh, report = mesh_solid(design, sizes(design), zone(design), symmetry)
+    check_whole(mesh)
+    check_planes(mesh, design)
+    assert {f"symmetry_{axis}" for axis in symmetry} == {label for label in mesh.facets if "symmetry" in label}
+    assert report.volume_mm3 == pytest.approx(design.volume_mm3, rel=1e-4)
+    assert report.min_dihedral_deg > 11.0
+    assert not report.from_cache
+    assert report.cache_path is None
+
+
+def test_meshes_are_deterministic() -> None:
+    first, second = (mesh_solid(FIG9, sizes(FIG9), zone(FIG9), ())[1].hash for _ in range(2))
+    assert first == second != mesh_solid(FIG9, sizes(FIG9, 0.07), zone(FIG9), ())[1].hash
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_whole_is_its_own_mirror_image_to_the_last_bit(dim: int) -> None:
+    # A zone off the middle must not spoil it.
+    where = (5.0, 20.0, -10.0, 10.0)
+    mesh = mesh_section(FIG9, sizes(FIG9), where)[0] if dim == 2 else mesh_solid(FIG9, sizes(FIG9), where)[0]
+    number = {tuple(p): i for i, p in enumerate(mesh.points)}
+    cells = {tuple(sorted(c)) for c in mesh.cells.tolist()}
+    for axis in (0, 2)[: dim - 1]:
+        flip = np.ones(dim)
+        flip[axis] = -1.0
+        image = np.array([number[tuple(p)] for p in mesh.points * flip + 0.0])
+        assert {tuple(sorted(c)) for c in image[mesh.cells].tolist()} == cells
+
+
+def test_a_quarter_unfolds_to_the_whole() -> None:
+    quarter, report = mesh_solid(HALF, sizes(HALF), zone(HALF), ("x", "z"))
+    whole = unfold(quarter, (0, 2))[0]
+    check_whole(whole)
+    assert mesh_solid(HALF, sizes(HALF), zone(HALF), ())[1].points == len(whole.points)
+    assert report.volume_mm3 == pytest.approx(HALF.volume_mm3, rel=1e-4)
+
+
+@pytest.mark.parametrize("size", [0.5, 1.0, 2.0])
+def test_edges_have_the_asked_length_in_the_zone_and_grow_away_from_it(size: float) -> None:
+    options = SimpleNamespace(size_mm=size, base_size_mm=8.0, mesher="swept")
+    mesh = mesh_section(FIG9, options, (-40.0, 40.0, 0.0, 0.0))[0]
+    edges = mesh.points[mesh.facets["contact"][:, :2]]
+    length = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
+    inside = np.abs(edges[..., 0]).max(axis=1) < 40.0
+    np.testing.assert_allclose(length[inside], size, rtol=0.05)
+    assert length[inside].max() / length[inside].min() < 1.001
+    base = mesh.points[mesh.facets["base"][:, :2]]
+    assert np.linalg.norm(base[:, 1] - base[:, 0], axis=1).max() == pytest.approx(8.0, rel=0.2)
+    assert np.diff(np.sort(mesh.points[mesh.points[:, 0] == 0.0][:, 1]))[-1] == pytest.approx(size / 2, rel=0.2)
+
+
+def test_the_curved_area_converges_with_the_fourth_power_of_the_size() -> None:
+    errors = []
+    for share in (0.16, 0.08, 0.04):
+        report = mesh_section(HALF, sizes(HALF, share, 1.0), zone(HALF))[1]
+        errors.append(abs(report.volume_mm3 / report.cad_volume_mm3 - 1.0))
+    rates = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert (rates > 3.5).all()
+
+
+def test_a_section_of_25_000_unknowns_takes_less_than_03_s() -> None:
+    options = SimpleNamespace(size_mm=0.38, base_size_mm=1.5)
+    mesh_section(FIG9, options, (-44.0, 44.0, 0.0, 0.0))
+    start = time.perf_counter()
+    mesh = mesh_section(FIG9, options, (-44.0, 44.0, 0.0, 0.0))[0]
+    assert mesh.points.size > 20_000
+    assert time.perf_counter() - start < 0.3  # measured 0.03 s on one of two busy cores
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    radius=st.floats(1.0, 200.0),
+    length=st.floats(0.4, 1.0),
+    edge=st.one_of(st.just(0.0), st.floats(0.1, 1.0)),
+    share=st.floats(0.02, 0.3),
+    grow=st.floats(1.0, 10.0),
+    where=st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)),
+)
+def test_any_finger_gives_a_sound_section(
+    radius: float, length: float, edge: float, share: float, grow: float, where: tuple[float, float]
+) -> None:
+    design = designs()["clipped_cylinder"](radius, length * radius, edge * radius, 10.0)
+    size = share * min(design.height_mm, design.half_length_mm)
+    options = SimpleNamespace(size_mm=size, base_size_mm=grow * size)
+    low, high = sorted(w * design.half_length_mm for w in where)
+    mesh, report = mesh_section(design, options, (low, high, 0.0, 0.0))
+    check_whole(mesh)
+    assert report.volume_mm3 == pytest.approx(design.volume_mm3, rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"size_mm": 60.0, "base_size_mm": 60.0}, "mesh.size_mm = 60 is larger than the finger.*width, 20 mm"),
+        ({"size_mm": 3.0, "base_size_mm": 2.0}, "mesh.base_size_mm = 2 is smaller than size_mm"),
+        ({"size_mm": 0.0}, "mesh.size_mm = 0.0 is no edge length"),
+        ({"base_size_mm": math.nan}, "mesh.base_size_mm = nan is no edge length"),
+        ({"size_mm": 0.01, "base_size_mm": 0.02}, "mesh.size_mm = 0.01 .* tetrahedra, forecast .* GB"),
+    ],
+)
+def test_sizes_that_cannot_work_are_refused_in_one_line(changes: dict[str, float], text: str) -> None:
+    options = SimpleNamespace(**{"size_mm": 2.0, "base_size_mm": 8.0, "mesher": "swept", "layers": 2, **changes})
+    with pytest.raises(Finger3dError, match=text) as refused:
+        mesh_solid(FIG9, options, zone(FIG9))
+    assert "\n" not in str(refused.value)
+
+
+def test_a_wall_too_thin_for_the_size_is_refused() -> None:
+    design = designs()["clipped_cylinder"](100.0, 100.0, 0.02, 20.0)
+    with pytest.raises(Finger3dError, match="choose smaller sizes, or edge_height_mm = 0"):
+        mesh_section(design, SimpleNamespace(size_mm=20.0, base_size_mm=50.0), (-20.0, 20.0, 0.0, 0.0))
+
+
+def test_a_design_without_section_cannot_be_swept() -> None:
+    ball = designs()["hemisphere"](5.0)
+    options = SimpleNamespace(size_mm=1.0, base_size_mm=2.0, mesher="swept", layers=2)
+    with pytest.raises(Finger3dError, match="hemisphere.*'ftetwild'"):
+        mesh_solid(ball, options, (-1, 1, -1, 1))
+    with pytest.raises(Finger3dError, match="hemisphere.*'solid'"):
+        mesh_section(ball, options, (-1, 1, -1, 1))
+
+
+def test_structured_meshes_load_no_cad() -> None:
+    code = (
+        "import sys; from types import SimpleNamespace as N; from finger3d.geometry.registry import *;"
+        "from finger3d.meshing.generate import *; from finger3d.meshing.swept import *;"
+        "d = designs()['half_cylinder'](5.0, 10.0); o = N(size_mm=0.5, base_size_mm=2.0, mesher='swept', layers=2);"
+        "z = (-2, 2, -5, 5); mesh_section(d, o, z); mesh_solid(d, o, z);"
+        "print({'build123d', 'OCP', 'pytetwild', 'trimesh', 'scipy', 'vtk'} & set(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
+    assert done.stdout.strip() == "set()"
+
+
+def test_cell_angles_of_known_cells() -> None:
+    corner = np.vstack([np.zeros(3), np.eye(3)])
+    assert cell_angles_deg(corner, np.array([[0, 1, 2, 3]]))[0] == pytest.approx(math.degrees(math.acos(3**-0.5)))
+    assert cell_angles_deg(corner, np.array([[1, 0, 2, 3]]))[0] == 0.0
+    assert cell_angles_deg(corner[:3, :2], np.array([[0, 1, 2]]))[0] == pytest.approx(45.0)
+
+
+@pytest.mark.parametrize("size", [5.6, 4.0, 2.8, 2.0])
+def test_no_layer_along_z_is_thicker_than_the_edges_at_the_contact(size: float) -> None:
+    options = SimpleNamespace(size_mm=size, base_size_mm=4.0 * size, mesher="swept", layers=2)
+    mesh = mesh_solid(FIG9, options, zone(FIG9))[0]
+    levels = np.unique(mesh.points[np.unique(mesh.facets["contact"][:, :3]), 2])
+    assert np.diff(levels).max() <= size
+
+
+def test_the_least_number_of_layers_is_kept() -> None:
+    for layers in (1, 2, 4):
+        options = SimpleNamespace(size_mm=12.0, base_size_mm=12.0, mesher="swept", layers=layers)
+        mesh = mesh_solid(FIG9, options, zone(FIG9))[0]
+        levels = np.unique(mesh.points[np.unique(mesh.facets["contact"][:, :3]), 2])
+        assert len(levels) == 2 * layers + 1

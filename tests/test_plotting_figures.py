@@ -1,0 +1,280 @@
+"""Pictures are drawn, show what they should, and survive a machine without OpenGL."""
+
+from __future__ import annotations
+
+import itertools
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
+from finger3d.errors import MissingError
+from finger3d.fem.simplex import Mesh, boundary, quadratic
+from finger3d.plotting import solid as render
+from finger3d.plotting.figures import contact_figure, finger_picture, force_figure, zones
+
+MU = 0.25
+
+
+def top(x: np.ndarray) -> np.ndarray:
+    """Height of the Fig. 9 finger, R = 100, mm."""
+    return 36.6 + np.sqrt(100.0**2 - x**2) - np.sqrt(100.0**2 - 50.0**2)
+
+
+def finger(shape: tuple[int, ...]) -> Mesh:
+    """A coarse Fig. 9 finger, (nx, ny) or (nx, ny, nz) boxes, quadratic, with labelled facets."""
+    d = len(shape)
+    grid = np.stack(np.meshgrid(*(np.linspace(0, 1, n + 1) for n in shape), indexing="ij"), axis=-1).reshape(-1, d)
+    number = np.arange(len(grid)).reshape([n + 1 for n in shape])
+    cells = []
+    for order in itertools.permutations(range(d)):
+        corner, path = [0] * d, []
+        for axis in (None, *order):
+            if axis is not None:
+                corner[axis] = 1
+            path.append(number[tuple(slice(c, c + n) for c, n in zip(corner, shape, strict=True))].ravel())
+        cells.append(np.stack(path, axis=1))
+    tets = np.concatenate(cells)
+    x = 100.0 * grid[:, 0] - 50.0
+    points = np.column_stack([x, grid[:, 1] * top(x), *(20.0 * grid[:, k] - 10.0 for k in range(2, d))])
+    negative = np.linalg.det(points[tets[:, 1:]] - points[tets[:, :1]]) < 0.0
+    tets[negative] = tets[negative][:, [1, 0, *range(2, d + 1)]]
+    faces, at = boundary(tets, d), {}
+    sides_of = {"contact": (1, (1.0,)), "base": (1, (0.0,)), "walls": (0, (0.0, 1.0)), "ends": (2, (0.0, 1.0))}
+    for label, (axis, sides) in sides_of.items():
+        if axis < d:
+            on = [np.all(grid[faces][..., axis] == side, axis=1) for side in sides]
+            at[label] = faces[np.any(on, axis=0)]
+    return quadratic(Mesh(points, tets, at))
+
+
+def pressed(mesh: Mesh) -> dict[str, Any]:
+    """Made-up but likely fields: pressed 10 mm, Hertz's pressure, friction limited by mu p and pointing outward."""
+    x, y = mesh.points[:, 0], mesh.points[:, 1]
+    push = np.maximum(top(x) - 40.0, 0.0)
+    u = np.zeros_like(mesh.points)
+    u[:, 1] = -push * (y / top(x)) ** 1.5
+    u[:, 0] = 0.05 * x * (y / 50.0) * (1.0 - y / 55.0)
+    if mesh.dim == 3:
+        u[:, 2] = 0.25 * mesh.points[:, 2] * np.sin(np.pi * np.minimum(y / 48.0, 1.0)) * np.exp(-((x / 45.0) ** 2))
+    nodes = np.unique(mesh.facets["contact"][:, : mesh.dim])
+    a = 38.0
+    inside = np.abs(x[nodes]) < a
+    pressure = 0.3 * np.sqrt(np.maximum(1.0 - (x[nodes] / a) ** 2, 0.0))
+    along = mesh.points[nodes][:, [0, *range(2, mesh.dim)]] / np.array([a, 10.0][: mesh.dim - 1])
+    wanted = 0.09 * along
+    size = np.linalg.norm(wanted, axis=1)
+    limit = MU * pressure
+    shear = wanted * np.minimum(1.0, limit / np.maximum(size, 1e-12))[:, None]
+    status = np.where(~inside, OPEN, np.where(size < limit, STICK, SLIP))
+    table = {
+        "x_mm": x[nodes],
+        "z_mm": mesh.points[nodes, 2] if mesh.dim == 3 else np.zeros(len(nodes)),
+        "pressure_MPa": pressure,
+        "shear_x_MPa": shear[:, 0],
+        "shear_z_MPa": shear[:, 1] if mesh.dim == 3 else np.zeros(len(nodes)),
+        "status": [STATUS_NAMES[s] for s in status],
+    }
+    return {"displacement": u, "table": table, "contact_nodes": nodes}
+
+
+def pixels(path: Path) -> np.ndarray:
+    """The picture as (h, w, 3) in 0 .. 1."""
+    from matplotlib.image import imread
+
+    return imread(path)[..., :3]
+
+
+def share(path: Path, colour: str, within: float = 0.12) -> float:
+    """Share of the pixels that have about that colour."""
+    from matplotlib.colors import to_rgb
+
+    return float(np.mean(np.all(np.abs(pixels(path) - to_rgb(colour)) < within, axis=-1)))
+
+
+@pytest.fixture(autouse=True)
+def _fresh_renderer(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No renderer is forced, and no crash of another test is remembered."""
+    monkeypatch.delenv("FINGER3D_RENDERER", raising=False)
+    monkeypatch.setattr(render, "_failure", [])
+
+
+@pytest.fixture(scope="module")
+def solid() -> tuple[Mesh, dict[str, Any]]:
+    mesh = finger((20, 5, 6))
+    return mesh, pressed(mesh)
+
+
+def assert_shows_the_zones(path: Path) -> None:
+    """Both zones cover a visible part of the picture, and the pressure has the colours of a peak and of an edge."""
+    assert pixels(path).std() > 0.1
+    assert share(path, render.COLOURS[STICK]) > 0.01
+    assert share(path, render.COLOURS[SLIP]) > 0.01
+    assert share(path, "#dde318", within=0.2) > 0.01
+    assert share(path, "#33638d", within=0.2) > 0.003
+
+
+PROFILE = np.array([[-55.0, 40.0], [55.0, 40.0]])
+
+
+def test_a_solid_is_drawn_by_matplotlib_when_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, solid: tuple[Mesh, dict[str, Any]]
+) -> None:
+    monkeypatch.setenv("FINGER3D_RENDERER", "matplotlib")
+    mesh, result = solid
+    assert finger_picture(tmp_path / "f.png", mesh, **result, title="Fig. 9", profile=PROFILE) == "matplotlib"
+    assert_shows_the_zones(tmp_path / "f.png")
+
+
+def test_pyvista_draws_a_solid_or_tells_that_opengl_is_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, solid: tuple[Mesh, dict[str, Any]]
+) -> None:
+    monkeypatch.setenv("FINGER3D_RENDERER", "pyvista")
+    mesh, result = solid
+    tiny = "import pyvista as pv; p = pv.Plotter(off_screen=True); p.add_mesh(pv.Sphere()); p.screenshot()"
+    if render.run_child([sys.executable, "-c", tiny]) is None:
+        assert finger_picture(tmp_path / "f.png", mesh, **result, title="Fig. 9", profile=PROFILE) == "pyvista"
+        assert_shows_the_zones(tmp_path / "f.png")
+    else:
+        with pytest.raises(MissingError, match="PyVista cannot render here"):
+            finger_picture(tmp_path / "f.png", mesh, **result)
+
+
+def test_a_crash_of_the_renderer_is_survived_and_remembered(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, solid: tuple[Mesh, dict[str, Any]]
+) -> None:
+    # Without an EGL driver and a display VTK ends its process by a segmentation fault; abort() is as hard.
+    (tmp_path / "sitecustomize.py").write_text(
+        f"import os, pathlib\npathlib.Path({str(tmp_path / 'tried')!r}).open('a').write('x')\nos.abort()\n"
+    )
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    mesh, result = solid
+    for name in ("one.png", "two.png"):
+        assert finger_picture(tmp_path / name, mesh, **result) == "matplotlib"
+        assert_shows_the_zones(tmp_path / name)
+    assert (tmp_path / "tried").read_text() == "x"
+    monkeypatch.setenv("FINGER3D_RENDERER", "pyvista")
+    with pytest.raises(MissingError, match="crashed .signal 6.*unset FINGER3D_RENDERER"):
+        finger_picture(tmp_path / "three.png", mesh, **result)
+
+
+def test_a_missing_opengl_driver_is_survived(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, solid: tuple[Mesh, dict[str, Any]]
+) -> None:
+    monkeypatch.setenv("__EGL_VENDOR_LIBRARY_FILENAMES", str(tmp_path / "no-such-driver.json"))
+    monkeypatch.delenv("DISPLAY", raising=False)
+    mesh, result = solid
+    assert finger_picture(tmp_path / "f.png", mesh, **result) == "matplotlib"
+    assert_shows_the_zones(tmp_path / "f.png")
+
+
+def test_a_section_is_drawn_without_vtk(tmp_path: Path) -> None:
+    mesh = finger((50, 10))
+    assert finger_picture(tmp_path / "f.png", mesh, **pressed(mesh), title="Fig. 9, plane strain") == "matplotlib"
+    assert pixels(tmp_path / "f.png").std() > 0.1
+    assert share(tmp_path / "f.png", render.COLOURS[STICK]) > 1e-3
+    assert share(tmp_path / "f.png", render.COLOURS[SLIP]) > 1e-3
+
+
+def test_what_draws_loads_neither_the_solver_nor_a_renderer() -> None:
+    code = (
+        "import sys, finger3d.plotting.worker; begun = 'numpy' in sys.modules; import finger3d.plotting.figures;"
+        "print(begun, {'matplotlib', 'vtkmodules', 'scipy', 'finger3d.mechanics'} & set(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False set()"
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_finger_that_does_not_touch_is_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, dim: int) -> None:
+    monkeypatch.setenv("FINGER3D_RENDERER", "matplotlib")
+    mesh = finger((10, 4, 3)[:dim])
+    result = pressed(mesh)
+    count = len(result["contact_nodes"])
+    none = {name: np.zeros(count) for name in ("pressure_MPa", "shear_x_MPa", "shear_z_MPa")}
+    table = {**result["table"], **none, "status": ["open"] * count}
+    finger_picture(tmp_path / "f.png", mesh, np.zeros_like(mesh.points), table, result["contact_nodes"])
+    assert pixels(tmp_path / "f.png").std() > 0.05
+    assert share(tmp_path / "f.png", render.COLOURS[STICK]) < 5e-3  # the legend's patch only
+
+
+def test_the_skin_is_the_whole_boundary_and_lies_on_the_curved_surface(solid: tuple[Mesh, dict[str, Any]]) -> None:
+    mesh, result = solid
+    table = result["table"]
+    status = np.array([STATUS_NAMES.index(s) for s in table["status"]])
+    shear = np.column_stack([table["shear_x_MPa"], table["shear_z_MPa"]])
+    still = np.zeros_like(mesh.points)
+    skin = render.skin_of(mesh, still, table["pressure_MPa"], shear, status, result["contact_nodes"], None)
+    assert len(skin.contact) == 6 * len(mesh.facets["contact"])
+    assert len(skin.body) == sum(len(f) for k, f in mesh.facets.items() if k != "contact")
+    assert np.abs(skin.contact[..., 1] - top(skin.contact[..., 0])).max() < 0.2  # sagitta of a facet 5 mm long
+    edges = skin.contact[:, 1:] - skin.contact[:, :1]
+    area = 0.5 * np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+    assert area.sum() == pytest.approx(20.0 * 200.0 * np.arcsin(0.5), rel=1e-3)
+    # Every contact point owns as much of the picture as of the surface: slip's share of the touching area.
+    touching = skin.status != OPEN
+    assert 0.4 < area[skin.status == SLIP].sum() / area[touching].sum() < 0.9
+    assert 20 < len(skin.arrow) < 150
+    assert np.linalg.norm(skin.arrow, axis=1).max() <= 1.0 + 1e-12
+
+
+def test_zones_meet_between_points_of_different_status() -> None:
+    x = np.array([-2.0, -1.0, 0.0, 1.0, 2.0, 3.0])
+    status = np.array([OPEN, SLIP, STICK, STICK, SLIP, OPEN])
+    assert zones(x, status) == [
+        (-2.0, -1.5, OPEN),
+        (-1.5, -0.5, SLIP),
+        (-0.5, 1.5, STICK),
+        (1.5, 2.5, SLIP),
+        (2.5, 3.0, OPEN),
+    ]
+    assert zones(x[:1], status[:1]) == [(-2.0, -2.0, OPEN)]
+    assert zones(x[:0], status[:0]) == []
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_contact_forces_are_drawn_with_their_zones(tmp_path: Path, dim: int) -> None:
+    mesh = finger((40, 4, 6)[:dim])
+    half_width = 10.0 if dim == 3 else None
+    contact_figure(tmp_path / "c.png", pressed(mesh)["table"], MU, half_width_mm=half_width)
+    assert share(tmp_path / "c.png", "#c9d9ee", within=0.02) > 0.05
+    assert share(tmp_path / "c.png", "#fde3c4", within=0.02) > 0.05
+    # The end line z = width/2 is a second panel below the middle one.
+    ratio = pixels(tmp_path / "c.png").shape[0] / pixels(tmp_path / "c.png").shape[1]
+    assert (ratio > 0.8) == (dim == 3)
+
+
+def test_a_huge_mu_does_not_flatten_the_contact_forces(tmp_path: Path) -> None:
+    mesh = finger((40, 4))
+    pictures = []
+    for mu in (2.0, 1e6):
+        contact_figure(tmp_path / f"{mu}.png", pressed(mesh)["table"], mu)
+        pictures.append(pixels(tmp_path / f"{mu}.png"))
+    # The red curve of f_t is as tall in both.
+    tall = [
+        np.ptp(np.flatnonzero(np.any(np.abs(p - [0.753, 0.224, 0.169]).max(axis=2) < 0.05, axis=1))) for p in pictures
+    ]
+    assert tall[1] == pytest.approx(tall[0], rel=0.1)
+    assert tall[0] > 50
+
+
+def test_force_against_depth_is_drawn(tmp_path: Path) -> None:
+    force_figure(tmp_path / "f.png", STEPS, "Fig. 9")
+    assert share(tmp_path / "f.png", "#c0392b", within=0.05) > 1e-4
+    assert share(tmp_path / "f.png", render.COLOURS[STICK], within=0.05) > 1e-4
+
+
+STEPS = [
+    {
+        "depth_mm": d,
+        "normal_force_N": 15.0 * d**1.3,
+        "friction_sum_N": 3.0 * d**1.3,
+        "contact_half_length_mm": 7.0 * d**0.7,
+        "stick_half_length_mm": 5.0 * d**0.7,
+    }
+    for d in range(1, 11)
+]

@@ -1,0 +1,173 @@
+"""Pictures know their panels; every panel can be read on a telephone, and nothing of it sticks out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from finger3d.errors import Outcome
+from finger3d.mechanics.model import Gauge
+from finger3d.plotting.calibration import draw as draw_calibration
+from finger3d.plotting.comparison import draw as draw_comparison
+from finger3d.plotting.figures import contact_figure, finger_picture, force_figure
+from finger3d.plotting.gauges import marks_of
+from finger3d.plotting.layout import DPI, Panel, cells, panels_of, sheet
+from finger3d.plotting.optimise import draw as draw_search
+from finger3d.plotting.strain_map import draw_map
+from finger3d.report.sweep import sweep_charts
+from finger3d.report.sweep_figure import draw as draw_sweep
+from finger3d.results.comparison import Case
+from finger3d.sensor.curve import Calibration, Tolerance
+from finger3d.sensor.maps import StrainMap
+from tests.test_plotting_figures import MU, STEPS, finger, pressed
+
+PHONE = 368  # CSS pixels that a page 400 wide leaves for a figure
+LEGIBLE = 7  # CSS pixels of an em: below, lower-case letters have less than four pixels
+
+GAUGE = Gauge("g36", 36.0, 40.0)
+
+MUS = np.linspace(0.05, 1.0, 6)
+CAUSES = ("depth_mm", "E_percent", "nu", "tilt_deg", "gauge_x_mm", "gauge_y_mm", "gauge_angle_deg", "mesh")
+CURVE = Calibration(
+    "g36", MUS, 0.02 + 0.01 * MUS - 0.004 * MUS**2, 1.5e-4, 0.1,
+    tuple(Tolerance(name, "", 0.5, np.full(6, 1e-3), np.full(6, 1e-3)) for name in CAUSES), about={"domain": "solid"},
+)  # fmt: skip
+
+
+def contact(path: Path) -> None:
+    contact_figure(path, pressed(finger((40, 4, 6)))["table"], MU, half_width_mm=10.0)
+
+
+def section(path: Path) -> None:
+    mesh = finger((20, 4))
+    finger_picture(path, mesh, **pressed(mesh), title="9 N", marks=marks_of(mesh, [GAUGE]), profile=np.eye(2))
+
+
+def solid(path: Path) -> None:
+    mesh = finger((20, 4, 3))
+    marks = marks_of(mesh, [GAUGE], near=True)
+    finger_picture(path, mesh, **pressed(mesh), title="9 N", marks=marks, profile=np.eye(2))
+
+
+def comparison(path: Path) -> None:
+    names = ("force_N_per_mm", "contact_length_mm", "stick_length_mm", "friction_sum_N_per_mm",
+             "friction_along_x_N_per_mm", "peak_pressure_MPa", "gauge_g36", "gauge_g40")  # fmt: skip
+    x = np.linspace(-20.0, 20.0, 9)
+    line = {"x_mm": x, "pressure_MPa": 0.1 - 2e-4 * x**2, "shear_x_MPa": 1e-4 * x}
+    cases = [
+        Case(model, 20.0, 2.0, "swept", Outcome.CONVERGED, dict.fromkeys(names, 30.0), lines={"z = 0": line})
+        for model in ("plane strain", "plane stress", "solid")
+    ]
+    draw_comparison(path, cases, 20.0, "Fig. 9 finger, 20 mm wide")
+
+
+def calibration(path: Path) -> None:
+    draw_calibration(path, CURVE)
+
+
+def strain_map(path: Path) -> None:
+    x, y = np.linspace(-50.0, 50.0, 21), np.linspace(0.0, 50.0, 11)
+    strain = 1e-3 * np.random.default_rng(0).random((len(MUS), len(y), len(x), 3))
+    draw_map(path, StrainMap(MUS, x, y, 0.0, strain), Gauge("g36", 36.0, 40.0, 0.0, 0.5), CURVE)
+
+
+def sweep(path: Path) -> None:
+    keys = ["friction.mu", "material.nu", "press.depth_mm"]
+    rows = [
+        {**dict(zip(keys, map(str, (a, b, c)), strict=True)), "outcome": "converged",
+         "normal_force_N": str(1000.0 * a * b * c), "gauge_g36": str(1000.0 * a * b * c - 9e3)}
+        for a, b, c in product([0.06, 0.25, 1.0], [0.3, 0.45, 0.49], [5.0, 10.0, 15.0])
+    ]  # fmt: skip
+    draw_sweep(path, sweep_charts(rows, keys))
+
+
+def search(path: Path) -> None:
+    places = np.random.default_rng(0).random((30, 3))
+    values = [-1000.0 * a if b > 0.2 else np.nan for a, b, _ in places]
+    draw_search(path, ["finger.radius_mm", "gauge.g36.x_mm", "gauge.g36.angle_deg"], places, values, places[0], "best")
+
+
+@pytest.fixture
+def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """The figures that are saved; solids are drawn by matplotlib."""
+    from matplotlib.figure import Figure
+
+    seen, save = [], Figure.savefig
+
+    def kept(figure: Any, *arguments: Any, **options: Any) -> None:
+        seen.append(figure)
+        save(figure, *arguments, **options)
+
+    monkeypatch.setattr(Figure, "savefig", kept)
+    monkeypatch.setenv("FINGER3D_RENDERER", "matplotlib")
+    return seen
+
+
+@pytest.mark.parametrize(
+    ("draw", "count"),
+    [(contact, 2), (section, 2), (solid, 2), (comparison, 4), (calibration, 3), (strain_map, 3), (sweep, 6),
+     (search, 4), (lambda path: force_figure(path, STEPS), 2)],
+    ids=["contact", "section", "solid", "comparison", "calibration", "map", "sweep", "design", "force"],
+)  # fmt: skip
+def test_a_panel_is_legible_on_a_telephone_and_holds_all_that_belongs_to_it(
+    tmp_path: Path, figures: list[Any], draw: Callable[[Path], object], count: int
+) -> None:
+    from matplotlib.text import Text
+
+    draw(tmp_path / "p.png")
+    size, panels = panels_of(tmp_path / "p.png")
+    assert len(panels) == count
+    assert all(panel.name[0].isupper() for panel in panels)
+    (figure,) = figures
+    smallest = min(t.get_fontsize() for t in figure.findobj(Text) if t.get_text() and t.get_visible())
+    widest = max(panel.width for panel in panels)
+    assert smallest / 72.0 * PHONE / (widest / DPI) >= LEGIBLE
+    # a tick label may be half outside of its axes, and antialiasing spreads by a pixel: both are inside the cell
+    scale = np.array(size) / figure.bbox.size
+    for part in (*figure.axes, *figure.legends):
+        box = part.get_tightbbox(figure.canvas.get_renderer())
+        left, right = np.array([box.x0, box.x1]) * scale[0]
+        top, bottom = size[1] - np.array([box.y1, box.y0]) * scale[1]
+        inside = [
+            p for p in panels
+            if p.left - 1 <= left and right <= p.left + p.width + 1 and p.top - 1 <= top
+            and bottom <= p.top + p.height + 1
+        ]  # fmt: skip
+        assert len(inside) == 1, (part, left, right, top, bottom, panels)
+
+
+def test_a_picture_comes_back_with_its_panels(tmp_path: Path) -> None:
+    made = sheet(2, 3, (2.0, 1.0), (0.2, 0.1, 0.3, 0.1))
+    made.save(tmp_path / "ü.png", ["a", "b", "c", "d", "<e> & 'é'", "f"])
+    size, panels = panels_of(tmp_path / "ü.png")
+    assert size == (6 * DPI, 2 * DPI)
+    assert panels[4] == Panel("<e> & 'é'", 2 * DPI, DPI, 2 * DPI, DPI)
+    # axes of the same cell: 0.2 in from its left, 0.3 in above its lower end
+    box = made.axes[4].get_position()
+    assert (box.x0 * 6.0, box.y0 * 2.0) == pytest.approx((2.2, 0.3))
+    assert (box.width * 6.0, box.height * 2.0) == pytest.approx((1.7, 0.6))
+
+
+def test_a_title_stands_above_the_panels(tmp_path: Path) -> None:
+    sheet(1, 2, (3.0, 2.0), (0.5, 0.1, 0.5, 0.1), "a title").save(tmp_path / "p.png", "ab")
+    (_, height), panels = panels_of(tmp_path / "p.png")
+    assert [panel.top + panel.height for panel in panels] == [height, height]
+    assert [panel.height for panel in panels] == [2 * DPI, 2 * DPI]
+    assert panels[0].top > 0
+
+
+def test_other_pictures_have_no_panels(tmp_path: Path) -> None:
+    from PIL import Image
+
+    Image.new("RGB", (30, 20)).save(tmp_path / "p.png")
+    assert panels_of(tmp_path / "p.png") == ((30, 20), [])
+
+
+def test_cells_share_what_the_title_leaves() -> None:
+    assert cells(1, 2, 0.25) == [(0.0, 0.25, 0.5, 1.0), (0.5, 0.25, 1.0, 1.0)]
+    assert [box[1] for box in cells(2, 1)] == [0.0, 0.5]
