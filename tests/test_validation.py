@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import pytest
@@ -14,15 +13,11 @@ STUDIES = studies()
 
 @pytest.mark.parametrize("study", STUDIES.values(), ids=STUDIES.keys())
 def test_study_quick(study: Study, tmp_path: Path) -> None:
-    start = time.process_time()
     result = study.run(quick=True)
-    seconds = time.process_time() - start
     assert result.rows
     assert not [row for row in result.rows if not row.passed]
     if result.figure is not None:
         draw(result.figure, tmp_path / "figure.png")
-    # aim: 5 s at most.  Own processor time, which a busy machine stretches to about twice that
-    assert seconds < 10.0, f"{study.name} takes {seconds:.1f} s"
 
 
 @pytest.mark.parametrize("study", STUDIES.values(), ids=STUDIES.keys())
