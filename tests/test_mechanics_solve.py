@@ -189,9 +189,9 @@ def test_work_is_what_is_stored_and_dissipated_in_few_increments_and_in_many(leg
         excess.append(abs(work - stored(problem, end) - end.dissipation_mJ) / work)
     if mu == 0.0:
         assert max(excess) < 1e-12  # of a linear body the sum is exact; a trapezoid over the depth leaves 1e-2 in 5
-    # friction turns where slip reverses: second order in the increment, 16 for each factor of 4
-    assert excess[3] <= max(excess[1] / 8.0, 1e-12)
-    assert excess[2] < 1e-3
+    # friction turns where slip reverses: second order in the increment, though points that change state make it uneven
+    for steps, left in zip((5, 10, 20, 40), excess, strict=True):
+        assert left < 0.4 / steps**2
 
 
 def test_dissipation_of_a_press_that_slips_everywhere_is_good_in_ten_increments() -> None:

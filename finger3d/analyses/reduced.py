@@ -21,6 +21,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from finger3d._machine import versions
+from finger3d.analyses.reduced_arrays import check_arrays
 from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import Elasticity, Stiffness
@@ -224,7 +225,7 @@ class Condensed:
         try:
             model = _model(header, arrays)
             axes = tuple(header["axes"])
-            _check_arrays(arrays, 2 if model.domain != "solid" else 3, len(model.gauges))
+            check_arrays(arrays, 2 if model.domain != "solid" else 3, len(model.gauges))
             problem = _assembled(model, arrays, float(header["touch_mm"]), axes)
             return cls(problem, _face("other", arrays, problem.dim), header["about"])
         except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError):
@@ -410,33 +411,3 @@ def _made(kind: Any, values: Mapping[str, Any]) -> Any:
         elif field.name == "axis" and value not in ("x", "z"):
             raise ValueError("axis is neither x nor z")
     return made
-
-
-def _check_arrays(arrays: Mapping[str, Any], d: int, gauges: int) -> None:
-    """Raise ValueError or KeyError unless types and shapes of all arrays fit together, and numbers are finite."""
-    c, p = len(arrays["face_nodes"]), len(arrays["nodes"])
-    wanted: dict[str, tuple[int, ...]] = {
-        "compliance": (c * d, c * d), "gauge_rows": (gauges, c * d), "parent": (p,), "sign": (p, d), "share": (p,),
-        "nodes": (p,), "points": (p, 3), "area": (p,), "band": (2,),
-    }  # fmt: skip
-    if "bare_compliance" in arrays:
-        wanted |= {"bare_compliance": (c * d, c * d), "bare_gauge_rows": (gauges, c * d)}
-    for face in ("face", "other"):
-        m, samples, entries = (len(arrays[f"{face}_{name}"]) for name in ("nodes", "samples", "mean"))
-        wanted |= {
-            f"{face}_nodes": (m,), f"{face}_points": (m, d), f"{face}_area": (m,), f"{face}_samples": (samples, d),
-            f"{face}_mean": (entries,), f"{face}_mean_at": (entries,), f"{face}_mean_rows": (m + 1,),
-        }  # fmt: skip
-    if not c:
-        raise ValueError("no contact points")
-    whole = ("nodes", "parent", "mean_at", "mean_rows")
-    for name, shape in wanted.items():
-        values = arrays[name]
-        kinds = "iu" if name.endswith(whole) else "f"
-        if values.shape != shape or values.dtype.kind not in kinds or not np.isfinite(values).all():
-            raise ValueError(f"{name} does not fit")
-    if not ((arrays["parent"] >= 0) & (arrays["parent"] < c)).all():
-        raise ValueError("parent is out of range")
-    faces = arrays.get("object_faces", np.zeros(0))
-    if faces.size and not 0 <= faces.min() <= faces.max() < len(arrays["object_points"]):
-        raise ValueError("object_faces is out of range")

@@ -30,8 +30,9 @@ DISSIPATION_TOLERANCE = 0.05
 FLOOR = 1e-4
 """Share of the external work below which dissipation is not resolved: it is that of a few points that slip early."""
 
-_PAIRS = 3
-"""Pairs of successive counts that make the estimate, at most."""
+_PAIRS = {2: 4, 3: 3}
+"""Pairs of successive counts that make the estimate, at most, by dimension. With three, one section of eight drawn at
+random was called good to 1 % with an error of 1.8 %; a solid would take twice as long with four."""
 
 _LEAST_RUNS = {2: 4, 3: 3}
 """Runs before a tolerance may be met; three still agree by chance now and then, and in a section one more is cheap."""
@@ -206,7 +207,7 @@ def _ends(problem: Problem, frames: tuple[Frame, ...]) -> tuple[Frame, ...]:
 
 
 def _estimate(problem: Problem, levels: Sequence[tuple[int, tuple[Frame, ...]]]) -> StepEstimate:
-    used = levels[-(_PAIRS + 1) :]
+    used = levels[-(_PAIRS[problem.dim] + 1) :]
     counts = [count for count, _ in used]
     told = [[_numbers(problem, frame) for frame in ends] for _, ends in used]
     finest = told[-1]
