@@ -28,7 +28,7 @@ HEAVY = {
     "plotly",
 }
 TOP_LEVEL = {
-    "pyproject.toml", "finger3d", "geometries", "tests", "validation", "README.md", "LICENSE", "CITATION.cff",
+    "pyproject.toml", "finger3d", "geometries", "tests", "validation", "docs", "README.md", "LICENSE", "CITATION.cff",
     "Makefile", "CHANGELOG.md", "CONTRIBUTING.md", "constraints.txt",
 }  # fmt: skip
 
@@ -95,7 +95,7 @@ def test_versions_agree(root: Path) -> None:
 
 
 def test_the_readmes_first_screen_has_a_sentence_the_picture_and_the_two_commands(root: Path) -> None:
-    first_screen = "\n".join((root / "README.md").read_text().splitlines()[:20])
+    first_screen = "\n".join((root / "README.md").read_text().splitlines()[:25])
     assert "](validation/figures/fig9.png)" in first_screen
     targets = re.findall(r"^make (\w+)", first_screen, flags=re.MULTILINE)
     assert targets == ["demo", "test"]
@@ -104,9 +104,9 @@ def test_the_readmes_first_screen_has_a_sentence_the_picture_and_the_two_command
 
 
 def test_what_the_readme_shows_of_the_command_line_exists(root: Path) -> None:
-    readme = (root / "README.md").read_text()
-    shown = set(re.findall(r"^finger3d (\w+)", readme, flags=re.MULTILINE))
-    assert {"new", "plan", "press", "info"} <= shown
+    blocks = re.findall(r"```sh\n(.*?)```", (root / "README.md").read_text(), flags=re.DOTALL)
+    shown = set(re.findall(r"^finger3d (\w+)", "\n".join(blocks), flags=re.MULTILINE))
+    assert {"new", "plan", "press", "compare", "calibrate"} <= shown
     done = subprocess.run(
         [sys.executable, "-m", "finger3d", "--help"], cwd=root, capture_output=True, text=True, check=True
     )
@@ -114,9 +114,9 @@ def test_what_the_readme_shows_of_the_command_line_exists(root: Path) -> None:
 
 
 def test_local_links_lead_somewhere(root: Path) -> None:
-    for page in ("README.md", "CONTRIBUTING.md"):
-        for target in re.findall(r"\]\((?!https?://)([^)#]+)\)", (root / page).read_text()):
-            assert (root / target).exists(), f"{page} links to {target}"
+    for page in [root / "README.md", root / "CONTRIBUTING.md", *root.glob("docs/*.md")]:
+        for target in re.findall(r"\]\((?!https?://)([^)#]+)\)", page.read_text()):
+            assert (page.parent / target).exists(), f"{page.name} links to {target}"
 
 
 def test_the_demo_scene_is_the_papers_finger(root: Path) -> None:

@@ -1,4 +1,4 @@
-"""The README: every command that it shows is run, every example of code too, and the reference is the code's own."""
+"""README, docs/ and CONTRIBUTING: every command and every example is run, and the key table is that of the code."""
 
 from __future__ import annotations
 
@@ -23,13 +23,15 @@ COARSE = {
 
 
 def commands(root: Path) -> list[str]:
-    blocks = re.findall(r"```sh\n(.*?)```", (root / "README.md").read_text(encoding="utf-8"), flags=re.DOTALL)
+    """Every command that the README and the pages of docs/ show, once."""
+    text = "\n".join(page.read_text(encoding="utf-8") for page in [root / "README.md", *sorted(root.glob("docs/*.md"))])
+    blocks = re.findall(r"```sh\n(.*?)```", text, flags=re.DOTALL)
     lines = [line.split("  #")[0].strip() for block in blocks for line in block.splitlines()]
-    return [line for line in lines if line.startswith("finger3d ")]
+    return list(dict.fromkeys(line for line in lines if line.startswith("finger3d ")))
 
 
-def python(root: Path, heading: str) -> list[str]:
-    text = (root / "README.md").read_text(encoding="utf-8")
+def python(root: Path, heading: str, page: str = "README.md") -> list[str]:
+    text = (root / page).read_text(encoding="utf-8")
     part = text[text.index(f"\n## {heading}\n") :].split("\n## ", 2)[1]
     return re.findall(r"```python\n(.*?)```", part, flags=re.DOTALL)
 
@@ -74,7 +76,7 @@ def test_the_examples_of_adding_work_and_are_short(root: Path, folder: Path) -> 
     from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
     from finger3d.mechanics.solve import build, march
 
-    geometry, effect, study = python(root, "How to add")
+    geometry, effect, study = python(root, "How to add", "CONTRIBUTING.md")
     assert all(len(example.splitlines()) < 20 for example in (geometry, effect, study))
     names: dict = {}
     for example in (geometry, effect, study):
@@ -92,7 +94,7 @@ def test_the_examples_of_adding_work_and_are_short(root: Path, folder: Path) -> 
 def test_the_reference_is_the_codes_own(root: Path) -> None:
     from finger3d.scene.reference import reference
 
-    text = (root / "README.md").read_text(encoding="utf-8")
+    text = (root / "docs" / "scenes.md").read_text(encoding="utf-8")
     inside = re.search(r"<!-- from finger3d.scene.reference[^\n]*-->\n(.*?)<!-- end -->", text, flags=re.DOTALL)
     assert inside is not None
     assert inside[1] == reference()
