@@ -8,7 +8,6 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from finger3d._lazy import loading
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.cli.common import Json, Set, app, check_writable, complain, load, print_json, print_rows, reporting
 from finger3d.errors import Finger3dError, MissingError
@@ -52,11 +51,10 @@ def calibrate(
     """
     loaded = load(scene, set_)
     check_writable(out, scene)
-    with loading():
-        from finger3d.analyses.calibrate.run import calibrate as run
-        from finger3d.analyses.calibrate.run import parsed_mus
-        from finger3d.sensor.curve import summary
-        from finger3d.sensor.files import as_dict
+    from finger3d.analyses.calibrate.run import calibrate as run
+    from finger3d.analyses.calibrate.run import parsed_mus
+    from finger3d.sensor.curve import summary
+    from finger3d.sensor.files import as_dict
 
     report, aside = reporting(json_)
     try:

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import App, Parameter
 
 import finger3d
-from finger3d._lazy import loading, postpone
 from finger3d._ranges import printable
 from finger3d.errors import Finger3dError
 from finger3d.progress import Report, reporter
@@ -76,10 +75,7 @@ def print_json(data: Any) -> None:
 
 
 def load(path: Path, overrides: list[str] | None) -> Scene:
-    with loading():
-        # SciPy imports every part of NumPy; these take a third of its time, and no command uses them
-        postpone("numpy.f2py", "numpy.testing")
-        from finger3d.scene import load
+    from finger3d.scene import load
 
     return load(path, overrides or [])
 

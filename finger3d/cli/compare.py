@@ -8,7 +8,6 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from finger3d._lazy import loading
 from finger3d.cli.common import Json, Set, app, check_writable, complain, load, print_json, reporting
 from finger3d.errors import Finger3dError, MissingError
 
@@ -42,8 +41,7 @@ def compare(
             "them and writes them to its scene.toml, take that one"
         )
     check_writable(out, scene)
-    with loading():
-        from finger3d.analyses.compare.run import compare as run
+    from finger3d.analyses.compare.run import compare as run
 
     report, aside = reporting(json_)
     try:

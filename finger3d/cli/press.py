@@ -10,7 +10,6 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from finger3d._lazy import loading
 from finger3d.cli.common import Json, Set, app, check_writable, complain, kept, load, print_json, print_rows, reporting
 from finger3d.errors import MissingError
 
@@ -42,9 +41,8 @@ def press(
     with Artist(figures, formulae=False) as artist:  # it loads what it needs while the scene is read
         loaded = load(scene, set_)
         check_writable(out, scene)
-        with loading():
-            import finger3d.accuracy.prefetch  # noqa: F401  all that the job will import
-            from finger3d.analyses.press import press as run
+        import finger3d.accuracy.prefetch  # noqa: F401  all that the job will import
+        from finger3d.analyses.press import press as run
 
         report, aside = reporting(json_)
         try:

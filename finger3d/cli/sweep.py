@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from finger3d._lazy import loading
 from finger3d.cli.common import (
     Json,
     Set,
@@ -62,13 +61,12 @@ def sweep(
         raise Finger3dError(f"--workers {workers}: must be at least 1")
     if workers is not None and scheduler is not None:
         raise Finger3dError("--workers and --scheduler: give one of them; a cluster has its own workers")
-    with loading():
-        from finger3d.analyses.sweep.cluster import prepare
+    from finger3d.analyses.sweep.cluster import prepare
 
-        if scheduler is None and any("," in text and not text.strip().startswith(_SHARED) for text in vary):
-            prepare()  # workers load what they need while the points are checked
-        from finger3d.analyses.sweep.points import combinations
-        from finger3d.analyses.sweep.run import sweep as run
+    if scheduler is None and any("," in text and not text.strip().startswith(_SHARED) for text in vary):
+        prepare()  # workers load what they need while the points are checked
+    from finger3d.analyses.sweep.points import combinations
+    from finger3d.analyses.sweep.run import sweep as run
 
     report, aside = reporting(json_)
     try:

@@ -6,7 +6,6 @@ it.
 
 from __future__ import annotations
 
-import gc
 import os
 import pickle
 import subprocess
@@ -92,7 +91,6 @@ class Artist:
 
 
 def _main(module: str, *words: str) -> None:
-    gc.disable()  # nothing lives long here
     _warm_up(module, "formulae" in words)
     sent = sys.stdin.buffer.read()
     for call in pickle.loads(sent) if sent else ():
