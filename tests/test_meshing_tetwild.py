@@ -304,7 +304,7 @@ from types import SimpleNamespace
 from finger3d.geometry.registry import designs
 from finger3d.meshing import tetwild
 from finger3d.meshing.sizing import sizing
-from tests.test_design_tetwild import CUBE, SIDES
+from tests.test_meshing_tetwild import CUBE, SIDES
 low, high = np.array([-5.0, 0, -5]), np.array([5.0, 10, 5])
 options = SimpleNamespace(size_mm=0.3, base_size_mm=0.3)
 field = sizing(designs()["block"](5.0, 10.0, 10.0), options, (-5, 5, -5, 5), low, high)
