@@ -103,17 +103,21 @@ def test_streams_are_put_back(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
 def test_a_termination_is_an_interruption(name: str) -> None:
     number = getattr(signal, name)
-    before = signal.getsignal(number)
-    with pytest.raises(KeyboardInterrupt), termination_interrupts():
-        signal.raise_signal(number)
-    assert signal.getsignal(number) == before
+    outside = signal.signal(number, signal.SIG_DFL)  # under nohup, SIGHUP would be ignored
+    try:
+        with pytest.raises(KeyboardInterrupt), termination_interrupts():
+            signal.raise_signal(number)
+        assert signal.getsignal(number) == signal.SIG_DFL
+    finally:
+        signal.signal(number, outside)
 
 
 def test_an_ignored_hangup_stays_ignored() -> None:
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
         with termination_interrupts():
-            signal.raise_signal(signal.SIGHUP)
+            assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+        assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
     finally:
         signal.signal(signal.SIGHUP, before)
 
