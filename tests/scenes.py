@@ -2,6 +2,16 @@
 
 from __future__ import annotations
 
+FIG9 = """
+[finger]
+geometry = "clipped_cylinder"
+radius_mm = 100.0
+half_length_mm = 50.0
+edge_height_mm = 36.6
+width_mm = 20.0
+"""
+"""The finger of the paper's Fig. 9; a scene adds everything else."""
+
 HALF_CYLINDER = """
 title = "half cylinder"
 [finger]

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from scenes import FIG9
 
 import finger3d.analyses.compare.run as compare_module
 from finger3d.accuracy.estimate import FACTOR, estimate
@@ -22,14 +23,12 @@ from finger3d.mechanics.solve import build, march
 from finger3d.results.comparison import FORCE, Case
 from finger3d.scene import load
 
-SCENE = """
+SCENE = (
+    """
 title = "coarse finger"
-[finger]
-geometry = "clipped_cylinder"
-radius_mm = 100.0
-half_length_mm = 50.0
-edge_height_mm = 36.6
-width_mm = 20.0
+"""
+    + FIG9
+    + """
 [material]
 E_MPa = 1.0
 nu = 0.49
@@ -48,6 +47,7 @@ x_mm = 36.0
 y_mm = 38.0
 angle_deg = 30.0
 """
+)
 
 
 @pytest.fixture

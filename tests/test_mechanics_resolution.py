@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bodies import ball, box, write_stl
+from scenes import FIG9 as FINGER
 
 from finger3d.cli import main
 from finger3d.contact.friction import OPEN, Coulomb
@@ -26,13 +27,9 @@ from finger3d.mechanics.solve import build, march, symmetry
 from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
 
 FIG9 = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
-SCENE = """
-[finger]
-geometry = "clipped_cylinder"
-radius_mm = 100.0
-half_length_mm = 50.0
-edge_height_mm = 36.6
-width_mm = 20.0
+SCENE = (
+    FINGER
+    + """
 [material]
 E_MPa = 1.0
 nu = 0.45
@@ -52,6 +49,7 @@ name = "g"
 x_mm = 10.0
 y_mm = 30.0
 """
+)
 
 
 def fig9(obj: RigidObject, depth: float, size: float, **changes: object) -> Model:

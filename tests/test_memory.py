@@ -7,18 +7,15 @@ import sys
 from pathlib import Path
 
 import pytest
+from scenes import FIG9
 
 from finger3d import cli
 from finger3d.errors import OUT_OF_MEMORY, out_of_memory
 from finger3d.fem import pardiso
 
-SCENE = """
-[finger]
-geometry = "clipped_cylinder"
-radius_mm = 100.0
-half_length_mm = 50.0
-edge_height_mm = 36.6
-width_mm = 20.0
+SCENE = (
+    FIG9
+    + """
 [material]
 E_MPa = 1.0
 nu = 0.49
@@ -30,6 +27,7 @@ size_mm = 1.5
 base_size_mm = 6.0
 mesher = "swept"
 """
+)
 
 LIMITED = """
 import resource, sys
