@@ -60,7 +60,7 @@ _LOCK = ".finger3d.lock"
 
 _RESULTS = {
     "press": "summary.json", "compare": "compare.json", "calibrate": "calibration.json", "sweep": "sweep.json",
-    "design": "search.json",
+    "optimise": "search.json",
 }  # fmt: skip
 """By command, the file that tells its results."""
 

@@ -120,7 +120,7 @@ def test_an_objective_from_a_file_on_the_command_line(root, tmp_path, capsys):
     judge = tmp_path / "judge.py"
     judge.write_text("def objective(table):\n    return -abs(table.scene.tables.gauge[0].angle_deg - 40.0)\n")
     scene, out = root / "geometries" / "fig9.toml", tmp_path / "out"
-    arguments = ["design", str(scene), *COARSE, "--free", "gauge.g36.angle_deg=0:90", "--out", str(out)]
+    arguments = ["optimise", str(scene), *COARSE, "--free", "gauge.g36.angle_deg=0:90", "--out", str(out)]
     assert main([*arguments, "--objective", str(judge), "--budget", "40", "--mu", "0.1,0.5"]) == 0
     told = capsys.readouterr().out
     assert "best.toml" in told
@@ -153,7 +153,7 @@ def test_an_objective_from_a_file_on_the_command_line(root, tmp_path, capsys):
 )
 def test_bad_input_is_one_line(options, expected, root, tmp_path, capsys):
     scene = root / "geometries" / "fig9.toml"
-    assert main(["design", str(scene), *COARSE, *options, "--out", str(tmp_path / "out")]) == 2
+    assert main(["optimise", str(scene), *COARSE, *options, "--out", str(tmp_path / "out")]) == 2
     err = capsys.readouterr().err
     assert len(err.splitlines()) == 1
     assert expected in err

@@ -172,7 +172,7 @@ def test_results_of_another_command_are_not_replaced(root: Path, tmp_path: Path,
 
 
 @pytest.mark.parametrize(
-    "words", ["sweep --vary friction.mu=0.1,0.2", "design --free gauge.g36.angle_deg=0:90"], ids=["sweep", "design"]
+    "words", ["sweep --vary friction.mu=0.1,0.2", "optimise --free gauge.g36.angle_deg=0:90"], ids=["sweep", "optimise"]
 )
 def test_a_sweep_and_a_design_take_no_other_results_folder(root: Path, tmp_path: Path, capsys, words: str) -> None:
     (tmp_path / "summary.json").write_text("{}")

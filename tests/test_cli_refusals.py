@@ -50,7 +50,7 @@ def scene(tmp_path: Path) -> Path:
         ["calibrate", "--gauge", "g", "--mu", "3:1:2"],
         ["calibrate", "--gauge", "g", "--tolerance", "luck=1"],
         ["sweep", "--vary", "friction.mu=-1,2"],
-        ["design", "--free", "gauge.g9.x_mm=1:2"],
+        ["optimise", "--free", "gauge.g9.x_mm=1:2"],
         ["export", "--mold", "--wall-mm", "-3"],
         ["export", "--tolerance-mm", "-1"],
     ],
@@ -126,7 +126,7 @@ def test_export_prints_json_alone(scene: Path, tmp_path: Path, capsys: pytest.Ca
 
 def test_design_prints_json_alone(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     few = ["--free", "gauge.g.angle_deg=0:90", "--budget", "3", "--mu", "0.1,0.5", "--json"]
-    assert main(["design", str(scene), *few, "--out", str(tmp_path / "out")]) == 0
+    assert main(["optimise", str(scene), *few, "--out", str(tmp_path / "out")]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found == json.loads((tmp_path / "out" / "design.json").read_text(encoding="utf-8"))
     assert found["best"] >= found["start"]

@@ -17,7 +17,7 @@ COARSE = {
     "compare": "mesh.mesher=swept mesh.size_mm=8.0 mesh.base_size_mm=20.0",
     "calibrate": "mesh.size_mm=2.0 mesh.base_size_mm=8.0",
     "sweep": "model.domain=plane-strain mesh.size_mm=3.0 mesh.base_size_mm=12.0",
-    "design": "model.domain=plane-strain mesh.size_mm=3.0 mesh.base_size_mm=12.0",
+    "optimise": "model.domain=plane-strain mesh.size_mm=3.0 mesh.base_size_mm=12.0",
 }
 """What a test adds to a command, so that it takes seconds; the commands are the README's otherwise."""
 

@@ -1,7 +1,7 @@
 """Does the best finger for friction, by radius R, edge height H, gauge place x and angle, change in 20 mm of width?
 
 Source: Maeno 2004, Sec. III-B: R = 100, H = 36.6 mm, a gauge at x = 36 mm and 30 degrees, chosen in plane strain at
-10 mm to be sensitive to friction throughout a large range.  The criterion is that of `finger3d design`: the least
+10 mm to be sensitive to friction throughout a large range.  The criterion is that of `finger3d optimise`: the least
 change of strain per mu between neighbours of .06, .125, .25, .5, 1, negative where the strain turns back; and the same
 up to .5 only.  Every finger is judged at its best gauge, 4 to 48 mm from the middle along the line of _paper.py, 0 to
 90 degrees, at z = 0.  The table has the paper's finger on a finer and a coarser mesh as well.  geometry_search.py

@@ -1,4 +1,4 @@
-"""design: free keys of a scene, chosen for the largest objective."""
+"""optimise: free keys of a scene, chosen for the largest objective."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from finger3d.errors import Finger3dError
 
 
 @app.command
-def design(
+def optimise(
     scene: Path,
     /,
     *,
@@ -40,7 +40,7 @@ def design(
 
     Keys of gauges cost no condensation: where only they are free, the body is solved once.
 
-    Example: finger3d design scene.toml --free gauge.g36.x_mm=10:48 --free gauge.g36.angle_deg=0:90 --out best
+    Example: finger3d optimise scene.toml --free gauge.g36.x_mm=10:48 --free gauge.g36.angle_deg=0:90 --out best
 
     Parameters
     ----------

@@ -60,7 +60,7 @@ def design_page(folder: str | Path) -> Path:
                                Code(best_scene.read_text(encoding="utf-8"), "best.toml")]),
         ],
         [Figure("design.png", "The search")],
-        command="design",
+        command="optimise",
         outcome=f"{len(good)} of {len(rows)} designs have a number",
         good=bool(good),
     )  # fmt: skip

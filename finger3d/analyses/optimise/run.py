@@ -323,7 +323,7 @@ def search(problem: Problem, out: str | Path, report: Report | None = None) -> F
     report = report or Report()
     judge = objective_of(problem.objective)
     start = checked_start(problem)
-    with claimed(out, "design") as folder:
+    with claimed(out, "optimise") as folder:
         return _searched(problem, folder, report, judge, start)
 
 
@@ -345,7 +345,7 @@ def _searched(problem: Problem, folder: Path, report: Report, judge: Objective, 
         if best is not None:
             _write_best(problem, folder, best, first, run)
     if best is None:
-        raise Finger3dError(f"design: no design within the bounds gives a number; the first: {first.outcome}")
+        raise Finger3dError(f"optimise: no design within the bounds gives a number; the first: {first.outcome}")
     report.stage("increments of the best")
     _write_best(problem, folder, best, first, run, run.increments(best.values))
     judged = tuple(run.known.values())

@@ -164,7 +164,7 @@ def checked_start(problem: Problem) -> tuple[float, ...]:
         raise Finger3dError(f"--budget {problem.budget}: must be at least 1")
     keys = problem.keys()
     if not keys:
-        raise Finger3dError("design: nothing is free; give at least one --free, such as finger.radius_mm=60:200")
+        raise Finger3dError("optimise: nothing is free; give at least one --free, such as finger.radius_mm=60:200")
     if len(set(keys)) < len(keys):
         raise Finger3dError(f"--free {next(k for i, k in enumerate(keys) if k in keys[:i])}: given twice")
     if len(problem.mus) < 2 or any(b <= a for a, b in zip(problem.mus, problem.mus[1:], strict=False)):
@@ -173,7 +173,7 @@ def checked_start(problem: Problem) -> tuple[float, ...]:
         raise Finger3dError(f"--noise {problem.noise}: must be above 0")
     names = [g.name for g in parse(problem.given, problem.path).tables.gauge]
     if problem.objective == "sensitivity" and not names:
-        raise Finger3dError("design: the objective reads a gauge, and the scene has no [[gauge]]; add one")
+        raise Finger3dError("optimise: the objective reads a gauge, and the scene has no [[gauge]]; add one")
     if problem.gauge is not None and problem.gauge not in names:
         raise Finger3dError(f"--gauge {problem.gauge}: no such gauge; the scene has {', '.join(names) or 'none'}")
     values = []
