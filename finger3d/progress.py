@@ -11,7 +11,7 @@ from typing import Any, TextIO
 from finger3d._ranges import printable
 
 
-class Report:
+class Progress:
     """What a job calls while it works. This one is silent, and serves as the default.
 
     Attributes
@@ -22,7 +22,7 @@ class Report:
     steps_done: int = 0
     steps_total: int = 0
 
-    def __enter__(self) -> Report:
+    def __enter__(self) -> Progress:
         return self
 
     def __exit__(
@@ -41,7 +41,7 @@ class Report:
         """Tell something worth keeping, for instance that a mesh came from the cache."""
 
 
-class PlainReport(Report):
+class PlainProgress(Progress):
     """One line per event, with the seconds since the start: for logs and pipes."""
 
     def __init__(self, stream: TextIO | None = None) -> None:
@@ -65,7 +65,7 @@ class PlainReport(Report):
         self._line(text)
 
 
-class BarReport(Report):
+class BarProgress(Progress):
     """A rich progress bar: the stage, a bar over the steps, the elapsed time and the last remark."""
 
     def __init__(self, stream: TextIO | None = None) -> None:
@@ -86,7 +86,7 @@ class BarReport(Report):
         # A task without total pulses: nobody knows how long meshing takes.
         self.task: Any = self.progress.add_task("starting", total=None, count="", remark="")
 
-    def __enter__(self) -> BarReport:
+    def __enter__(self) -> BarProgress:
         self.progress.start()
         return self
 
@@ -110,7 +110,7 @@ class BarReport(Report):
         self.console.print(printable(text), markup=False)
 
 
-def reporter(stream: TextIO | None = None) -> Report:
+def reporter(stream: TextIO | None = None) -> Progress:
     """Return a bar on an interactive terminal, plain lines in a pipe, a dumb terminal or CI.
 
     Parameters
@@ -120,4 +120,4 @@ def reporter(stream: TextIO | None = None) -> Report:
     target = stream or sys.stdout
     unicode = (target.encoding or "utf-8").lower().startswith("utf")  # bar and spinner are no ASCII
     interactive = target.isatty() and unicode and os.environ.get("TERM") != "dumb" and not os.environ.get("CI")
-    return BarReport(stream) if interactive else PlainReport(stream)
+    return BarProgress(stream) if interactive else PlainProgress(stream)

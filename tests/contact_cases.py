@@ -35,10 +35,12 @@ def violation(before: ContactState, after: ContactState, free: np.ndarray, compl
     """
     moved = free + np.einsum("idjk,jk->id", compliance, after.force)
     scale = max(np.abs(after.force).max(), 1e-300)
-    worst = max(np.abs(moved[:, 0] - after.gap).max(), np.abs(moved[:, 1:] - after.position).max(initial=0.0))
+    worst = max(
+        np.abs(moved[:, 0] - after.gap).max(), np.abs(moved[:, 1:] - after.tangential_displacement).max(initial=0.0)
+    )
     for i, status in enumerate(after.status):
         n, t = after.force[i, 0], after.force[i, 1:]
-        slip = moved[i, 1:] - before.position[i]
+        slip = moved[i, 1:] - before.tangential_displacement[i]
         if status == OPEN:  # Eq. 1
             worst = max(worst, -moved[i, 0], np.abs(after.force[i]).max() / scale)
             continue

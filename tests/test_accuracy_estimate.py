@@ -31,7 +31,7 @@ from finger3d.effects.elastic_object import SoftObject
 from finger3d.errors import Finger3dError
 from finger3d.fem.simplex import Mesh
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.history import Frame
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
 from finger3d.mechanics.solve import Problem, build, march
 from finger3d.mechanics.step_halving import step_error
@@ -53,7 +53,7 @@ def half_cylinder(size: float, steps: int = 10) -> Model:
     )  # fmt: skip
 
 
-def pressed(model: Model) -> tuple[Problem, list[Frame]]:
+def pressed(model: Model) -> tuple[Problem, list[StepResult]]:
     problem = build(model)
     return problem, list(march(problem))
 

@@ -12,7 +12,7 @@ import pytest
 
 from finger3d.accuracy import prefetch
 from finger3d.accuracy.estimate import companion
-from finger3d.accuracy.prefetch import Ahead
+from finger3d.accuracy.prefetch import MeshPrefetch
 from finger3d.analyses.press import press
 from finger3d.mechanics.solve import build
 from finger3d.scene import Scene, parse
@@ -48,7 +48,7 @@ def test_a_press_finds_its_companion_meshed(ball: Scene, tmp_path: Path) -> None
     assert kept(tmp_path) == 2
     assert prefetch._expected(ball.model()).mesh == companion(build(ball.model())).model.mesh  # which is what was made
     # nothing is left to do for the next press
-    with Ahead(ball) as beside:
+    with MeshPrefetch(ball) as beside:
         assert beside._child is None
     again = press(ball, tmp_path / "out", figures=False).summary()
     assert again["error_estimate"]["discretisation"] == pytest.approx(told["error_estimate"]["discretisation"])
@@ -68,13 +68,13 @@ def test_a_press_finds_its_companion_meshed(ball: Scene, tmp_path: Path) -> None
     ids=["a section", "a swept companion", "a mesh that is refined"],
 )
 def test_what_is_quick_or_not_known_yet_is_not_begun(ball: Scene, tables: dict[str, Any]) -> None:
-    with Ahead(scene(BALL, **tables)) as beside:
+    with MeshPrefetch(scene(BALL, **tables)) as beside:
         assert beside._child is None
         beside.wait()
 
 
 def test_without_an_estimate_nothing_is_begun() -> None:
-    with Ahead(None) as beside:
+    with MeshPrefetch(None) as beside:
         assert beside._child is None
 
 
@@ -84,10 +84,10 @@ def test_an_interruption_ends_the_child_and_leaves_no_litter(
     litter = tmp_path / "tmp"
     litter.mkdir()
     monkeypatch.setenv("TMPDIR", str(litter))
-    begun: list[Ahead] = []
+    begun: list[MeshPrefetch] = []
 
     def interrupted() -> None:
-        with Ahead(ball) as beside:
+        with MeshPrefetch(ball) as beside:
             begun.append(beside)
             assert beside._child is not None
             assert beside._child.poll() is None

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from finger3d.accuracy.refine import Refined, Round, _affordable, refined
+from finger3d.accuracy.refine import Refinement, Round, _affordable, refined
 from finger3d.cli import main
 from finger3d.contact.friction import Coulomb
 from finger3d.geometry.registry import designs
@@ -99,7 +99,7 @@ def test_a_step_is_as_large_as_the_time_allows(left: float, size: float | None) 
 
 def test_the_best_round_need_not_be_the_last() -> None:
     rounds = (Round(1.0, 4.0, 100, 0.02, "normal_force_N", 1.0), Round(0.5, 4.0, 400, 0.03, "friction_sum_N", 2.0))
-    found = Refined(0.01, OPTIONS, rounds, "8 rounds")
+    found = Refinement(0.01, OPTIONS, rounds, "8 rounds")
     assert found.best is rounds[0]
     assert "estimated error of 0.02 in normal_force_N" in found.warning
     assert found.as_dict()["rounds"][1]["dofs"] == 400

@@ -209,7 +209,7 @@ def test_coverage_with_a_depth_that_is_off_by_presses_of_the_real_body() -> None
     hits = 0
     for mu in random.uniform(0.2, 0.9, count):
         legs = [replace(leg, depth_mm=leg.depth_mm + random.normal(0.0, 0.1)) for leg in model.legs]
-        strain = body.press(float(mu), legs).frames[-1].gauges["g36"] + random.normal(0.0, found.noise)
+        strain = body.press(float(mu), legs).steps[-1].gauges["g36"] + random.normal(0.0, found.noise)
         (answer,) = estimate(found, strain)
         hits += any(c.low <= mu <= c.high for c in answer.candidates)
     wanted = math.erf(1.0 / math.sqrt(2.0))

@@ -13,9 +13,9 @@ import pytest
 from finger3d.analyses.calibrate.increments import error_left, found_increments, increment_error
 from finger3d.analyses.calibrate.run import calibrate, calibrated
 from finger3d.analyses.calibrate.tolerances import read
-from finger3d.analyses.optimise.run import search
-from finger3d.analyses.optimise.task import Free
-from finger3d.analyses.optimise.task import Problem as Search
+from finger3d.analyses.optimise.run import optimise
+from finger3d.analyses.optimise.task import FreeKey
+from finger3d.analyses.optimise.task import OptimisationProblem as Search
 from finger3d.mechanics.solve import build
 from finger3d.sensor import estimate, load
 from tests.sensor_cases import NONE, SCENE, scene
@@ -124,14 +124,14 @@ def test_chosen_increments_press_the_curve_and_fewer_the_differences() -> None:
 @pytest.mark.parametrize("count", [4, "auto"])
 def test_a_search_tells_the_increments_of_its_best_design(count: int | str, tmp_path: Path) -> None:
     given = {**SCENE, "press": {"depth_mm": 2.0, "steps": count}, "mesh": {"size_mm": 6.0, "base_size_mm": 16.0}}
-    free = (Free("gauge.g36.angle_deg", 0.0, 90.0),)
-    found = search(Search(given, free, mus=(0.1, 0.5), budget=2), tmp_path)
+    free = (FreeKey("gauge.g36.angle_deg", 0.0, 90.0),)
+    found = optimise(Search(given, free, mus=(0.1, 0.5), budget=2), tmp_path)
     told = json.loads((tmp_path / "design.json").read_text())["increments"]
     assert told["chosen"] is (count == "auto")
     assert told["steps"] == [4] if count == 4 else told["steps"][0] >= 40
     assert told["strain_error"] >= 0.0
     assert found.scene.as_dict()["press"]["steps"] == count
     # the same number again, where the start is remembered and the search goes on
-    more = search(Search(given, free, mus=(0.1, 0.5), budget=3), tmp_path)
+    more = optimise(Search(given, free, mus=(0.1, 0.5), budget=3), tmp_path)
     assert json.loads((tmp_path / "design.json").read_text())["increments"]["steps"] == told["steps"]
     assert more.evaluations[: len(found.evaluations)] == found.evaluations

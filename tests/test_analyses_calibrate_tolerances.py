@@ -22,7 +22,7 @@ from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.solve import build, march
-from finger3d.progress import Report
+from finger3d.progress import Progress
 from finger3d.sensor import Calibration, estimate
 from tests.sensor_cases import FEW, NONE, SCENE, scene
 
@@ -65,7 +65,7 @@ def test_every_tolerance_is_the_difference_of_two_scenes() -> None:
         assert slopes[name][number] == pytest.approx(wanted, rel=1e-6, abs=1e-9), name
     assert not slopes["E_percent"].any()
     problem = build(scene().model())  # another depth by the same mesh: the zone that is meshed fine follows the depth
-    deep = [Condensed.of(problem).press(mu, [Leg(10.0 + s, steps=4)]).frames[-1].gauges["g36"] for s in (0.1, -0.1)]
+    deep = [Condensed.of(problem).press(mu, [Leg(10.0 + s, steps=4)]).steps[-1].gauges["g36"] for s in (0.1, -0.1)]
     assert slopes["depth_mm"][number] == pytest.approx((deep[0] - deep[1]) / 0.2, rel=1e-6)
 
 
@@ -182,7 +182,7 @@ def test_a_viscous_curve_is_read_after_the_hold_and_tells_mu() -> None:
 
 
 def test_large_deformation_goes_the_long_way_and_says_so(tmp_path: Path) -> None:
-    class Told(Report):
+    class Told(Progress):
         lines: list[str] = []
 
         def say(self, text: str) -> None:

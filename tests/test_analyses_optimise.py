@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finger3d.analyses.optimise.run import search
-from finger3d.analyses.optimise.task import Free, Problem, Table, sensitivity
+from finger3d.analyses.optimise.run import optimise
+from finger3d.analyses.optimise.task import FreeKey, ObjectiveTable, OptimisationProblem, sensitivity
 from finger3d.cli import main
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.solve import build, march
@@ -21,18 +21,18 @@ from tests.test_report import words
 
 SETS = ["model.domain=plane-strain", "mesh.size_mm=4", "mesh.base_size_mm=16", "press.steps=10"]
 COARSE = [option for text in SETS for option in ("--set", text)]
-ANGLE = Free("gauge.g36.angle_deg", 0.0, 90.0)
+ANGLE = FreeKey("gauge.g36.angle_deg", 0.0, 90.0)
 MUS = (0.1, 0.5, 1.0)
 
 
 @pytest.fixture
-def problem(root: Path) -> Problem:
+def problem(root: Path) -> OptimisationProblem:
     path = root / "geometries" / "fig9.toml"
-    return Problem(tree.override(tree.read(path), SETS), (ANGLE,), path=path, mus=MUS, budget=12)
+    return OptimisationProblem(tree.override(tree.read(path), SETS), (ANGLE,), path=path, mus=MUS, budget=12)
 
 
-def table_of(strain: list[float], mu: tuple[float, ...] = MUS) -> Table:
-    return Table(np.array(mu), {"g": np.array(strain)}, (), 1e-3, "g", None)  # type: ignore[arg-type]
+def table_of(strain: list[float], mu: tuple[float, ...] = MUS) -> ObjectiveTable:
+    return ObjectiveTable(np.array(mu), {"g": np.array(strain)}, (), 1e-3, "g", None)  # type: ignore[arg-type]
 
 
 def test_sensitivity_is_the_least_slope_in_units_of_noise():
@@ -44,7 +44,7 @@ def test_sensitivity_is_the_least_slope_in_units_of_noise():
 
 
 def test_gauges_are_searched_in_one_body_and_read_as_a_press_reads_them(problem, tmp_path):
-    found = search(problem, tmp_path)
+    found = optimise(problem, tmp_path)
     assert found.bodies == 1
     assert len(found.evaluations) == 13
     assert found.best.value == max(e.value for e in found.evaluations) >= found.start.value
@@ -62,7 +62,7 @@ def test_gauges_of_a_body_that_relaxes_are_read_as_a_press_reads_them(problem, b
     """Ten time constants long, so that the instantaneous field is far from the one the press ends with."""
     visco = f"effects.viscosity={{prony = [[0.5, 0.1]], bulk = {str(bulk).lower()}}}"
     given = tree.override(problem.given, [*SETS, visco, "press.duration_s=1.0", "press.steps=4", "material.nu=0.45"])
-    found = search(replace(problem, given=given, budget=1), tmp_path)
+    found = optimise(replace(problem, given=given, budget=1), tmp_path)
     assert found.bodies == 1
     model = found.scene.model()
     strain = []
@@ -73,28 +73,28 @@ def test_gauges_of_a_body_that_relaxes_are_read_as_a_press_reads_them(problem, b
 
 
 def test_a_search_goes_on_with_what_is_kept_and_is_the_same_every_time(problem, tmp_path):
-    whole = search(replace(problem, budget=10), tmp_path / "whole")
-    first = search(replace(problem, budget=4), tmp_path / "parts")
+    whole = optimise(replace(problem, budget=10), tmp_path / "whole")
+    first = optimise(replace(problem, budget=4), tmp_path / "parts")
     kept = tmp_path / "parts" / "evaluations.csv"
     torn = kept.read_text()
     kept.write_text(torn + "12.5,3")
-    second = search(replace(problem, budget=10), tmp_path / "parts")
+    second = optimise(replace(problem, budget=10), tmp_path / "parts")
     assert kept.read_text() == (tmp_path / "whole" / "evaluations.csv").read_text()
     assert [e.values for e in second.evaluations] == [e.values for e in whole.evaluations]
     assert second.evaluations[: len(first.evaluations)] == first.evaluations
     with pytest.raises(Finger3dError, match="holds another search"):
-        search(replace(problem, noise=1.0), tmp_path / "parts")
+        optimise(replace(problem, noise=1.0), tmp_path / "parts")
 
 
 def test_keys_of_the_body_search_the_gauges_anew_in_every_body(problem, tmp_path):
-    free = (Free("finger.edge_height_mm", 30.0, 40.0), ANGLE)
-    found = search(replace(problem, free=free, budget=2), tmp_path)
+    free = (FreeKey("finger.edge_height_mm", 30.0, 40.0), ANGLE)
+    found = optimise(replace(problem, free=free, budget=2), tmp_path)
     assert 2 <= found.bodies <= 3
     assert len(found.evaluations) > 50
 
 
 def test_a_design_that_cannot_be_built_is_a_line_with_its_reason(problem, tmp_path):
-    found = search(replace(problem, free=(Free("gauge.0.y_mm", 40.0, 60.0),), budget=8), tmp_path)
+    found = optimise(replace(problem, free=(FreeKey("gauge.0.y_mm", 40.0, 60.0),), budget=8), tmp_path)
     with (tmp_path / "evaluations.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert any("outside the finger" in row["outcome"] for row in rows)
@@ -111,7 +111,7 @@ def test_a_design_that_cannot_be_built_is_a_line_with_its_reason(problem, tmp_pa
 
 @pytest.mark.parametrize("method", ["dual-annealing", "nelder-mead"])
 def test_other_optimisers_stay_within_bounds_and_budget(method, problem, tmp_path):
-    found = search(replace(problem, method=method), tmp_path)
+    found = optimise(replace(problem, method=method), tmp_path)
     assert len(found.evaluations) <= problem.budget + 1
     assert all(ANGLE.low <= e.values[0] <= ANGLE.high for e in found.evaluations)
 

@@ -49,9 +49,9 @@ def same(reduced: Condensed, problem: Any, mu: float) -> None:
     whole = list(march(replace(problem, model=replace(problem.model, friction=law))))
     small = reduced.press(mu)
     assert small.outcome.ok
-    assert len(whole) == len(small.frames)
+    assert len(whole) == len(small.steps)
     scale = max(np.abs(whole[-1].state.force).max(), 1e-300)
-    for a, b in zip(whole, small.frames, strict=True):
+    for a, b in zip(whole, small.steps, strict=True):
         assert np.abs(a.state.force - b.state.force).max() <= ROUND_OFF * scale
         for name, strain in a.gauges.items():
             assert b.gauges[name] == pytest.approx(strain, abs=ROUND_OFF)
@@ -91,8 +91,8 @@ def test_other_legs_and_a_kinetic_ratio_are_those_of_the_scene() -> None:
     changed = Kinetic(0.6, "paper").apply(model(friction=Coulomb(0.4), legs=legs))
     small = Condensed.of(build(model())).press(0.4, legs, ratio=0.6, branch="paper")
     whole = list(march(replace(build(model()), model=changed)))
-    assert small.frames[2].gauges["g"] == pytest.approx(whole[2].gauges["g"], abs=ROUND_OFF)
-    assert small.frames[-1].dissipation_mJ == pytest.approx(whole[-1].dissipation_mJ, rel=1e-11)
+    assert small.steps[2].gauges["g"] == pytest.approx(whole[2].gauges["g"], abs=ROUND_OFF)
+    assert small.steps[-1].dissipation_mJ == pytest.approx(whole[-1].dissipation_mJ, rel=1e-11)
 
 
 def test_ten_steps_with_a_hundred_points_take_less_than_50_ms(tmp_path: Path) -> None:

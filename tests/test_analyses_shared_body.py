@@ -8,13 +8,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from finger3d.analyses.shared_body import Body, Variant, body_key, families, finest, shared_legs
+from finger3d.analyses.shared_body import SharedBody, Variant, body_key, families, finest, shared_legs
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.recover import displacement
 from finger3d.fem.traces import restrict, surface
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg
-from finger3d.mechanics.solve import build, covered, covers, march, whole
+from finger3d.mechanics.solve import (
+    build,
+    candidates_cover_face,
+    contact_within_candidates,
+    march,
+    step_within_candidates,
+)
 from finger3d.scene import Scene, parse, tree
 
 BLOCK = {
@@ -46,7 +52,7 @@ def test_a_body_pressed_as_its_variants_is_each_pressed_on_its_own():
     scenes = [scene(), *(scene(*c) for c in SHARING)]
     assert list(families(scenes).values()) == [list(range(len(scenes)))]
     models = [s.model() for s in scenes]
-    body = Body(replace(models[0], mesh=finest(models)), [Variant.of(m) for m in models])
+    body = SharedBody(replace(models[0], mesh=finest(models)), [Variant.of(m) for m in models])
     for model in models:
         own = build(model)
         alone = measure(own.points, list(march(own))[-1])
@@ -63,7 +69,7 @@ def test_a_slide_among_the_variants_costs_the_mirror_plane_only():
     level = ["object={shape='plane'}", "finger={geometry='half_cylinder', radius_mm=3.0, width_mm=1.0}"]
     level += ["gauge.0.x_mm=0.5"]
     models = [scene(*level).model(), scene(*level, "press.slide_x_mm=0.1").model()]
-    body = Body(models[0], [Variant.of(m) for m in models])
+    body = SharedBody(models[0], [Variant.of(m) for m in models])
     assert body.problem.axes == ()
     for model in models:
         own = build(model)
@@ -75,7 +81,7 @@ def test_a_slide_among_the_variants_costs_the_mirror_plane_only():
 
 def test_a_shallower_press_on_the_mesh_of_the_deepest():
     models = [scene().model(), scene("press.depth_mm=0.15").model()]
-    body = Body(models[0], [Variant.of(m) for m in models])
+    body = SharedBody(models[0], [Variant.of(m) for m in models])
     shared = body.press(Variant.of(models[1]))
     # other candidate points on the same mesh: open points change nothing but round-off
     every = replace(build(models[0], margin=math.inf), model=models[1])
@@ -90,11 +96,11 @@ def test_a_shallower_press_on_the_mesh_of_the_deepest():
 
 def test_candidates_are_widened_when_contact_reaches_beyond_them(monkeypatch):
     model = scene("friction.mu=0.0").model()
-    wide = Body(model, [Variant.of(model)]).press(Variant.of(model))
+    wide = SharedBody(model, [Variant.of(model)]).press(Variant.of(model))
     said = []
     first = [lambda m, say, margin=-0.8: build(m, say, margin)]
     monkeypatch.setattr("finger3d.mechanics.solve.build", lambda m, say, *margin: first[0](m, say, *margin))
-    narrow = Body(model, [Variant.of(model)], said.append)
+    narrow = SharedBody(model, [Variant.of(model)], said.append)
     again = narrow.press(Variant.of(model))
     assert any("beyond" in text for text in said)
     assert again.numbers["normal_force_N"] == pytest.approx(wide.numbers["normal_force_N"], rel=1e-9)
@@ -102,7 +108,7 @@ def test_candidates_are_widened_when_contact_reaches_beyond_them(monkeypatch):
 
 def test_gauges_alone_cost_no_press():
     models = [scene().model(), scene("gauge.0.x_mm=0.5").model()]
-    body = Body(models[0], [Variant.of(m) for m in models])
+    body = SharedBody(models[0], [Variant.of(m) for m in models])
     first, second = (body.press(Variant.of(m)) for m in models)
     assert first.seconds > 0.0
     assert second.seconds == 0.0
@@ -125,7 +131,7 @@ def test_a_gauge_that_is_stiff_shapes_the_body():
     foil = ["effects.embedded_gauge={E_MPa=3000.0, thickness_mm=0.02, width_mm=1.0}", "gauge.0.length_mm=1.0"]
     assert body_key(scene(*foil)) != body_key(scene(*foil, "gauge.0.x_mm=0.5"))
     models = [scene(*foil).model(), scene(*foil, "friction.mu=1.0").model()]
-    body = Body(models[0], [Variant.of(m) for m in models])
+    body = SharedBody(models[0], [Variant.of(m) for m in models])
     own = build(models[1])
     alone = measure(own.points, list(march(own))[-1])
     assert body.press(Variant.of(models[1])).gauges == pytest.approx(alone["gauges"], rel=1e-9)
@@ -142,7 +148,7 @@ def test_chosen_sizes_follow_the_depth_and_are_shared():
 def test_a_step_that_fails_is_named():
     """The paper's rule, which does not exclude friction that helps slip."""
     model = scene("contact.rule=paper", "material.nu=0.45", "mesh.size_mm=0.1", "press.depth_mm=0.6").model()
-    pressed = Body(model, [Variant.of(model)]).press(Variant.of(model))
+    pressed = SharedBody(model, [Variant.of(model)]).press(Variant.of(model))
     assert pressed.outcome.startswith("step ")
     assert pressed.numbers == {}
     assert pressed.gauges == {}
@@ -177,7 +183,7 @@ def test_several_presses_are_proved_as_each_on_its_own(effect, at_once, monkeypa
     monkeypatch.setattr("finger3d.mechanics.problem._AT_ONCE", at_once)
     model = scene(*effect).model()
     problem = build(model)
-    assert not whole(problem)
+    assert not candidates_cover_face(problem)
     ends = [
         list(
             march(
@@ -190,16 +196,20 @@ def test_several_presses_are_proved_as_each_on_its_own(effect, at_once, monkeypa
     ]
     face = surface(problem.mesh, "contact", problem.thickness)
     others = ~np.isin(face.nodes, problem.surface.nodes)
-    kinematics = model.kinematics
+    kinematics = model.formulation
     together = kinematics.gaps(problem, [f.part for f in ends], [f.target for f in ends], restrict(face, others))
     for frame, found in zip(ends, together, strict=True):
         (alone,) = kinematics.gaps(problem, [frame.part], [frame.target], face)
         assert np.abs(found - alone[others]).max() <= 1e-12 * frame.target.depth_mm
         if not kinematics.finite_strain:
             u = displacement(problem.mesh, kinematics.unknowns(problem, frame.part))
-            moved = problem.gap(frame.target, face) + (face.trace @ u) @ problem.points.frame[0]
+            moved = problem.gap(frame.target, face) + (face.trace @ u) @ problem.points.basis[0]
             assert np.abs(found - moved[others]).max() <= 1e-12 * frame.target.depth_mm
-    assert covered(problem, ends) == [covers(problem, frame) for frame in ends] == [True] * 3
+    assert (
+        contact_within_candidates(problem, ends)
+        == [step_within_candidates(problem, frame) for frame in ends]
+        == [True] * 3
+    )
 
 
 def test_one_solver_proves_as_the_other(monkeypatch):
@@ -216,8 +226,8 @@ def test_one_solver_proves_as_the_other(monkeypatch):
 def test_a_face_that_is_touched_nearly_everywhere_is_all_candidates():
     """Then nothing is beyond them, and no press pays a proof."""
     level = ["object={shape='plane'}", "finger={geometry='block', half_length_mm=4.0, height_mm=3.0, width_mm=4.0}"]
-    assert whole(build(scene(*level).model()))
-    assert not whole(build(scene().model()))
+    assert candidates_cover_face(build(scene(*level).model()))
+    assert not candidates_cover_face(build(scene().model()))
 
 
 NARROW = -0.8
@@ -237,11 +247,11 @@ def test_presses_together_are_the_presses_alone(threads, monkeypatch):
     changes = [[shallow], ["friction.mu=0.1"], ["friction.mu=1.0"], ["friction.mu=0.1", "gauge.0.x_mm=0.5"]]
     models = [scene(*change).model() for change in changes]
     variants = [Variant.of(m) for m in models]
-    wide = Body(models[1], variants)
+    wide = SharedBody(models[1], variants)
     alone = [wide.press(v) for v in variants]
     narrowed(monkeypatch)
     said: list[str] = []
-    body = Body(models[1], variants, said.append)
+    body = SharedBody(models[1], variants, said.append)
     together = list(body.presses(variants))
     assert sum("beyond" in text for text in said) == 1
     for one, other in zip(alone, together, strict=True):
@@ -250,7 +260,7 @@ def test_presses_together_are_the_presses_alone(threads, monkeypatch):
     assert together[1].gauges != together[3].gauges
     assert [p.seconds > 0.0 for p in together] == [True, True, True, False]
     # frames speak of the body as it is in the end
-    again = Body(models[1], variants)
+    again = SharedBody(models[1], variants)
     assert {f[-1].part.force.shape for f in again.frames(variants)} == {(len(again.problem.surface.nodes), 2)}
 
 
@@ -259,7 +269,7 @@ def test_a_press_that_fails_takes_no_other_along(threads, monkeypatch):
     monkeypatch.setattr("finger3d.mechanics.solve._WORTH", 1 if threads else 10**6)
     monkeypatch.setattr("finger3d.mechanics.solve.cores", lambda: 2)
     models = [scene(f"friction.mu={mu}").model() for mu in (0.1, 0.5, 1.0)]
-    body = Body(models[0], [Variant.of(m) for m in models])
+    body = SharedBody(models[0], [Variant.of(m) for m in models])
 
     def failing(problem):
         if problem.model.friction.static == 0.5:
@@ -277,7 +287,7 @@ def test_a_press_that_fails_takes_no_other_along(threads, monkeypatch):
 def test_presses_that_cannot_be_proved_fail_and_what_failed_before_keeps_its_reason(monkeypatch):
     models = [scene(f"friction.mu={mu}").model() for mu in (0.1, 0.5)]
     variants = [Variant.of(m) for m in models]
-    body = Body(models[0], variants)
+    body = SharedBody(models[0], variants)
 
     def failing(problem):
         if problem.model.friction.static == 0.5:
@@ -288,7 +298,7 @@ def test_presses_that_cannot_be_proved_fail_and_what_failed_before_keeps_its_rea
         raise MemoryError("no proof")
 
     monkeypatch.setattr("finger3d.mechanics.step_halving.march", failing)
-    monkeypatch.setattr("finger3d.mechanics.solve.covered", unproved)
+    monkeypatch.setattr("finger3d.mechanics.solve.contact_within_candidates", unproved)
     assert [str(p) for p in body.presses(variants)] == ["no proof", "its own"]
 
 
@@ -302,6 +312,6 @@ def test_a_body_that_cannot_be_widened_fails_those_that_need_it_only(monkeypatch
         return build(model, say, margin)
 
     monkeypatch.setattr("finger3d.mechanics.solve.build", once)
-    found = list(Body(models[0], variants).presses(variants))
+    found = list(SharedBody(models[0], variants).presses(variants))
     assert [isinstance(p, MemoryError) for p in found] == [True, False, True]
     assert found[1].outcome == "converged"

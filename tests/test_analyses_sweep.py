@@ -21,7 +21,7 @@ import pytest
 from finger3d.analyses.shared_body import _FREE
 from finger3d.analyses.sweep import run as running
 from finger3d.analyses.sweep.points import Sweep, Vary, combinations
-from finger3d.analyses.sweep.store import Kept
+from finger3d.analyses.sweep.store import ResultStore
 from finger3d.analyses.sweep.table import write_parquet
 from finger3d.analyses.sweep.worker import press_all
 from finger3d.cli import main
@@ -147,7 +147,7 @@ def test_a_scheduler_that_does_not_answer_is_left_after_the_time_limit(scene, tm
 def test_rows_become_a_table_in_the_scenes_own_names(scene, tmp_path):
     sweep = points_of(scene, "friction.mu=0.06,1", "contact.rule=projection,paper")
     rows = pressed_here(sweep)
-    with Kept(sweep, tmp_path).open() as kept:
+    with ResultStore(sweep, tmp_path).open() as kept:
         for row in rows[:3]:
             assert kept.add(row)
         assert not kept.add(rows[0])
@@ -169,12 +169,12 @@ def test_rows_become_a_table_in_the_scenes_own_names(scene, tmp_path):
 def test_a_torn_line_is_dropped_and_its_point_done_again(scene, tmp_path):
     sweep = points_of(scene, "friction.mu=0.06,1")
     rows = pressed_here(sweep)
-    with Kept(sweep, tmp_path).open() as kept:
+    with ResultStore(sweep, tmp_path).open() as kept:
         kept.add(rows[0])
     journal = tmp_path / "points.jsonl"
     whole = journal.read_text()
     journal.write_text(whole + json.dumps(rows[1])[:50])
-    with Kept(sweep, tmp_path).open() as kept:
+    with ResultStore(sweep, tmp_path).open() as kept:
         assert kept.left() == [1]
         kept.add(rows[1])
     assert lines(tmp_path) == rows
@@ -194,7 +194,7 @@ EDITS = [
 def test_a_journal_edited_by_hand_is_one_line(scene, tmp_path, capsys):
     sweep = points_of(scene, "friction.mu=0.06,1")
     rows = pressed_here(sweep)
-    with Kept(sweep, tmp_path).open() as kept:
+    with ResultStore(sweep, tmp_path).open() as kept:
         for row in rows:
             kept.add(row)
     journal, before = tmp_path / "points.jsonl", (tmp_path / "points.jsonl").read_text()
@@ -214,7 +214,7 @@ def test_a_journal_edited_by_hand_is_one_line(scene, tmp_path, capsys):
 
 
 def test_a_damaged_sweep_json_is_one_line(scene, tmp_path, capsys):
-    with Kept(points_of(scene, "friction.mu=0.06,1"), tmp_path).open():
+    with ResultStore(points_of(scene, "friction.mu=0.06,1"), tmp_path).open():
         pass
     path = tmp_path / "sweep.json"
     whole = json.loads(path.read_text())
@@ -244,7 +244,7 @@ def test_a_damaged_table_is_one_line(data, tmp_path, capsys):
 
 
 def test_a_folder_of_another_sweep_is_refused(scene, tmp_path, capsys):
-    with Kept(points_of(scene, "friction.mu=0.06,1"), tmp_path).open():
+    with ResultStore(points_of(scene, "friction.mu=0.06,1"), tmp_path).open():
         pass
     arguments = ["sweep", str(scene), *COARSE, "--vary", "friction.mu=0.06,2", "--out", str(tmp_path)]
     assert main(arguments) == 2
@@ -261,12 +261,12 @@ def test_a_folder_of_another_sweep_is_refused(scene, tmp_path, capsys):
     ],
 )
 def test_what_makes_it_another_sweep_is_named(vary, expected, scene, tmp_path):
-    with Kept(points_of(scene, "friction.mu=0.06,1"), tmp_path).open():
+    with ResultStore(points_of(scene, "friction.mu=0.06,1"), tmp_path).open():
         pass
-    with pytest.raises(Finger3dError, match=expected), Kept(points_of(scene, *vary), tmp_path).open():
+    with pytest.raises(Finger3dError, match=expected), ResultStore(points_of(scene, *vary), tmp_path).open():
         pass
     other = combinations(scene, [*SETS, "press.steps=3"], ["friction.mu=0.06,1"])
-    with pytest.raises(Finger3dError, match="of another scene"), Kept(other, tmp_path).open():
+    with pytest.raises(Finger3dError, match="of another scene"), ResultStore(other, tmp_path).open():
         pass
 
 
@@ -300,8 +300,8 @@ def test_one_body_is_swept_without_workers_and_its_points_are_shown(scene, tmp_p
 
 def test_a_folder_in_use_is_refused(scene, tmp_path):
     sweep = points_of(scene, "friction.mu=0.06")
-    with Kept(sweep, tmp_path).open(), pytest.raises(Finger3dError, match="another finger3d is writing there"):
-        with Kept(sweep, tmp_path).open():
+    with ResultStore(sweep, tmp_path).open(), pytest.raises(Finger3dError, match="another finger3d is writing there"):
+        with ResultStore(sweep, tmp_path).open():
             pass
 
 
@@ -352,7 +352,7 @@ def test_what_workers_are_copied_from_has_one_thread_and_what_they_need():
 def test_a_full_disk_is_one_line_that_says_what_is_kept(name, scene, tmp_path, monkeypatch):
     sweep = points_of(scene, "friction.mu=0.06,1")
     rows = pressed_here(sweep)
-    kept = Kept(sweep, tmp_path)
+    kept = ResultStore(sweep, tmp_path)
     with kept.open():
         kept.add(rows[0])
         if name == "results.parquet":
@@ -380,7 +380,7 @@ def test_a_full_disk_is_one_line_that_says_what_is_kept(name, scene, tmp_path, m
         with pytest.raises(MissingError, match=r"No space left on device; 1 of 2 points are kept") as told:
             act()
     assert name in str(told.value)
-    with Kept(sweep, tmp_path).open() as again:
+    with ResultStore(sweep, tmp_path).open() as again:
         assert again.left() == [1]
 
 

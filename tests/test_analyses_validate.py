@@ -166,7 +166,7 @@ def test_every_exclusion_is_there() -> None:
 def test_an_interruption_keeps_the_studies_that_are_done(folder: Path) -> None:
     (folder / "stops.py").write_text(STOPS)
     known = studies(folder)
-    report = study.Report()
+    report = study.Progress()
     with pytest.raises(KeyboardInterrupt):
         validate(chosen(["good", "stops", "bad"], known), False, folder, report, known=known)
     assert report.steps_done == 1

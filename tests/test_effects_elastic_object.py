@@ -18,7 +18,7 @@ from finger3d.fem.traces import surface
 from finger3d.fem.transfer import facing_trace, values_over
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
-from finger3d.mechanics.history import Frame, measure
+from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import build, march
@@ -43,7 +43,7 @@ def pad(**changes: Any) -> Model:
     return replace(model, **changes)
 
 
-def run(model: Model) -> tuple[Problem, list[Frame]]:
+def run(model: Model) -> tuple[Problem, list[StepResult]]:
     problem = build(model)
     frames = list(march(problem))
     assert all(f.outcome.ok and f.residual <= 1e-8 for f in frames)
@@ -157,10 +157,10 @@ def test_energy_goes_into_both_bodies() -> None:
     problem, frames = run(
         Effect(1.0, 0.3).apply(pad(object=Cylinder(radius_mm=4.0), friction=Coulomb(0.0), legs=(Leg(0.3, steps=20),)))
     )
-    own = np.all(problem.sign == 1.0, axis=1)
+    own = np.all(problem.mirror_sign == 1.0, axis=1)
     part = np.zeros((len(problem.surface.nodes), 3))
-    part[problem.parent[own]] = frames[-1].state.force[own] / problem.share[own, None]
-    stored = 0.5 * 4.0 * np.einsum("id,idje,je->", part, problem.compliance, part)
+    part[problem.image_of[own]] = frames[-1].state.force[own] / problem.multiplicity[own, None]
+    stored = 0.5 * 4.0 * np.einsum("id,idje,je->", part, problem.delassus, part)
     assert frames[-1].external_work_mJ == pytest.approx(stored, rel=1e-10)
 
 

@@ -17,9 +17,9 @@ from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import Stiffness
 from finger3d.fem.condense import condense, spring_forces, stiffened
-from finger3d.fem.kelvin import Endless, Foil
+from finger3d.fem.kelvin import FoilPatches, InfiniteBody
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.history import Frame, measure
+from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
 from finger3d.mechanics.solve import Problem, build, march, symmetry
 from finger3d.objects import Plane, Sphere
@@ -40,7 +40,7 @@ def block(**changes: object) -> Model:
     return replace(model, **changes)
 
 
-def run(problem: Problem) -> list[Frame]:
+def run(problem: Problem) -> list[StepResult]:
     frames = list(march(problem))
     assert all(f.outcome.ok and f.residual <= 1e-8 for f in frames)
     return frames
@@ -68,29 +68,31 @@ def test_condensed_foils_are_foils_in_the_stiffness(domain: str, nu: float) -> N
     model = FOIL.apply(block(domain=domain, material=Material(1.0, nu), gauges=(MIDDLE, ASIDE)))
     problem = build(model)
     assert problem.factorizations == 1
-    inlay = model.inclusions.lay(model, problem.mesh, problem.axes)
-    added = sp.csr_matrix(inlay.rows.T @ sp.diags_array(inlay.springs) @ inlay.rows)
+    inlay = model.inclusions.discretise(model, problem.mesh, problem.axes)
+    added = sp.csr_matrix(inlay.rows.T @ sp.diags_array(inlay.bar_stiffness) @ inlay.rows)
     added.resize(problem.stiffness.upper.shape)
     stiffer = Stiffness(
         sp.csr_matrix(problem.stiffness.upper + sp.triu(added)), problem.stiffness.pressure_vertices,
         problem.stiffness.pressure_scale,
     )  # fmt: skip
-    rows = problem.condensed._rows[: len(problem.kept) + 2, : problem.mesh.points.size]
-    direct = condense(stiffer, problem.held, rows).compliance
-    r, mesh_alone = len(problem.kept), problem.condensed.compliance.copy()
-    mesh_alone[r:, r:] -= problem.beyond
-    found = stiffened(mesh_alone, problem.springs)[: r + 2, : r + 2]
+    rows = problem.condensed._rows[: len(problem.active_dofs) + 2, : problem.mesh.points.size]
+    direct = condense(stiffer, problem.fixed_dofs, rows).compliance
+    r, mesh_alone = len(problem.active_dofs), problem.condensed.compliance.copy()
+    mesh_alone[r:, r:] -= problem.subgrid_compliance
+    found = stiffened(mesh_alone, problem.bar_stiffness)[: r + 2, : r + 2]
     assert found == pytest.approx(direct, abs=1e-8 * direct.max())
 
 
 def test_the_rows_of_gauges_are_means_of_their_bars() -> None:
     model = FOIL.apply(block(domain="plane-strain", gauges=(MIDDLE, ASIDE)))
     problem = build(model)
-    inlay = model.inclusions.lay(model, problem.mesh, problem.axes)
-    whole, r = problem.condensed.compliance, len(problem.kept)
-    assert inlay.reads.sum(axis=1) == pytest.approx(1.0)
-    assert whole[r : r + 2] == pytest.approx(inlay.reads @ whole[r + 2 :], abs=1e-12 * whole.max())
-    assert np.linalg.eigvalsh(problem.beyond).min() > -1e-3 * np.abs(problem.beyond).max()  # finer is more compliant
+    inlay = model.inclusions.discretise(model, problem.mesh, problem.axes)
+    whole, r = problem.condensed.compliance, len(problem.active_dofs)
+    assert inlay.gauge_weights.sum(axis=1) == pytest.approx(1.0)
+    assert whole[r : r + 2] == pytest.approx(inlay.gauge_weights @ whole[r + 2 :], abs=1e-12 * whole.max())
+    assert (
+        np.linalg.eigvalsh(problem.subgrid_compliance).min() > -1e-3 * np.abs(problem.subgrid_compliance).max()
+    )  # finer is more compliant
 
 
 def test_a_foil_across_a_bar_shares_its_load() -> None:
@@ -178,9 +180,9 @@ def test_neither_more_bars_nor_a_finer_mesh_change_much(domain: str, monkeypatch
     assert ratio(0.8) == pytest.approx(few, rel=0.02)
 
 
-def foil(along: np.ndarray, at: float = 0.0, turn: float = 0.0, width: float = 0.01) -> Foil:
+def foil(along: np.ndarray, at: float = 0.0, turn: float = 0.0, width: float = 0.01) -> FoilPatches:
     direction = np.array([np.cos(turn), np.sin(turn), 0.0])
-    return Foil(np.array([at, 0.0, 0.0]), direction, along, np.array([-0.5 * width, 0.5 * width]))
+    return FoilPatches(np.array([at, 0.0, 0.0]), direction, along, np.array([-0.5 * width, 0.5 * width]))
 
 
 def test_a_foil_in_a_long_plate_reads_what_the_wing_equation_says() -> None:
@@ -191,15 +193,17 @@ def test_a_foil_in_a_long_plate_reads_what_the_wing_equation_says() -> None:
     sine = np.sin(np.outer(theta, n))
     kernel = (1.0 + nu) * (3.0 - nu) / 4.0 * 2.0 / length
     first = np.linalg.solve(sine / stiff + kernel * n * sine / np.sin(theta)[:, None], np.ones(100))[0]
-    alone = Foil.of(np.zeros(3), np.array([1.0, 0.0, 0.0]), length, 1.0, 32, 1)
-    bars = alone.strained_by(alone, Endless(1.0, nu, True, 4.0))
+    alone = FoilPatches.of(np.zeros(3), np.array([1.0, 0.0, 0.0]), length, 1.0, 32, 1)
+    bars = alone.strained_by(alone, InfiniteBody(1.0, nu, True, 4.0))
     springs = 3000.0 * 0.02 * alone.area
     strain = np.linalg.solve(np.eye(31) + bars * springs, np.ones(31))
     assert strain @ alone.area / alone.area.sum() == pytest.approx(0.25 * np.pi * first / stiff, rel=0.002)
 
 
-@pytest.mark.parametrize("body", [Endless(2.0, 0.3), Endless(2.0, 0.3, True, 5.0), Endless(2.0, 0.3, False, 5.0)])
-def test_a_bar_far_away_feels_a_pair_of_point_forces(body: Endless) -> None:
+@pytest.mark.parametrize(
+    "body", [InfiniteBody(2.0, 0.3), InfiniteBody(2.0, 0.3, True, 5.0), InfiniteBody(2.0, 0.3, False, 5.0)]
+)
+def test_a_bar_far_away_feels_a_pair_of_point_forces(body: InfiniteBody) -> None:
     E, nu = 2.0, 0.3
     if body.thickness is None:
         push = (1.0 + nu) / (8.0 * np.pi * E * (1.0 - nu)) * (4.0 - 4.0 * nu)  # u_x = push / x for 1 N along x, ahead
@@ -217,9 +221,9 @@ def test_a_bar_far_away_feels_a_pair_of_point_forces(body: Endless) -> None:
 
 
 def test_what_two_foils_do_to_each_other_is_mutual() -> None:
-    a = Foil.of(np.zeros(3), np.array([1.0, 0.0, 0.0]), 2.0, 1.0, 8, 4)
-    b = Foil.of(np.array([0.3, 0.1, 0.3]), np.array([0.6, 0.8, 0.0]), 1.0, 1.0, 6, 4)
-    for body in (Endless(1.0, 0.4), Endless(1.0, 0.4, False, 2.0)):
+    a = FoilPatches.of(np.zeros(3), np.array([1.0, 0.0, 0.0]), 2.0, 1.0, 8, 4)
+    b = FoilPatches.of(np.array([0.3, 0.1, 0.3]), np.array([0.6, 0.8, 0.0]), 1.0, 1.0, 6, 4)
+    for body in (InfiniteBody(1.0, 0.4), InfiniteBody(1.0, 0.4, False, 2.0)):
         forth, back = a.strained_by(b, body), b.strained_by(a, body)
         assert forth == pytest.approx(back.T, abs=1e-12)
 

@@ -47,7 +47,7 @@ def test_light_load_is_small_strain(nu: float) -> None:
     for depth in (0.08, 0.01):
         model = fig9(nu, legs=(Leg(depth, steps=2),), mesh=MeshOptions(0.2, 8.0))
         problem = build(model)
-        small = list(march(replace(problem, model=replace(model, kinematics=SmallStrain()))))
+        small = list(march(replace(problem, model=replace(model, formulation=SmallStrain()))))
         large = list(march(problem))
         a, b = (measure(problem.points, f[-1]) for f in (small, large))
         ratios.append(abs(b["normal_force_N"] / a["normal_force_N"] - 1.0))
@@ -65,7 +65,7 @@ def test_newton_converges_quadratically(nu: float, monkeypatch: pytest.MonkeyPat
     problem = build(fig9(nu, legs=(Leg(10.0, steps=5),)))
     frames = list(march(problem))
     assert all(f.outcome.ok for f in frames)
-    assert problem.later.factorizations <= 5 * len(frames)
+    assert problem.cache.factorizations <= 5 * len(frames)
     # once all sets are found an error is followed by its square, times a constant of the mesh, down to round-off
     pairs = [(a, b) for a, b in zip(errors[:-1], errors[1:], strict=True) if 1e-6 < a < 1e-3 and b < a]
     assert pairs
@@ -79,7 +79,7 @@ def test_incompressible_plane_stress_converges_to_the_limit_of_nu() -> None:
         *_, end = march(problem)
         assert end.outcome is Outcome.CONVERGED
         forces.append(measure(problem.points, end)["normal_force_N"])
-        assert problem.later.factorizations <= 5 * 3
+        assert problem.cache.factorizations <= 5 * 3
     # linear in 0.5 - nu, so extrapolation from the first two leaves the square: 1e-6 and a factor
     assert forces[2] == pytest.approx(forces[1] + (forces[1] - forces[0]) / 9.0, rel=1e-5)
 
@@ -108,9 +108,9 @@ def test_quarter_and_whole_agree_in_3d_and_curved_objects_are_followed() -> None
         at = problem.points.points + 0.0
         u = np.zeros_like(at)
         touching = end.state.status != OPEN
-        assert end.state.frames is not None
+        assert end.state.bases is not None
         # where it touches the flank, the force leans outward with the cylinder's normal
-        world = problem.points.seen_in(end.state).world(end.state.force * [1.0, 0.0, 0.0])[touching]
+        world = problem.points.with_basis_of(end.state).to_global(end.state.force * [1.0, 0.0, 0.0])[touching]
         lean = world[:, 0] * np.sign(at[touching, 0])
         assert lean[np.abs(at[touching, 0]) > 0.4].min() > 0.0
         assert u.shape == at.shape

@@ -8,15 +8,15 @@ from meshes import grid
 
 from finger3d.fem.finite_contact import DeformedContact, deformed_contact
 from finger3d.fem.simplex import Mesh, quadratic
-from finger3d.fem.traces import Surface, surface
+from finger3d.fem.traces import BoundarySurface, surface
 
 
-def made(d: int) -> tuple[Mesh, Surface, np.ndarray]:
+def made(d: int) -> tuple[Mesh, BoundarySurface, np.ndarray]:
     mesh = quadratic(grid((2,) * d))
     return mesh, surface(mesh, "y+"), np.random.default_rng(d).normal(0.0, 0.05, mesh.points.shape)
 
 
-def contact(mesh: Mesh, face: Surface, u: np.ndarray) -> DeformedContact:
+def contact(mesh: Mesh, face: BoundarySurface, u: np.ndarray) -> DeformedContact:
     """With a tilted plane, whose normal does not turn."""
     normal = np.array([0.2, -1.0, 0.1])[: mesh.dim]
     normal = normal / np.linalg.norm(normal)
@@ -43,7 +43,7 @@ def test_softening_is_the_derivative_of_the_rows(d: int) -> None:
     h = 1e-6
     ends = [contact(mesh, face, u + s * h * way).rows[::d].T @ force for s in (1.0, -1.0)]
     slope = (ends[0] - ends[1]) / (2 * h)
-    second = contact(mesh, face, u).softening(face, force)
+    second = contact(mesh, face, u).geometric_stiffness(face, force)
     assert abs(second - second.T).max() <= 1e-12 * abs(second).max()
     assert second @ way.ravel() == pytest.approx(slope, rel=1e-6, abs=1e-7 * np.abs(slope).max())
 
@@ -52,5 +52,5 @@ def test_at_rest_rows_are_the_weighted_means() -> None:
     mesh, face, _ = made(3)
     u = np.zeros_like(mesh.points)
     at = contact(mesh, face, u)
-    assert at.growth == pytest.approx(1.0, rel=1e-14)
-    assert np.abs(np.asarray(at.rows[:, ::3].sum(axis=1))[0::3] - at.frames[:, 0, :1]).max() < 1e-12
+    assert at.area_ratio == pytest.approx(1.0, rel=1e-14)
+    assert np.abs(np.asarray(at.rows[:, ::3].sum(axis=1))[0::3] - at.bases[:, 0, :1]).max() < 1e-12

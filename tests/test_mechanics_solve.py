@@ -19,7 +19,7 @@ from finger3d.fem.recover import displacement
 from finger3d.fem.traces import displacement_row
 from finger3d.geometry.registry import designs
 from finger3d.mechanics import formulation
-from finger3d.mechanics.history import Frame, measure
+from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.model import Domain, Gauge, Leg, Material, MeshOptions, Model
 from finger3d.mechanics.solve import Problem, build, march, targets
 from finger3d.mechanics.step_halving import automatic, limits, marched, refine, remaining, step_error
@@ -44,7 +44,7 @@ def block(**changes: object) -> Model:
     return replace(model, **changes)
 
 
-def run(model: Model) -> tuple[Problem, list[Frame]]:
+def run(model: Model) -> tuple[Problem, list[StepResult]]:
     problem = build(model)
     frames = list(march(problem))
     assert all(f.outcome.ok and f.residual <= 1e-8 for f in frames)
@@ -127,7 +127,7 @@ def test_contact_forces_and_base_reaction_balance() -> None:
     full = problem.stiffness.upper + sp.triu(problem.stiffness.upper, 1).T
     residual = (full @ unknowns)[: problem.mesh.points.size].reshape(problem.mesh.points.shape)
     base = np.unique(problem.mesh.facets["base"])
-    contact = problem.points.world(frames[-1].state.force).sum(axis=0)
+    contact = problem.points.to_global(frames[-1].state.force).sum(axis=0)
     scale = np.abs(frames[-1].state.force).sum()
     assert np.abs(residual[base].sum(axis=0) + contact).max() < 1e-10 * scale
     assert np.abs(residual.sum(axis=0)).max() < 1e-10 * scale  # K moves no rigid body, so inner forces cancel
@@ -165,11 +165,11 @@ def test_solvers_behind_the_same_interface_agree(monkeypatch: pytest.MonkeyPatch
     assert b["normal_force_N"] == pytest.approx(a["normal_force_N"], rel=1e-11)
 
 
-def stored(problem: Problem, frame: Frame) -> float:
+def stored(problem: Problem, frame: StepResult) -> float:
     """Elastic energy (mJ), f C f / 2, summed over the whole finger's points."""
     force = frame.part.force
-    each = 0.5 * np.einsum("id,idje,je->i", force, problem.compliance, force)
-    return float((each[problem.parent] * problem.share).sum())
+    each = 0.5 * np.einsum("id,idje,je->i", force, problem.delassus, force)
+    return float((each[problem.image_of] * problem.multiplicity).sum())
 
 
 SLIDE_OVER_A_BALL = (Leg(0.3), Leg(0.3, slide_x_mm=0.4))
@@ -218,7 +218,7 @@ def test_tilted_plane_pushes_along_its_own_normal() -> None:
     tilt = np.deg2rad(5.0)
     body = block(object=Plane(tilt=tilt), friction=Coulomb(0.0), legs=(Leg(0.5, steps=2),))
     problem, frames = run(body)
-    world = problem.points.world(frames[-1].state.force).sum(axis=0)
+    world = problem.points.to_global(frames[-1].state.force).sum(axis=0)
     assert world[0] / -world[1] == pytest.approx(np.tan(tilt), rel=1e-12)
     assert world[1] < 0
 
@@ -350,12 +350,12 @@ def test_most_automatic_increments_fall_with_the_size_of_the_contact(domain: Dom
     found = [limits(model, 1e4 * points, points) for points in (30, 300, 3000)]
     assert all(first == 5 and last >= 20 for first, last in found)
     assert found[0][1] >= found[1][1] >= found[2][1]
-    assert limits(replace(model, kinematics=FiniteStrain()), 1e4, 100) == (3, 12)
+    assert limits(replace(model, formulation=FiniteStrain()), 1e4, 100) == (3, 12)
 
 
 def test_presses_at_once_are_the_presses_in_turn(monkeypatch: pytest.MonkeyPatch) -> None:
     from finger3d.mechanics import solve
-    from finger3d.mechanics.solve import each
+    from finger3d.mechanics.solve import map_parallel
 
     monkeypatch.setattr(solve, "_WORTH", 1)
     monkeypatch.setattr(solve, "cores", lambda: 2)
@@ -368,7 +368,7 @@ def test_presses_at_once_are_the_presses_in_turn(monkeypatch: pytest.MonkeyPatch
         own = replace(problem, model=replace(problem.model, friction=Coulomb(mu)))
         return [f.part.force for f in march(own, before[-1] if before else ())]
 
-    at_once = list(each(problem, press, mus))
+    at_once = list(map_parallel(problem, press, mus))
     assert all(
         np.array_equal(a, b)
         for mu, found in zip(mus, at_once, strict=True)
@@ -379,7 +379,7 @@ def test_presses_at_once_are_the_presses_in_turn(monkeypatch: pytest.MonkeyPatch
 def test_presses_nobody_waits_for_end_with_their_increment(monkeypatch: pytest.MonkeyPatch) -> None:
     """As after Ctrl-C: a long press at once with a short one, after which no more is asked."""
     from finger3d.mechanics import solve
-    from finger3d.mechanics.solve import each
+    from finger3d.mechanics.solve import map_parallel
 
     monkeypatch.setattr(solve, "_WORTH", 1)
     monkeypatch.setattr(solve, "cores", lambda: 2)
@@ -391,7 +391,7 @@ def test_presses_nobody_waits_for_end_with_their_increment(monkeypatch: pytest.M
             increments[steps] += 1
         return steps
 
-    told = each(problem, press, list(increments))
+    told = map_parallel(problem, press, list(increments))
     assert next(told) == 1
     told.close()
     assert increments[1] == 1

@@ -9,9 +9,9 @@ import pytest
 from finger3d.fem.quality import cell_angles_deg, curved_jacobians, curved_volume
 from finger3d.fem.simplex import boundary, unfold
 from finger3d.geometry.cad import cut, sound
-from finger3d.geometry.implicit import Cylinder, Freeform, Plane, Sphere, surface_of
+from finger3d.geometry.implicit import Freeform, ImplicitCylinder, ImplicitPlane, ImplicitSphere, surface_of
 from finger3d.geometry.registry import designs
-from finger3d.geometry.tessellate import Body, CadFace, tessellate
+from finger3d.geometry.tessellate import CadFace, Tessellation, tessellate
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.seams import Seams
 from finger3d.meshing.snap import MIN_DIHEDRAL_DEG, UnusableMeshError, check_closed, placed, project, repair, snap
@@ -21,7 +21,7 @@ HALF = designs()["half_cylinder"](5.0, 10.0)
 EXACT = (0.0, 10.0, -10.0, 5.0, -5.0, 50.0, -50.0)
 
 
-def body_of(design: Any, symmetry: tuple[str, ...] = (), tolerance: float = 0.01) -> Body:
+def body_of(design: Any, symmetry: tuple[str, ...] = (), tolerance: float = 0.01) -> Tessellation:
     return tessellate(cut(design.solid(), symmetry), tolerance, exact=EXACT)
 
 
@@ -93,9 +93,11 @@ def faces_of(*surfaces: Any) -> tuple[CadFace, ...]:
 
 
 def test_points_go_where_their_surfaces_meet() -> None:
-    plane = Plane(np.array([0.0, 0.0, 0.5]), np.array([0.0, 0.0, 1.0]))
-    tilted = Plane(np.array([0.2, 0.0, 0.0]), np.array([1.0, 1.0, 0.0]) / np.sqrt(2.0))
-    faces = faces_of(plane, tilted, Sphere(np.zeros(3), 1.0), Cylinder(np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.8))
+    plane = ImplicitPlane(np.array([0.0, 0.0, 0.5]), np.array([0.0, 0.0, 1.0]))
+    tilted = ImplicitPlane(np.array([0.2, 0.0, 0.0]), np.array([1.0, 1.0, 0.0]) / np.sqrt(2.0))
+    faces = faces_of(
+        plane, tilted, ImplicitSphere(np.zeros(3), 1.0), ImplicitCylinder(np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.8)
+    )
     points = np.random.default_rng(0).uniform(0.3, 0.7, (8, 3)) * [1.0, -1.0, 1.0]
     sets = np.array([[0, 0, 1, 0], [1, 0, 0, 0], [1, 0, 1, 0], [1, 1, 1, 0], [0, 1, 0, 1], [0, 0, 0, 1]], dtype=bool)
     sets = np.vstack([sets, np.zeros((2, 4), dtype=bool)])
@@ -109,7 +111,7 @@ def test_points_go_where_their_surfaces_meet() -> None:
 
 
 @pytest.fixture(scope="module")
-def rounded() -> tuple[Body, dict[str, int]]:
+def rounded() -> tuple[Tessellation, dict[str, int]]:
     """A box 12 x 5 x 8 on its base, its upper edges along z rounded with 1.5 mm, and the numbers of its faces."""
     from build123d import Axis, Box, Pos, fillet
 
@@ -121,7 +123,7 @@ def rounded() -> tuple[Body, dict[str, int]]:
     return body, {name: min(middle, key=lambda i: np.linalg.norm(middle[i] - at)) for name, at in of.items()}
 
 
-def placed_on(rounded: tuple[Body, dict[str, int]], point: list[float], names: str, reach: float = 9.0) -> Any:
+def placed_on(rounded: tuple[Tessellation, dict[str, int]], point: list[float], names: str, reach: float = 9.0) -> Any:
     body, number = rounded
     sets = np.zeros((1, len(body.faces)), dtype=bool)
     sets[0, [number[n] for n in names.split()]] = True
@@ -129,7 +131,7 @@ def placed_on(rounded: tuple[Body, dict[str, int]], point: list[float], names: s
     return moved[0], {n for n, i in number.items() if rows[0, i]}
 
 
-def test_where_faces_join_smoothly_a_node_goes_onto_the_nearest(rounded: tuple[Body, dict[str, int]]) -> None:
+def test_where_faces_join_smoothly_a_node_goes_onto_the_nearest(rounded: tuple[Tessellation, dict[str, int]]) -> None:
     # 0.4 mm beside the seam at x = 4.5 the fillet is 0.4^2/3 = 0.053 mm below the flat top; both ways it stays there.
     moved, on = placed_on(rounded, [4.1, 4.98, 1.0], "top fillet")
     assert on == {"top"}
@@ -144,7 +146,9 @@ def test_where_faces_join_smoothly_a_node_goes_onto_the_nearest(rounded: tuple[B
     assert np.hypot(moved[0] - 4.5, moved[1] - 3.5) == pytest.approx(1.5, abs=1e-12)
 
 
-def test_a_node_that_cannot_reach_where_its_faces_meet_stays_beside(rounded: tuple[Body, dict[str, int]]) -> None:
+def test_a_node_that_cannot_reach_where_its_faces_meet_stays_beside(
+    rounded: tuple[Tessellation, dict[str, int]],
+) -> None:
     near, on = placed_on(rounded, [2.0, 4.9, 3.7], "top end")
     assert on == {"top", "end"}
     np.testing.assert_allclose(near, [2.0, 5.0, 4.0], atol=1e-12)
@@ -157,7 +161,7 @@ def test_a_node_that_cannot_reach_where_its_faces_meet_stays_beside(rounded: tup
     np.testing.assert_array_equal(moved, [2.0, 0.0, 1.0])
 
 
-def test_a_crease_between_faces_is_no_seam(rounded: tuple[Body, dict[str, int]]) -> None:
+def test_a_crease_between_faces_is_no_seam(rounded: tuple[Tessellation, dict[str, int]]) -> None:
     body, number = rounded
     sets = np.zeros((3, len(body.faces)), dtype=bool)
     for row, names in enumerate((("top", "end"), ("wall", "base"), ("fillet", "end"))):
@@ -167,7 +171,7 @@ def test_a_crease_between_faces_is_no_seam(rounded: tuple[Body, dict[str, int]])
 
 def test_points_without_a_place_are_reported() -> None:
     axis = np.array([0.0, 1.0, 0.0])
-    faces = faces_of(Plane(np.zeros(3), axis), Plane(axis, axis))
+    faces = faces_of(ImplicitPlane(np.zeros(3), axis), ImplicitPlane(axis, axis))
     with pytest.raises(UnusableMeshError, match="no place"):
         project(np.array([[0.0, 0.4, 0.0], [1.0, 0.0, 1.0]]), np.ones((2, 2), dtype=bool), faces)
 
@@ -207,7 +211,7 @@ def test_free_form_surfaces_are_reached_by_projection() -> None:
     assert isinstance(surface, Freeform)
     points = np.array([[0.5, 5.3, 0.2], [-1.0, 4.6, 1.0]])
     distance, normal = surface.distance(points)
-    exact, out = Cylinder(np.zeros(3), np.array([0.0, 0.0, 1.0]), 5.0).distance(points)
+    exact, out = ImplicitCylinder(np.zeros(3), np.array([0.0, 0.0, 1.0]), 5.0).distance(points)
     np.testing.assert_allclose(np.abs(distance), np.abs(exact), atol=1e-4)
     np.testing.assert_allclose(np.abs(np.einsum("ij,ij->i", normal, out)), 1.0, atol=1e-4)
     moved = project(points, np.ones((2, 1), dtype=bool), faces_of(surface))

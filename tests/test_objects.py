@@ -23,8 +23,8 @@ from finger3d.objects import (
     Sphere,
     Wave,
     Wedge,
-    approach,
-    first_touch,
+    first_contact_height,
+    initial_contact,
     slope_of,
 )
 
@@ -34,7 +34,7 @@ PRESS = np.array([[10.0, 0.0, 0.0]])
 
 
 def near(obj: RigidObject, path: np.ndarray = PRESS) -> float:
-    return approach(FIG9.top, obj, 50.0, 10.0, np.asarray(path, dtype=float)).touch_mm
+    return initial_contact(FIG9.top, obj, 50.0, 10.0, np.asarray(path, dtype=float)).first_contact_mm
 
 
 # heights at (x, z) = (3, 4) above the lowest point at (0, 0), and one mm beside it along x
@@ -62,7 +62,7 @@ def test_heights_in_closed_form(obj: RigidObject, far: float, close: float) -> N
      Wedge(12.3, angle=0.4), Wave(1.7, wavelength_mm=4.0, amplitude_mm=0.5), Sphere(-17.77, 3.33, radius_mm=0.01)],
 )  # fmt: skip
 def test_first_touch_is_the_largest_overlap_of_the_real_surfaces(obj: RigidObject) -> None:
-    touch = first_touch(FIG9.top, obj, 50.0, 10.0)
+    touch = first_contact_height(FIG9.top, obj, 50.0, 10.0)
     x, z = np.random.default_rng(0).uniform(-1.0, 1.0, (2, 200_000)) * [[50.0], [10.0]]
     tried = (FIG9.top(x, z) - obj.height(x, z)).max()
     assert tried <= touch + 1e-9
@@ -81,14 +81,14 @@ def test_first_touch_by_search_not_by_bounding_box() -> None:
     # The object's corner beside a flat top: a vertex against a face.
     block = designs()["block"](4.0, 3.0, 4.0)
     spike = MeshObject(0.123, 0.321, surface=box(1.0, 1.0, 1.0))
-    assert first_touch(block.top, spike, 4.0, 2.0) == 3.0
+    assert first_contact_height(block.top, spike, 4.0, 2.0) == 3.0
 
 
 def test_several_bumps_as_high_are_all_tried() -> None:
     def top(x: np.ndarray, z: np.ndarray) -> np.ndarray:
         return 5.0 - 0.5 * (x - 7.003) ** 2 * (x + 7.003) ** 2 / 50.0 - 1e-3 * z**2 + 1e-7 * x
 
-    assert first_touch(top, Plane(), 10.0, 2.0) == pytest.approx(5.0 + 7.003e-7, abs=1e-10)
+    assert first_contact_height(top, Plane(), 10.0, 2.0) == pytest.approx(5.0 + 7.003e-7, abs=1e-10)
 
 
 @pytest.mark.parametrize(
@@ -124,7 +124,7 @@ def test_approaches_that_are_not(obj: RigidObject) -> None:
 
 def test_the_zone_finds_a_tip_between_the_points_of_its_grid() -> None:
     tip = Sphere(0.1317, 0.077, radius_mm=1e-3)
-    x0, x1, z0, z1 = approach(FIG9.top, tip, 50.0, 10.0, np.array([[1e-4, 0, 0]])).zone
+    x0, x1, z0, z1 = initial_contact(FIG9.top, tip, 50.0, 10.0, np.array([[1e-4, 0, 0]])).contact_box
     assert x0 <= 0.1317 <= x1 < x0 + 2e-3
     assert z0 <= 0.077 <= z1 < z0 + 2e-3
 

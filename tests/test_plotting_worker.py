@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from finger3d.plotting.worker import Artist
+from finger3d.plotting.worker import PlotWorker
 
 
 @pytest.fixture(autouse=True)
@@ -33,7 +33,7 @@ def known_only_here(path: Path) -> None:
 
 
 def test_a_child_draws_while_this_process_goes_on(tmp_path: Path) -> None:
-    with Artist() as artist:
+    with PlotWorker() as artist:
         artist.draw(note_process, tmp_path / "a")
         artist.draw(note_process, tmp_path / "b")
         artist.begin()
@@ -42,7 +42,7 @@ def test_a_child_draws_while_this_process_goes_on(tmp_path: Path) -> None:
 
 
 def test_what_a_failed_child_did_not_draw_is_drawn_here(tmp_path: Path) -> None:
-    with Artist() as artist:
+    with PlotWorker() as artist:
         artist.draw(known_only_here, tmp_path / "a")
         artist.begin()
         artist.finish()
@@ -50,7 +50,7 @@ def test_what_a_failed_child_did_not_draw_is_drawn_here(tmp_path: Path) -> None:
 
 
 def test_an_error_of_a_picture_is_raised_here(tmp_path: Path) -> None:
-    with Artist() as artist:
+    with PlotWorker() as artist:
         artist.draw(note_process, tmp_path / "no folder" / "a")
         artist.begin()
         with pytest.raises(FileNotFoundError):
@@ -64,7 +64,7 @@ def test_to_begin_does_not_wait_for_a_child_that_is_loading(tmp_path: Path, monk
         f"while not Path({str(begun)!r}).exists():\n    assert time.monotonic() < end\n    time.sleep(0.01)\n"
     )
     monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
-    with Artist(module="loads_until_begun") as artist:
+    with PlotWorker(module="loads_until_begun") as artist:
         artist.draw(len, bytes(2**20))  # more than a pipe holds
         artist.draw(note_process, tmp_path / "a")
         artist.begin()
@@ -75,7 +75,7 @@ def test_to_begin_does_not_wait_for_a_child_that_is_loading(tmp_path: Path, monk
 
 def test_pictures_that_were_begun_are_finished_when_interrupted(tmp_path: Path) -> None:
     def interrupted() -> None:
-        with Artist() as artist:
+        with PlotWorker() as artist:
             artist.draw(note_process, tmp_path / "a")
             artist.begin()
             raise KeyboardInterrupt
@@ -87,7 +87,7 @@ def test_pictures_that_were_begun_are_finished_when_interrupted(tmp_path: Path) 
 
 @pytest.mark.parametrize("wanted", [True, False])
 def test_nothing_to_draw_leaves_nothing_running(wanted: bool) -> None:
-    with Artist(wanted) as artist:
+    with PlotWorker(wanted) as artist:
         child = artist._child
     assert (child is not None) == wanted
     if child:
@@ -96,7 +96,7 @@ def test_nothing_to_draw_leaves_nothing_running(wanted: bool) -> None:
 
 def test_where_matplotlib_is_loaded_no_child_is_started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib", os)
-    with Artist() as artist:
+    with PlotWorker() as artist:
         artist.draw(note_process, tmp_path / "a")
         artist.begin()
         artist.finish()

@@ -7,10 +7,10 @@ import re
 
 import pytest
 
-from finger3d.progress import BarReport, PlainReport, Report, reporter
+from finger3d.progress import BarProgress, PlainProgress, Progress, reporter
 
 
-def work(report: Report) -> Report:
+def work(report: Progress) -> Progress:
     with report:
         report.stage("meshing")
         report.say("mesh taken from the cache [quickly]")
@@ -22,7 +22,7 @@ def work(report: Report) -> Report:
 
 def test_plain_report_writes_a_line_per_event():
     stream = io.StringIO()
-    report = work(PlainReport(stream))
+    report = work(PlainProgress(stream))
     lines = [re.sub(r"^\[ *[\d.]+ s\] ", "", line) for line in stream.getvalue().splitlines()]
     assert lines == [
         "meshing",
@@ -35,13 +35,13 @@ def test_plain_report_writes_a_line_per_event():
 
 
 def test_the_silent_report_still_counts(capsys):
-    report = work(Report())
+    report = work(Progress())
     assert (report.steps_done, report.steps_total) == (2, 2)
     assert capsys.readouterr() == ("", "")
 
 
 def test_bar_report_keeps_what_is_said(capsys):
-    report = work(BarReport())
+    report = work(BarProgress())
     assert report.steps_done == 2
     assert "mesh taken from the cache [quickly]" in capsys.readouterr().out
 
@@ -49,10 +49,10 @@ def test_bar_report_keeps_what_is_said(capsys):
 @pytest.mark.parametrize(
     ("terminal", "environment", "kind"),
     [
-        (True, {"TERM": "xterm"}, BarReport),
-        (True, {"TERM": "dumb"}, PlainReport),
-        (True, {"TERM": "xterm", "CI": "true"}, PlainReport),
-        (False, {"TERM": "xterm"}, PlainReport),
+        (True, {"TERM": "xterm"}, BarProgress),
+        (True, {"TERM": "dumb"}, PlainProgress),
+        (True, {"TERM": "xterm", "CI": "true"}, PlainProgress),
+        (False, {"TERM": "xterm"}, PlainProgress),
     ],
 )
 def test_reporter_fits_the_place(terminal, environment, kind, monkeypatch):

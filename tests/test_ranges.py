@@ -25,13 +25,13 @@ from finger3d.scene.tables import (
     MaterialTable,
     MeshTable,
     PressTable,
-    Table,
+    TomlTable,
     table_of,
 )
 
 OF_DESIGNS = [table_of(design) for design in designs().values()]
 OF_EFFECTS = [table_of(effect_type(name)) for name in effect_names()]
-TABLES: list[type[Table]] = [
+TABLES: list[type[TomlTable]] = [
     *OF_DESIGNS, *OF_EFFECTS, *SHAPES.values(),
     FrictionTable, GaugeTable, LegTable, MaterialTable, MeshTable, PressTable,
 ]  # fmt: skip
@@ -50,7 +50,7 @@ def numbers(hint: Any) -> list[tuple[bool, bool]]:
 
 
 @pytest.mark.parametrize("table", TABLES, ids=lambda t: t.__name__)
-def test_every_number_has_a_range(table: type[Table]) -> None:
+def test_every_number_has_a_range(table: type[TomlTable]) -> None:
     for name, hint in typing.get_type_hints(table, include_extras=True).items():
         if name != "model_config":
             assert all(low and high for low, high in numbers(hint)), name

@@ -18,7 +18,7 @@ from finger3d.cli import main
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Gauge
 from finger3d.plotting.layout import panels_of, sheet
-from finger3d.report.build import CITE, PAPER, Code, Figure, Row, Section, Table, number, write_page
+from finger3d.report.build import CITE, PAPER, Code, Figure, HeadlineRow, PageSection, Table, number, write_page
 from finger3d.report.compare import compare_page
 from finger3d.report.press import press_page
 from finger3d.report.view3d import view_of
@@ -132,10 +132,14 @@ def test_the_builder_takes_what_calibrate_and_sweep_have(tmp_path: Path) -> None
 
     Image.new("RGB", (30, 20)).save(tmp_path / "fit.png")
     page = write_page(
-        tmp_path, "mu <from> strain", [Row("resolution & more", 0.0123, "1/N", 0.0011), Row("fit", "second order")],
-        [Section("Fit", ["a < b", Table(["mu", "s"], [(0.25, 1e-3), ("x", None)]), Code("x = <1>", "code")], True)],
-        [Figure("fit.png", 'the "fit"'), Figure("absent.png", "never seen")], command="calibrate", notes=["take care"],
-    )  # fmt: skip
+        tmp_path,
+        "mu <from> strain",
+        [HeadlineRow("resolution & more", 0.0123, "1/N", 0.0011), HeadlineRow("fit", "second order")],
+        [PageSection("Fit", ["a < b", Table(["mu", "s"], [(0.25, 1e-3), ("x", None)]), Code("x = <1>", "code")], True)],
+        [Figure("fit.png", 'the "fit"'), Figure("absent.png", "never seen")],
+        command="calibrate",
+        notes=["take care"],
+    )
     assert page == tmp_path / "report.html"
     text = words(page)
     for said in ("finger3d calibrate", "mu <from> strain", "resolution & more 0.0123 ± 0.0011 1/N", "second order",

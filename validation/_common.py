@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from finger3d.contact.friction import Coulomb
-from finger3d.contact.solve import advance
-from finger3d.contact.state import ContactState, Increment
+from finger3d.contact.solve import solve_increment
+from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.fem.assembly import Elasticity, stiffness
 from finger3d.fem.condense import condense
 from finger3d.fem.elements import physical_gradients, quadrature, shape, surface_measure
 from finger3d.fem.simplex import Mesh, boundary, quadratic, signed_volumes
-from finger3d.fem.traces import Surface, local_rows, restrict, surface
+from finger3d.fem.traces import BoundarySurface, local_rows, restrict, surface
 from finger3d.objects import vertical_frame
 
 Float = NDArray[np.float64]
@@ -175,18 +175,18 @@ def pressure_error(mesh: Mesh, pressure: Float, exact: Field) -> float:
 class Body:
     """A body condensed to the contact points of one side: compliance (c, d, c, d) mm/N in the vertical frame."""
 
-    surface: Surface
+    surface: BoundarySurface
     compliance: Float
 
     def press(
         self, gap: Float, mu: float = 0.0, previous: ContactState | None = None, scale: float | None = None
-    ) -> Increment:
+    ) -> ContactSolution:
         """Forces under a rigid gap (c,) mm at rest, negative where the object would overlap."""
         d = self.compliance.shape[1]
         free = np.zeros((len(gap), d))
         free[:, 0] = gap
         start = previous or ContactState.at_rest(np.maximum(gap, 0.0), d)
-        return advance(start, free, self.compliance, Coulomb(mu), scale or float(-gap.min()))
+        return solve_increment(start, free, self.compliance, Coulomb(mu), scale or float(-gap.min()))
 
     def gap(self, height: Field) -> Float:
         """Weighted mean (c,) of a height above the surface, given at points (q, d)."""

@@ -19,18 +19,18 @@ from finger3d.contact.friction import OPEN, STICK, Coulomb
 from finger3d.fem.assembly import Elasticity, Stiffness, stiffness
 from finger3d.fem.condense import condense
 from finger3d.fem.simplex import Mesh
-from finger3d.fem.traces import Surface, local_rows, surface
+from finger3d.fem.traces import BoundarySurface, local_rows, surface
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.history import ContactPoints, Frame, measure
+from finger3d.mechanics.history import ContactPoints, StepResult, measure
 from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
-from finger3d.mechanics.problem import Problem, at_points
+from finger3d.mechanics.problem import Problem, scatter_to_points
 
 # The steps of `build`, not public, since the product has no other elements.
 from finger3d.mechanics.solve import MARGIN, _candidates, _held, _kept_rows, _unfolded, gauge_row, march, symmetry
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.report import MeshReport
 from finger3d.meshing.swept import mesh_section
-from finger3d.objects import approach
+from finger3d.objects import initial_contact
 
 Float = NDArray[np.float64]
 
@@ -104,12 +104,12 @@ class Parts:
     report: MeshReport
     elastic: Elasticity
     stiffness: Stiffness
-    surface: Surface
-    kept: NDArray[np.int64]
+    surface: BoundarySurface
+    active_dofs: NDArray[np.int64]
     rows: sp.csr_matrix
     gauges: sp.csr_matrix
-    held: NDArray[np.int64]
-    touch_mm: float
+    fixed_dofs: NDArray[np.int64]
+    first_contact_mm: float
     axes: tuple[str, ...]
     seconds: dict[str, float] = field(default_factory=dict)
 
@@ -121,9 +121,9 @@ class Parts:
 
 def assembled(model: Model, element: str) -> Parts:
     """Mesh and assemble a model with elements of a kind."""
-    way, axes = approach(*model.approach), symmetry(model)
+    way, axes = initial_contact(*model.approach), symmetry(model)
     make = mesh_solid if model.domain == "solid" else mesh_section
-    mesh, report = make(model.design, model.mesh, way.zone, axes)
+    mesh, report = make(model.design, model.mesh, way.contact_box, axes)
     start = time.perf_counter()
     if element == "linear":
         mesh = straight(mesh)
@@ -131,32 +131,48 @@ def assembled(model: Model, element: str) -> Parts:
     elastic = replace(constants, mixed=element == "mixed")
     thickness = 1.0 if mesh.dim == 3 else model.design.width_mm
     matrix = stiffness(mesh, elastic, thickness)
-    face = _candidates(model, surface(mesh, "contact", thickness), way.touch_mm, MARGIN)
+    face = _candidates(model, surface(mesh, "contact", thickness), way.first_contact_mm, MARGIN)
     kept = _kept_rows(face, axes)
     rows = local_rows(face, model.object.frame(mesh.dim))[kept]
     gauges = sp.vstack([gauge_row(mesh, g, axes) for g in model.gauges], format="csr")
     seconds = {**report.seconds, "assembly": time.perf_counter() - start}
     held = _held(model, mesh, axes)
     return Parts(
-        model, mesh, report, elastic, matrix, face, kept, rows, gauges, held, way.touch_mm, axes, seconds
+        model, mesh, report, elastic, matrix, face, kept, rows, gauges, held, way.first_contact_mm, axes, seconds
     )  # fmt: skip
 
 
 def condensed(parts: Parts, solver: str | None = None) -> Problem:
     """The problem, as `build` makes it."""
-    small = condense(parts.stiffness, parts.held, sp.vstack([parts.rows, parts.gauges], format="csr"), solver)
+    small = condense(parts.stiffness, parts.fixed_dofs, sp.vstack([parts.rows, parts.gauges], format="csr"), solver)
     count, d = parts.surface.points.shape
     strain = np.zeros((len(parts.model.gauges), count * d))
-    strain[:, parts.kept] = small.compliance[len(parts.kept) :, : len(parts.kept)]
+    strain[:, parts.active_dofs] = small.compliance[len(parts.active_dofs) :, : len(parts.active_dofs)]
     parent, sign, share, points = _unfolded(parts.model, parts.mesh, parts.surface, parts.axes)
     return Problem(
-        parts.model, parts.mesh, parts.report, parts.elastic, parts.stiffness, parts.surface, small,
-        at_points(small.compliance, parts.kept, count, d), strain, parts.kept, parts.held, parts.thickness,
-        parts.touch_mm, parts.axes, points, parent, sign, share, {**parts.seconds, "condensation": small.seconds},
-    )  # fmt: skip
+        parts.model,
+        parts.mesh,
+        parts.report,
+        parts.elastic,
+        parts.stiffness,
+        parts.surface,
+        small,
+        scatter_to_points(small.compliance, parts.active_dofs, count, d),
+        strain,
+        parts.active_dofs,
+        parts.fixed_dofs,
+        parts.thickness,
+        parts.first_contact_mm,
+        parts.axes,
+        points,
+        parent,
+        sign,
+        share,
+        {**parts.seconds, "condensation": small.seconds},
+    )
 
 
-def in_steps(problem: Problem, count: int) -> list[Frame]:
+def in_steps(problem: Problem, count: int) -> list[StepResult]:
     """Frames of a press in so many increments."""
     legs = tuple(replace(leg, steps=count) for leg in problem.model.legs)
     frames = list(march(replace(problem, model=replace(problem.model, legs=legs))))
@@ -165,7 +181,7 @@ def in_steps(problem: Problem, count: int) -> list[Frame]:
     return frames
 
 
-def numbers(points: ContactPoints, frame: Frame) -> dict[str, float]:
+def numbers(points: ContactPoints, frame: StepResult) -> dict[str, float]:
     """The quantities as a press reports them, and the edges of contact and stick between the points."""
     told = measure(points, frame)
     contact, stick = edges(points, frame)
@@ -182,7 +198,7 @@ def numbers(points: ContactPoints, frame: Frame) -> dict[str, float]:
     }
 
 
-def edges(points: ContactPoints, frame: Frame, fit: int = 6) -> tuple[float, float]:
+def edges(points: ContactPoints, frame: StepResult, fit: int = 6) -> tuple[float, float]:
     """Half-lengths (mm) at z = 0 between the points: of the contact where p^2 goes through zero, and of the stick zone.
 
     p^2 is linear in x at its edge (Johnson 1985, ch. 4): a line through `fit` points, the outermost left out, finds it

@@ -67,7 +67,7 @@ def factored(given: dict[str, Any]) -> dict[str, Any]:
     from pypardiso import PyPardisoSolver
 
     parts = assembled(model_of(Case(**{**given, "counts": tuple(given["counts"])})), given["element"])
-    free = np.setdiff1d(np.arange(parts.stiffness.upper.shape[0]), parts.held)
+    free = np.setdiff1d(np.arange(parts.stiffness.upper.shape[0]), parts.fixed_dofs)
     upper = parts.stiffness.upper[free][:, free].tocsr()
     solver = PyPardisoSolver(mtype=-2)
     for k, value in zip((1, 2, 10, 21), (1, 3, 13, 1), strict=True):  # as in finger3d.fem.pardiso
@@ -82,15 +82,15 @@ def single(given: dict[str, Any]) -> dict[str, Any]:
     """What a compliance kept in single precision changes, and what a solve in single precision would save."""
     case = Case(**{**given, "counts": tuple(given["counts"])})
     problem = condensed(assembled(model_of(case), case.element))
-    rounded = problem.compliance.astype(np.float32).astype(np.float64)
+    rounded = problem.delassus.astype(np.float32).astype(np.float64)
     count = case.counts[0]
-    frames = [in_steps(p, count)[-1] for p in (problem, replace(problem, compliance=rounded))]
+    frames = [in_steps(p, count)[-1] for p in (problem, replace(problem, delassus=rounded))]
     state = frames[1].part
     c, d = state.force.shape
     # the state found with the rounded compliance, held against the true one; position is the change from the start
-    moved = problem.free(frames[1].target) + np.einsum("aibj,bj->ai", problem.compliance, state.force)
+    moved = problem.free_motion(frames[1].target) + np.einsum("aibj,bj->ai", problem.delassus, state.force)
     gap = np.where(state.status == OPEN, np.maximum(-moved[:, 0], 0.0), np.abs(moved[:, 0]))
-    dense = problem.compliance.reshape(c * d, c * d)
+    dense = problem.delassus.reshape(c * d, c * d)
     seconds = {}
     for name, kind in (("double", np.float64), ("single", np.float32)):
         matrix, right = dense.astype(kind), np.ones(c * d, dtype=kind)

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from finger3d.contact.conditions import TOLERANCE, Increments, project, residual
+from finger3d.contact.conditions import TOLERANCE, ContactProblem, project_on_friction_cone, residual
 from finger3d.contact.friction import SLIP, STICK
 from finger3d.contact.state import ContactState, next_state
 from finger3d.mechanics.problem import Problem, targets
@@ -29,15 +29,16 @@ class EachIteration:
     def __init__(self, parts: Parts) -> None:
         self.parts, self.solves = parts, 0
         size = parts.stiffness.upper.shape[0]
-        self.free = np.setdiff1d(np.arange(size), parts.held)
+        self.free = np.setdiff1d(np.arange(size), parts.fixed_dofs)
         upper = parts.stiffness.upper[self.free][:, self.free]
         self.whole = (upper + sp.triu(upper, 1).T).tocsr()
         c, d = parts.surface.points.shape
         place = sp.csr_matrix(
-            (np.ones(len(parts.kept)), (parts.kept, np.arange(len(parts.kept)))), (c * d, len(parts.kept))
+            (np.ones(len(parts.active_dofs)), (parts.active_dofs, np.arange(len(parts.active_dofs)))),
+            (c * d, len(parts.active_dofs)),
         )
         self.read = (place @ self._columns(parts.rows)).tocsr()
-        self.locked = np.setdiff1d(np.arange(c * d), parts.kept)
+        self.locked = np.setdiff1d(np.arange(c * d), parts.active_dofs)
         # any positive weight will do: a column of the finger below each point
         spring = parts.model.material.E_MPa * parts.surface.area / parts.model.mesh.size_mm
         self.rho = np.repeat(spring[:, None], d, axis=1)
@@ -53,13 +54,13 @@ class EachIteration:
         legs = tuple(replace(leg, steps=count) for leg in parts.model.legs)
         # only for its gaps: nothing of it is condensed
         shell: Any = Problem.__new__(Problem)
-        for name in ("model", "surface", "touch_mm", "mesh"):
+        for name in ("model", "surface", "first_contact_mm", "mesh"):
             object.__setattr__(shell, name, getattr(parts, name))
         state = ContactState.at_rest(np.maximum(shell.gap(targets(legs)[0]), 0.0), d)
         for target in targets(legs):
-            free = shell.free(target)
-            free[:, 1:] -= state.position
-            problem = Increments(free, np.zeros((0, 0)), np.full(c, MU), self.rho, target.depth_mm)
+            free = shell.free_motion(target)
+            free[:, 1:] -= state.tangential_displacement
+            problem = ContactProblem(free, np.zeros((0, 0)), np.full(c, MU), self.rho, target.depth_mm)
             force, moved, status, u = self._settle(problem, state.force)
             state = next_state(state, force, moved, status)
         # a point on a symmetry plane carries its part's share of the force, like all others
@@ -70,26 +71,26 @@ class EachIteration:
             "gauge_strain": float((self._columns(parts.gauges) @ u)[0]),
         }
 
-    def _settle(self, problem: Increments, start: Float) -> tuple[Float, Float, NDArray[np.int8], Float]:
-        force, moved = start, problem.free.copy()
+    def _settle(self, problem: ContactProblem, start: Float) -> tuple[Float, Float, NDArray[np.int8], Float]:
+        force, moved = start, problem.free_motion.copy()
         if start.any():
             moved[start[:, 0] > 0.0] = 0.0
         for _ in range(60):
-            _, status, trial = project(problem, force, moved)
+            _, status, trial = project_on_friction_cone(problem, force, moved)
             force, u = self._solve(problem, status, trial)
-            moved = problem.free + (self.read @ u).reshape(force.shape)
-            if residual(force, moved, status, problem.mu, problem.length_scale) <= TOLERANCE:
+            moved = problem.free_motion + (self.read @ u).reshape(force.shape)
+            if residual(force, moved, status, problem.friction, problem.length_scale) <= TOLERANCE:
                 return force, moved, status, u
         raise ArithmeticError(f"no convergence at {problem.length_scale} mm")
 
-    def _solve(self, problem: Increments, status: NDArray[np.int8], trial: Float) -> tuple[Float, Float]:
+    def _solve(self, problem: ContactProblem, status: NDArray[np.int8], trial: Float) -> tuple[Float, Float]:
         """Forces (c, d) and free unknowns (N,) that solve the equations of the sets: one factorisation."""
         from pypardiso import PyPardisoSolver
 
         expand, test, own = self._equations(status, trial)
         matrix = sp.bmat([[self.whole, -(expand @ self.read).T], [test @ self.read, sp.diags(own)]], format="csr")
         matrix.sort_indices()
-        right = np.concatenate([np.zeros(len(self.free)), -(test @ problem.free.ravel())])
+        right = np.concatenate([np.zeros(len(self.free)), -(test @ problem.free_motion.ravel())])
         solver = PyPardisoSolver()
         x = solver.solve(matrix, right)
         solver.free_memory(everything=True)

@@ -46,9 +46,12 @@ def alone(length: float, foil: Strips, E: float, nu: float, dim: int) -> float:
     A section is 1 mm wide, and the foil's width that of its share.
     """
     mesh = quadratic(box([np.array([0.0, length + foil.width_mm])] * dim))
-    inlay = foil.lay(_model(length, E, nu, dim), mesh, ("x", "y", "z")[:dim])
-    strain = np.linalg.solve(np.eye(len(inlay.springs)) + inlay.alone * inlay.springs, np.ones(len(inlay.springs)))
-    return float(inlay.reads[0] @ strain)
+    inlay = foil.discretise(_model(length, E, nu, dim), mesh, ("x", "y", "z")[:dim])
+    strain = np.linalg.solve(
+        np.eye(len(inlay.bar_stiffness)) + inlay.self_compliance * inlay.bar_stiffness,
+        np.ones(len(inlay.bar_stiffness)),
+    )
+    return float(inlay.gauge_weights[0] @ strain)
 
 
 def by_mesh(

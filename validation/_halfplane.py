@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb, FrictionLaw
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.history import Frame
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
 from finger3d.mechanics.solve import Problem, build, march
 from finger3d.objects import Cylinder
@@ -82,10 +82,10 @@ class Profile:
     q: Float
     gap: Float
     status: NDArray[np.int8]
-    frame: Frame
+    frame: StepResult
 
     @classmethod
-    def of(cls, problem: Problem, frame: Frame) -> Profile:
+    def of(cls, problem: Problem, frame: StepResult) -> Profile:
         """From a frame of a 2D problem."""
         x = problem.points.points[:, 0]
         order = np.argsort(x)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
-from finger3d.contact.solve import advance
+from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
 from finger3d.fem.assembly import Elasticity
 from finger3d.fem.simplex import quadratic
@@ -115,11 +115,11 @@ def press(ball: Ball, mu: float, path: Sequence[tuple[float, float]]) -> list[St
     for depth, slide in path:
         free = np.zeros((len(ball.gap), 3))
         free[:, 0], free[:, 1] = ball.gap - depth, -slide
-        found = advance(state, free, ball.compliance, Coulomb(mu), max(depth, 1e-3))
+        found = solve_increment(state, free, ball.compliance, Coulomb(mu), max(depth, 1e-3))
         if not found.outcome.ok:
             raise AssertionError(f"mu = {mu:g}, depth {depth:g}, slide {slide:g}: {found.outcome}")
         friction, slips = found.state.force[:, 1:], found.state.status == SLIP
-        lost -= float((friction * (found.state.slip - state.slip))[slips].sum())
+        lost -= float((friction * (found.state.accumulated_slip - state.accumulated_slip))[slips].sum())
         state = found.state
         # points on a plane of symmetry carry the part's share of their force
         total = ball.parts * state.force.sum(axis=0)

@@ -15,7 +15,7 @@ from finger3d.analyses.press import press
 from finger3d.analyses.validate import Row
 from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.contact.newton import uniqueness
-from finger3d.contact.solve import advance
+from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
 from finger3d.effects.kinetic_friction import TwoCoefficients
 from finger3d.errors import Finger3dError, Outcome
@@ -76,7 +76,7 @@ def one_point(quick: bool) -> Iterator[Row]:
         for free in loads:
             answers = _admissible(compliance, free, mu)
             rest = ContactState.at_rest(np.zeros(1), 2)
-            found = advance(rest, free[None], compliance.reshape(1, 2, 1, 2), Coulomb(mu), 1.0)
+            found = solve_increment(rest, free[None], compliance.reshape(1, 2, 1, 2), Coulomb(mu), 1.0)
             several += len(answers) > 1
             near = [np.abs(found.state.force[0] - a).max() < 1e-8 for a in answers]
             unlisted += not (found.outcome.ok and any(near))
@@ -114,9 +114,9 @@ def touch(quick: bool) -> Iterator[Row]:
     """No point, one point, and all points at once."""
     arch = designs()["clipped_cylinder"](radius_mm=20.0, half_length_mm=10.0, edge_height_mm=5.0, width_mm=1.0)
     problem = _block(0.3, (Leg(1.0, steps=1),), arch)
-    apart = advance(
-        ContactState.at_rest(problem.gap(problem.origin), 2), problem.free(problem.origin) + [1e-6, 0.0],
-        problem.compliance, Coulomb(0.25), 1.0,
+    apart = solve_increment(
+        ContactState.at_rest(problem.gap(problem.origin), 2), problem.free_motion(problem.origin) + [1e-6, 0.0],
+        problem.delassus, Coulomb(0.25), 1.0,
     )  # fmt: skip
     yield _is("no point touches: settled, without force", 0, np.abs(apart.state.force).max() + (not apart.outcome.ok))
     tiny = list(march(_block(0.3, (Leg(0.05, steps=40 if quick else 100), Leg(1.0, steps=2)), arch)))
@@ -265,10 +265,12 @@ def turned(quick: bool) -> Iterator[Row]:
     for angle in (0.0, np.pi / 6.0):
         turn = np.eye(3)
         turn[1:, 1:] = [[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]
-        compliance = np.einsum("ab,ibjc,dc->iajd", turn, problem.compliance, turn)
+        compliance = np.einsum("ab,ibjc,dc->iajd", turn, problem.delassus, turn)
         state = ContactState.at_rest(problem.gap(problem.origin), 3)
         for frame in march(problem):
-            state = advance(state, problem.free(frame.target) @ turn.T, compliance, Coulomb(0.25), 0.3).state
+            state = solve_increment(
+                state, problem.free_motion(frame.target) @ turn.T, compliance, Coulomb(0.25), 0.3
+            ).state
         states.append(state.force @ turn)
     apart = np.abs(states[1] - states[0]).max() / np.abs(states[0]).max()
     yield _is("solid turned by 30 degrees about the normal: change of forces", 0, apart, 1e-8, "the residual")
@@ -282,19 +284,19 @@ def refusals(quick: bool) -> Iterator[Row]:
     """Bad input: a clear outcome or one line, nothing lost."""
     problem = _block(0.3, (Leg(0.5, steps=1),))
     state = ContactState.at_rest(problem.gap(problem.origin), 2)
-    free = problem.free(targets(problem.model.legs)[-1])
+    free = problem.free_motion(targets(problem.model.legs)[-1])
     hole = free.copy()
     hole[0, 0] = np.nan
     c = len(free)
-    floating = problem.compliance.reshape(2 * c, 2 * c) - 1e3 * np.eye(2 * c)
-    spoilt = problem.compliance.copy()
+    floating = problem.delassus.reshape(2 * c, 2 * c) - 1e3 * np.eye(2 * c)
+    spoilt = problem.delassus.copy()
     spoilt[0, 0, 0, 0] = np.nan
     for what, gap, compliance, wanted in (
-        ("gap with NaN", hole, problem.compliance, Outcome.NOT_FINITE),
+        ("gap with NaN", hole, problem.delassus, Outcome.NOT_FINITE),
         ("compliance with NaN", free, spoilt, Outcome.NOT_FINITE),
-        ("floating body", free, floating.reshape(problem.compliance.shape), Outcome.INDEFINITE),
+        ("floating body", free, floating.reshape(problem.delassus.shape), Outcome.INDEFINITE),
     ):
-        found = advance(state, gap, compliance, Coulomb(0.25), 0.5)
+        found = solve_increment(state, gap, compliance, Coulomb(0.25), 0.5)
         told = found.outcome is wanted and found.state is state
         yield _is(f"{what}: outcome says so, and the state before is handed back", 1, told)
     legs = "[[press.leg]]\ndepth_mm = {}\nslide_x_mm = {}\n[[press.leg]]\ndepth_mm = 0.5\nslide_x_mm = 1.0\n"

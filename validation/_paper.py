@@ -19,7 +19,7 @@ from finger3d.analyses.validate import Measure, Row
 from finger3d.contact.friction import OPEN, STICK, Coulomb, FrictionLaw
 from finger3d.fem.recover import displacement
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.history import Frame, contact_table
+from finger3d.mechanics.history import StepResult, contact_table
 from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
 from finger3d.mechanics.solve import Problem, build, march
 
@@ -68,7 +68,7 @@ def _built(
     return build(model)
 
 
-def under(problem: Problem, friction: FrictionLaw | float, steps: int | None = None) -> list[Frame]:
+def under(problem: Problem, friction: FrictionLaw | float, steps: int | None = None) -> list[StepResult]:
     """Frames under another friction and in other steps; the condensation is shared."""
     law = Coulomb(friction) if isinstance(friction, int | float) else friction
     legs = problem.model.legs if steps is None else tuple(replace(leg, steps=steps) for leg in problem.model.legs)
@@ -78,7 +78,7 @@ def under(problem: Problem, friction: FrictionLaw | float, steps: int | None = N
     return frames
 
 
-def settled(problem: Problem, friction: FrictionLaw | float, quick: bool = False) -> tuple[Frame, Frame]:
+def settled(problem: Problem, friction: FrictionLaw | float, quick: bool = False) -> tuple[StepResult, StepResult]:
     """Last frames with enough increments and with half as many, for strains that are compared between coefficients.
 
     The error of the strain falls as 1 / increments, so that of the first is what the second changes.
@@ -108,16 +108,16 @@ class Profile:
     moved: Float
 
     @classmethod
-    def of(cls, problem: Problem, frame: Frame) -> Profile:
+    def of(cls, problem: Problem, frame: StepResult) -> Profile:
         """From a frame; `moved` is the displacement along x."""
         points = problem.points
         table = contact_table(points, frame.state)
         on = np.flatnonzero(np.abs(points.points[:, 2]) <= 1e-9)
         on = on[np.argsort(table["x_mm"][on])]
         along = np.zeros((len(points.points), points.dim))
-        along[:, 1:] = frame.state.position
+        along[:, 1:] = frame.state.tangential_displacement
         columns = [np.asarray(table[k])[on] for k in ("x_mm", "area_mm2", "pressure_MPa", "shear_x_MPa")]
-        return cls(*columns, frame.state.status[on], points.world(along)[on, 0])
+        return cls(*columns, frame.state.status[on], points.to_global(along)[on, 0])
 
     @property
     def force(self) -> float:
@@ -181,18 +181,18 @@ def _rosettes(x: Float, y: Float) -> list[Gauge]:
     ]
 
 
-def strains(frame: Frame, count: int) -> Float:
+def strains(frame: StepResult, count: int) -> Float:
     """eps_x, eps_y, gamma_xy (3, n) of the `count` points of a line."""
     read = np.array([[frame.gauges[f"{i}:{k}"] for k in range(3)] for i in range(count)])
     along_x, slanted, along_y = read.T
     return np.array([along_x, along_y, 2.0 * slanted - along_x - along_y])
 
 
-def moved(problem: Problem, frame: Frame) -> Float:
+def moved(problem: Problem, frame: StepResult) -> Float:
     """Displacement (n, d) mm of the meshed part, recovered from the contact forces of a frame."""
-    own = np.flatnonzero(np.all(problem.sign == 1.0, axis=1))
-    first = own[np.argsort(problem.parent[own])]
-    force = frame.state.force[first] / problem.share[first][:, None]
+    own = np.flatnonzero(np.all(problem.mirror_sign == 1.0, axis=1))
+    first = own[np.argsort(problem.image_of[own])]
+    force = frame.state.force[first] / problem.multiplicity[first][:, None]
     return displacement(problem.mesh, problem.unknowns(force))
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.special import ellipe, ellipkm1
 
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
-from finger3d.contact.solve import advance
+from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
 
 Float = NDArray[np.float64]
@@ -111,11 +111,13 @@ def press(body: Rings, radius: float, mu: float, depths: Sequence[float]) -> Pre
     lost, most = 0.0, 0
     for depth in depths:
         free = np.stack([gap - depth, np.zeros_like(gap)], axis=1)
-        found = advance(state, free, body.compliance, Coulomb(mu), depth)
+        found = solve_increment(state, free, body.compliance, Coulomb(mu), depth)
         if not found.outcome.ok:
             raise AssertionError(f"rings, mu = {mu:g}, depth {depth:g}: {found.outcome}")
         slips = found.state.status == SLIP
-        lost -= float(np.sum(found.state.force[slips, 1] * (found.state.slip - state.slip)[slips, 0]))
+        lost -= float(
+            np.sum(found.state.force[slips, 1] * (found.state.accumulated_slip - state.accumulated_slip)[slips, 0])
+        )
         state, most = found.state, max(most, found.iterations)
     area = np.pi * np.diff(body.edges**2)
     touching, sticking = (body.edges[1:][s].max(initial=0.0) for s in (state.status != OPEN, state.status == STICK))

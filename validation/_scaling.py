@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from finger3d.analyses.press import press
-from finger3d.progress import Report
+from finger3d.progress import Progress
 from finger3d.scene import Scene, parse
 
 from ._child import HOME, peak_mb, reset_peak
@@ -31,7 +31,7 @@ class Size:
     figures: bool = True
 
 
-class Watch(Report):
+class Watch(Progress):
     """Tells by the job's own announcements which stage runs, and keeps the seconds and the largest memory of each."""
 
     _STARTS: Mapping[str, str] = {

@@ -22,7 +22,7 @@ from scipy import sparse
 from finger3d.analyses.validate import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.history import Frame
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
 from finger3d.mechanics.solve import Problem, build, march
 
@@ -41,7 +41,7 @@ def finger(domain: Any, nu: float) -> Problem:
     return build(Model(body, Material(1.0, nu), mesh, (Leg(10.0),), domain=domain, symmetry=()))
 
 
-def along(problem: Problem, steps: int, mu: float, slide: float) -> list[Frame]:
+def along(problem: Problem, steps: int, mu: float, slide: float) -> list[StepResult]:
     """Frames of a press, and a slide if there is one, of `steps` increments each."""
     legs = (Leg(10.0, steps=steps),) + ((Leg(10.0, slide_x_mm=slide, steps=steps),) if slide else ())
     return list(march(replace(problem, model=replace(problem.model, legs=legs, friction=Coulomb(mu)))))
@@ -56,7 +56,7 @@ class Balance:
     work: float
 
 
-def balance(problem: Problem, frame: Frame) -> Balance:
+def balance(problem: Problem, frame: StepResult) -> Balance:
     """Compare contact forces with K u, and work with what is stored and lost."""
     upper, n, d = problem.stiffness.upper, problem.mesh.points.size, problem.dim
     unknowns = problem.unknowns(frame.part.force)
@@ -65,10 +65,10 @@ def balance(problem: Problem, frame: Frame) -> Balance:
     base = np.unique(problem.mesh.facets["base"])
     reaction, arm = np.zeros((len(base), 3)), np.zeros((len(base), 3))
     reaction[:, :d], arm[:, :d] = nodal[base], problem.mesh.points[base]
-    push = problem.points.world(frame.state.force)
+    push = problem.points.to_global(frame.state.force)
     # a contact force acts where its hat's mean is, which for a moment is the hat's mean place
     place = np.zeros_like(push)
-    place[:, :d] = (problem.surface.trace @ problem.mesh.points)[problem.parent]  # no symmetry here: no sign
+    place[:, :d] = (problem.surface.trace @ problem.mesh.points)[problem.image_of]  # no symmetry here: no sign
     scale = np.linalg.norm(push.sum(axis=0))
     turning = np.cross(arm, reaction).sum(axis=0) + np.cross(place, push).sum(axis=0)
     stored = 0.5 * float(unknowns @ inner)
@@ -79,10 +79,10 @@ def balance(problem: Problem, frame: Frame) -> Balance:
     )
 
 
-def least_loss(frames: list[Frame]) -> float:
+def least_loss(frames: list[StepResult]) -> float:
     """Smallest energy lost by friction at any point in any increment, over the largest."""
     lost = [
-        -np.sum(b.part.force[:, 1:] * (b.part.slip - a.part.slip), axis=1)
+        -np.sum(b.part.force[:, 1:] * (b.part.accumulated_slip - a.part.accumulated_slip), axis=1)
         for a, b in zip(frames, frames[1:], strict=False)
     ]
     return float(np.min(lost) / np.max(lost))

@@ -24,7 +24,7 @@ from typing import Any
 from finger3d._machine import versions
 from finger3d.analyses.validate import Result, Row
 from finger3d.errors import MissingError
-from finger3d.mechanics.solve import contact_zone, symmetry
+from finger3d.mechanics.solve import contact_box, symmetry
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.swept import mesh_section
 
@@ -109,7 +109,7 @@ def _pressed(case: Case) -> Pressed:
     model = model_of(case)
     make = mesh_solid if case.body == SOLID else mesh_section
     axes = symmetry(model)
-    mesh, _ = make(model.design, model.mesh, contact_zone(model), axes)
+    mesh, _ = make(model.design, model.mesh, contact_box(model), axes)
     return Pressed(mesh, 1.0, NU, model.friction.static, 10.0, case.counts[0], model.design.width_mm, axes)
 
 

@@ -24,7 +24,7 @@ from finger3d.contact.friction import Coulomb
 from finger3d.effects.elastic_object import SoftObject
 from finger3d.geometry.registry import designs
 from finger3d.io import AREAS, MAIN
-from finger3d.mechanics.history import Frame
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Domain, Gauge, Leg, Material, MeshOptions, Model
 from finger3d.mechanics.solve import Problem, build, march
 from finger3d.mechanics.step_halving import DISSIPATION_TOLERANCE, TOLERANCE, error_by_count, marched, step_error
@@ -175,7 +175,7 @@ def _runs(problem: Problem, mus: tuple[float, ...] = MUS) -> Iterator[tuple[floa
             yield mu, legs[0].depth_mm, replace(problem, model=model)
 
 
-def _end(problem: Problem) -> Frame:
+def _end(problem: Problem) -> StepResult:
     return list(march(problem))[-1]
 
 
@@ -209,7 +209,7 @@ def _hertz(case: Case, exact: dict[str, float]) -> dict[str, float]:
 def _by_steps(name: str, model: Model) -> Iterator[Judged]:
     """Numbers in explicit counts of increments, and in automatic ones, beside those in many."""
     problem = build(model, margin=math.inf)
-    ends: dict[int, Frame] = {}
+    ends: dict[int, StepResult] = {}
 
     def in_steps(count: int) -> Problem:
         return replace(problem, model=replace(model, legs=tuple(replace(leg, steps=count) for leg in model.legs)))

@@ -23,7 +23,7 @@ from finger3d.analyses.validate import Result, Row
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
 from finger3d.errors import Outcome
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.history import Frame
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
 from finger3d.mechanics.solve import Problem, build, march
 
@@ -85,12 +85,12 @@ def finger(dim: int, nu: float, size: float) -> Problem:
     )
 
 
-def violation(problem: Problem, before: Any, frame: Frame) -> float:
+def violation(problem: Problem, before: Any, frame: StepResult) -> float:
     """Largest violation of the conditions: lengths over DEPTH, forces over the largest; from compliance and forces."""
     mu, state = problem.model.friction.static, frame.part
     force, status = state.force, state.status
-    moved = problem.free(frame.target) + np.einsum("idje,je->id", problem.compliance, force)
-    gap, change = moved[:, 0], moved[:, 1:] - before.position
+    moved = problem.free_motion(frame.target) + np.einsum("idje,je->id", problem.delassus, force)
+    gap, change = moved[:, 0], moved[:, 1:] - before.tangential_displacement
     normal, friction = force[:, 0], force[:, 1:]
     size = np.linalg.norm(friction, axis=1)
     touching, stuck, slips = status != OPEN, status == STICK, status == SLIP
@@ -115,7 +115,7 @@ def case(problem: Problem, mu: float, steps: int) -> Iterator[tuple[Any, ...]]:
     """Rows of the table of one history, one a leg; the iterations of every increment follow each."""
     model = replace(problem.model, friction=Coulomb(mu), legs=path(problem.dim, mu, steps))
     problem = replace(problem, model=model)
-    before, found = problem.model.kinematics.start(problem), []
+    before, found = problem.model.formulation.start(problem), []
     for frame in march(problem):
         found.append((frame, violation(problem, before, frame) if frame.outcome.ok else np.inf))
         before = frame.part

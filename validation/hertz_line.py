@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from finger3d.analyses.validate import Result, Row
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.history import Frame
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
 from finger3d.mechanics.solve import Problem, build, march
 from finger3d.objects import Cylinder
@@ -68,7 +68,9 @@ def contact(x: Float, p: Float, force: float, modulus: float) -> Contact:
     return Contact(float(np.sqrt(-top / slope)) / a, float(moment), float(np.sqrt(top)) / p0, float(away))
 
 
-def press(domain: Any, nu: float, count: int, height: float = 200.0, width: float = 1.0) -> tuple[Problem, list[Frame]]:
+def press(
+    domain: Any, nu: float, count: int, height: float = 200.0, width: float = 1.0
+) -> tuple[Problem, list[StepResult]]:
     """Press to 20 depths with half-widths near 0.7 to 1; `count` points to a."""
     depths = [line(v / height, nu).depth * v**2 / RADIUS for v in np.linspace(0.7, 1.0, 20)]
     block = designs()["block"](half_length_mm=height, height_mm=height, width_mm=width)

@@ -17,11 +17,11 @@ import scipy.sparse as sp
 
 from finger3d.analyses.validate import Result, Row
 from finger3d.contact.friction import OPEN, STICK, Coulomb
-from finger3d.contact.maeno import swap
-from finger3d.contact.solve import advance
-from finger3d.contact.state import ContactState, Increment
+from finger3d.contact.maeno import maeno_active_set
+from finger3d.contact.solve import solve_increment
+from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.fem.assembly import Elasticity, stiffness
-from finger3d.fem.condense import Condensed, condense
+from finger3d.fem.condense import Condensation, condense
 from finger3d.fem.recover import displacement
 from finger3d.fem.simplex import Mesh, unfold
 from finger3d.fem.traces import strain_row
@@ -31,7 +31,7 @@ from finger3d.meshing.grid import Sizes, rows, triangulate
 from ._paper import MUS, STRAIN, STRESS, Profile, columns, half_cylinder, line_r5, said, strains, under
 
 CASES = ((STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.45), (STRAIN, 0.49))
-RULES = {"swap": swap, "projection": advance}
+RULES = {"swap": maeno_active_set, "projection": solve_increment}
 NODES = 96
 
 
@@ -51,7 +51,7 @@ class Coarse:
 
     mesh: Mesh
     nodes: np.ndarray
-    condensed: Condensed
+    condensed: Condensation
 
     @classmethod
     def of(cls, mesh: Mesh, plane: str, nu: float) -> Coarse:
@@ -65,7 +65,7 @@ class Coarse:
         matrix = stiffness(mesh, Elasticity.of(1.0, nu, plane == STRESS, mixed=False))
         return cls(mesh, nodes, condense(matrix, held, sp.kron(read, [[0.0, -1.0], [1.0, 0.0]], format="csr")))
 
-    def press(self, mu: float, rule: str) -> list[Increment]:
+    def press(self, mu: float, rule: str) -> list[ContactSolution]:
         """Ten increments of .1 mm; a rule that fails hands on what it has."""
         count = len(self.nodes)
         compliance = self.condensed.compliance.reshape(count, 2, count, 2)

@@ -47,8 +47,8 @@ def end_force_loss(profiles: list[Profile]) -> float:
     """Sum of slip times the friction at the end of each increment (mJ), first order in the increment."""
     lost, before = 0.0, 0.0
     for state in (p.frame.state for p in profiles):
-        lost -= float(((state.slip - before)[:, 0] * state.force[:, 1] * (state.status == SLIP)).sum())
-        before = state.slip
+        lost -= float(((state.accumulated_slip - before)[:, 0] * state.force[:, 1] * (state.status == SLIP)).sum())
+        before = state.accumulated_slip
     return lost
 
 

@@ -5,7 +5,7 @@ Source: Code_Aster V6.04.128, a benchmark of the GRECO (validation/REFERENCES.md
 50 MPa on the top; the right side is held along x, and its foot also along y.  Both loads grow together.
 
 No object is pressed on this body.  It is condensed to the contact points of its foot and to one row for the loads, and
-the increments are passed to `advance` directly; `free` is the displacement that the loads alone would cause.
+the increments are passed to `solve_increment` directly; `free` is the displacement that the loads alone would cause.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from scipy import sparse
 
 from finger3d.analyses.validate import Result, Row
 from finger3d.contact.friction import SLIP, STATUS_NAMES, Coulomb
-from finger3d.contact.maeno import swap
-from finger3d.contact.solve import advance
+from finger3d.contact.maeno import maeno_active_set
+from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
 from finger3d.fem.assembly import Elasticity, stiffness
-from finger3d.fem.condense import Condensed, condense
+from finger3d.fem.condense import Condensation, condense
 from finger3d.fem.simplex import quadratic
-from finger3d.fem.traces import Surface, local_rows, surface
+from finger3d.fem.traces import BoundarySurface, local_rows, surface
 
 from ._common import box, held_at, nodes_of, side_load
 
@@ -49,12 +49,12 @@ class Square:
         held[np.all(self.mesh.points == [SIDE, 0.0], axis=1)] = True
         load = side_load(self.mesh, "x-", lambda p: np.tile([LEFT, 0.0], (len(p), 1)))
         load += side_load(self.mesh, "y+", lambda p: np.tile([0.0, -TOP], (len(p), 1)))
-        self.foot: Surface = surface(self.mesh, "y-")
+        self.foot: BoundarySurface = surface(self.mesh, "y-")
         # normal into the body: up
         rows = local_rows(self.foot, np.array([[0.0, 1.0], [1.0, 0.0]]))
         rows = sparse.vstack([rows, sparse.csr_matrix(load.reshape(1, -1))], format="csr")
         matrix = stiffness(self.mesh, Elasticity.of(1.3e5, 0.2))
-        self.condensed: Condensed = condense(matrix, np.flatnonzero(held.ravel()), rows)
+        self.condensed: Condensation = condense(matrix, np.flatnonzero(held.ravel()), rows)
         c = len(self.foot.nodes)
         self.compliance = self.condensed.compliance[:-1, :-1].reshape(c, 2, c, 2)
         self.loaded = self.condensed.compliance[:-1, -1].reshape(c, 2)
@@ -72,7 +72,7 @@ class Square:
         state = ContactState.at_rest(np.zeros(len(self.foot.nodes)), 2)
         iterations, worst, settled = 0, 0.0, 0
         for k in range(1, count + 1):
-            step = {"projection": advance, "paper": swap}[rule]
+            step = {"projection": solve_increment, "paper": maeno_active_set}[rule]
             found = step(state, k / count * self.loaded, self.compliance, Coulomb(mu), 1e-3 * SIDE)
             state, settled = found.state, settled + found.outcome.ok
             iterations, worst = max(iterations, found.iterations), max(worst, found.residual)
@@ -130,7 +130,7 @@ def _draw(figure: Any, table: list[tuple[Any, ...]], square: Square, state: Cont
     left, right = figure.subplots(1, 2)
     x = square.foot.points[:, 0]
     order = np.argsort(x)
-    left.plot(x[order], 1e3 * state.position[order, 0], label=f"finger3d, {len(x) - 1} cells a side")
+    left.plot(x[order], 1e3 * state.tangential_displacement[order, 0], label=f"finger3d, {len(x) - 1} cells a side")
     left.plot(PLACES, ASTER, "k+", ms=10, label="SSNV128")
     worst = max(
         100 * abs(np.array(r[4:9], dtype=float) / ASTER - 1).max()

@@ -23,7 +23,7 @@ from scipy import sparse
 
 from finger3d.analyses.validate import Result, Row
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
-from finger3d.contact.solve import advance
+from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
 from finger3d.fem.assembly import Elasticity, stiffness
 from finger3d.fem.condense import condense
@@ -75,12 +75,12 @@ def block(dim: int, nu: float, cells: int) -> list[tuple[Any, ...]]:
     state = ContactState.at_rest(np.zeros(c), dim)
     table = []
     for share in (0.0, *SHARES):
-        found = advance(state, press + share * shear, compliance, Coulomb(MU), 1.0)
+        found = solve_increment(state, press + share * shear, compliance, Coulomb(MU), 1.0)
         if not found.outcome.ok:
             raise AssertionError(f"{dim}D, nu = {nu:g}, {share:g} of mu N: {found.outcome}")
         state = found.state
         total = state.force.sum(axis=0)
-        slip = np.linalg.norm(state.slip, axis=1)
+        slip = np.linalg.norm(state.accumulated_slip, axis=1)
         table.append(
             (
                 dim, nu, share, int((state.status == STICK).sum()), int((state.status == SLIP).sum()),

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.calibrate.run import MUS, Sweep, calibrated
+from finger3d.analyses.calibrate.run import MUS, CurvePoints, calibrated
 from finger3d.analyses.calibrate.tolerances import TOLERANCES
 from finger3d.analyses.reduced import Condensed
 from finger3d.analyses.validate import Result, Row
@@ -80,7 +80,7 @@ def run(quick: bool) -> Result:
     return Result(tuple(rows), columns(LINES, lines), lambda figure: _draw(figure, found, maps))
 
 
-def _checks(domain: Domain, c: Calibration, problem: Problem, sweep: Sweep) -> list[Row]:
+def _checks(domain: Domain, c: Calibration, problem: Problem, sweep: CurvePoints) -> list[Row]:
     """What must hold whatever the answer: maps, the reduced model, and the coverage of the intervals."""
     here = NAMES[domain]
     first, last = sweep.mus[0], sweep.mus[-1]
@@ -89,7 +89,7 @@ def _checks(domain: Domain, c: Calibration, problem: Problem, sweep: Sweep) -> l
     at = replace(problem.model.gauges[0], x_mm=36.5, y_mm=40.5)
     other = build(replace(problem.model, gauges=(at,)))
     row = np.array([other.gauge_strains(sweep.frames[mu].part.force)["g"] for mu in (first, last)])
-    reduced = Condensed.of(problem).press(last).frames[-1].gauges["g"]
+    reduced = Condensed.of(problem).press(last).steps[-1].gauges["g"]
     random = np.random.default_rng(20261121)
     count = 4000
     mu = random.uniform(first, last, count)

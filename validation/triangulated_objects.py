@@ -26,7 +26,7 @@ from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
 from finger3d.mechanics.solve import build, march
-from finger3d.objects import Cylinder, MeshObject, RigidObject, Sphere, first_touch
+from finger3d.objects import Cylinder, MeshObject, RigidObject, Sphere, first_contact_height
 
 from ._common import convergence, rate
 
@@ -102,14 +102,14 @@ def run(quick: bool) -> Result:
         ("bar", bar, Cylinder(0.7, radius_mm=RADIUS)),
     ):
         true = pressed(exact, size)
-        touch = first_touch(dome.top, replace(exact, x_mm=4.0), 12.0, 4.0)
+        touch = first_contact_height(dome.top, replace(exact, x_mm=4.0), 12.0, 4.0)
         x, z = 0.7 + np.linspace(-3.0, 3.0, 101), 0.4 + np.linspace(-2.0, 2.0, 101)
         errors: dict[str, list[float]] = {"height": [], "first touch": [], "force": []}
         for sectors in levels:
             obj = MeshObject(0.7, 0.4 if name == "ball" else 0.0, surface=make(sectors))
             got = pressed(obj, size)
             errors["height"].append(float(np.sqrt(np.mean((obj.height(x, z) - exact.height(x, z)) ** 2))))
-            errors["first touch"].append(abs(first_touch(dome.top, replace(obj, x_mm=4.0), 12.0, 4.0) - touch))
+            errors["first touch"].append(abs(first_contact_height(dome.top, replace(obj, x_mm=4.0), 12.0, 4.0) - touch))
             errors["force"].append(abs(got["normal_force_N"] / true["normal_force_N"] - 1.0))
             table.append((name, sectors, len(obj.surface.faces), *(e[-1] for e in errors.values())))
         edges = [2.0 * np.pi * RADIUS / n for n in levels]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from finger3d.analyses.validate import Result, Row
 from finger3d.contact.friction import Coulomb
-from finger3d.contact.solve import advance
+from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
 from finger3d.fem.assembly import Elasticity
 from finger3d.fem.simplex import Mesh
@@ -24,7 +24,7 @@ from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing.generate import mesh_solid
-from finger3d.objects import MeshObject, first_touch
+from finger3d.objects import MeshObject, first_contact_height
 
 from ._common import Body, body
 from .triangulated_objects import ball
@@ -59,7 +59,7 @@ def oval(degrees: float, sectors: int) -> tuple[MeshObject, float]:
     round_ = ball(sectors)
     points = (round_.points - round_.points.mean(axis=0)) * [1.6, 1.0, 0.8] @ q.T
     obj = MeshObject(*(q @ PLACE)[[0, 2]], surface=Triangles(points, round_.faces))
-    return obj, first_touch(designs()["hemisphere"](radius_mm=FINGER).top, obj, FINGER, FINGER)
+    return obj, first_contact_height(designs()["hemisphere"](radius_mm=FINGER).top, obj, FINGER, FINGER)
 
 
 def dragged(soft: Body, degrees: float, steps: int, obj: MeshObject, touch: float) -> Float:
@@ -79,7 +79,7 @@ def dragged(soft: Body, degrees: float, steps: int, obj: MeshObject, touch: floa
         free[:, 0] = soft.surface.average @ gap
         free[:, 1:] = -moved[[0, 2]]
         state = state or ContactState.at_rest(np.maximum(free[:, 0], 0.0), 3)
-        found = advance(state, free, soft.compliance, Coulomb(MU), DEPTH)
+        found = solve_increment(state, free, soft.compliance, Coulomb(MU), DEPTH)
         assert found.outcome.ok, found.outcome
         state = found.state
         total = state.force.sum(axis=0)

@@ -30,7 +30,7 @@ from finger3d.fem.transfer import facing_trace
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
-from finger3d.mechanics.solve import Problem, build, contact_zone, march
+from finger3d.mechanics.solve import Problem, build, contact_box, march
 from finger3d.objects import Cylinder, Plane
 
 from ._common import held_at, solve
@@ -184,7 +184,7 @@ def _third_law_rows() -> list[Row]:
     *_, frame = march(problem)
     assert frame.outcome.ok
     force = frame.state.force.ravel()
-    other, _ = ObjectBody(model, 5.0, contact_zone(model), (), lambda text: None).mesh()
+    other, _ = ObjectBody(model, 5.0, contact_box(model), (), lambda text: None).mesh()
     axes = model.object.frame(2)
     ends, moved = [], np.zeros_like(force)
     for mesh, rows, (modulus, nu) in (
@@ -197,7 +197,7 @@ def _third_law_rows() -> list[Row]:
         moved += rows @ found.u.ravel() / problem.thickness
     total = np.abs(ends[0]).max()
     c = len(problem.surface.nodes)
-    condensed = np.einsum("idje,je->id", problem.compliance, frame.state.force).ravel()
+    condensed = np.einsum("idje,je->id", problem.delassus, frame.state.force).ravel()
     third = "Newton's third law"
     what = f"bases' forces, finger's less object's over finger's, {c} points, dragged"
     return [

@@ -27,13 +27,13 @@ from finger3d.analyses.validate import Result, Row
 from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.effects.viscosity import Viscoelastic
 from finger3d.fem.assembly import Elasticity, Stiffness, stiffness
-from finger3d.fem.condense import Condensed, condense
+from finger3d.fem.condense import Condensation, condense
 from finger3d.fem.simplex import Mesh, quadratic
-from finger3d.fem.traces import Surface, local_rows, restrict, surface
-from finger3d.mechanics.formulation import Kinematics, SmallStrain
-from finger3d.mechanics.history import Target
+from finger3d.fem.traces import BoundarySurface, local_rows, restrict, surface
+from finger3d.mechanics.formulation import Formulation, SmallStrain
+from finger3d.mechanics.history import ObjectPose
 from finger3d.mechanics.model import Leg
-from finger3d.mechanics.problem import Later
+from finger3d.mechanics.problem import SolverCache
 from finger3d.objects import Sphere, vertical_frame
 
 from . import _rings
@@ -60,18 +60,18 @@ class StandIn:
 
     rest: Float
     area: Float
-    compliance: Float
+    delassus: Float
     condensed: Any
-    kept: NDArray[np.int64]
+    active_dofs: NDArray[np.int64]
     parts: int
     mesh: Mesh | None = None
     elastic: Elasticity | None = None
     stiffness: Stiffness | None = None
     thickness: float = 1.0
-    springs: Float = field(default_factory=lambda: np.zeros(0))
-    beyond: Float = field(default_factory=lambda: np.zeros((0, 0)))
-    origin: Target = Target(0.0)
-    later: Later = field(default_factory=Later)
+    bar_stiffness: Float = field(default_factory=lambda: np.zeros(0))
+    subgrid_compliance: Float = field(default_factory=lambda: np.zeros((0, 0)))
+    origin: ObjectPose = ObjectPose(0.0)
+    cache: SolverCache = field(default_factory=SolverCache)
 
     @property
     def model(self) -> Any:
@@ -79,22 +79,22 @@ class StandIn:
 
     @property
     def dim(self) -> int:
-        return int(self.compliance.shape[1])
+        return int(self.delassus.shape[1])
 
     @property
     def surface(self) -> Any:
         return SimpleNamespace(nodes=np.arange(len(self.rest)))
 
-    def gap(self, target: Target) -> Float:
+    def gap(self, target: ObjectPose) -> Float:
         return self.rest - target.depth_mm
 
-    def free(self, target: Target) -> Float:
+    def free_motion(self, target: ObjectPose) -> Float:
         out = np.zeros((len(self.rest), self.dim))
         out[:, 0] = self.gap(target)
         return out
 
     def row_forces(self, force: Float) -> Float:
-        return force.ravel()[self.kept]
+        return force.ravel()[self.active_dofs]
 
 
 def on_rings(nu: float, count: int) -> StandIn:
@@ -125,23 +125,23 @@ def on_tets(nu: float, points: int) -> StandIn:
     )
 
 
-def _rest(face: Surface) -> Float:
+def _rest(face: BoundarySurface) -> Float:
     at = face.samples
     return np.asarray(face.average @ Sphere(radius_mm=RADIUS).height(at[:, 0], at[:, 2]))
 
 
-def _widened(small: Condensed, kept: NDArray[np.int64], count: int) -> Float:
-    from finger3d.mechanics.problem import at_points
+def _widened(small: Condensation, kept: NDArray[np.int64], count: int) -> Float:
+    from finger3d.mechanics.problem import scatter_to_points
 
-    return at_points(small.compliance, kept, count, 3)
+    return scatter_to_points(small.compliance, kept, count, 3)
 
 
-def march(body: StandIn, kinematics: Kinematics, path: Sequence[tuple[float, float]]) -> tuple[Float, Float]:
+def march(body: StandIn, kinematics: Formulation, path: Sequence[tuple[float, float]]) -> tuple[Float, Float]:
     """Force (N) and contact radius (mm) at the end of every increment of a path of (time, depth over DEPTH)."""
     state, at = kinematics.start(body), body.origin
     force, radius = [], []
     for t, depth in path:
-        target = Target(DEPTH * max(depth, 0.0), time_s=t)
+        target = ObjectPose(DEPTH * max(depth, 0.0), time_s=t)
         found = kinematics.increment(body, state, at, target, None)
         if not found.outcome.ok:
             raise AssertionError(f"t = {t:g}: {found.outcome}")

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.contact.friction import OPEN
-from finger3d.mechanics.history import Frame
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
 from finger3d.objects.slope import slope_of
@@ -17,10 +17,14 @@ Float = NDArray[np.float64]
 
 _STRAIN = 0.1
 _QUANTILE = 0.99  # the clamped corners are singular, their strain says nothing
-_AGAINST_FINITE_STRAIN = ("kinematics", "inclusions", "object_compliance")  # slots whose effects need linear elasticity
+_AGAINST_FINITE_STRAIN = (
+    "formulation",
+    "inclusions",
+    "object_compliance",
+)  # slots whose effects need linear elasticity
 
 
-def advise(problem: Problem, frame: Frame, strain: Float) -> list[str]:
+def advise(problem: Problem, frame: StepResult, strain: Float) -> list[str]:
     """Advice for a finished press.
 
     Parameters
@@ -29,7 +33,7 @@ def advise(problem: Problem, frame: Frame, strain: Float) -> list[str]:
     strain : (n, 3, 3) at the nodes
     """
     model = problem.model
-    found = [] if model.kinematics.finite_strain else [*_strain(model, strain), *_slopes(problem, frame)]
+    found = [] if model.formulation.finite_strain else [*_strain(model, strain), *_slopes(problem, frame)]
     return found + _width(model)
 
 
@@ -54,7 +58,7 @@ def _finite_strain(model: Model) -> str:
     return f"[effects.large_deformation] would account for it, but cannot be combined with {named}"
 
 
-def _slopes(problem: Problem, frame: Frame) -> list[str]:
+def _slopes(problem: Problem, frame: StepResult) -> list[str]:
     touching = frame.state.status != OPEN
     if not touching.any():
         return []

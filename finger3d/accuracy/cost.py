@@ -11,7 +11,7 @@ from typing import Any
 
 from finger3d.fem.assembly import MIXED_FROM
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.solve import AUTO_START, contact_zone, symmetry
+from finger3d.mechanics.solve import AUTO_START, contact_box, symmetry
 from finger3d.mechanics.step_halving import automatic, condensation_s, contact_s, limits
 from finger3d.meshing.limits import check_memory, rows_gb
 
@@ -46,7 +46,7 @@ def forecast(model: Model) -> dict[str, Any]:
     """
     d = 3 if model.domain == "solid" else 2
     axes = symmetry(model)
-    zone = contact_zone(model)
+    zone = contact_box(model)
     mixed = model.domain != "plane-stress" and model.material.nu >= MIXED_FROM
     size = _size(model, zone, axes, mixed)
     runs, free = _runs(model, size, d), sum(leg.steps == "auto" for leg in model.legs)
@@ -113,7 +113,7 @@ def _costs(name: str, model: Model, size: _Size, seconds: dict[str, float], step
         each = _NEWTON * _NUMERIC * condensation + (_NEWTON + 1) * _TANGENT * assembly + _NEWTON_S[d]
         pressed = (_NEWTON - 1) * seconds["contact"]
         return _Cost(steps * each + pressed, factor_mb, f"about {_NEWTON} factorisations in each of {steps} steps")
-    if name == "viscosity" and not getattr(model.kinematics, "bulk", True):
+    if name == "viscosity" and not getattr(model.formulation, "bulk", True):
         lengths = {leg.duration_s / leg.steps for leg in model.legs if leg.duration_s and leg.steps != "auto"}
         lengths_in_all = len(lengths) + runs * len({leg.duration_s for leg in model.legs if leg.steps == "auto"})
         more = max(lengths_in_all, 1)
@@ -185,8 +185,8 @@ def _kept_mb(model: Model, size: _Size, axes: tuple[str, ...]) -> float:
     if "large_deformation" in effects:
         each += 8.0 * size.dofs
     if "viscosity" in effects:
-        branches = 1 + len(getattr(model.kinematics, "prony", ()))
-        each += 8.0 * branches * (d * size.contact_points if getattr(model.kinematics, "bulk", True) else size.dofs)
+        branches = 1 + len(getattr(model.formulation, "prony", ()))
+        each += 8.0 * branches * (d * size.contact_points if getattr(model.formulation, "bulk", True) else size.dofs)
     return steps * each / 1e6
 
 

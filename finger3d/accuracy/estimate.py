@@ -23,9 +23,9 @@ from finger3d.accuracy.point_resolution import Grain
 from finger3d.errors import Finger3dError, UnresolvedError
 from finger3d.fem.traces import surface
 from finger3d.io import AREAS, MAIN
-from finger3d.mechanics.history import Frame, measure
+from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.model import MeshOptions, Model
-from finger3d.mechanics.solve import Problem, build, contact_zone, symmetry
+from finger3d.mechanics.solve import Problem, build, contact_box, symmetry
 from finger3d.mechanics.step_halving import TIMES, as_solved, error_by_count, last_frame, other_counts, step_error
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.swept import mesh_section
@@ -34,7 +34,7 @@ from finger3d.objects.triangulated import MeshObject
 
 Float = NDArray[np.float64]
 Say = Callable[[str], None]
-Told = Callable[[Problem, Frame], dict[str, float]]
+Told = Callable[[Problem, StepResult], dict[str, float]]
 
 FACTOR = 2.0
 _FINER = 0.5
@@ -96,13 +96,13 @@ class ErrorEstimate:
         return sum(found) if name in self.discretisation else None
 
 
-def main_numbers(problem: Problem, frame: Frame) -> dict[str, float]:
+def main_numbers(problem: Problem, frame: StepResult) -> dict[str, float]:
     """The numbers that get an error bar, by name."""
     told = measure(problem.points, frame)
     return {name: told[name] for name in (*MAIN, *AREAS)} | {f"gauge_{k}": v for k, v in told["gauges"].items()}
 
 
-def press_numbers(problem: Problem, frame: Frame) -> dict[str, float]:
+def press_numbers(problem: Problem, frame: StepResult) -> dict[str, float]:
     """Those of a press that get an error bar: the main numbers and both energies."""
     energies = {"external_work_mJ": frame.external_work_mJ, "dissipation_mJ": frame.dissipation_mJ}
     return main_numbers(problem, frame) | energies
@@ -186,7 +186,7 @@ def companion(problem: Problem, say: Say = lambda text: None) -> Problem:
 def companions(model: Model, unknowns: float) -> tuple[list[MeshOptions], list[MeshOptions]]:
     """Meshes that may stand beside one of so many unknowns: coarser ones and finer ones, the best first."""
     own, enough = model.mesh, unknowns >= _LEAST_UNSTRUCTURED
-    costly = model.domain != "solid" and model.kinematics.finite_strain
+    costly = model.domain != "solid" and model.formulation.finite_strain
     longer = coarser(model, _FACTOR_WHERE_STEPS_FACTOR if costly else FACTOR).mesh
     chosen = [longer] if longer.mesher == "swept" or enough else []
     if model.domain == "solid" and own.mesher != longer.mesher:
@@ -206,7 +206,7 @@ def _built_if(problem: Problem, model: Model, enough: Callable[[float], bool], s
     """
     if model.domain != "solid" or model.mesh.mesher == "swept":
         made = mesh_solid if model.domain == "solid" else mesh_section
-        mesh = made(model.design, model.mesh, contact_zone(model), symmetry(model))[0]
+        mesh = made(model.design, model.mesh, contact_box(model), symmetry(model))[0]
         if not enough((problem.mesh.points.size / mesh.points.size) ** (1.0 / problem.dim)):
             return None
     try:
@@ -223,7 +223,7 @@ def built_like(problem: Problem, model: Model, say: Say = lambda text: None) -> 
 
 
 def compared(
-    problem: Problem, frame: Frame, beside: Problem, last: Frame, told: Told = main_numbers
+    problem: Problem, frame: StepResult, beside: Problem, last: StepResult, told: Told = main_numbers
 ) -> dict[str, float]:
     """Discretisation error by name, of what is told of a frame of a problem, from that of its companion."""
     grains = Grain.of(problem, frame), Grain.of(beside, last)
@@ -246,13 +246,13 @@ def _ratio(problem: Problem, beside: Problem) -> float:
 
 def _spacing(problem: Problem) -> float:
     """Typical distance (mm) of contact points where contact is predicted."""
-    x0, x1, z0, z1 = contact_zone(problem.model)
+    x0, x1, z0, z1 = contact_box(problem.model)
     at = problem.points.points
     inside = (at[:, 0] >= x0) & (at[:, 0] <= x1) & (at[:, 2] >= z0) & (at[:, 2] <= z1)
     return float(np.sqrt(np.median(problem.points.area[inside if inside.any() else slice(None)])))
 
 
-def strain_error(problem: Problem, frame: Frame, beside: Problem, fine: Float, coarse: Float) -> Float:
+def strain_error(problem: Problem, frame: StepResult, beside: Problem, fine: Float, coarse: Float) -> Float:
     """Discretisation error (m,) of a gauge's strain (m,) at several coefficients of friction, from its companion's;
     the grain is that of a last `frame` at any of them.
     """
@@ -263,11 +263,11 @@ def strain_error(problem: Problem, frame: Frame, beside: Problem, fine: Float, c
 
 def estimate(
     problem: Problem,
-    frames: Sequence[Frame],
+    frames: Sequence[StepResult],
     spent: Mapping[str, float],
     say: Say = lambda text: None,
     told: Told = main_numbers,
-    levels: Sequence[tuple[int, Frame]] = (),
+    levels: Sequence[tuple[int, StepResult]] = (),
 ) -> ErrorEstimate:
     """Estimate the errors of the last frame by another mesh, coarser if there is one, and by other increments.
 
@@ -293,8 +293,8 @@ def estimate(
 
 
 def _estimated(
-    problem: Problem, frames: Sequence[Frame], spent: Mapping[str, float], say: Say, told: Told,
-    levels: Sequence[tuple[int, Frame]],
+    problem: Problem, frames: Sequence[StepResult], spent: Mapping[str, float], say: Say, told: Told,
+    levels: Sequence[tuple[int, StepResult]],
 ) -> ErrorEstimate:  # fmt: skip
     if not frames or not frames[-1].outcome.ok:
         raise Finger3dError("the last step did not converge")

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.contact.friction import OPEN, STICK
-from finger3d.mechanics.history import ContactPoints, Frame, measure
+from finger3d.mechanics.history import ContactPoints, StepResult, measure
 from finger3d.mechanics.problem import Problem
 
 _ALONG_Z = 0.5
@@ -37,7 +37,7 @@ class Grain:
     least: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, problem: Problem, frame: Frame) -> Grain:
+    def of(cls, problem: Problem, frame: StepResult) -> Grain:
         """Of a frame; medians where points touch."""
         points, reach = problem.points, measure(problem.points, frame)["contact_half_length_mm"]
         alone = reach == 0.0 and problem.model.friction.static > 0.0
@@ -56,7 +56,9 @@ class Grain:
         share = _share(step, reach, along_z, half_width)
         least = least_bars(points, frame, along_z)
         if points.dim == 2:
-            friction = float(np.linalg.norm(points.seen_in(frame.state).friction(frame.state.force), axis=1).sum())
+            friction = float(
+                np.linalg.norm(points.with_basis_of(frame.state).friction(frame.state.force), axis=1).sum()
+            )
             least["friction_sum_N"] = _IN_SECTIONS * share * friction
             least["friction_sum_N_per_mm"] = least["friction_sum_N"] / (2.0 * half_width)
         return cls(step, share, alone, least)
@@ -74,7 +76,7 @@ def _edge_length(points: ContactPoints, touching: NDArray[np.bool_]) -> float:
     return float(np.median(length[both] if both.any() else length)) if len(length) else 0.0
 
 
-def least_bars(points: ContactPoints, frame: Frame, along_z_mm: float) -> dict[str, float]:
+def least_bars(points: ContactPoints, frame: StepResult, along_z_mm: float) -> dict[str, float]:
     """Lower bounds of error bars that follow from the size of the zones in points, by name (mm, mm2, N, N/mm).
 
     An area is uncertain by half the area of the points along the border of its zone, the mean of those on either side
@@ -102,7 +104,7 @@ def least_bars(points: ContactPoints, frame: Frame, along_z_mm: float) -> dict[s
             found[f"{name}_length_mm"] = 2.0 * found[f"{name}_half_length_mm"]
     if points.dim == 3 and touching.any():
         extent = max(0.5 * float(np.ptp(points.points[touching, 2])), along_z_mm)
-        friction = float(np.abs(points.seen_in(frame.state).friction(frame.state.force)[:, 2]).sum())
+        friction = float(np.abs(points.with_basis_of(frame.state).friction(frame.state.force)[:, 2]).sum())
         force = _ALONG_Z * (along_z_mm / extent) ** 2 * friction if extent > 0.0 else 0.0
         width = 2.0 * points.half_width_mm
         found["friction_sum_N"] = force

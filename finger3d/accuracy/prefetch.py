@@ -18,14 +18,14 @@ from typing import Self
 from finger3d._process import child_environment, end_with
 from finger3d.accuracy.estimate import companions
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.solve import build, contact_zone, symmetry
+from finger3d.mechanics.solve import build, contact_box, symmetry
 from finger3d.scene import Scene, parse, tree
 
 _NODES = 1.55
 """Nodes of a quadratic mesh for each of its tets."""
 
 
-class Ahead:
+class MeshPrefetch:
     """Meshes the companion of a scene in a child process, if that takes long and can begin at once.
 
     A child that fails costs time only: the estimate then makes the mesh itself, and says what is wrong.
@@ -71,7 +71,7 @@ def _takes_long(model: Model) -> bool:
     from finger3d.meshing import cache
     from finger3d.meshing.sizing import rounded_zone
 
-    zone, axes = rounded_zone(model.design, model.mesh, contact_zone(model)), symmetry(model)
+    zone, axes = rounded_zone(model.design, model.mesh, contact_box(model)), symmetry(model)
     return not (cache.folder() / f"{cache.key(model.design, model.mesh, zone, axes)}.npz").exists()
 
 
@@ -80,7 +80,7 @@ def _expected(model: Model) -> Model:
     from finger3d.meshing.sizing import forecast, rounded_zone, sizing
     from finger3d.meshing.tetwild import box
 
-    zone = rounded_zone(model.design, model.mesh, contact_zone(model))
+    zone = rounded_zone(model.design, model.mesh, contact_box(model))
     field = sizing(model.design, model.mesh, zone, *box(model.design, symmetry(model)))
     coarse, fine = companions(model, 3.0 * _NODES * forecast(model.design, field))
     return replace(model, mesh=[*coarse, *fine][0])

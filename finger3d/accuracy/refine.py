@@ -53,7 +53,7 @@ class Round:
 
 
 @dataclass(frozen=True)
-class Refined:
+class Refinement:
     """What the refinement came to.
 
     Attributes
@@ -104,7 +104,7 @@ def refined(
     tolerance: float,
     max_seconds: float | None = None,
     say: Callable[[str], None] = lambda text: None,
-) -> Refined:
+) -> Refinement:
     """Refine a model's edge lengths, from those it has, until its estimated errors are below a tolerance.
 
     Parameters
@@ -149,7 +149,7 @@ def refined(
         options = found
     best = min(rounds, key=lambda r: r.error)
     mesh = replace(model.mesh, size_mm=best.size_mm, base_size_mm=best.base_size_mm)
-    return Refined(tolerance, mesh, tuple(rounds), stopped, problem if best is rounds[-1] else None)
+    return Refinement(tolerance, mesh, tuple(rounds), stopped, problem if best is rounds[-1] else None)
 
 
 def relative(numbers: Mapping[str, float], errors: Mapping[str, float]) -> dict[str, float]:

@@ -16,15 +16,15 @@ from finger3d.analyses.result import PressResult
 from finger3d.contact.friction import OPEN
 from finger3d.fem.simplex import middles
 from finger3d.io import atomic, claimed, write_csv, write_json
-from finger3d.mechanics.history import Frame, History, contact_table, measure
-from finger3d.plotting.worker import Artist
-from finger3d.progress import Report
+from finger3d.mechanics.history import History, StepResult, contact_table, measure
+from finger3d.plotting.worker import PlotWorker
+from finger3d.progress import Progress
 from finger3d.results.vtu import write_vtu
 
 if TYPE_CHECKING:
     from finger3d.accuracy.estimate import ErrorEstimate
-    from finger3d.accuracy.prefetch import Ahead
-    from finger3d.accuracy.refine import Refined
+    from finger3d.accuracy.prefetch import MeshPrefetch
+    from finger3d.accuracy.refine import Refinement
     from finger3d.mechanics.solve import Problem
     from finger3d.mechanics.step_halving import StepEstimate
     from finger3d.scene import Scene
@@ -51,7 +51,7 @@ class _Output:
         self.scene, self.problem, self.out, self.started = scene, problem, out, started
         self.factorizations_before = before
         self.factorizations: int | None = None  # of the press alone, once it is done: the estimate makes its own
-        self.frames: list[Frame] = []
+        self.frames: list[StepResult] = []
         self.estimate: StepEstimate | None = None
         self.error: ErrorEstimate | None = None
         self.refinement: dict[str, Any] | None = None
@@ -63,7 +63,7 @@ class _Output:
         self._written = -math.inf
         self._write_s = 0.0
 
-    def add(self, frame: Frame, seconds: float) -> None:
+    def add(self, frame: StepResult, seconds: float) -> None:
         self.frames.append(frame)
         self.seconds["contact"] += seconds
         if time.perf_counter() - self._written > max(_WRITE_EVERY_S, _WRITE_SHARE * self._write_s):
@@ -127,10 +127,10 @@ class _Output:
 def press(
     scene: Scene | str | Path,
     out: str | Path | None = None,
-    report: Report | None = None,
+    report: Progress | None = None,
     figures: bool | None = None,
     error: bool = True,
-    artist: Artist | None = None,
+    artist: PlotWorker | None = None,
 ) -> PressResult:
     """Press a scene, and write its results into a folder.
 
@@ -154,10 +154,10 @@ def press(
     >>> finger3d.press("scene.toml", "out").summary()["outcome"]
     'converged'
     >>> stiff = finger3d.load("scene.toml", ["material.E_MPa=2.0"])
-    >>> len(finger3d.press(stiff).history.frames)
+    >>> len(finger3d.press(stiff).history.steps)
     4
     """
-    from finger3d.accuracy.prefetch import Ahead
+    from finger3d.accuracy.prefetch import MeshPrefetch
     from finger3d.scene import load
 
     started = time.perf_counter()
@@ -166,20 +166,20 @@ def press(
     figures = temporary is None if figures is None else figures
     with claimed(temporary.name if temporary else str(out), "press") as folder:
         with (
-            nullcontext(artist) if artist else Artist(figures, formulae=False) as mine,
-            Ahead(scene if error else None) as ahead,
+            nullcontext(artist) if artist else PlotWorker(figures, formulae=False) as mine,
+            MeshPrefetch(scene if error else None) as ahead,
         ):
             drawing, beside = mine if figures else None, ahead if error else None
-            history, summary = _pressed(scene, folder, report or Report(), started, drawing, beside)
+            history, summary = _pressed(scene, folder, report or Progress(), started, drawing, beside)
     return PressResult(history, folder, summary, temporary)
 
 
 def _pressed(
-    scene: Scene, folder: Path, report: Report, started: float, artist: Artist | None, ahead: Ahead | None
+    scene: Scene, folder: Path, report: Progress, started: float, artist: PlotWorker | None, ahead: MeshPrefetch | None
 ) -> tuple[History, dict[str, Any]]:
     from finger3d.accuracy.estimate import estimate, press_numbers
     from finger3d.mechanics import resolution
-    from finger3d.mechanics.solve import covers
+    from finger3d.mechanics.solve import step_within_candidates
 
     _clear(folder)
     refinement = _refined(scene, report)
@@ -188,7 +188,7 @@ def _pressed(
     with atomic(folder / "scene.toml") as path:
         path.write_text(scene.to_toml(), encoding="utf-8")
     problem, output = _solve(scene, folder, report, started, refinement=refinement)
-    if output.frames and output.frames[-1].outcome.ok and not covers(problem, output.frames[-1]):
+    if output.frames and output.frames[-1].outcome.ok and not step_within_candidates(problem, output.frames[-1]):
         report.say("contact reached beyond the candidate points; solving again with all of the contact face")
         problem, output = _solve(scene, folder, report, started, math.inf, output, refinement)
     begin = time.perf_counter()
@@ -214,7 +214,7 @@ def _pressed(
     return history, summary
 
 
-def _refined(scene: Scene, report: Report) -> Refined | None:
+def _refined(scene: Scene, report: Progress) -> Refinement | None:
     """Edge lengths for mesh.tolerance, if the scene asks for one."""
     mesh = scene.tables.mesh
     if mesh.tolerance is None:
@@ -235,7 +235,7 @@ def _coupling_warning(coupling: float) -> list[str]:
 
 
 def _depth_warning(problem: Problem) -> list[str]:
-    if problem.model.kinematics.finite_strain:
+    if problem.model.formulation.finite_strain:
         return []
     height = problem.model.design.height_mm
     share = max(leg.depth_mm for leg in problem.model.legs) / height
@@ -247,7 +247,7 @@ def _depth_warning(problem: Problem) -> list[str]:
     ]
 
 
-def _coarse_warning(problem: Problem, frames: list[Frame]) -> list[str]:
+def _coarse_warning(problem: Problem, frames: list[StepResult]) -> list[str]:
     """Whether the contact is wide enough in points to be called resolved, where it was widest."""
     touching = max((f.state.status != OPEN for f in frames), key=np.count_nonzero, default=np.zeros(0, dtype=bool))
     count = int(np.count_nonzero(touching))
@@ -266,11 +266,11 @@ def _clear(folder: Path) -> None:
 def _solve(
     scene: Scene,
     folder: Path,
-    report: Report,
+    report: Progress,
     started: float,
     margin: float | None = None,
     before: _Output | None = None,
-    refinement: Refined | None = None,
+    refinement: Refinement | None = None,
 ) -> tuple[Problem, _Output]:
     from finger3d.mechanics.solve import build
     from finger3d.mechanics.step_halving import automatic
@@ -298,7 +298,7 @@ def _solve(
     return problem, output
 
 
-def _press_steps(problem: Problem, output: _Output, report: Report) -> None:
+def _press_steps(problem: Problem, output: _Output, report: Progress) -> None:
     from finger3d.mechanics.solve import march, targets
 
     total = len(targets(problem.model.legs))
@@ -310,7 +310,7 @@ def _press_steps(problem: Problem, output: _Output, report: Report) -> None:
         begin = time.perf_counter()
 
 
-def _press_automatically(problem: Problem, output: _Output, report: Report) -> None:
+def _press_automatically(problem: Problem, output: _Output, report: Progress) -> None:
     """Refine the increments; every finer run takes the place of the one before, also on disk."""
     from finger3d.mechanics.step_halving import refine
 
@@ -326,12 +326,12 @@ def _press_automatically(problem: Problem, output: _Output, report: Report) -> N
         output.warnings.append(estimate.warning)
 
 
-def _remark(problem: Problem, frame: Frame) -> str:
+def _remark(problem: Problem, frame: StepResult) -> str:
     force = measure(problem.points, frame)["normal_force_N"]
     return f"depth {frame.target.depth_mm:.4g} mm, force {force:.5g} N, residual {frame.residual:.1e}"
 
 
-def _fields(problem: Problem, output: _Output, folder: Path, artist: Artist | None) -> None:
+def _fields(problem: Problem, output: _Output, folder: Path, artist: PlotWorker | None) -> None:
     """fields.vtu and the pictures, from the last good step; the field is recovered with the factor at hand."""
     from finger3d.accuracy.advice import advise
     from finger3d.fem.simplex import unfold
@@ -342,7 +342,7 @@ def _fields(problem: Problem, output: _Output, folder: Path, artist: Artist | No
     if not good:
         return
     frame, points = good[-1], problem.points
-    u, strain, sigma = problem.model.kinematics.fields(problem, frame.part)
+    u, strain, sigma = problem.model.formulation.fields(problem, frame.part)
     output.warnings += resolution.inside(problem, frame, u)
     output.advice = advise(problem, frame, strain)
     if output.estimate and output.estimate.advice:
@@ -377,7 +377,7 @@ def _fields(problem: Problem, output: _Output, folder: Path, artist: Artist | No
 
 def _told(history: History) -> str:
     """The outcome, with the depth where a step failed."""
-    failed = next((f for f in history.frames if not f.outcome.ok), None)
+    failed = next((f for f in history.steps if not f.outcome.ok), None)
     return (
         str(history.outcome) if failed is None else f"at a depth of {failed.target.depth_mm:.4g} mm: {failed.outcome}"
     )
@@ -388,7 +388,9 @@ def _voigt(tensor: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
     return np.stack([tensor[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))], axis=1)
 
 
-def _figures(problem: Problem, output: _Output, frame: Frame, mesh: Any, u: Any, folder: Path, artist: Artist) -> None:
+def _figures(
+    problem: Problem, output: _Output, frame: StepResult, mesh: Any, u: Any, folder: Path, artist: PlotWorker
+) -> None:
     from finger3d.plotting import figures as view
     from finger3d.plotting.gauges import marks_of
 

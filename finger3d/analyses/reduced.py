@@ -25,9 +25,9 @@ from finger3d.analyses.reduced_arrays import check_arrays
 from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import Elasticity, Stiffness
-from finger3d.fem.condense import Condensed as Factored
+from finger3d.fem.condense import Condensation as Factored
 from finger3d.fem.simplex import Mesh
-from finger3d.fem.traces import Surface, restrict, surface
+from finger3d.fem.traces import BoundarySurface, restrict, surface
 from finger3d.io import atomic, read_arrays
 from finger3d.mechanics.history import ContactPoints, History
 from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
@@ -47,7 +47,7 @@ _ENOUGH = 0.5 * MARGIN  # of the depth: candidates reach to a rigid gap of MARGI
 
 
 @dataclass(frozen=True)
-class Body:
+class DesignSummary:
     """What is left of a design: height and width, mm."""
 
     height_mm: float
@@ -66,7 +66,7 @@ class Condensed:
     """
 
     problem: Problem
-    others: Surface
+    others: BoundarySurface
     about: Mapping[str, Any]
 
     def __repr__(self) -> str:
@@ -85,8 +85,8 @@ class Condensed:
             If an effect makes the compliance depend on the state or on time.
         """
         model = problem.model
-        if not model.kinematics.elastic:
-            name = dict(model.filled).get("kinematics", "its kinematics")
+        if not model.formulation.elastic:
+            name = dict(model.filled).get("formulation", "its kinematics")
             raise Finger3dError(
                 f"effects.{name}: a body with it has no reduced model, its compliance changes on the way; "
                 "take the effect out, or press the scene itself"
@@ -98,10 +98,10 @@ class Condensed:
             "effects": sorted({effect for _, effect in model.filled}),
         }  # fmt: skip
         light = replace(
-            model, design=Body(float(model.design.height_mm), float(model.design.width_mm)), inclusions=None,
+            model, design=DesignSummary(float(model.design.height_mm), float(model.design.width_mm)), inclusions=None,
             object_compliance=None, symmetry=problem.axes,
         )  # fmt: skip
-        return cls(_assembled(light, _arrays_of(problem), problem.touch_mm, problem.axes), _bare(others), about)
+        return cls(_assembled(light, _arrays_of(problem), problem.first_contact_mm, problem.axes), _bare(others), about)
 
     @property
     def gauges(self) -> tuple[str, ...]:
@@ -146,7 +146,7 @@ class Condensed:
         problem = replace(self.problem, model=replace(model, friction=law, legs=tuple(legs or model.legs)))
         if legs is not None:
             self._check(problem)
-            check(problem.model, problem.surface, problem.touch_mm, problem.place_mm, problem.axes)
+            check(problem.model, problem.surface, problem.first_contact_mm, problem.place_mm, problem.axes)
         return History(problem.points, tuple(march(problem)))
 
     def _check(self, problem: Problem) -> None:
@@ -170,7 +170,7 @@ class Condensed:
             return
         path = targets(legs)
         deepest = max(t.depth_mm for t in path)
-        nearest = min(float(rigid_gap(problem.model, self.others, problem.touch_mm, t).min()) for t in path)
+        nearest = min(float(rigid_gap(problem.model, self.others, problem.first_contact_mm, t).min()) for t in path)
         if nearest < _ENOUGH * deepest:
             raise Finger3dError(
                 f"press: at depth {deepest:g} mm contact may leave the {self.contact_points} points that were "
@@ -256,7 +256,7 @@ def _kinetic(law: FrictionLaw, ratio: float | None, branch: str | None) -> Frict
     return TwoCoefficients(law.static, float(ratio), kind)
 
 
-def _face_arrays(name: str, face: Surface) -> dict[str, Any]:
+def _face_arrays(name: str, face: BoundarySurface) -> dict[str, Any]:
     mean = face.average.tocsr()
     return {
         f"{name}_nodes": face.nodes, f"{name}_points": face.points, f"{name}_area": face.area,
@@ -265,7 +265,7 @@ def _face_arrays(name: str, face: Surface) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _face(name: str, arrays: Mapping[str, Any], dim: int) -> Surface:
+def _face(name: str, arrays: Mapping[str, Any], dim: int) -> BoundarySurface:
     """A surface that knows where the object is over it, and nothing of a mesh."""
     samples, nodes = arrays[f"{name}_samples"].reshape(-1, dim), arrays[f"{name}_nodes"]
     parts = (arrays[f"{name}_mean"], arrays[f"{name}_mean_at"], arrays[f"{name}_mean_rows"])
@@ -273,10 +273,10 @@ def _face(name: str, arrays: Mapping[str, Any], dim: int) -> Surface:
     mean.check_format(full_check=True)  # of a file: its indices must be in range
     points = arrays[f"{name}_points"].reshape(-1, dim)
     none = sp.csr_matrix((len(nodes), 0)), sp.csr_matrix((len(samples), 0))
-    return Surface(nodes, points, arrays[f"{name}_area"], none[0], samples, mean, none[1])
+    return BoundarySurface(nodes, points, arrays[f"{name}_area"], none[0], samples, mean, none[1])
 
 
-def _bare(face: Surface) -> Surface:
+def _bare(face: BoundarySurface) -> BoundarySurface:
     """The same surface with only the samples that its points read."""
     used = np.unique(face.average.tocsr().indices)
     light = replace(face, samples=face.samples[used], average=face.average.tocsr()[:, used])
@@ -284,19 +284,25 @@ def _bare(face: Surface) -> Surface:
 
 
 def _arrays_of(problem: Problem) -> dict[str, Any]:
-    c, d = problem.compliance.shape[:2]
+    c, d = problem.delassus.shape[:2]
     arrays = {
-        "compliance": problem.compliance.reshape(c * d, c * d), "gauge_rows": problem.gauge_rows,
-        "parent": problem.parent, "sign": problem.sign, "share": problem.share, "nodes": problem.points.nodes,
-        "points": problem.points.points, "area": problem.points.area,
+        "compliance": problem.delassus.reshape(c * d, c * d),
+        "gauge_rows": problem.gauge_rows,
+        "parent": problem.image_of,
+        "sign": problem.mirror_sign,
+        "share": problem.multiplicity,
+        "nodes": problem.points.nodes,
+        "points": problem.points.points,
+        "area": problem.points.area,
         "band": np.array([problem.points.half_width_mm, problem.points.band_mm]),
         "edges": problem.points.edges,
         **_face_arrays("face", _bare(problem.surface)),
-    }  # fmt: skip
-    if problem.bare:
+    }
+    if problem.without_inclusions:
         arrays |= {
-            "bare_compliance": problem.bare.compliance.reshape(c * d, c * d), "bare_gauge_rows": problem.bare.gauge_rows
-        }  # fmt: skip
+            "bare_compliance": problem.without_inclusions.delassus.reshape(c * d, c * d),
+            "bare_gauge_rows": problem.without_inclusions.gauge_rows,
+        }
     return arrays
 
 
@@ -323,7 +329,8 @@ def _assembled(model: Model, arrays: Mapping[str, Any], touch_mm: float, axes: t
         return problem
     rows = arrays["bare_gauge_rows"].reshape(len(model.gauges), c * d)
     return replace(
-        problem, bare=replace(problem, compliance=arrays["bare_compliance"].reshape(c, d, c, d), gauge_rows=rows)
+        problem,
+        without_inclusions=replace(problem, delassus=arrays["bare_compliance"].reshape(c, d, c, d), gauge_rows=rows),
     )
 
 
@@ -341,7 +348,7 @@ def _header(problem: Problem) -> dict[str, Any]:
         "friction": {"kind": type(model.friction).__name__, **asdict(model.friction)},  # type: ignore[call-overload]
         "gauges": [asdict(g) for g in model.gauges], "domain": model.domain, "rule": model.rule,
         "warnings": list(model.warnings), "filled": [list(f) for f in model.filled], "axes": list(problem.axes),
-        "touch_mm": problem.touch_mm,
+        "touch_mm": problem.first_contact_mm,
     }  # fmt: skip
 
 
@@ -362,7 +369,7 @@ def _model(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> Model:
         raise ValueError("domain or rule")
     if not header["legs"] or not set(header["axes"]) <= {"x", "z"} or _number(header["touch_mm"]) <= 0.0:
         raise ValueError("legs, axes or touch_mm")
-    body, material = _made(Body, header["body"]), _made(Material, header["material"])
+    body, material = _made(DesignSummary, header["body"]), _made(Material, header["material"])
     legs = tuple(_made(Leg, leg) for leg in header["legs"])
     if not (body.height_mm > 0.0 < body.width_mm and material.E_MPa > 0.0 <= material.nu <= 0.5):
         raise ValueError("body or material")

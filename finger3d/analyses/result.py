@@ -114,7 +114,7 @@ class PressResult:
         return grid(self.out, step)
 
     def _contact(self) -> dict[str, Any]:
-        frames = self.history.frames
+        frames = self.history.steps
         if not frames:
             raise Finger3dError(f"{self.out}: no step was finished, so there is no contact to show")
         last = next((f for f in reversed(frames) if f.outcome.ok), frames[-1])

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 from finger3d.contact.friction import FrictionLaw
 from finger3d.errors import Finger3dError, Outcome
-from finger3d.mechanics.history import Frame, measure
+from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.scene import Scene
 
@@ -52,7 +52,7 @@ class Variant:
 
 
 @dataclass(frozen=True)
-class Pressed:
+class VariantResult:
     """The end of a press.
 
     Attributes
@@ -104,7 +104,7 @@ def finest(models: Sequence[Model]) -> MeshOptions:
     return replace(models[0].mesh, size_mm=min(sizes), base_size_mm=min(bases))
 
 
-class Body:
+class SharedBody:
     """A body built once for some variants, and pressed as each of them.
 
     Parameters
@@ -131,14 +131,14 @@ class Body:
         self._free = model.inclusions is not None
         self.problem = build(replace(model, legs=shared_legs(variants), gauges=gauges), say)
         self.seconds = time.perf_counter() - start
-        self._done: dict[Any, Pressed | Exception] = {}
+        self._done: dict[Any, VariantResult | Exception] = {}
 
     def problem_of(self, variant: Variant) -> Problem:
         """The condensed body under the friction, path and rule of a variant, with all gauges of all variants."""
         own = replace(self.problem.model, friction=variant.friction, legs=variant.legs, rule=variant.rule)
         return replace(self.problem, model=own)
 
-    def frames(self, variants: Sequence[Variant]) -> list[tuple[Frame, ...]]:
+    def frames(self, variants: Sequence[Variant]) -> list[tuple[StepResult, ...]]:
         """Frames of each variant, all of `problem` as it then is.
 
         If contact reached beyond the candidate points, that is the body condensed to all of its contact face.
@@ -149,14 +149,14 @@ class Body:
                 found[i] = run
         return [run.known() for run in found if run]
 
-    def press(self, variant: Variant) -> Pressed:
+    def press(self, variant: Variant) -> VariantResult:
         """The last step's numbers of a variant."""
         found = next(self.presses([variant]))
         if isinstance(found, Exception):
             raise found
         return found
 
-    def presses(self, variants: Sequence[Variant], most: int | None = None) -> Iterator[Pressed | Exception]:
+    def presses(self, variants: Sequence[Variant], most: int | None = None) -> Iterator[VariantResult | Exception]:
         """The last step's numbers of each variant, or what it failed of, in that order; each at most some way behind.
 
         Variants that differ in their gauges only share a press.  As many run at once as pays, and no more than `most`.
@@ -168,7 +168,7 @@ class Body:
             while key not in self._done:
                 self._done[next(keys)] = next(runs).pressed()
             pressed = self._done[key]
-            if isinstance(pressed, Pressed):
+            if isinstance(pressed, VariantResult):
                 gauges = self.strains(variant, pressed.gauges) if pressed.gauges else {}
                 pressed = replace(pressed, gauges=gauges, seconds=pressed.seconds if key in unpaid else 0.0)
             unpaid.discard(key)
@@ -179,14 +179,14 @@ class Body:
 
         What is finished waits for that a second, or for as long as the press beside it takes.
         """
-        from finger3d.mechanics.solve import each, whole
+        from finger3d.mechanics.solve import candidates_cover_face, map_parallel
 
         left = deque(variants)
         while left:
             waiting: list[_Run] = []
             since, reached = time.perf_counter(), False
-            wait = 0.0 if whole(self.problem) else _WAIT_S
-            with closing(each(self.problem, self._run, tuple(left), most)) as runs:
+            wait = 0.0 if candidates_cover_face(self.problem) else _WAIT_S
+            with closing(map_parallel(self.problem, self._run, tuple(left), most)) as runs:
                 for run in runs:
                     waiting.append(run)
                     if len(waiting) < len(left) and time.perf_counter() - since < wait:
@@ -210,11 +210,11 @@ class Body:
         from finger3d.mechanics.step_halving import marched
 
         start = time.perf_counter()
-        frames: tuple[Frame, ...] | Exception
+        frames: tuple[StepResult, ...] | Exception
         try:
             problem = self.problem_of(variant)
             if variant.legs != self.problem.model.legs:  # the body was built, and its mesh checked, for another path
-                check(problem.model, problem.surface, problem.touch_mm, problem.place_mm, problem.axes)
+                check(problem.model, problem.surface, problem.first_contact_mm, problem.place_mm, problem.axes)
             frames = marched(problem)[0]
         except TROUBLE as error:
             frames = error.with_traceback(None)  # which would keep all arrays on the way
@@ -240,21 +240,21 @@ class _Run:
     """Frames of a press of a problem, or what it failed of."""
 
     problem: Problem
-    frames: tuple[Frame, ...] | Exception
+    frames: tuple[StepResult, ...] | Exception
     seconds: float
 
     @property
-    def end(self) -> Frame | None:
+    def end(self) -> StepResult | None:
         """The last frame, if all converged."""
         return None if isinstance(self.frames, Exception) or not self.frames[-1].outcome.ok else self.frames[-1]
 
-    def known(self) -> tuple[Frame, ...]:
+    def known(self) -> tuple[StepResult, ...]:
         """The frames; raises what it failed of."""
         if isinstance(self.frames, Exception):
             raise self.frames
         return self.frames
 
-    def pressed(self) -> Pressed | Exception:
+    def pressed(self) -> VariantResult | Exception:
         """What is told of it."""
         if isinstance(self.frames, Exception):
             return self.frames
@@ -262,21 +262,21 @@ class _Run:
         for number, frame in enumerate(self.frames, start=1):
             if not frame.outcome.ok:
                 at = f"step {number} (depth {frame.target.depth_mm:.4g} mm)"
-                return Pressed(f"{at}: {frame.outcome}", residual, {}, {}, self.seconds)
+                return VariantResult(f"{at}: {frame.outcome}", residual, {}, {}, self.seconds)
         numbers = measure(self.problem.points, self.frames[-1])
         gauges = numbers.pop("gauges")
         for key in ("iterations", "residual", "method", "outcome"):
             numbers.pop(key)
-        return Pressed(str(Outcome.CONVERGED), residual, numbers, gauges, self.seconds)
+        return VariantResult(str(Outcome.CONVERGED), residual, numbers, gauges, self.seconds)
 
 
 def _proved(problem: Problem, runs: Sequence[_Run]) -> list[_Run]:
     """The runs before the first that went beyond the candidate points; each pays its part of the proof."""
-    from finger3d.mechanics.solve import covered
+    from finger3d.mechanics.solve import contact_within_candidates
 
     start = time.perf_counter()
     try:
-        good = iter(covered(problem, [run.end for run in runs if run.end]))
+        good = iter(contact_within_candidates(problem, [run.end for run in runs if run.end]))
     except TROUBLE as error:
         return [replace(run, frames=error.with_traceback(None)) if run.end else run for run in runs]
     proved = list(takewhile(lambda run: run.end is None or next(good), runs))

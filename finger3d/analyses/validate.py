@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike
 
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.io import atomic, write_csv, write_json
-from finger3d.progress import Report
+from finger3d.progress import Progress
 
 Kind = Literal["verification", "validation", "sensitivity", "statement"]
 Measure = Literal["relative", "absolute", "at most", "at least"]
@@ -197,7 +197,7 @@ def validate(
     selected: Sequence[Study],
     quick: bool,
     out: Path,
-    report: Report | None = None,
+    report: Progress | None = None,
     resume: bool = False,
     known: Mapping[str, Study] | None = None,
 ) -> dict[str, tuple[Row, ...]]:
@@ -215,7 +215,7 @@ def validate(
     dict
         Rows by study, of those that ran and those left out.
     """
-    report = report or Report()
+    report = report or Progress()
     found: dict[str, tuple[Row, ...]] = {}
     for done, study in enumerate(selected, start=1):
         stamp = study.stamp()

@@ -15,7 +15,7 @@ from cyclopts import App, Parameter
 import finger3d
 from finger3d._ranges import printable
 from finger3d.errors import Finger3dError
-from finger3d.progress import Report, reporter
+from finger3d.progress import Progress, reporter
 
 if TYPE_CHECKING:
     from finger3d.scene import Scene
@@ -55,7 +55,7 @@ Json = Annotated[
 ]
 
 
-def reporting(json_: bool) -> tuple[Report, AbstractContextManager[Any]]:
+def reporting(json_: bool) -> tuple[Progress, AbstractContextManager[Any]]:
     """A report for a job, and what to run the job in: with --json all it prints goes to standard error."""
     if json_:
         return reporter(sys.stderr), redirect_stdout(sys.stderr)

@@ -47,20 +47,28 @@ def optimise(
     scene
         The scene file (TOML).
     """
-    from finger3d.analyses.optimise.run import search
-    from finger3d.analyses.optimise.task import MUS, Free, Problem
+    from finger3d.analyses.optimise.run import optimise
+    from finger3d.analyses.optimise.task import MUS, FreeKey, OptimisationProblem
     from finger3d.scene import tree
 
     given = tree.override(tree.read(scene), set_ or [])
-    problem = Problem(
-        given, tuple(Free.of(text) for text in free), objective, scene, gauge, _mus(mu) if mu else MUS, noise, budget,
-        method, seed,
-    )  # fmt: skip
+    problem = OptimisationProblem(
+        given,
+        tuple(FreeKey.of(text) for text in free),
+        objective,
+        scene,
+        gauge,
+        _mus(mu) if mu else MUS,
+        noise,
+        budget,
+        method,
+        seed,
+    )
     check_writable(out, scene)
     report, aside = reporting(json_)
     try:
         with aside, report:
-            found = search(problem, out, report)
+            found = optimise(problem, out, report)
     except KeyboardInterrupt:
         complain(f"interrupted; every design judged is kept in {out / 'evaluations.csv'}; the same command goes on")
         return 130

@@ -36,9 +36,9 @@ def press(
     scene
         The scene file (TOML); `finger3d new` writes one.
     """
-    from finger3d.plotting.worker import Artist
+    from finger3d.plotting.worker import PlotWorker
 
-    with Artist(figures, formulae=False) as artist:  # it loads what it needs while the scene is read
+    with PlotWorker(figures, formulae=False) as artist:  # it loads what it needs while the scene is read
         loaded = load(scene, set_)
         check_writable(out, scene)
         import finger3d.accuracy.prefetch  # noqa: F401  all that the job will import

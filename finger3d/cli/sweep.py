@@ -22,7 +22,7 @@ from finger3d.cli.common import (
 from finger3d.errors import Finger3dError, MissingError
 
 if TYPE_CHECKING:
-    from finger3d.analyses.sweep.store import Kept
+    from finger3d.analyses.sweep.store import ResultStore
 
 _SHOWN, _GAUGES = 10, 3  # points and gauges
 _SHARED = ("friction.", "press.", "contact.", "gauge.")  # keys that leave one body, which is pressed without workers
@@ -88,7 +88,7 @@ def sweep(
     return MissingError.exit_code
 
 
-def _tell(kept: Kept, out: Path, json_: bool) -> None:
+def _tell(kept: ResultStore, out: Path, json_: bool) -> None:
     if json_:
         print_json(_as_dict(kept, out))
     else:
@@ -100,13 +100,13 @@ def _said(done: int, total: int, out: Path) -> str:
     return f"{done} of {total} points are kept in {out}; the same command goes on" if done else "no point was finished"
 
 
-def _points(kept: Kept) -> list[dict[str, Any]]:
+def _points(kept: ResultStore) -> list[dict[str, Any]]:
     """Every point as a row of the table in the results."""
     columns = kept.columns()
     return [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
 
 
-def _as_dict(kept: Kept, out: Path) -> dict[str, Any]:
+def _as_dict(kept: ResultStore, out: Path) -> dict[str, Any]:
     points = _points(kept)
     failed = sum(row["outcome"] != "converged" for row in points)
     return {
@@ -115,7 +115,7 @@ def _as_dict(kept: Kept, out: Path) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _print_points(kept: Kept) -> None:
+def _print_points(kept: ResultStore) -> None:
     """The varied keys and the main numbers of the first points."""
     from finger3d.io import MAIN
     from finger3d.report.build import number
@@ -133,7 +133,7 @@ def _print_points(kept: Kept) -> None:
         print(f"  the first {_SHOWN} of {len(points)} points; all are in results.csv")
 
 
-def _rows(kept: Kept, out: Path) -> list[tuple[str, str]]:
+def _rows(kept: ResultStore, out: Path) -> list[tuple[str, str]]:
     seconds = sum(row.get("seconds") or 0.0 for row in kept.rows.values())
     built = {row["body"]: row.get("build_seconds") or 0.0 for row in kept.rows.values()}
     return [

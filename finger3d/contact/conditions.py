@@ -29,34 +29,34 @@ PRECISION: dict[int, type[Any]] = {1: np.float64, 2: np.float64, 3: np.float32}
 
 
 @dataclass(frozen=True)
-class Increments:
+class ContactProblem:
     """One increment to be solved: find force (c, d) such that ``moved = free + C force`` meets the conditions.
 
     Attributes
     ----------
-    free : (c, d) mm
+    free_motion : (c, d) mm
         Gap and change of tangential position of each point under no contact force.
-    compliance : (c d, c d) mm/N
-    mu : (c,)
-    rho : (c, d) N/mm
+    delassus : (c d, c d) mm/N
+    friction : (c,)
+    augmentation : (c, d) N/mm
         Stiffness that weighs a violated gap or slip against a force: 1 / diagonal of the compliance, tangents alike.
     length_scale : mm
         What a violated gap or slip is measured by.
     """
 
-    free: Float
-    compliance: Float
-    mu: Float
-    rho: Float
+    free_motion: Float
+    delassus: Float
+    friction: Float
+    augmentation: Float
     length_scale: float
 
-    def moved(self, force: Float) -> Float:
+    def relative_displacement(self, force: Float) -> Float:
         """Gap and change of position (c, d) mm under forces (c, d) N."""
-        return self.free + self._times(self.compliance, force).reshape(force.shape)
+        return self.free_motion + self._times(self.delassus, force).reshape(force.shape)
 
     def gap(self, force: Float) -> Float:
         """Gap (c,) mm under forces (c, d) N."""
-        return self.free[:, 0] + self._times(self.compliance[:: force.shape[1]], force)
+        return self.free_motion[:, 0] + self._times(self.delassus[:: force.shape[1]], force)
 
     @staticmethod
     def _times(rows: Float, force: Float) -> Float:
@@ -73,7 +73,7 @@ class Increments:
         stride = max(1, _CACHED // max(1, reach))
         for i in range(0, len(chosen), stride):
             part = slice(i, i + stride)
-            rows: NDArray[Any] = self.compliance[chosen[part], :reach].astype(precision, copy=False)
+            rows: NDArray[Any] = self.delassus[chosen[part], :reach].astype(precision, copy=False)
             np.take(rows, chosen, axis=1, out=found[part], mode="clip")  # "raise" would copy
         return found
 
@@ -83,7 +83,7 @@ def lengths(vectors: Float) -> Float:
     return np.abs(vectors[:, 0]) if vectors.shape[1] == 1 else np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
 
 
-def stiffness_weights(compliance: Float, dim: int) -> Float:
+def augmentation_parameters(compliance: Float, dim: int) -> Float:
     """Weights rho (c, d) N/mm from the diagonal of a compliance (c d, c d); the tangents of a point share the least."""
     rho = 1.0 / np.diagonal(compliance).reshape(-1, dim)
     rho = rho.copy()
@@ -91,7 +91,9 @@ def stiffness_weights(compliance: Float, dim: int) -> Float:
     return rho
 
 
-def project(problem: Increments, force: Float, moved: Float) -> tuple[Float, NDArray[np.int8], Float]:
+def project_on_friction_cone(
+    problem: ContactProblem, force: Float, moved: Float
+) -> tuple[Float, NDArray[np.int8], Float]:
     """Projection of ``force - rho moved`` on the friction cone of its own normal force.
 
     Returns
@@ -100,12 +102,12 @@ def project(problem: Increments, force: Float, moved: Float) -> tuple[Float, NDA
     status : (c,) read off the projection
     trial : (c, d) N, normal force cut at 0, tangential force before it is cut back to length mu n
     """
-    trial = force - problem.rho * moved
+    trial = force - problem.augmentation * moved
     trial[:, 0] = np.maximum(trial[:, 0], 0.0)
     normal = trial[:, 0]
     length = lengths(trial[:, 1:])
-    bound = problem.mu * normal
-    slips = (length > bound) | (problem.mu == 0.0)
+    bound = problem.friction * normal
+    slips = (length > bound) | (problem.friction == 0.0)
     cut = np.where(slips, bound / np.where(length > 0.0, length, 1.0), 1.0)
     projected = trial.copy()
     projected[:, 1:] *= cut[:, None]
@@ -118,7 +120,7 @@ def residual(force: Float, moved: Float, status: NDArray[np.int8], mu: Float, le
 
     Parameters
     ----------
-    force, moved : (c, d) N and mm, as in `Increments`
+    force, moved : (c, d) N and mm, as in `ContactProblem`
     status : (c,)
     mu : (c,) coefficient that limits each point
     """

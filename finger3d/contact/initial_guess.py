@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.contact.conditions import PRECISION, Increments, project
-from finger3d.contact.newton import solver
+from finger3d.contact.conditions import PRECISION, ContactProblem, project_on_friction_cone
+from finger3d.contact.newton import lu_solver
 
 Float = NDArray[np.float64]
 
@@ -40,13 +40,13 @@ Array = NDArray[np.floating[Any]]
 Solve = Callable[[Array], Array]
 
 
-def predict(problem: Increments, force: Float) -> Float:
+def initial_guess(problem: ContactProblem, force: Float) -> Float:
     """Forces (c, d) N to start from, given those expected: these, if hardly anything would change under them.
 
     They decide nothing.
     """
     gap = problem.gap(force)
-    touched, touches = force[:, 0] > 0.0, force[:, 0] > problem.rho[:, 0] * gap
+    touched, touches = force[:, 0] > 0.0, force[:, 0] > problem.augmentation[:, 0] * gap
     if (touched == touches).all() and _fits(problem, force):
         return force
     found = np.zeros_like(force)
@@ -61,9 +61,9 @@ def predict(problem: Increments, force: Float) -> Float:
     return found
 
 
-def _fits(problem: Increments, force: Float) -> bool:
+def _fits(problem: ContactProblem, force: Float) -> bool:
     """Whether forces (c, d) nearly are their own projection."""
-    missed = force - project(problem, force, problem.moved(force))[0]
+    missed = force - project_on_friction_cone(problem, force, problem.relative_displacement(force))[0]
     return float(np.linalg.norm(missed)) <= _FITS * float(np.linalg.norm(force))
 
 
@@ -72,7 +72,7 @@ def _deep(gap: Float, closes: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return gap <= np.quantile(gap[closes], _DEEP) if closes.any() else closes
 
 
-def _normal(problem: Increments, force: Float, touches: NDArray[np.bool_]) -> tuple[NDArray[np.intp], Array, Solve]:
+def _normal(problem: ContactProblem, force: Float, touches: NDArray[np.bool_]) -> tuple[NDArray[np.intp], Array, Solve]:
     """Normal forces under friction as expected: the active set of a symmetric problem, from points that touch.
 
     Returns
@@ -88,11 +88,11 @@ def _normal(problem: Increments, force: Float, touches: NDArray[np.bool_]) -> tu
     open_gap = problem.gap(expected)
     for _ in range(_CHANGES):
         at = np.flatnonzero(touches)
-        press: Solve = solver(problem.between(at * d, precision), d > 2)
+        press: Solve = lu_solver(problem.between(at * d, precision), d > 2)
         expected[:] = 0.0
         expected[at, 0] = normal = press(-open_gap[at].astype(precision))
-        gap = open_gap + problem.gap(expected) - problem.free[:, 0]
-        last, touches = touches, expected[:, 0] > problem.rho[:, 0] * gap
+        gap = open_gap + problem.gap(expected) - problem.free_motion[:, 0]
+        last, touches = touches, expected[:, 0] > problem.augmentation[:, 0] * gap
         if (touches == last).all():
             break
     return at, np.maximum(normal, 0.0), press
@@ -115,13 +115,13 @@ class _Touching(NamedTuple):
     step: Array
 
     @classmethod
-    def of(cls, problem: Increments, points: NDArray[np.int64], press: Solve) -> _Touching:
-        d, k = problem.free.shape[1], len(points)
+    def of(cls, problem: ContactProblem, points: NDArray[np.int64], press: Solve) -> _Touching:
+        d, k = problem.free_motion.shape[1], len(points)
         chosen = (np.arange(d)[:, None] + points * d).ravel()
         whole = problem.between(chosen, PRECISION[d])
-        free, rho = (a.ravel()[chosen].astype(whole.dtype) for a in (problem.free, problem.rho))
+        free, rho = (a.ravel()[chosen].astype(whole.dtype) for a in (problem.free_motion, problem.augmentation))
         coupling, tangential, rho = whole[:k, k:], whole[k:, k:], rho[k:]
-        mu, step = problem.mu[points].astype(whole.dtype), rho / _largest(tangential, rho)
+        mu, step = problem.friction[points].astype(whole.dtype), rho / _largest(tangential, rho)
         return cls(free[:k], free[k:], press, coupling, tangential, mu, step)
 
     def under(self, normal: Array) -> tuple[Array, Array]:

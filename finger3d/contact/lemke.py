@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.contact.conditions import Increments
+from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import OPEN, SLIP, STICK
 
 Float = NDArray[np.float64]
@@ -65,17 +65,17 @@ def lemke(matrix: Float, q: Float, limit: int) -> Float | None:
     return None
 
 
-def friction_start(problem: Increments, points: NDArray[np.int64]) -> tuple[NDArray[np.int8], Float] | None:
+def friction_start(problem: ContactProblem, points: NDArray[np.int64]) -> tuple[NDArray[np.int8], Float] | None:
     """States (c,) and slip directions (c, d - 1) of the polygonal problem over `points`; None if none was found."""
-    c, d = problem.free.shape
+    c, d = problem.free_motion.shape
     span = directions(d - 1)
     k, p = len(span), len(points)
     if p == 0 or p * (k + 2) > LARGEST:
         return None
     dof = (points[:, None] * d + np.arange(d)).ravel()
-    stiff = 1.0 / np.diagonal(problem.compliance)[dof].mean()
-    block = (problem.compliance[np.ix_(dof, dof)] * stiff).reshape(p, d, p, d)
-    free = problem.free[points] / max(float(np.abs(problem.free[points]).max()), 1e-300)
+    stiff = 1.0 / np.diagonal(problem.delassus)[dof].mean()
+    block = (problem.delassus[np.ix_(dof, dof)] * stiff).reshape(p, d, p, d)
+    free = problem.free_motion[points] / max(float(np.abs(problem.free_motion[points]).max()), 1e-300)
     m = p * (k + 2)
     matrix = np.zeros((m, m))
     n, b, lam = slice(0, p), slice(p, p + p * k), slice(p + p * k, m)
@@ -85,7 +85,7 @@ def friction_start(problem: Increments, points: NDArray[np.int64]) -> tuple[NDAr
     matrix[b, b] = np.einsum("kt,itju,lu->ikjl", span, block[:, 1:, :, 1:], span).reshape(p * k, p * k)
     choose = np.kron(np.eye(p), np.ones((k, 1)))
     matrix[b, lam] = choose
-    matrix[lam, n] = np.diag(problem.mu[points])
+    matrix[lam, n] = np.diag(problem.friction[points])
     matrix[lam, b] = -choose.T
     q = np.concatenate([free[:, 0], (free[:, 1:] @ span.T).ravel(), np.zeros(p)])
     z = lemke(matrix, q, 20 * m)

@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.contact.conditions import TOLERANCE, Increments, residual, stiffness_weights
+from finger3d.contact.conditions import TOLERANCE, ContactProblem, augmentation_parameters, residual
 from finger3d.contact.friction import OPEN, SLIP, STICK, FrictionLaw
 from finger3d.contact.newton import force_of_sets
-from finger3d.contact.state import ContactState, Increment, next_state, refusal
+from finger3d.contact.state import ContactSolution, ContactState, invalid_input, next_state
 from finger3d.errors import Outcome
 
 Float = NDArray[np.float64]
@@ -20,7 +20,7 @@ Float = NDArray[np.float64]
 _LIMIT = 500
 
 
-def swap(
+def maeno_active_set(
     previous: ContactState,
     free: Float,
     compliance: Float,
@@ -28,21 +28,21 @@ def swap(
     length_scale: float,
     guess: Float | None = None,
     weights: Float | None = None,
-) -> Increment:
+) -> ContactSolution:
     """Solve one increment by the paper's swaps; arguments as for `advance`; the guess is not used.
 
     A cycled increment hands on the last state it tried, so that a run can go on and show what became of it.
     """
     c, d = free.shape
     matrix = compliance.reshape(c * d, c * d)
-    refused = refusal(free, matrix, weights is None)
+    refused = invalid_input(free, matrix, weights is None)
     if refused:
-        return Increment(previous, refused, np.inf, 0, "none")
+        return ContactSolution(previous, refused, np.inf, 0, "none")
     change = free.copy()
-    change[:, 1:] -= previous.position
+    change[:, 1:] -= previous.tangential_displacement
     mu = law.coefficients(previous.status)
-    rho = stiffness_weights(matrix, d) if weights is None else weights
-    problem = Increments(change, matrix, mu, rho, length_scale)
+    rho = augmentation_parameters(matrix, d) if weights is None else weights
+    problem = ContactProblem(change, matrix, mu, rho, length_scale)
     # in the last time frame's contact: stuck; all others: free
     status = np.where(previous.status == OPEN, OPEN, STICK).astype(np.int8)
     direction = np.zeros((c, d))
@@ -50,7 +50,7 @@ def swap(
     for iteration in range(1, _LIMIT + 1):
         seen.add(status.tobytes())
         force = force_of_sets(problem, status, direction)
-        moved = problem.moved(force)
+        moved = problem.relative_displacement(force)
         length = np.linalg.norm(force[:, 1:], axis=1)
         swapped = status.copy()
         swapped[(status == OPEN) & (moved[:, 0] < 0.0)] = STICK
@@ -64,13 +64,18 @@ def swap(
         if status.tobytes() in seen:
             break
     error = residual(force, moved, status, mu, length_scale)
-    return Increment(next_state(previous, force, moved, status), Outcome.CYCLED, error, iteration, "paper")
+    return ContactSolution(next_state(previous, force, moved, status), Outcome.CYCLED, error, iteration, "paper")
 
 
 def _judged(
-    previous: ContactState, problem: Increments, force: Float, moved: Float, status: NDArray[np.int8], iterations: int
-) -> Increment:
+    previous: ContactState,
+    problem: ContactProblem,
+    force: Float,
+    moved: Float,
+    status: NDArray[np.int8],
+    iterations: int,
+) -> ContactSolution:
     """Eqs. (1)-(4) hold; whether friction also opposes slip decides if the step may call itself converged."""
-    error = residual(force, moved, status, problem.mu, problem.length_scale)
+    error = residual(force, moved, status, problem.friction, problem.length_scale)
     outcome = Outcome.CONVERGED if error <= TOLERANCE else Outcome.WRONG_WAY
-    return Increment(next_state(previous, force, moved, status), outcome, error, iterations, "paper")
+    return ContactSolution(next_state(previous, force, moved, status), outcome, error, iterations, "paper")

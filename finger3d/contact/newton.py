@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.contact.conditions import PRECISION, Increments, lengths, project, residual
+from finger3d.contact.conditions import PRECISION, ContactProblem, lengths, project_on_friction_cone, residual
 from finger3d.contact.friction import SLIP, STICK
 
 Float = NDArray[np.float64]
@@ -29,7 +29,9 @@ _STALLED = 1e-3
 _DIVERGED = 1e9
 
 _SINGLE, _RUBBER = 4, 2.0
-"""Iterations of `quick_newton` in single precision, and the largest mu for it: at mu = 10 it often wants digits."""
+"""Iterations of `mixed_precision_newton` in single precision, and the largest mu for it: at mu = 10 it often wants
+digits.
+"""
 
 _CORRECTIONS, _PAYS = 12, 0.1
 """Corrections with one factor, and the share of the residual that one may leave: it costs a tenth of an iteration."""
@@ -48,18 +50,18 @@ class Iterate:
     """
 
     force: Float
-    moved: Float
+    relative_displacement: Float
     status: NDArray[np.int8]
     solved: bool
     iterations: int
 
 
-def force_of_sets(problem: Increments, status: NDArray[np.int8], trial: Float) -> Float:
+def force_of_sets(problem: ContactProblem, status: NDArray[np.int8], trial: Float) -> Float:
     """Forces (c, d) that solve the equations of the sets, slip rows with the normal force unknown.
 
-    `trial` (c, d) gives slipping points their direction e, and how firmly it is held (see `project`).  A sticking
-    point has d unknowns; a slipping one its f_n, with f_t = mu f_n e, and in 3D the force across e, which follows the
-    slip's turning (the derivative of the projection).
+    `trial` (c, d) gives slipping points their direction e, and how firmly it is held (see `project_on_friction_cone`).
+    A sticking point has d unknowns; a slipping one its f_n, with f_t = mu f_n e, and in 3D the force across e, which
+    follows the slip's turning (the derivative of the projection).
     """
     return _System.of(problem, status, trial).solution()
 
@@ -90,7 +92,7 @@ class _System:
 
     @classmethod
     def of(
-        cls, problem: Increments, status: NDArray[np.int8], trial: Float, precision: type[Any] = np.float64
+        cls, problem: ContactProblem, status: NDArray[np.int8], trial: Float, precision: type[Any] = np.float64
     ) -> _System:
         """The equations of the sets of `force_of_sets`."""
         c, d = trial.shape
@@ -101,7 +103,7 @@ class _System:
         length = np.where(length > 0.0, length, 1.0)
         direction = tangent / length[:, None]
         across = np.stack([-direction[:, 1], direction[:, 0]], axis=1) if d > 2 else direction
-        mu = problem.mu[slip]
+        mu = problem.friction[slip]
         pull = mu[:, None] * direction
         # unknowns: forces of sticking points, f_n of slipping ones, force across; equations: which displacement
         # vanishes, weighted to a force.  All is made in place of the compliance between points that touch, whose
@@ -109,8 +111,8 @@ class _System:
         own = np.concatenate([(stick[:, None] * d + np.arange(d)).ravel(), slip * d])
         sides = [slip * d + i for i in range(1, d)]
         whole = problem.between(np.concatenate([own, *sides]), precision)
-        free, kind = problem.free.ravel(), whole.dtype  # one operand in double would make all of it so
-        rho, pulls, sideways = (a.astype(kind, copy=False) for a in (problem.rho.ravel(), pull, across))
+        free, kind = problem.free_motion.ravel(), whole.dtype  # one operand in double would make all of it so
+        rho, pulls, sideways = (a.astype(kind, copy=False) for a in (problem.augmentation.ravel(), pull, across))
         normal, first, second = (slice(n + i * k, n + (i + 1) * k) for i in range(3))
         for i, side in enumerate((first, second)[: d - 1]):
             whole[normal] += pulls[:, i, None] * whole[side]  # displacements per unit of f_n; compliance is symmetric
@@ -129,7 +131,7 @@ class _System:
             at = np.arange(n + k, count)
             whole[at, at] += 1.0 - turn
         exact = count == n + k and precision is np.float64
-        return cls((c, d), solver(whole[:count, :count].T, not exact), -right, own, slip, pull, across, exact)
+        return cls((c, d), lu_solver(whole[:count, :count].T, not exact), -right, own, slip, pull, across, exact)
 
     def solution(self) -> Float:
         """Forces (c, d) that meet the equations."""
@@ -163,7 +165,7 @@ class _System:
         return force
 
 
-def solver(matrix: NDArray[Any], again: bool) -> Callable[[NDArray[Any]], NDArray[Any]]:
+def lu_solver(matrix: NDArray[Any], again: bool) -> Callable[[NDArray[Any]], NDArray[Any]]:
     """What solves with a matrix; factored at once if it will be asked again."""
     if not (again and len(matrix)):  # LAPACK takes no empty ones
         return partial(np.linalg.solve, matrix)
@@ -190,31 +192,31 @@ class _Tried(NamedTuple):
     merit: float
 
     @classmethod
-    def of(cls, problem: Increments, force: Float) -> _Tried:
-        moved = problem.moved(force)
-        projected, status, trial = project(problem, force, moved)
+    def of(cls, problem: ContactProblem, force: Float) -> _Tried:
+        moved = problem.relative_displacement(force)
+        projected, status, trial = project_on_friction_cone(problem, force, moved)
         return cls(force, moved, projected, status, trial, float(np.linalg.norm(force - projected)))
 
-    def fine(self, problem: Increments) -> bool:
+    def fine(self, problem: ContactProblem) -> bool:
         """Whether nothing is left to correct, neither of the forces nor of the gaps that violate them."""
-        gaps = _EXACT * problem.length_scale * float(problem.rho.min(initial=np.inf))
+        gaps = _EXACT * problem.length_scale * float(problem.augmentation.min(initial=np.inf))
         return self.merit <= min(_FINE * float(np.linalg.norm(self.force)), gaps)
 
-    def solves(self, problem: Increments, status: NDArray[np.int8]) -> bool:
+    def solves(self, problem: ContactProblem, status: NDArray[np.int8]) -> bool:
         """Whether the conditions hold with these states."""
-        near = _NEAR * float(problem.mu.max(initial=1.0)) * float(np.linalg.norm(self.force))
+        near = _NEAR * float(problem.friction.max(initial=1.0)) * float(np.linalg.norm(self.force))
         if not self.merit <= near:
             return False
-        return residual(self.force, self.moved, status, problem.mu, problem.length_scale) <= _EXACT
+        return residual(self.force, self.moved, status, problem.friction, problem.length_scale) <= _EXACT
 
 
-def quick_newton(problem: Increments, start: Float, limit: int, damped: bool) -> Iterate:
+def mixed_precision_newton(problem: ContactProblem, start: Float, limit: int, damped: bool) -> Iterate:
     """`newton`, in 3D and under moderate friction in single precision first, and if that settles nothing in double.
 
     Corrections bring the digits that a factor in single precision leaves out, and cost less than it saves.
     """
     precision = PRECISION[start.shape[1]]
-    if precision is np.float64 or problem.mu.max(initial=0.0) > _RUBBER:
+    if precision is np.float64 or problem.friction.max(initial=0.0) > _RUBBER:
         return newton(problem, start, limit, damped)
     single = newton(problem, start, _SINGLE, damped, precision)
     if single.solved:
@@ -223,7 +225,9 @@ def quick_newton(problem: Increments, start: Float, limit: int, damped: bool) ->
     return replace(double, iterations=single.iterations + double.iterations)
 
 
-def newton(problem: Increments, start: Float, limit: int, damped: bool, precision: type[Any] = np.float64) -> Iterate:
+def newton(
+    problem: ContactProblem, start: Float, limit: int, damped: bool, precision: type[Any] = np.float64
+) -> Iterate:
     """Semismooth Newton from forces `start` (c, d) N; full steps, or with a backtracking search on the residual force.
 
     A set of states that comes back with no smaller a residual ends it: it would cycle from there.  `precision` is that
@@ -256,7 +260,7 @@ def newton(problem: Increments, start: Float, limit: int, damped: bool, precisio
     return Iterate(here.force, here.moved, here.status, False, iteration)
 
 
-def _turned(problem: Increments, system: _System, found: _Tried) -> _Tried:
+def _turned(problem: ContactProblem, system: _System, found: _Tried) -> _Tried:
     """What corrections with the factor at hand make of forces whose sets are those of the system, while they pay."""
     best = _Tried.of(problem, system.rubbing(found.force))
     for _ in range(_CORRECTIONS):
@@ -269,23 +273,24 @@ def _turned(problem: Increments, system: _System, found: _Tried) -> _Tried:
     return min(found, best, key=lambda t: t.merit)
 
 
-def sweeps(problem: Increments, start: Float, count: int) -> Float:
+def block_gauss_seidel(problem: ContactProblem, start: Float, count: int) -> Float:
     """Forces (c, d) after `count` projected block Gauss-Seidel sweeps over the points that may touch."""
     c, d = start.shape
     force = start.copy()
-    moved = problem.moved(force)
-    columns = problem.compliance.reshape(c, d, c, d)
+    moved = problem.relative_displacement(force)
+    columns = problem.delassus.reshape(c, d, c, d)
     far = _DIVERGED * (
-        float(np.abs(problem.rho * problem.free).max(initial=0.0)) + float(np.abs(start).max(initial=0.0))
+        float(np.abs(problem.augmentation * problem.free_motion).max(initial=0.0))
+        + float(np.abs(start).max(initial=0.0))
     )
     for _ in range(count):
         if not float(np.abs(force).max(initial=0.0)) <= far:  # the compliance has a direction that is not held
             return start
         for i in np.flatnonzero((force[:, 0] > 0.0) | (moved[:, 0] < 0.0)):
-            trial = force[i] - problem.rho[i] * moved[i]
+            trial = force[i] - problem.augmentation[i] * moved[i]
             trial[0] = max(trial[0], 0.0)
             length = float(np.linalg.norm(trial[1:]))
-            bound = problem.mu[i] * trial[0]
+            bound = problem.friction[i] * trial[0]
             if length > bound:
                 trial[1:] *= bound / length
             change = trial - force[i]

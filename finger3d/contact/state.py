@@ -22,20 +22,20 @@ class ContactState:
     status : (c,) OPEN, STICK or SLIP
     force : (c, d) N, on the body
     gap : (c,) mm
-    position : (c, d - 1) mm
+    tangential_displacement : (c, d - 1) mm
         Tangential displacement relative to the object, w_t of Maeno 2004, Eq. 3; kept for open points too.
-    slip : (c, d - 1) mm
-        Sum of the changes of `position` while the point touched.
-    frames : (c, d, d), optional
+    accumulated_slip : (c, d - 1) mm
+        Sum of the changes of `tangential_displacement` while the point touched.
+    bases : (c, d, d), optional
         Each point's own directions, where they turn with the motion; otherwise the object's frame holds for all.
     """
 
     status: NDArray[np.int8]
     force: Float
     gap: Float
-    position: Float
-    slip: Float
-    frames: Float | None = None
+    tangential_displacement: Float
+    accumulated_slip: Float
+    bases: Float | None = None
 
     @classmethod
     def at_rest(cls, gap: Float, dim: int) -> ContactState:
@@ -47,7 +47,7 @@ class ContactState:
 
 
 @dataclass(frozen=True)
-class Increment:
+class ContactSolution:
     """What one call of `advance` found.
 
     Attributes
@@ -73,10 +73,12 @@ class Increment:
 def next_state(previous: ContactState, force: Float, moved: Float, status: NDArray[np.int8]) -> ContactState:
     """State after an increment with forces (c, d), gaps and changes of position `moved` (c, d), and sets (c,)."""
     slid = np.where((status != OPEN)[:, None], moved[:, 1:], 0.0)
-    return ContactState(status, force, moved[:, 0], previous.position + moved[:, 1:], previous.slip + slid)
+    return ContactState(
+        status, force, moved[:, 0], previous.tangential_displacement + moved[:, 1:], previous.accumulated_slip + slid
+    )
 
 
-def refusal(free: Float, compliance: Float, definite: bool = True) -> Outcome | None:
+def invalid_input(free: Float, compliance: Float, definite: bool = True) -> Outcome | None:
     """Why an increment cannot be tried at all: NaN, or a compliance (c d, c d) with a direction that is not held."""
     if not (np.isfinite(free).all() and np.isfinite(compliance).all()):
         return Outcome.NOT_FINITE

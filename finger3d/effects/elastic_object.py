@@ -47,7 +47,7 @@ class SoftObject:
     nu: float
     height_mm: float | None = None
 
-    def at_points(self, problem: Problem, zone: Zone, say: Say) -> Float:
+    def contact_compliance(self, problem: Problem, zone: Zone, say: Say) -> Float:
         """Compliance (c, d, c, d) mm/N of the object at the contact points; 0 in directions left out by symmetry."""
         model, axes, d = problem.model, problem.axes, problem.dim
         start = time.perf_counter()
@@ -64,12 +64,12 @@ class SoftObject:
         say(f"condensing the object's {mesh.points.size} unknowns")
         matrix = stiffness(mesh, elastic, problem.thickness)
         held = _held(mesh, () if whole else axes, model.held_ends)
-        condensed = condense(matrix, held, rows[problem.kept])
-        problem.later.factorizations += condensed.factorizations
+        condensed = condense(matrix, held, rows[problem.active_dofs])
+        problem.cache.factorizations += condensed.factorizations
         problem.seconds["object_condensation"] = condensed.seconds
         c = len(problem.surface.nodes)
         out = np.zeros((c * d, c * d))
-        out[np.ix_(problem.kept, problem.kept)] = condensed.compliance / images
+        out[np.ix_(problem.active_dofs, problem.active_dofs)] = condensed.compliance / images
         return out.reshape(c, d, c, d)
 
 

@@ -23,11 +23,11 @@ from numpy.typing import NDArray
 from finger3d._ranges import Length, Modulus, at_most
 from finger3d.effects.base import fill
 from finger3d.errors import Finger3dError
-from finger3d.fem.kelvin import Endless, Foil
+from finger3d.fem.kelvin import FoilPatches, InfiniteBody
 from finger3d.fem.simplex import Mesh
 from finger3d.fem.traces import displacement_row
-from finger3d.mechanics.model import Gauge, Inlay, Model
-from finger3d.mechanics.problem import folded
+from finger3d.mechanics.model import EmbeddedBars, Gauge, Model
+from finger3d.mechanics.problem import reflect_into_part
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -55,13 +55,15 @@ class Strips:
             axis for axis, seen in images.items() if all(any(_same(_place(g), p) for p in places) for g in seen)
         )
 
-    def lay(self, model: Model, mesh: Mesh, axes: tuple[str, ...]) -> Inlay:
+    def discretise(self, model: Model, mesh: Mesh, axes: tuple[str, ...]) -> EmbeddedBars:
         """The bars of all foils, those that are images of each other as one row.
 
         The part has its share of the foils' energy: all of them count, read from the part where they lie in an image.
         """
         copies = 2 ** len(axes)
-        foils = [Foil.of(g.middle, g.direction, g.length_mm, self.width_mm, *_PATCHES[mesh.dim]) for g in model.gauges]
+        foils = [
+            FoilPatches.of(g.middle, g.direction, g.length_mm, self.width_mm, *_PATCHES[mesh.dim]) for g in model.gauges
+        ]
         rows: dict[tuple[float, ...], sp.csr_matrix] = {}
         numbers = np.concatenate([_enter(rows, foil, mesh, axes) for foil in foils])
         stiff = self.E_MPa * self.thickness_mm * np.concatenate([foil.area for foil in foils])
@@ -72,25 +74,25 @@ class Strips:
         share = np.zeros((len(rows), len(numbers)))
         share[numbers, np.arange(len(numbers))] = stiff / (copies * springs[numbers])
         alone = copies * share @ _alone(model, foils) @ share.T
-        return Inlay(sp.vstack(list(rows.values()), format="csr"), springs, reads, alone)
+        return EmbeddedBars(sp.vstack(list(rows.values()), format="csr"), springs, reads, alone)
 
 
-def _alone(model: Model, foils: list[Foil]) -> Float:
+def _alone(model: Model, foils: list[FoilPatches]) -> Float:
     """Compliance of all bars in a body without end."""
     section = None if model.domain == "solid" else model.design.width_mm
-    body = Endless(model.material.E_MPa, model.material.nu, model.domain == "plane-stress", section)
+    body = InfiniteBody(model.material.E_MPa, model.material.nu, model.domain == "plane-stress", section)
     whole = np.block([[a.strained_by(b, body) for b in foils] for a in foils])
     return 0.5 * (whole + whole.T)
 
 
-def _enter(rows: dict[tuple[float, ...], sp.csr_matrix], foil: Foil, mesh: Mesh, axes: tuple[str, ...]) -> Int:
+def _enter(rows: dict[tuple[float, ...], sp.csr_matrix], foil: FoilPatches, mesh: Mesh, axes: tuple[str, ...]) -> Int:
     """Numbers (bars,) of the rows of a foil's bars; those that are not there yet are added."""
     at, known, numbers = foil.places, {}, []
     order = {key: i for i, key in enumerate(rows)}
 
     def moved(place: Float) -> sp.csr_matrix:
         if tuple(place) not in known:
-            known[tuple(place)] = displacement_row(mesh, *folded(place, foil.direction, axes, mesh.dim))
+            known[tuple(place)] = displacement_row(mesh, *reflect_into_part(place, foil.direction, axes, mesh.dim))
         return known[tuple(place)]
 
     for a, b in zip(at[:-1].reshape(-1, 3), at[1:].reshape(-1, 3), strict=True):
@@ -104,7 +106,7 @@ def _enter(rows: dict[tuple[float, ...], sp.csr_matrix], foil: Foil, mesh: Mesh,
 
 def _key(a: Float, b: Float, axes: tuple[str, ...], dim: int) -> tuple[float, ...]:
     """The same for all bars that are images of one."""
-    images = sorted((folded(p, p, axes, dim)[0] for p in (a, b)), key=tuple)
+    images = sorted((reflect_into_part(p, p, axes, dim)[0] for p in (a, b)), key=tuple)
     return tuple(np.round(np.concatenate(images), 9) + 0.0)
 
 

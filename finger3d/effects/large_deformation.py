@@ -16,20 +16,20 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from finger3d.contact.conditions import TOLERANCE, residual, stiffness_weights
-from finger3d.contact.state import ContactState, Increment, next_state
+from finger3d.contact.conditions import TOLERANCE, augmentation_parameters, residual
+from finger3d.contact.state import ContactSolution, ContactState, next_state
 from finger3d.effects.base import fill
 from finger3d.errors import Outcome
 from finger3d.fem.assembly import Pattern, Stiffness, on_places, pressure_scale
-from finger3d.fem.condense import Condensed, condense
+from finger3d.fem.condense import Condensation, condense
 from finger3d.fem.finite_contact import DeformedContact, deformed_contact
 from finger3d.fem.neo_hooke import InvertedError, NeoHooke, assemble, nodal_fields, stretch
 from finger3d.fem.recover import displacement
 from finger3d.fem.simplex import Mesh
-from finger3d.fem.traces import Surface
+from finger3d.fem.traces import BoundarySurface
 from finger3d.mechanics.formulation import RULES, length_scale
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.problem import at_points, folded
+from finger3d.mechanics.problem import reflect_into_part, scatter_to_points
 
 Float = NDArray[np.float64]
 
@@ -63,11 +63,11 @@ class FiniteStrain:
         """At rest."""
         law, mesh = self._law(problem), problem.mesh
         unknowns = np.zeros(mesh.points.size + (len(mesh.vertices) if law.mixed else 0))
-        frames = np.broadcast_to(problem.points.frame, (len(problem.surface.nodes), problem.dim, problem.dim))
+        frames = np.broadcast_to(problem.points.basis, (len(problem.surface.nodes), problem.dim, problem.dim))
         rest = ContactState.at_rest(problem.gap(problem.origin), problem.dim)
-        return DeformedState(**(vars(rest) | {"frames": frames}), unknowns=unknowns)
+        return DeformedState(**(vars(rest) | {"bases": frames}), unknowns=unknowns)
 
-    def increment(self, problem: Any, state: ContactState, a: Any, b: Any, guess: Float | None) -> Increment:
+    def increment(self, problem: Any, state: ContactState, a: Any, b: Any, guess: Float | None) -> ContactSolution:
         """Newton until all conditions hold where it has come to.
 
         It begins with the factor that the increment before ended with, which is that of the same place.
@@ -75,8 +75,8 @@ class FiniteStrain:
         assert isinstance(state, DeformedState)
         assert state.unknowns is not None
         law, scale = self._law(problem), length_scale(problem, a, b)
-        c, d = problem.compliance.shape[:2]
-        rule, weights = RULES[problem.model.rule], stiffness_weights(problem.compliance.reshape(c * d, c * d), d)
+        c, d = problem.delassus.shape[:2]
+        rule, weights = RULES[problem.model.rule], augmentation_parameters(problem.delassus.reshape(c * d, c * d), d)
         place, body = self._begin(problem, law, state.unknowns)
         force, spent, found = state.force if guess is None else guess, 0, None
         error = size = np.inf
@@ -86,35 +86,35 @@ class FiniteStrain:
                 moved = _moved_by(problem, state, contact, (state.unknowns, place.x, None), (a, b))
                 last, error = error, _violation(problem, place, contact, found.state, moved, (scale, law.shear))
                 if error <= _SETTLED or 0.3 * last < error <= TOLERANCE:
-                    problem.later.last = replace(place, tangent=None), body
+                    problem.cache.last = replace(place, tangent=None), body
                     after = vars(next_state(state, found.state.force, moved, found.state.status))
-                    settled = DeformedState(**(after | {"frames": contact.frames}), unknowns=place.x)
-                    return Increment(settled, Outcome.CONVERGED, max(found.residual, error), spent, found.method)
+                    settled = DeformedState(**(after | {"bases": contact.bases}), unknowns=place.x)
+                    return ContactSolution(settled, Outcome.CONVERGED, max(found.residual, error), spent, found.method)
             if place.tangent is not None:
                 body = _factored(problem, place.tangent, contact, force[:, 0], body)
             assert body is not None
             relaxed = body.solve(-place.inner)
             free = _moved_by(problem, state, contact, (state.unknowns, place.x, relaxed), (a, b))
-            free[:, 1:] += state.position
-            compliance = at_points(body.compliance, problem.kept, c, d)
+            free[:, 1:] += state.tangential_displacement
+            compliance = scatter_to_points(body.compliance, problem.active_dofs, c, d)
             found = rule(state, free, compliance, problem.model.friction, scale, force, weights)
             spent += found.iterations
             if not found.outcome.ok:
                 return replace(found, state=state, iterations=spent)
             force = found.state.force
-            step = relaxed + body.unknowns(force.ravel()[problem.kept])
+            step = relaxed + body.unknowns(force.ravel()[problem.active_dofs])
             last, size = size, float(np.abs(step[: problem.mesh.points.size]).max()) / scale
             if not np.isfinite(size) or size > max(10.0, 1e3 * last):
                 break
             onward = _onward(problem, law, place, step)
             if onward is None:
-                return Increment(state, Outcome.INVERTED, error, spent, "none")
+                return ContactSolution(state, Outcome.INVERTED, error, spent, "none")
             place = onward
-        return Increment(state, Outcome.NEWTON, error, spent, "none")
+        return ContactSolution(state, Outcome.NEWTON, error, spent, "none")
 
-    def _begin(self, problem: Any, law: NeoHooke, x: Float) -> tuple[_Place, Condensed | None]:
+    def _begin(self, problem: Any, law: NeoHooke, x: Float) -> tuple[_Place, Condensation | None]:
         """The place of unknowns x without a tangent if its body is at hand; otherwise a body to overwrite."""
-        kept, problem.later.last = problem.later.last, None
+        kept, problem.cache.last = problem.cache.last, None
         place, body = kept or (None, None)
         return (place if place is not None and place.x is x else _Place.at(problem, law, x)), body
 
@@ -135,13 +135,15 @@ class FiniteStrain:
         out = {}
         for gauge in problem.model.gauges:
             if gauge.length_mm == 0.0:
-                out[gauge.name] = stretch(mesh, u, *folded(gauge.middle, gauge.direction, axes, mesh.dim))
+                out[gauge.name] = stretch(mesh, u, *reflect_into_part(gauge.middle, gauge.direction, axes, mesh.dim))
                 continue
             ends = [_moved(mesh, u, end, axes) for end in gauge.ends]
             out[gauge.name] = float(np.linalg.norm(ends[1] - ends[0])) / gauge.length_mm - 1.0
         return out
 
-    def gaps(self, problem: Any, states: Sequence[ContactState], targets: Sequence[Any], face: Surface) -> list[Float]:
+    def gaps(
+        self, problem: Any, states: Sequence[ContactState], targets: Sequence[Any], face: BoundarySurface
+    ) -> list[Float]:
         """Gap of the moved points."""
         moved = (displacement(problem.mesh, unknowns) for unknowns in self.all_unknowns(problem, states))
         return [_contact(problem, face, u, target).gap for u, target in zip(moved, targets, strict=True)]
@@ -176,22 +178,24 @@ def _places(problem: Any) -> tuple[Pattern, sp.csr_matrix]:
         face, d = problem.surface, problem.dim
         beside = sp.csr_matrix((face.average != 0).astype(float) @ (face.interpolate != 0).astype(float))
         pairs = (beside.T @ beside).tocoo()
-        rows = sp.kron(beside, np.ones((d, d)), format="csr")[problem.kept]
+        rows = sp.kron(beside, np.ones((d, d)), format="csr")[problem.active_dofs]
         rows.sort_indices()
         linked = pairs.row.astype(np.int64), pairs.col.astype(np.int64)
         return Pattern.of(problem.mesh, problem.elastic.mixed, linked), rows
 
-    made: tuple[Pattern, sp.csr_matrix] = problem.later.once("places", make)
+    made: tuple[Pattern, sp.csr_matrix] = problem.cache.once("places", make)
     return made
 
 
-def _factored(problem: Any, tangent: Stiffness, contact: DeformedContact, force: Float, spent: Any) -> Condensed:
+def _factored(problem: Any, tangent: Stiffness, contact: DeformedContact, force: Float, spent: Any) -> Condensation:
     """The body condensed at a place, under normal forces (c,) N."""
     _, places = _places(problem)
-    rows = sp.csr_matrix((on_places(contact.rows[problem.kept], places), places.indices, places.indptr), places.shape)
-    softened = tangent.less(contact.softening(problem.surface, force))
-    body = condense(softened, problem.held, rows, spent=spent)
-    problem.later.factorizations += body.factorizations
+    rows = sp.csr_matrix(
+        (on_places(contact.rows[problem.active_dofs], places), places.indices, places.indptr), places.shape
+    )
+    softened = tangent.less(contact.geometric_stiffness(problem.surface, force))
+    body = condense(softened, problem.fixed_dofs, rows, spent=spent)
+    problem.cache.factorizations += body.factorizations
     return body
 
 
@@ -217,9 +221,9 @@ def _moved_by(
     out = np.empty((len(contact.gap), d))
     out[:, 0] = contact.gap + (0.0 if relaxed is None else (contact.rows @ relaxed[:n])[::d])
     since = problem.surface.trace @ (there - before)[:n].reshape(-1, d) - travel
-    out[:, 1:] = np.einsum("ctk,ck->ct", contact.frames[:, 1:], since)
+    out[:, 1:] = np.einsum("ctk,ck->ct", contact.bases[:, 1:], since)
     # the tangent across a symmetry plane does not move, whatever the half hat's mean says
-    out.ravel()[np.setdiff1d(np.arange(out.size), problem.kept)] = 0.0
+    out.ravel()[np.setdiff1d(np.arange(out.size), problem.active_dofs)] = 0.0
     return out
 
 
@@ -233,8 +237,8 @@ def _violation(
     normal, length = force[:, 0], np.linalg.norm(force[:, 1:], axis=1)
     mu = length / np.where(normal > 0.0, normal, 1.0)
     astray = place.inner.copy()
-    astray[:n] -= contact.rows[problem.kept].T @ force.ravel()[problem.kept]
-    astray[problem.held] = 0.0
+    astray[:n] -= contact.rows[problem.active_dofs].T @ force.ravel()[problem.active_dofs]
+    astray[problem.fixed_dofs] = 0.0
     largest = float(np.linalg.norm(force, axis=1).max()) or float(np.abs(place.inner[:n]).max()) or 1.0
     unbalanced = float(np.abs(astray[:n]).max()) / largest
     mesh = problem.mesh
@@ -250,12 +254,12 @@ def _moved(mesh: Mesh, u: Float, place: Float, axes: tuple[str, ...]) -> Float:
     from finger3d.fem.traces import locate
 
     d = mesh.dim
-    inside, ones = folded(place, np.ones(3), axes, d)
+    inside, ones = reflect_into_part(place, np.ones(3), axes, d)
     cell, bary = locate(mesh, inside)[0]
     return place[:d] + ones * (shape(bary[None], mesh.is_quadratic)[0] @ u[mesh.cells[cell]])
 
 
-def _contact(problem: Any, face: Surface, u: Float, target: Any) -> DeformedContact:
+def _contact(problem: Any, face: BoundarySurface, u: Float, target: Any) -> DeformedContact:
     """Contact of a face displaced by u (n, d): gaps are means over the deformed area."""
     model, d = problem.model, problem.dim
     at = face.samples + face.interpolate @ u
@@ -267,10 +271,10 @@ def _contact(problem: Any, face: Surface, u: Float, target: Any) -> DeformedCont
     slope_z = (model.object.height(x, z + step) - model.object.height(x, z - step)) / (2.0 * step)
     normal = np.stack([slope_x, np.full(len(x), -1.0), slope_z], axis=1)[:, :d]
     usable = there & np.isfinite(normal).all(axis=1)
-    normal = np.where(usable[:, None], normal, problem.points.frame[0])
+    normal = np.where(usable[:, None], normal, problem.points.basis[0])
     length = np.linalg.norm(normal, axis=1)
     normal = normal / length[:, None]
-    vertical = level + problem.touch_mm - target.depth_mm - at[:, 1]
+    vertical = level + problem.first_contact_mm - target.depth_mm - at[:, 1]
     sampled = np.where(there, vertical / length, _BESIDE * model.design.height_mm)
     axes = problem.axes
     return deformed_contact(face, (problem.mesh.points, u), (sampled, normal), axes)
@@ -282,4 +286,4 @@ class Effect:
 
     def apply(self, model: Model) -> Model:
         """Fill the kinematics slot."""
-        return fill(model, "kinematics", FiniteStrain(), "large_deformation")
+        return fill(model, "formulation", FiniteStrain(), "large_deformation")

@@ -25,25 +25,25 @@ from numpy.typing import NDArray
 from scipy.special import exprel
 
 from finger3d._ranges import Fraction, Seconds
-from finger3d.contact.state import ContactState, Increment
+from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.effects.base import fill
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import Elasticity, Stiffness, stiffness
-from finger3d.fem.condense import Condensed, spring_forces, stiffened
+from finger3d.fem.condense import Condensation, spring_forces, stiffened
 from finger3d.fem.recover import across, displacement, nodal_strain, pressure, stress
 from finger3d.mechanics.formulation import RULES, SmallStrain, length_scale
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.problem import at_points
+from finger3d.mechanics.problem import scatter_to_points
 
 Float = NDArray[np.float64]
 Prony = tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True)
-class Memory:
+class InternalVariables:
     """What a body remembers: a vector (k,) that says its shape, and each branch's share of it that has not relaxed."""
 
-    now: Float
+    elastic: Float
     branches: Float
 
 
@@ -59,28 +59,28 @@ class Step:
         return self.seconds / np.array([time for _, time in self.prony])
 
     @property
-    def fade(self) -> Float:
+    def decay(self) -> Float:
         """e_i: what is left of a branch at the end."""
         return np.exp(-self._rates)
 
     @property
-    def feed(self) -> Float:
+    def gain(self) -> Float:
         """g_i gamma_i: what a branch takes of a change of shape."""
         return np.array([share for share, _ in self.prony]) * exprel(-self._rates)
 
     @property
     def alpha(self) -> float:
         """Stiffness against what moves in this step, in those of an instantaneous one."""
-        return long_time_share(self.prony) + float(self.feed.sum())
+        return long_time_share(self.prony) + float(self.gain.sum())
 
-    def past(self, memory: Memory) -> Float:
+    def history_load(self, memory: InternalVariables) -> Float:
         """Vector (k,) with ``alpha now' - past`` the stress at the end of the step."""
-        return self.feed.sum() * memory.now - self.fade @ memory.branches
+        return self.gain.sum() * memory.elastic - self.decay @ memory.branches
 
-    def after(self, memory: Memory, now: Float) -> Memory:
+    def after(self, memory: InternalVariables, now: Float) -> InternalVariables:
         """The memory once the shape is `now`."""
-        branches = self.fade[:, None] * memory.branches + self.feed[:, None] * (now - memory.now)
-        return Memory(now, branches)
+        branches = self.decay[:, None] * memory.branches + self.gain[:, None] * (now - memory.elastic)
+        return InternalVariables(now, branches)
 
 
 def long_time_share(prony: Prony) -> float:
@@ -88,9 +88,9 @@ def long_time_share(prony: Prony) -> float:
     return 1.0 - math.fsum(share for share, _ in prony)
 
 
-def relaxed(prony: Prony, memory: Memory) -> Float:
+def relaxed(prony: Prony, memory: InternalVariables) -> Float:
     """Vector (k,) of which the present stress is the instantaneous elastic one."""
-    return long_time_share(prony) * memory.now + memory.branches.sum(axis=0)
+    return long_time_share(prony) * memory.elastic + memory.branches.sum(axis=0)
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ class Response:
     shape: Callable[[Float], Float]
 
 
-class Body(Protocol):
+class ViscoelasticBody(Protocol):
     """What remembers, and how it answers."""
 
     @property
@@ -118,7 +118,7 @@ class Body(Protocol):
         """Length of the memory's vectors."""
         ...
 
-    def respond(self, step: Step, memory: Memory) -> Response:
+    def respond(self, step: Step, memory: InternalVariables) -> Response:
         """Rows over a step."""
         ...
 
@@ -130,13 +130,13 @@ class Body(Protocol):
         """Row displacements (r,) of a shape."""
         ...
 
-    def stress(self, prony: Prony, memory: Memory) -> Float:
+    def stress(self, prony: Prony, memory: InternalVariables) -> Float:
         """Nodal stress (n, 3, 3), or (n, 2, 2) and (n,) across the section."""
         ...
 
 
 @dataclass(frozen=True)
-class AllRelaxes:
+class ConstantPoissonRatio:
     """Poisson's ratio is constant: a shape is told by the row forces that would hold it elastically."""
 
     problem: Any
@@ -146,9 +146,9 @@ class AllRelaxes:
         """Number of condensed rows."""
         return len(self.problem.condensed.compliance)
 
-    def respond(self, step: Step, memory: Memory) -> Response:
+    def respond(self, step: Step, memory: InternalVariables) -> Response:
         """The instantaneous compliance over alpha."""
-        past, alpha = step.past(memory), step.alpha
+        past, alpha = step.history_load(memory), step.alpha
         compliance = self.problem.condensed.compliance / alpha
         return Response(compliance, compliance @ past, lambda rows: (rows + past) / alpha)
 
@@ -160,7 +160,7 @@ class AllRelaxes:
         """Through the compliance."""
         return self.problem.condensed.compliance @ now
 
-    def stress(self, prony: Prony, memory: Memory) -> Float:
+    def stress(self, prony: Prony, memory: InternalVariables) -> Float:
         """That of the elastic body under the forces that are left."""
         problem = self.problem
         unknowns = self.unknowns(relaxed(prony, memory))
@@ -170,7 +170,7 @@ class AllRelaxes:
 
 
 @dataclass(frozen=True)
-class ShearRelaxes:
+class ConstantBulkModulus:
     """The bulk modulus is constant: a shape is told by displacements and, in the mixed form, vertex dilatations.
 
     What inclusions yield beyond the mesh is told by their row forces; it relaxes as if nu were constant.
@@ -185,7 +185,7 @@ class ShearRelaxes:
     @property
     def size(self) -> int:
         """Number of unknowns, and of rows that yield beyond the mesh."""
-        return self._own + len(self.problem.beyond)
+        return self._own + len(self.problem.subgrid_compliance)
 
     @property
     def _bulk(self) -> float:
@@ -194,19 +194,19 @@ class ShearRelaxes:
     def _lame(self, alpha: float) -> float:
         return self._bulk - 2.0 / 3.0 * alpha * self.problem.elastic.shear
 
-    def respond(self, step: Step, memory: Memory) -> Response:
+    def respond(self, step: Step, memory: InternalVariables) -> Response:
         """The body with its shear modulus times alpha; the past is a load on all of it."""
         # steps of one length differ by round-off of their ends
         alpha = Step(step.prony, float(f"{step.seconds:.12g}")).alpha
         problem = self.problem
-        body: Condensed = problem.later.once(
+        body: Condensation = problem.cache.once(
             ("viscosity", alpha), lambda: problem.condensed.again(self._stiffness(alpha))
         )
-        past, first = step.past(memory), len(body.compliance) - len(problem.beyond)
+        past, first = step.history_load(memory), len(body.compliance) - len(problem.subgrid_compliance)
         settled = body.solve(self._shear_force(past[: self._own]))
         compliance, moved = body.compliance.copy(), body.read(settled)
-        compliance[first:, first:] += problem.beyond / alpha
-        moved[first:] += problem.beyond @ past[self._own :] / alpha
+        compliance[first:, first:] += problem.subgrid_compliance / alpha
+        moved[first:] += problem.subgrid_compliance @ past[self._own :] / alpha
 
         def shape(rows: Float) -> Float:
             found = settled + body.unknowns(rows)
@@ -219,7 +219,7 @@ class ShearRelaxes:
         """K_s (displacement form): the deviatoric stiffness, in the plane of a section too."""
         problem, shear = self.problem, self.problem.elastic.shear
         part = Elasticity(shear, -2.0 / 3.0 * shear, False)
-        return problem.later.once("viscosity", lambda: stiffness(problem.mesh, part, problem.thickness).upper)
+        return problem.cache.once("viscosity", lambda: stiffness(problem.mesh, part, problem.thickness).upper)
 
     def _stiffness(self, alpha: float) -> Stiffness:
         """K_b + alpha K_s; in the mixed form every block has its own factor."""
@@ -253,15 +253,15 @@ class ShearRelaxes:
 
     def read(self, now: Float) -> Float:
         """From the displacements, and what the mesh does not see."""
-        rows, beyond = self.problem.condensed.read(now[: self._own]), self.problem.beyond
+        rows, beyond = self.problem.condensed.read(now[: self._own]), self.problem.subgrid_compliance
         rows[len(rows) - len(beyond) :] += beyond @ now[self._own :]
         return rows
 
-    def stress(self, prony: Prony, memory: Memory) -> Float:
+    def stress(self, prony: Prony, memory: InternalVariables) -> Float:
         """2 G dev(eps) of what has not relaxed, and the bulk modulus times the dilatation as it is; (n, 3, 3)."""
         shear, left = self.problem.elastic.shear, relaxed(prony, memory)
         strain, swelling = self._strain(left[: self._own])
-        spherical = self._bulk * self._strain(memory.now[: self._own])[1] - 2.0 / 3.0 * shear * swelling
+        spherical = self._bulk * self._strain(memory.elastic[: self._own])[1] - 2.0 / 3.0 * shear * swelling
         d = self.problem.dim
         whole = np.zeros((len(strain), 3, 3))
         whole[:, :d, :d] = 2.0 * shear * strain
@@ -284,7 +284,7 @@ def _times(upper: sp.csr_matrix, vector: Float) -> Float:
 class ViscousState(ContactState):
     """A contact state with the memory of the meshed part that goes with it."""
 
-    memory: Memory
+    memory: InternalVariables
 
 
 @dataclass(frozen=True)
@@ -301,10 +301,10 @@ class Viscoelastic(SmallStrain):
         """Not where presses share a factor for every length of step, and solve with it."""
         return self.bulk
 
-    def _body(self, problem: Any) -> Body:
-        return AllRelaxes(problem) if self.bulk else ShearRelaxes(problem)
+    def _body(self, problem: Any) -> ViscoelasticBody:
+        return ConstantPoissonRatio(problem) if self.bulk else ConstantBulkModulus(problem)
 
-    def _memory(self, state: ContactState) -> Memory:
+    def _memory(self, state: ContactState) -> InternalVariables:
         assert isinstance(state, ViscousState)
         return state.memory
 
@@ -312,23 +312,25 @@ class Viscoelastic(SmallStrain):
         """Nothing to remember."""
         _check_domain(problem.model, self.bulk)
         size = self._body(problem).size
-        empty = Memory(np.zeros(size), np.zeros((len(self.prony), size)))
+        empty = InternalVariables(np.zeros(size), np.zeros((len(self.prony), size)))
         return ViscousState(**vars(super().start(problem)), memory=empty)
 
-    def increment(self, problem: Any, state: ContactState, a: Any, b: Any, guess: Float | None) -> Increment:
+    def increment(self, problem: Any, state: ContactState, a: Any, b: Any, guess: Float | None) -> ContactSolution:
         """One call of the contact rule, with the compliance of this length of step and points moved by the past."""
         memory, step = self._memory(state), Step(self.prony, b.time_s - a.time_s)
         body = self._body(problem).respond(step, memory)
-        own, springs, first = body.compliance, problem.springs, len(body.compliance) - len(problem.springs)
+        own, springs, first = body.compliance, problem.bar_stiffness, len(body.compliance) - len(problem.bar_stiffness)
         moved = body.moved
         if len(springs):
             moved = moved + own[:, first:] @ spring_forces(own, springs, moved)
         c, d = len(problem.surface.nodes), problem.dim
-        free = problem.free(b)
-        free.reshape(-1)[problem.kept] += moved[: len(problem.kept)]
+        free = problem.free_motion(b)
+        free.reshape(-1)[problem.active_dofs] += moved[: len(problem.active_dofs)]
         # what is elastic beside the body (an object that yields) stays so
-        rest = problem.compliance - at_points(stiffened(problem.condensed.compliance, springs), problem.kept, c, d)
-        compliance = at_points(stiffened(own, springs), problem.kept, c, d) + rest
+        rest = problem.delassus - scatter_to_points(
+            stiffened(problem.condensed.compliance, springs), problem.active_dofs, c, d
+        )
+        compliance = scatter_to_points(stiffened(own, springs), problem.active_dofs, c, d) + rest
         rule = RULES[problem.model.rule]
         found = rule(state, free, compliance, problem.model.friction, length_scale(problem, a, b), guess)
         if found.state is state:
@@ -337,16 +339,16 @@ class Viscoelastic(SmallStrain):
         if len(springs):
             rows[first:] = spring_forces(own, springs, body.moved + own @ rows)
         after = ViscousState(**vars(found.state), memory=step.after(memory, body.shape(rows)))
-        return Increment(after, found.outcome, found.residual, found.iterations, found.method)
+        return ContactSolution(after, found.outcome, found.residual, found.iterations, found.method)
 
     def all_unknowns(self, problem: Any, states: Sequence[ContactState]) -> Iterator[Float]:
         """From each memory."""
-        return (self._body(problem).unknowns(self._memory(state).now) for state in states)
+        return (self._body(problem).unknowns(self._memory(state).elastic) for state in states)
 
     def gauges(self, problem: Any, state: ContactState) -> dict[str, float]:
         """From the memory, through the gauges' rows."""
-        first = len(problem.kept)
-        rows = self._body(problem).read(self._memory(state).now)[first:]
+        first = len(problem.active_dofs)
+        rows = self._body(problem).read(self._memory(state).elastic)[first:]
         return {g.name: float(strain) for g, strain in zip(problem.model.gauges, rows, strict=False)}
 
     def fields(self, problem: Any, state: ContactState) -> tuple[Float, Float, Float]:
@@ -393,7 +395,7 @@ class Effect:
     def apply(self, model: Model) -> Model:
         """Fill the kinematics slot; every leg must say how long it takes."""
         prony = tuple((share, time) for share, time in self.prony)
-        model = fill(model, "kinematics", Viscoelastic(prony, self.bulk), "viscosity")
+        model = fill(model, "formulation", Viscoelastic(prony, self.bulk), "viscosity")
         timeless = [i for i, leg in enumerate(model.legs) if leg.duration_s is None]
         if timeless:
             which = f"press.leg.{timeless[0]}.duration_s" if len(model.legs) > 1 else "press.duration_s"

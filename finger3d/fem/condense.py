@@ -30,7 +30,7 @@ _SOLVE_CHUNK = 64
 
 
 @dataclass(frozen=True)
-class Condensed:
+class Condensation:
     """A body seen through its rows.
 
     Attributes
@@ -68,15 +68,15 @@ class Condensed:
         """Row displacements (r,) mm of all unknowns (N,)."""
         return np.asarray(self._rows @ unknowns)
 
-    def again(self, stiffness: Stiffness) -> Condensed:
+    def again(self, stiffness: Stiffness) -> Condensation:
         """Another stiffness on the same numbering, held and condensed alike: one more factorisation."""
         fixed = np.setdiff1d(np.arange(self._rows.shape[1]), self._free)
         return condense(stiffness, fixed, self._rows, self.solver)
 
 
 def condense(
-    stiffness: Stiffness, fixed: Int, rows: sp.csr_matrix, solver: str | None = None, spent: Condensed | None = None
-) -> Condensed:
+    stiffness: Stiffness, fixed: Int, rows: sp.csr_matrix, solver: str | None = None, spent: Condensation | None = None
+) -> Condensation:
     """Condense a stiffness to rows.
 
     Parameters
@@ -118,7 +118,7 @@ def condense(
         return factor_solve(load) / unit
 
     seconds = time.perf_counter() - start
-    return Condensed(compliance, perturbed, 1, seconds, solver, padded, free, solve, series)
+    return Condensation(compliance, perturbed, 1, seconds, solver, padded, free, solve, series)
 
 
 def _power_of_two(values: Float) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from finger3d.fem.traces import Surface
+from finger3d.fem.traces import BoundarySurface
 
 Float = NDArray[np.float64]
 
@@ -23,38 +23,38 @@ class DeformedContact:
     ----------
     gap : (c,) mm
     rows : (c d, n d) displacement of every point along its directions
-    frames : (c, d, d)
-    growth : (q,) deformed over initial area at the face's samples
-    approach, spread : (q, n d) derivatives of the gap and of `growth` at the samples
-    seen : (q,) mm, gap at the samples
-    bend : (q,) weights -> (n d, n d), the weighted sum of the second derivatives of `growth`
+    bases : (c, d, d)
+    area_ratio : (q,) deformed over initial area at the face's samples
+    d_gap, d_area_ratio : (q, n d) derivatives of the gap and of `area_ratio` at the samples
+    gap_at_samples : (q,) mm, gap at the samples
+    d2_area_ratio : (q,) weights -> (n d, n d), the weighted sum of the second derivatives of `area_ratio`
     """
 
     gap: Float
     rows: sp.csr_matrix
-    frames: Float
-    growth: Float
-    approach: sp.csr_matrix
-    spread: sp.csr_matrix
-    seen: Float
-    bend: Callable[[Float], sp.csr_matrix]
+    bases: Float
+    area_ratio: Float
+    d_gap: sp.csr_matrix
+    d_area_ratio: sp.csr_matrix
+    gap_at_samples: Float
+    d2_area_ratio: Callable[[Float], sp.csr_matrix]
 
-    def softening(self, face: Surface, force: Float) -> sp.csr_matrix:
+    def geometric_stiffness(self, face: BoundarySurface, force: Float) -> sp.csr_matrix:
         """Second derivative (n d, n d) of the gaps under normal forces (c,) N; what the moving area takes from K.
 
         The pressure acts on the deformed area, without which the surface's own pressure would push its middle nodes
         along it: from pressures of a few G on, K would lose its definiteness there.
         """
-        per_area = sp.diags_array(force / (face.average @ self.growth))
+        per_area = sp.diags_array(force / (face.average @ self.area_ratio))
         pressure = sp.diags_array(face.average.T @ per_area.diagonal())
-        normal = self.rows[:: self.frames.shape[1]]
-        half = self.approach.T @ pressure @ self.spread - normal.T @ per_area @ face.average @ self.spread
-        uneven = self.seen * pressure.diagonal() - face.average.T @ (per_area @ self.gap)
-        return sp.csr_matrix(half + half.T + self.bend(uneven))
+        normal = self.rows[:: self.bases.shape[1]]
+        half = self.d_gap.T @ pressure @ self.d_area_ratio - normal.T @ per_area @ face.average @ self.d_area_ratio
+        uneven = self.gap_at_samples * pressure.diagonal() - face.average.T @ (per_area @ self.gap)
+        return sp.csr_matrix(half + half.T + self.d2_area_ratio(uneven))
 
 
 def deformed_contact(
-    face: Surface, moved: tuple[Float, Float], seen: tuple[Float, Float], axes: tuple[str, ...]
+    face: BoundarySurface, moved: tuple[Float, Float], seen: tuple[Float, Float], axes: tuple[str, ...]
 ) -> DeformedContact:
     """Contact of a face with something seen from its samples.
 
@@ -90,7 +90,9 @@ def _rows(parts: list[Any]) -> sp.csr_matrix:
     return sp.csr_matrix(sp.hstack(parts, format="csr")[:, np.arange(n * d).reshape(d, n).T.ravel()])
 
 
-def _growth(face: Surface, points: Float, u: Float) -> tuple[Float, sp.csr_matrix, Callable[[Float], sp.csr_matrix]]:
+def _growth(
+    face: BoundarySurface, points: Float, u: Float
+) -> tuple[Float, sp.csr_matrix, Callable[[Float], sp.csr_matrix]]:
     """Deformed over initial area (q,) at the samples, its derivative (q, n d), and weighted sums of its second one."""
     d = u.shape[1]
     rest, moved = ([slope @ x for slope in face.along] for x in (points, points + u))
@@ -126,7 +128,7 @@ def _component(rows: sp.csr_matrix, axis: int) -> sp.csr_matrix:
     return sp.csr_matrix(sp.kron(rows, np.eye(3)[[axis]], format="csr"))
 
 
-def _change(face: Surface, moved: list[Float], i: int) -> sp.csr_matrix:
+def _change(face: BoundarySurface, moved: list[Float], i: int) -> sp.csr_matrix:
     """Derivative (q, n d) of component i of the tangent in 2D, of the tangents' cross product in 3D."""
     d = moved[0].shape[1]
     if d == 2:

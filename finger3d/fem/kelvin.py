@@ -20,7 +20,7 @@ _BLUNT = 0.3  # of a patch's size: what a point force of another foil is spread 
 
 
 @dataclass(frozen=True)
-class Endless:
+class InfiniteBody:
     """A body without end; a section of it is `thickness` mm wide, a solid has none."""
 
     E_MPa: float
@@ -61,7 +61,7 @@ class Endless:
 
 
 @dataclass(frozen=True)
-class Foil:
+class FoilPatches:
     """A foil cut into patches: `along` (n + 1,) and `across` (m + 1,) their edges, mm from the middle.
 
     Bars join the middles of patches that follow each other along the foil, numbered ``i * m + k``, i along and k across
@@ -74,7 +74,7 @@ class Foil:
     across: Float
 
     @classmethod
-    def of(cls, middle: Float, direction: Float, length: float, width: float, count: int, lines: int) -> Foil:
+    def of(cls, middle: Float, direction: Float, length: float, width: float, count: int, lines: int) -> FoilPatches:
         """Cut by cosines both ways: dense at the ends, where a foil hands over most of its force."""
         return cls(middle, direction, _cosines(length, count), _cosines(width, lines))
 
@@ -89,7 +89,7 @@ class Foil:
         aside = _middles(self.across)[None, :, None] * np.array([0.0, 0.0, 1.0])
         return self.middle + _middles(self.along)[:, None, None] * self.direction + aside
 
-    def strained_by(self, other: Foil, body: Endless) -> Float:
+    def strained_by(self, other: FoilPatches, body: InfiniteBody) -> Float:
         """Strain of this foil's bars (n m - m, n' m' - m') by the pull of the other's, 1 N mm each: 1/(N mm)."""
         if other is self:
             s, z = _middles(self.along)[:, None, None, None], _middles(self.across)[None, :, None, None]
@@ -103,7 +103,7 @@ class Foil:
         found = np.einsum("ia,akbl,jb->ikjl", steps[0], moved, steps[1], optimize=True)
         return found.reshape(len(self.area), len(other.area))
 
-    def _sizes(self, body: Endless) -> Float:
+    def _sizes(self, body: InfiniteBody) -> Float:
         """Extent (n, m) mm of the patches."""
         along, across = np.diff(self.along)[:, None], np.diff(self.across)
         return np.sqrt(along * across) if body.thickness is None else along

@@ -45,7 +45,7 @@ class NeoHooke:
         return cls(shear, 1.0 / compressibility, nu >= MIXED_FROM and not plane_stress, plane_stress)
 
 
-def response(law: NeoHooke, f: Float, p: Float | None) -> tuple[Float, Float]:
+def first_piola_and_tangent(law: NeoHooke, f: Float, p: Float | None) -> tuple[Float, Float]:
     """First Piola stress (..., 3, 3) and its derivative (..., 3, 3, 3, 3) by F; `p` (...,) MPa in the mixed form.
 
     In plane stress F is one of `deformation`, for which P_33 = 0.
@@ -114,7 +114,7 @@ def cell_response(law: NeoHooke, slope: Float, p: Float | None) -> tuple[Float, 
     j = np.linalg.det(f)
     if not (j > 0.0).all():
         raise InvertedError
-    stress, tangent = response(law, f, p)
+    stress, tangent = first_piola_and_tangent(law, f, p)
     if law.plane_stress:
         column, row = tangent[..., :, :, 2, 2], tangent[..., 2, 2, :, :]
         tangent = (
@@ -195,6 +195,6 @@ def nodal_fields(mesh: Mesh, law: NeoHooke, unknowns: Float) -> tuple[Float, Flo
         p = np.zeros(n)
         p[mesh.vertices] = pressure_scale(mesh, law.shear) * unknowns[n * d :]
         p[mesh.cells[:, d + 1 :]] = p[mesh.cells[:, EDGES[d]]].mean(axis=2)
-    stress, _ = response(law, f, p)
+    stress, _ = first_piola_and_tangent(law, f, p)
     cauchy = stress @ np.swapaxes(f, 1, 2) / np.linalg.det(f)[:, None, None]
     return 0.5 * (np.swapaxes(f, 1, 2) @ f - np.eye(3)), cauchy

@@ -24,7 +24,7 @@ _INSIDE = -1e-8
 
 
 @dataclass(frozen=True)
-class Surface:
+class BoundarySurface:
     """Contact points of a boundary.
 
     Attributes
@@ -54,7 +54,7 @@ class Surface:
     along: tuple[sp.csr_matrix, ...] = ()
 
 
-def surface(mesh: Mesh, label: str, thickness: float = 1.0) -> Surface:
+def surface(mesh: Mesh, label: str, thickness: float = 1.0) -> BoundarySurface:
     """Contact points of the boundary `label`; `thickness` (mm) is the width of a 2D section."""
     d = mesh.dim
     facets = mesh.facets[label]
@@ -81,10 +81,10 @@ def surface(mesh: Mesh, label: str, thickness: float = 1.0) -> Surface:
 
     values, slopes = sampled(psi), gradient(bary, mesh.is_quadratic)
     along = tuple(sampled(slopes[:, :, k]) for k in range(d - 1))
-    return Surface(nodes, mesh.points[nodes], area, (average @ values).tocsr(), samples, average, values, along)
+    return BoundarySurface(nodes, mesh.points[nodes], area, (average @ values).tocsr(), samples, average, values, along)
 
 
-def restrict(surface: Surface, keep: NDArray[np.bool_] | Int) -> Surface:
+def restrict(surface: BoundarySurface, keep: NDArray[np.bool_] | Int) -> BoundarySurface:
     """The contact points where `keep` (c,) holds, or those of the numbers `keep` in this order."""
     return replace(
         surface,
@@ -96,7 +96,7 @@ def restrict(surface: Surface, keep: NDArray[np.bool_] | Int) -> Surface:
     )
 
 
-def local_rows(surface: Surface, frame: Float) -> sp.csr_matrix:
+def local_rows(surface: BoundarySurface, frame: Float) -> sp.csr_matrix:
     """Rows (c d, n d) that read the points' displacements in the frame (d, d), order point * d + direction."""
     return sp.kron(surface.trace, frame, format="csr")
 

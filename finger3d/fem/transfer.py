@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from finger3d.fem.elements import gradient, shape
 from finger3d.fem.simplex import Mesh
-from finger3d.fem.traces import Surface
+from finger3d.fem.traces import BoundarySurface
 from finger3d.geometry.surface import Triangles
 
 Float = NDArray[np.float64]
@@ -19,7 +19,7 @@ _BEYOND = 0.25  # a curved facet's border bulges at most this far, in barycentri
 _COVERED = 0.5  # least share of a point's hat that must be under the other surface
 
 
-def facing_trace(surface: Surface, mesh: Mesh, label: str) -> sp.csr_matrix:
+def facing_trace(surface: BoundarySurface, mesh: Mesh, label: str) -> sp.csr_matrix:
     """Weighted mean (c, n) at the points of a surface of what lies straight over it on the facets `label` of a mesh.
 
     The weights are those of the surface's own trace, so that forces on its points reach the other mesh undiminished:

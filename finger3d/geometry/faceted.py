@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from finger3d.geometry.surface import Triangles
 from finger3d.geometry.surface_checks import mistake
-from finger3d.geometry.tessellate import Body, CadFace
+from finger3d.geometry.tessellate import CadFace, Tessellation
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -116,7 +116,7 @@ def moved_onto(surfaces: list[Faceted], points: Float) -> Float | None:
     return surfaces[0].network.meeting(tuple(s.number for s in surfaces), points)
 
 
-def body(surface: Triangles) -> Body:
+def body(surface: Triangles) -> Tessellation:
     """A closed surface with its base on y = 0 as a body of labelled patches."""
     base = (surface.corners[:, :, 1] == 0.0).all(axis=1)
     up = _looks_up(surface, base)
@@ -133,7 +133,7 @@ def body(surface: Triangles) -> Body:
         faces.append(CadFace(label, Faceted(network, number), mine.min(axis=0), mine.max(axis=0), 1.0))
     many = [v for v, at in enumerate(network.at_point) if len(at) >= 3]
     corner_faces = tuple(tuple(sorted(network.at_point[v])) for v in many)
-    return Body(surface.points, surface.faces, patch, tuple(faces), surface.points[many], corner_faces)
+    return Tessellation(surface.points, surface.faces, patch, tuple(faces), surface.points[many], corner_faces)
 
 
 def _looks_up(surface: Triangles, base: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -167,7 +167,7 @@ def _neighbours(surface: Triangles) -> tuple[Int, Int, Int]:
     return owner[pair], owner[pair + 1], edges[pair]
 
 
-def coarser(body: Body, tolerance: float) -> Body:
+def coarser(body: Tessellation, tolerance: float) -> Tessellation:
     """The body with fewer triangles for the mesher, which is slow on many; its patches, for snapping, stay as fine.
 
     `tolerance` (mm) is what one removal may move the surface; removals add up to some twenty times that. A surface
@@ -183,7 +183,7 @@ def coarser(body: Body, tolerance: float) -> Body:
     return body
 
 
-def _decimated(body: Body, tolerance: float) -> Triangles:
+def _decimated(body: Tessellation, tolerance: float) -> Triangles:
     from pyvista import PolyData, wrap
     from vtkmodules.vtkFiltersCore import vtkDecimatePro
 

@@ -14,7 +14,7 @@ Float = NDArray[np.float64]
 _PRECISION = 1e-9  # mm
 
 
-class Surface(Protocol):
+class ImplicitSurface(Protocol):
     """A surface without borders."""
 
     def distance(self, points: Float) -> tuple[Float, Float]:
@@ -23,14 +23,14 @@ class Surface(Protocol):
 
 
 @dataclass(frozen=True)
-class Plane:
+class ImplicitPlane:
     """A plane through a point (mm)."""
 
     origin: Float
     direction: Float
 
     def distance(self, points: Float) -> tuple[Float, Float]:
-        """See :class:`Surface`."""
+        """See :class:`ImplicitSurface`."""
         return (points - self.origin) @ self.direction, np.broadcast_to(self.direction, points.shape)
 
     @property
@@ -41,7 +41,7 @@ class Plane:
 
 
 @dataclass(frozen=True)
-class Cylinder:
+class ImplicitCylinder:
     """A round cylinder (mm)."""
 
     origin: Float
@@ -49,20 +49,20 @@ class Cylinder:
     radius: float
 
     def distance(self, points: Float) -> tuple[Float, Float]:
-        """See :class:`Surface`."""
+        """See :class:`ImplicitSurface`."""
         out = points - self.origin
         return _round(out - np.outer(out @ self.direction, self.direction), self.radius)
 
 
 @dataclass(frozen=True)
-class Sphere:
+class ImplicitSphere:
     """A sphere (mm)."""
 
     origin: Float
     radius: float
 
     def distance(self, points: Float) -> tuple[Float, Float]:
-        """See :class:`Surface`."""
+        """See :class:`ImplicitSurface`."""
         return _round(points - self.origin, self.radius)
 
 
@@ -84,7 +84,7 @@ class Freeform:
         return ShapeAnalysis_Surface(self.geometry)
 
     def distance(self, points: Float) -> tuple[Float, Float]:
-        """See :class:`Surface`."""
+        """See :class:`ImplicitSurface`."""
         from OCP.GeomLProp import GeomLProp_SLProps
         from OCP.gp import gp_Pnt
 
@@ -99,7 +99,7 @@ class Freeform:
         return distance, normal
 
 
-def surface_of(face: Any, exact: tuple[float, ...] = (0.0,)) -> Surface:
+def surface_of(face: Any, exact: tuple[float, ...] = (0.0,)) -> ImplicitSurface:
     """The surface under a build123d face; a plane's constant coordinate becomes the number in `exact` it stands for."""
     from OCP.BRep import BRep_Tool
     from OCP.BRepAdaptor import BRepAdaptor_Surface
@@ -115,14 +115,14 @@ def surface_of(face: Any, exact: tuple[float, ...] = (0.0,)) -> Surface:
                 direction = np.eye(3)[axis] * np.sign(direction[axis])
                 near = min(exact, key=lambda value: abs(value - origin[axis]))
                 origin[axis] = near if abs(near - origin[axis]) < 1e-9 else origin[axis]
-        return Plane(origin, direction)
+        return ImplicitPlane(origin, direction)
     if kind == GeomAbs_Cylinder:
         cylinder = adaptor.Cylinder()
         axis_line = cylinder.Axis()
-        return Cylinder(_vector(axis_line.Location()), _vector(axis_line.Direction()), float(cylinder.Radius()))
+        return ImplicitCylinder(_vector(axis_line.Location()), _vector(axis_line.Direction()), float(cylinder.Radius()))
     if kind == GeomAbs_Sphere:
         sphere = adaptor.Sphere()
-        return Sphere(_vector(sphere.Location()), float(sphere.Radius()))
+        return ImplicitSphere(_vector(sphere.Location()), float(sphere.Radius()))
     return Freeform(BRep_Tool.Surface_s(face.wrapped))
 
 

@@ -16,7 +16,7 @@ from finger3d.geometry.surface import Triangles
 from finger3d.geometry.surface_checks import crossings, mistake
 
 if TYPE_CHECKING:
-    from finger3d.geometry.tessellate import Body
+    from finger3d.geometry.tessellate import Tessellation
 
 Float = NDArray[np.float64]
 
@@ -121,7 +121,7 @@ class Imported:
             raise Finger3dError(f"{self.path}: an STL file has triangles, and no CAD solid; export it as STL again")
         return sound(self.cad, self.name)
 
-    def body(self) -> Body | None:
+    def body(self) -> Tessellation | None:
         """The triangles in labelled patches, for meshing without CAD; None for STEP, which is meshed from CAD."""
         from finger3d.geometry.faceted import body
 

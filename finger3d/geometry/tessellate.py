@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.geometry.cad import labelled_faces
-from finger3d.geometry.implicit import Surface, surface_of
+from finger3d.geometry.implicit import ImplicitSurface, surface_of
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -22,14 +22,14 @@ class CadFace:
     """One face of a solid: its label, its surface, the box (mm) around it, and +1 if the surface's normal looks out."""
 
     label: str
-    surface: Surface
+    surface: ImplicitSurface
     low: Float
     high: Float
     sign: float
 
 
 @dataclass(frozen=True)
-class Body:
+class Tessellation:
     """A solid as closed triangles.
 
     Attributes
@@ -59,7 +59,7 @@ class Body:
         return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
 
 
-def tessellate(solid: Any, tolerance_mm: float, angle: float = 0.5, exact: tuple[float, ...] = (0.0,)) -> Body:
+def tessellate(solid: Any, tolerance_mm: float, angle: float = 0.5, exact: tuple[float, ...] = (0.0,)) -> Tessellation:
     """Tessellate a build123d solid within `tolerance_mm` (absolute) and `angle` radians between facets.
 
     build123d's own `tessellate` and `export_stl` take a relative tolerance and reuse what was tessellated before.
@@ -71,7 +71,7 @@ def tessellate(solid: Any, tolerance_mm: float, angle: float = 0.5, exact: tuple
     touching = np.unique(np.stack([triangles.ravel(), np.repeat(face, 3)], axis=1), axis=0)
     many = np.flatnonzero(np.bincount(touching[:, 0], minlength=len(points)) >= 3)
     sets = tuple(tuple(int(i) for i in touching[touching[:, 0] == v, 1]) for v in many)
-    return Body(points, triangles, face, known, points[many], sets)
+    return Tessellation(points, triangles, face, known, points[many], sets)
 
 
 def triangulated(solid: Any, faces: list[Any], tolerance_mm: float, angle: float) -> tuple[Float, Int, Int]:
@@ -114,7 +114,7 @@ def _triangulation(face: Any) -> tuple[Float, Int]:
     return points, triangles[:, ::-1] if face.wrapped.Orientation() == TopAbs_REVERSED else triangles
 
 
-def _cad_face(face: Any, points: Float, triangles: Int, surface: Surface) -> CadFace:
+def _cad_face(face: Any, points: Float, triangles: Int, surface: ImplicitSurface) -> CadFace:
     corners = points[triangles]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     largest = int(np.argmax(np.linalg.norm(area, axis=1)))

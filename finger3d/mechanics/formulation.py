@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.contact.maeno import swap
-from finger3d.contact.solve import advance
-from finger3d.contact.state import ContactState, Increment
+from finger3d.contact.maeno import maeno_active_set
+from finger3d.contact.solve import solve_increment
+from finger3d.contact.state import ContactSolution, ContactState
 
 if TYPE_CHECKING:
-    from finger3d.fem.traces import Surface
+    from finger3d.fem.traces import BoundarySurface
 
 Float = NDArray[np.float64]
 
-RULES = {"projection": advance, "paper": swap}
+RULES = {"projection": solve_increment, "paper": maeno_active_set}
 
 
-class Kinematics(Protocol):
+class Formulation(Protocol):
     """What marching through a history asks of a body; `problem` is a `finger3d.mechanics.problem.Problem`.
 
     One that also answers for inclusions (`problem.springs`) says so by a class attribute ``inclusions = True``;
@@ -42,7 +42,7 @@ class Kinematics(Protocol):
         """State at rest, before the first increment."""
         ...
 
-    def increment(self, problem: Any, state: ContactState, a: Any, b: Any, guess: Float | None) -> Increment:
+    def increment(self, problem: Any, state: ContactState, a: Any, b: Any, guess: Float | None) -> ContactSolution:
         """Advance a state from target a to target b; `guess` (c, d) N is where the forces may start."""
         ...
 
@@ -58,7 +58,9 @@ class Kinematics(Protocol):
         """Strain of every gauge by name."""
         ...
 
-    def gaps(self, problem: Any, states: Sequence[ContactState], targets: Sequence[Any], face: Surface) -> list[Float]:
+    def gaps(
+        self, problem: Any, states: Sequence[ContactState], targets: Sequence[Any], face: BoundarySurface
+    ) -> list[Float]:
         """Gap (c,) mm of any points of the contact face, candidates or not, in each state under its target."""
         ...
 
@@ -86,11 +88,11 @@ class SmallStrain:
         """No force, gaps at rest."""
         return ContactState.at_rest(problem.gap(problem.origin), problem.dim)
 
-    def increment(self, problem: Any, state: ContactState, a: Any, b: Any, guess: Float | None) -> Increment:
+    def increment(self, problem: Any, state: ContactState, a: Any, b: Any, guess: Float | None) -> ContactSolution:
         """One call of the contact rule."""
         rule = RULES[problem.model.rule]
         scale = length_scale(problem, a, b)
-        return rule(state, problem.free(b), problem.compliance, problem.model.friction, scale, guess)
+        return rule(state, problem.free_motion(b), problem.delassus, problem.model.friction, scale, guess)
 
     def unknowns(self, problem: Any, state: ContactState) -> Float:
         """Those of one state."""
@@ -104,11 +106,13 @@ class SmallStrain:
         """From the forces, through the gauges' rows."""
         return problem.gauge_strains(state.force)
 
-    def gaps(self, problem: Any, states: Sequence[ContactState], targets: Sequence[Any], face: Surface) -> list[Float]:
+    def gaps(
+        self, problem: Any, states: Sequence[ContactState], targets: Sequence[Any], face: BoundarySurface
+    ) -> list[Float]:
         """Gap at rest, changed by the displacement along the object's normal."""
         from finger3d.fem.recover import displacement
 
-        normal = problem.points.frame[0]
+        normal = problem.points.basis[0]
         return [
             problem.gap(target, face) + (face.trace @ displacement(problem.mesh, unknowns)) @ normal
             for target, unknowns in zip(targets, self.all_unknowns(problem, states), strict=True)

@@ -19,7 +19,7 @@ _ON_LINE = 1e-9
 
 
 @dataclass(frozen=True)
-class Target:
+class ObjectPose:
     """Where the object is: pressed down by a depth, slid along x and z, at a time (s)."""
 
     depth_mm: float
@@ -37,7 +37,7 @@ class ContactPoints:
     nodes : (m,) numbers in the whole mesh
     points : (m, 3) mm at rest, z = 0 in a section
     area : (m,) mm2
-    frame : (d, d), or (m, d, d) where each point has its own: normal into the finger, then tangents
+    basis : (d, d), or (m, d, d) where each point has its own: normal into the finger, then tangents
     half_width_mm, band_mm : float
         Where no point lies on the line z = 0, figures show the points within `band_mm` of it.
     edges : (e, 2)
@@ -47,7 +47,7 @@ class ContactPoints:
     nodes: NDArray[np.int64]
     points: Float
     area: Float
-    frame: Float
+    basis: Float
     half_width_mm: float
     band_mm: float
     edges: NDArray[np.int64]
@@ -55,11 +55,11 @@ class ContactPoints:
     @property
     def dim(self) -> int:
         """2 for a section, 3 for a solid."""
-        return self.frame.shape[-1]
+        return self.basis.shape[-1]
 
-    def seen_in(self, state: ContactState) -> ContactPoints:
+    def with_basis_of(self, state: ContactState) -> ContactPoints:
         """The points with the directions of a state, where they turn with the motion."""
-        return self if state.frames is None else replace(self, frame=state.frames)
+        return self if state.bases is None else replace(self, basis=state.bases)
 
     def middle_line(self) -> tuple[Float, NDArray[np.int64]]:
         """Where the surface mesh meets the line z = 0: x (k,) mm, and the number (k,) of the point nearest on the edge.
@@ -91,10 +91,10 @@ class ContactPoints:
         out[j[inner[i] & inside[j]]] = True
         return out
 
-    def world(self, local: Float) -> Float:
+    def to_global(self, local: Float) -> Float:
         """Vectors (m, 3) in x, y, z from vectors (m, d) in the frame."""
         out = np.zeros((len(local), 3))
-        own = self.frame if self.frame.ndim == 3 else self.frame[None]
+        own = self.basis if self.basis.ndim == 3 else self.basis[None]
         out[:, : self.dim] = np.einsum("ma,mak->mk", local, np.broadcast_to(own, (len(local), self.dim, self.dim)))
         return out
 
@@ -102,17 +102,17 @@ class ContactPoints:
         """Tangential part (m, 3) of forces (m, d), in x, y, z."""
         tangential = force.copy()
         tangential[:, 0] = 0.0
-        return self.world(tangential)
+        return self.to_global(tangential)
 
 
 @dataclass(frozen=True)
-class Frame:
+class StepResult:
     """One increment as reported: whole contact state (m points), gauge strains, work, and how it was settled.
 
     `part` is the state of the meshed part (c points), from which fields are recovered.
     """
 
-    target: Target
+    target: ObjectPose
     state: ContactState
     part: ContactState
     lowest: tuple[float, float]
@@ -130,23 +130,23 @@ class History:
     """Frames of one press, with the points they speak of."""
 
     points: ContactPoints
-    frames: tuple[Frame, ...]
+    steps: tuple[StepResult, ...]
 
     def __repr__(self) -> str:
         """One line: the arrays would fill pages."""
-        return f"<History of {len(self.frames)} frames, {len(self.points.nodes)} contact points: {self.outcome}>"
+        return f"<History of {len(self.steps)} steps, {len(self.points.nodes)} contact points: {self.outcome}>"
 
     @property
     def outcome(self) -> Outcome:
         """CONVERGED if every increment is."""
-        return next((f.outcome for f in self.frames if not f.outcome.ok), Outcome.CONVERGED)
+        return next((f.outcome for f in self.steps if not f.outcome.ok), Outcome.CONVERGED)
 
 
 def _half_extent(x: Float) -> float:
     return float(np.ptp(x) / 2.0) if len(x) else 0.0
 
 
-def measure(points: ContactPoints, frame: Frame) -> dict[str, Any]:
+def measure(points: ContactPoints, frame: StepResult) -> dict[str, Any]:
     """The entry of `steps` in summary.json for one frame.
 
     ``contact_half_length_mm`` and ``stick_half_length_mm`` are half the distance along x between the first and the last
@@ -154,8 +154,8 @@ def measure(points: ContactPoints, frame: Frame) -> dict[str, Any]:
     intersections of its edges with it, each with the state of the nearer end of the edge.
     """
     state, target = frame.state, frame.target
-    points = points.seen_in(state)
-    world = points.world(state.force)
+    points = points.with_basis_of(state)
+    world = points.to_global(state.force)
     friction = points.friction(state.force)
     touching, sticking = state.status != OPEN, state.status == STICK
     x, z = points.points[:, 0], points.points[:, 2]
@@ -194,11 +194,11 @@ def measure(points: ContactPoints, frame: Frame) -> dict[str, Any]:
 
 def contact_table(points: ContactPoints, state: ContactState) -> dict[str, Any]:
     """Columns of contact.csv; pressure and shear are the traction on the finger, slip is in x and z."""
-    points = points.seen_in(state)
+    points = points.with_basis_of(state)
     friction = points.friction(state.force)
-    padded = np.zeros((len(state.slip), points.dim))
-    padded[:, 1:] = state.slip
-    slip = points.world(padded)
+    padded = np.zeros((len(state.accumulated_slip), points.dim))
+    padded[:, 1:] = state.accumulated_slip
+    slip = points.to_global(padded)
     return {
         "x_mm": points.points[:, 0],
         "y_mm": points.points[:, 1],

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.contact.friction import Coulomb, FrictionLaw
-from finger3d.mechanics.formulation import Kinematics, SmallStrain
+from finger3d.mechanics.formulation import Formulation, SmallStrain
 from finger3d.objects import Plane, RigidObject
 
 Float = NDArray[np.float64]
@@ -86,28 +86,28 @@ class MeshOptions:
 
 
 @dataclass(frozen=True)
-class Inlay:
+class EmbeddedBars:
     """Stiff things laid into a meshed part, cut into bars.
 
     Attributes
     ----------
     rows : (s, n d) sparse
         Strain of every bar from displacements.
-    springs : (s,) N mm, their stiffness in the part
-    reads : (g, s) what each of the model's gauges reads of them
-    alone : (s, s) 1/(N mm)
+    bar_stiffness : (s,) N mm, their stiffness in the part
+    gauge_weights : (g, s) what each of the model's gauges reads of them
+    self_compliance : (s, s) 1/(N mm)
         How the bars unload themselves and each other, in a body without end; in place of what the mesh says.
     """
 
     rows: Any
-    springs: Float
-    reads: Float
-    alone: Float
+    bar_stiffness: Float
+    gauge_weights: Float
+    self_compliance: Float
 
-    def beyond(self, compliance: Float) -> Float:
+    def subgrid_compliance(self, compliance: Float) -> Float:
         """What rows of gauges and bars yield (g + s, g + s) beyond the mesh, from its compliance (s, s) of bars."""
-        both = np.vstack([self.reads, np.eye(len(self.springs))])
-        return both @ (self.alone - compliance) @ both.T
+        both = np.vstack([self.gauge_weights, np.eye(len(self.bar_stiffness))])
+        return both @ (self.self_compliance - compliance) @ both.T
 
 
 class Inclusions(Protocol):
@@ -117,7 +117,7 @@ class Inclusions(Protocol):
         """Planes, "x" and "z", about which they are mirror images."""
         ...
 
-    def lay(self, model: Any, mesh: Any, axes: tuple[str, ...]) -> Inlay:
+    def discretise(self, model: Any, mesh: Any, axes: tuple[str, ...]) -> EmbeddedBars:
         """Cut them into bars."""
         ...
 
@@ -125,7 +125,7 @@ class Inclusions(Protocol):
 class ObjectCompliance(Protocol):
     """An object that yields."""
 
-    def at_points(self, problem: Any, zone: tuple[float, float, float, float], say: Any) -> Float:
+    def contact_compliance(self, problem: Any, zone: tuple[float, float, float, float], say: Any) -> Float:
         """Compliance (c, d, c, d) mm/N of the object at the contact points of a problem; 0 in directions left out."""
         ...
 
@@ -150,7 +150,7 @@ class Model:
     legs: tuple[Leg, ...]
     object: RigidObject = field(default_factory=Plane)
     friction: FrictionLaw = field(default_factory=Coulomb)
-    kinematics: Kinematics = field(default_factory=SmallStrain)
+    formulation: Formulation = field(default_factory=SmallStrain)
     gauges: tuple[Gauge, ...] = ()
     inclusions: Inclusions | None = None
     object_compliance: ObjectCompliance | None = None
@@ -163,7 +163,7 @@ class Model:
 
     @property
     def approach(self) -> tuple[Any, ...]:
-        """What `finger3d.objects.approach` takes: top, object, half extents, path, the finger's corners."""
+        """What `finger3d.objects.initial_contact` takes: top, object, half extents, path, the finger's corners."""
         at, path = np.zeros(3), []
         for leg in self.legs:
             end = np.array([leg.depth_mm, leg.slide_x_mm, leg.slide_z_mm])

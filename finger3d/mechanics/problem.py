@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from finger3d.contact.newton import uniqueness
 from finger3d.contact.state import ContactState
 from finger3d.fem.assembly import Elasticity, Stiffness
-from finger3d.fem.condense import Condensed, spring_forces
+from finger3d.fem.condense import Condensation, spring_forces
 from finger3d.fem.simplex import Mesh
-from finger3d.fem.traces import Surface
-from finger3d.mechanics.history import ContactPoints, Target
+from finger3d.fem.traces import BoundarySurface
+from finger3d.mechanics.history import ContactPoints, ObjectPose
 from finger3d.mechanics.model import Leg, Model
 from finger3d.meshing.report import MeshReport
 
@@ -32,7 +32,7 @@ _KEPT = 5  # a factor is what takes the memory; a path rarely has more than four
 
 
 @dataclass
-class Later:
+class SolverCache:
     """What is made of a problem after its build, once for each key; the last few are kept, factorisations counted.
 
     `last` is what an increment may leave for the one that goes on from it.
@@ -51,7 +51,7 @@ class Later:
         return found  # type: ignore[return-value]
 
     def _counted(self, made: object) -> object:
-        if isinstance(made, Condensed):
+        if isinstance(made, Condensation):
             self.factorizations += made.factorizations
         return made
 
@@ -62,21 +62,21 @@ class Problem:
 
     Attributes
     ----------
-    compliance : (c, d, c, d) mm/N, in the object's frame
+    delassus : (c, d, c, d) mm/N, in the object's frame
     gauge_rows : (g, c d) strain per N
-    kept : (r,) directions among c d that the condensed rows stand for
-    touch_mm : height of the object's lowest point at first touch
-    held : numbers of the unknowns that are zero
+    active_dofs : (r,) directions among c d that the condensed rows stand for
+    first_contact_mm : height of the object's lowest point at first touch
+    fixed_dofs : numbers of the unknowns that are zero
     thickness : mm, the width of a section, 1 for a solid
-    parent, sign, share : (m,), (m, d), (m,)
+    image_of, mirror_sign, multiplicity : (m,), (m, d), (m,)
         Whole point -> part point, its mirror signs in the frame, and how often the part's force and area count there.
-    springs : (s,) N mm
+    bar_stiffness : (s,) N mm
         Stiffness of the last s condensed rows, which inclusions add to the body; `condensed` is the body without.
-    beyond : (g + s, g + s)
+    subgrid_compliance : (g + s, g + s)
         What the last rows of `condensed`, gauges and inclusions, yield more than the mesh says.
-    bare : the same without inclusions, if there are any
+    without_inclusions : the same without inclusions, if there are any
     place_mm : (x, z) of first touch, if the finger's surface is known
-    later : what is made of the problem after its build
+    cache : what is made of the problem after its build
     """
 
     model: Model
@@ -84,47 +84,47 @@ class Problem:
     report: MeshReport
     elastic: Elasticity
     stiffness: Stiffness
-    surface: Surface
-    condensed: Condensed
-    compliance: Float
+    surface: BoundarySurface
+    condensed: Condensation
+    delassus: Float
     gauge_rows: Float
-    kept: NDArray[np.int64]
-    held: NDArray[np.int64]
+    active_dofs: NDArray[np.int64]
+    fixed_dofs: NDArray[np.int64]
     thickness: float
-    touch_mm: float
+    first_contact_mm: float
     axes: tuple[str, ...]
     points: ContactPoints
-    parent: NDArray[np.int64]
-    sign: Float
-    share: Float
+    image_of: NDArray[np.int64]
+    mirror_sign: Float
+    multiplicity: Float
     seconds: dict[str, float]
-    springs: Float = field(default_factory=lambda: np.zeros(0))
-    beyond: Float = field(default_factory=lambda: np.zeros((0, 0)))
-    bare: Problem | None = None
+    bar_stiffness: Float = field(default_factory=lambda: np.zeros(0))
+    subgrid_compliance: Float = field(default_factory=lambda: np.zeros((0, 0)))
+    without_inclusions: Problem | None = None
     place_mm: tuple[float, float] | None = None
-    later: Later = field(default_factory=Later, compare=False)
+    cache: SolverCache = field(default_factory=SolverCache, compare=False)
 
     @property
     def factorizations(self) -> int:
         """All so far: that of the build, and those that followed."""
-        return self.condensed.factorizations + self.later.factorizations
+        return self.condensed.factorizations + self.cache.factorizations
 
     @property
-    def origin(self) -> Target:
+    def origin(self) -> ObjectPose:
         """Where every path begins: first touch."""
-        return Target(0.0)
+        return ObjectPose(0.0)
 
     @property
     def dim(self) -> int:
         """Space dimensions."""
         return self.mesh.dim
 
-    def gap(self, target: Target, surface: Surface | None = None) -> Float:
+    def gap(self, target: ObjectPose, surface: BoundarySurface | None = None) -> Float:
         """Weighted gap (c,) mm at rest under a target, from the exact object at the surface's quadrature points."""
         where = surface or self.surface
-        return rigid_gap(self.model, where, self.touch_mm, target)
+        return rigid_gap(self.model, where, self.first_contact_mm, target)
 
-    def free(self, target: Target) -> Float:
+    def free_motion(self, target: ObjectPose) -> Float:
         """Gap and tangential position (c, d) mm of every point under no contact force."""
         frame = self.model.object.frame(self.dim)
         moved = np.array([target.slide_x_mm, -target.depth_mm, target.slide_z_mm])[: self.dim]
@@ -133,34 +133,34 @@ class Problem:
         out[:, 1:] = -(frame[1:] @ moved)
         return out
 
-    def whole(self, state: ContactState) -> ContactState:
+    def unfold(self, state: ContactState) -> ContactState:
         """The state of the whole finger's points from that of the part's."""
-        p = self.parent
-        tangent = self.sign[:, 1:]
+        p = self.image_of
+        tangent = self.mirror_sign[:, 1:]
         return ContactState(
             state.status[p],
-            state.force[p] * self.sign * self.share[:, None],
+            state.force[p] * self.mirror_sign * self.multiplicity[:, None],
             state.gap[p],
-            state.position[p] * tangent,
-            state.slip[p] * tangent,
-            self._whole_frames(state.frames),
+            state.tangential_displacement[p] * tangent,
+            state.accumulated_slip[p] * tangent,
+            self._whole_frames(state.bases),
         )
 
     def _whole_frames(self, frames: Float | None) -> Float | None:
         if frames is None:
             return None
-        world = self.sign[:, [1, 0, 2][: self.dim]]
-        return frames[self.parent] * self.sign[:, :, None] * world[:, None, :]
+        world = self.mirror_sign[:, [1, 0, 2][: self.dim]]
+        return frames[self.image_of] * self.mirror_sign[:, :, None] * world[:, None, :]
 
     def world_force(self, state: ContactState) -> Float:
         """Forces (m, 3) N on the whole finger's points in x, y, z, from the part's state."""
-        whole = self.whole(state)
-        return self.points.seen_in(whole).world(whole.force)
+        whole = self.unfold(state)
+        return self.points.with_basis_of(whole).to_global(whole.force)
 
     def coupling(self) -> float:
         """Largest mu |K_tt^-1 K_tn| over points; above 1 a contact state need not be the only one."""
-        c, d = self.compliance.shape[:2]
-        return uniqueness(np.full(c, self.model.friction.static), self.compliance.reshape(c * d, c * d), d)
+        c, d = self.delassus.shape[:2]
+        return uniqueness(np.full(c, self.model.friction.static), self.delassus.reshape(c * d, c * d), d)
 
     def gauge_strains(self, force: Float) -> dict[str, float]:
         """Strain by gauge name under contact forces (c, d), through the condensed rows."""
@@ -170,7 +170,7 @@ class Problem:
     def row_forces(self, force: Float) -> Float:
         """Forces on the condensed rows from contact forces (c, d); none on the rows of gauges and inclusions."""
         rows = np.zeros(len(self.condensed.compliance))
-        rows[: len(self.kept)] = force.ravel()[self.kept]
+        rows[: len(self.active_dofs)] = force.ravel()[self.active_dofs]
         return rows
 
     def unknowns(self, force: Float) -> Float:
@@ -187,12 +187,12 @@ class Problem:
     def _unknowns(self, rows: Float) -> Float:
         """All unknowns (N, ...) under forces (r, ...) on the condensed rows; springs add theirs."""
         compliance = self.condensed.compliance
-        if len(self.springs):
-            rows[-len(self.springs) :] = spring_forces(compliance, self.springs, compliance @ rows)
+        if len(self.bar_stiffness):
+            rows[-len(self.bar_stiffness) :] = spring_forces(compliance, self.bar_stiffness, compliance @ rows)
         return self.condensed.unknowns(rows)
 
 
-def rigid_gap(model: Model, where: Surface, touch: float, target: Target) -> Float:
+def rigid_gap(model: Model, where: BoundarySurface, touch: float, target: ObjectPose) -> Float:
     """Weighted gap (c,) mm between the object under a target and a surface at rest, along the object's normal."""
     x, y = where.samples[:, 0], where.samples[:, 1]
     z = where.samples[:, 2] if where.samples.shape[1] == 3 else np.zeros_like(x)
@@ -208,7 +208,7 @@ def rigid_gap(model: Model, where: Surface, touch: float, target: Target) -> Flo
     return np.where(share < _COVERED, _BESIDE * model.design.height_mm, mean * upright)
 
 
-def at_points(rows: Float, kept: NDArray[np.int64], count: int, dim: int) -> Float:
+def scatter_to_points(rows: Float, kept: NDArray[np.int64], count: int, dim: int) -> Float:
     """Compliance (c, d, c, d) of contact points from that of the condensed rows (r, r), of which they are the first.
 
     A point on a symmetry plane cannot move across it: that direction is left uncoupled, and never sees a force.
@@ -219,30 +219,30 @@ def at_points(rows: Float, kept: NDArray[np.int64], count: int, dim: int) -> Flo
     return out.reshape(count, dim, count, dim)
 
 
-def folded(point: Float, direction: Float, axes: tuple[str, ...], dim: int) -> tuple[Float, Float]:
+def reflect_into_part(point: Float, direction: Float, axes: tuple[str, ...], dim: int) -> tuple[Float, Float]:
     """A place and a direction (3,) in the meshed part (d,), reflected back where they lie in a mirror image."""
     sign = np.array([-1.0 if a in axes and v < 0.0 else 1.0 for a, v in zip("xyz", point, strict=True)])
     return (point * sign)[:dim], (direction * sign)[:dim]
 
 
-def targets(legs: tuple[Leg, ...]) -> list[Target]:
+def targets(legs: tuple[Leg, ...]) -> list[ObjectPose]:
     """Every increment of the legs, the start not among them."""
-    out: list[Target] = []
-    at = Target(0.0)
+    out: list[ObjectPose] = []
+    at = ObjectPose(0.0)
     for leg in legs:
         count = leg.steps if isinstance(leg.steps, int) else AUTO_START
-        end = Target(leg.depth_mm, leg.slide_x_mm, leg.slide_z_mm, at.time_s + (leg.duration_s or 0.0))
+        end = ObjectPose(leg.depth_mm, leg.slide_x_mm, leg.slide_z_mm, at.time_s + (leg.duration_s or 0.0))
         out += [between(at, end, k / count) for k in range(1, count)] + [end]
         at = end
     return out
 
 
-def between(a: Target, b: Target, share: float) -> Target:
+def between(a: ObjectPose, b: ObjectPose, share: float) -> ObjectPose:
     """The target a share of the way from a to b."""
     values = [u + share * (v - u) for u, v in zip(values_of(a), values_of(b), strict=True)]
-    return Target(*values)
+    return ObjectPose(*values)
 
 
-def values_of(t: Target) -> tuple[float, float, float, float]:
+def values_of(t: ObjectPose) -> tuple[float, float, float, float]:
     """Depth, slides and time."""
     return t.depth_mm, t.slide_x_mm, t.slide_z_mm, t.time_s

@@ -20,11 +20,11 @@ from scipy.spatial import KDTree
 
 from finger3d.contact.friction import OPEN
 from finger3d.errors import UnresolvedError
-from finger3d.fem.traces import Surface
-from finger3d.mechanics.history import Frame, Target
+from finger3d.fem.traces import BoundarySurface
+from finger3d.mechanics.history import ObjectPose, StepResult
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.problem import Problem, rigid_gap, targets
-from finger3d.objects import Cylinder, MeshObject, Sphere, Wave, Wedge, approach
+from finger3d.objects import Cylinder, MeshObject, Sphere, Wave, Wedge, initial_contact
 
 Float = NDArray[np.float64]
 Box = tuple[float, float, float, float]
@@ -57,11 +57,13 @@ class Hidden:
     share: float
     seen: bool
     depth_mm: float
-    target: Target
+    target: ObjectPose
     place: Float
 
 
-def hidden(model: Model, face: Surface, touch_mm: float, tips: Float | None, axes: tuple[str, ...] = ()) -> Hidden:
+def hidden(
+    model: Model, face: BoundarySurface, touch_mm: float, tips: Float | None, axes: tuple[str, ...] = ()
+) -> Hidden:
     """Largest hidden depth over a model's path.
 
     Parameters
@@ -109,7 +111,7 @@ def tips_of(model: Model, place: tuple[float, float] | None) -> Float | None:
 
 
 def check(
-    model: Model, face: Surface, touch_mm: float, place: tuple[float, float] | None, axes: tuple[str, ...] = ()
+    model: Model, face: BoundarySurface, touch_mm: float, place: tuple[float, float] | None, axes: tuple[str, ...] = ()
 ) -> None:
     """Refuse a press whose object passes between the contact points.
 
@@ -127,22 +129,24 @@ def check(
 
 def warnings(problem: Problem) -> list[str]:
     """What to tell of a press whose contact points see less than all of the object."""
-    model, touch = problem.model, problem.touch_mm
+    model, touch = problem.model, problem.first_contact_mm
     tips = tips_of(model, problem.place_mm)
     return _told(model, touch, tips, hidden(model, problem.surface, touch, tips, problem.axes))
 
 
 def foreseen(model: Model, axes: tuple[str, ...]) -> list[str]:
     """The same before there is a mesh, for regular contact points around first touch, as far apart as its edges."""
-    way, size = approach(*model.approach), model.mesh.size_mm
+    way, size = initial_contact(*model.approach), model.mesh.size_mm
     reach = _FORESEEN * size
-    (x0, x1, z0, z1), (x, z) = way.zone, way.place
+    (x0, x1, z0, z1), (x, z) = way.contact_box, way.place
     box = (max(x0, x - reach), min(x1, x + reach), max(z0, z - reach), min(z1, z + reach))
     # a mesh has points on its symmetry planes
     at = np.array([0.5 * size if axis in axes else place for axis, place in zip("xz", way.place, strict=True)])
     tips = tips_of(model, way.place)
     tips = None if tips is None else _within(tips, box)
-    return _told(model, way.touch_mm, tips, hidden(model, regular(model, box, size, at), way.touch_mm, tips))
+    return _told(
+        model, way.first_contact_mm, tips, hidden(model, regular(model, box, size, at), way.first_contact_mm, tips)
+    )
 
 
 def _told(model: Model, touch_mm: float, tips: Float | None, found: Hidden) -> list[str]:
@@ -152,9 +156,9 @@ def _told(model: Model, touch_mm: float, tips: Float | None, found: Hidden) -> l
     return told
 
 
-def unseen(problem: Problem, frames: Sequence[Frame]) -> list[str]:
+def unseen(problem: Problem, frames: Sequence[StepResult]) -> list[str]:
     """What to tell of increments at which the object reaches into the finger at rest, and no contact point sees it."""
-    model, face, touch, missed = problem.model, problem.surface, problem.touch_mm, list[float]()
+    model, face, touch, missed = problem.model, problem.surface, problem.first_contact_mm, list[float]()
     for frame in frames:
         end = frame.target
         if end.depth_mm <= 0.0 or not frame.outcome.ok or (frame.state.status != OPEN).any():
@@ -172,7 +176,7 @@ def unseen(problem: Problem, frames: Sequence[Frame]) -> list[str]:
     ]
 
 
-def penetration(problem: Problem, frame: Frame, u: Float) -> tuple[float, Float]:
+def penetration(problem: Problem, frame: StepResult, u: Float) -> tuple[float, Float]:
     """How deep (mm) the displaced contact face is inside a rigid object anywhere between its contact points, and where.
 
     In small strain displacements count along the normal only, as in the gap.
@@ -183,18 +187,18 @@ def penetration(problem: Problem, frame: Frame, u: Float) -> tuple[float, Float]
     """
     model, face, target, d = problem.model, problem.surface, frame.target, problem.dim
     moved = face.interpolate @ u
-    if not model.kinematics.finite_strain:
+    if not model.formulation.finite_strain:
         normal = model.object.frame(d)[0]
         moved = np.outer(moved @ normal, normal)
     at = face.samples + moved
-    over = _overlap(model, at, problem.touch_mm, target)
+    over = _overlap(model, at, problem.first_contact_mm, target)
     at, over = at[over > 0.0], over[over > 0.0]
     if not len(at):
         return 0.0, np.zeros(d)
     if isinstance(model.object, MeshObject):  # beside a wall the vertical overlap says little
         there = np.zeros((len(at), 3))
         there[:, :d] = at
-        there -= [target.slide_x_mm, problem.touch_mm - target.depth_mm, target.slide_z_mm]
+        there -= [target.slide_x_mm, problem.first_contact_mm - target.depth_mm, target.slide_z_mm]
         over = np.minimum(over, -model.object.signed_distance(there)[0])
     else:
         over = over * _upright(model, at, target)
@@ -202,7 +206,7 @@ def penetration(problem: Problem, frame: Frame, u: Float) -> tuple[float, Float]
     return max(float(over[worst]), 0.0), at[worst]
 
 
-def inside(problem: Problem, frame: Frame, u: Float) -> list[str]:
+def inside(problem: Problem, frame: StepResult, u: Float) -> list[str]:
     """What to tell of a press at whose end the object is inside the finger between the contact points."""
     if problem.model.object_compliance is not None:  # its surface has moved as well
         return []
@@ -216,7 +220,7 @@ def inside(problem: Problem, frame: Frame, u: Float) -> list[str]:
     ]
 
 
-def _upright(model: Model, at: Float, target: Target) -> Float:
+def _upright(model: Model, at: Float, target: ObjectPose) -> Float:
     """Cosine (n,) of the object's slope over points (n, d)."""
     x = at[:, 0] - target.slide_x_mm
     z = at[:, 2] - target.slide_z_mm if at.shape[1] == 3 else np.zeros(len(at))
@@ -250,7 +254,7 @@ def _within(places: Float, box: Box) -> Float:
     return places[np.all((places >= low) & (places <= high), axis=1)]
 
 
-def regular(model: Model, box: Box, size_mm: float, at: Float | None = None) -> Surface:
+def regular(model: Model, box: Box, size_mm: float, at: Float | None = None) -> BoundarySurface:
     """Contact points a distance apart over a box (x_min, x_max, z_min, z_max) mm, `at` (2,) in the middle of four."""
     design, solid = model.design, model.domain == "solid"
     half = (design.half_length_mm, 0.5 * design.width_mm)
@@ -269,7 +273,7 @@ def regular(model: Model, box: Box, size_mm: float, at: Float | None = None) -> 
     mean = sp.csr_matrix(sp.diags_array(1.0 / weight[kept]) @ mean[kept])
     samples, points = (np.insert(p, 1, v, axis=1) for p, v in ((samples[used], height[used]), (points[kept], y[kept])))
     none = sp.csr_matrix((len(points), 0)), sp.csr_matrix((len(samples), 0))
-    return Surface(np.arange(len(points)), points, np.ones(len(points)), none[0], samples, mean, none[1])
+    return BoundarySurface(np.arange(len(points)), points, np.ones(len(points)), none[0], samples, mean, none[1])
 
 
 def _lines(box: Any, half: float, size: float, at: float) -> Float:
@@ -301,7 +305,7 @@ def _flat(points: Float) -> Float:
     return points[..., ::2] if points.shape[-1] == 3 else points[..., :1]
 
 
-def _overlap(model: Model, at: Float, touch: float, target: Target) -> Float:
+def _overlap(model: Model, at: Float, touch: float, target: ObjectPose) -> Float:
     """How deep (n,) mm the object would be below places (n, d) of the finger at rest; -inf beside it."""
     z = at[:, 2] if at.shape[1] == 3 else np.zeros(len(at))
     height = model.object.height(at[:, 0] - target.slide_x_mm, z - target.slide_z_mm)

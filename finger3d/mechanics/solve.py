@@ -18,20 +18,29 @@ from numpy.typing import NDArray
 
 from finger3d._machine import cores
 from finger3d.contact.friction import SLIP
-from finger3d.contact.state import ContactState, Increment
+from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.contact.threads import one_thread
 from finger3d.fem.assembly import Elasticity, stiffness
 from finger3d.fem.condense import condense, stiffened
 from finger3d.fem.simplex import Mesh, unfold
-from finger3d.fem.traces import Surface, displacement_row, local_rows, restrict, strain_row, surface
-from finger3d.mechanics.history import ContactPoints, Frame, Target
-from finger3d.mechanics.model import Gauge, Inlay, Leg, Model
-from finger3d.mechanics.problem import AUTO_START, Problem, at_points, between, folded, rigid_gap, targets, values_of
+from finger3d.fem.traces import BoundarySurface, displacement_row, local_rows, restrict, strain_row, surface
+from finger3d.mechanics.history import ContactPoints, ObjectPose, StepResult
+from finger3d.mechanics.model import EmbeddedBars, Gauge, Leg, Model
+from finger3d.mechanics.problem import (
+    AUTO_START,
+    Problem,
+    between,
+    reflect_into_part,
+    rigid_gap,
+    scatter_to_points,
+    targets,
+    values_of,
+)
 from finger3d.mechanics.resolution import check
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.limits import check_rows
 from finger3d.meshing.swept import mesh_section
-from finger3d.objects import approach
+from finger3d.objects import initial_contact
 
 Float = NDArray[np.float64]
 Asked = TypeVar("Asked")
@@ -41,15 +50,15 @@ __all__ = [
     "AUTO_START",
     "Problem",
     "build",
-    "contact_zone",
-    "covered",
-    "covers",
-    "each",
+    "contact_box",
+    "contact_within_candidates",
+    "step_within_candidates",
+    "map_parallel",
     "gauge_row",
     "march",
     "symmetry",
     "targets",
-    "whole",
+    "candidates_cover_face",
 ]
 
 MARGIN = 0.3  # candidate points reach to a rigid gap of this share of the depth; checked after the solution
@@ -72,9 +81,9 @@ def symmetry(model: Model) -> tuple[str, ...]:
     return tuple(a for a in axes if a in body and a in inner and a in model.object.mirrors() and not any(slides[a]))
 
 
-def contact_zone(model: Model) -> tuple[float, float, float, float]:
+def contact_box(model: Model) -> tuple[float, float, float, float]:
     """Box (x_min, x_max, z_min, z_max) mm over which the rigid object would overlap the finger at rest."""
-    return approach(*model.approach).zone
+    return initial_contact(*model.approach).contact_box
 
 
 def build(model: Model, say: Callable[[str], None] = lambda text: None, margin: float = MARGIN) -> Problem:
@@ -86,8 +95,8 @@ def build(model: Model, say: Callable[[str], None] = lambda text: None, margin: 
         If the object passes between the contact points.
     """
     design = model.design
-    way = approach(*model.approach)
-    touch, zone, axes = way.touch_mm, way.zone, symmetry(model)
+    way = initial_contact(*model.approach)
+    touch, zone, axes = way.first_contact_mm, way.contact_box, symmetry(model)
     if model.domain == "solid":
         mesh, report = mesh_solid(design, model.mesh, zone, axes, say)
     else:
@@ -105,8 +114,8 @@ def build(model: Model, say: Callable[[str], None] = lambda text: None, margin: 
     if len(model.gauges) >= _MANY:
         say(f"placing {len(model.gauges)} gauges")
     rows = local_rows(face, model.object.frame(mesh.dim))[kept]
-    inlay = model.inclusions.lay(model, mesh, axes) if model.inclusions else None
-    read = [inlay.reads @ inlay.rows, inlay.rows] if inlay else [gauge_row(mesh, g, axes) for g in model.gauges]
+    inlay = model.inclusions.discretise(model, mesh, axes) if model.inclusions else None
+    read = [inlay.gauge_weights @ inlay.rows, inlay.rows] if inlay else [gauge_row(mesh, g, axes) for g in model.gauges]
     assembly = time.perf_counter() - start
     say(f"condensing {matrix.upper.shape[0]} unknowns to {len(face.nodes)} contact points")
     held = _held(model, mesh, axes)
@@ -120,21 +129,21 @@ def build(model: Model, say: Callable[[str], None] = lambda text: None, margin: 
     )  # fmt: skip
     yields: Float | float = 0.0
     if model.object_compliance:
-        yields = model.object_compliance.at_points(bare, zone, say)
-        bare = replace(bare, compliance=bare.compliance + yields)
-    return replace(_laid(bare, inlay, yields), bare=bare) if inlay else bare
+        yields = model.object_compliance.contact_compliance(bare, zone, say)
+        bare = replace(bare, delassus=bare.delassus + yields)
+    return replace(_laid(bare, inlay, yields), without_inclusions=bare) if inlay else bare
 
 
-def _laid(bare: Problem, inlay: Inlay, yields: Float | float) -> Problem:
+def _laid(bare: Problem, inlay: EmbeddedBars, yields: Float | float) -> Problem:
     """The problem with its inclusions in place; the object's own compliance `yields` is none of theirs."""
-    rows, kept, count = bare.condensed.compliance.copy(), bare.kept, len(inlay.springs)
-    beyond = inlay.beyond(rows[-count:, -count:])
+    rows, kept, count = bare.condensed.compliance.copy(), bare.active_dofs, len(inlay.bar_stiffness)
+    beyond = inlay.subgrid_compliance(rows[-count:, -count:])
     rows[len(kept) :, len(kept) :] += beyond
-    held_by = stiffened(rows, inlay.springs)
-    compliance, gauge_rows = _read(held_by, kept, len(bare.surface.nodes), bare.dim, len(inlay.reads))
+    held_by = stiffened(rows, inlay.bar_stiffness)
+    compliance, gauge_rows = _read(held_by, kept, len(bare.surface.nodes), bare.dim, len(inlay.gauge_weights))
     return replace(
-        bare, condensed=replace(bare.condensed, compliance=rows), compliance=compliance + yields,
-        gauge_rows=gauge_rows, springs=inlay.springs, beyond=beyond,
+        bare, condensed=replace(bare.condensed, compliance=rows), delassus=compliance + yields,
+        gauge_rows=gauge_rows, bar_stiffness=inlay.bar_stiffness, subgrid_compliance=beyond,
     )  # fmt: skip
 
 
@@ -142,32 +151,32 @@ def _read(rows: Float, kept: NDArray[np.int64], count: int, dim: int, gauges: in
     """Compliance of contact points, and strain of the gauges per force on them, from that of condensed rows."""
     strain = np.zeros((gauges, count * dim))
     strain[:, kept] = rows[len(kept) : len(kept) + gauges, : len(kept)]
-    return at_points(rows, kept, count, dim), strain
+    return scatter_to_points(rows, kept, count, dim), strain
 
 
-def covers(problem: Problem, frame: Frame) -> bool:
+def step_within_candidates(problem: Problem, frame: StepResult) -> bool:
     """Whether no point of the contact face outside the candidates went through the object."""
-    return covered(problem, [frame])[0]
+    return contact_within_candidates(problem, [frame])[0]
 
 
-def covered(problem: Problem, frames: Sequence[Frame]) -> list[bool]:
+def contact_within_candidates(problem: Problem, frames: Sequence[StepResult]) -> list[bool]:
     """The same for each of several frames; in small strain at the price of one back-substitution."""
-    if whole(problem):
+    if candidates_cover_face(problem):
         return [True] * len(frames)
     face = surface(problem.mesh, "contact", problem.thickness)
     others = ~np.isin(face.nodes, problem.surface.nodes)
     parts, ends = [f.part for f in frames], [f.target for f in frames]
-    gaps = problem.model.kinematics.gaps(problem, parts, ends, restrict(face, others))
+    gaps = problem.model.formulation.gaps(problem, parts, ends, restrict(face, others))
     return [bool(gap.min() > -1e-9 * end.depth_mm) for gap, end in zip(gaps, ends, strict=True)]
 
 
-def whole(problem: Problem) -> bool:
+def candidates_cover_face(problem: Problem) -> bool:
     """Whether all of the contact face are candidates, so that nothing is beyond them."""
     corners = problem.mesh.facets["contact"][:, : problem.dim]
     return len(np.unique(corners)) == len(problem.surface.nodes)
 
 
-def _candidates(model: Model, face: Surface, touch: float, margin: float) -> Surface:
+def _candidates(model: Model, face: BoundarySurface, touch: float, margin: float) -> BoundarySurface:
     path = targets(tuple(replace(leg, steps=_stations(leg)) for leg in model.legs))
     nearest = np.min([rigid_gap(model, face, touch, t) for t in path], axis=0)
     reach = margin * max(t.depth_mm for t in path) + max(float(nearest.min()), 0.0)
@@ -180,7 +189,7 @@ def _stations(leg: Leg) -> int:
     return min(leg.steps, _LOOKS) if isinstance(leg.steps, int) else _LOOKS
 
 
-def _kept_rows(face: Surface, axes: tuple[str, ...]) -> NDArray[np.int64]:
+def _kept_rows(face: BoundarySurface, axes: tuple[str, ...]) -> NDArray[np.int64]:
     """Numbers point * d + direction of the contact rows, less the tangent across a symmetry plane for points on it."""
     keep = np.ones(face.points.shape, dtype=bool)
     for axis in axes:
@@ -192,8 +201,8 @@ def gauge_row(mesh: Mesh, gauge: Gauge, axes: tuple[str, ...]) -> sp.csr_matrix:
     """Row of one gauge, read from the mirrored part where the gauge lies in an image."""
     along = gauge.direction
     if gauge.length_mm == 0.0:
-        return strain_row(mesh, *folded(gauge.middle, along, axes, mesh.dim))
-    start, end = (displacement_row(mesh, *folded(x, along, axes, mesh.dim)) for x in gauge.ends)
+        return strain_row(mesh, *reflect_into_part(gauge.middle, along, axes, mesh.dim))
+    start, end = (displacement_row(mesh, *reflect_into_part(x, along, axes, mesh.dim)) for x in gauge.ends)
     return sp.csr_matrix((end - start) / gauge.length_mm)
 
 
@@ -209,7 +218,7 @@ def _held(model: Model, mesh: Mesh, axes: tuple[str, ...]) -> NDArray[np.int64]:
 
 
 def _unfolded(
-    model: Model, mesh: Mesh, face: Surface, axes: tuple[str, ...]
+    model: Model, mesh: Mesh, face: BoundarySurface, axes: tuple[str, ...]
 ) -> tuple[NDArray[np.int64], Float, Float, ContactPoints]:
     d = mesh.dim
     numbers = tuple("xyz".index(a) for a in axes)
@@ -240,7 +249,7 @@ def _edges(corners: NDArray[np.int64], nodes: NDArray[np.int64]) -> NDArray[np.i
     return np.unique(ends, axis=0)
 
 
-def march(problem: Problem, near: Sequence[Float] = ()) -> Iterator[Frame]:
+def march(problem: Problem, near: Sequence[Float] = ()) -> Iterator[StepResult]:
     """Frames of all legs in turn; stops after the first increment that did not settle.
 
     Under the paper's rule an increment that cycled is handed on as it is, and never cut: that is what the rule does.
@@ -253,12 +262,12 @@ def march(problem: Problem, near: Sequence[Float] = ()) -> Iterator[Frame]:
     """
     literal = problem.model.rule == "paper"
     at = problem.origin
-    kinematics = problem.model.kinematics
+    kinematics = problem.model.formulation
     state = kinematics.start(problem)
-    pace: tuple[Target, Float] | None = None
+    pace: tuple[ObjectPose, Float] | None = None
     work = dissipation = 0.0
     # what the gauges would read if nothing were embedded: the same path in the same body without
-    beside = march(replace(problem.bare, model=problem.model)) if problem.bare else None
+    beside = march(replace(problem.without_inclusions, model=problem.model)) if problem.without_inclusions else None
     for number, target in enumerate(targets(problem.model.legs)):
         if (left := _LEFT.get()) and left.is_set():
             raise _LeftError
@@ -269,8 +278,8 @@ def march(problem: Problem, near: Sequence[Float] = ()) -> Iterator[Frame]:
             dissipation += _dissipated(problem, before, after)
         pace = at, state.force
         state, at = found.state, target
-        yield Frame(
-            target, problem.whole(state), state, problem.model.object.lowest(target.slide_x_mm, target.slide_z_mm),
+        yield StepResult(
+            target, problem.unfold(state), state, problem.model.object.lowest(target.slide_x_mm, target.slide_z_mm),
             kinematics.gauges(problem, state) | _free(problem, beside), work, dissipation,
             found.outcome, found.residual, found.iterations, found.method,
         )  # fmt: skip
@@ -278,7 +287,7 @@ def march(problem: Problem, near: Sequence[Float] = ()) -> Iterator[Frame]:
             return
 
 
-def each(
+def map_parallel(
     problem: Problem, press: Callable[[Asked, Sequence[Told]], Told], asked: Sequence[Asked], most: int | None = None
 ) -> Generator[Told, None, None]:
     """What `press` tells of everything asked, in that order; for presses of one problem, under one law after another.
@@ -290,8 +299,8 @@ def each(
     """
     before: tuple[Told, ...] = ()
     at_once = min(len(asked), cores() if most is None else most)
-    alone = len(problem.kept) < _WORTH or at_once < 2
-    if alone or not getattr(problem.model.kinematics, "independent", False):
+    alone = len(problem.active_dofs) < _WORTH or at_once < 2
+    if alone or not getattr(problem.model.formulation, "independent", False):
         for one in asked:
             before = (*before, press(one, before))[-2:]
             yield before[-1]
@@ -317,7 +326,7 @@ class _LeftError(Exception):
     """Nobody waits for this press any more."""
 
 
-def _free(problem: Problem, beside: Iterator[Frame] | None) -> dict[str, float]:
+def _free(problem: Problem, beside: Iterator[StepResult] | None) -> dict[str, float]:
     """Free strain of every gauge by name, ``_free`` added; NaN once the path beside has failed, none without one."""
     if beside is None:
         return {}
@@ -326,7 +335,7 @@ def _free(problem: Problem, beside: Iterator[Frame] | None) -> dict[str, float]:
     return {f"{g.name}_free": frame.gauges[g.name] if frame and known else np.nan for g in problem.model.gauges}
 
 
-def _guess(state: ContactState, a: Target, b: Target, pace: tuple[Target, Float] | None) -> Float | None:
+def _guess(state: ContactState, a: ObjectPose, b: ObjectPose, pace: tuple[ObjectPose, Float] | None) -> Float | None:
     """Forces continued at their pace, where the path goes straight on from the increment before."""
     if pace is None:
         return None
@@ -337,14 +346,14 @@ def _guess(state: ContactState, a: Target, b: Target, pace: tuple[Target, Float]
     return state.force + ratio * (state.force - pace[1])
 
 
-_Done = list[tuple[ContactState, ContactState, Target, Target]]
+_Done = list[tuple[ContactState, ContactState, ObjectPose, ObjectPose]]
 
 
 def _increment(
-    problem: Problem, state: ContactState, a: Target, b: Target, cuts: int, guess: Float | None = None
-) -> tuple[Increment, _Done]:
+    problem: Problem, state: ContactState, a: ObjectPose, b: ObjectPose, cuts: int, guess: Float | None = None
+) -> tuple[ContactSolution, _Done]:
     """Advance from a to b; an increment that does not settle is cut in two, from the state restored."""
-    found = problem.model.kinematics.increment(problem, state, a, b, guess)
+    found = problem.model.formulation.increment(problem, state, a, b, guess)
     if found.outcome.ok or cuts == 0:
         return found, [(state, found.state, a, b)]
     middle = between(a, b, 0.5)
@@ -360,7 +369,7 @@ def _increment(
     ), done + more
 
 
-def _work(problem: Problem, before: ContactState, after: ContactState, a: Target, b: Target) -> float:
+def _work(problem: Problem, before: ContactState, after: ContactState, a: ObjectPose, b: ObjectPose) -> float:
     """Work (mJ) of the object on the finger in an increment: mean contact force times the displacement it acts through.
 
     A point that comes into contact, or leaves it, has its force for a part of the increment only; the change of its
@@ -370,7 +379,7 @@ def _work(problem: Problem, before: ContactState, after: ContactState, a: Target
     moved = np.array([b.slide_x_mm - a.slide_x_mm, a.depth_mm - b.depth_mm, b.slide_z_mm - a.slide_z_mm])
     mean = 0.5 * (problem.world_force(before) + problem.world_force(after))
     normal = 0.5 * (before.force[:, 0] + after.force[:, 0])
-    if not problem.model.kinematics.finite_strain:
+    if not problem.model.formulation.finite_strain:
         closed = after.gap - before.gap
         if moved[0] or moved[2]:
             # the object's profile moves under a point: its force does work where the finger follows the profile
@@ -389,7 +398,7 @@ def _dissipated(problem: Problem, before: ContactState, after: ContactState) -> 
     The direction of friction, and the coefficient, are those at the end of the increment.
     """
     slips = after.status == SLIP
-    lost = -np.sum(after.force[:, 1:] * (after.slip - before.slip), axis=1) * slips
+    lost = -np.sum(after.force[:, 1:] * (after.accumulated_slip - before.accumulated_slip), axis=1) * slips
     end = after.force[:, 0]
     share = np.divide(0.5 * (before.force[:, 0] + end), end, out=np.ones_like(end), where=end > 0.0)
     return _summed(problem, lost * share)
@@ -397,4 +406,4 @@ def _dissipated(problem: Problem, before: ContactState, after: ContactState) -> 
 
 def _summed(problem: Problem, values: Float) -> float:
     """Sum over the points of the whole finger of values (c,) of the meshed part."""
-    return float((values[problem.parent] * problem.share).sum())
+    return float((values[problem.image_of] * problem.multiplicity).sum())

@@ -17,11 +17,11 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.history import Frame, measure
+from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.solve import AUTO_START, Problem, march
 
-Told = Callable[[Problem, Frame], dict[str, float]]
+Told = Callable[[Problem, StepResult], dict[str, float]]
 
 TOLERANCE = 0.01
 """Of normal force and friction sum, relative; of a gauge's strain, relative to the largest of all gauges."""
@@ -68,7 +68,7 @@ class StepEstimate:
     met: bool
     tolerance: float = TOLERANCE
     dissipation_tolerance: float = DISSIPATION_TOLERANCE
-    levels: tuple[tuple[int, tuple[Frame, ...]], ...] = field(default=(), repr=False, compare=False)
+    levels: tuple[tuple[int, tuple[StepResult, ...]], ...] = field(default=(), repr=False, compare=False)
 
     def as_dict(self) -> dict[str, Any]:
         """For summary.json."""
@@ -131,15 +131,15 @@ def remaining(counts: Sequence[int], values: Sequence[float], at: int) -> float:
     return max(rates) / at
 
 
-def refine(problem: Problem) -> Iterator[tuple[tuple[Frame, ...], StepEstimate | None]]:
+def refine(problem: Problem) -> Iterator[tuple[tuple[StepResult, ...], StepEstimate | None]]:
     """Frames and estimate of ever more increments; none after the first run, and none is met too early.
 
     Ends when the estimate is met or the limit is reached.  A run that fails is left out if one with fewer increments
     succeeded or one with twice as many does.
     """
     steps, last = limits(problem.model, problem.stiffness.upper.shape[0], len(problem.surface.nodes))
-    levels: list[tuple[int, tuple[Frame, ...]]] = []
-    failed: tuple[Frame, ...] = ()
+    levels: list[tuple[int, tuple[StepResult, ...]]] = []
+    failed: tuple[StepResult, ...] = ()
     while steps <= last:
         trial = with_steps(problem, steps)
         frames = tuple(march(trial))
@@ -160,7 +160,7 @@ def refine(problem: Problem) -> Iterator[tuple[tuple[Frame, ...], StepEstimate |
         yield failed, None
 
 
-def marched(problem: Problem) -> tuple[tuple[Frame, ...], StepEstimate | None]:
+def marched(problem: Problem) -> tuple[tuple[StepResult, ...], StepEstimate | None]:
     """Frames of a press, its automatic increments chosen; the estimate is None where none are or no run told it."""
     if not automatic(problem.model):
         return tuple(march(problem)), None
@@ -170,10 +170,10 @@ def marched(problem: Problem) -> tuple[tuple[Frame, ...], StepEstimate | None]:
 
 def limits(model: Model, dofs: float, contact_points: float) -> tuple[int, int]:
     """Fewest and most automatic increments of a leg; by the size of the problem, so that every run has the same."""
-    if model.kinematics.finite_strain:
+    if model.formulation.finite_strain:
         return _FIRST_IF_FACTORED, _LARGEST_IF_FACTORED
     dim = 3 if model.domain == "solid" else 2
-    if dim == 3 and not getattr(model.kinematics, "bulk", True):
+    if dim == 3 and not getattr(model.formulation, "bulk", True):
         return _FIRST, 4 * _FIRST  # every length of increments takes a condensation of its own
     budget = WORTH_S[dim] + condensation_s(dofs, dim)
     most = budget / contact_s(contact_points, dim) / len(model.legs)
@@ -197,7 +197,7 @@ def condensation_s(dofs: float, dim: int) -> float:
     return 6.0 * (dofs / 85_000.0) ** 1.75 if dim == 3 else 0.004 + 8e-6 * dofs
 
 
-def _ends(problem: Problem, frames: tuple[Frame, ...]) -> tuple[Frame, ...]:
+def _ends(problem: Problem, frames: tuple[StepResult, ...]) -> tuple[StepResult, ...]:
     """The frame at the end of every leg."""
     out, at = [], 0
     for leg in problem.model.legs:
@@ -206,7 +206,7 @@ def _ends(problem: Problem, frames: tuple[Frame, ...]) -> tuple[Frame, ...]:
     return tuple(out)
 
 
-def _estimate(problem: Problem, levels: Sequence[tuple[int, tuple[Frame, ...]]]) -> StepEstimate:
+def _estimate(problem: Problem, levels: Sequence[tuple[int, tuple[StepResult, ...]]]) -> StepEstimate:
     used = levels[-(_PAIRS[problem.dim] + 1) :]
     counts = [count for count, _ in used]
     told = [[_numbers(problem, frame) for frame in ends] for _, ends in used]
@@ -234,7 +234,7 @@ def _estimate(problem: Problem, levels: Sequence[tuple[int, tuple[Frame, ...]]])
     )  # fmt: skip
 
 
-def _numbers(problem: Problem, frame: Frame) -> dict[str, float]:
+def _numbers(problem: Problem, frame: StepResult) -> dict[str, float]:
     """Numbers that the increments are chosen by."""
     numbers = measure(problem.points, frame)
     names = ("normal_force_N", "friction_sum_N", "dissipation_mJ", "external_work_mJ")
@@ -284,7 +284,7 @@ def other_counts(here_s: float, beside_s: float, budget: float) -> tuple[bool, s
     return next(affordable, (False, "down"))
 
 
-def last_frame(problem: Problem) -> Frame:
+def last_frame(problem: Problem) -> StepResult:
     """March to the end.
 
     Raises

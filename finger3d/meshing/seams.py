@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.geometry.faceted import Faceted
-from finger3d.geometry.implicit import Plane
+from finger3d.geometry.implicit import ImplicitPlane
 from finger3d.geometry.surface import Triangles
-from finger3d.geometry.tessellate import Body
+from finger3d.geometry.tessellate import Tessellation
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -31,9 +31,9 @@ _PINNED = ("base", "symmetry_x", "symmetry_z")  # exactly planar, whatever runs 
 class Seams:
     """The seams of a body, sampled where its tessellation has points on them."""
 
-    def __init__(self, body: Body) -> None:
+    def __init__(self, body: Tessellation) -> None:
         self.faces = body.faces
-        self.pinned = np.array([f.label in _PINNED and isinstance(f.surface, Plane) for f in body.faces])
+        self.pinned = np.array([f.label in _PINNED and isinstance(f.surface, ImplicitPlane) for f in body.faces])
         self._triangles = [Triangles(body.points, body.triangles[body.face == i]) for i in range(len(body.faces))]
         self._samples: dict[tuple[int, int], tuple[Float, Bool]] = {}
         if any(isinstance(f.surface, Faceted) for f in body.faces):

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from finger3d.fem.quality import cell_angles_deg, curved_jacobians
 from finger3d.fem.simplex import EDGES, Mesh, boundary, quadratic
 from finger3d.geometry.faceted import Faceted, moved_onto
-from finger3d.geometry.implicit import Plane
-from finger3d.geometry.tessellate import Body, CadFace
+from finger3d.geometry.implicit import ImplicitPlane
+from finger3d.geometry.tessellate import CadFace, Tessellation
 from finger3d.meshing.seams import Seams
 
 Float = NDArray[np.float64]
@@ -37,7 +37,7 @@ class UnusableMeshError(Exception):
     """This mesh will not do; another attempt may."""
 
 
-def snap(points: Float, tets: Int, body: Body) -> Mesh:
+def snap(points: Float, tets: Int, body: Tessellation) -> Mesh:
     """The quadratic mesh with labelled facets, on the CAD surfaces, made from linear tets near them.
 
     Raises
@@ -88,7 +88,7 @@ def check_closed(faces: Int) -> None:
         raise UnusableMeshError("its boundary is not closed")
 
 
-def _cad_faces(points: Float, faces: Int, body: Body, sets: Bool | None = None) -> Int:
+def _cad_faces(points: Float, faces: Int, body: Tessellation, sets: Bool | None = None) -> Int:
     """Number of the CAD face (m,) under every boundary facet; of those all its nodes lie on, if `sets` is given."""
     a, b, c = (points[faces[:, i]] for i in range(3))
     normal = np.cross(b - a, c - a)
@@ -111,7 +111,7 @@ def _cad_faces(points: Float, faces: Int, body: Body, sets: Bool | None = None) 
     return np.argmin(cost, axis=0)
 
 
-def _node_sets(points: Float, faces: Int, owner: Int, body: Body) -> Bool:
+def _node_sets(points: Float, faces: Int, owner: Int, body: Tessellation) -> Bool:
     """Which CAD faces (n, f) every node belongs to; each CAD corner takes its nearest boundary node."""
     sets = np.zeros((len(points), len(body.faces)), dtype=bool)
     sets[faces.ravel(), np.repeat(owner, 3)] = True
@@ -181,7 +181,7 @@ def _moved(points: Float, sets: Bool, faces: tuple[CadFace, ...]) -> tuple[Float
             p = p - np.einsum("nxk,nk->nx", inverse, distance)
         missed[at] = ~(np.abs(distance).max(axis=1) <= 1e-7 * scale)
         for f in chosen:
-            if isinstance(f.surface, Plane) and f.surface.axis is not None:
+            if isinstance(f.surface, ImplicitPlane) and f.surface.axis is not None:
                 p[:, f.surface.axis] = f.surface.origin[f.surface.axis]
         points[at] = p
     return points, missed

@@ -28,7 +28,7 @@ from finger3d.meshing.report import MeshReport, report
 from finger3d.meshing.sizing import Sizing, forecast, rounded_zone, sizing
 
 if TYPE_CHECKING:
-    from finger3d.geometry.tessellate import Body
+    from finger3d.geometry.tessellate import Tessellation
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -115,7 +115,7 @@ def box(design: Any, symmetry: tuple[str, ...]) -> tuple[Float, Float]:
     return low, high
 
 
-def _body(design: Any, symmetry: tuple[str, ...], field: Sizing) -> tuple[Body, float]:
+def _body(design: Any, symmetry: tuple[str, ...], field: Sizing) -> tuple[Tessellation, float]:
     """The tessellated part, and the envelope fTetWild shall keep, per diagonal."""
     from finger3d.geometry.cad import cut, labelled_faces
     from finger3d.geometry.faceted import coarser

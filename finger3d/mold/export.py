@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from finger3d.errors import Finger3dError
 from finger3d.mold.options import MoldOptions
-from finger3d.progress import Report
+from finger3d.progress import Progress
 
 if TYPE_CHECKING:
     from finger3d.mold.shell import Shell
@@ -46,7 +46,7 @@ def export(
     mold: MoldOptions | None = None,
     text: bool = False,
     tolerance_mm: float = 0.05,
-    report: Report | None = None,
+    report: Progress | None = None,
 ) -> Exported:
     """Write finger.step and finger.stl and, if asked, a mold's parts, plate, sheet and picture; all in mm.
 
@@ -77,7 +77,7 @@ def export(
     from finger3d.io import claimed
     from finger3d.mold.shell import Shell, shell, write_step, write_stl
 
-    out, report, design = Path(out), report or Report(), scene.design
+    out, report, design = Path(out), report or Progress(), scene.design
     if not _SMALLEST_MM <= tolerance_mm <= _LARGEST * design.height_mm:
         raise Finger3dError(
             f"--tolerance-mm {tolerance_mm}: must be from {_SMALLEST_MM:g} to {_LARGEST * design.height_mm:.4g}, "

@@ -13,7 +13,7 @@ from finger3d.mold.parts import Mold, strips
 from finger3d.mold.sheet import oversize, sheet
 from finger3d.mold.shell import Shell, shell, write_3mf, write_step, write_stl
 from finger3d.plotting.mold import picture
-from finger3d.progress import Report
+from finger3d.progress import Progress
 
 Float = NDArray[np.float64]
 
@@ -50,7 +50,7 @@ def plate(printed: dict[str, Shell]) -> tuple[dict[str, Shell], Float]:
 
 
 def write_mold(
-    title: str, made: Mold, body: Shell, out: Path, text: bool, report: Report
+    title: str, made: Mold, body: Shell, out: Path, text: bool, report: Progress
 ) -> tuple[list[Path], list[str]]:
     """Write all files of a mold; returns them, and remarks for the user.
 

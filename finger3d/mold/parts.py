@@ -46,7 +46,7 @@ _PROBE = 0.01  # mm
 
 
 @dataclass(frozen=True)
-class Foil:
+class FoilSlot:
     """The strip that carries one gauge's foil, or several, through both walls: its section in x and y, unshrunk, mm.
 
     Attributes
@@ -95,7 +95,7 @@ class Mold:
     body: Any
     parts: dict[str, Any]
     slots: tuple[Any, ...]
-    foils: tuple[Foil, ...]
+    foils: tuple[FoilSlot, ...]
     ports: Ports
     pegs: tuple[Any, ...]
     holes: tuple[Any, ...]
@@ -109,7 +109,7 @@ class Mold:
         return volume(self.body)
 
 
-def mold(solid: Any, gauges: Sequence[Foil], options: MoldOptions) -> Mold:
+def mold(solid: Any, gauges: Sequence[FoilSlot], options: MoldOptions) -> Mold:
     """Build a mold around a finger (y up, base on y = 0, mm).
 
     Raises
@@ -142,7 +142,7 @@ def mold(solid: Any, gauges: Sequence[Foil], options: MoldOptions) -> Mold:
     return made
 
 
-def _assemble(body: Any, foils: tuple[Foil, ...], options: MoldOptions) -> Mold:
+def _assemble(body: Any, foils: tuple[FoilSlot, ...], options: MoldOptions) -> Mold:
     low, high = box(body)
     w, split = options.wall_mm, options.split_mm * options.scale
     places, top = _peg_places(low, high, options)
@@ -205,13 +205,13 @@ def _peg_places(low: Float, high: Float, options: MoldOptions) -> tuple[list[tup
     return [(x, y) for y in rows for x in sides], max(float(high[1]) + w, far + around)
 
 
-def _slot(foil: Foil, options: MoldOptions, z_low: float, z_high: float) -> Any:
+def _slot(foil: FoilSlot, options: MoldOptions, z_low: float, z_high: float) -> Any:
     """The strip with its gaps, through both walls; where it lies is scaled, the strip itself does not shrink."""
     gap = 2.0 * options.slot_gap_mm
     return _strip(foil, options.scale, foil.length_mm + gap, foil.thickness_mm + gap, float(z_low), float(z_high))
 
 
-def _strip(foil: Foil, scale: float, length: float, thickness: float, z_low: float, z_high: float) -> Any:
+def _strip(foil: FoilSlot, scale: float, length: float, thickness: float, z_low: float, z_high: float) -> Any:
     from build123d import Box, Pos, Rot
 
     at = Pos(foil.x_mm * scale, foil.y_mm * scale, 0.5 * (z_low + z_high))
@@ -289,7 +289,9 @@ def _check_split(solid: Any, options: MoldOptions) -> None:
         )
 
 
-def foils(gauges: Sequence[Gauge], options: MoldOptions, section_mm: tuple[float, float] | None) -> tuple[Foil, ...]:
+def foils(
+    gauges: Sequence[Gauge], options: MoldOptions, section_mm: tuple[float, float] | None
+) -> tuple[FoilSlot, ...]:
     """Strips of a scene's gauges; gauges that differ in z only share one.
 
     Parameters
@@ -302,15 +304,15 @@ def foils(gauges: Sequence[Gauge], options: MoldOptions, section_mm: tuple[float
         key = (g.x_mm, g.y_mm, g.angle % np.pi, g.length_mm)
         strips.setdefault(tuple(round(v, 9) for v in key), []).append(g)
 
-    def strip(on: list[Gauge]) -> Foil:
+    def strip(on: list[Gauge]) -> FoilSlot:
         g, length = on[0], on[0].length_mm or options.foil_length_mm
         names, z = tuple(g.name for g in on), tuple(g.z_mm for g in on)
-        return Foil(names, g.x_mm, g.y_mm, z, g.angle, length, thickness, width)
+        return FoilSlot(names, g.x_mm, g.y_mm, z, g.angle, length, thickness, width)
 
     return tuple(strip(on) for on in strips.values())
 
 
-def _check_foils(body: Any, foils: tuple[Foil, ...], options: MoldOptions) -> None:
+def _check_foils(body: Any, foils: tuple[FoilSlot, ...], options: MoldOptions) -> None:
     gap = 2.0 * options.slot_gap_mm
     low, high = box(body)
     slots = []

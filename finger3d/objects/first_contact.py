@@ -27,17 +27,18 @@ _NOTHING = 1e-9  # of the finger's extent: a contact as narrow as this has no ar
 
 
 @dataclass(frozen=True)
-class Approach:
+class InitialContact:
     """How an object comes near: height (mm) of its lowest point at first touch, and the box that it will overlap.
 
     Attributes
     ----------
-    zone : (x_min, x_max, z_min, z_max) mm over which the rigid object would overlap the finger at rest on its way
+    contact_box : (x_min, x_max, z_min, z_max) mm over which the rigid object would overlap the finger at rest on its
+        way
     place : (x, z) mm of first touch
     """
 
-    touch_mm: float
-    zone: tuple[float, float, float, float]
+    first_contact_mm: float
+    contact_box: tuple[float, float, float, float]
     place: tuple[float, float]
 
 
@@ -91,7 +92,9 @@ def _apart(at: Float, value: Float, distance: Float) -> Float:
     return np.array(kept).reshape(-1, 2) if kept else at[order[:1]]
 
 
-def first_touch(top: Top, obj: RigidObject, half_length: float, half_width: float, marks: Float | None = None) -> float:
+def first_contact_height(
+    top: Top, obj: RigidObject, half_length: float, half_width: float, marks: Float | None = None
+) -> float:
     """Height (mm) of the object's lowest point at first touch: the largest difference of the two surfaces.
 
     The maximum is searched on a grid and at corners that stand out, then on finer grids around the best places.
@@ -104,15 +107,16 @@ def first_touch(top: Top, obj: RigidObject, half_length: float, half_width: floa
     return _touching(top, obj, half_length, half_width, marks)[0]
 
 
-def approach(
+def initial_contact(
     top: Top,
     obj: RigidObject,
     half_length: float,
     half_width: float,
     path: Float,
     marks: Float | None = None,
-) -> Approach:
-    """First touch, as in :func:`first_touch`, of an object that then goes a way which the vertical gap can describe.
+) -> InitialContact:
+    """First touch, as in :func:`first_contact_height`, of an object that then goes a way which the vertical gap can
+    describe.
 
     Parameters
     ----------
@@ -130,7 +134,7 @@ def approach(
             "never touches; change x_mm, z_mm"
         )
     if isinstance(obj, Plane):  # it has no end that could hang down, and its gap is measured along its own normal
-        return Approach(touch, _box(top, obj, half_length, half_width, touch, place, path), _pair(place))
+        return InitialContact(touch, _box(top, obj, half_length, half_width, touch, place, path), _pair(place))
     deepest = float(path[:, 0].max())
     if touch <= deepest:
         raise Finger3dError(
@@ -140,7 +144,7 @@ def approach(
     zone = _box(top, obj, half_length, half_width, touch, place, path)
     _not_a_wall(obj, place, half_length, half_width)
     _no_side(top, obj, touch, path, half_length, half_width)
-    return Approach(touch, zone, _pair(place))
+    return InitialContact(touch, zone, _pair(place))
 
 
 def _pair(place: Float) -> tuple[float, float]:

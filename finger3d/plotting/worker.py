@@ -23,7 +23,7 @@ from finger3d._process import child_environment
 _PATIENCE_S = 20.0  # for pictures that were begun when the user interrupted
 
 
-class Artist:
+class PlotWorker:
     """Calls functions that draw, in a child process unless matplotlib is loaded in this one already.
 
     A child that fails costs time, but no picture: the calls are then made here, where an error says what is wrong.

@@ -42,7 +42,7 @@ _SHORT = 18  # letters of a cell that is not broken into lines
 
 
 @dataclass(frozen=True)
-class Row:
+class HeadlineRow:
     """A number (or text) of the headline: what it is, its unit, and its error in the same unit, if one is known."""
 
     name: str
@@ -82,7 +82,7 @@ Part = str | Table | Figure | Code
 
 
 @dataclass(frozen=True)
-class Section:
+class PageSection:
     """A heading and what stands under it: paragraphs, tables, pictures, code; `folded` hides it behind the heading."""
 
     title: str
@@ -93,8 +93,8 @@ class Section:
 def write_page(
     folder: str | Path,
     title: str,
-    headline: Sequence[Row] = (),
-    sections: Sequence[Section] = (),
+    headline: Sequence[HeadlineRow] = (),
+    sections: Sequence[PageSection] = (),
     figures: Sequence[Figure] = (),
     view: View3D | None = None,
     charts: Sequence[Chart] = (),
@@ -143,8 +143,8 @@ def write_page(
     body += [_figures(folder, figures), _grid(chart.html() for chart in charts)]
     found = installed() if versions is None else versions
     closing = [
-        Section("Versions", [", ".join(f"{k} {v}" for k, v in found.items())]),
-        Section("How to cite", [f"{CITE}, version {found.get('finger3d', 'unknown')}.", f"{PAPER}."]),
+        PageSection("Versions", [", ".join(f"{k} {v}" for k, v in found.items())]),
+        PageSection("How to cite", [f"{CITE}, version {found.get('finger3d', 'unknown')}.", f"{PAPER}."]),
     ]
     body += [_section(folder, s) for s in (*sections, *closing)]
     scripts = [view.script()] if view is not None else []
@@ -192,12 +192,12 @@ def _plotly() -> bytes:
     return library.read_bytes().replace(b"</script", b"<\\/script")
 
 
-def _card(row: Row) -> str:
+def _card(row: HeadlineRow) -> str:
     unit = f' <span class="unit">{escape(row.unit)}</span>' if row.unit else ""
     return f"<div><dt>{escape(row.name)}</dt><dd>{escape(number(row.value, row.error))}{unit}</dd></div>"
 
 
-def _section(folder: Path, section: Section) -> str:
+def _section(folder: Path, section: PageSection) -> str:
     inside = "".join(_part(folder, part) for part in section.parts)
     title = f"<h2>{escape(section.title)}</h2>"
     if section.folded:

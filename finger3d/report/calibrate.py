@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from finger3d.report.build import Code, Figure, Row, Section, Table, write_page
+from finger3d.report.build import Code, Figure, HeadlineRow, PageSection, Table, write_page
 from finger3d.report.scene import how_modelled
 from finger3d.results.summary import read_json, title_of
 
@@ -27,14 +27,14 @@ def calibrate_page(folder: str | Path) -> Path:
     known = [(i, s) for i, s in enumerate(sd) if s is not None]
     best = min(known, key=lambda pair: pair[1], default=None)
     headline = [
-        Row(f"mu within {data['resolution_limit']:g}, all tolerances", ranges["trusted"]),
-        Row("the same from strain noise alone", ranges["usable"]),
-        Row(f"strain at mu = {mu[0]:g}", strain[0]),
-        Row(f"strain at mu = {mu[-1]:g}", strain[-1]),
-        Row("residual of the second-order fit, rms", f"{data['fit']['residual_rms']:.2g}"),
+        HeadlineRow(f"mu within {data['resolution_limit']:g}, all tolerances", ranges["trusted"]),
+        HeadlineRow("the same from strain noise alone", ranges["usable"]),
+        HeadlineRow(f"strain at mu = {mu[0]:g}", strain[0]),
+        HeadlineRow(f"strain at mu = {mu[-1]:g}", strain[-1]),
+        HeadlineRow("residual of the second-order fit, rms", f"{data['fit']['residual_rms']:.2g}"),
     ]
     if best:
-        headline.append(Row(f"mu \u00b1 at mu = {mu[best[0]]:.3g}, all tolerances", f"{best[1]:.2g}"))
+        headline.append(HeadlineRow(f"mu \u00b1 at mu = {mu[best[0]]:.3g}, all tolerances", f"{best[1]:.2g}"))
     a, b, c = data["fit"]["coefficients"]
     curve = Table(
         ("mu", "strain", "resolution of mu", "sd of mu"), list(zip(mu, strain, data["resolution"], sd, strict=True))
@@ -50,10 +50,10 @@ def calibrate_page(folder: str | Path) -> Path:
         f"{title_of(data['scene'])}: gauge {data['gauge']} against friction",
         headline,
         [
-            Section("Verdict", [data["verdict"]]),
-            Section("Curve", [f"Second order: strain = {a:.5g} {b:+.5g} mu {c:+.5g} mu\u00b2", curve, causes]),
-            Section("Scene", how_modelled(data, folder)),
-            Section("Use it", [Code(use)]),
+            PageSection("Verdict", [data["verdict"]]),
+            PageSection("Curve", [f"Second order: strain = {a:.5g} {b:+.5g} mu {c:+.5g} mu\u00b2", curve, causes]),
+            PageSection("Scene", how_modelled(data, folder)),
+            PageSection("Use it", [Code(use)]),
         ],
         [Figure("calibration.png", "Strain and fit, resolution, and what the uncertainty of mu is made of"),
          Figure("map.png", "Where strains follow friction")],

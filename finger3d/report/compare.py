@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from finger3d.report.build import Figure, Row, Section, Table, number, write_page
+from finger3d.report.build import Figure, HeadlineRow, PageSection, Table, number, write_page
 from finger3d.report.scene import how_modelled
 from finger3d.results.summary import read_json, title_of
 
@@ -26,7 +26,7 @@ def compare_page(folder: str | Path) -> Path:
     own = data["scene"]["finger"].get("width_mm")
     cases = [c for c in data["cases"] if c["numbers"]]
     headline = [
-        Row(f"force per width, {c['model']}", c["numbers"][_FORCE], "N/mm", c["errors"].get(_FORCE))
+        HeadlineRow(f"force per width, {c['model']}", c["numbers"][_FORCE], "N/mm", c["errors"].get(_FORCE))
         for c in cases
         if c["width_mm"] == own and c["model"] != "solid, ends held"
     ]
@@ -45,9 +45,9 @@ def compare_page(folder: str | Path) -> Path:
         f"{title_of(data['scene'])}: 2D against 3D",
         headline,
         [
-            Section("Verdict", list(data["verdict"])),
-            Section("Scene", how_modelled(data, folder)),
-            Section("Every case", [proof, _BARS, Table(head, rows)]),
+            PageSection("Verdict", list(data["verdict"])),
+            PageSection("Scene", how_modelled(data, folder)),
+            PageSection("Every case", [proof, _BARS, Table(head, rows)]),
         ],
         [Figure("compare.png", "Force against width, tractions along x, and every quantity beside the solid's")],
         command="compare",

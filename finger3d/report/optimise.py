@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from finger3d.report.build import Code, Figure, Row, Section, Table, write_page
+from finger3d.report.build import Code, Figure, HeadlineRow, PageSection, Table, write_page
 from finger3d.results.summary import read_json, read_rows, title_of
 
 _MOST_ROWS = 10
@@ -17,7 +17,7 @@ _SENSITIVITY = (
 )
 
 
-def design_page(folder: str | Path) -> Path:
+def optimise_page(folder: str | Path) -> Path:
     """Write report.html of a search.
 
     Raises
@@ -32,11 +32,11 @@ def design_page(folder: str | Path) -> Path:
     bounds = {key: (low, high) for key, low, high in search["free"]}
     objective = Path(found["objective"]).name
     headline = [
-        Row(f"objective ({objective})", found["best"]),
-        Row("objective at the start", "none" if found["start"] is None else found["start"]),
-        *(Row(key, value) for key, value in found["values"].items()),
-        Row("designs judged", str(len(rows))),
-        Row("bodies condensed", str(found["bodies"])),
+        HeadlineRow(f"objective ({objective})", found["best"]),
+        HeadlineRow("objective at the start", "none" if found["start"] is None else found["start"]),
+        *(HeadlineRow(key, value) for key, value in found["values"].items()),
+        HeadlineRow("designs judged", str(len(rows))),
+        HeadlineRow("bodies condensed", str(found["bodies"])),
         *_increments(found.get("increments") or {}),
     ]
     free = [
@@ -54,9 +54,9 @@ def design_page(folder: str | Path) -> Path:
         f"{title_of(search['scene'])}: design for {objective}",
         headline,
         [
-            Section("Free keys", [*told, Table(("key", "from", "to", "start", "best", ""), free)]),
-            Section("The best designs", [*said, *parts]),
-            Section("Use it", [Code(f"finger3d press {best_scene} --out {folder / 'pressed'}"),
+            PageSection("Free keys", [*told, Table(("key", "from", "to", "start", "best", ""), free)]),
+            PageSection("The best designs", [*said, *parts]),
+            PageSection("Use it", [Code(f"finger3d press {best_scene} --out {folder / 'pressed'}"),
                                Code(best_scene.read_text(encoding="utf-8"), "best.toml")]),
         ],
         [Figure("design.png", "The search")],
@@ -66,12 +66,12 @@ def design_page(folder: str | Path) -> Path:
     )  # fmt: skip
 
 
-def _increments(found: Mapping[str, Any]) -> list[Row]:
+def _increments(found: Mapping[str, Any]) -> list[HeadlineRow]:
     """How many a press of the best design has, and the error that they leave."""
     if not found:
         return []
     steps = ", ".join(map(str, found["steps"]))
-    return [Row(f"error of the strain with {steps} increments", f"{found['strain_error'] or math.nan:.2g}")]
+    return [HeadlineRow(f"error of the strain with {steps} increments", f"{found['strain_error'] or math.nan:.2g}")]
 
 
 def _at_a_bound(value: float, low: float, high: float) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from finger3d.contact.conditions import TOLERANCE
 from finger3d.contact.friction import OPEN, STATUS_NAMES
-from finger3d.report.build import Figure, Row, Section, Table, write_page
+from finger3d.report.build import Figure, HeadlineRow, PageSection, Table, write_page
 from finger3d.report.scene import how_modelled
 from finger3d.report.view3d import view_of
 from finger3d.results.states import States, load_states
@@ -54,11 +54,11 @@ def press_page(folder: str | Path) -> Path:
     states = load_states(source) if source.exists() else None
     last = f" after step {steps.index(good[-1]) + 1}, {good[-1]['depth_mm']:.4g} mm deep" if good else ""
     sections = [
-        Section("Scene", [*how_modelled(summary, folder)]),
+        PageSection("Scene", [*how_modelled(summary, folder)]),
         *([_proof(steps, states, good)] if steps else []),
         *_error_bars(summary),
         *([_steps(good)] if good else []),
-        Section("Mesh and cost", [_mesh(summary["mesh"]), _cost(summary["cost"])]),
+        PageSection("Mesh and cost", [_mesh(summary["mesh"]), _cost(summary["cost"])]),
     ]
     return write_page(
         folder,
@@ -75,16 +75,16 @@ def press_page(folder: str | Path) -> Path:
     )
 
 
-def headline(step: Mapping[str, Any], errors: Mapping[str, float]) -> list[Row]:
+def headline(step: Mapping[str, Any], errors: Mapping[str, float]) -> list[HeadlineRow]:
     """The numbers of a step by name, with errors where they were estimated; net friction only where there is some."""
     rows = []
     for key, (name, factor, unit) in _HEADLINE.items():
         if key.startswith("tangential") and abs(step[key]) <= 1e-9 * max(step["friction_sum_N"], 1e-300):
             continue
         error = errors.get(key)
-        rows.append(Row(name, factor * step[key], unit, None if error is None else factor * error))
+        rows.append(HeadlineRow(name, factor * step[key], unit, None if error is None else factor * error))
     return rows + [
-        Row(f"strain of gauge {name}", "unknown" if strain is None else strain, "", errors.get(f"gauge_{name}"))
+        HeadlineRow(f"strain of gauge {name}", "unknown" if strain is None else strain, "", errors.get(f"gauge_{name}"))
         for name, strain in step["gauges"].items()
     ]
 
@@ -94,7 +94,7 @@ def _what_bars_leave_out(summary: Mapping[str, Any]) -> list[str]:
     return ["What follows ± is the error by mesh and increments, not by what the model leaves out."] if known else []
 
 
-def _error_bars(summary: Mapping[str, Any]) -> list[Section]:
+def _error_bars(summary: Mapping[str, Any]) -> list[PageSection]:
     """How each error splits into that of the mesh and that of the increments, and how they were found."""
     estimate = summary.get("error_estimate") or {}
     if not estimate:
@@ -102,10 +102,10 @@ def _error_bars(summary: Mapping[str, Any]) -> list[Section]:
     mesh, steps = estimate.get("discretisation") or {}, estimate.get("steps") or {}
     rows = [(name, value, steps.get(name)) for name, value in mesh.items() if value is not None]
     table = [Table(("error, in the unit of the name", "of the mesh", "of the increments"), rows)] if rows else []
-    return [Section("Error bars", [f"What follows ± is both added. How: {estimate.get('method', '')}", *table])]
+    return [PageSection("Error bars", [f"What follows ± is both added. How: {estimate.get('method', '')}", *table])]
 
 
-def _proof(steps: Sequence[Mapping[str, Any]], states: States | None, good: Sequence[Mapping[str, Any]]) -> Section:
+def _proof(steps: Sequence[Mapping[str, Any]], states: States | None, good: Sequence[Mapping[str, Any]]) -> PageSection:
     worst = max((s["residual"] for s in good if s["residual"] is not None), default=None)
     parts: list[Any] = [
         "Every contact point is either open (gap > 0, no force) or touches (gap 0, pressure > 0); one that touches "
@@ -127,7 +127,7 @@ def _proof(steps: Sequence[Mapping[str, Any]], states: States | None, good: Sequ
         for k, step in enumerate(steps, start=1)
     ]  # fmt: skip
     head = ("step", "depth (mm)", "residual", f"≤ {TOLERANCE:g}", "iterations", "method", "outcome")
-    return Section("Proof of the contact conditions", [*parts, Table(head, rows)])
+    return PageSection("Proof of the contact conditions", [*parts, Table(head, rows)])
 
 
 def _last_state(states: States) -> Table:
@@ -145,7 +145,7 @@ def _last_state(states: States) -> Table:
     return Table(("in the last step", "", ""), rows)
 
 
-def _steps(good: Sequence[Mapping[str, Any]]) -> Section:
+def _steps(good: Sequence[Mapping[str, Any]]) -> PageSection:
     keys = {
         "depth_mm": "depth (mm)", "slide_x_mm": "slide x (mm)", "slide_z_mm": "slide z (mm)", "time_s": "time (s)",
         "normal_force_N": "normal force (N)", "tangential_force_x_N": "friction x (N)",
@@ -158,7 +158,7 @@ def _steps(good: Sequence[Mapping[str, Any]]) -> Section:
     gauges = list(good[-1]["gauges"])
     rows = [[float(s[k]) for k in shown] + [s["gauges"].get(g) for g in gauges] for s in good]
     table = Table([*(keys[k] for k in shown), *(f"strain {g}" for g in gauges)], rows)
-    return Section("Every step", ["The same numbers, and more, with all digits: history.csv.", table], folded=True)
+    return PageSection("Every step", ["The same numbers, and more, with all digits: history.csv.", table], folded=True)
 
 
 def _mesh(mesh: Mapping[str, Any]) -> Table:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from finger3d.report.build import Code, Row, Section, Table, write_page
+from finger3d.report.build import Code, HeadlineRow, PageSection, Table, write_page
 from finger3d.report.chart import Chart, Line
 from finger3d.results.summary import read_json, read_rows, title_of
 
@@ -31,9 +31,12 @@ def sweep_page(folder: str | Path) -> Path:
     forces = [float(row["normal_force_N"]) for row in rows if row["outcome"] == "converged"]
     names = [*data["vary"], "normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm"]
     names += [name for name in (rows[0] if rows else {}) if name.startswith("gauge_")] + ["outcome"]
-    headline = [Row("points", f"{len(rows)} of {data['points']}"), Row("bodies", str(len(data["bodies"])))]
+    headline = [
+        HeadlineRow("points", f"{len(rows)} of {data['points']}"),
+        HeadlineRow("bodies", str(len(data["bodies"]))),
+    ]
     if forces:
-        headline.append(Row("normal force", f"{min(forces):.4g} to {max(forces):.4g}", "N"))
+        headline.append(HeadlineRow("normal force", f"{min(forces):.4g} to {max(forces):.4g}", "N"))
     shown = [tuple(_number(row.get(name, "")) for name in names) for row in rows[:_MOST_ROWS]]
     more = [f"The first {_MOST_ROWS} of {len(rows)} points; all are in results.csv."] if len(rows) > _MOST_ROWS else []
     varied = [(key, ", ".join(values)) for key, values in data["vary"].items()]
@@ -42,9 +45,9 @@ def sweep_page(folder: str | Path) -> Path:
         f"{title_of(data['scene'])}: sweep over {', '.join(data['vary'])}",
         headline,
         [
-            Section("Points", [*more, Table(tuple(names), shown)]),
-            Section("Varied", [Table(("key", "values"), varied)]),
-            Section("Scene", [Code(json.dumps(data["scene"], indent=2), "the scene that was varied")]),
+            PageSection("Points", [*more, Table(tuple(names), shown)]),
+            PageSection("Varied", [Table(("key", "values"), varied)]),
+            PageSection("Scene", [Code(json.dumps(data["scene"], indent=2), "the scene that was varied")]),
         ],
         charts=sweep_charts(rows, list(data["vary"])),
         command="sweep",

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from finger3d.errors import Finger3dError
 from finger3d.fem.simplex import Mesh, middles
 from finger3d.io import atomic, read_arrays
-from finger3d.mechanics.history import Frame, contact_table
+from finger3d.mechanics.history import StepResult, contact_table
 from finger3d.mechanics.problem import Problem
 
 Array = NDArray[Any]
@@ -86,7 +86,9 @@ def chosen(count: int, most: int = MOST) -> list[int]:
     return np.unique(np.round(np.linspace(count - 1, 0, min(count, most))).astype(int)).tolist() if count else []
 
 
-def states_of(problem: Problem, frames: Sequence[Frame], mesh: Mesh, parent: Array, sign: Array, last: Array) -> States:
+def states_of(
+    problem: Problem, frames: Sequence[StepResult], mesh: Mesh, parent: Array, sign: Array, last: Array
+) -> States:
     """Recover chosen increments.
 
     Parameters
@@ -100,7 +102,7 @@ def states_of(problem: Problem, frames: Sequence[Frame], mesh: Mesh, parent: Arr
     kept = chosen(len(frames))
     u = np.empty((len(kept), *mesh.points.shape), dtype=np.float32)
     parts = [frames[number].part for number in kept[:-1]]
-    for k, unknowns in enumerate(problem.model.kinematics.all_unknowns(problem, parts)):
+    for k, unknowns in enumerate(problem.model.formulation.all_unknowns(problem, parts)):
         u[k] = displacement(problem.mesh, unknowns)[parent] * sign
     u[-1] = last
     tables = [contact_table(problem.points, frames[i].state) for i in kept]

@@ -2,4 +2,8 @@
 
 from finger3d.scene.scene import Scene, load, parse
 
-__all__ = ["Scene", "load", "parse"]
+__all__ = [
+    "Scene",
+    "load",
+    "parse",
+]

@@ -14,7 +14,7 @@ import annotated_types as at
 from pydantic import ValidationError
 
 from finger3d._ranges import Zero, number
-from finger3d.scene.tables import Table
+from finger3d.scene.tables import TomlTable
 
 Place = tuple[str | int, ...]
 
@@ -134,12 +134,12 @@ def described(hint: Any) -> str:
 
 
 def _is_table(hint: Any) -> bool:
-    return isinstance(hint, type) and issubclass(hint, Table)
+    return isinstance(hint, type) and issubclass(hint, TomlTable)
 
 
-def _target(table: type[Table], place: Place) -> tuple[Place, type[Table], Any]:
+def _target(table: type[TomlTable], place: Place) -> tuple[Place, type[TomlTable], Any]:
     """Follow `place` from `table`: the part of it that a user typed, the table that holds its key, the key's type."""
-    holder: type[Table] = table
+    holder: type[TomlTable] = table
     hint: Any = table
     typed: list[str | int] = []
     for part in place:
@@ -165,7 +165,7 @@ def _value(tree: Any, place: Place) -> Any:
 
 
 def worded(
-    error: ValidationError, table: type[Table], tree: Any, under: Place, also: Sequence[str] = ()
+    error: ValidationError, table: type[TomlTable], tree: Any, under: Place, also: Sequence[str] = ()
 ) -> dict[Place, str]:
     """Word the findings of a check of `tree` (which stands at `under` in the file) against `table`.
 

@@ -20,7 +20,7 @@ from finger3d.scene.tables import (
     MaterialTable,
     MeshTable,
     ObjectTable,
-    Table,
+    TomlTable,
     table_of,
 )
 
@@ -62,7 +62,7 @@ def _tables() -> Iterator[tuple[str, list[_Row]]]:
         yield f"[effects.{name}]", rows or [("", "no keys", "", (effect.__doc__ or "").split(": none. ")[-1])]
 
 
-def _rows(table: type[Table], documented: type | None = None) -> list[_Row]:
+def _rows(table: type[TomlTable], documented: type | None = None) -> list[_Row]:
     hints = typing.get_type_hints(table, include_extras=True)
     said = _said(documented or table)
     return [

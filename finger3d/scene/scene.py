@@ -18,7 +18,7 @@ from finger3d.errors import Finger3dError
 from finger3d.geometry.files import SUFFIXES
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import Domain, Gauge, Leg, Material, MeshOptions, Model
-from finger3d.objects import RigidObject, approach
+from finger3d.objects import RigidObject, initial_contact
 from finger3d.scene import checks, files, tree
 from finger3d.scene.messages import Place, choose, described, dotted, listed, nearest, shown, unknown, worded
 from finger3d.scene.registry import effect_names, effect_type
@@ -30,11 +30,11 @@ from finger3d.scene.tables import (
     ObjectTable,
     PressTable,
     SceneTable,
-    Table,
+    TomlTable,
     table_of,
 )
 
-AnyTable = TypeVar("AnyTable", bound=Table)
+AnyTable = TypeVar("AnyTable", bound=TomlTable)
 
 
 @dataclass(frozen=True, repr=False)
@@ -214,12 +214,12 @@ def _zone(way: Model) -> tuple[float, float, float, float]:
         return _kept_zone(way)
     except TypeError:
         # a surface from a file cannot be looked up
-        return approach(*way.approach).zone
+        return initial_contact(*way.approach).contact_box
 
 
 @functools.lru_cache(maxsize=64)
 def _kept_zone(way: Model) -> tuple[float, float, float, float]:
-    return approach(*way.approach).zone
+    return initial_contact(*way.approach).contact_box
 
 
 def _refusal(lines: list[str], path: Path | None, set_keys: Iterable[str] | Mapping[str, str]) -> Finger3dError:
@@ -243,7 +243,7 @@ def _checked(
         return None
 
 
-def _built(record: Any, settings: Table, place: Place, found: dict[Place, str]) -> Any:
+def _built(record: Any, settings: TomlTable, place: Place, found: dict[Place, str]) -> Any:
     """Build a design or an effect; what its own rules refuse is a mistake like any other."""
     try:
         return record(**dict(settings))
@@ -252,7 +252,7 @@ def _built(record: Any, settings: Table, place: Place, found: dict[Place, str]) 
         return None
 
 
-def _design(geometry: str, dimensions: Table | None, found: dict[Place, str]) -> Any:
+def _design(geometry: str, dimensions: TomlTable | None, found: dict[Place, str]) -> Any:
     """Build the finger from a design, or read it from a file."""
     if dimensions is None:
         return None
@@ -265,7 +265,7 @@ def _design(geometry: str, dimensions: Table | None, found: dict[Place, str]) ->
         return None
 
 
-def _object(placed: Table | None, found: dict[Place, str]) -> RigidObject | None:
+def _object(placed: TomlTable | None, found: dict[Place, str]) -> RigidObject | None:
     """Build the object; what is wrong with its file is a mistake like any other."""
     if not isinstance(placed, ObjectTable):
         return None
@@ -286,7 +286,7 @@ def _shaped(table: Any) -> Any:
 
 def _named(
     given: Mapping[str, Any], name: str, key: str, known: Mapping[str, type], found: dict[Place, str]
-) -> tuple[str, Table | None]:
+) -> tuple[str, TomlTable | None]:
     """Check a table whose `key` says which other keys it takes."""
     given_table = given.get(name)
     if not isinstance(given_table, Mapping):
@@ -323,7 +323,7 @@ def _named(
     elif not isinstance(value, str) or value not in known:
         found[name, key] = choose((name, key), value, list(known))
     else:
-        kind = known[value] if issubclass(known[value], Table) else table_of(known[value])
+        kind = known[value] if issubclass(known[value], TomlTable) else table_of(known[value])
         rest = {k: v for k, v in given_table.items() if k != key}
         return value, _checked(kind, rest, (name,), found, also=(key,))
     return "", None
@@ -344,9 +344,9 @@ def _press(given: Mapping[str, Any], found: dict[Place, str]) -> PressTable | Le
     return _checked(LegsTable, press, ("press",), found)
 
 
-def _effects(given: Mapping[str, Any], found: dict[Place, str]) -> dict[str, tuple[Table, Any]]:
+def _effects(given: Mapping[str, Any], found: dict[Place, str]) -> dict[str, tuple[TomlTable, Any]]:
     """Check the effects that are present; those that are absent are not even imported."""
-    effects: dict[str, tuple[Table, Any]] = {}
+    effects: dict[str, tuple[TomlTable, Any]] = {}
     present = given.get("effects")
     for name, settings in present.items() if isinstance(present, Mapping) else ():
         place = ("effects", name)

@@ -36,13 +36,13 @@ LARGEST = 1e12
 """Largest magnitude of a number of a design or an effect that states no bound of its own."""
 
 
-class Table(BaseModel):
+class TomlTable(BaseModel):
     """A TOML table. Lists arrive as tuples (see `finger3d.scene.tree.read`), so that strictness can stay on."""
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-class MaterialTable(Table):
+class MaterialTable(TomlTable):
     """[material]: nu has no default because the paper gives none.
 
     Attributes
@@ -55,7 +55,7 @@ class MaterialTable(Table):
     nu: Poisson
 
 
-class FrictionTable(Table):
+class FrictionTable(TomlTable):
     """[friction]; without it: none.
 
     Attributes
@@ -66,7 +66,7 @@ class FrictionTable(Table):
     mu: Friction
 
 
-class LegTable(Table):
+class LegTable(TomlTable):
     """[[press.leg]]: a target that is reached from the one before; depth 0 releases the finger.
 
     Attributes
@@ -90,13 +90,13 @@ class PressTable(LegTable):
     depth_mm: Length
 
 
-class LegsTable(Table):
+class LegsTable(TomlTable):
     """[press] with legs."""
 
     leg: Annotated[tuple[LegTable, ...], MinLen(1)]
 
 
-class ContactTable(Table):
+class ContactTable(TomlTable):
     """[contact].
 
     Attributes
@@ -107,7 +107,7 @@ class ContactTable(Table):
     rule: Literal["projection", "paper"] = "projection"
 
 
-class DomainTable(Table):
+class DomainTable(TomlTable):
     """[model].
 
     Attributes
@@ -118,7 +118,7 @@ class DomainTable(Table):
     domain: Domain = "solid"
 
 
-class MeshTable(Table):
+class MeshTable(TomlTable):
     """[mesh]: absent sizes are chosen from the finger (see `finger3d.scene.checks`).
 
     Attributes
@@ -137,7 +137,7 @@ class MeshTable(Table):
     max_seconds: Annotated[float, Ge(1e-3), Le(1e7)] | None = None
 
 
-class GaugeTable(Table):
+class GaugeTable(TomlTable):
     """[[gauge]]: the strain along a direction in the x-y plane; any number of them.
 
     Attributes
@@ -156,7 +156,7 @@ class GaugeTable(Table):
     length_mm: Zero | Length = 0.0
 
 
-class SceneTable(Table):
+class SceneTable(TomlTable):
     """The whole file. Tables whose keys depend on a name are checked afterwards, against that name's own table."""
 
     title: Title | None = None
@@ -172,7 +172,7 @@ class SceneTable(Table):
     effects: dict[str, Any] = {}
 
 
-class ObjectTable(Table):
+class ObjectTable(TomlTable):
     """What every object has: the place of its lowest point.
 
     Attributes
@@ -296,7 +296,7 @@ class MeshObjectTable(ObjectTable):
         return MeshObject(self.x_mm, self.z_mm, surface=surface, path=self.path, scale=self.scale)
 
 
-class FileTable(Table):
+class FileTable(TomlTable):
     """[finger] with a file as its geometry: all dimensions are the file's."""
 
 
@@ -311,14 +311,14 @@ SHAPES: dict[str, type[ObjectTable]] = {
 
 
 @functools.cache
-def table_of(record: type) -> type[Table]:
+def table_of(record: type) -> type[TomlTable]:
     """Return the strict table of a dataclass: a design's dimensions, or an effect's settings."""
     hints = typing.get_type_hints(record, include_extras=True)
     fields: dict[str, Any] = {}
     for f in dataclasses.fields(record):
         default = f.default if f.default_factory is dataclasses.MISSING else f.default_factory()
         fields[f.name] = (_bounded(hints[f.name]), ... if default is dataclasses.MISSING else default)
-    return create_model(record.__name__, __base__=Table, **fields)
+    return create_model(record.__name__, __base__=TomlTable, **fields)
 
 
 def _bounded(hint: Any) -> Any:

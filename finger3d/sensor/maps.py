@@ -19,7 +19,7 @@ from finger3d.fem.elements import gradient, shape
 from finger3d.fem.recover import displacement
 from finger3d.fem.simplex import Mesh
 from finger3d.io import write_csv
-from finger3d.mechanics.history import Frame
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
 
@@ -41,8 +41,8 @@ _NEWTON = 6
 
 def check(model: Model) -> None:
     """Refuse a body whose gauges do not read the small strain of a displacement field."""
-    if model.kinematics.finite_strain:
-        name = dict(model.filled).get("kinematics", "kinematics")
+    if model.formulation.finite_strain:
+        name = dict(model.filled).get("formulation", "formulation")
         raise Finger3dError(f"--map: not with effects.{name}; take the effect out, or the map")
 
 
@@ -144,7 +144,7 @@ class StrainMap:
 
     @classmethod
     def of(
-        cls, problem: Problem, frames: Mapping[float, Frame], pixel_mm: float = PIXEL_MM, z_mm: float = 0.0
+        cls, problem: Problem, frames: Mapping[float, StepResult], pixel_mm: float = PIXEL_MM, z_mm: float = 0.0
     ) -> StrainMap:
         """Recover the field of every frame with the factor at hand, and read it at every square of the plane z_mm."""
         check(problem.model)
@@ -158,7 +158,7 @@ class StrainMap:
         reader = Reader.at(problem.mesh, points, problem.axes)
         mus = np.array(sorted(frames))
         fields = []
-        for unknowns in problem.model.kinematics.all_unknowns(problem, [frames[float(mu)].part for mu in mus]):
+        for unknowns in problem.model.formulation.all_unknowns(problem, [frames[float(mu)].part for mu in mus]):
             fields.append(reader.strain(displacement(problem.mesh, unknowns)).reshape(len(y), len(x), 3))
         return cls(mus, x, y, z_mm, np.array(fields))
 

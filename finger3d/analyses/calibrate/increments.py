@@ -89,7 +89,7 @@ def found_increments(problem: Problem, strain: Callable[[Problem], Float], noise
     legs = model.legs
     if all(isinstance(leg.steps, int) for leg in legs):
         return Increments(legs, legs, False, math.nan, wanted)
-    most, steps = _MOST_FACTORED if model.kinematics.finite_strain else _MOST[model.domain], AUTO_START
+    most, steps = _MOST_FACTORED if model.formulation.finite_strain else _MOST[model.domain], AUTO_START
     strains: dict[float, Float] = {}
     while True:
         trial = with_steps(problem, steps)
@@ -107,7 +107,7 @@ def _levels(problem: Problem, chosen: bool) -> tuple[float, ...]:
     """How many times as many increments tell the error of those that there are; fewer cost least."""
     if chosen:
         return 0.25, 0.5
-    if problem.model.kinematics.finite_strain:
+    if problem.model.formulation.finite_strain:
         return 0.5, 2.0
     return (0.25, 0.5, 2.0) if min(int(leg.steps) for leg in problem.model.legs) >= _FEW else (2.0, 4.0, 8.0)
 

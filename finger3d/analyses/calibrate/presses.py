@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.analyses.reduced import friction_at
-from finger3d.mechanics.history import Frame
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.solve import each, march
+from finger3d.mechanics.solve import map_parallel, march
 
 Float = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ class Press:
     """A press with one mu: its last increment, and the forces (c, d) N on the meshed part at the end of every one."""
 
     mu: float
-    frame: Frame
+    frame: StepResult
     forces: tuple[Float, ...]
 
 
@@ -49,12 +49,12 @@ def press(problem: Problem, mu: float, near: Sequence[Press] = ()) -> Press:
 def presses(problem: Problem, mus: Sequence[float], like: Like | None = None) -> Iterator[Press]:
     """Presses with ascending mu; where `like` has a press with the same mu, that is what it starts from."""
     known = like or {}
-    return each(problem, lambda mu, before: press(problem, mu, [known[mu]] if mu in known else before), mus)
+    return map_parallel(problem, lambda mu, before: press(problem, mu, [known[mu]] if mu in known else before), mus)
 
 
 def _start(problem: Problem, mu: float, near: Sequence[Press]) -> list[Float]:
     """Forces of the last press near, continued at the pace of the two; none of a body with other points."""
-    shape = problem.compliance.shape[:2]
+    shape = problem.delassus.shape[:2]
     good = [p for p in near if p.forces[0].shape == shape]
     if not good or abs(good[-1].mu - mu) > _NEAR:
         return []

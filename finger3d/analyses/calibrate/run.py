@@ -18,16 +18,16 @@ from finger3d._machine import versions
 from finger3d._ranges import LARGEST_STRAIN, number
 from finger3d.analyses.calibrate.increments import Increments, found_increments
 from finger3d.analyses.calibrate.presses import Press, presses
-from finger3d.analyses.calibrate.tolerances import Pressed, chosen, moved_gauges, read, slopes
+from finger3d.analyses.calibrate.tolerances import ReferenceReadings, chosen, moved_gauges, read, slopes
 from finger3d.analyses.reduced import Condensed
 from finger3d.errors import Finger3dError
 from finger3d.io import atomic, claimed, write_csv
-from finger3d.mechanics.history import Frame
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Gauge, Model
 from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.solve import MARGIN, build, covered
-from finger3d.plotting.worker import Artist
-from finger3d.progress import Report
+from finger3d.mechanics.solve import MARGIN, build, contact_within_candidates
+from finger3d.plotting.worker import PlotWorker
+from finger3d.progress import Progress
 from finger3d.report.calibrate import calibrate_page
 from finger3d.sensor.curve import FEWEST, NOISE, RESOLUTION, Calibration, Tolerance
 from finger3d.sensor.files import save, write_table
@@ -48,14 +48,14 @@ _SLOPES = {True: 7, False: 3}  # values of mu at which tolerances are tried: in 
 
 
 @dataclass
-class Sweep:
+class CurvePoints:
     """The presses of one calibration as they come: last frame by mu, or why there is none; a few with their paths.
 
     `increments` is known once there is a press.
     """
 
     mus: tuple[float, ...]
-    frames: dict[float, Frame] = field(default_factory=dict)
+    frames: dict[float, StepResult] = field(default_factory=dict)
     failed: dict[float, str] = field(default_factory=dict)
     few: dict[float, Press] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
@@ -75,7 +75,7 @@ def calibrate(
     noise: float = NOISE,
     limit: float = RESOLUTION,
     tolerances: Mapping[str, float] | None = None,
-    report: Report | None = None,
+    report: Progress | None = None,
     maps: bool = False,
 ) -> Calibration:
     """Calibrate a gauge: its strain at the end of the scene's path, for every mu.
@@ -101,7 +101,7 @@ def calibrate(
     """
     from finger3d.scene import load
 
-    report = report or Report()
+    report = report or Progress()
     scene = load(scene) if isinstance(scene, str | Path) else scene
     model = scene.model()
     known = found_gauge(model, gauge)
@@ -112,7 +112,7 @@ def calibrate(
 
         check(model)
     settings = (known, asked, wanted, noise, limit, report, maps)
-    with Artist(out is not None, "finger3d.plotting.calibration") as artist:
+    with PlotWorker(out is not None, "finger3d.plotting.calibration") as artist:
         if out is None:
             return _whole(scene, model, None, artist, *settings)
         with claimed(out, "calibrate") as folder:
@@ -120,8 +120,8 @@ def calibrate(
 
 
 def _whole(
-    scene: Scene, model: Model, folder: Path | None, artist: Artist, gauge: Gauge, mus: tuple[float, ...],
-    wanted: Mapping[str, float], noise: float, limit: float, report: Report, maps: bool,
+    scene: Scene, model: Model, folder: Path | None, artist: PlotWorker, gauge: Gauge, mus: tuple[float, ...],
+    wanted: Mapping[str, float], noise: float, limit: float, report: Progress, maps: bool,
 ) -> Calibration:  # fmt: skip
     """Calibrate and write what is found; an interruption leaves the curve so far in calibration.csv."""
     text = scene.to_toml()
@@ -130,7 +130,7 @@ def _whole(
             (folder / name).unlink(missing_ok=True)
         with atomic(folder / "scene.toml") as path:
             path.write_text(text, encoding="utf-8")
-    sweep, start = Sweep(mus), time.perf_counter()
+    sweep, start = CurvePoints(mus), time.perf_counter()
     try:
         problem = _condensed(model, gauge, wanted, sweep, noise, report)
         calibration = _calibrated(problem, gauge, wanted, sweep, noise, limit, report)
@@ -159,10 +159,10 @@ def calibrated(
     noise: float = NOISE,
     limit: float = RESOLUTION,
     tolerances: Mapping[str, float] | None = None,
-    report: Report | None = None,
-) -> tuple[Calibration, Problem, Sweep]:
+    report: Progress | None = None,
+) -> tuple[Calibration, Problem, CurvePoints]:
     """The same for a model made in Python; writes nothing. Returns also the condensed body and the last frames."""
-    report, known, sweep = report or Report(), found_gauge(model, gauge), Sweep(_checked(mus, noise, limit))
+    report, known, sweep = report or Progress(), found_gauge(model, gauge), CurvePoints(_checked(mus, noise, limit))
     wanted = chosen(tolerances)
     problem = _condensed(model, known, wanted, sweep, noise, report)
     return _calibrated(problem, known, wanted, sweep, noise, limit, report), problem, sweep
@@ -196,7 +196,7 @@ def _checked(mus: Sequence[float], noise: float, limit: float) -> tuple[float, .
 
 
 def _condensed(
-    model: Model, gauge: Gauge, wanted: Mapping[str, float], sweep: Sweep, noise: float, report: Report
+    model: Model, gauge: Gauge, wanted: Mapping[str, float], sweep: CurvePoints, noise: float, report: Progress
 ) -> Problem:
     """Build, press every mu, and once more with the whole contact face where contact went beyond the candidates."""
     extra = () if model.inclusions else tuple(m.gauge for m in moved_gauges(model, gauge, wanted))
@@ -215,15 +215,15 @@ def _condensed(
         problem = replace(problem, model=replace(problem.model, legs=sweep.increments.legs))
         _press(problem, sweep, report)
         sweep.seconds["presses"] = time.perf_counter() - start
-        if all(covered(problem, list(sweep.frames.values()))):
+        if all(contact_within_candidates(problem, list(sweep.frames.values()))):
             break
         report.say("contact reached beyond the candidate points; once more with all of the contact face")
     return problem
 
 
-def _press(problem: Problem, sweep: Sweep, report: Report) -> None:
-    if problem.model.kinematics.finite_strain:
-        name = dict(problem.model.filled).get("kinematics", "this body")
+def _press(problem: Problem, sweep: CurvePoints, report: Progress) -> None:
+    if problem.model.formulation.finite_strain:
+        name = dict(problem.model.filled).get("formulation", "this body")
         report.say(f"{name}: its compliance changes on the way, so that every one of {len(sweep.mus)} mu is a full "
                    "march, and so is every tolerance")  # fmt: skip
     report.stage("pressing")
@@ -243,13 +243,13 @@ def _press(problem: Problem, sweep: Sweep, report: Report) -> None:
 
 def _few(problem: Problem, count: int) -> NDArray[np.int64]:
     """Numbers, among `count` values of mu, of those at which tolerances are tried."""
-    wanted = _SLOPES[not problem.model.kinematics.finite_strain]
+    wanted = _SLOPES[not problem.model.formulation.finite_strain]
     return np.unique(np.linspace(0, count - 1, wanted).round().astype(int))
 
 
 def _calibrated(
-    problem: Problem, gauge: Gauge, wanted: Mapping[str, float], sweep: Sweep, noise: float, limit: float,
-    report: Report,
+    problem: Problem, gauge: Gauge, wanted: Mapping[str, float], sweep: CurvePoints, noise: float, limit: float,
+    report: Progress,
 ) -> Calibration:  # fmt: skip
     start = time.perf_counter()
     mu, strain = sweep.strains(gauge.name)
@@ -258,13 +258,13 @@ def _calibrated(
     found: tuple[Tolerance, ...] = ()
     if wanted and sweep.increments:
         strains = {g.name: sweep.strains(g.name)[1] for g in problem.model.gauges}
-        base = Pressed(mu, strains, _few(problem, len(mu)), sweep.frames[float(mu[-1])], sweep.few)
+        base = ReferenceReadings(mu, strains, _few(problem, len(mu)), sweep.frames[float(mu[-1])], sweep.few)
         found = tuple(slopes(problem, gauge, wanted, base, sweep.increments, report.stage))
     sweep.seconds["tolerances"] = time.perf_counter() - start
     return replace(bare, tolerances=found)
 
 
-def _keep(folder: Path, sweep: Sweep, gauge: str) -> None:
+def _keep(folder: Path, sweep: CurvePoints, gauge: str) -> None:
     """What there is of a curve that was not finished."""
     done = sorted([*sweep.frames, *sweep.failed])
     strain = [sweep.frames[mu].gauges[gauge] if mu in sweep.frames else math.nan for mu in done]
@@ -273,9 +273,16 @@ def _keep(folder: Path, sweep: Sweep, gauge: str) -> None:
 
 
 def _write(
-    folder: Path, artist: Artist, calibration: Calibration, problem: Problem, model: Model, gauge: Gauge, sweep: Sweep,
-    report: Report, maps: bool,
-) -> None:  # fmt: skip
+    folder: Path,
+    artist: PlotWorker,
+    calibration: Calibration,
+    problem: Problem,
+    model: Model,
+    gauge: Gauge,
+    sweep: CurvePoints,
+    report: Progress,
+    maps: bool,
+) -> None:
     from finger3d.plotting.calibration import draw
 
     report.stage("writing")
@@ -285,7 +292,7 @@ def _write(
     own = replace(
         problem, model=replace(problem.model, gauges=model.gauges), gauge_rows=problem.gauge_rows[: len(model.gauges)]
     )
-    if model.kinematics.elastic:
+    if model.formulation.elastic:
         Condensed.of(own).save(folder / "reduced.npz")
     else:
         report.say("no reduced.npz: the body's answer changes on the way")

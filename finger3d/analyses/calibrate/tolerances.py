@@ -26,9 +26,9 @@ from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import MIXED_FROM
 from finger3d.fem.condense import stiffened
-from finger3d.mechanics.history import Frame
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.problem import Problem, at_points, targets
+from finger3d.mechanics.problem import Problem, scatter_to_points, targets
 from finger3d.mechanics.solve import build
 from finger3d.objects import Plane
 from finger3d.sensor.curve import Tolerance
@@ -57,7 +57,7 @@ def chosen(given: Mapping[str, float] | None) -> dict[str, float]:
 
 
 @dataclass(frozen=True)
-class Moved:
+class DisplacedGauge:
     """The same gauge laid a little off, by `step` of one tolerance's unit, under another name."""
 
     tolerance: str
@@ -65,7 +65,7 @@ class Moved:
     gauge: Gauge
 
 
-def moved_gauges(model: Model, gauge: Gauge, tolerances: Mapping[str, float]) -> list[Moved]:
+def moved_gauges(model: Model, gauge: Gauge, tolerances: Mapping[str, float]) -> list[DisplacedGauge]:
     """The gauge off by plus and minus each tolerance of place; sides that leave the body are left out."""
     found = []
     for name in (n for n in _PLACES if n in tolerances):
@@ -73,7 +73,7 @@ def moved_gauges(model: Model, gauge: Gauge, tolerances: Mapping[str, float]) ->
             step = sign * tolerances[name]
             off = replace(_off(gauge, name, step), name=f"{gauge.name} {name} {sign:+g}")
             if _inside(model, off):
-                found.append(Moved(name, step, off))
+                found.append(DisplacedGauge(name, step, off))
     return found
 
 
@@ -92,7 +92,7 @@ def _inside(model: Model, gauge: Gauge) -> bool:
 
 
 @dataclass(frozen=True)
-class Pressed:
+class ReferenceReadings:
     """What was found of the body as it should be.
 
     Attributes
@@ -106,12 +106,12 @@ class Pressed:
     mu: Float
     strain: Mapping[str, Float]
     few: Int
-    frame: Frame
+    frame: StepResult
     pressed: Like
 
 
 @dataclass(frozen=True)
-class Body:
+class ReferenceBody:
     """The body that others are compared with: strain (m,) of the gauge at mu (m,), and presses they may start from."""
 
     problem: Problem
@@ -137,12 +137,12 @@ def read(problem: Problem, names: tuple[str, ...], mu: Float, like: Like | None 
     return np.array([[_strain(f, n) for f in frames] for n in names])
 
 
-def _strain(frame: Frame, name: str) -> float:
+def _strain(frame: StepResult, name: str) -> float:
     return frame.gauges[name] if frame.outcome.ok else math.nan
 
 
 def slopes(
-    problem: Problem, gauge: Gauge, tolerances: Mapping[str, float], base: Pressed, increments: Increments,
+    problem: Problem, gauge: Gauge, tolerances: Mapping[str, float], base: ReferenceReadings, increments: Increments,
     say: Callable[[str], None],
 ) -> Iterator[Tolerance]:  # fmt: skip
     """Every tolerance with its slope at all mu of `base`; those between the few are interpolated.
@@ -156,7 +156,7 @@ def slopes(
     """
     at = base.few
     own = base.strain[gauge.name][at]
-    body = Body(problem, gauge, base.mu[at], own, base.pressed)
+    body = ReferenceBody(problem, gauge, base.mu[at], own, base.pressed)
     others = set(tolerances) - {*_PLACES, "increments"}
     if others and increments.light != problem.model.legs:
         body = _body(replace(problem, model=replace(problem.model, legs=increments.light)), gauge, base.mu[at])
@@ -198,7 +198,7 @@ def _between(mu: Float, at: Float, values: Float) -> Float:
     return np.asarray(PchipInterpolator(at, values)(np.clip(mu, at[0], at[-1])))
 
 
-def _beside(model: Model, gauge: Gauge, name: str, sd: float, base: Pressed) -> list[tuple[float, Float]]:
+def _beside(model: Model, gauge: Gauge, name: str, sd: float, base: ReferenceReadings) -> list[tuple[float, Float]]:
     """Steps of a gauge's place, and what they change, read from the same presses."""
     if model.inclusions:
         return []
@@ -206,7 +206,7 @@ def _beside(model: Model, gauge: Gauge, name: str, sd: float, base: Pressed) -> 
     return [(m.step, base.strain[m.gauge.name] - base.strain[gauge.name]) for m in off]
 
 
-def _steps(body: Body, name: str, sd: float) -> Iterator[tuple[float, Float]]:
+def _steps(body: ReferenceBody, name: str, sd: float) -> Iterator[tuple[float, Float]]:
     """One or two steps of a tolerance, and what they change the strain (m,) by."""
     problem, gauge = body.problem, body.gauge
     model = problem.model
@@ -231,7 +231,7 @@ def _steps(body: Body, name: str, sd: float) -> Iterator[tuple[float, Float]]:
             yield sd, body.change(body.rebuilt(gauges=gauges))
 
 
-def _along(body: Body, legs: tuple[Leg, ...]) -> Like:
+def _along(body: ReferenceBody, legs: tuple[Leg, ...]) -> Like:
     """The body's presses as they may be on other legs: forces go on with the depth at the pace of each increment."""
     own = [t.depth_mm for t in targets(body.problem.model.legs)]
     strides = np.diff([0.0, *own])
@@ -253,24 +253,28 @@ def _step_of_nu(nu: float, sd: float) -> float:
 
 def with_modulus(problem: Problem, times: float) -> Problem:
     """The problem with its Young's modulus multiplied, in small strain from the same condensation."""
-    if not problem.model.kinematics.elastic:
+    if not problem.model.formulation.elastic:
         material = replace(problem.model.material, E_MPa=problem.model.material.E_MPa * times)
         return build(replace(problem.model, material=material))
-    c, d = problem.compliance.shape[:2]
+    c, d = problem.delassus.shape[:2]
 
     def soft(one: Problem) -> Problem:
-        own = stiffened(one.condensed.compliance, one.springs)
-        rest = one.compliance - at_points(own, one.kept, c, d)  # of the object
-        changed = stiffened(one.condensed.compliance / times, one.springs)
+        own = stiffened(one.condensed.compliance, one.bar_stiffness)
+        rest = one.delassus - scatter_to_points(own, one.active_dofs, c, d)  # of the object
+        changed = stiffened(one.condensed.compliance / times, one.bar_stiffness)
         rows = np.zeros_like(one.gauge_rows)
-        rows[:, one.kept] = changed[len(one.kept) : len(one.kept) + len(rows), : len(one.kept)]
-        return replace(one, compliance=at_points(changed, one.kept, c, d) + rest, gauge_rows=rows)
+        rows[:, one.active_dofs] = changed[
+            len(one.active_dofs) : len(one.active_dofs) + len(rows), : len(one.active_dofs)
+        ]
+        return replace(one, delassus=scatter_to_points(changed, one.active_dofs, c, d) + rest, gauge_rows=rows)
 
     changed = soft(problem)
-    return replace(changed, bare=soft(problem.bare)) if problem.bare else changed
+    return (
+        replace(changed, without_inclusions=soft(problem.without_inclusions)) if problem.without_inclusions else changed
+    )
 
 
-def _beside_mesh(body: Body, say: Callable[[str], None]) -> Body | None:
+def _beside_mesh(body: ReferenceBody, say: Callable[[str], None]) -> ReferenceBody | None:
     """The same on the coarser mesh that the error bar comes from; none of a mesh that has no coarser one."""
     try:
         return _body(companion(body.problem, say), body.gauge, body.mu)
@@ -278,14 +282,14 @@ def _beside_mesh(body: Body, say: Callable[[str], None]) -> Body | None:
         return None
 
 
-def _body(problem: Problem, gauge: Gauge, mu: Float) -> Body:
+def _body(problem: Problem, gauge: Gauge, mu: Float) -> ReferenceBody:
     """A body pressed at mu (m,), to compare others with."""
     pressed = {p.mu: p for p in presses(problem, mu.tolist())}
     strain = np.array([_strain(p.frame, gauge.name) for p in pressed.values()])
-    return Body(problem, gauge, mu, strain, pressed)
+    return ReferenceBody(problem, gauge, mu, strain, pressed)
 
 
-def _mesh_error(body: Body, coarse: Body, frame: Frame) -> Float:
+def _mesh_error(body: ReferenceBody, coarse: ReferenceBody, frame: StepResult) -> Float:
     """Error bar (m,) of the strain, by its grain in a last frame at any mu.
 
     Nowhere below its root mean square: errors of a mesh are much alike at all mu, and where the two curves cross they
@@ -306,7 +310,7 @@ def _coarser(problem: Problem) -> MeshOptions:
     return replace(options, size_mm=times * options.size_mm, base_size_mm=times * options.base_size_mm, mesher=mesher)
 
 
-def _tilted(body: Body, sd: float) -> Iterator[tuple[float, Float]]:
+def _tilted(body: ReferenceBody, sd: float) -> Iterator[tuple[float, Float]]:
     """A plane that is not level; of a scene that is its own mirror image one tilt gives both, by the mirrored gauge."""
     problem, gauge, model = body.problem, body.gauge, body.problem.model
     thing: Any = model.object

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.accuracy.estimate import FACTOR, estimate
-from finger3d.mechanics.history import ContactPoints, Frame, contact_table, measure
+from finger3d.mechanics.history import ContactPoints, StepResult, contact_table, measure
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.solve import Problem, build
 from finger3d.mechanics.step_halving import marched
@@ -64,7 +64,7 @@ def measured_on(name: str, model: Model) -> Case:
     return _pressed(name, model)[-1]
 
 
-def _pressed(name: str, model: Model) -> tuple[Problem, tuple[Frame, ...], list[tuple[int, Frame]], Case]:
+def _pressed(name: str, model: Model) -> tuple[Problem, tuple[StepResult, ...], list[tuple[int, StepResult]], Case]:
     start = time.perf_counter()
     # all of the contact face: how far contact reaches differs from model to model
     problem = build(model, margin=math.inf)
@@ -78,7 +78,7 @@ def _pressed(name: str, model: Model) -> tuple[Problem, tuple[Frame, ...], list[
     return problem, frames, levels, replace(case, seconds=time.perf_counter() - start)
 
 
-def measured(points: ContactPoints, frame: Frame) -> dict[str, float]:
+def measured(points: ContactPoints, frame: StepResult) -> dict[str, float]:
     """Numbers of a frame that a section and a solid share: N per mm of width, mm, MPa, strains."""
     numbers = measure(points, frame)
     width = 2.0 * points.half_width_mm
@@ -99,7 +99,7 @@ def measured(points: ContactPoints, frame: Frame) -> dict[str, float]:
     return out | {f"gauge_{name}": float(strain) for name, strain in numbers["gauges"].items()}
 
 
-def lines_along_x(points: ContactPoints, frame: Frame) -> dict[str, dict[str, Any]]:
+def lines_along_x(points: ContactPoints, frame: StepResult) -> dict[str, dict[str, Any]]:
     """Tractions along x at z = 0, and for a solid at its end; points in the band stand in where none is on the line."""
     table = contact_table(points, frame.state)
     z = table["z_mm"]

@@ -15,7 +15,7 @@ from finger3d.analyses.compare.verdict import WITHIN, passage, reached, sentence
 from finger3d.errors import Finger3dError, Outcome, UnresolvedError
 from finger3d.io import atomic, claimed, write_csv, write_json
 from finger3d.mechanics.model import Model
-from finger3d.progress import Report
+from finger3d.progress import Progress
 from finger3d.results.comparison import Case
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ class Comparison:
 
 
 def compare(
-    scene: Scene | str | Path, out: str | Path, widths: Sequence[float] | None = None, report: Report | None = None
+    scene: Scene | str | Path, out: str | Path, widths: Sequence[float] | None = None, report: Progress | None = None
 ) -> Comparison:
     """Solve a scene as plane stress, plane strain and solid, and tell how far 2D is from 3D.
 
@@ -77,7 +77,7 @@ def compare(
     """
     from finger3d.scene import load
 
-    report = report or Report()
+    report = report or Progress()
     solid = _as_solid(load(scene) if isinstance(scene, str | Path) else scene)
     model = solid.model()
     asked = _widths(model, widths)
@@ -86,7 +86,7 @@ def compare(
         return _compared(solid, model, asked, folder, report)
 
 
-def _compared(solid: Scene, model: Model, asked: list[float], folder: Path, report: Report) -> Comparison:
+def _compared(solid: Scene, model: Model, asked: list[float], folder: Path, report: Progress) -> Comparison:
     for name in ("compare.csv", "compare.json", "lines.csv", "compare.png", "report.html"):
         (folder / name).unlink(missing_ok=True)
     with atomic(folder / "scene.toml") as path:

@@ -13,17 +13,26 @@ from typing import Any, Literal
 import numpy as np
 
 from finger3d.analyses.calibrate.increments import found_increments, increment_error
-from finger3d.analyses.optimise.task import METHODS, Float, Free, Objective, Problem, Table, checked_start, objective_of
+from finger3d.analyses.optimise.task import (
+    METHODS,
+    Float,
+    FreeKey,
+    Objective,
+    ObjectiveTable,
+    OptimisationProblem,
+    checked_start,
+    objective_of,
+)
 from finger3d.analyses.reduced import friction_at
-from finger3d.analyses.shared_body import Body, Variant, body_key
+from finger3d.analyses.shared_body import SharedBody, Variant, body_key
 from finger3d.errors import Finger3dError
 from finger3d.io import atomic, claimed, write_json
-from finger3d.mechanics.history import Frame, measure
+from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.model import Gauge, Leg, Model
 from finger3d.mechanics.solve import gauge_row
 from finger3d.plotting.optimise import draw
-from finger3d.progress import Report
-from finger3d.report.optimise import design_page
+from finger3d.progress import Progress
+from finger3d.report.optimise import optimise_page
 from finger3d.scene import Scene
 
 _INNER = 60  # readings of gauges in one body
@@ -41,7 +50,7 @@ class Evaluation:
 
 
 @dataclass(frozen=True)
-class Found:
+class OptimisationResult:
     """What a search came to; `scene` is the best design, ready to be pressed.
 
     `evaluations` are in the order asked for, some more than once; `judged` designs are in evaluations.csv.
@@ -66,7 +75,7 @@ class _Pressed:
 
 def _whole(model: Model) -> bool:
     """Whether gauges are read in the body's own way, so that a gauge moved is a press of its own."""
-    return model.inclusions is not None or model.kinematics.finite_strain
+    return model.inclusions is not None or model.formulation.finite_strain
 
 
 class _Bench:
@@ -75,17 +84,17 @@ class _Bench:
     def __init__(self, model: Model, mus: Sequence[float], say: Callable[[str], None]) -> None:
         self._model, self._apart = model, _whole(model)
         variants = self._variants(mus, model.legs)
-        self.body = Body(model, variants if self._apart else [replace(v, gauges=()) for v in variants], say)
+        self.body = SharedBody(model, variants if self._apart else [replace(v, gauges=()) for v in variants], say)
 
     def _variants(self, mus: Sequence[float], legs: tuple[Leg, ...]) -> list[Variant]:
         laws = [friction_at(self._model.friction, mu) for mu in mus]
         return [Variant.of(replace(self._model, friction=law, legs=legs)) for law in laws]
 
-    def ends(self, mus: Sequence[float], legs: tuple[Leg, ...]) -> list[Frame]:
+    def ends(self, mus: Sequence[float], legs: tuple[Leg, ...]) -> list[StepResult]:
         """The last frame under every mu."""
         return [frames[-1] for frames in self.body.frames(self._variants(mus, legs))]
 
-    def reader(self, ends: Sequence[Frame]) -> Callable[[Gauge], Float]:
+    def reader(self, ends: Sequence[StepResult]) -> Callable[[Gauge], Float]:
         """Gauge -> strain (m,) of frames (m,)."""
         body = self.body
         if self._apart:
@@ -93,7 +102,7 @@ class _Bench:
             strains = [body.strains(variant, frame.gauges) for frame in ends]
             return lambda g: np.array([strain[g.name] for strain in strains])
         mesh, axes = body.problem.mesh, body.problem.axes
-        fields = body.problem.model.kinematics.all_unknowns(body.problem, [f.part for f in ends])
+        fields = body.problem.model.formulation.all_unknowns(body.problem, [f.part for f in ends])
         u = np.array([x[: mesh.points.size] for x in fields])
         return lambda g: np.asarray(gauge_row(mesh, g, axes)[:, : mesh.points.size] @ u.T).ravel()
 
@@ -109,9 +118,9 @@ class _Spent(Exception):
 
 @dataclass
 class _Search:
-    problem: Problem
+    problem: OptimisationProblem
     folder: Path
-    report: Report
+    report: Progress
     judge: Objective
     known: dict[tuple[float, ...], Evaluation] = field(default_factory=dict)
     done: list[Evaluation] = field(default_factory=list)
@@ -141,7 +150,7 @@ class _Search:
             return Evaluation(place, math.nan, pressed.outcome)
         strain = {g.name: pressed.read(g) for g in scene.model().gauges}
         gauge = self.problem.gauge or next(iter(strain))
-        table = Table(np.array(self.problem.mus), strain, pressed.steps, self.problem.noise, gauge, scene)
+        table = ObjectiveTable(np.array(self.problem.mus), strain, pressed.steps, self.problem.noise, gauge, scene)
         value = self.judge(table)
         return Evaluation(place, value, "converged" if math.isfinite(value) else "the objective is no finite number")
 
@@ -294,7 +303,7 @@ def _three(mus: Sequence[float]) -> tuple[float, ...]:
     return tuple(dict.fromkeys((mus[0], mus[len(mus) // 2], mus[-1])))
 
 
-def _minimise(method: str, cost: Callable[[Float], float], free: Sequence[Free], start: Float, seed: int) -> None:
+def _minimise(method: str, cost: Callable[[Float], float], free: Sequence[FreeKey], start: Float, seed: int) -> None:
     from scipy import optimize
 
     bounds = [(f.low, f.high) for f in free]
@@ -307,7 +316,7 @@ def _minimise(method: str, cost: Callable[[Float], float], free: Sequence[Free],
         optimize.differential_evolution(cost, bounds, x0=start, rng=seed, popsize=max(5, 12 // len(free)), polish=False)
 
 
-def search(problem: Problem, out: str | Path, report: Report | None = None) -> Found:
+def optimise(problem: OptimisationProblem, out: str | Path, report: Progress | None = None) -> OptimisationResult:
     """Search within the bounds for the largest objective; every design judged is kept at once.
 
     Parameters
@@ -320,14 +329,16 @@ def search(problem: Problem, out: str | Path, report: Report | None = None) -> F
     Finger3dError
         For a mistake in the problem, or if no design within the bounds could be built.
     """
-    report = report or Report()
+    report = report or Progress()
     judge = objective_of(problem.objective)
     start = checked_start(problem)
     with claimed(out, "optimise") as folder:
         return _searched(problem, folder, report, judge, start)
 
 
-def _searched(problem: Problem, folder: Path, report: Report, judge: Objective, start: tuple[float, ...]) -> Found:
+def _searched(
+    problem: OptimisationProblem, folder: Path, report: Progress, judge: Objective, start: tuple[float, ...]
+) -> OptimisationResult:
     _same(problem, folder)
     for name in ("design.png", "report.html"):
         (folder / name).unlink(missing_ok=True)
@@ -353,11 +364,11 @@ def _searched(problem: Problem, folder: Path, report: Report, judge: Objective, 
         folder / "design.png", [f.key for f in problem.free], [e.values for e in judged], [e.value for e in judged],
         first.values, Path(problem.objective).stem,
     )  # fmt: skip
-    design_page(folder)
-    return Found(best, first, tuple(run.done), len(judged), run.bodies, problem.scene(best.values))
+    optimise_page(folder)
+    return OptimisationResult(best, first, tuple(run.done), len(judged), run.bodies, problem.scene(best.values))
 
 
-def _same(problem: Problem, folder: Path) -> None:
+def _same(problem: OptimisationProblem, folder: Path) -> None:
     wanted = json.loads(json.dumps(problem.identity()))
     path = folder / "search.json"
     if path.exists() and json.loads(path.read_text(encoding="utf-8")) != wanted:
@@ -366,7 +377,7 @@ def _same(problem: Problem, folder: Path) -> None:
 
 
 def _write_best(
-    problem: Problem, folder: Path, best: Evaluation, first: Evaluation, run: _Search,
+    problem: OptimisationProblem, folder: Path, best: Evaluation, first: Evaluation, run: _Search,
     increments: Mapping[str, Any] | None = None,
 ) -> None:  # fmt: skip
     with atomic(folder / "best.toml") as path:

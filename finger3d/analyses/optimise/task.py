@@ -19,7 +19,7 @@ from finger3d.scene import Scene, parse, tree
 from finger3d.scene.messages import shown
 
 Float = NDArray[np.float64]
-Objective = Callable[["Table"], float]
+Objective = Callable[["ObjectiveTable"], float]
 
 MUS = tuple(float(v) for v in np.round(np.linspace(0.05, 1.0, 9), 5))
 METHODS = ("differential-evolution", "dual-annealing", "nelder-mead")
@@ -27,7 +27,7 @@ _MISTAKES = (ArithmeticError, AttributeError, LookupError, NameError, TypeError,
 
 
 @dataclass(frozen=True)
-class Free:
+class FreeKey:
     """A key of the scene, and the bounds within which it may be chosen."""
 
     key: str
@@ -35,7 +35,7 @@ class Free:
     high: float
 
     @classmethod
-    def of(cls, text: str) -> Free:
+    def of(cls, text: str) -> FreeKey:
         """From ``KEY=LOW:HIGH``."""
         key, equals, bounds = text.partition("=")
         try:
@@ -50,7 +50,7 @@ class Free:
 
 
 @dataclass(frozen=True)
-class Table:
+class ObjectiveTable:
     """What an objective judges: one design, pressed at several mu.
 
     Attributes
@@ -71,7 +71,7 @@ class Table:
     scene: Scene
 
 
-def sensitivity(table: Table) -> float:
+def sensitivity(table: ObjectiveTable) -> float:
     """The paper's criterion (Sec. III-B): sensitive to mu throughout a large range.
 
     The least change of strain per mu between neighbouring mu, in units of noise: the inverse of the worst resolution of
@@ -104,7 +104,7 @@ def objective_of(text: str) -> Objective:
     if not callable(found):
         raise Finger3dError(f"--objective {text}: has no function objective(table) -> number, the larger the better")
 
-    def judged(table: Table) -> float:
+    def judged(table: ObjectiveTable) -> float:
         try:
             return float(found(table))
         except _MISTAKES as error:
@@ -114,7 +114,7 @@ def objective_of(text: str) -> Objective:
 
 
 @dataclass(frozen=True)
-class Problem:
+class OptimisationProblem:
     """What is searched.
 
     Attributes
@@ -125,7 +125,7 @@ class Problem:
     """
 
     given: Mapping[str, Any]
-    free: tuple[Free, ...]
+    free: tuple[FreeKey, ...]
     objective: str = "sensitivity"
     path: Path | None = None
     gauge: str | None = None
@@ -156,7 +156,7 @@ class Problem:
         }  # fmt: skip
 
 
-def checked_start(problem: Problem) -> tuple[float, ...]:
+def checked_start(problem: OptimisationProblem) -> tuple[float, ...]:
     """The scene's own values where they are within the bounds, else the middle."""
     if problem.method not in METHODS:
         raise Finger3dError(f"--method {problem.method}: must be one of {', '.join(METHODS)}")

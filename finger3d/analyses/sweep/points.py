@@ -112,7 +112,7 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Body:
+class BodySpec:
     """What a worker is sent to build a body: a scene of the family, and the mesh that all share."""
 
     given: Mapping[str, Any]
@@ -131,7 +131,7 @@ class Sweep:
     given: Mapping[str, Any]
     vary: tuple[Vary, ...]
     points: tuple[Point, ...]
-    bodies: dict[str, Body]
+    bodies: dict[str, BodySpec]
     title: str
 
     def identity(self) -> dict[str, Any]:
@@ -191,5 +191,5 @@ def combinations(
         members.setdefault(body, []).append(scene)
         named = {v.key: value for v, value in zip(vary, here, strict=True)}
         points.append(Point(number, named, body, Variant.of(scene.model())))
-    shared = {key: Body(s[0].given, finest([m.model() for m in s])) for key, s in members.items()}
+    shared = {key: BodySpec(s[0].given, finest([m.model() for m in s])) for key, s in members.items()}
     return Sweep(bodies.absolute(base, path), vary, tuple(points), shared, scenes[0].title)

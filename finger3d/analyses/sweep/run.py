@@ -12,10 +12,10 @@ from typing import Any
 
 from finger3d.analyses.sweep import cluster
 from finger3d.analyses.sweep.points import Sweep
-from finger3d.analyses.sweep.store import Kept
+from finger3d.analyses.sweep.store import ResultStore
 from finger3d.analyses.sweep.worker import Task, on_worker, press_all
 from finger3d.errors import Finger3dError, MissingError
-from finger3d.progress import Report
+from finger3d.progress import Progress
 from finger3d.report.sweep import sweep_page
 
 WAIT_S = 60.0
@@ -29,8 +29,8 @@ def sweep(
     out: str | Path,
     scheduler: str | None = None,
     workers: int | None = None,
-    report: Report | None = None,
-) -> Kept:
+    report: Progress | None = None,
+) -> ResultStore:
     """Press every point of a sweep that is not kept yet.
 
     Parameters
@@ -54,9 +54,9 @@ def sweep(
     MissingError
         If a file cannot be written, or the cluster is gone; what is finished is kept.
     """
-    report = report or Report()
+    report = report or Progress()
     folder = Path(out)
-    with Kept(points, folder).open() as kept:
+    with ResultStore(points, folder).open() as kept:
         report.steps_done, report.steps_total = len(kept.rows), len(points.points)
         if before := len(kept.rows):
             report.say(f"{before} of {len(points.points)} points are kept from before")
@@ -73,7 +73,7 @@ def sweep(
         return kept
 
 
-def _press(kept: Kept, tasks: list[Task], scheduler: str | None, workers: int | None, report: Report) -> None:
+def _press(kept: ResultStore, tasks: list[Task], scheduler: str | None, workers: int | None, report: Progress) -> None:
     """Press what is left: a single body in this process, several, or any on a cluster, by workers."""
     if len(tasks) > 1 or (tasks and scheduler):
         with _cluster(scheduler, workers, len(tasks), report) as client:
@@ -82,12 +82,12 @@ def _press(kept: Kept, tasks: list[Task], scheduler: str | None, workers: int | 
         _Run(None, kept, tasks, report).here()
 
 
-def _cluster(scheduler: str | None, workers: int | None, bodies: int, report: Report) -> AbstractContextManager[Any]:
+def _cluster(scheduler: str | None, workers: int | None, bodies: int, report: Progress) -> AbstractContextManager[Any]:
     report.stage("starting workers" if scheduler is None else f"connecting to {scheduler}")
     return cluster.local(workers or cluster.default_workers(bodies)) if scheduler is None else cluster.remote(scheduler)
 
 
-def _tasks(points: Sweep, kept: Kept) -> list[Task]:
+def _tasks(points: Sweep, kept: ResultStore) -> list[Task]:
     """A body with its points that are left, the largest first: they end the run last."""
     members: dict[str, list[Any]] = {}
     for number in kept.left():
@@ -99,7 +99,7 @@ def _tasks(points: Sweep, kept: Kept) -> list[Task]:
 class _Run:
     """Bodies on their way: rows and ends arrive in one queue, filled by the client's own thread."""
 
-    def __init__(self, client: Any, kept: Kept, tasks: list[Task], report: Report) -> None:
+    def __init__(self, client: Any, kept: ResultStore, tasks: list[Task], report: Progress) -> None:
         self.client, self.kept, self.report = client, kept, report
         self.arrived: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self.name = f"finger3d-sweep-{uuid.uuid4().hex[:12]}"
@@ -128,7 +128,7 @@ class _Run:
         self.report.stage("pressing")
         try:
             self._submit()
-        except OSError:  # of the connection: files that cannot be written are told by `Kept`
+        except OSError:  # of the connection: files that cannot be written are told by `ResultStore`
             raise self._gone("no scheduler") from None
 
     def _submit(self) -> None:

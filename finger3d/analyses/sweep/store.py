@@ -24,7 +24,7 @@ _EVERY_S, _SHARE = 1.0, 0.05
 Row = dict[str, Any]
 
 
-class Kept:
+class ResultStore:
     """The rows of a sweep in its folder.
 
     Every finished point is one appended line of points.jsonl, so that whatever ends the program loses none; a line cut
@@ -38,7 +38,7 @@ class Kept:
         self._written, self._cost = math.inf, 0.0
 
     @contextmanager
-    def open(self) -> Iterator[Kept]:
+    def open(self) -> Iterator[ResultStore]:
         """Take the folder: go on where the same sweep ended; another sweep, or a running one, is refused."""
         with claimed(self.folder, "sweep"):
             self._begin()

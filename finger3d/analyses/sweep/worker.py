@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from finger3d.analyses.shared_body import TROUBLE, Body, Pressed, Variant
+from finger3d.analyses.shared_body import TROUBLE, SharedBody, Variant, VariantResult
 from finger3d.analyses.sweep import points
 from finger3d.errors import Finger3dError
 
-Task = tuple[str, points.Body, Sequence[tuple[int, Variant]]]
+Task = tuple[str, points.BodySpec, Sequence[tuple[int, Variant]]]
 
 
 def press_all(
@@ -42,13 +42,13 @@ def press_all(
             tell({"point": number, "body": key, **_row(body, pressed)})
 
 
-def _built(how: points.Body, variants: Sequence[Variant]) -> Body:
+def _built(how: points.BodySpec, variants: Sequence[Variant]) -> SharedBody:
     from finger3d.scene import parse
 
-    return Body(replace(parse(how.given).model(), mesh=how.mesh), variants)
+    return SharedBody(replace(parse(how.given).model(), mesh=how.mesh), variants)
 
 
-def _row(body: Body, pressed: Pressed | Exception) -> dict[str, Any]:
+def _row(body: SharedBody, pressed: VariantResult | Exception) -> dict[str, Any]:
     if isinstance(pressed, Exception):
         return {"outcome": _reason(pressed)}
     return {
