@@ -186,7 +186,7 @@ def _extrapolated(bare: dict[tuple[float, float, int], Float], nu: float, size: 
     big = off > 0.1 * NOISE
     rows.append(
         Row(
-            "share of strains off by more than a tenth of the noise that are within twice the error told",
+            "share of strains in error by more than a tenth of the noise whose error is within twice its estimate",
             "no reference", 0.9, float(np.mean(off[big] <= 2.0 * told[big])), 0.0, "nine in ten", "statement",
             "at least",
         )
@@ -195,18 +195,29 @@ def _extrapolated(bare: dict[tuple[float, float, int], Float], nu: float, size: 
 
 
 def _draw(figure: Any, found: list[Reading]) -> None:
-    figure.set_size_inches(12.0, 4.6)
+    figure.set_size_inches(12.0, 4.8)
+    figure.set_layout_engine("constrained")
     left, right = figure.subplots(1, 2)
     cases = list(dict.fromkeys((r.steps, r.mesh) for r in found))
     for k, (steps, mesh) in enumerate(cases):
         some = [r for r in found if (r.steps, r.mesh) == (steps, mesh)]
         where = k + np.random.default_rng(k).uniform(-0.3, 0.3, len(some))
-        left.semilogy(where, np.abs([r.z_without for r in some]), ".", ms=3, color="#bbbbbb")
-        left.semilogy(where, np.abs([r.z for r in some]), ".", ms=3, color="#2166ac")
-        right.plot([r.mu for r in some], [r.z for r in some], ".", ms=4, label=f"{steps}, {mesh}")
-    left.set(xticks=range(len(cases)), ylabel="|z| of the strain", ylim=(1e-2, None))
+        first = k == 0
+        left.semilogy(
+            where, np.abs([r.z_without for r in some]), ".", ms=3, color="#aaaaaa",
+            label="without the tolerance of the increments" if first else None,
+        )  # fmt: skip
+        left.semilogy(
+            where, np.abs([r.z for r in some]), ".", ms=3, color="#2166ac",
+            label="with all tolerances" if first else None,
+        )  # fmt: skip
+    left.set(xticks=range(len(cases)), xlabel="increments of the calibration, mesh of the reading")
+    left.set(ylabel="|z| of the strain", ylim=(1e-2, None), title="Error over its standard deviation")
     left.set_xticklabels([f"{s}\n{m}" for s, m in cases], fontsize=8)
-    left.set_title("blue: as told; grey: without the error of the increments")
-    right.axhspan(-1.0, 1.0, color="#dddddd", lw=0)
-    right.set(xlabel="true mu", ylabel="z of the strain", title="increments calibrated with, and mesh")
-    right.legend(fontsize=7, frameon=False)
+    for mesh, color in ((SAME, "#2166ac"), (FINER, "#d95f02")):
+        some = [r for r in found if r.mesh == mesh]
+        right.plot([r.mu for r in some], [r.z for r in some], ".", ms=4, color=color, label=f"read on the {mesh}")
+    right.axhspan(-1.0, 1.0, color="#dddddd", lw=0, zorder=0, label="one standard deviation")
+    right.set(xlabel="true mu", ylabel="z of the strain", title="The same errors over mu")
+    for axes in (left, right):
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3, fontsize=8, frameon=False)
