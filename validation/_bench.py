@@ -86,7 +86,7 @@ def measured(size: float) -> dict[str, float]:
 
     problem, found = _pressed(size)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
-    del problem  # its factor need not lie beside
+    del problem  # frees the memory of its factor
     problem, again = _pressed(size)
     free = np.setdiff1d(np.arange(problem.stiffness.upper.shape[0]), problem.fixed_dofs)
     upper = problem.stiffness.upper[free][:, free]
@@ -105,7 +105,7 @@ def _pressed(size: float) -> tuple[Problem, dict[str, float]]:
         raise AssertionError(f"mu = {MU:g}: {frame.outcome}")
     found["contact"] = time.perf_counter() - begin
     begin = time.perf_counter()
-    if not all(told.frame.outcome.ok for told in presses(problem, MUS)):
+    if not all(one.frame.outcome.ok for one in presses(problem, MUS)):
         raise AssertionError("not every mu converged")
     return problem, found | {"contact_all": time.perf_counter() - begin}
 
@@ -235,17 +235,17 @@ def run(quick: bool) -> tuple[Row, ...]:
 
 
 def _beside_calculix(quick: bool, load: float) -> list[Row]:
-    """How many times faster than CalculiX on the finest meshes of beside_calculix.py; nothing where ccx is missing."""
+    """Return time of CalculiX over finger3d's on the finest meshes of beside_calculix.py; nothing without ccx."""
     from validation._calculix import program
     from validation.beside_calculix import cases, measured, times
 
     if program() is None:
-        print("ccx is not installed (apt install calculix-ccx): nothing is set beside CalculiX", file=sys.stderr)
+        print("ccx is not installed (apt install calculix-ccx): no comparison with CalculiX", file=sys.stderr)
         return []
     finest = list({case.body: case for case in cases(quick)}.values())
     table = measured(finest)
-    told = [row for ours, theirs in zip(table[::2], table[1::2], strict=True) for row in times(ours, theirs)]
-    return [replace(row, reason=f"{row.reason}; load {load:.1f}", kind="statement") for row in told]
+    rows = [row for ours, theirs in zip(table[::2], table[1::2], strict=True) for row in times(ours, theirs)]
+    return [replace(row, reason=f"{row.reason}; load {load:.1f}", kind="statement") for row in rows]
 
 
 def _ratios(best: dict[str, float], load: float) -> list[Row]:

@@ -1,4 +1,4 @@
-"""CalculiX beside finger3d: the same mesh written as its input, one run, and what it says of force, friction and time.
+"""CalculiX input decks of finger3d meshes, one run, and the force, friction and time that it reports.
 
 Small strain, surface-to-surface penalty contact under a flat plate whose nodes are all moved.  Sources: CalculiX
 CrunchiX user's manual 2.20, sec. 6.2 (elements), 6.7.8 (contact), 7 (cards).

@@ -39,7 +39,7 @@ def reset_peak() -> None:
 
 
 class Bench:
-    """Calls functions ``(case: dict) -> dict`` of a module beside this one, each call in a fork of its own."""
+    """Calls functions ``(case: dict) -> dict`` of a module in this folder, each in a fork of its own."""
 
     def __init__(self, module: str) -> None:
         self.module = module

@@ -224,7 +224,7 @@ def rate(sizes: Sequence[float], errors: Sequence[float]) -> float:
 def convergence(
     axes: Any, sizes: Sequence[float], curves: Mapping[str, Sequence[float]], slope: float, xlabel: str, ylabel: str
 ) -> None:
-    """Draw measured errors as solid points over the size, log-log, and the slope of theory dashed beside them."""
+    """Draw measured errors as solid points over the size, log-log, and a dashed line of the theoretical slope."""
     from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
 
     sizes = np.asarray(sizes, dtype=float)

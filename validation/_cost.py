@@ -183,16 +183,16 @@ def in_steps(problem: Problem, count: int) -> list[StepResult]:
 
 def numbers(points: ContactPoints, frame: StepResult) -> dict[str, float]:
     """The quantities as a press reports them, and the edges of contact and stick between the points."""
-    told = measure(points, frame)
+    values = measure(points, frame)
     contact, stick = edges(points, frame)
     return {
-        "force": told["normal_force_N"],
-        "contact_length": told["contact_half_length_mm"],
-        "stick_length": told["stick_half_length_mm"],
-        "friction_sum": told["friction_sum_N"],
-        "gauge_strain": told["gauges"]["g"],
-        "outward_x": told["outward_friction_x_N"],
-        "outward_z": told["outward_friction_z_N"],
+        "force": values["normal_force_N"],
+        "contact_length": values["contact_half_length_mm"],
+        "stick_length": values["stick_half_length_mm"],
+        "friction_sum": values["friction_sum_N"],
+        "gauge_strain": values["gauges"]["g"],
+        "outward_x": values["outward_friction_x_N"],
+        "outward_z": values["outward_friction_z_N"],
         "contact_edge": contact,
         "stick_edge": stick,
     }

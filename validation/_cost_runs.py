@@ -45,9 +45,9 @@ def measured(given: dict[str, Any]) -> dict[str, Any]:
     if case.way == "each iteration":
         press = EachIteration(parts)
         begin = time.perf_counter()
-        told = press.run(case.counts[0])
+        values = press.run(case.counts[0])
         seconds |= {"condensation": 0.0, f"contact {case.counts[0]}": time.perf_counter() - begin}
-        return {**answer, "seconds": seconds, "numbers": {str(case.counts[0]): told}, "factorizations": press.solves}
+        return {**answer, "seconds": seconds, "numbers": {str(case.counts[0]): values}, "factorizations": press.solves}
     problem = condensed(parts, case.solver)
     seconds["condensation"] = problem.condensed.seconds
     answer |= {"rows": len(problem.condensed.compliance), "perturbed_pivots": problem.condensed.perturbed_pivots}
@@ -98,10 +98,10 @@ def single(given: dict[str, Any]) -> dict[str, Any]:
         begin = time.perf_counter()
         np.linalg.solve(matrix, right)
         seconds[name] = time.perf_counter() - begin
-    told = [numbers(problem.points, f) for f in frames]
+    values = [numbers(problem.points, f) for f in frames]
     return {
         "seconds": seconds,
         "residual": float(gap.max() / frames[1].target.depth_mm),
-        "change": max(abs(told[1][k] / told[0][k] - 1.0) for k in ("force", "friction_sum", "gauge_strain")),
+        "change": max(abs(values[1][k] / values[0][k] - 1.0) for k in ("force", "friction_sum", "gauge_strain")),
         "rows": c * d,
     }

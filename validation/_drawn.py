@@ -1,4 +1,4 @@
-"""Sections drawn at random, on which the error that increments leave is judged: none of them chose the rule."""
+"""Random sections on which the error estimate of the increments is tested; none was used to choose the rule."""
 
 from __future__ import annotations
 

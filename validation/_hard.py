@@ -191,10 +191,10 @@ def coarse_and_deep(quick: bool) -> Iterator[Row]:
     thin = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=0.01, width_mm=20.0)
     try:
         _block(0.3, (Leg(1.0, steps=1),), thin)
-        told = ""
+        message = ""
     except Finger3dError as error:
-        told = str(error)
-    yield _is("sliver cells: refused, with what to choose", 1, "flatter" in told and "choose" in told)
+        message = str(error)
+    yield _is("sliver cells: refused, with what to choose", 1, "flatter" in message and "choose" in message)
 
 
 def _pressed(folder: str, *changes: str) -> Any:
@@ -232,8 +232,8 @@ def surfaces(quick: bool) -> Iterator[Row]:
             ("a missing face", _FACES[1:], "not closed"),
         ):
             _write_stl(Path(folder, "object.stl"), faces)
-            told = _refused(folder, text=SCENE + '[object]\nshape = "mesh"\npath = "object.stl"\n')
-            yield _is(f"STL with {name}: refused in one line that says so", 1, word in told)
+            message = _refused(folder, text=SCENE + '[object]\nshape = "mesh"\npath = "object.stl"\n')
+            yield _is(f"STL with {name}: refused in one line that says so", 1, word in message)
         _write_stl(Path(folder, "object.stl"), _FACES)
         forces = []
         for text in (wedge, SCENE + '[object]\nshape = "mesh"\npath = "object.stl"\n'):
@@ -297,8 +297,8 @@ def refusals(quick: bool) -> Iterator[Row]:
         ("floating body", free, floating.reshape(problem.delassus.shape), Outcome.INDEFINITE),
     ):
         found = solve_increment(state, gap, compliance, Coulomb(0.25), 0.5)
-        told = found.outcome is wanted and found.state is state
-        yield _is(f"{what}: outcome says so, and the state before is handed back", 1, told)
+        message = found.outcome is wanted and found.state is state
+        yield _is(f"{what}: outcome says so, and the state before is handed back", 1, message)
     legs = "[[press.leg]]\ndepth_mm = {}\nslide_x_mm = {}\n[[press.leg]]\ndepth_mm = 0.5\nslide_x_mm = 1.0\n"
     with tempfile.TemporaryDirectory() as folder:
         for what, first, word in (

@@ -93,7 +93,9 @@ def steps_row(what: str, error: Float, change: float, quick: bool = False) -> Ro
     steps = QUICK_STEPS if quick else STEPS
     text = f"{what}: largest error by {steps} increments, over its largest change with mu"
     share = float(np.abs(error).max() / change)
-    return Row(text, f"{steps // 2} increments", 0.05, share, 0.0, "small beside the signal", "statement", "at most")
+    return Row(
+        text, f"{steps // 2} increments", 0.05, share, 0.0, "small compared with the signal", "statement", "at most"
+    )
 
 
 @dataclass(frozen=True)

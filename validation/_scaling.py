@@ -107,16 +107,16 @@ def pressed(given: dict[str, Any]) -> dict[str, Any]:
     with tempfile.TemporaryDirectory(prefix="finger3d_scaling_") as folder:
         result = press(scene, folder, watch, figures=given["figures"])
         watch.close()
-    told = result.summary()
-    last = told["steps"][-1]
+    summary = result.summary()
+    last = summary["steps"][-1]
     return {
         "seconds": watch.seconds,
         "peaks": watch.peaks,
         "peak_MB": max(watch.peaks.values()),
-        "dofs": told["mesh"]["dofs"],
-        "rows": 3 * told["mesh"]["contact_points"],
-        "factorizations": told["cost"]["factorizations"],
+        "dofs": summary["mesh"]["dofs"],
+        "rows": 3 * summary["mesh"]["contact_points"],
+        "factorizations": summary["cost"]["factorizations"],
         "force": last["normal_force_N"],
-        "iterations": sum(s["iterations"] for s in told["steps"]),
-        "outcome": told["outcome"],
+        "iterations": sum(s["iterations"] for s in summary["steps"]),
+        "outcome": summary["outcome"],
     }

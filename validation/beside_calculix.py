@@ -37,7 +37,7 @@ from ._cost_runs import MODULE
 
 BY_NAME = True
 CALCULIX = "CalculiX 2.20, same mesh"
-WANTED = {SECTION: 20.0, SOLID: 60.0}  # goals: times faster than CalculiX
+WANTED = {SECTION: 20.0, SOLID: 60.0}  # goals: time of CalculiX over finger3d's
 NU = 0.45
 LIMIT_S = 900.0
 TEXT = ("body", "program", "version", "settings")
@@ -114,10 +114,10 @@ def _pressed(case: Case) -> Pressed:
 
 
 def _line_ours(case: Case, ours: dict[str, Any], load: float) -> dict[str, Any]:
-    told = ours["numbers"]["10"]
+    found = ours["numbers"]["10"]
     values = [
         case.body, "finger3d", case.size, case.base, ours["dofs"], 10, ours["iterations"]["10"], ours["factorizations"],
-        told["force"], told["outward_x"], told["outward_z"], sum(ours["seconds"].values()), ours["cpu_s"],
+        found["force"], found["outward_x"], found["outward_z"], sum(ours["seconds"].values()), ours["cpu_s"],
         ours["peak_MB"], _threads(), load, versions().get("finger3d", ""), "swept mesh, PARDISO, projection",
     ]  # fmt: skip
     return dict(zip(COLUMNS, values, strict=True))
@@ -159,8 +159,17 @@ def times(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> list[Row]:
     why = "from meshing to the last increment here, the whole run there"
     wall, cpu = (theirs[k] / ours[k] for k in ("wall_s", "cpu_s"))
     return [
-        Row(f"times faster than CalculiX, {here}", source, wanted, wall, 0.0, why, "validation", "at least"),
-        Row(f"processor time of CalculiX over ours, {here}", source, wanted, cpu, 0.0, why, "validation", "at least"),
+        Row(f"time of CalculiX over finger3d's, {here}", source, wanted, wall, 0.0, why, "validation", "at least"),
+        Row(
+            f"processor time of CalculiX over finger3d's, {here}",
+            source,
+            wanted,
+            cpu,
+            0.0,
+            why,
+            "validation",
+            "at least",
+        ),
     ]
 
 

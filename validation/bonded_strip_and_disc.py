@@ -74,7 +74,7 @@ def run(quick: bool) -> Result:
         why = (
             "the reference has four digits, and the last may be off by one"
             if body == "strip"
-            else "the last digit of the reference, and a coarser mesh"
+            else "the last digit of the reference and a coarser mesh"
         )
         rows.append(Row(f"E_a/E of a {body}, nu = {nu:g}", _BOND, wanted, limit, 5e-4, why))
         why = "on the coarsest mesh the smooth part of the error, of fourth order, still contributes"

@@ -1,10 +1,10 @@
-"""Is what a calibration says of its own error, by mesh and increments, the error that readings then show?
+"""Does the error that a calibration states for mesh and increments agree with the error of readings?
 
 No source; the readings are presses of the same section with more increments than the calibration's, on its mesh and on
 one of half the edge length, at coefficients of friction drawn between the calibrated ones, with noise added.  A half
 cylinder of 5 mm pressed 1 mm in plane strain; six gauges; 10, 20 and 40 increments, and as many as "auto" chooses.
 Nothing else that is not known is drawn, so all other tolerances are left out.  z is (reading - curve) / standard
-deviation of a reading, at the true mu; of mu (estimated - true) / told, where mu is told.
+deviation of a reading, at the true mu; of mu (estimated - true) / stated, where an estimate is given.
 """
 
 from __future__ import annotations
@@ -94,9 +94,9 @@ def _readings(
 ) -> Iterator[Reading]:
     """Every gauge calibrated, and read at `mus` in presses with more increments, on its mesh and on a finer one."""
     curve = np.linspace(*RANGE, 17 if quick else 25)
-    told = gauges()[1::3] if quick else gauges()
+    some = gauges()[1::3] if quick else gauges()
     found = {}
-    for gauge in told:
+    for gauge in some:
         c, problem, sweep = calibrated(model(nu, size, steps), gauge.name, curve, NOISE, 0.1, ON)
         assert sweep.increments is not None
         own = int(sweep.increments.legs[0].steps)
@@ -139,14 +139,14 @@ def _rows(found: list[Reading]) -> Iterator[Row]:
         for mesh in (SAME, FINER):
             some = [r for r in found if r.steps == steps and r.mesh == mesh]
             what = f"calibrated with {steps} increments, read with more, {mesh}, {len(some)} readings"
-            yield from _near_one(f"z of the strain, rms: {what}", np.array([r.z for r in some]))
+            yield from _near_one(f"rms of z of the strain: {what}", np.array([r.z for r in some]))
             z_mu = np.array([r.z_mu for r in some if math.isfinite(r.z_mu)])
             if len(z_mu) > 10:
-                yield from _near_one(f"z of mu, rms: {what}, {len(z_mu)} of which tell mu", z_mu)
+                yield from _near_one(f"rms of z of mu: {what}, {len(z_mu)} with an estimate of mu", z_mu)
             share = float(np.mean([r.inside for r in some]))
             yield Row(
-                f"share of 68 % sets that hold the true mu: {what}", "erf(1/sqrt 2)", 0.683, share, 0.0,
-                "errors of one sign are told by their size, so more than 68 % may hold", "statement", "at least",
+                f"share of 68 % sets that contain the true mu: {what}", "erf(1/sqrt 2)", 0.683, share, 0.0,
+                "systematic errors are stated by their size, so more may be covered", "statement", "at least",
             )  # fmt: skip
             worst = float(np.abs([r.z_without for r in some]).max())
             yield Row(
@@ -156,11 +156,11 @@ def _rows(found: list[Reading]) -> Iterator[Row]:
 
 
 def _near_one(what: str, z: Float) -> Iterator[Row]:
-    """Not overconfident, which must be; nor told much too large, which is a finding where the mesh has its part."""
-    why = "the error of a body is one draw for all of its readings"
-    yield Row(what, "1 if the errors are as told", 1.3, _rms(z), 0.0, why, "sensitivity", "at most")
+    """Yield two rows: the stated errors are not too small, and they are not much too large."""
+    why = "all readings of a body share one error of that body"
+    yield Row(what, "1 if the errors are right", 1.3, _rms(z), 0.0, why, "sensitivity", "at most")
     yield Row(
-        f"{what}; not less than half", "1 if the errors are as told", 0.5, _rms(z), 0.0, why, "statement", "at least"
+        f"{what}; not less than half", "1 if the errors are right", 0.5, _rms(z), 0.0, why, "statement", "at least"
     )
 
 
@@ -181,13 +181,13 @@ def _extrapolated(bare: dict[tuple[float, float, int], Float], nu: float, size: 
                 better / plain, 0.0, "below 1 it helps", "statement", "at most",
             )
         )  # fmt: skip
-    told = np.array([error_left({n: strains[n].ravel() for n in (b // 4, b // 2, b)}, b) for b in (40, 80, 160)])
+    stated = np.array([error_left({n: strains[n].ravel() for n in (b // 4, b // 2, b)}, b) for b in (40, 80, 160)])
     off = np.array([np.abs(strains[b] - true).ravel() for b in (40, 80, 160)])
     big = off > 0.1 * NOISE
     rows.append(
         Row(
             "share of strains in error by more than a tenth of the noise whose error is within twice its estimate",
-            "no reference", 0.9, float(np.mean(off[big] <= 2.0 * told[big])), 0.0, "nine in ten", "statement",
+            "no reference", 0.9, float(np.mean(off[big] <= 2.0 * stated[big])), 0.0, "nine in ten", "statement",
             "at least",
         )
     )  # fmt: skip

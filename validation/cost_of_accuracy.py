@@ -2,7 +2,7 @@
 
 Three presses with mu = 0.25: the Fig. 9 finger at nu = 0.49 as a section in plane strain and as a 20 mm wide solid
 (Maeno 2004, Sec. III), and the paper's half cylinder in plane stress at nu = 0.3 (Sec. II).  Every case is pressed in a
-process of its own, which tells its peak memory; times are the least of up to three runs in turn, from meshing to the
+process of its own, which reports its peak memory; times are the least of up to three runs in turn, from meshing to the
 last increment.  The truth is extrapolated from the finest meshes and the most increments.  Lengths are those that a
 press reports, which move from point to point; their truth is the edge between points (Johnson 1985, ch. 4: p^2 is
 linear there).
@@ -171,7 +171,7 @@ def _judged(made: Mapping[str, Groups], runs: Runs, plain: Runs, floats: Runs, q
 def _truth_rows(body: str, truths: Mapping[str, Truth], quick: bool) -> list[Row]:
     """What was extrapolated without the finest run, against the finest run."""
     far = {"force": 0.002, "friction_sum": 0.02, "gauge_strain": 0.05, "contact_length": 0.05, "stick_length": 0.15}
-    why = "the levels between differ by more; a wrong extrapolation would show as much"
+    why = "levels differ by more than this; a wrong extrapolation would show"
     return [
         Row(f"{q} of the finest run over that extrapolated from the coarser ones, less 1, {body}", "finest run", 0.0,
             truths[q].check, far[q] * (4.0 if quick else 1.0), why, "verification", "absolute")
@@ -197,8 +197,8 @@ def _rate_rows(body: str, series: Groups, runs: Runs) -> list[Row]:
                 measure="absolute")
         )  # fmt: skip
     if body == HALF:
-        told = [value(runs[series["steps"][0]], "friction_sum", n) for n in (5, 10, 20)]
-        rate = float(np.log2((told[0] - told[1]) / (told[1] - told[2])))
+        sums = [value(runs[series["steps"][0]], "friction_sum", n) for n in (5, 10, 20)]
+        rate = float(np.log2((sums[0] - sums[1]) / (sums[1] - sums[2])))
         why = "the edge of the stick zone moves from point to point"
         rows.append(
             Row(f"rate of the friction sum in the increments, {body}", "1/N; REFERENCES.md, 2.4", 1.0, rate, 0.2, why,
@@ -234,7 +234,7 @@ def _slower_row(body: str, series: Groups, runs: Runs) -> list[Row]:
     what = (
         f"time of {runs[case]['factorizations']} factorisations over that of one condensation, {own['dofs']} unknowns"
     )
-    why = "the contact itself costs some factorisations of so small a body"
+    why = "for so small a body the contact solves cost as much as some factorisations"
     return [
         Row(f"{what}, {body}", "a factorisation each iteration saved", 5.0, times, 0.0, why, "sensitivity", "at least")
     ]
@@ -267,9 +267,9 @@ def _default_rows(
         got = errors[case][q] + steps[q][10]
         unit = f"{claim:g} edge length{'s' if claim > 1.0 else ''}" if q in LENGTHS else f"{100 * claim:g} %"
         rows.append(
-            Row(f"error of {q} by default ({case.size:g} mm, {case.base:g} mm, {case.mesher}, 10 steps), {body}",
+            Row(f"error of {q} at the defaults ({case.size:g} mm, {case.base:g} mm, {case.mesher}, 10 steps), {body}",
                 "truth above", abs(limit), got, truths[q].uncertainty,
-                f"claimed: {unit}, and what the truth is known to", "sensitivity", "at most")
+                f"claimed: {unit}, plus the uncertainty of the reference", "sensitivity", "at most")
         )  # fmt: skip
     return rows
 

@@ -1,4 +1,4 @@
-"""Does the true error of a press lie within twice its error bar in nine cases of ten, and is the bar no wild guess?
+"""Does the true error of a press lie within twice its error bar in nine cases of ten, and is the bar of the right size?
 
 Source: Richardson 1911 for the estimate, Williams 1952 for its order.  Truth is the finest mesh, or, for a
 cylinder on a half-plane, Hertz' length under the force found (Johnson 1985, sec. 4.2).  nu = .4 and mu = .125 and .5

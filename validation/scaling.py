@@ -78,7 +78,7 @@ def _growth_rows(runs: Runs, unknowns: Sequence[Size], quick: bool) -> list[Row]
 
     assembly, factor = (growth([runs[s]["seconds"][k] for s in big]) for k in ("assembly", "condensation"))
     memory = growth([runs[s]["peak_MB"] for s in big])
-    why = "timing of a shared machine"
+    why = "times of a shared machine scatter"
     return [
         Row("assembly grows as unknowns to the power", "one visit to each cell", 1.0, assembly, 0.25, why, "validation",
             "at most"),
@@ -100,7 +100,7 @@ def _workers() -> list[Row]:
 
 def _one_factorisation(runs: Runs) -> list[Row]:
     worst = max(r["factorizations"] for r in runs.values())
-    what = "factorisations a press, whatever the size"
+    what = "factorisations a press, for every size"
     return [Row(what, "one condensation serves all increments", 1.0, float(worst), 0.0, "a count", measure="at most")]
 
 

@@ -1,4 +1,4 @@
-"""Does the 30 degree gauge of the Fig. 9 finger tell mu to 0.1 at mu = 0.5, as the paper measured, and why as much?
+"""Does the 30 degree gauge of the Fig. 9 finger resolve mu = 0.5 to 0.1, as the paper measured?
 
 Source: Maeno 2004, Sec. IV, Fig. 14: the strain falls as mu grows, a second-order equation goes through seven points,
 the largest standard deviation of the strain, 1.5e-4, makes an error of 0.1 in mu, up to mu = 0.5.  Neither Poisson's
@@ -109,7 +109,7 @@ def _checks(domain: Domain, c: Calibration, problem: Problem, sweep: CurvePoints
             1e-9, "from another start; both end at a residual of 1e-11",
         ),
         Row(
-            f"68 % intervals that hold the true mu, {count} readings, {here}", "erf(1/sqrt 2)", share, float(hit),
+            f"68 % intervals that contain the true mu, {count} readings, {here}", "erf(1/sqrt 2)", share, float(hit),
             3.0 * math.sqrt(share * (1.0 - share) / count), "three binomial standard deviations", measure="absolute",
         ),
     ]  # fmt: skip
@@ -136,7 +136,7 @@ def _statements(what: str, c: Calibration) -> list[Row]:
         *_left(what, c),
         said(
             f"mu is measured with 0.1 up to .5: end of the usable range that begins below .3, {what}", "Sec. IV", 0.5,
-            usable, "as said", 0.0, "at least",
+            usable, "as the paper states", 0.0, "at least",
         ),
         said(
             f"a second-order equation describes the curve: its residual (rms), {what}", "Fig. 14", NOISE, c.fit.rms,
@@ -162,13 +162,13 @@ def _widths(found: Found) -> list[Row]:
     return [
         Row(
             f"change of the strain over all mu, 20 mm wide over plane strain, {kind}", "plane strain", 1.0,
-            moved["solid", kind] / moved["plane-strain", kind], 0.5, "half would do for a design", "statement",
+            moved["solid", kind] / moved["plane-strain", kind], 0.5, "half suffices for a design", "statement",
         )
         for kind in (FREE, READ)
     ] + [
         Row(
             f"change of the strain over all mu, a foil's over free, {NAMES[domain]}", "a gauge without stiffness", 1.0,
-            moved[domain, READ] / moved[domain, FREE], 0.5, "half would do for a design", "statement",
+            moved[domain, READ] / moved[domain, FREE], 0.5, "half suffices for a design", "statement",
         )
         for domain in NAMES
     ]  # fmt: skip

@@ -121,7 +121,7 @@ def run(quick: bool) -> Result:
                 rate(edges, errors["height"]), 0.1, "over two or three halvings", measure="at least",
             ),
             Row(
-                f"{name}: force with {levels[-1]} sectors, by the exact shape's", CLOSED, 1.0,
+                f"{name}: force with {levels[-1]} sectors, relative to the exact shape's", CLOSED, 1.0,
                 1.0 + errors["force"][-1], 3.0 * sagitta / 0.4, "three sagittas over the depth; P ~ depth^1.5",
             ),
             Row(
@@ -165,7 +165,15 @@ def _distance_rows() -> list[Row]:
         Row("signed distance from a box, largest error, mm", CLOSED, 0.0, off, 1e-12, "round-off", measure="absolute"),
         Row("its normal against the distance's slope", "differences", 0.0, turned, 1e-6, "theirs", measure="absolute"),
         Row(tip, "all lie outside", 0.0, wrong, 0.0, "none", measure="absolute"),
-        Row("the same by the nearest triangle's normal", paper, 0.1, naive, 0.0, "so it can fail", measure="at least"),
+        Row(
+            "the same by the nearest triangle's normal",
+            paper,
+            0.1,
+            naive,
+            0.0,
+            "the check can fail",
+            measure="at least",
+        ),
     ]
 
 

@@ -116,8 +116,8 @@ def run(quick: bool) -> Result:
             "largest change of the height of first touch, mm", "symmetry", 0.0, float(np.ptp(touched)), 1e-4 * DEPTH,
             "1e-4 of the depth, or 1.5e-4 of the force; it is searched on finer and finer grids", measure="absolute",
         ),
-        Row(one, "symmetry", 0.0, meshed, allowed, "the mesh is not its own image", measure="absolute"),
-        Row("friction over force at the end", "mu = 0.3", 0.05, sideways, 0.0, "the slide is felt", measure="at least"),
+        Row(one, "symmetry", 0.0, meshed, allowed, "the mesh is not invariant under the rotation", measure="absolute"),
+        Row("friction over force at the end", "mu = 0.3", 0.05, sideways, 0.0, "friction acts", measure="at least"),
     ]  # fmt: skip
     world = np.array([turn(a) @ f[-1] for a, f in zip(angles, alone, strict=True)])
     table: dict[str, Any] = {"angle_deg": list(angles)}

@@ -149,14 +149,16 @@ def _mirror_rows() -> list[Row]:
     return [
         Row(what, "symmetry", 0.0, share, 1e-8, "round-off", measure="absolute"),
         Row(
-            "their force, by that on a smooth plane at half the depth",
+            "their force over that on a smooth plane at half the depth",
             "symmetry",
             1.0,
             plane,
             1e-7,
             "chords for arcs",
         ),
-        Row("force with E2 = 1e12 E1, by the rigid object's", "a rigid object", 1.0, limit, 1e-9, "1e-12 is left"),
+        Row(
+            "force with E2 = 1e12 E1 over that of a rigid object", "a rigid object", 1.0, limit, 1e-9, "stiffness ratio"
+        ),
     ]
 
 

@@ -54,7 +54,7 @@ def run(quick: bool) -> Result:
     rows = _rows(found, quick)
     if not quick:  # a time, which a busy machine cannot judge by few pairs
         ratio, scatter = _paired(25)
-        what = "time of a press without effects over one where they cannot be imported, least of 25 pairs each"
+        what = "time of a press without effects over that with the effects package removed, least of 25 pairs"
         why = f"times scatter by {100.0 * scatter:.0f} %"
         rows += (Row(what, "an absent effect costs nothing", 1.0, ratio, 0.1, why, "sensitivity"),)
     return Result(rows, table, lambda figure: _draw(figure, found))
