@@ -49,7 +49,7 @@ def fake_press(monkeypatch):
     """Replace the driver: writes two steps, then ends as told."""
     calls = SimpleNamespace(end=Outcome.CONVERGED, scene=None, figures=None)
 
-    def press(scene, out, report, figures=True, error=True, artist=None):
+    def press(scene, out, report, figures=True, error=True):
         calls.scene, calls.figures = scene, figures
         steps = [{**STEP, "depth_mm": 5.0}, STEP]
         if isinstance(calls.end, Outcome) and not calls.end.ok:
@@ -150,7 +150,7 @@ def test_an_interrupted_press_ends_with_130_and_says_what_is_kept(scene, tmp_pat
 
 
 def test_an_interruption_before_the_first_step(scene, tmp_path, monkeypatch, capsys):
-    def press(scene, out, report, figures=True, error=True, artist=None):
+    def press(scene, out, report, figures=True, error=True):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(finger3d.analyses.press, "press", press)

@@ -1,20 +1,70 @@
-"""What `finger3d.press` returns: numbers, tables, pictures and fields of one press, for a script or a notebook."""
+"""Result of a press: its numbers, tables, pictures and fields, for a script or a notebook."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Literal
 
+from finger3d.analyses.press_files import history_table
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.io import atomic
 from finger3d.mechanics.history import History, contact_table
+from finger3d.results.vtu import grid
 
 if TYPE_CHECKING:
     import pandas
     import pyvista
-from finger3d.results.vtu import grid
+
+
+@dataclass(frozen=True)
+class PressStep:
+    """Numbers of one increment, as in the entries of ``steps`` in summary.json.
+
+    Attributes
+    ----------
+    depth_mm : press depth, the way of the object along -y from first touch
+    slide_x_mm, slide_z_mm : way of the object along x and z from where it touched first
+    time_s : time at the end of the increment
+    normal_force_N : sum of the contact forces along -y on the finger
+    tangential_force_x_N, tangential_force_z_N : net friction on the finger
+    friction_sum_N : sum of |friction| over the contact points
+    outward_friction_x_N, outward_friction_z_N : sum of the friction away from the object's lowest point
+    contact_area_mm2, stick_area_mm2 : area of the points in contact, and of those that stick
+    contact_half_length_mm, stick_half_length_mm : half the extent along x of contact and stick zone at z = 0
+    contact_half_length_end_mm : half the extent of the contact zone at z = width/2; None for a section
+    external_work_mJ, dissipation_mJ : work done on the finger, and work lost to friction, since the start
+    gauges : strain by the name of the gauge, dimensionless
+    iterations : of the contact solver
+    residual : largest violation of the contact conditions, dimensionless
+    method : the algorithm that solved the increment
+    outcome : "converged", or what failed
+    """
+
+    depth_mm: float
+    slide_x_mm: float
+    slide_z_mm: float
+    time_s: float
+    normal_force_N: float
+    tangential_force_x_N: float
+    tangential_force_z_N: float
+    friction_sum_N: float
+    outward_friction_x_N: float
+    outward_friction_z_N: float
+    contact_area_mm2: float
+    stick_area_mm2: float
+    contact_half_length_mm: float
+    stick_half_length_mm: float
+    external_work_mJ: float
+    dissipation_mJ: float
+    gauges: Mapping[str, float]
+    iterations: int
+    residual: float
+    method: str
+    outcome: str
+    contact_half_length_end_mm: float | None = None
 
 
 @dataclass(frozen=True)
@@ -38,8 +88,8 @@ class PressResult:
 
     Attributes
     ----------
-    history : the contact state of every increment, with all digits
-    out : folder of the files; a temporary one, which goes with this object, if none was asked for
+    history : the contact state of every increment
+    out : folder of the files; a temporary one, removed together with this object, if none was asked for
 
     Examples
     --------
@@ -47,9 +97,10 @@ class PressResult:
     >>> result = finger3d.press("scene.toml")
     >>> result.outcome.ok
     True
-    >>> last = result.summary()["steps"][-1]
-    >>> f"{last['normal_force_N']:.2f} N"
+    >>> f"{result.last.normal_force_N:.2f} N"
     '0.81 N'
+    >>> result.summary()["steps"][-1]["normal_force_N"] == result.last.normal_force_N
+    True
     >>> result.to_dataframe()[["depth_mm", "normal_force_N"]].shape
     (4, 2)
     >>> set(result.to_dataframe("contact")["status"]) <= {"open", "stick", "slip"}
@@ -70,6 +121,25 @@ class PressResult:
         """CONVERGED if every increment is."""
         return self.history.outcome
 
+    @property
+    def steps(self) -> tuple[PressStep, ...]:
+        """The numbers of every increment."""
+        return tuple(PressStep(**step) for step in self._numbers["steps"])
+
+    @property
+    def last(self) -> PressStep:
+        """The numbers of the last increment that converged.
+
+        Raises
+        ------
+        Finger3dError
+            If none did.
+        """
+        good = self._good()
+        if not good:
+            raise Finger3dError(f"{self.out}: no increment converged: {self._numbers['outcome']}")
+        return good[-1]
+
     def summary(self) -> dict[str, Any]:
         """Return what summary.json holds: scene, effects, steps, mesh, cost, versions, errors, warnings."""
         return self._numbers
@@ -88,9 +158,8 @@ class PressResult:
             return pandas.DataFrame(self._contact())
         if table != "history":
             raise Finger3dError(f'to_dataframe({table!r}): must be "history" or "contact"')
-        gauges = [{f"gauge_{name}": strain for name, strain in s["gauges"].items()} for s in self._numbers["steps"]]
-        flat = [{**s, **g} for s, g in zip(self._numbers["steps"], gauges, strict=True)]
-        return pandas.DataFrame(flat).drop(columns="gauges", errors="ignore")
+        steps = self._numbers["steps"]
+        return pandas.DataFrame(history_table(steps) if steps else {})
 
     def plot_contact(self) -> Picture:
         """Draw pressure, friction and its limit along x in the last good step, with the zones that stick and slip."""
@@ -122,7 +191,7 @@ class PressResult:
 
     def __repr__(self) -> str:
         """One line: title, outcome, force and depth of the last good step."""
-        return f"<PressResult {self._title}: {self._said()}>"
+        return f"<PressResult {self._title}: {self._status()}>"
 
     @property
     def _title(self) -> str:
@@ -130,12 +199,12 @@ class PressResult:
 
         return title_of(self._numbers["scene"])
 
-    def _good(self) -> list[dict[str, Any]]:
-        return [step for step in self._numbers["steps"] if step["outcome"] == "converged"]
+    def _good(self) -> list[PressStep]:
+        return [step for step in self.steps if step.outcome == "converged"]
 
-    def _said(self) -> str:
+    def _status(self) -> str:
         good = self._good()
-        last = f", {good[-1]['normal_force_N']:.5g} N at {good[-1]['depth_mm']:.4g} mm" if good else ""
+        last = f", {good[-1].normal_force_N:.5g} N at {good[-1].depth_mm:.4g} mm" if good else ""
         return f"{self.outcome}, {len(good)} steps{last}"
 
     def _repr_html_(self) -> str:
@@ -147,6 +216,6 @@ class PressResult:
         good = self._good()
         rows = [
             (row.name, f"{number(row.value, row.error)} {row.unit}".strip())
-            for row in (headline(good[-1], errors_of(self._numbers)) if good else ())
+            for row in (headline(asdict(good[-1]), errors_of(self._numbers)) if good else ())
         ]
-        return card(self._title, self._said(), rows, self._numbers["warnings"], self._numbers["advice"])
+        return card(self._title, self._status(), rows, self._numbers["warnings"], self._numbers["advice"])

@@ -36,21 +36,17 @@ def press(
     scene
         The scene file (TOML); `finger3d new` writes one.
     """
-    from finger3d.plotting.worker import PlotWorker
+    loaded = load(scene, set_)
+    check_writable(out, scene)
+    from finger3d.analyses.press import press as run
 
-    with PlotWorker(figures, formulae=False) as artist:  # it loads what it needs while the scene is read
-        loaded = load(scene, set_)
-        check_writable(out, scene)
-        import finger3d.accuracy.prefetch  # noqa: F401  all that the job will import
-        from finger3d.analyses.press import press as run
-
-        report, aside = reporting(json_)
-        try:
-            with aside, report:
-                result = run(loaded, out, report, figures=figures, error=error, artist=artist)
-        except KeyboardInterrupt:
-            complain(f"interrupted; {kept(out, report.steps_total)}")
-            return 130
+    report, aside = reporting(json_)
+    try:
+        with aside, report:
+            result = run(loaded, out, report, figures=figures, error=error)
+    except KeyboardInterrupt:
+        complain(f"interrupted; {kept(out, report.steps_total)}")
+        return 130
     if json_:
         print_json(result.summary())
     else:

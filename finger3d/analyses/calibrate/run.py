@@ -26,7 +26,6 @@ from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Gauge, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import MARGIN, build, contact_within_candidates
-from finger3d.plotting.worker import PlotWorker
 from finger3d.progress import Progress
 from finger3d.report.calibrate import calibrate_page
 from finger3d.sensor.curve import FEWEST, NOISE, RESOLUTION, Calibration, Tolerance
@@ -112,15 +111,14 @@ def calibrate(
 
         check(model)
     settings = (known, asked, wanted, noise, limit, report, maps)
-    with PlotWorker(out is not None, "finger3d.plotting.calibration") as artist:
-        if out is None:
-            return _whole(scene, model, None, artist, *settings)
-        with claimed(out, "calibrate") as folder:
-            return _whole(scene, model, folder, artist, *settings)
+    if out is None:
+        return _whole(scene, model, None, *settings)
+    with claimed(out, "calibrate") as folder:
+        return _whole(scene, model, folder, *settings)
 
 
 def _whole(
-    scene: Scene, model: Model, folder: Path | None, artist: PlotWorker, gauge: Gauge, mus: tuple[float, ...],
+    scene: Scene, model: Model, folder: Path | None, gauge: Gauge, mus: tuple[float, ...],
     wanted: Mapping[str, float], noise: float, limit: float, report: Progress, maps: bool,
 ) -> Calibration:  # fmt: skip
     """Calibrate and write what is found; an interruption leaves the curve so far in calibration.csv."""
@@ -148,7 +146,7 @@ def _whole(
     digest = hashlib.sha256(text.encode()).hexdigest()[:16]
     calibration = replace(calibration, scene=scene.as_dict(), hash=digest, about=about)
     if folder:
-        _write(folder, artist, calibration, problem, model, gauge, sweep, report, maps)
+        _write(folder, calibration, problem, model, gauge, sweep, report, maps)
     return calibration
 
 
@@ -274,7 +272,6 @@ def _keep(folder: Path, sweep: CurvePoints, gauge: str) -> None:
 
 def _write(
     folder: Path,
-    artist: PlotWorker,
     calibration: Calibration,
     problem: Problem,
     model: Model,
@@ -286,8 +283,6 @@ def _write(
     from finger3d.plotting.calibration import draw
 
     report.stage("writing")
-    artist.draw(draw, folder / "calibration.png", calibration)
-    artist.begin()
     write_table(calibration, folder / "calibration.csv")
     own = replace(
         problem, model=replace(problem.model, gauges=model.gauges), gauge_rows=problem.gauge_rows[: len(model.gauges)]
@@ -304,7 +299,7 @@ def _write(
         found.write(folder / "map.csv", gauge.angle, calibration.noise)
         draw_map(folder / "map.png", found, gauge, calibration)
     save(calibration, folder / "calibration.json")
-    artist.finish()
+    draw(folder / "calibration.png", calibration)
     calibrate_page(folder)
 
 

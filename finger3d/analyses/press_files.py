@@ -1,0 +1,179 @@
+"""Files of a press: summary, tables, fields and pictures in one folder."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.fem.simplex import Mesh, middles, unfold
+from finger3d.io import atomic, write_csv, write_json
+from finger3d.mechanics.history import StepResult, contact_table, measure
+from finger3d.results.states import states_of, write_states
+from finger3d.results.vtu import write_vtu
+
+if TYPE_CHECKING:
+    from finger3d.analyses.press_record import PressRecord
+
+Float = NDArray[np.float64]
+
+_WRITE_EVERY_S = 0.5
+"""Shortest time between two writes of the tables, s."""
+
+_WRITE_SHARE = 10.0
+"""Shortest time between two writes over the time of one: a table holds all increments, and grows with them."""
+
+_INCOMPLETE = "incomplete: the press was still running, or was interrupted; the steps written are valid"
+_FILES = (
+    "summary.json", "history.csv", "contact.csv", "fields.vtu", "steps.npz", "report.html", "finger.png",
+    "contact.png", "force.png",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Fields:
+    """Fields of the whole finger after the last converged increment.
+
+    Attributes
+    ----------
+    mesh : the whole finger at rest, unfolded where symmetry was used, mm
+    image_of : (n,) node of the meshed part that each node is an image of
+    mirror_sign : (n, d) factor of a vector's components at the image, +1 or -1
+    displacement : (n, d) mm
+    strain, stress : (n, 3, 3) nodal averages; stress in MPa
+    """
+
+    mesh: Mesh
+    image_of: NDArray[np.int64]
+    mirror_sign: Float
+    displacement: Float
+    strain: Float
+    stress: Float
+
+    @classmethod
+    def of(cls, record: PressRecord, u: Float, strain: Float, stress: Float) -> Fields:
+        """Unfold fields of the meshed part: displacements (p, d) mm, strain and stress (p, 3, 3)."""
+        problem = record.problem
+        mesh, image_of, sign = unfold(problem.mesh, tuple("xyz".index(axis) for axis in problem.axes))
+        flip = np.ones((len(image_of), 3))
+        flip[:, : problem.dim] = sign
+        both = flip[:, :, None] * flip[:, None, :]
+        return cls(mesh, image_of, sign, u[image_of] * sign, strain[image_of] * both, stress[image_of] * both)
+
+
+class ResultWriter:
+    """Writes the results of a press into a folder as they come.
+
+    Parameters
+    ----------
+    folder : where the files go; results of an earlier press there are removed
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._written = -math.inf
+        self._seconds = 0.0
+        for name in _FILES:
+            (folder / name).unlink(missing_ok=True)
+
+    def scene(self, text: str) -> None:
+        """Write scene.toml."""
+        with atomic(self.folder / "scene.toml") as path:
+            path.write_text(text, encoding="utf-8")
+
+    def progress(self, record: PressRecord, outcome: str = _INCOMPLETE) -> None:
+        """Write summary and tables of a press that still runs."""
+        begin = time.perf_counter()
+        steps = self.summary(record, outcome)["steps"]
+        if steps:
+            write_csv(self.folder / "history.csv", history_table(steps))
+            last = next((step for step in reversed(record.steps) if step.outcome.ok), record.steps[-1])
+            write_csv(self.folder / "contact.csv", contact_table(record.problem.points, last.state))
+        self._written = time.perf_counter()
+        self._seconds = self._written - begin
+
+    def progress_if_due(self, record: PressRecord) -> None:
+        """Write summary and tables unless that was done a moment ago."""
+        if time.perf_counter() - self._written > max(_WRITE_EVERY_S, _WRITE_SHARE * self._seconds):
+            self.progress(record)
+
+    def summary(self, record: PressRecord, outcome: str) -> dict[str, Any]:
+        """Write summary.json and return its content."""
+        begin = time.perf_counter()
+        content = record.summary(outcome)
+        write_json(self.folder / "summary.json", content)
+        record.seconds["output"] += time.perf_counter() - begin
+        return content
+
+    def fields(self, record: PressRecord, fields: Fields) -> None:
+        """Write fields.vtu, the fields after the last converged increment, and steps.npz, displacements of them all."""
+        good = record.converged_steps
+        mesh, step = fields.mesh, good[-1]
+        surface = _on_surface(mesh, record.problem.points.nodes, contact_table(record.problem.points, step.state), step)
+        states = states_of(record.problem, good, mesh, fields.image_of, fields.mirror_sign, fields.displacement)
+        write_states(self.folder / "steps.npz", states)
+        write_vtu(
+            self.folder / "fields.vtu",
+            mesh,
+            {
+                "displacement": fields.displacement,
+                "strain": _voigt(fields.strain),
+                "stress": _voigt(fields.stress),
+                **surface,
+            },
+        )
+
+    def pictures(self, record: PressRecord, fields: Fields) -> None:
+        """Draw finger.png, contact.png and force.png."""
+        from finger3d.plotting import figures
+        from finger3d.plotting.gauges import marks_of
+
+        problem, good, mesh = record.problem, record.converged_steps, fields.mesh
+        steps = [measure(problem.points, step) for step in good]
+        table = contact_table(problem.points, good[-1].state)
+        half_width = problem.points.half_width_mm if problem.dim == 3 else None
+        mu = problem.model.friction.static
+        figures.contact_figure(self.folder / "contact.png", table, mu, problem.points.band_mm, half_width)
+        figures.force_figure(self.folder / "force.png", steps)
+        figures.finger_picture(
+            self.folder / "finger.png",
+            mesh,
+            fields.displacement,
+            table,
+            problem.points.nodes,
+            f"{steps[-1]['normal_force_N']:.4g} N at {good[-1].target.depth_mm:g} mm",
+            marks=marks_of(mesh, problem.model.gauges, near=mesh.dim == 3),
+        )
+
+
+def history_table(steps: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
+    """Return the columns of history.csv from the entries of `steps` in summary.json."""
+    rows = [{**step, **{f"gauge_{name}": strain for name, strain in step["gauges"].items()}} for step in steps]
+    return {name: [row[name] for row in rows] for name in rows[0] if name != "gauges"}
+
+
+def _on_surface(
+    mesh: Mesh, nodes: NDArray[np.int64], table: Mapping[str, Any], step: StepResult
+) -> dict[str, NDArray[Any]]:
+    """Contact quantities on all nodes (n,): as computed at vertices, interpolated between them."""
+    ends, between = middles(mesh.facets["contact"], mesh.dim)
+    out = {}
+    for name in ("pressure", "shear_x", "shear_z"):
+        out[name] = np.zeros(len(mesh.points))
+        out[name][nodes] = table[f"{name}_MPa"]
+        out[name][between] = out[name][ends].mean(axis=1)
+    out["status"] = np.zeros(len(mesh.points))
+    out["status"][nodes] = step.state.status
+    out["status"][between] = out["status"][ends].min(axis=1)
+    return out
+
+
+def _voigt(tensor: Float) -> Float:
+    """Components xx yy zz xy yz xz (n, 6) of symmetric tensors (n, 3, 3), the order of VTK."""
+    return np.stack([tensor[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))], axis=1)

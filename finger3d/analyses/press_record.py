@@ -1,0 +1,173 @@
+"""Record of one press: its increments, warnings, errors and cost, and the summary made from them."""
+
+from __future__ import annotations
+
+import resource
+import time
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from finger3d._machine import versions
+from finger3d.contact.friction import OPEN
+from finger3d.mechanics.history import History, StepResult, measure
+
+if TYPE_CHECKING:
+    from finger3d.accuracy.estimate import ErrorEstimate
+    from finger3d.accuracy.refine import Refinement
+    from finger3d.mechanics.problem import Problem
+    from finger3d.mechanics.step_halving import StepEstimate
+    from finger3d.scene import Scene
+
+_SMALL_STRAIN_DEPTH = 0.3
+"""Largest press depth over the finger's height without a warning at small strain; 0.2 in Maeno et al. 2004, Fig. 9."""
+
+_RESOLVED_POINTS = {2: 6, 3: 100}
+"""Fewest contact points of a resolved contact zone, by dimension: six on a line, ten by ten on a surface."""
+
+
+@dataclass
+class PressRecord:
+    """All that is known of a press while it runs.
+
+    Attributes
+    ----------
+    scene : the scene as it is run
+    problem : the discretised problem
+    started : `time.perf_counter()` at the start of the job, s
+    refinement : the mesh refinement that chose the mesh, if the scene asks for an error instead of sizes
+    factorizations_before : factorisations of an earlier attempt with too few candidate points
+    steps : the increments so far
+    step_estimate : how automatic increments were chosen
+    error_estimate : errors by mesh and increments
+    warnings, advice : lines for the user
+    seconds : time by stage, s
+    factorizations : of this attempt, without those of the error estimate; None while it runs
+    """
+
+    scene: Scene
+    problem: Problem
+    started: float
+    refinement: Refinement | None = None
+    factorizations_before: int = 0
+    steps: list[StepResult] = field(default_factory=list)
+    step_estimate: StepEstimate | None = None
+    error_estimate: ErrorEstimate | None = None
+    warnings: list[str] = field(default_factory=list)
+    advice: list[str] = field(default_factory=list)
+    seconds: dict[str, float] = field(default_factory=dict)
+    factorizations: int | None = None
+
+    def __post_init__(self) -> None:
+        from finger3d.mechanics import resolution
+
+        self.coupling = self.problem.coupling()
+        self.seconds = {"cad": 0.0, "mesh": 0.0, **self.problem.seconds, "contact": 0.0, "output": 0.0}
+        self.warnings += [
+            *self.problem.model.warnings,
+            *_coupling_warning(self.coupling),
+            *_depth_warning(self.problem),
+        ]
+        self.warnings += resolution.warnings(self.problem)
+        if self.refinement and self.refinement.warning:
+            self.warnings.append(self.refinement.warning)
+
+    @property
+    def history(self) -> History:
+        """The increments with the contact points they belong to."""
+        return History(self.problem.points, tuple(self.steps))
+
+    @property
+    def converged_steps(self) -> list[StepResult]:
+        """Increments that converged; all but the last of a press that failed."""
+        return [step for step in self.steps if step.outcome.ok]
+
+    @property
+    def all_factorizations(self) -> int:
+        """Factorisations so far, with those of an earlier attempt."""
+        own = self.problem.factorizations if self.factorizations is None else self.factorizations
+        return self.factorizations_before + own
+
+    def outcome(self) -> str:
+        """Return the outcome, with the depth of the increment that failed."""
+        failed = next((step for step in self.steps if not step.outcome.ok), None)
+        if failed is None:
+            return str(self.history.outcome)
+        return f"at a depth of {failed.target.depth_mm:.4g} mm: {failed.outcome}"
+
+    def summary(self, outcome: str) -> dict[str, Any]:
+        """Return the content of summary.json."""
+        return {
+            "scene": self.scene.as_dict(),
+            "effects": list(self.scene.effects),
+            "outcome": outcome,
+            "warnings": self.warnings,
+            "advice": self.advice,
+            "steps": [measure(self.problem.points, step) for step in self.steps],
+            "step_estimate": self.step_estimate.as_dict() if self.step_estimate else None,
+            "error_estimate": self.error_estimate.as_dict() if self.error_estimate else None,
+            "refinement": self.refinement.as_dict() if self.refinement else None,
+            "uniqueness": {"largest_coupling": self.coupling},
+            "mesh": _mesh(self.problem),
+            "cost": _cost(self),
+            "versions": versions(),
+        }
+
+
+def _mesh(problem: Problem) -> dict[str, Any]:
+    report = problem.report
+    return {
+        "points": report.points,
+        "cells": report.cells,
+        "dofs": int(problem.stiffness.upper.shape[0]),
+        "contact_points": len(problem.surface.nodes),
+        "min_dihedral_deg": report.min_dihedral_deg,
+        "volume_mm3": report.volume_mm3,
+        "cad_volume_mm3": report.cad_volume_mm3,
+        "hash": report.hash,
+        "from_cache": report.from_cache,
+        "cache_path": report.cache_path,
+        "symmetry": list(problem.axes),
+        "formulation": "mixed quadratic/linear" if problem.elastic.mixed else "quadratic displacement",
+    }
+
+
+def _cost(record: PressRecord) -> dict[str, Any]:
+    return {
+        "seconds": {**record.seconds, "total": time.perf_counter() - record.started},
+        "factorizations": record.all_factorizations,
+        "peak_memory_MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0,
+        "solver": record.problem.condensed.solver,
+        "perturbed_pivots": record.problem.condensed.perturbed_pivots,
+    }
+
+
+def _coupling_warning(coupling: float) -> list[str]:
+    if coupling <= 1.0:
+        return []
+    return [
+        f"The largest mu |K_tt^-1 K_tn| is {coupling:.3g}, above 1: several contact states may satisfy all conditions. "
+        "The one reported follows from the load history."
+    ]
+
+
+def _depth_warning(problem: Problem) -> list[str]:
+    if problem.model.formulation.finite_strain:
+        return []
+    height = problem.model.design.height_mm
+    ratio = max(leg.depth_mm for leg in problem.model.legs) / height
+    if ratio <= _SMALL_STRAIN_DEPTH:
+        return []
+    return [
+        f"The press depth is {100.0 * ratio:.0f} % of the finger's height of {height:.4g} mm: small strain is a poor "
+        "model there, however small the residual. Press less, or switch on [effects.large_deformation]."
+    ]
+
+
+def point_count_warning(record: PressRecord) -> list[str]:
+    """Return a warning if the widest contact zone has too few points to be resolved."""
+    count = max((int(np.count_nonzero(step.state.status != OPEN)) for step in record.steps), default=0)
+    if not count or count >= _RESOLVED_POINTS[record.problem.dim]:
+        return []
+    return [f"Only {count} points touch: too few for contact and stick lengths. Lower mesh.size_mm."]
