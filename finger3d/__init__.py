@@ -1,11 +1,11 @@
 """Frictional contact of an elastic, finger-shaped tactile sensor in 3D.
 
-Names are loaded when they are first used, so that ``import finger3d`` stays light. The main job is
-``finger3d.press("scene.toml", "out")``; without a folder the files go with what it returns:
+Every command is a function: `press`, `compare`, `calibrate`, `estimate`, `sweep`, `optimise`, `export`, `plan` and
+`validate`. Names are loaded when they are first used, so that ``import finger3d`` is quick.
 
 >>> import finger3d
 >>> result = finger3d.press("scene.toml")
->>> result.summary()["outcome"]
+>>> result.last.outcome
 'converged'
 
 The designs make plain build123d solids, which any viewer shows and any CAD program takes:
@@ -21,19 +21,23 @@ True
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from finger3d._lazy import from_home
-
 if TYPE_CHECKING:
+    from finger3d._api import estimate, export, optimise, plan, sweep
+    from finger3d.analyses.calibrate.run import calibrate
+    from finger3d.analyses.compare.run import compare
     from finger3d.analyses.press import press
     from finger3d.analyses.reduced import Condensed
     from finger3d.analyses.result import PressResult
+    from finger3d.analyses.validate import validate
     from finger3d.contact.friction import Coulomb
     from finger3d.errors import Finger3dError, MissingError, Outcome
     from finger3d.fem.simplex import Mesh
     from finger3d.geometry.registry import designs
     from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
+    from finger3d.mold.options import MoldOptions
     from finger3d.objects import Cylinder, Plane, Sphere, Wave, Wedge
     from finger3d.scene import Scene, load, parse
 
@@ -51,6 +55,7 @@ _HOME = {
     "MeshOptions": "mechanics.model",
     "MissingError": "errors",
     "Model": "mechanics.model",
+    "MoldOptions": "mold.options",
     "Outcome": "errors",
     "Plane": "objects",
     "PressResult": "analyses.result",
@@ -58,11 +63,20 @@ _HOME = {
     "Sphere": "objects",
     "Wave": "objects",
     "Wedge": "objects",
+    "calibrate": "analyses.calibrate.run",
+    "compare": "analyses.compare.run",
     "designs": "geometry.registry",
+    "estimate": "_api",
+    "export": "_api",
     "load": "scene",
+    "optimise": "_api",
     "parse": "scene",
+    "plan": "_api",
     "press": "analyses.press",
+    "sweep": "_api",
+    "validate": "analyses.validate",
 }
+"""Module of each public name."""
 
 __all__ = [
     "Condensed",
@@ -76,6 +90,7 @@ __all__ = [
     "MeshOptions",
     "MissingError",
     "Model",
+    "MoldOptions",
     "Outcome",
     "Plane",
     "PressResult",
@@ -84,14 +99,19 @@ __all__ = [
     "Wave",
     "Wedge",
     "__version__",
+    "calibrate",
+    "compare",
     "designs",
+    "estimate",
+    "export",
     "load",
+    "optimise",
     "parse",
+    "plan",
     "press",
+    "sweep",
+    "validate",
 ]
-
-
-_load = from_home(__name__, _HOME)
 
 
 def __getattr__(name: str) -> Any:
@@ -99,7 +119,9 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         return version("finger3d")
-    return _load(name)
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
 
 
 def __dir__() -> list[str]:

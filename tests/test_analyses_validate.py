@@ -9,7 +9,7 @@ import pytest
 
 from finger3d import cli
 from finger3d.analyses import validate as study
-from finger3d.analyses.validate import Row, Study, chosen, kept_rows, studies, validate
+from finger3d.analyses.validate import Row, Study, chosen, kept_rows, run_studies, studies
 from finger3d.errors import Finger3dError, MissingError
 
 GOOD = '''"""Is one and a half what it was?
@@ -76,7 +76,7 @@ def test_a_statement_that_does_not_hold_fails_nothing() -> None:
 
 def test_results_are_kept_to_the_last_digit_and_indexed(folder: Path) -> None:
     known = studies(folder)
-    found = validate(chosen(["good"], known), False, folder, known=known)
+    found = run_studies(chosen(["good"], known), False, folder, known=known)
     assert kept_rows(folder, known["good"]) == found["good"]
     assert (folder / "results" / "good_table.csv").read_text().splitlines()[2] == f"2,{1 / 3!r}"
     assert (folder / "figures" / "good.png").read_bytes().startswith(b"\x89PNG")
@@ -84,7 +84,7 @@ def test_results_are_kept_to_the_last_digit_and_indexed(folder: Path) -> None:
     assert "Is one and a half what it was?" in index
     assert "| good | value \\| mm | sensitivity | a page | 1.5 | 1.5 | 0 % | 1 %: so | pass |" in index
     assert "Not run yet: bad." in index
-    validate(chosen(["bad"], known), False, folder, known=known)
+    run_studies(chosen(["bad"], known), False, folder, known=known)
     index = (folder / "README.md").read_text()
     assert "| good | value" in index, "running one study keeps the rows of the others"
     assert "**FAIL**" in index
@@ -92,13 +92,13 @@ def test_results_are_kept_to_the_last_digit_and_indexed(folder: Path) -> None:
 
 def test_a_run_of_all_leaves_out_what_is_up_to_date(folder: Path) -> None:
     known = studies(folder)
-    validate(list(known.values()), False, folder, known=known)
+    run_studies(list(known.values()), False, folder, known=known)
     before = ran(folder, "good"), ran(folder, "bad")
-    again = validate(list(known.values()), False, folder, resume=True, known=known)
+    again = run_studies(list(known.values()), False, folder, resume=True, known=known)
     assert (ran(folder, "good"), ran(folder, "bad")) == before
     assert not again["bad"][0].passed, "a failure is not forgotten because it is old"
     (folder / "bad.py").write_text(BAD + "\n")
-    validate(list(known.values()), False, folder, resume=True, known=known)
+    run_studies(list(known.values()), False, folder, resume=True, known=known)
     assert ran(folder, "good") == before[0]
     assert ran(folder, "bad") > before[1]
 
@@ -108,6 +108,15 @@ def test_a_changed_helper_makes_those_old_that_use_it(folder: Path) -> None:
     before = {name: known[name].stamp() for name in known}
     (folder / "_shared.py").write_text("VALUE = 1.4\n")
     assert {name for name in known if known[name].stamp() != before[name]} == {"good"}
+
+
+def test_results_are_out_of_date_under_another_version_of_a_library(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    good = studies(folder)["good"]
+    before = good.stamp()
+    monkeypatch.setattr(study, "versions", lambda: {"scipy": "0.1"})
+    assert good.stamp() != before
 
 
 PACKAGE = Path(study.__file__).parents[1]
@@ -150,15 +159,17 @@ def test_a_new_module_counts_unless_it_is_left_out_by_name(tmp_path: Path) -> No
         "results/states.py",
         "plotting/figures.py",
         "plotting/calibration.py",
+        "table.csv",
     ):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text("")
     found = {str(p.relative_to(tmp_path)) for p in study.sources(tmp_path)}
-    assert found == {"thermal.py", "sub/solver.py", "results/states.py"}
+    assert found == {"thermal.py", "sub/solver.py", "results/states.py", "table.csv"}
 
 
 def test_every_exclusion_is_there() -> None:
     left_out = set(PACKAGE.rglob("*.py")) - set(study.sources(PACKAGE))
+    left_out |= {PACKAGE / "py.typed"}  # ships with the wheel
     for pattern in study._NO_NUMBERS:
         assert any(fnmatchcase(path.relative_to(PACKAGE).as_posix(), pattern) for path in left_out), pattern
 
@@ -168,7 +179,7 @@ def test_an_interruption_keeps_the_studies_that_are_done(folder: Path) -> None:
     known = studies(folder)
     report = study.Progress()
     with pytest.raises(KeyboardInterrupt):
-        validate(chosen(["good", "stops", "bad"], known), False, folder, report, known=known)
+        run_studies(chosen(["good", "stops", "bad"], known), False, folder, report, known=known)
     assert report.steps_done == 1
     assert kept_rows(folder, known["good"])
     assert not kept_rows(folder, known["bad"])

@@ -5,8 +5,12 @@ from __future__ import annotations
 import csv
 import doctest
 import importlib
+import inspect
 import json
 import re
+import subprocess
+import sys
+from dataclasses import asdict
 from html import escape
 from pathlib import Path
 
@@ -139,6 +143,84 @@ def test_without_a_folder_the_files_go_with_the_result(tmp_path: Path, monkeypat
     del result
     assert not out.exists()
     assert sorted(p.name for p in tmp_path.iterdir()) == ["scene.toml"]
+
+
+COMMANDS = ("press", "compare", "calibrate", "estimate", "sweep", "optimise", "export", "plan", "validate")
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_is_a_function_with_documented_parameters(name: str) -> None:
+    function = getattr(finger3d, name)
+    parameters = [p for p in inspect.signature(function).parameters if p != "self"]
+    assert name in dir(finger3d)
+    assert all(re.search(rf"^(\w+, )*{p}(, \w+)* :", inspect.getdoc(function) or "", re.M) for p in parameters)
+
+
+def test_the_import_is_quick_and_loads_neither_cad_nor_a_renderer() -> None:
+    code = "import finger3d, sys; print({'OCP', 'vtkmodules', 'matplotlib', 'scipy', 'numpy'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "set()"
+
+
+def test_steps_have_typed_numbers_that_are_those_of_the_summary(solid: PressResult) -> None:
+    assert [asdict(step) for step in solid.steps] == [
+        {**step, "gauges": dict(step["gauges"])} for step in solid.summary()["steps"]
+    ]
+    assert solid.last == solid.steps[-1]
+    assert solid.last.normal_force_N > solid.last.friction_sum_N > 0.0
+
+
+def test_a_plan_forecasts_size_time_and_memory(tmp_path: Path) -> None:
+    plan = finger3d.plan(_written(tmp_path))
+    assert plan.dofs > plan.contact_points > 0
+    assert plan.total_s > 0.0
+    assert plan.memory_MB > 0.0
+    assert plan.summary()["forecast"]["dofs"] == plan.dofs
+
+
+def test_a_calibration_is_estimated_from(tmp_path: Path) -> None:
+    calibration = finger3d.calibrate(_written(tmp_path), "<g>", tmp_path / "cal", mus=(0.05, 0.2, 0.4, 0.8), noise=1e-9)
+    strain = float(np.interp(0.2, calibration.mu, calibration.strain))
+    for source in (calibration, tmp_path / "cal" / "calibration.json"):
+        (found,) = finger3d.estimate(source, strain, tolerances=False)
+        assert found.strain == strain
+        assert found.mu == pytest.approx(0.2, abs=1e-3)
+
+
+def test_a_comparison_has_its_cases(tmp_path: Path) -> None:
+    found = finger3d.compare(_written(tmp_path), tmp_path / "out", widths=())
+    assert found.outcome.ok
+    assert {case.model for case in found.cases} >= {"plane stress", "plane strain"}
+
+
+def test_a_sweep_presses_every_combination(tmp_path: Path) -> None:
+    vary = {"friction.mu": [0.1, 0.3], "model.domain": ["plane-strain", "plane-stress"]}
+    found = finger3d.sweep(_written(tmp_path), vary, tmp_path / "out", ["press.steps=1"], workers=1)
+    table = found.to_dataframe()
+    assert found.failed == 0
+    assert list(table["friction.mu"]) == [0.1, 0.1, 0.3, 0.3]
+    assert list(table["model.domain"]) == 2 * ["plane-strain", "plane-stress"]
+    assert (table["normal_force_N"] > 0.0).all()
+
+
+def test_a_search_returns_the_best_design_as_a_scene(tmp_path: Path) -> None:
+    free = {"gauge.0.angle_deg": (0.0, 90.0)}
+    scene = _written(tmp_path)
+    found = finger3d.optimise(scene, free, tmp_path / "out", mus=(0.1, 0.3), budget=4, overrides=["press.steps=1"])
+    assert found.best.value >= found.start.value
+    assert 0.0 <= found.best.values[0] <= 90.0
+    assert found.scene.tables.gauge[0].angle_deg == pytest.approx(found.best.values[0])
+
+
+def test_an_export_writes_files_of_the_fingers_volume(tmp_path: Path) -> None:
+    done = finger3d.export(_written(tmp_path), tmp_path / "out")
+    assert [file.name for file in done.files] == ["finger.step", "finger.stl"]
+    assert done.stl_volume_mm3 == pytest.approx(done.volume_mm3, rel=0.01)
+
+
+def test_a_study_is_validated(tmp_path: Path) -> None:
+    found = finger3d.validate(["patch_test"], quick=True, out=tmp_path)
+    assert all(row.passed for row in found["patch_test"])
 
 
 def _written(folder: Path) -> Path:

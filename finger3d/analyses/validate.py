@@ -14,6 +14,7 @@ import json
 import math
 import re
 import sys
+import tempfile
 import time
 import types
 from collections.abc import Callable, Mapping, Sequence
@@ -24,6 +25,7 @@ from typing import Any, Literal
 
 from numpy.typing import ArrayLike
 
+from finger3d._machine import versions
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.io import atomic, write_csv, write_json
 from finger3d.progress import Progress
@@ -32,9 +34,12 @@ Kind = Literal["verification", "validation", "sensitivity", "statement"]
 Measure = Literal["relative", "absolute", "at most", "at least"]
 
 _COLUMNS = ("what", "kind", "reference", "wanted", "got", "measure", "error", "tolerance", "reason", "verdict")
-_NO_NUMBERS = ("cli/*", "plotting/*", "report/*", "__main__.py", "_lazy.py", "_notebook.py", "progress.py")
+_NO_NUMBERS = ("cli/*", "plotting/*", "report/*", "__main__.py", "_notebook.py", "progress.py", "py.typed")
 """Files of the package that only draw, write pages, report progress or parse commands. A change of any other one makes
-the results of all studies old."""
+the results of all studies out of date."""
+
+_LIBRARIES = ("numpy", "scipy", "pypardiso", "mkl", "build123d", "cadquery-ocp-novtk", "pytetwild", "trimesh")
+"""Packages that shape numbers."""
 
 
 @dataclass(frozen=True)
@@ -134,24 +139,31 @@ class Study:
         return result
 
     def stamp(self) -> str:
-        """Hash of the sources that shape the study's numbers."""
+        """Return a hash of all that shapes the study's numbers: sources, data files, and versions of the libraries."""
         package = Path(__file__).resolve().parents[1]
-        folders = (package / "geometries", package.parent / "geometries")
-        scenes = [p for f in folders for suffix in ("py", "toml", "stl") for p in sorted(f.glob(f"*.{suffix}"))]
         digest = hashlib.sha256()
-        for path in [*sources(package), *scenes, *_with_helpers(self.path)]:
+        for path in [*sources(package), *_scenes(package), *_with_helpers(self.path)]:
             digest.update(path.read_bytes())
+        installed = versions()
+        digest.update(repr([(name, installed.get(name)) for name in _LIBRARIES]).encode())
         return digest.hexdigest()[:16]
 
 
 def sources(package: Path) -> list[Path]:
-    """Return the Python files of a package that can change a study's numbers: all but those that only draw or tell."""
+    """Return the files of a package that can change a study's numbers: all but those that only draw or report."""
 
     def counts(path: Path) -> bool:
         name = path.relative_to(package).as_posix()
         return not any(fnmatchcase(name, pattern) for pattern in _NO_NUMBERS)
 
-    return [path for path in sorted(package.rglob("*.py")) if counts(path) and "geometries" not in path.parts]
+    files = (path for path in sorted(package.rglob("*")) if path.is_file() and "__pycache__" not in path.parts)
+    return [path for path in files if counts(path) and "geometries" not in path.parts]
+
+
+def _scenes(package: Path) -> list[Path]:
+    """Designs, scenes and triangulated objects of the folder geometries/, in a checkout or an installed package."""
+    found = (path for folder in (package, package.parent) for path in sorted((folder / "geometries").rglob("*")))
+    return [path for path in found if path.is_file() and "__pycache__" not in path.parts]
 
 
 def _with_helpers(path: Path) -> list[Path]:
@@ -194,6 +206,43 @@ def chosen(names: Sequence[str], known: Mapping[str, Study], quick: bool = False
 
 
 def validate(
+    names: Sequence[str] = (), quick: bool = False, out: str | Path | None = None, report: Progress | None = None
+) -> dict[str, tuple[Row, ...]]:
+    """Run studies of the checkout and keep their results as they come.
+
+    Parameters
+    ----------
+    names : of studies; none: those whose results are out of date, but for those that run only by name
+    quick : small meshes and few steps
+    out : folder for the results; None: validation/, or a temporary folder for quick results
+    report : told about every study
+
+    Returns
+    -------
+    dict
+        Rows by study, of those that ran and those that were up to date.
+
+    Raises
+    ------
+    Finger3dError
+        For an unknown name, and for quick results that would replace full ones.
+    """
+    known = studies()
+    selected = chosen(names, known, quick)
+    return run_studies(selected, quick, results_folder(known, quick, out), report, not names and not quick, known)
+
+
+def results_folder(known: Mapping[str, Study], quick: bool, out: str | Path | None) -> Path:
+    """Return the folder of the results; a new temporary one for quick results if none is given."""
+    home = next(iter(known.values())).path.parent
+    if quick and out is not None and Path(out).resolve() == home:
+        raise Finger3dError(f"--out {out}: quick results would overwrite the full ones there; name another folder")
+    if out is not None:
+        return Path(out)
+    return Path(tempfile.mkdtemp(prefix="finger3d-validate-")) if quick else home
+
+
+def run_studies(
     selected: Sequence[Study],
     quick: bool,
     out: Path,

@@ -23,22 +23,15 @@ def plan(scene: Path, /, *, set_: Set = None, json_: Json = False) -> int:
         The scene file (TOML).
     """
     loaded = load(scene, set_)
-    from finger3d.accuracy.cost import forecast
-    from finger3d.mechanics.resolution import foreseen
-    from finger3d.mechanics.solve import symmetry
+    from finger3d.analyses.plan import plan as run
 
-    model = loaded.model()
-    expected, warnings = forecast(model), foreseen(model, symmetry(model))
-    if loaded.tables.mesh.tolerance is not None:
-        expected = {"mesh": f"the first of those refined to tolerance = {loaded.tables.mesh.tolerance:g}"} | expected
+    found = run(loaded)
     if json_:
-        print_json(
-            {"title": loaded.title, "effects": loaded.as_dict()["effects"], "forecast": expected, "warnings": warnings}
-        )
+        print_json(found.summary())
         return 0
     print_rows("effects", effect_rows(loaded))
-    print_rows(loaded.title, [(key.replace("_", " "), value) for key, value in expected.items()])
-    for text in warnings:
+    print_rows(loaded.title, [(key.replace("_", " "), value) for key, value in found.forecast.items()])
+    for text in found.warnings:
         print(f"warning: {text}")
     return 0
 

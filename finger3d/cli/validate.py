@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -10,7 +9,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from finger3d.cli.common import Json, app, check_folder, complain, print_columns, print_json, reporting
-from finger3d.errors import Finger3dError, MissingError
+from finger3d.errors import MissingError
 
 
 @app.command
@@ -40,15 +39,12 @@ def validate(
 
     known = study.studies()
     selected = study.chosen(studies or [], known, quick)
-    home = next(iter(known.values())).path.parent
-    if quick and out is not None and out.resolve() == home:
-        raise Finger3dError(f"--out {out}: quick results would overwrite the full ones there; name another folder")
-    folder = out or (Path(tempfile.mkdtemp(prefix="finger3d-validate-")) if quick else home)
+    folder = study.results_folder(known, quick, out)
     check_folder(folder)
     report, aside = reporting(json_)
     try:
         with aside, report:
-            found = study.validate(selected, quick, folder, report, resume=not studies and not quick, known=known)
+            found = study.run_studies(selected, quick, folder, report, not studies and not quick, known)
     except KeyboardInterrupt:
         complain(f"interrupted; {report.steps_done} of {len(selected)} studies are kept in {folder}")
         return 130

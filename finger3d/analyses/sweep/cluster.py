@@ -8,6 +8,7 @@ import signal
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from importlib import metadata
 from typing import Any
 
 from finger3d._machine import cores
@@ -149,8 +150,6 @@ async def _greet(address: str) -> None:
 
 
 def _ready(client: Any, address: str) -> None:
-    from finger3d import __version__
-
     try:
         client.wait_for_workers(1, timeout=CONNECT_S)
     except TimeoutError:
@@ -158,17 +157,15 @@ def _ready(client: Any, address: str) -> None:
             f"--scheduler {address}: has no worker; start some with `dask worker {address} --nthreads 1`"
         ) from None
     for worker, version in client.run(version_here).items():
-        if version != __version__:
+        if version != version_here():
             raise MissingError(
-                f"--scheduler {address}: the worker {worker} has finger3d {version}; install {__version__} there"
+                f"--scheduler {address}: the worker {worker} has finger3d {version}; install {version_here()} there"
             )
 
 
 def version_here() -> str:
     """Version of finger3d where this is called; that it can be called there says that it is installed."""
-    from finger3d import __version__
-
-    return __version__
+    return metadata.version("finger3d")
 
 
 def default_workers(bodies: int) -> int:

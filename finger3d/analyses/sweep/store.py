@@ -9,6 +9,7 @@ import os
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -119,9 +120,7 @@ class ResultStore:
         return f"{taken[0]} is given by the sweep" if taken else ""
 
     def _identity(self) -> dict[str, Any]:
-        from finger3d import __version__
-
-        return json.loads(json.dumps({"finger3d": __version__} | self.sweep.identity()))
+        return json.loads(json.dumps({"finger3d": metadata.version("finger3d")} | self.sweep.identity()))
 
     def add(self, row: Row) -> bool:
         """Keep a finished point; return whether it is new."""

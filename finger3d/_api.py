@@ -1,0 +1,219 @@
+"""Functions of the Python interface that read a scene or a calibration before they call the analysis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from finger3d.progress import Progress
+
+if TYPE_CHECKING:
+    import pandas
+    from numpy.typing import ArrayLike
+
+    from finger3d.analyses.optimise.run import OptimisationResult
+    from finger3d.analyses.plan import Plan
+    from finger3d.mold.export import Exported
+    from finger3d.mold.options import MoldOptions
+    from finger3d.scene import Scene
+    from finger3d.sensor import Calibration, Estimate
+
+Value = float | int | bool | str
+"""A value of a key of a scene."""
+
+
+def plan(scene: Scene | str | Path) -> Plan:
+    """Forecast size, time and memory of a press without solving anything.
+
+    Parameters
+    ----------
+    scene : a loaded scene, or the path of a TOML file
+
+    Returns
+    -------
+    Plan
+        For instance ``plan.dofs``, ``plan.total_s`` and ``plan.memory_MB``.
+    """
+    from finger3d.analyses import plan
+
+    return plan.plan(_loaded(scene))
+
+
+@dataclass(frozen=True)
+class SweepResult:
+    """Rows of a sweep.
+
+    Attributes
+    ----------
+    out : folder of results.csv, results.parquet and report.html
+    columns : name -> a value for each point: the varied keys, the numbers of the last step with their units in the
+        name, gauges, outcome
+    failed : number of points without results
+    """
+
+    out: Path
+    columns: Mapping[str, Sequence[Value]]
+    failed: int
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """Return the columns as pandas has them, a row a point."""
+        import pandas
+
+        return pandas.DataFrame(dict(self.columns))
+
+
+def sweep(
+    scene: str | Path,
+    vary: Mapping[str, Sequence[Value]],
+    out: str | Path,
+    overrides: Sequence[str] = (),
+    scheduler: str | None = None,
+    workers: int | None = None,
+    report: Progress | None = None,
+) -> SweepResult:
+    """Press every combination of some values of a scene's keys.
+
+    A sweep that was interrupted continues in the same folder.
+
+    Parameters
+    ----------
+    scene : path of a TOML file
+    vary : key -> values, for instance ``{"friction.mu": [0.06, 0.25, 1.0], "material.nu": [0.45, 0.49]}``
+    out : folder for the results
+    overrides : other keys to set, such as ``"mesh.size_mm=1.0"``
+    scheduler : address of a Dask scheduler; None: processes on this machine
+    workers : number of these processes; None: one for each core
+    report : told about every point
+
+    Raises
+    ------
+    Finger3dError
+        For a mistake in the scene or the values, before any point is solved.
+    """
+    from finger3d.analyses.sweep.points import combinations
+    from finger3d.analyses.sweep.run import sweep as run
+
+    texts = [f"{key}={','.join(map(_as_toml, values))}" for key, values in vary.items()]
+    store = run(combinations(Path(scene), overrides, texts), out, scheduler, workers, report)
+    columns = store.columns()
+    return SweepResult(Path(out), columns, sum(outcome != "converged" for outcome in columns["outcome"]))
+
+
+def optimise(
+    scene: str | Path,
+    free: Mapping[str, tuple[float, float]],
+    out: str | Path,
+    objective: str | Path = "sensitivity",
+    gauge: str | None = None,
+    mus: Sequence[float] | None = None,
+    noise: float = 1.5e-4,
+    budget: int = 60,
+    method: str = "differential-evolution",
+    seed: int = 0,
+    overrides: Sequence[str] = (),
+    report: Progress | None = None,
+) -> OptimisationResult:
+    """Search for the values of free keys with the largest objective.
+
+    Parameters
+    ----------
+    scene : path of a TOML file, the start of the search
+    free : key -> lower and upper bound, for instance ``{"gauge.g36.x_mm": (10.0, 48.0)}``
+    out : folder for evaluations.csv, best.toml and report.html
+    objective : "sensitivity", or a Python file with a function ``objective(table) -> number``
+    gauge : name of the gauge that the objective reads; None: the first
+    mus : friction coefficients, ascending; None: nine from 0.05 to 1
+    noise : standard deviation of a strain reading
+    budget : number of designs, or of bodies if gauges are searched in each
+    method : "differential-evolution", "dual-annealing" or "nelder-mead"
+    seed : of the random numbers
+    overrides : other keys to set, such as ``"mesh.size_mm=1.0"``
+    report : told about every design
+
+    Returns
+    -------
+    OptimisationResult
+        With the best design as a scene that can be pressed.
+    """
+    from finger3d.analyses.optimise.run import optimise as run
+    from finger3d.analyses.optimise.task import MUS, FreeKey, OptimisationProblem
+    from finger3d.scene import tree
+
+    problem = OptimisationProblem(
+        given=tree.override(tree.read(Path(scene)), overrides),
+        free=tuple(FreeKey.of(f"{key}={low!r}:{high!r}") for key, (low, high) in free.items()),
+        objective=str(objective),
+        path=Path(scene),
+        gauge=gauge,
+        mus=tuple(mus) if mus is not None else MUS,
+        noise=noise,
+        budget=budget,
+        method=method,
+        seed=seed,
+    )
+    return run(problem, out, report)
+
+
+def estimate(
+    calibration: Calibration | str | Path,
+    strain: ArrayLike,
+    std: ArrayLike | None = None,
+    curve: Literal["interpolation", "fit"] = "interpolation",
+    tolerances: bool = True,
+) -> list[Estimate]:
+    """Estimate the friction coefficient from strain readings.
+
+    Parameters
+    ----------
+    calibration : what `finger3d.calibrate` returned, or the path of its calibration.json
+    strain : one reading, or (m,) of them
+    std : standard deviation of each; None: the noise of the calibration
+    curve : whether to invert the monotone interpolation or the second-order fit
+    tolerances : whether the standard deviations of depth, modulus and so on count
+
+    Returns
+    -------
+    list
+        An Estimate for each reading, with ``mu``, ``std`` and ``status``.
+    """
+    from finger3d.sensor import estimate as run
+    from finger3d.sensor import load
+
+    known = load(calibration) if isinstance(calibration, str | Path) else calibration
+    return run(known, strain, std, curve, tolerances)
+
+
+def export(
+    scene: Scene | str | Path,
+    out: str | Path,
+    mold: MoldOptions | None = None,
+    text: bool = False,
+    tolerance_mm: float = 0.05,
+    report: Progress | None = None,
+) -> Exported:
+    """Write the finger as STEP and STL and, if asked, the printable parts of a mold; all in mm.
+
+    Parameters
+    ----------
+    scene : a loaded scene, or the path of a TOML file
+    out : folder for the files
+    mold : `finger3d.MoldOptions`; None: no mold
+    text : whether the STL file is text instead of binary
+    tolerance_mm : largest distance of the triangles from the CAD surface
+    report : told about stages
+    """
+    from finger3d.mold.export import export as run
+
+    return run(_loaded(scene), out, mold, text, tolerance_mm, report)
+
+
+def _loaded(scene: Scene | str | Path) -> Scene:
+    from finger3d.scene import load
+
+    return load(scene) if isinstance(scene, str | Path) else scene
+
+
+def _as_toml(value: Value) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)

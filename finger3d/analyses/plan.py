@@ -1,0 +1,71 @@
+"""Plan of a press: which effects are on, the size of the model, and the time and memory it will take."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from finger3d.accuracy.cost import forecast
+from finger3d.mechanics.resolution import foreseen
+from finger3d.mechanics.solve import symmetry
+
+if TYPE_CHECKING:
+    from finger3d.scene import Scene
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a press will take, before anything is solved.
+
+    Attributes
+    ----------
+    title : of the scene
+    effects : settings by name of the effects that are on
+    forecast : printable values by name: model, size, seconds of each stage, memory
+    warnings : what the mesh will not resolve
+    """
+
+    title: str
+    effects: Mapping[str, Mapping[str, Any]]
+    forecast: Mapping[str, Any]
+    warnings: tuple[str, ...]
+
+    @property
+    def dofs(self) -> int:
+        """Number of unknowns."""
+        return int(self.forecast["dofs"])
+
+    @property
+    def contact_points(self) -> int:
+        """Number of contact points of the meshed part."""
+        return int(self.forecast["contact_points"])
+
+    @property
+    def total_s(self) -> float:
+        """Time of the press, s; good to a factor of 2."""
+        return float(self.forecast["total_s"])
+
+    @property
+    def memory_MB(self) -> float:
+        """Peak memory, MB."""
+        return float(self.forecast["memory_MB"])
+
+    def summary(self) -> dict[str, Any]:
+        """Return what `finger3d plan --json` prints."""
+        return {
+            "title": self.title,
+            "effects": dict(self.effects),
+            "forecast": dict(self.forecast),
+            "warnings": list(self.warnings),
+        }
+
+
+def plan(scene: Scene) -> Plan:
+    """Forecast size, time and memory of a press without solving anything."""
+    model = scene.model()
+    expected, warnings = forecast(model), foreseen(model, symmetry(model))
+    tolerance = scene.tables.mesh.tolerance
+    if tolerance is not None:
+        expected = {"mesh": f"the first of those refined to tolerance = {tolerance:g}"} | expected
+    return Plan(scene.title, scene.as_dict()["effects"], expected, tuple(warnings))
