@@ -271,10 +271,10 @@ def test_a_press_that_fails_takes_no_other_along(threads, monkeypatch):
     models = [scene(f"friction.mu={mu}").model() for mu in (0.1, 0.5, 1.0)]
     body = SharedBody(models[0], [Variant.of(m) for m in models])
 
-    def failing(problem):
+    def failing(problem, **arguments):
         if problem.model.friction.static == 0.5:
             raise MemoryError("none left")
-        return march(problem)
+        return march(problem, **arguments)
 
     monkeypatch.setattr("finger3d.mechanics.step_halving.march", failing)
     first, second, third = body.presses([Variant.of(m) for m in models])
@@ -289,10 +289,10 @@ def test_presses_that_cannot_be_proved_fail_and_what_failed_before_keeps_its_rea
     variants = [Variant.of(m) for m in models]
     body = SharedBody(models[0], variants)
 
-    def failing(problem):
+    def failing(problem, **arguments):
         if problem.model.friction.static == 0.5:
             raise ArithmeticError("its own")
-        return march(problem)
+        return march(problem, **arguments)
 
     def unproved(problem, frames):
         raise MemoryError("no proof")

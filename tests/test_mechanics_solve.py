@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from threading import Event
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from finger3d.fem.recover import displacement
 from finger3d.fem.traces import displacement_row
 from finger3d.geometry.registry import designs
 from finger3d.mechanics import formulation
+from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.model import Domain, Gauge, Leg, Material, MeshOptions, Model
 from finger3d.mechanics.solve import Problem, build, march, targets
@@ -325,9 +327,9 @@ def test_a_run_in_few_increments_that_fails_does_not_fail_the_press(monkeypatch:
     monkeypatch.setattr("finger3d.mechanics.solve._CUTS", 0)
     true_march = march
 
-    def anew(problem: Problem):
+    def anew(problem: Problem, **arguments: Any):
         timid.gap = start
-        return true_march(problem)
+        return true_march(problem, **arguments)
 
     monkeypatch.setattr("finger3d.mechanics.step_halving.march", anew)
     frames, estimate = marched(problem)
@@ -364,7 +366,7 @@ def test_presses_at_once_are_the_presses_in_turn(monkeypatch: pytest.MonkeyPatch
     problem = build(Model(design, Material(1.0, 0.3), MeshOptions(0.3, 1.5), legs, domain="plane-stress"))
     mus = (0.1, 0.3, 0.6, 1.2)
 
-    def press(mu: float, before: Sequence[Any] = ()) -> list[np.ndarray]:
+    def press(mu: float, before: Sequence[Any] = (), *_: object) -> list[np.ndarray]:
         own = replace(problem, model=replace(problem.model, friction=Coulomb(mu)))
         return [f.part.force for f in march(own, before[-1] if before else ())]
 
@@ -386,8 +388,9 @@ def test_presses_nobody_waits_for_end_with_their_increment(monkeypatch: pytest.M
     problem = build(block())
     increments = {1: 0, 2000: 0}
 
-    def press(steps: int, before: Sequence[Any] = ()) -> int:
-        for _ in march(replace(problem, model=replace(problem.model, legs=(Leg(0.3, steps=steps),)))):
+    def press(steps: int, before: Sequence[Any], workspace: Workspace, cancel: Event) -> int:
+        trial = replace(problem, model=replace(problem.model, legs=(Leg(0.3, steps=steps),)))
+        for _ in march(trial, workspace=workspace, cancel=cancel):
             increments[steps] += 1
         return steps
 

@@ -33,7 +33,6 @@ from finger3d.fem.traces import BoundarySurface, local_rows, restrict, surface
 from finger3d.mechanics.formulation import Formulation, SmallStrain
 from finger3d.mechanics.history import ObjectPose
 from finger3d.mechanics.model import Leg
-from finger3d.mechanics.problem import SolverCache
 from finger3d.objects import Sphere, vertical_frame
 
 from . import _rings
@@ -71,7 +70,6 @@ class StandIn:
     bar_stiffness: Float = field(default_factory=lambda: np.zeros(0))
     subgrid_compliance: Float = field(default_factory=lambda: np.zeros((0, 0)))
     origin: ObjectPose = ObjectPose(0.0)
-    cache: SolverCache = field(default_factory=SolverCache)
 
     @property
     def model(self) -> Any:
@@ -138,11 +136,11 @@ def _widened(small: Condensation, kept: NDArray[np.int64], count: int) -> Float:
 
 def march(body: StandIn, kinematics: Formulation, path: Sequence[tuple[float, float]]) -> tuple[Float, Float]:
     """Force (N) and contact radius (mm) at the end of every increment of a path of (time, depth over DEPTH)."""
-    state, at = kinematics.start(body), body.origin
+    state, at, workspace = kinematics.start(body), body.origin, kinematics.workspace()
     force, radius = [], []
     for t, depth in path:
         target = ObjectPose(DEPTH * max(depth, 0.0), time_s=t)
-        found = kinematics.increment(body, state, at, target, None)
+        found = kinematics.increment(body, state, at, target, None, workspace)
         if not found.outcome.ok:
             raise AssertionError(f"t = {t:g}: {found.outcome}")
         state, at = found.state, target

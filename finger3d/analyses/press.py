@@ -160,7 +160,7 @@ def _march_through(record: PressRecord, writer: ResultWriter, report: Progress) 
     total = len(targets(record.problem.model.legs))
     report.stage("pressing")
     begin = time.perf_counter()
-    for step in march(record.problem):
+    for step in march(record.problem, workspace=record.workspace):
         record.steps.append(step)
         record.seconds["contact"] += time.perf_counter() - begin
         writer.progress_if_due(record)
@@ -174,7 +174,7 @@ def _march_automatically(record: PressRecord, writer: ResultWriter, report: Prog
 
     report.stage("pressing, increments chosen by their error")
     begin = time.perf_counter()
-    for steps, estimate in refine(record.problem):
+    for steps, estimate in refine(record.problem, record.workspace):
         record.seconds["contact"] += time.perf_counter() - begin
         record.steps, record.step_estimate = list(steps), estimate
         writer.progress(record)
@@ -210,7 +210,6 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fie
         writer.fields(record, fields)
     record.warnings += point_count_warning(record) + resolution.unseen(problem, record.steps)
     record.seconds["output"] += time.perf_counter() - begin
-    record.factorizations = problem.factorizations  # without those of the error estimate
     return fields
 
 

@@ -16,6 +16,7 @@ from finger3d.mechanics.history import History, StepResult, measure
 if TYPE_CHECKING:
     from finger3d.accuracy.estimate import ErrorEstimate
     from finger3d.accuracy.refine import Refinement
+    from finger3d.mechanics.formulation import Workspace
     from finger3d.mechanics.problem import Problem
     from finger3d.mechanics.step_halving import StepEstimate
     from finger3d.scene import Scene
@@ -43,7 +44,7 @@ class PressRecord:
     error_estimate : errors by mesh and increments
     warnings, advice : lines for the user
     seconds : time by stage, s
-    factorizations : of this attempt, without those of the error estimate; None while it runs
+    workspace : factors that increments leave for the next, those of the error estimate not among them
     """
 
     scene: Scene
@@ -57,11 +58,12 @@ class PressRecord:
     warnings: list[str] = field(default_factory=list)
     advice: list[str] = field(default_factory=list)
     seconds: dict[str, float] = field(default_factory=dict)
-    factorizations: int | None = None
+    workspace: Workspace = field(init=False)
 
     def __post_init__(self) -> None:
         from finger3d.mechanics import resolution
 
+        self.workspace = self.problem.model.formulation.workspace()
         self.coupling = self.problem.coupling()
         self.seconds = {"cad": 0.0, "mesh": 0.0, **self.problem.seconds, "contact": 0.0, "output": 0.0}
         self.warnings += [
@@ -86,8 +88,7 @@ class PressRecord:
     @property
     def all_factorizations(self) -> int:
         """Factorisations so far, with those of an earlier attempt."""
-        own = self.problem.factorizations if self.factorizations is None else self.factorizations
-        return self.factorizations_before + own
+        return self.factorizations_before + self.problem.factorizations + self.workspace.factorizations
 
     def outcome(self) -> str:
         """Return the outcome, with the depth of the increment that failed."""

@@ -85,7 +85,7 @@ class Condensed:
             If an effect makes the compliance depend on the state or on time.
         """
         model = problem.model
-        if not model.formulation.elastic:
+        if not model.formulation.is_linear_elastic:
             name = dict(model.filled).get("formulation", "its kinematics")
             raise Finger3dError(
                 f"effects.{name}: a body with it has no reduced model, its compliance changes on the way; "

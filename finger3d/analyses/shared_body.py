@@ -17,6 +17,7 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 from itertools import dropwhile, takewhile
 from pathlib import Path
+from threading import Event
 from typing import TYPE_CHECKING, Any
 
 from finger3d.contact.friction import FrictionLaw
@@ -26,6 +27,7 @@ from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.scene import Scene
 
 if TYPE_CHECKING:
+    from finger3d.mechanics.formulation import Workspace
     from finger3d.mechanics.solve import Problem
 
 _FREE = ("title", "friction", "press", "contact", "gauge")
@@ -205,7 +207,7 @@ class SharedBody:
                     left.popleft()
                     yield replace(waiting[len(proved)], frames=error.with_traceback(None))
 
-    def _run(self, variant: Variant, before: Sequence[_Run]) -> _Run:
+    def _run(self, variant: Variant, before: Sequence[_Run], workspace: Workspace, cancel: Event) -> _Run:
         from finger3d.mechanics.resolution import check
         from finger3d.mechanics.step_halving import marched
 
@@ -215,7 +217,7 @@ class SharedBody:
             problem = self.problem_of(variant)
             if variant.legs != self.problem.model.legs:  # the body was built, and its mesh checked, for another path
                 check(problem.model, problem.surface, problem.first_contact_mm, problem.place_mm, problem.axes)
-            frames = marched(problem)[0]
+            frames = marched(problem, workspace, cancel)[0]
         except TROUBLE as error:
             frames = error.with_traceback(None)  # which would keep all arrays on the way
         return _Run(self.problem, frames, time.perf_counter() - start)

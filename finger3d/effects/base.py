@@ -17,7 +17,7 @@ def fill(model: Model, slot: str, value: Any, effect: str) -> Model:
     filled = tuple(sorted((*model.filled, (slot, effect))))
     made = replace(model, **{slot: value}, filled=filled)
     for wish in ("inclusions", "object_compliance"):
-        if getattr(made, wish) is not None and not getattr(made.formulation, wish, False):
+        if getattr(made, wish) is not None and wish not in made.formulation.supported_slots:
             others = {wish, "formulation"} - {slot}
             other = next((name for s, name in model.filled if s in others), "the model's own slots")
             raise Finger3dError(f"effects: {other} and {effect} do not go together; keep one of them")

@@ -25,7 +25,7 @@ from finger3d.fem.condense import condense
 from finger3d.fem.simplex import Mesh, reflected
 from finger3d.fem.transfer import facing_trace
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.model import MeshOptions, Model
+from finger3d.mechanics.model import MeshOptions, Model, ObjectResponse
 from finger3d.mechanics.problem import Problem
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.swept import mesh_section
@@ -47,13 +47,13 @@ class SoftObject:
     nu: float
     height_mm: float | None = None
 
-    def contact_compliance(self, problem: Problem, zone: Zone, say: Say) -> Float:
-        """Compliance (c, d, c, d) mm/N of the object at the contact points; 0 in directions left out by symmetry."""
+    def respond(self, problem: Problem, zone: Zone, say: Say) -> ObjectResponse:
+        """Mesh and condense the object, and read its compliance at the contact points of the finger."""
         model, axes, d = problem.model, problem.axes, problem.dim
         start = time.perf_counter()
         body = ObjectBody(model, self.height_mm or model.design.height_mm, zone, axes, say)
         mesh, whole = body.mesh()
-        problem.seconds["object_mesh"] = time.perf_counter() - start
+        meshing = time.perf_counter() - start
         trace = facing_trace(problem.surface, mesh, "contact")
         frame = model.object.frame(d)
         rows = sp.kron(trace, frame, format="csr")
@@ -65,12 +65,11 @@ class SoftObject:
         matrix = stiffness(mesh, elastic, problem.thickness)
         held = _held(mesh, () if whole else axes, model.held_ends)
         condensed = condense(matrix, held, rows[problem.active_dofs])
-        problem.cache.factorizations += condensed.factorizations
-        problem.seconds["object_condensation"] = condensed.seconds
         c = len(problem.surface.nodes)
         out = np.zeros((c * d, c * d))
         out[np.ix_(problem.active_dofs, problem.active_dofs)] = condensed.compliance / images
-        return out.reshape(c, d, c, d)
+        seconds = {"object_mesh": meshing, "object_condensation": condensed.seconds}
+        return ObjectResponse(out.reshape(c, d, c, d), condensed.factorizations, seconds)
 
 
 def _all_images(problem: Problem, mesh: Mesh, frame: Float) -> sp.csr_matrix:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -27,9 +27,10 @@ from finger3d.fem.neo_hooke import InvertedError, NeoHooke, assemble, nodal_fiel
 from finger3d.fem.recover import displacement
 from finger3d.fem.simplex import Mesh
 from finger3d.fem.traces import BoundarySurface
-from finger3d.mechanics.formulation import RULES, length_scale
+from finger3d.mechanics.formulation import RULES, Workspace, length_scale
+from finger3d.mechanics.history import ObjectPose
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.problem import reflect_into_part, scatter_to_points
+from finger3d.mechanics.problem import Problem, reflect_into_part, scatter_to_points
 
 Float = NDArray[np.float64]
 
@@ -53,13 +54,19 @@ class FiniteStrain:
     """Kinematics of a neo-Hookean body."""
 
     finite_strain: ClassVar[bool] = True
-    elastic: ClassVar[bool] = False
+    is_linear_elastic: ClassVar[bool] = False
+    refactorises: ClassVar[bool] = True
+    supported_slots: ClassVar[frozenset[str]] = frozenset()
 
-    def _law(self, problem: Any) -> NeoHooke:
+    def workspace(self) -> NewtonWorkspace:
+        """Nothing assembled, nothing factored."""
+        return NewtonWorkspace()
+
+    def _law(self, problem: Problem) -> NeoHooke:
         material = problem.model.material
         return NeoHooke.of(material.E_MPa, material.nu, problem.model.domain == "plane-stress")
 
-    def start(self, problem: Any) -> DeformedState:
+    def start(self, problem: Problem) -> DeformedState:
         """At rest."""
         law, mesh = self._law(problem), problem.mesh
         unknowns = np.zeros(mesh.points.size + (len(mesh.vertices) if law.mixed else 0))
@@ -67,17 +74,26 @@ class FiniteStrain:
         rest = ContactState.at_rest(problem.gap(problem.origin), problem.dim)
         return DeformedState(**(vars(rest) | {"bases": frames}), unknowns=unknowns)
 
-    def increment(self, problem: Any, state: ContactState, a: Any, b: Any, guess: Float | None) -> ContactSolution:
+    def increment(
+        self,
+        problem: Problem,
+        state: ContactState,
+        a: ObjectPose,
+        b: ObjectPose,
+        guess: Float | None,
+        workspace: Workspace,
+    ) -> ContactSolution:
         """Newton until all conditions hold where it has come to.
 
         It begins with the factor that the increment before ended with, which is that of the same place.
         """
         assert isinstance(state, DeformedState)
+        assert isinstance(workspace, NewtonWorkspace)
         assert state.unknowns is not None
         law, scale = self._law(problem), length_scale(problem, a, b)
         c, d = problem.delassus.shape[:2]
         rule, weights = RULES[problem.model.rule], augmentation_parameters(problem.delassus.reshape(c * d, c * d), d)
-        place, body = self._begin(problem, law, state.unknowns)
+        place, body = self._begin(problem, law, state.unknowns, workspace)
         force, spent, found = state.force if guess is None else guess, 0, None
         error = size = np.inf
         for _ in range(_ITERATIONS):
@@ -86,12 +102,12 @@ class FiniteStrain:
                 moved = _moved_by(problem, state, contact, (state.unknowns, place.x, None), (a, b))
                 last, error = error, _violation(problem, place, contact, found.state, moved, (scale, law.shear))
                 if error <= _SETTLED or 0.3 * last < error <= TOLERANCE:
-                    problem.cache.last = replace(place, tangent=None), body
+                    workspace.last = replace(place, tangent=None), body
                     after = vars(next_state(state, found.state.force, moved, found.state.status))
                     settled = DeformedState(**(after | {"bases": contact.bases}), unknowns=place.x)
                     return ContactSolution(settled, Outcome.CONVERGED, max(found.residual, error), spent, found.method)
             if place.tangent is not None:
-                body = _factored(problem, place.tangent, contact, force[:, 0], body)
+                body = _factored(problem, place.tangent, contact, force[:, 0], body, workspace)
             assert body is not None
             relaxed = body.solve(-place.inner)
             free = _moved_by(problem, state, contact, (state.unknowns, place.x, relaxed), (a, b))
@@ -106,29 +122,31 @@ class FiniteStrain:
             last, size = size, float(np.abs(step[: problem.mesh.points.size]).max()) / scale
             if not np.isfinite(size) or size > max(10.0, 1e3 * last):
                 break
-            onward = _onward(problem, law, place, step)
+            onward = _onward(problem, law, place, step, workspace)
             if onward is None:
                 return ContactSolution(state, Outcome.INVERTED, error, spent, "none")
             place = onward
         return ContactSolution(state, Outcome.NEWTON, error, spent, "none")
 
-    def _begin(self, problem: Any, law: NeoHooke, x: Float) -> tuple[_Place, Condensation | None]:
+    def _begin(
+        self, problem: Problem, law: NeoHooke, x: Float, workspace: NewtonWorkspace
+    ) -> tuple[_Place, Condensation | None]:
         """The place of unknowns x without a tangent if its body is at hand; otherwise a body to overwrite."""
-        kept, problem.cache.last = problem.cache.last, None
+        kept, workspace.last = workspace.last, None
         place, body = kept or (None, None)
-        return (place if place is not None and place.x is x else _Place.at(problem, law, x)), body
+        return (place if place is not None and place.x is x else _Place.at(problem, law, x, workspace)), body
 
-    def unknowns(self, problem: Any, state: ContactState) -> Float:
+    def unknowns(self, problem: Problem, state: ContactState) -> Float:
         """Kept with the state."""
         assert isinstance(state, DeformedState)
         assert state.unknowns is not None
         return state.unknowns
 
-    def all_unknowns(self, problem: Any, states: Sequence[ContactState]) -> Iterator[Float]:
+    def all_unknowns(self, problem: Problem, states: Sequence[ContactState]) -> Iterator[Float]:
         """Those of each state."""
         return (self.unknowns(problem, state) for state in states)
 
-    def gauges(self, problem: Any, state: ContactState) -> dict[str, float]:
+    def gauges(self, problem: Problem, state: ContactState) -> dict[str, float]:
         """Relative elongation of a line along the gauge, at its point or between its ends."""
         mesh, axes = problem.mesh, problem.axes
         u = displacement(mesh, self.unknowns(problem, state))
@@ -142,13 +160,13 @@ class FiniteStrain:
         return out
 
     def gaps(
-        self, problem: Any, states: Sequence[ContactState], targets: Sequence[Any], face: BoundarySurface
+        self, problem: Problem, states: Sequence[ContactState], targets: Sequence[ObjectPose], face: BoundarySurface
     ) -> list[Float]:
         """Gap of the moved points."""
         moved = (displacement(problem.mesh, unknowns) for unknowns in self.all_unknowns(problem, states))
         return [_contact(problem, face, u, target).gap for u, target in zip(moved, targets, strict=True)]
 
-    def fields(self, problem: Any, state: ContactState) -> tuple[Float, Float, Float]:
+    def fields(self, problem: Problem, state: ContactState) -> tuple[Float, Float, Float]:
         """Displacement, Green-Lagrange strain and Cauchy stress."""
         unknowns, law = self.unknowns(problem, state), self._law(problem)
         strain, cauchy = nodal_fields(problem.mesh, law, unknowns)
@@ -164,54 +182,65 @@ class _Place:
     tangent: Stiffness | None
 
     @classmethod
-    def at(cls, problem: Any, law: NeoHooke, x: Float) -> _Place:
+    def at(cls, problem: Problem, law: NeoHooke, x: Float, workspace: NewtonWorkspace) -> _Place:
         """Assemble; raises InvertedError."""
-        pattern, _ = _places(problem)
+        pattern, _ = workspace.places(problem)
         tangent, inner = assemble(problem.mesh, law, x, pattern, problem.thickness)
         return cls(x, inner, tangent)
 
 
-def _places(problem: Any) -> tuple[Pattern, sp.csr_matrix]:
-    """Where entries of the tangent and of the contact rows (r, n d) may stand: the same in all iterations."""
+@dataclass
+class NewtonWorkspace(Workspace):
+    """Sparsity patterns of the tangent, and the place and factor that the last increment ended with."""
 
-    def make() -> tuple[Pattern, sp.csr_matrix]:
-        face, d = problem.surface, problem.dim
-        beside = sp.csr_matrix((face.average != 0).astype(float) @ (face.interpolate != 0).astype(float))
-        pairs = (beside.T @ beside).tocoo()
-        rows = sp.kron(beside, np.ones((d, d)), format="csr")[problem.active_dofs]
-        rows.sort_indices()
-        linked = pairs.row.astype(np.int64), pairs.col.astype(np.int64)
-        return Pattern.of(problem.mesh, problem.elastic.mixed, linked), rows
+    last: tuple[_Place, Condensation | None] | None = None
+    _patterns: tuple[Pattern, sp.csr_matrix] | None = None
 
-    made: tuple[Pattern, sp.csr_matrix] = problem.cache.once("places", make)
-    return made
+    def places(self, problem: Problem) -> tuple[Pattern, sp.csr_matrix]:
+        """Where entries of the tangent and of the contact rows (r, n d) may stand: the same in all iterations."""
+        if self._patterns is None:
+            face, d = problem.surface, problem.dim
+            beside = sp.csr_matrix((face.average != 0).astype(float) @ (face.interpolate != 0).astype(float))
+            pairs = (beside.T @ beside).tocoo()
+            rows = sp.kron(beside, np.ones((d, d)), format="csr")[problem.active_dofs]
+            rows.sort_indices()
+            linked = pairs.row.astype(np.int64), pairs.col.astype(np.int64)
+            self._patterns = Pattern.of(problem.mesh, problem.elastic.mixed, linked), rows
+        return self._patterns
 
 
-def _factored(problem: Any, tangent: Stiffness, contact: DeformedContact, force: Float, spent: Any) -> Condensation:
+def _factored(
+    problem: Problem,
+    tangent: Stiffness,
+    contact: DeformedContact,
+    force: Float,
+    spent: Condensation | None,
+    workspace: NewtonWorkspace,
+) -> Condensation:
     """The body condensed at a place, under normal forces (c,) N."""
-    _, places = _places(problem)
+    _, places = workspace.places(problem)
     rows = sp.csr_matrix(
         (on_places(contact.rows[problem.active_dofs], places), places.indices, places.indptr), places.shape
     )
     softened = tangent.less(contact.geometric_stiffness(problem.surface, force))
     body = condense(softened, problem.fixed_dofs, rows, spent=spent)
-    problem.cache.factorizations += body.factorizations
+    workspace.factorizations += body.factorizations
     return body
 
 
-def _onward(problem: Any, law: NeoHooke, place: _Place, step: Float) -> _Place | None:
+def _onward(problem: Problem, law: NeoHooke, place: _Place, step: Float, workspace: NewtonWorkspace) -> _Place | None:
     """The place a step further on, or as much of it as turns no cell inside out."""
     for share in _SHARES:
         try:
-            return _Place.at(problem, law, place.x + share * step)
+            return _Place.at(problem, law, place.x + share * step, workspace)
         except InvertedError:
             continue
     return None
 
 
 def _moved_by(
-    problem: Any, state: ContactState, contact: DeformedContact,
-    motion: tuple[Float, Float, Float | None], path: tuple[Any, Any],
+    problem: Problem, state: ContactState, contact: DeformedContact,
+    motion: tuple[Float, Float, Float | None], path: tuple[ObjectPose, ObjectPose],
 ) -> Float:  # fmt: skip
     """Gap and change of tangential position (c, d) of a body that moved from `before` to x, and on by `relaxed`."""
     (before, x, relaxed), (a, b) = motion, path
@@ -228,7 +257,7 @@ def _moved_by(
 
 
 def _violation(
-    problem: Any, place: _Place, contact: DeformedContact, found: ContactState, moved: Float,
+    problem: Problem, place: _Place, contact: DeformedContact, found: ContactState, moved: Float,
     scales: tuple[float, float],
 ) -> float:  # fmt: skip
     """Largest violation at a place: of contact (lengths by a scale), equilibrium (by the largest nodal force), and
@@ -259,7 +288,7 @@ def _moved(mesh: Mesh, u: Float, place: Float, axes: tuple[str, ...]) -> Float:
     return place[:d] + ones * (shape(bary[None], mesh.is_quadratic)[0] @ u[mesh.cells[cell]])
 
 
-def _contact(problem: Any, face: BoundarySurface, u: Float, target: Any) -> DeformedContact:
+def _contact(problem: Problem, face: BoundarySurface, u: Float, target: ObjectPose) -> DeformedContact:
     """Contact of a face displaced by u (n, d): gaps are means over the deformed area."""
     model, d = problem.model, problem.dim
     at = face.samples + face.interpolate @ u

@@ -15,8 +15,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Protocol
+from dataclasses import dataclass, field
+from typing import Annotated, ClassVar, Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -31,12 +31,16 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import Elasticity, Stiffness, stiffness
 from finger3d.fem.condense import Condensation, spring_forces, stiffened
 from finger3d.fem.recover import across, displacement, nodal_strain, pressure, stress
-from finger3d.mechanics.formulation import RULES, SmallStrain, length_scale
+from finger3d.mechanics.formulation import RULES, SmallStrain, Workspace, length_scale
+from finger3d.mechanics.history import ObjectPose
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.problem import scatter_to_points
+from finger3d.mechanics.problem import Problem, scatter_to_points
 
 Float = NDArray[np.float64]
 Prony = tuple[tuple[float, float], ...]
+
+_FACTORS_KEPT = 5
+"""Condensations kept at once: each holds a factor, and a path rarely has more than four lengths of step."""
 
 
 @dataclass(frozen=True)
@@ -110,6 +114,25 @@ class Response:
     shape: Callable[[Float], Float]
 
 
+@dataclass
+class RelaxationWorkspace(Workspace):
+    """The body condensed for the lengths of step used last, by alpha, and the shear part of its stiffness."""
+
+    shear_part: sp.csr_matrix | None = None
+    _condensations: dict[float, Condensation] = field(default_factory=dict)
+
+    def condensation(self, alpha: float, make: Callable[[], Condensation]) -> Condensation:
+        """Return the condensation for alpha, made unless it is one of the last few."""
+        found = self._condensations.pop(alpha, None)
+        if found is None:
+            found = make()
+            self.factorizations += found.factorizations
+        self._condensations[alpha] = found
+        if len(self._condensations) > _FACTORS_KEPT:
+            self._condensations.pop(next(iter(self._condensations)))
+        return found
+
+
 class ViscoelasticBody(Protocol):
     """What remembers, and how it answers."""
 
@@ -118,7 +141,7 @@ class ViscoelasticBody(Protocol):
         """Length of the memory's vectors."""
         ...
 
-    def respond(self, step: Step, memory: InternalVariables) -> Response:
+    def respond(self, step: Step, memory: InternalVariables, workspace: RelaxationWorkspace) -> Response:
         """Rows over a step."""
         ...
 
@@ -139,14 +162,14 @@ class ViscoelasticBody(Protocol):
 class ConstantPoissonRatio:
     """Poisson's ratio is constant: a shape is told by the row forces that would hold it elastically."""
 
-    problem: Any
+    problem: Problem
 
     @property
     def size(self) -> int:
         """Number of condensed rows."""
         return len(self.problem.condensed.compliance)
 
-    def respond(self, step: Step, memory: InternalVariables) -> Response:
+    def respond(self, step: Step, memory: InternalVariables, workspace: RelaxationWorkspace) -> Response:
         """The instantaneous compliance over alpha."""
         past, alpha = step.history_load(memory), step.alpha
         compliance = self.problem.condensed.compliance / alpha
@@ -176,7 +199,7 @@ class ConstantBulkModulus:
     What inclusions yield beyond the mesh is told by their row forces; it relaxes as if nu were constant.
     """
 
-    problem: Any
+    problem: Problem
 
     @property
     def _own(self) -> int:
@@ -194,16 +217,14 @@ class ConstantBulkModulus:
     def _lame(self, alpha: float) -> float:
         return self._bulk - 2.0 / 3.0 * alpha * self.problem.elastic.shear
 
-    def respond(self, step: Step, memory: InternalVariables) -> Response:
+    def respond(self, step: Step, memory: InternalVariables, workspace: RelaxationWorkspace) -> Response:
         """The body with its shear modulus times alpha; the past is a load on all of it."""
         # steps of one length differ by round-off of their ends
         alpha = Step(step.prony, float(f"{step.seconds:.12g}")).alpha
         problem = self.problem
-        body: Condensation = problem.cache.once(
-            ("viscosity", alpha), lambda: problem.condensed.again(self._stiffness(alpha))
-        )
+        body = workspace.condensation(alpha, lambda: problem.condensed.again(self._stiffness(alpha, workspace)))
         past, first = step.history_load(memory), len(body.compliance) - len(problem.subgrid_compliance)
-        settled = body.solve(self._shear_force(past[: self._own]))
+        settled = body.solve(self._shear_force(past[: self._own], workspace))
         compliance, moved = body.compliance.copy(), body.read(settled)
         compliance[first:, first:] += problem.subgrid_compliance / alpha
         moved[first:] += problem.subgrid_compliance @ past[self._own :] / alpha
@@ -215,29 +236,31 @@ class ConstantBulkModulus:
 
         return Response(compliance, moved, shape)
 
-    def _shear_part(self) -> sp.csr_matrix:
+    def _shear_part(self, workspace: RelaxationWorkspace) -> sp.csr_matrix:
         """K_s (displacement form): the deviatoric stiffness, in the plane of a section too."""
-        problem, shear = self.problem, self.problem.elastic.shear
-        part = Elasticity(shear, -2.0 / 3.0 * shear, False)
-        return problem.cache.once("viscosity", lambda: stiffness(problem.mesh, part, problem.thickness).upper)
+        if workspace.shear_part is None:
+            problem, shear = self.problem, self.problem.elastic.shear
+            part = Elasticity(shear, -2.0 / 3.0 * shear, False)
+            workspace.shear_part = stiffness(problem.mesh, part, problem.thickness).upper
+        return workspace.shear_part
 
-    def _stiffness(self, alpha: float) -> Stiffness:
+    def _stiffness(self, alpha: float, workspace: RelaxationWorkspace) -> Stiffness:
         """K_b + alpha K_s; in the mixed form every block has its own factor."""
         problem = self.problem
         whole: Stiffness = problem.stiffness
         if not problem.elastic.mixed:
-            return Stiffness(whole.upper - (1.0 - alpha) * self._shear_part(), whole.pressure_vertices, 1.0)
+            return Stiffness(whole.upper - (1.0 - alpha) * self._shear_part(workspace), whole.pressure_vertices, 1.0)
         upper, n = whole.upper.copy(), problem.mesh.points.size
         row = np.repeat(np.arange(upper.shape[0]), np.diff(upper.indptr))
         upper.data[upper.indices < n] *= alpha
         upper.data[row >= n] *= problem.elastic.lame / self._lame(alpha)
         return Stiffness(upper, whole.pressure_vertices, whole.pressure_scale)
 
-    def _shear_force(self, shape: Float) -> Float:
+    def _shear_force(self, shape: Float, workspace: RelaxationWorkspace) -> Float:
         """K_s times a shape (N,), as loads (N,)."""
         problem, n = self.problem, self.problem.mesh.points.size
         if not problem.elastic.mixed:
-            return _times(self._shear_part(), shape)
+            return _times(self._shear_part(workspace), shape)
         deviator = shape.copy()
         deviator[n:] *= -2.0 / 3.0 * problem.elastic.shear / problem.stiffness.pressure_scale
         load = _times(problem.stiffness.upper, deviator)
@@ -291,34 +314,47 @@ class ViscousState(ContactState):
 class Viscoelastic(SmallStrain):
     """Small strain, with moduli that relax."""
 
-    elastic: ClassVar[bool] = False
+    is_linear_elastic: ClassVar[bool] = False
 
     prony: Prony
     bulk: bool
 
     @property
-    def independent(self) -> bool:  # type: ignore[override]
-        """Not where presses share a factor for every length of step, and solve with it."""
-        return self.bulk
+    def refactorises(self) -> bool:
+        """Without `bulk` every length of step has a factor of its own."""
+        return not self.bulk
 
-    def _body(self, problem: Any) -> ViscoelasticBody:
+    def workspace(self) -> RelaxationWorkspace:
+        """No factor yet."""
+        return RelaxationWorkspace()
+
+    def _body(self, problem: Problem) -> ViscoelasticBody:
         return ConstantPoissonRatio(problem) if self.bulk else ConstantBulkModulus(problem)
 
     def _memory(self, state: ContactState) -> InternalVariables:
         assert isinstance(state, ViscousState)
         return state.memory
 
-    def start(self, problem: Any) -> ViscousState:
+    def start(self, problem: Problem) -> ViscousState:
         """Nothing to remember."""
         _check_domain(problem.model, self.bulk)
         size = self._body(problem).size
         empty = InternalVariables(np.zeros(size), np.zeros((len(self.prony), size)))
         return ViscousState(**vars(super().start(problem)), memory=empty)
 
-    def increment(self, problem: Any, state: ContactState, a: Any, b: Any, guess: Float | None) -> ContactSolution:
+    def increment(
+        self,
+        problem: Problem,
+        state: ContactState,
+        a: ObjectPose,
+        b: ObjectPose,
+        guess: Float | None,
+        workspace: Workspace,
+    ) -> ContactSolution:
         """One call of the contact rule, with the compliance of this length of step and points moved by the past."""
+        assert isinstance(workspace, RelaxationWorkspace)
         memory, step = self._memory(state), Step(self.prony, b.time_s - a.time_s)
-        body = self._body(problem).respond(step, memory)
+        body = self._body(problem).respond(step, memory, workspace)
         own, springs, first = body.compliance, problem.bar_stiffness, len(body.compliance) - len(problem.bar_stiffness)
         moved = body.moved
         if len(springs):
@@ -341,17 +377,17 @@ class Viscoelastic(SmallStrain):
         after = ViscousState(**vars(found.state), memory=step.after(memory, body.shape(rows)))
         return ContactSolution(after, found.outcome, found.residual, found.iterations, found.method)
 
-    def all_unknowns(self, problem: Any, states: Sequence[ContactState]) -> Iterator[Float]:
+    def all_unknowns(self, problem: Problem, states: Sequence[ContactState]) -> Iterator[Float]:
         """From each memory."""
         return (self._body(problem).unknowns(self._memory(state).elastic) for state in states)
 
-    def gauges(self, problem: Any, state: ContactState) -> dict[str, float]:
+    def gauges(self, problem: Problem, state: ContactState) -> dict[str, float]:
         """From the memory, through the gauges' rows."""
         first = len(problem.active_dofs)
         rows = self._body(problem).read(self._memory(state).elastic)[first:]
         return {g.name: float(strain) for g, strain in zip(problem.model.gauges, rows, strict=False)}
 
-    def fields(self, problem: Any, state: ContactState) -> tuple[Float, Float, Float]:
+    def fields(self, problem: Problem, state: ContactState) -> tuple[Float, Float, Float]:
         """Linear strain, and the stress that has not relaxed."""
         u = displacement(problem.mesh, self.unknowns(problem, state))
         strain = nodal_strain(problem.mesh, u)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,61 +15,107 @@ from finger3d.contact.state import ContactSolution, ContactState
 
 if TYPE_CHECKING:
     from finger3d.fem.traces import BoundarySurface
+    from finger3d.mechanics.history import ObjectPose
+    from finger3d.mechanics.problem import Problem
 
 Float = NDArray[np.float64]
 
 RULES = {"projection": solve_increment, "paper": maeno_active_set}
 
 
-class Formulation(Protocol):
-    """What marching through a history asks of a body; `problem` is a `finger3d.mechanics.problem.Problem`.
+@dataclass
+class Workspace:
+    """Factors and sparsity patterns that one increment leaves for the next; formulations add fields of their own.
 
-    One that also answers for inclusions (`problem.springs`) says so by a class attribute ``inclusions = True``;
-    one whose presses keep nothing in the problem, so that several may run at once, by ``independent = True``.
+    Several presses of one problem may share a workspace in turn, but not at once.
 
     Attributes
     ----------
-    finite_strain : whether the strain measure is that of finite deformation; False for linear strain
-    elastic : whether strain is linear and displacements follow from the contact forces alone (`Problem.unknowns_of`)
-
-    Ask these rather than the class: the viscoelastic body is a subclass of `SmallStrain`, and not elastic.
+    factorizations : number of factorisations made with this workspace
     """
 
-    finite_strain: ClassVar[bool]
-    elastic: ClassVar[bool]
+    factorizations: int = 0
 
-    def start(self, problem: Any) -> ContactState:
+
+class Formulation(Protocol):
+    """Strain measure and material response of the body during a press.
+
+    Attributes
+    ----------
+    finite_strain : bool
+        Whether the strain measure is that of finite deformation.
+    is_linear_elastic : bool
+        Whether strain is linear and the displacements follow from the present contact forces alone.
+    refactorises : bool
+        Whether increments factor the stiffness again; presses of such a body run one after another.
+    supported_slots : frozenset of str
+        Which of the model's slots ``inclusions`` and ``object_compliance`` the formulation accounts for.
+    """
+
+    @property
+    def finite_strain(self) -> bool: ...
+
+    @property
+    def is_linear_elastic(self) -> bool: ...
+
+    @property
+    def refactorises(self) -> bool: ...
+
+    @property
+    def supported_slots(self) -> frozenset[str]: ...
+
+    def workspace(self) -> Workspace:
+        """Return an empty workspace for `increment`."""
+        ...
+
+    def start(self, problem: Problem) -> ContactState:
         """State at rest, before the first increment."""
         ...
 
-    def increment(self, problem: Any, state: ContactState, a: Any, b: Any, guess: Float | None) -> ContactSolution:
-        """Advance a state from target a to target b; `guess` (c, d) N is where the forces may start."""
+    def increment(
+        self,
+        problem: Problem,
+        state: ContactState,
+        a: ObjectPose,
+        b: ObjectPose,
+        guess: Float | None,
+        workspace: Workspace,
+    ) -> ContactSolution:
+        """Advance a state from pose a to pose b of the object.
+
+        Parameters
+        ----------
+        guess : (c, d) array, N, optional
+            Contact forces where the iteration starts; those of `state` unless given.
+        workspace : Workspace
+            What `workspace` of this formulation returned; the increment may change it.
+        """
         ...
 
-    def unknowns(self, problem: Any, state: ContactState) -> Float:
+    def unknowns(self, problem: Problem, state: ContactState) -> Float:
         """All unknowns (N,) of the meshed part in a state."""
         ...
 
-    def all_unknowns(self, problem: Any, states: Sequence[ContactState]) -> Iterator[Float]:
+    def all_unknowns(self, problem: Problem, states: Sequence[ContactState]) -> Iterator[Float]:
         """The same in each of several states, which may cost less than one after another."""
         ...
 
-    def gauges(self, problem: Any, state: ContactState) -> dict[str, float]:
+    def gauges(self, problem: Problem, state: ContactState) -> dict[str, float]:
         """Strain of every gauge by name."""
         ...
 
     def gaps(
-        self, problem: Any, states: Sequence[ContactState], targets: Sequence[Any], face: BoundarySurface
+        self, problem: Problem, states: Sequence[ContactState], targets: Sequence[ObjectPose], face: BoundarySurface
     ) -> list[Float]:
         """Gap (c,) mm of any points of the contact face, candidates or not, in each state under its target."""
         ...
 
-    def fields(self, problem: Any, state: ContactState) -> tuple[Float, Float, Float]:
+    def fields(self, problem: Problem, state: ContactState) -> tuple[Float, Float, Float]:
         """Displacement (n, d) mm, strain (n, 3, 3) and stress (n, 3, 3) MPa at the nodes of the meshed part."""
         ...
 
 
-def length_scale(problem: Any, a: Any, b: Any) -> float:
+def length_scale(problem: Problem, a: ObjectPose, b: ObjectPose) -> float:
     """What gaps are measured by (mm): the depth, or that of the deepest leg while the finger is let go."""
     return max(a.depth_mm, b.depth_mm) or max(leg.depth_mm for leg in problem.model.legs)
 
@@ -79,35 +125,50 @@ class SmallStrain:
     """Linear elasticity over the condensed compliance: the paper's baseline."""
 
     finite_strain: ClassVar[bool] = False
-    elastic: ClassVar[bool] = True
-    inclusions: ClassVar[bool] = True
-    object_compliance: ClassVar[bool] = True
-    independent: ClassVar[bool] = True
+    is_linear_elastic: ClassVar[bool] = True
+    supported_slots: ClassVar[frozenset[str]] = frozenset({"inclusions", "object_compliance"})
 
-    def start(self, problem: Any) -> ContactState:
+    @property
+    def refactorises(self) -> bool:
+        """False: the factor of the build serves every increment."""
+        return False
+
+    def workspace(self) -> Workspace:
+        """Nothing is kept: the compliance is that of the build."""
+        return Workspace()
+
+    def start(self, problem: Problem) -> ContactState:
         """No force, gaps at rest."""
         return ContactState.at_rest(problem.gap(problem.origin), problem.dim)
 
-    def increment(self, problem: Any, state: ContactState, a: Any, b: Any, guess: Float | None) -> ContactSolution:
+    def increment(
+        self,
+        problem: Problem,
+        state: ContactState,
+        a: ObjectPose,
+        b: ObjectPose,
+        guess: Float | None,
+        workspace: Workspace,
+    ) -> ContactSolution:
         """One call of the contact rule."""
         rule = RULES[problem.model.rule]
         scale = length_scale(problem, a, b)
         return rule(state, problem.free_motion(b), problem.delassus, problem.model.friction, scale, guess)
 
-    def unknowns(self, problem: Any, state: ContactState) -> Float:
+    def unknowns(self, problem: Problem, state: ContactState) -> Float:
         """Those of one state."""
         return next(iter(self.all_unknowns(problem, [state])))
 
-    def all_unknowns(self, problem: Any, states: Sequence[ContactState]) -> Iterator[Float]:
+    def all_unknowns(self, problem: Problem, states: Sequence[ContactState]) -> Iterator[Float]:
         """From the forces, with the factor at hand: one back-substitution for many states."""
         return problem.unknowns_of([state.force for state in states])
 
-    def gauges(self, problem: Any, state: ContactState) -> dict[str, float]:
+    def gauges(self, problem: Problem, state: ContactState) -> dict[str, float]:
         """From the forces, through the gauges' rows."""
         return problem.gauge_strains(state.force)
 
     def gaps(
-        self, problem: Any, states: Sequence[ContactState], targets: Sequence[Any], face: BoundarySurface
+        self, problem: Problem, states: Sequence[ContactState], targets: Sequence[ObjectPose], face: BoundarySurface
     ) -> list[Float]:
         """Gap at rest, changed by the displacement along the object's normal."""
         from finger3d.fem.recover import displacement
@@ -118,7 +179,7 @@ class SmallStrain:
             for target, unknowns in zip(targets, self.all_unknowns(problem, states), strict=True)
         ]
 
-    def fields(self, problem: Any, state: ContactState) -> tuple[Float, Float, Float]:
+    def fields(self, problem: Problem, state: ContactState) -> tuple[Float, Float, Float]:
         """Linear strain and stress; a section gets the component across it that its assumption implies."""
         from finger3d.fem.recover import across, displacement, nodal_strain, pressure, stress
 

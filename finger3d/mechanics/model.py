@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,9 @@ from numpy.typing import NDArray
 from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.mechanics.formulation import Formulation, SmallStrain
 from finger3d.objects import Plane, RigidObject
+
+if TYPE_CHECKING:
+    from finger3d.mechanics.problem import Problem
 
 Float = NDArray[np.float64]
 Domain = Literal["solid", "plane-strain", "plane-stress"]
@@ -122,11 +126,36 @@ class Inclusions(Protocol):
         ...
 
 
-class ObjectCompliance(Protocol):
-    """An object that yields."""
+@dataclass(frozen=True)
+class ObjectResponse:
+    """Elastic response of the object at the contact points.
 
-    def contact_compliance(self, problem: Any, zone: tuple[float, float, float, float], say: Any) -> Float:
-        """Compliance (c, d, c, d) mm/N of the object at the contact points of a problem; 0 in directions left out."""
+    Attributes
+    ----------
+    compliance : (c, d, c, d) array, mm/N
+        Zero in the directions that symmetry holds.
+    factorizations : int
+    seconds : time of each stage by name
+    """
+
+    compliance: Float
+    factorizations: int
+    seconds: dict[str, float]
+
+
+class ObjectCompliance(Protocol):
+    """An elastic object."""
+
+    def respond(
+        self, problem: Problem, zone: tuple[float, float, float, float], say: Callable[[str], None]
+    ) -> ObjectResponse:
+        """Return the response at the contact points of a problem.
+
+        Parameters
+        ----------
+        zone : (x_min, x_max, z_min, z_max), mm
+            Where the object touches the finger; its mesh is fine there.
+        """
         ...
 
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +19,6 @@ from finger3d.mechanics.model import Leg, Model
 from finger3d.meshing.report import MeshReport
 
 Float = NDArray[np.float64]
-Made = TypeVar("Made")
 
 AUTO_START = 10
 """Increments that ``steps = "auto"`` begins with."""
@@ -28,32 +26,6 @@ AUTO_START = 10
 _COVERED = 0.5  # least share of a point's hat that must be under the object
 _BESIDE = 2.0  # gap beside an object, in heights of the finger: finite, and never closed
 _AT_ONCE = 8_000_000  # unknowns of fields that are solved for together: 64 MB, and as much again a few times on the way
-_KEPT = 5  # a factor is what takes the memory; a path rarely has more than four lengths of increments
-
-
-@dataclass
-class SolverCache:
-    """What is made of a problem after its build, once for each key; the last few are kept, factorisations counted.
-
-    `last` is what an increment may leave for the one that goes on from it.
-    """
-
-    factorizations: int = 0
-    last: Any = None
-    _kept: dict[Hashable, object] = field(default_factory=dict)
-
-    def once(self, key: Hashable, make: Callable[[], Made]) -> Made:
-        """Return what `make` gave for the key, now or before."""
-        found = self._kept.pop(key) if key in self._kept else self._counted(make())
-        self._kept[key] = found
-        while len(self._kept) > _KEPT:
-            self._kept.pop(next(iter(self._kept)))
-        return found  # type: ignore[return-value]
-
-    def _counted(self, made: object) -> object:
-        if isinstance(made, Condensation):
-            self.factorizations += made.factorizations
-        return made
 
 
 @dataclass(frozen=True)
@@ -76,7 +48,7 @@ class Problem:
         What the last rows of `condensed`, gauges and inclusions, yield more than the mesh says.
     without_inclusions : the same without inclusions, if there are any
     place_mm : (x, z) of first touch, if the finger's surface is known
-    cache : what is made of the problem after its build
+    object_factorizations : of the object, where it yields
     """
 
     model: Model
@@ -102,12 +74,12 @@ class Problem:
     subgrid_compliance: Float = field(default_factory=lambda: np.zeros((0, 0)))
     without_inclusions: Problem | None = None
     place_mm: tuple[float, float] | None = None
-    cache: SolverCache = field(default_factory=SolverCache, compare=False)
+    object_factorizations: int = 0
 
     @property
     def factorizations(self) -> int:
-        """All so far: that of the build, and those that followed."""
-        return self.condensed.factorizations + self.cache.factorizations
+        """Number of factorisations of the build; a press counts its own in its workspace."""
+        return self.condensed.factorizations + self.object_factorizations
 
     @property
     def origin(self) -> ObjectPose:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextvars import ContextVar
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from dataclasses import replace
 from itertools import islice
 from threading import Event
@@ -24,6 +23,7 @@ from finger3d.fem.assembly import Elasticity, stiffness
 from finger3d.fem.condense import condense, stiffened
 from finger3d.fem.simplex import Mesh, unfold
 from finger3d.fem.traces import BoundarySurface, displacement_row, local_rows, restrict, strain_row, surface
+from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.history import ContactPoints, ObjectPose, StepResult
 from finger3d.mechanics.model import EmbeddedBars, Gauge, Leg, Model
 from finger3d.mechanics.problem import (
@@ -43,8 +43,8 @@ from finger3d.meshing.swept import mesh_section
 from finger3d.objects import initial_contact
 
 Float = NDArray[np.float64]
-Asked = TypeVar("Asked")
-Told = TypeVar("Told")
+Variant = TypeVar("Variant")
+Result = TypeVar("Result")
 
 __all__ = [
     "AUTO_START",
@@ -67,7 +67,6 @@ _MANY = 100  # gauges: each takes some milliseconds
 _WORTH = 1000  # contact rows from which presses at once are quicker than in turn
 _LOOKS = 20  # and where rigid gaps are, for the candidate points
 _NEARLY = 0.95  # of the face: so many candidates, and all are: a few more rows cost less than to check every press
-_LEFT: ContextVar[Event | None] = ContextVar("left", default=None)  # set in a thread whose press nobody waits for
 
 
 def symmetry(model: Model) -> tuple[str, ...]:
@@ -129,8 +128,14 @@ def build(model: Model, say: Callable[[str], None] = lambda text: None, margin: 
     )  # fmt: skip
     yields: Float | float = 0.0
     if model.object_compliance:
-        yields = model.object_compliance.contact_compliance(bare, zone, say)
-        bare = replace(bare, delassus=bare.delassus + yields)
+        response = model.object_compliance.respond(bare, zone, say)
+        yields = response.compliance
+        bare = replace(
+            bare,
+            delassus=bare.delassus + yields,
+            object_factorizations=response.factorizations,
+            seconds=bare.seconds | response.seconds,
+        )
     return replace(_laid(bare, inlay, yields), without_inclusions=bare) if inlay else bare
 
 
@@ -249,7 +254,12 @@ def _edges(corners: NDArray[np.int64], nodes: NDArray[np.int64]) -> NDArray[np.i
     return np.unique(ends, axis=0)
 
 
-def march(problem: Problem, near: Sequence[Float] = ()) -> Iterator[StepResult]:
+def march(
+    problem: Problem,
+    near: Sequence[Float] = (),
+    workspace: Workspace | None = None,
+    cancel: Event | None = None,
+) -> Iterator[StepResult]:
     """Frames of all legs in turn; stops after the first increment that did not settle.
 
     Under the paper's rule an increment that cycled is handed on as it is, and never cut: that is what the rule does.
@@ -259,20 +269,29 @@ def march(problem: Problem, near: Sequence[Float] = ()) -> Iterator[StepResult]:
     problem : the condensed body, its path and its law of friction
     near : forces (c, d) N at the ends of the increments of a press much like this one, where these may start; they
         save iterations and decide nothing
+    workspace : what an earlier press of the same body left; empty unless given
+    cancel : once it is set, the press ends before its next increment
+
+    Raises
+    ------
+    CancelledError
+        If `cancel` is set.
     """
     literal = problem.model.rule == "paper"
     at = problem.origin
     kinematics = problem.model.formulation
+    workspace = workspace or kinematics.workspace()
     state = kinematics.start(problem)
     pace: tuple[ObjectPose, Float] | None = None
     work = dissipation = 0.0
     # what the gauges would read if nothing were embedded: the same path in the same body without
-    beside = march(replace(problem.without_inclusions, model=problem.model)) if problem.without_inclusions else None
+    bare = problem.without_inclusions
+    beside = march(replace(bare, model=problem.model), workspace=workspace) if bare else None
     for number, target in enumerate(targets(problem.model.legs)):
-        if (left := _LEFT.get()) and left.is_set():
-            raise _LeftError
+        if cancel is not None and cancel.is_set():
+            raise CancelledError
         guess = near[number] if number < len(near) else _guess(state, at, target, pace)
-        found, done = _increment(problem, state, at, target, 0 if literal else _CUTS, guess)
+        found, done = _increment(problem, workspace, state, at, target, 0 if literal else _CUTS, guess)
         for before, after, a, b in done:
             work += _work(problem, before, after, a, b)
             dissipation += _dissipated(problem, before, after)
@@ -288,42 +307,55 @@ def march(problem: Problem, near: Sequence[Float] = ()) -> Iterator[StepResult]:
 
 
 def map_parallel(
-    problem: Problem, press: Callable[[Asked, Sequence[Told]], Told], asked: Sequence[Asked], most: int | None = None
-) -> Generator[Told, None, None]:
-    """What `press` tells of everything asked, in that order; for presses of one problem, under one law after another.
+    problem: Problem,
+    press: Callable[[Variant, Sequence[Result], Workspace, Event], Result],
+    variants: Sequence[Variant],
+    most: int | None = None,
+) -> Generator[Result, None, None]:
+    """Press one body as several variants, and yield the results in the order of the variants.
 
-    `press` is given what it told of the last two that are known when it begins, from which it may start.  Where presses
-    share nothing that changes, as many run at once as there are cores, or as `most` says, each on one thread: dense
-    systems of this size gain more by that than by threads of their own, and smaller ones spend their time in Python.
-    Whoever stops asking does not wait for those that run: they end with their increment.
+    Presses run at once, each on one thread, if the body has enough contact points for that to pay and the formulation
+    factors nothing on the way; otherwise one after another.  Closing the generator cancels those that run.
+
+    Parameters
+    ----------
+    problem : Problem
+        The condensed body.
+    press : function of a variant, the last two results known, a workspace, and the event that cancels it
+        The results may serve as initial guess; workspace and event are for `march`.
+    variants : sequence
+    most : int, optional
+        Largest number of presses at once; the number of cores unless given.
     """
-    before: tuple[Told, ...] = ()
-    at_once = min(len(asked), cores() if most is None else most)
-    alone = len(problem.active_dofs) < _WORTH or at_once < 2
-    if alone or not getattr(problem.model.formulation, "independent", False):
-        for one in asked:
-            before = (*before, press(one, before))[-2:]
-            yield before[-1]
+    formulation = problem.model.formulation
+    known: tuple[Result, ...] = ()
+    at_once = min(len(variants), cores() if most is None else most)
+    cancel = Event()
+    if len(problem.active_dofs) < _WORTH or at_once < 2 or formulation.refactorises:
+        workspace = formulation.workspace()
+        for variant in variants:
+            known = (*known, press(variant, known, workspace, cancel))[-2:]
+            yield known[-1]
         return
-    left, rest = Event(), iter(asked)
-    # One limit around them all: those inside would each restore what another has set.
-    with (
-        one_thread(problem.dim > 2),
-        ThreadPoolExecutor(at_once, initializer=_LEFT.set, initargs=(left,)) as pool,
-    ):
-        running = deque(pool.submit(press, one, before) for one in islice(rest, at_once))
+    waiting = iter(variants)
+    # The limit on threads is set once around the pool: a limit set by a press would undo that of another.
+    with one_thread(problem.dim > 2), ThreadPoolExecutor(at_once) as pool:
+
+        def submitted(count: int) -> list[Future[Result]]:
+            return [
+                pool.submit(press, variant, known, formulation.workspace(), cancel)
+                for variant in islice(waiting, count)
+            ]
+
+        running = deque(submitted(at_once))
         try:
             while running:
-                before = (*before, running.popleft().result())[-2:]
-                running.extend(pool.submit(press, one, before) for one in islice(rest, 1))
-                yield before[-1]
+                known = (*known, running.popleft().result())[-2:]
+                running.extend(submitted(1))
+                yield known[-1]
         finally:
-            left.set()
+            cancel.set()
             pool.shutdown(cancel_futures=True)
-
-
-class _LeftError(Exception):
-    """Nobody waits for this press any more."""
 
 
 def _free(problem: Problem, beside: Iterator[StepResult] | None) -> dict[str, float]:
@@ -350,17 +382,23 @@ _Done = list[tuple[ContactState, ContactState, ObjectPose, ObjectPose]]
 
 
 def _increment(
-    problem: Problem, state: ContactState, a: ObjectPose, b: ObjectPose, cuts: int, guess: Float | None = None
+    problem: Problem,
+    workspace: Workspace,
+    state: ContactState,
+    a: ObjectPose,
+    b: ObjectPose,
+    cuts: int,
+    guess: Float | None = None,
 ) -> tuple[ContactSolution, _Done]:
     """Advance from a to b; an increment that does not settle is cut in two, from the state restored."""
-    found = problem.model.formulation.increment(problem, state, a, b, guess)
+    found = problem.model.formulation.increment(problem, state, a, b, guess, workspace)
     if found.outcome.ok or cuts == 0:
         return found, [(state, found.state, a, b)]
     middle = between(a, b, 0.5)
-    first, done = _increment(problem, state, a, middle, cuts - 1)
+    first, done = _increment(problem, workspace, state, a, middle, cuts - 1)
     if not first.outcome.ok:
         return replace(first, state=state, iterations=first.iterations + found.iterations), done
-    second, more = _increment(problem, first.state, middle, b, cuts - 1)
+    second, more = _increment(problem, workspace, first.state, middle, b, cuts - 1)
     return replace(
         second,
         residual=max(first.residual, second.residual),

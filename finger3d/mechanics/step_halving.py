@@ -14,9 +14,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from threading import Event
 from typing import Any
 
 from finger3d.errors import Finger3dError
+from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.solve import AUTO_START, Problem, march
@@ -131,18 +133,21 @@ def remaining(counts: Sequence[int], values: Sequence[float], at: int) -> float:
     return max(rates) / at
 
 
-def refine(problem: Problem) -> Iterator[tuple[tuple[StepResult, ...], StepEstimate | None]]:
+def refine(
+    problem: Problem, workspace: Workspace | None = None, cancel: Event | None = None
+) -> Iterator[tuple[tuple[StepResult, ...], StepEstimate | None]]:
     """Frames and estimate of ever more increments; none after the first run, and none is met too early.
 
     Ends when the estimate is met or the limit is reached.  A run that fails is left out if one with fewer increments
-    succeeded or one with twice as many does.
+    succeeded or one with twice as many does.  Workspace and event are those of `march`.
     """
+    workspace = workspace or problem.model.formulation.workspace()
     steps, last = limits(problem.model, problem.stiffness.upper.shape[0], len(problem.surface.nodes))
     levels: list[tuple[int, tuple[StepResult, ...]]] = []
     failed: tuple[StepResult, ...] = ()
     while steps <= last:
         trial = with_steps(problem, steps)
-        frames = tuple(march(trial))
+        frames = tuple(march(trial, workspace=workspace, cancel=cancel))
         if not frames[-1].outcome.ok:
             if levels:
                 return
@@ -160,11 +165,13 @@ def refine(problem: Problem) -> Iterator[tuple[tuple[StepResult, ...], StepEstim
         yield failed, None
 
 
-def marched(problem: Problem) -> tuple[tuple[StepResult, ...], StepEstimate | None]:
+def marched(
+    problem: Problem, workspace: Workspace | None = None, cancel: Event | None = None
+) -> tuple[tuple[StepResult, ...], StepEstimate | None]:
     """Frames of a press, its automatic increments chosen; the estimate is None where none are or no run told it."""
     if not automatic(problem.model):
-        return tuple(march(problem)), None
-    *_, last = refine(problem)
+        return tuple(march(problem, workspace=workspace, cancel=cancel)), None
+    *_, last = refine(problem, workspace, cancel)
     return last
 
 
@@ -173,7 +180,7 @@ def limits(model: Model, dofs: float, contact_points: float) -> tuple[int, int]:
     if model.formulation.finite_strain:
         return _FIRST_IF_FACTORED, _LARGEST_IF_FACTORED
     dim = 3 if model.domain == "solid" else 2
-    if dim == 3 and not getattr(model.formulation, "bulk", True):
+    if dim == 3 and model.formulation.refactorises:
         return _FIRST, 4 * _FIRST  # every length of increments takes a condensation of its own
     budget = WORTH_S[dim] + condensation_s(dofs, dim)
     most = budget / contact_s(contact_points, dim) / len(model.legs)

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from threading import Event
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.analyses.reduced import friction_at
+from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import map_parallel, march
@@ -36,11 +38,17 @@ Like = Mapping[float, Press]
 """Presses of a body much like another, by mu."""
 
 
-def press(problem: Problem, mu: float, near: Sequence[Press] = ()) -> Press:
+def press(
+    problem: Problem,
+    mu: float,
+    near: Sequence[Press] = (),
+    workspace: Workspace | None = None,
+    cancel: Event | None = None,
+) -> Press:
     """Press the condensed body with this mu, started from the last two presses of `near`."""
     law, forces, frame = friction_at(problem.model.friction, mu), [], None
     start = _start(problem, mu, near)
-    for frame in march(replace(problem, model=replace(problem.model, friction=law)), start):
+    for frame in march(replace(problem, model=replace(problem.model, friction=law)), start, workspace, cancel):
         forces.append(frame.part.force)
     assert frame is not None  # a path has an increment
     return Press(mu, frame, tuple(forces))
@@ -49,7 +57,11 @@ def press(problem: Problem, mu: float, near: Sequence[Press] = ()) -> Press:
 def presses(problem: Problem, mus: Sequence[float], like: Like | None = None) -> Iterator[Press]:
     """Presses with ascending mu; where `like` has a press with the same mu, that is what it starts from."""
     known = like or {}
-    return map_parallel(problem, lambda mu, before: press(problem, mu, [known[mu]] if mu in known else before), mus)
+
+    def pressed(mu: float, before: Sequence[Press], workspace: Workspace, cancel: Event) -> Press:
+        return press(problem, mu, [known[mu]] if mu in known else before, workspace, cancel)
+
+    return map_parallel(problem, pressed, mus)
 
 
 def _start(problem: Problem, mu: float, near: Sequence[Press]) -> list[Float]:

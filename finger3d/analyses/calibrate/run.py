@@ -287,7 +287,7 @@ def _write(
     own = replace(
         problem, model=replace(problem.model, gauges=model.gauges), gauge_rows=problem.gauge_rows[: len(model.gauges)]
     )
-    if model.formulation.elastic:
+    if model.formulation.is_linear_elastic:
         Condensed.of(own).save(folder / "reduced.npz")
     else:
         report.say("no reduced.npz: the body's answer changes on the way")

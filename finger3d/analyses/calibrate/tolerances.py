@@ -253,7 +253,7 @@ def _step_of_nu(nu: float, sd: float) -> float:
 
 def with_modulus(problem: Problem, times: float) -> Problem:
     """The problem with its Young's modulus multiplied, in small strain from the same condensation."""
-    if not problem.model.formulation.elastic:
+    if not problem.model.formulation.is_linear_elastic:
         material = replace(problem.model.material, E_MPa=problem.model.material.E_MPa * times)
         return build(replace(problem.model, material=material))
     c, d = problem.delassus.shape[:2]
