@@ -78,5 +78,10 @@ class Outcome(Enum):
         """Whether the step may be trusted."""
         return self is Outcome.CONVERGED
 
+    @property
+    def is_cycle(self) -> bool:
+        """Whether the paper's rule ended without a solution; the march goes on to show what became of it."""
+        return self in (Outcome.CYCLED, Outcome.WRONG_WAY)
+
     def __str__(self) -> str:
         return str(self.value)

@@ -28,7 +28,9 @@ def half_plane(points: int, dim: int, beta: float, spacing: float = 0.1) -> np.n
     return out
 
 
-def violation(before: ContactState, after: ContactState, free: np.ndarray, compliance: np.ndarray, mu: float) -> float:
+def violation(
+    before: ContactState, after: ContactState, free: np.ndarray, compliance: np.ndarray, mu: float | np.ndarray
+) -> float:
     """Largest violation of Eqs. (1)-(4) and of friction opposing slip, written out point by point.
 
     Independent of finger3d.contact.conditions; gaps in units of 1, forces in units of the largest.
@@ -38,7 +40,9 @@ def violation(before: ContactState, after: ContactState, free: np.ndarray, compl
     worst = max(
         np.abs(moved[:, 0] - after.gap).max(), np.abs(moved[:, 1:] - after.tangential_displacement).max(initial=0.0)
     )
+    coefficient = np.broadcast_to(mu, len(after.status))
     for i, status in enumerate(after.status):
+        mu = float(coefficient[i])
         n, t = after.force[i, 0], after.force[i, 1:]
         slip = moved[i, 1:] - before.tangential_displacement[i]
         if status == OPEN:  # Eq. 1

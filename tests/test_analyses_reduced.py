@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-import finger3d
 from finger3d.analyses.reduced import Condensed
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.elastic_object import Effect as ElasticObject
@@ -45,7 +44,7 @@ def model(**changes: Any) -> Model:
 
 
 def same(reduced: Condensed, problem: Any, mu: float) -> None:
-    law = finger3d.analyses.reduced.friction_at(problem.model.friction, mu)
+    law = problem.model.friction.with_mu(mu)
     whole = list(march(replace(problem, model=replace(problem.model, friction=law))))
     small = reduced.press(mu)
     assert small.outcome.ok

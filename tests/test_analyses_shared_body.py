@@ -272,7 +272,7 @@ def test_a_press_that_fails_takes_no_other_along(threads, monkeypatch):
     body = SharedBody(models[0], [Variant.of(m) for m in models])
 
     def failing(problem, **arguments):
-        if problem.model.friction.static == 0.5:
+        if problem.model.friction.mu == 0.5:
             raise MemoryError("none left")
         return march(problem, **arguments)
 
@@ -290,7 +290,7 @@ def test_presses_that_cannot_be_proved_fail_and_what_failed_before_keeps_its_rea
     body = SharedBody(models[0], variants)
 
     def failing(problem, **arguments):
-        if problem.model.friction.static == 0.5:
+        if problem.model.friction.mu == 0.5:
             raise ArithmeticError("its own")
         return march(problem, **arguments)
 

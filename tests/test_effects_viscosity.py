@@ -241,9 +241,9 @@ def test_an_increment_cut_in_two_starts_from_the_state_restored(monkeypatch: pyt
     true_rule = formulation.RULES["projection"]
     seen = SimpleNamespace(calls=0)
 
-    def timid(state, free, compliance, law, scale, guess):
+    def timid(state, free, *more):
         seen.calls += 1
-        found = true_rule(state, free, compliance, law, scale, guess)
+        found = true_rule(state, free, *more)
         if seen.calls == 7:  # the release, asked for in one step
             return replace(found, state=state, outcome=Outcome.NO_CONVERGENCE)
         return found

@@ -234,8 +234,8 @@ def test_an_increment_that_fails_is_cut_and_the_state_restored(monkeypatch: pyte
     problem = build(block(legs=(Leg(0.3, steps=1),)))
     true_rule = formulation.RULES["projection"]
 
-    def timid(state, free, compliance, law, scale, guess):  # fails on strides above a quarter of the leg
-        found = true_rule(state, free, compliance, law, scale, guess)
+    def timid(state, free, *more):  # fails on strides above a quarter of the leg
+        found = true_rule(state, free, *more)
         if np.abs(free[:, 0] - timid.gap).max() > 0.076:
             return replace(found, state=state, outcome=Outcome.NO_CONVERGENCE)
         timid.gap = free[:, 0]
@@ -314,8 +314,8 @@ def test_a_run_in_few_increments_that_fails_does_not_fail_the_press(monkeypatch:
     problem = build(block(legs=(Leg(0.3, steps="auto"),)))
     true_rule = formulation.RULES["projection"]
 
-    def timid(state, free, compliance, law, scale, guess):  # fails on increments above 0.3 / 8 mm
-        found = true_rule(state, free, compliance, law, scale, guess)
+    def timid(state, free, *more):  # fails on increments above 0.3 / 8 mm
+        found = true_rule(state, free, *more)
         if np.abs(free[:, 0] - timid.gap).max() > 0.3 / 8:
             return replace(found, state=state, outcome=Outcome.NO_CONVERGENCE)
         timid.gap = free[:, 0]

@@ -61,7 +61,7 @@ def under(problem: Problem, friction: FrictionLaw | float, legs: tuple[Leg, ...]
     found = []
     for frame in march(replace(problem, model=model)):
         if not frame.outcome.ok:
-            raise AssertionError(f"mu = {law.static:g}, {frame.target}: {frame.outcome}")
+            raise AssertionError(f"mu = {law.mu:g}, {frame.target}: {frame.outcome}")
         found.append(Profile.of(problem, frame))
     return found
 

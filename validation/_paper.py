@@ -74,7 +74,7 @@ def under(problem: Problem, friction: FrictionLaw | float, steps: int | None = N
     legs = problem.model.legs if steps is None else tuple(replace(leg, steps=steps) for leg in problem.model.legs)
     frames = list(march(replace(problem, model=replace(problem.model, friction=law, legs=legs))))
     if not frames[-1].outcome.ok:
-        raise AssertionError(f"mu = {law.static:g}, {frames[-1].target}: {frames[-1].outcome}")
+        raise AssertionError(f"mu = {law.mu:g}, {frames[-1].target}: {frames[-1].outcome}")
     return frames
 
 

@@ -110,7 +110,7 @@ def _pressed(case: Case) -> Pressed:
     make = mesh_solid if case.body == SOLID else mesh_section
     axes = symmetry(model)
     mesh, _ = make(model.design, model.mesh, contact_box(model), axes)
-    return Pressed(mesh, 1.0, NU, model.friction.static, 10.0, case.counts[0], model.design.width_mm, axes)
+    return Pressed(mesh, 1.0, NU, model.friction.mu, 10.0, case.counts[0], model.design.width_mm, axes)
 
 
 def _line_ours(case: Case, ours: dict[str, Any], load: float) -> dict[str, Any]:

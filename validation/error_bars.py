@@ -240,7 +240,7 @@ def _by_steps(name: str, model: Model) -> Iterator[Judged]:
             dofs = problem.stiffness.upper.shape[0]
             depth = model.legs[0].depth_mm
             yield Judged(
-                name, part, dofs, model.friction.static, depth, k, value, bar, abs(value - exact[k])
+                name, part, dofs, model.friction.mu, depth, k, value, bar, abs(value - exact[k])
             )  # fmt: skip
 
 

@@ -87,7 +87,7 @@ def finger(dim: int, nu: float, size: float) -> Problem:
 
 def violation(problem: Problem, before: Any, frame: StepResult) -> float:
     """Largest violation of the conditions: lengths over DEPTH, forces over the largest; from compliance and forces."""
-    mu, state = problem.model.friction.static, frame.part
+    mu, state = problem.model.friction.mu, frame.part
     force, status = state.force, state.status
     moved = problem.free_motion(frame.target) + np.einsum("idje,je->id", problem.delassus, force)
     gap, change = moved[:, 0], moved[:, 1:] - before.tangential_displacement

@@ -40,7 +40,7 @@ class Grain:
     def of(cls, problem: Problem, frame: StepResult) -> Grain:
         """Of a frame; medians where points touch."""
         points, reach = problem.points, measure(problem.points, frame)["contact_half_length_mm"]
-        alone = reach == 0.0 and problem.model.friction.static > 0.0
+        alone = reach == 0.0 and problem.model.friction.largest > 0.0
         half_width = points.half_width_mm
         if points.dim == 3 and problem.model.mesh.mesher != "swept":
             step = float(np.sqrt(np.median(points.area)))

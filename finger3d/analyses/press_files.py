@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d.contact.friction import STICK
 from finger3d.fem.simplex import Mesh, middles, unfold
 from finger3d.io import atomic, write_csv, write_json
 from finger3d.mechanics.history import StepResult, contact_table, measure
@@ -138,7 +139,8 @@ class ResultWriter:
         steps = [measure(problem.points, step) for step in good]
         table = contact_table(problem.points, good[-1].state)
         half_width = problem.points.half_width_mm if problem.dim == 3 else None
-        mu = problem.model.friction.static
+        stuck = np.full(len(table["status"]), STICK)
+        mu = problem.model.friction.coefficients(stuck, table["pressure_MPa"])
         figures.contact_figure(self.folder / "contact.png", table, mu, problem.points.band_mm, half_width)
         figures.force_figure(self.folder / "force.png", steps)
         figures.finger_picture(

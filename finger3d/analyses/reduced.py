@@ -14,7 +14,7 @@ import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import scipy.sparse as sp
@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from finger3d._machine import versions
 from finger3d.analyses.reduced_arrays import check_arrays
 from finger3d.contact.friction import Coulomb, FrictionLaw
+from finger3d.contact.rules import RULES
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import Elasticity, Stiffness
 from finger3d.fem.condense import Condensation as Factored
@@ -140,7 +141,7 @@ class Condensed:
             If a number is out of range, the path leaves what was condensed, or the object passes between its points.
         """
         model = self.problem.model
-        law = model.friction if mu is None else friction_at(model.friction, mu)
+        law = model.friction if mu is None else model.friction.with_mu(mu)
         if ratio is not None or branch is not None:
             law = _kinetic(law, ratio, branch)
         problem = replace(self.problem, model=replace(model, friction=law, legs=tuple(legs or model.legs)))
@@ -234,26 +235,21 @@ class Condensed:
             ) from None
 
 
-def friction_at(law: FrictionLaw, mu: float) -> FrictionLaw:
-    """The same law with another static coefficient."""
-    if isinstance(mu, bool) or not (isinstance(mu, int | float | np.floating) and math.isfinite(mu) and mu >= 0.0):
-        raise Finger3dError(f"mu = {mu}: must be a finite number from 0 up")
-    if isinstance(law, Coulomb):
-        return Coulomb(float(mu))
-    changed: FrictionLaw = replace(law, static=float(mu))  # type: ignore[type-var]
-    return changed
-
-
 def _kinetic(law: FrictionLaw, ratio: float | None, branch: str | None) -> FrictionLaw:
     from finger3d.effects.kinetic_friction import TwoCoefficients
 
-    ratio = getattr(law, "ratio", 1.0) if ratio is None else ratio
-    kind: Any = branch or getattr(law, "branch", "keep")
-    if not 0.0 <= ratio <= 1.0:
-        raise Finger3dError(f"ratio = {ratio}: must be a number from 0 to 1")
-    if kind not in ("keep", "paper"):
-        raise Finger3dError(f'branch = "{kind}": must be "keep" or "paper"')
-    return TwoCoefficients(law.static, float(ratio), kind)
+    if not isinstance(law, Coulomb | TwoCoefficients):
+        raise Finger3dError(f"ratio and branch: {type(law).__name__} has no kinetic coefficient")
+    before = law if isinstance(law, TwoCoefficients) else TwoCoefficients(law.mu, 1.0, "keep")
+    ratio = before.ratio if ratio is None else float(ratio)
+    return replace(before, ratio=ratio, branch=cast(Any, branch) or before.branch)
+
+
+def _friction_laws() -> dict[str, type[FrictionLaw]]:
+    """Return the friction laws that a file may name."""
+    from finger3d.effects.kinetic_friction import TwoCoefficients
+
+    return {law.__name__: law for law in (Coulomb, TwoCoefficients)}
 
 
 def _face_arrays(name: str, face: BoundarySurface) -> dict[str, Any]:
@@ -345,7 +341,7 @@ def _header(problem: Problem) -> dict[str, Any]:
     return {
         "body": asdict(model.design), "material": asdict(model.material), "mesh": asdict(model.mesh),
         "legs": [asdict(leg) for leg in model.legs], "object": {"kind": type(thing).__name__, **placed},
-        "friction": {"kind": type(model.friction).__name__, **asdict(model.friction)},  # type: ignore[call-overload]
+        "friction": {"kind": type(model.friction).__name__, **asdict(model.friction)},
         "gauges": [asdict(g) for g in model.gauges], "domain": model.domain, "rule": model.rule,
         "warnings": list(model.warnings), "filled": [list(f) for f in model.filled], "axes": list(problem.axes),
         "touch_mm": problem.first_contact_mm,
@@ -360,12 +356,8 @@ def _model(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> Model:
 
         placed["surface"] = Triangles(arrays["object_points"], arrays["object_faces"])
     rubs = dict(header["friction"])
-    law: FrictionLaw = Coulomb(_number(rubs["mu"])) if rubs["kind"] == "Coulomb" else _kinetic(
-        Coulomb(_number(rubs["static"])), _number(rubs["ratio"]), rubs["branch"]
-    )  # fmt: skip
-    if header["domain"] not in ("solid", "plane-strain", "plane-stress") or header["rule"] not in (
-        "projection", "paper",
-    ):  # fmt: skip
+    law: FrictionLaw = _made(_friction_laws()[rubs.pop("kind")], rubs)
+    if header["domain"] not in ("solid", "plane-strain", "plane-stress") or header["rule"] not in RULES:
         raise ValueError("domain or rule")
     if not header["legs"] or not set(header["axes"]) <= {"x", "z"} or _number(header["touch_mm"]) <= 0.0:
         raise ValueError("legs, axes or touch_mm")

@@ -76,7 +76,7 @@ class VariantResult:
 def body_key(scene: Scene) -> str:
     """Hash of all that shapes the condensation: equal for scenes that share a body."""
     tree = scene.as_dict()
-    effects = {k: v for k, v in tree["effects"].items() if k != "kinetic_friction"}
+    effects = {k: v for k, v in tree["effects"].items() if getattr(scene.effects[k], "slot", "") != "friction"}
     kept = {k: v for k, v in tree.items() if k not in _FREE} | {"effects": effects}
     if "embedded_gauge" in effects:
         kept["gauge"] = tree["gauge"]

@@ -1,49 +1,77 @@
-"""Friction laws: which coefficient limits each point, and when that choice must be revised."""
+"""Friction laws: the coefficient of friction of every contact point."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
+
+from finger3d.errors import Finger3dError
+
+Float = NDArray[np.float64]
+Status = NDArray[np.int8]
 
 OPEN, STICK, SLIP = 0, 1, 2
 STATUS_NAMES = ("open", "stick", "slip")
 
 
-class FrictionLaw(Protocol):
-    """What the contact solution asks of friction: a limit for every point, and when to revise it."""
+@dataclass(frozen=True)
+class FrictionLaw(ABC):
+    """Limit of the tangential force at every contact point, |f_t| <= mu f_n.
+
+    The coefficient may depend on the status of a point and on its pressure, the normal force over its tributary area.
+    The solver begins an increment with `coefficients` and solves again with those that `updated` returns until they
+    no longer change.
+
+    Attributes
+    ----------
+    mu : float
+        Coefficient that a scene, a sweep or a calibration sets, from 0 up.
+    """
+
+    mu: float
 
     @property
-    def static(self) -> float:
-        """Coefficient that a sticking point may not exceed."""
-        ...
+    def largest(self) -> float:
+        """Upper bound of the coefficient at any point; 0 for a frictionless contact."""
+        return self.mu
 
-    def coefficients(self, status: NDArray[np.int8]) -> NDArray[np.float64]:
-        """Coefficient (c,) that a step starts with, from the status (c,) at its begin."""
-        ...
+    @property
+    def depends_on_steps(self) -> bool:
+        """Whether the solution depends on the number of increments and has no limit as they become many."""
+        return False
 
-    def revised(self, mu: NDArray[np.float64], status: NDArray[np.int8]) -> NDArray[np.float64] | None:
-        """Coefficients to solve again with, given the status (c,) found with `mu` (c,); None when consistent."""
-        ...
+    @abstractmethod
+    def coefficients(self, status: Status, pressure: Float) -> Float:
+        """Return the coefficients (c,) for points with this status (c,) and pressure (c,), MPa."""
+
+    def updated(self, mu: Float, status: Status, pressure: Float) -> Float:
+        """Return the coefficients (c,) that follow from a solution found with `mu` (c,); `mu` if they agree."""
+        return mu
+
+    def with_mu(self, mu: float) -> Self:
+        """Return the same law with another `mu`.
+
+        Raises
+        ------
+        Finger3dError
+            If `mu` is not a finite number from 0 up.
+        """
+        if isinstance(mu, bool) or not (isinstance(mu, int | float | np.floating) and math.isfinite(mu) and mu >= 0.0):
+            raise Finger3dError(f"mu = {mu}: must be a finite number from 0 up")
+        return replace(self, mu=float(mu))
 
 
 @dataclass(frozen=True)
-class Coulomb:
-    """Coulomb friction with one coefficient (Maeno 2004, Eqs. 3 and 4); 0 is frictionless."""
+class Coulomb(FrictionLaw):
+    """Coulomb's law with one coefficient (Maeno 2004, Eqs. 3 and 4)."""
 
     mu: float = 0.0
 
-    @property
-    def static(self) -> float:
-        """Coefficient that a sticking point may not exceed."""
-        return self.mu
-
-    def coefficients(self, status: NDArray[np.int8]) -> NDArray[np.float64]:
-        """Coefficient (c,) that a step starts with, from the status (c,) at its begin."""
+    def coefficients(self, status: Status, pressure: Float) -> Float:
+        """Return `mu` for every point."""
         return np.full(len(status), self.mu)
-
-    def revised(self, mu: NDArray[np.float64], status: NDArray[np.int8]) -> NDArray[np.float64] | None:
-        """Coefficients to solve again with, given the status (c,) found with `mu` (c,); None when consistent."""
-        return None

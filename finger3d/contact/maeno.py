@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from finger3d.contact.conditions import TOLERANCE, ContactProblem, augmentation_parameters, residual
 from finger3d.contact.friction import OPEN, SLIP, STICK, FrictionLaw
 from finger3d.contact.newton import force_of_sets
-from finger3d.contact.state import ContactSolution, ContactState, invalid_input, next_state
+from finger3d.contact.state import ContactSolution, ContactState, invalid_input, next_state, pressure
 from finger3d.errors import Outcome
 
 Float = NDArray[np.float64]
@@ -28,6 +28,7 @@ def maeno_active_set(
     length_scale: float,
     guess: Float | None = None,
     weights: Float | None = None,
+    area: Float | None = None,
 ) -> ContactSolution:
     """Solve one increment by the paper's swaps; arguments as for `advance`; the guess is not used.
 
@@ -40,7 +41,7 @@ def maeno_active_set(
         return ContactSolution(previous, refused, np.inf, 0, "none")
     change = free.copy()
     change[:, 1:] -= previous.tangential_displacement
-    mu = law.coefficients(previous.status)
+    mu = law.coefficients(previous.status, pressure(previous.force, area))
     rho = augmentation_parameters(matrix, d) if weights is None else weights
     problem = ContactProblem(change, matrix, mu, rho, length_scale)
     # in the last time frame's contact: stuck; all others: free

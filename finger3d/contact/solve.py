@@ -13,11 +13,17 @@ from finger3d.contact.friction import FrictionLaw
 from finger3d.contact.initial_guess import initial_guess
 from finger3d.contact.lemke import friction_start
 from finger3d.contact.newton import Iterate, block_gauss_seidel, force_of_sets, mixed_precision_newton, newton
-from finger3d.contact.state import ContactSolution, ContactState, invalid_input, next_state
+from finger3d.contact.state import ContactSolution, ContactState, invalid_input, next_state, pressure
 from finger3d.contact.threads import threads_for
 from finger3d.errors import Outcome
 
 Float = NDArray[np.float64]
+
+_FRICTION_UPDATES = 50
+"""Updates of the friction coefficients allowed in an increment, and one more for every contact point."""
+
+_FRICTION_TOLERANCE = 1e-10
+"""Change of the friction coefficients, over the largest, at which they have converged; well below `TOLERANCE`."""
 
 
 def solve_increment(
@@ -28,6 +34,7 @@ def solve_increment(
     length_scale: float,
     guess: Float | None = None,
     weights: Float | None = None,
+    area: Float | None = None,
 ) -> ContactSolution:
     """Solve one increment.
 
@@ -37,7 +44,7 @@ def solve_increment(
     free : (c, d) mm
         Gap, and tangential position relative to the object, that each point would have under no contact force.
     compliance : (c, d, c, d) mm/N
-    law : coefficients per point, and their revision
+    law : FrictionLaw
     length_scale : mm
         What gaps are measured by in the residual: the depth.
     guess : (c, d) N
@@ -45,6 +52,8 @@ def solve_increment(
     weights : (c, d) N/mm
         What weighs a gap against a force, from the compliance's diagonal unless given.  With them an indefinite
         compliance is taken: at finite strain a body under its contact forces may be stable by the contact alone.
+    area : (c,) mm2
+        Tributary areas of the points; only laws whose coefficient depends on the pressure need them.
 
     Returns
     -------
@@ -60,19 +69,21 @@ def solve_increment(
         change = free.copy()
         change[:, 1:] -= previous.tangential_displacement
         rho = augmentation_parameters(matrix, d) if weights is None else weights
-        mu = law.coefficients(previous.status)
+        mu = law.coefficients(previous.status, pressure(previous.force, area))
         start = previous.force if guess is None else guess
         total = 0
-        while True:
+        for _ in range(_FRICTION_UPDATES + c):
             problem = ContactProblem(change, matrix, mu, rho, length_scale)
             method, found, error, spent = _settle(problem, start, guess is None)
             total += spent
             if found is None:
                 return ContactSolution(previous, Outcome.NO_CONVERGENCE, error, total, method)
-            revised = law.revised(mu, found.status)
-            if revised is None:
+            updated = law.updated(mu, found.status, pressure(found.force, area))
+            if np.abs(updated - mu).max(initial=0.0) <= _FRICTION_TOLERANCE * updated.max(initial=0.0):
                 break
-            mu, start = revised, found.force
+            mu, start = updated, found.force
+        else:
+            return ContactSolution(previous, Outcome.NO_CONVERGENCE, error, total, method)
         state = next_state(previous, found.force, found.relative_displacement, found.status)
     return ContactSolution(state, Outcome.CONVERGED, error, total, method)
 

@@ -70,6 +70,11 @@ class ContactSolution:
     method: str
 
 
+def pressure(force: Float, area: Float | None) -> Float:
+    """Pressure (c,) MPa of contact forces (c, d) N on tributary areas (c,) mm2; NaN where these are unknown."""
+    return np.full(len(force), np.nan) if area is None else force[:, 0] / area
+
+
 def next_state(previous: ContactState, force: Float, moved: Float, status: NDArray[np.int8]) -> ContactState:
     """State after an increment with forces (c, d), gaps and changes of position `moved` (c, d), and sets (c,)."""
     slid = np.where((status != OPEN)[:, None], moved[:, 1:], 0.0)

@@ -9,14 +9,15 @@ step.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal, get_args
 
 import numpy as np
 from annotated_types import Ge, Le
 from numpy.typing import NDArray
 
-from finger3d.contact.friction import SLIP
+from finger3d.contact.friction import SLIP, FrictionLaw, Status
 from finger3d.effects.base import fill, warn
+from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Model
 
 Float = NDArray[np.float64]
@@ -24,22 +25,31 @@ Branch = Literal["keep", "paper"]
 
 
 @dataclass(frozen=True)
-class TwoCoefficients:
-    """Friction law with a static coefficient and a kinetic one, ``ratio`` times smaller."""
+class TwoCoefficients(FrictionLaw):
+    """Friction law with the static coefficient ``mu`` and the kinetic one ``ratio * mu``."""
 
-    static: float
     ratio: float
     branch: Branch
 
-    def coefficients(self, status: NDArray[np.int8]) -> Float:
-        """Coefficient (c,) that a step starts with, from the status (c,) at its begin."""
-        keeps = (status == SLIP) & (self.branch == "keep")
-        return np.where(keeps, self.ratio, 1.0) * self.static
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.ratio <= 1.0:
+            raise Finger3dError(f"ratio = {self.ratio}: must be a number from 0 to 1")
+        if self.branch not in get_args(Branch):
+            raise Finger3dError(f'branch = "{self.branch}": must be "keep" or "paper"')
 
-    def revised(self, mu: Float, status: NDArray[np.int8]) -> Float | None:
-        """Lower the limit of points found slipping; it is never raised within a step, so this ends."""
-        lower = np.where(status == SLIP, self.ratio * self.static, mu)
-        return None if np.array_equal(lower, mu) else lower
+    @property
+    def depends_on_steps(self) -> bool:
+        """True where every increment starts with all points stuck."""
+        return self.branch == "paper"
+
+    def coefficients(self, status: Status, pressure: Float) -> Float:
+        """Return the kinetic coefficient for points that slip, if they keep it, and the static one elsewhere."""
+        keeps = (status == SLIP) & (self.branch == "keep")
+        return np.where(keeps, self.ratio, 1.0) * self.mu
+
+    def updated(self, mu: Float, status: Status, pressure: Float) -> Float:
+        """Lower the limit of points that slip; it is never raised within an increment, so this ends."""
+        return np.where(status == SLIP, self.ratio * self.mu, mu)
 
 
 @dataclass(frozen=True)
@@ -52,14 +62,14 @@ class Effect:
     branch : what a slipping point does in the next step
     """
 
+    slot: ClassVar[str] = "friction"
+
     ratio: Annotated[float, Ge(0.0), Le(1.0)]
     branch: Branch = "keep"
 
     def apply(self, model: Model) -> Model:
         """Fill the friction slot."""
-        model = fill(
-            model, "friction", TwoCoefficients(model.friction.static, self.ratio, self.branch), "kinetic_friction"
-        )
+        model = fill(model, "friction", TwoCoefficients(model.friction.mu, self.ratio, self.branch), "kinetic_friction")
         if self.branch == "paper" and self.ratio < 1.0:
             model = warn(
                 model,

@@ -27,7 +27,7 @@ from finger3d.fem.neo_hooke import InvertedError, NeoHooke, assemble, nodal_fiel
 from finger3d.fem.recover import displacement
 from finger3d.fem.simplex import Mesh
 from finger3d.fem.traces import BoundarySurface
-from finger3d.mechanics.formulation import RULES, Workspace, length_scale
+from finger3d.mechanics.formulation import Workspace, length_scale, solve_contact
 from finger3d.mechanics.history import ObjectPose
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem, reflect_into_part, scatter_to_points
@@ -92,7 +92,7 @@ class FiniteStrain:
         assert state.unknowns is not None
         law, scale = self._law(problem), length_scale(problem, a, b)
         c, d = problem.delassus.shape[:2]
-        rule, weights = RULES[problem.model.rule], augmentation_parameters(problem.delassus.reshape(c * d, c * d), d)
+        weights = augmentation_parameters(problem.delassus.reshape(c * d, c * d), d)
         place, body = self._begin(problem, law, state.unknowns, workspace)
         force, spent, found = state.force if guess is None else guess, 0, None
         error = size = np.inf
@@ -113,7 +113,7 @@ class FiniteStrain:
             free = _moved_by(problem, state, contact, (state.unknowns, place.x, relaxed), (a, b))
             free[:, 1:] += state.tangential_displacement
             compliance = scatter_to_points(body.compliance, problem.active_dofs, c, d)
-            found = rule(state, free, compliance, problem.model.friction, scale, force, weights)
+            found = solve_contact(problem, state, free, compliance, scale, force, weights)
             spent += found.iterations
             if not found.outcome.ok:
                 return replace(found, state=state, iterations=spent)

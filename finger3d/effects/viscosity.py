@@ -31,7 +31,7 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import Elasticity, Stiffness, stiffness
 from finger3d.fem.condense import Condensation, spring_forces, stiffened
 from finger3d.fem.recover import across, displacement, nodal_strain, pressure, stress
-from finger3d.mechanics.formulation import RULES, SmallStrain, Workspace, length_scale
+from finger3d.mechanics.formulation import SmallStrain, Workspace, length_scale, solve_contact
 from finger3d.mechanics.history import ObjectPose
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem, scatter_to_points
@@ -367,8 +367,7 @@ class Viscoelastic(SmallStrain):
             stiffened(problem.condensed.compliance, springs), problem.active_dofs, c, d
         )
         compliance = scatter_to_points(stiffened(own, springs), problem.active_dofs, c, d) + rest
-        rule = RULES[problem.model.rule]
-        found = rule(state, free, compliance, problem.model.friction, length_scale(problem, a, b), guess)
+        found = solve_contact(problem, state, free, compliance, length_scale(problem, a, b), guess)
         if found.state is state:
             return found
         rows = problem.row_forces(found.state.force)

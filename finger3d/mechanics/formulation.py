@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.contact.maeno import maeno_active_set
-from finger3d.contact.solve import solve_increment
+from finger3d.contact.rules import RULES
 from finger3d.contact.state import ContactSolution, ContactState
 
 if TYPE_CHECKING:
@@ -19,8 +18,6 @@ if TYPE_CHECKING:
     from finger3d.mechanics.problem import Problem
 
 Float = NDArray[np.float64]
-
-RULES = {"projection": solve_increment, "paper": maeno_active_set}
 
 
 @dataclass
@@ -120,6 +117,20 @@ def length_scale(problem: Problem, a: ObjectPose, b: ObjectPose) -> float:
     return max(a.depth_mm, b.depth_mm) or max(leg.depth_mm for leg in problem.model.legs)
 
 
+def solve_contact(
+    problem: Problem,
+    state: ContactState,
+    free: Float,
+    compliance: Float,
+    scale: float,
+    guess: Float | None,
+    weights: Float | None = None,
+) -> ContactSolution:
+    """Solve one increment by the model's stick rule and friction law; see `finger3d.contact.solve.solve_increment`."""
+    model = problem.model
+    return RULES[model.rule](state, free, compliance, model.friction, scale, guess, weights, problem.surface.area)
+
+
 @dataclass(frozen=True)
 class SmallStrain:
     """Linear elasticity over the condensed compliance: the paper's baseline."""
@@ -151,9 +162,9 @@ class SmallStrain:
         workspace: Workspace,
     ) -> ContactSolution:
         """One call of the contact rule."""
-        rule = RULES[problem.model.rule]
-        scale = length_scale(problem, a, b)
-        return rule(state, problem.free_motion(b), problem.delassus, problem.model.friction, scale, guess)
+        return solve_contact(
+            problem, state, problem.free_motion(b), problem.delassus, length_scale(problem, a, b), guess
+        )
 
     def unknowns(self, problem: Problem, state: ContactState) -> Float:
         """Those of one state."""

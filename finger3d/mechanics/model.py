@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.contact.friction import Coulomb, FrictionLaw
+from finger3d.contact.rules import RuleName
 from finger3d.mechanics.formulation import Formulation, SmallStrain
 from finger3d.objects import Plane, RigidObject
 
@@ -184,7 +185,7 @@ class Model:
     inclusions: Inclusions | None = None
     object_compliance: ObjectCompliance | None = None
     domain: Domain = "solid"
-    rule: Literal["projection", "paper"] = "projection"
+    rule: RuleName = "projection"
     held_ends: bool = False
     symmetry: tuple[str, ...] | None = None
     filled: tuple[tuple[str, str], ...] = ()

@@ -132,7 +132,7 @@ class Problem:
     def coupling(self) -> float:
         """Largest mu |K_tt^-1 K_tn| over points; above 1 a contact state need not be the only one."""
         c, d = self.delassus.shape[:2]
-        return uniqueness(np.full(c, self.model.friction.static), self.delassus.reshape(c * d, c * d), d)
+        return uniqueness(np.full(c, self.model.friction.largest), self.delassus.reshape(c * d, c * d), d)
 
     def gauge_strains(self, force: Float) -> dict[str, float]:
         """Strain by gauge name under contact forces (c, d), through the condensed rows."""

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from finger3d._machine import cores
 from finger3d.contact.friction import SLIP
+from finger3d.contact.rules import STEP_DEPENDENT_RULES
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.contact.threads import one_thread
 from finger3d.fem.assembly import Elasticity, stiffness
@@ -277,7 +278,7 @@ def march(
     CancelledError
         If `cancel` is set.
     """
-    literal = problem.model.rule == "paper"
+    most_cuts = 0 if problem.model.rule in STEP_DEPENDENT_RULES else _CUTS
     at = problem.origin
     kinematics = problem.model.formulation
     workspace = workspace or kinematics.workspace()
@@ -291,7 +292,7 @@ def march(
         if cancel is not None and cancel.is_set():
             raise CancelledError
         guess = near[number] if number < len(near) else _guess(state, at, target, pace)
-        found, done = _increment(problem, workspace, state, at, target, 0 if literal else _CUTS, guess)
+        found, done = _increment(problem, workspace, state, at, target, most_cuts, guess)
         for before, after, a, b in done:
             work += _work(problem, before, after, a, b)
             dissipation += _dissipated(problem, before, after)
@@ -302,7 +303,7 @@ def march(
             kinematics.gauges(problem, state) | _free(problem, beside), work, dissipation,
             found.outcome, found.residual, found.iterations, found.method,
         )  # fmt: skip
-        if not found.outcome.ok and not (literal and found.method == "paper"):
+        if not (found.outcome.ok or found.outcome.is_cycle):
             return
 
 
@@ -363,7 +364,7 @@ def _free(problem: Problem, beside: Iterator[StepResult] | None) -> dict[str, fl
     if beside is None:
         return {}
     frame = next(beside, None)
-    known = frame is not None and (frame.outcome.ok or frame.method == "paper")
+    known = frame is not None and (frame.outcome.ok or frame.outcome.is_cycle)
     return {f"{g.name}_free": frame.gauges[g.name] if frame and known else np.nan for g in problem.model.gauges}
 
 

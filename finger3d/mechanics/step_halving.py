@@ -17,6 +17,7 @@ from dataclasses import asdict, dataclass, field, replace
 from threading import Event
 from typing import Any
 
+from finger3d.contact.rules import STEP_DEPENDENT_RULES
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.history import StepResult, measure
@@ -105,8 +106,8 @@ def automatic(model: Model) -> bool:
     Under the paper's rules of contact or of kinetic friction the result depends on the increments and has no limit
     that more of them approach; there "auto" is a fixed number, `finger3d.mechanics.problem.AUTO_START`.
     """
-    literal = model.rule == "paper" or getattr(model.friction, "branch", "") == "paper"
-    return not literal and any(leg.steps == "auto" for leg in model.legs)
+    depends_on_steps = model.rule in STEP_DEPENDENT_RULES or model.friction.depends_on_steps
+    return not depends_on_steps and any(leg.steps == "auto" for leg in model.legs)
 
 
 def with_steps(problem: Problem, steps: int) -> Problem:

@@ -78,7 +78,7 @@ def finger_picture(
 def contact_figure(
     path: str | Path,
     table: Mapping[str, ArrayLike],
-    mu: float,
+    mu: ArrayLike,
     band_mm: float | None = None,
     half_width_mm: float | None = None,
     title: str = "",
@@ -88,7 +88,7 @@ def contact_figure(
     Parameters
     ----------
     table : columns of contact.csv, of which x_mm, z_mm, pressure_MPa, shear_x_MPa, shear_z_MPa and status are read
-    mu : friction coefficient
+    mu : friction coefficient of a sticking point, one for all or one for each
     band_mm : how far from z = 0 a point may lie if none are on that line; default 0.4 of the points' distance
     half_width_mm : of a solid, whose line at the end z = half_width_mm is a second panel; None for a section
     """
@@ -102,10 +102,11 @@ def contact_figure(
         lines = [("in the middle, z = 0", middle if len(middle) >= 5 else np.flatnonzero(np.abs(z) <= band))]
         lines += [(f"at the end, z = {half_width_mm:g} mm", end)] if len(end) else []
     fn, fx, fz = (_column(table, name) for name in ("pressure_MPa", "shear_x_MPa", "shear_z_MPa"))
+    coefficient = np.broadcast_to(np.asarray(mu, dtype=np.float64), x.shape)
     made = sheet(len(lines), 1, (WIDEST, 4.4), (0.95, 0.15, 1.25, 0.35), title)
     for axes, (where, points) in zip(made.axes, lines, strict=True):
         on = points[np.argsort(x[points], kind="stable")]
-        _contact_line(axes, x[on], fn[on], fx[on], fz[on], status[on], mu)
+        _contact_line(axes, x[on], fn[on], fx[on], fz[on], status[on], coefficient[on])
         axes.set_title(where, fontsize=10, loc="left")
         axes.set_ylabel("traction on the finger (MPa)")
         axes.set_xlabel("x at rest (mm)")
@@ -261,7 +262,7 @@ def zones(x: Float, status: Int) -> list[tuple[float, float, int]]:
     return [(float(a), float(b), int(status[i])) for a, b, i in zip(ends[:-1], ends[1:], first, strict=True)]
 
 
-def _contact_line(axes: Axes, x: Float, fn: Float, fx: Float, fz: Float, status: Int, mu: float) -> None:
+def _contact_line(axes: Axes, x: Float, fn: Float, fx: Float, fz: Float, status: Int, mu: Float) -> None:
     from matplotlib.lines import Line2D
 
     for start, end, state in zones(x, status):
@@ -274,7 +275,7 @@ def _contact_line(axes: Axes, x: Float, fn: Float, fx: Float, fz: Float, status:
     axes.plot(x, fx, "o-", color="#c0392b", lw=1.2, ms=3)
     handles = [
         Line2D([], [], color="#222222", lw=1.6, label="fₙ, pressure"),
-        Line2D([], [], color="#777777", ls="--", lw=1.2, label=f"± μ fₙ, μ = {mu:g}"),
+        Line2D([], [], color="#777777", ls="--", lw=1.2, label="± μ fₙ" if np.ptp(mu) else f"± μ fₙ, μ = {mu[0]:g}"),
         Line2D([], [], color="#c0392b", marker="o", ms=3, lw=1.2, label="fₜ along x"),
     ]
     shown = [fn, fx]
@@ -284,7 +285,7 @@ def _contact_line(axes: Axes, x: Float, fn: Float, fx: Float, fz: Float, status:
         shown.append(fz)
     # The limit lines of a large mu would flatten everything else, so they may leave the picture.
     high = max([float(v.max(initial=0.0)) for v in shown] + [1e-12])
-    low = min([float(v.min(initial=0.0)) for v in shown] + [-min(mu, 0.5) * high])
+    low = min([float(v.min(initial=0.0)) for v in shown] + [-min(float(mu.max()), 0.5) * high])
     axes.set_ylim(1.12 * low, 1.12 * high)
     touching = np.flatnonzero(status != OPEN)
     if len(touching):

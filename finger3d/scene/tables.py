@@ -28,6 +28,7 @@ from finger3d._ranges import (
     Title,
     Zero,
 )
+from finger3d.contact.rules import RuleName
 from finger3d.mechanics.model import Domain
 from finger3d.objects import Axis, Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
 
@@ -104,7 +105,7 @@ class ContactTable(TomlTable):
     rule : how stick and slip are settled; "paper": its literal swap, which may cycle
     """
 
-    rule: Literal["projection", "paper"] = "projection"
+    rule: RuleName = "projection"
 
 
 class DomainTable(TomlTable):

@@ -13,7 +13,6 @@ from threading import Event
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.analyses.reduced import friction_at
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.problem import Problem
@@ -46,7 +45,7 @@ def press(
     cancel: Event | None = None,
 ) -> Press:
     """Press the condensed body with this mu, started from the last two presses of `near`."""
-    law, forces, frame = friction_at(problem.model.friction, mu), [], None
+    law, forces, frame = problem.model.friction.with_mu(mu), [], None
     start = _start(problem, mu, near)
     for frame in march(replace(problem, model=replace(problem.model, friction=law)), start, workspace, cancel):
         forces.append(frame.part.force)

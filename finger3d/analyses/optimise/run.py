@@ -23,7 +23,6 @@ from finger3d.analyses.optimise.task import (
     checked_start,
     objective_of,
 )
-from finger3d.analyses.reduced import friction_at
 from finger3d.analyses.shared_body import SharedBody, Variant, body_key
 from finger3d.errors import Finger3dError
 from finger3d.io import atomic, claimed, write_json
@@ -87,7 +86,7 @@ class _Bench:
         self.body = SharedBody(model, variants if self._apart else [replace(v, gauges=()) for v in variants], say)
 
     def _variants(self, mus: Sequence[float], legs: tuple[Leg, ...]) -> list[Variant]:
-        laws = [friction_at(self._model.friction, mu) for mu in mus]
+        laws = [self._model.friction.with_mu(mu) for mu in mus]
         return [Variant.of(replace(self._model, friction=law, legs=legs)) for law in laws]
 
     def ends(self, mus: Sequence[float], legs: tuple[Leg, ...]) -> list[StepResult]:

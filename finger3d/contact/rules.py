@@ -1,0 +1,41 @@
+"""Stick rules: the algorithms that a scene may choose to settle which points are open, stick or slip."""
+
+from __future__ import annotations
+
+from typing import Final, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.contact.friction import FrictionLaw
+from finger3d.contact.maeno import maeno_active_set
+from finger3d.contact.solve import solve_increment
+from finger3d.contact.state import ContactSolution, ContactState
+
+Float = NDArray[np.float64]
+
+
+class StickRule(Protocol):
+    """Solution of one increment; see `finger3d.contact.solve.solve_increment` for the arguments."""
+
+    def __call__(
+        self,
+        previous: ContactState,
+        free: Float,
+        compliance: Float,
+        law: FrictionLaw,
+        length_scale: float,
+        guess: Float | None = None,
+        weights: Float | None = None,
+        area: Float | None = None,
+    ) -> ContactSolution:
+        """Solve one increment."""
+        ...
+
+
+RuleName = Literal["projection", "paper"]
+
+RULES: Final[dict[RuleName, StickRule]] = {"projection": solve_increment, "paper": maeno_active_set}
+
+STEP_DEPENDENT_RULES: Final[frozenset[RuleName]] = frozenset({"paper"})
+"""Rules whose increments are never cut and may end in a cycle, so that the result depends on the increments."""
