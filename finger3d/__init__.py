@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from finger3d.analyses.calibrate.run import calibrate
     from finger3d.analyses.compare.run import compare
     from finger3d.analyses.press import press
-    from finger3d.analyses.reduced import Condensed
+    from finger3d.analyses.reduced import ReducedModel
     from finger3d.analyses.result import PressResult
     from finger3d.analyses.validate import validate
     from finger3d.contact.friction import Coulomb
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     __version__: str
 
 _HOME = {
-    "Condensed": "analyses.reduced",
+    "ReducedModel": "analyses.reduced",
     "Coulomb": "contact.friction",
     "Cylinder": "objects",
     "Finger3dError": "errors",
@@ -79,7 +79,7 @@ _HOME = {
 """Module of each public name."""
 
 __all__ = [
-    "Condensed",
+    "ReducedModel",
     "Coulomb",
     "Cylinder",
     "Finger3dError",

@@ -11,7 +11,7 @@ import pytest
 
 from finger3d.analyses.calibrate import presses as pressing
 from finger3d.analyses.calibrate.run import calibrated
-from finger3d.analyses.reduced import Condensed
+from finger3d.analyses.reduced import ReducedModel
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.solve import build
 from finger3d.sensor import Calibration, Tolerance, estimate
@@ -203,7 +203,7 @@ def test_coverage_with_a_depth_that_is_off_by_presses_of_the_real_body() -> None
     """Depth errors are pressed, not linearised; noise is drawn; the interval comes from the calibration's slopes."""
     model = scene().model()
     found, problem, _ = calibrated(model, "g36", np.linspace(0.1, 1.0, 13), tolerances={**NONE, "depth_mm": 0.1})
-    body = Condensed.of(problem)
+    body = ReducedModel.of(problem)
     random = np.random.default_rng(7)
     count = 250
     hits = 0

@@ -16,7 +16,7 @@ from finger3d.analyses.calibrate import run as runs
 from finger3d.analyses.calibrate import tolerances as slopes
 from finger3d.analyses.calibrate.run import calibrate, calibrated
 from finger3d.analyses.calibrate.tolerances import TOLERANCES, with_modulus
-from finger3d.analyses.reduced import Condensed
+from finger3d.analyses.reduced import ReducedModel
 from finger3d.contact import initial_guess
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
@@ -65,7 +65,7 @@ def test_every_tolerance_is_the_difference_of_two_scenes() -> None:
         assert slopes[name][number] == pytest.approx(wanted, rel=1e-6, abs=1e-9), name
     assert not slopes["E_percent"].any()
     problem = build(scene().model())  # another depth by the same mesh: the zone that is meshed fine follows the depth
-    deep = [Condensed.of(problem).press(mu, [Leg(10.0 + s, steps=4)]).steps[-1].gauges["g36"] for s in (0.1, -0.1)]
+    deep = [ReducedModel.of(problem).press(mu, [Leg(10.0 + s, steps=4)]).steps[-1].gauges["g36"] for s in (0.1, -0.1)]
     assert slopes["depth_mm"][number] == pytest.approx((deep[0] - deep[1]) / 0.2, rel=1e-6)
 
 

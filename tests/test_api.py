@@ -112,7 +112,7 @@ def test_what_a_notebook_prints_of_the_other_objects_is_short_and_its_html_is_wh
         "Scene": scene,
         "Calibration": Calibration("<g>", mu, 0.01 * mu, 1e-4, 0.1),
         "Comparison": Comparison((good, failed), ("2D would do",), tmp_path),
-        "Condensed": finger3d.Condensed.of(build(scene.model())),
+        "ReducedModel": finger3d.ReducedModel.of(build(scene.model())),
         "History": solid.history,
         "Mesh": build(scene.model()).mesh,
     }

@@ -195,9 +195,9 @@ def test_a_sweep_refuses_the_depth_that_its_body_does_not_resolve(tmp_path: Path
 
 
 def test_a_condensed_body_refuses_a_path_that_its_points_do_not_see(tmp_path: Path) -> None:
-    from finger3d.analyses.reduced import Condensed
+    from finger3d.analyses.reduced import ReducedModel
 
-    body = Condensed.of(build(fig9(Plane(), 5.0, 4.0)))
+    body = ReducedModel.of(build(fig9(Plane(), 5.0, 4.0)))
     assert body.press(legs=[Leg(2.0, steps=1)]).outcome.ok
     with pytest.raises(UnresolvedError):
         body.press(legs=[Leg(0.01, steps=1)])

@@ -16,7 +16,7 @@ from finger3d.analyses.calibrate import presses as pressing
 from finger3d.analyses.calibrate import run as runs
 from finger3d.analyses.calibrate.run import calibrate, parsed_mus
 from finger3d.analyses.calibrate.tolerances import TOLERANCES
-from finger3d.analyses.reduced import Condensed
+from finger3d.analyses.reduced import ReducedModel
 from finger3d.cli import main
 from finger3d.errors import Finger3dError, MissingError, Outcome
 from finger3d.io import claimed
@@ -94,7 +94,7 @@ def test_from_a_scene_to_mu_with_two_commands(tmp_path: Path, scene_file: Path, 
     data = json.loads((out / "calibration.json").read_text())
     assert (data["format"], data["version"], len(data["hash"])) == ("finger3d calibration", 2, 16)
     assert data["about"]["factorizations"] == 1
-    assert Condensed.load(out / "reduced.npz").gauges == ("g36", "long")
+    assert ReducedModel.load(out / "reduced.npz").gauges == ("g36", "long")
     found = load(out / "calibration.json")
     strain = float(found.at(0.4))
     assert run("estimate", out / "calibration.json", "--strain", repr(strain)) == 0

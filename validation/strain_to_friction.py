@@ -21,7 +21,7 @@ import numpy as np
 
 from finger3d.analyses.calibrate.run import MUS, CurvePoints, calibrated
 from finger3d.analyses.calibrate.tolerances import TOLERANCES
-from finger3d.analyses.reduced import Condensed
+from finger3d.analyses.reduced import ReducedModel
 from finger3d.analyses.validate import Result, Row
 from finger3d.effects.embedded_gauge import Effect
 from finger3d.geometry.registry import designs
@@ -89,7 +89,7 @@ def _checks(domain: Domain, c: Calibration, problem: Problem, sweep: CurvePoints
     at = replace(problem.model.gauges[0], x_mm=36.5, y_mm=40.5)
     other = build(replace(problem.model, gauges=(at,)))
     row = np.array([other.gauge_strains(sweep.frames[mu].part.force)["g"] for mu in (first, last)])
-    reduced = Condensed.of(problem).press(last).steps[-1].gauges["g"]
+    reduced = ReducedModel.of(problem).press(last).steps[-1].gauges["g"]
     random = np.random.default_rng(20261121)
     count = 4000
     mu = random.uniform(first, last, count)

@@ -19,7 +19,7 @@ from finger3d._ranges import LARGEST_STRAIN, number
 from finger3d.analyses.calibrate.increments import Increments, found_increments
 from finger3d.analyses.calibrate.presses import Press, presses
 from finger3d.analyses.calibrate.tolerances import ReferenceReadings, chosen, moved_gauges, read, slopes
-from finger3d.analyses.reduced import Condensed
+from finger3d.analyses.reduced import ReducedModel
 from finger3d.errors import Finger3dError
 from finger3d.io import atomic, claimed, write_csv
 from finger3d.mechanics.history import StepResult
@@ -288,7 +288,7 @@ def _write(
         problem, model=replace(problem.model, gauges=model.gauges), gauge_rows=problem.gauge_rows[: len(model.gauges)]
     )
     if model.formulation.is_linear_elastic:
-        Condensed.of(own).save(folder / "reduced.npz")
+        ReducedModel.of(own).save(folder / "reduced.npz")
     else:
         report.say("no reduced.npz: the body's answer changes on the way")
     if maps:

@@ -1,0 +1,360 @@
+"""File of a reduced model: arrays and a JSON header in one .npz file, checked when it is read."""
+
+from __future__ import annotations
+
+import json
+import math
+import zipfile
+import zlib
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from finger3d.contact.friction import Coulomb, FrictionLaw
+from finger3d.contact.rules import RULES
+from finger3d.errors import Finger3dError
+from finger3d.fem.assembly import Elasticity, Stiffness
+from finger3d.fem.condense import Condensation as Factored
+from finger3d.fem.simplex import Mesh
+from finger3d.fem.traces import BoundarySurface
+from finger3d.io import atomic, read_arrays
+from finger3d.mechanics.history import ContactPoints
+from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.problem import Problem
+from finger3d.meshing.report import MeshReport
+from finger3d.objects import Cylinder, MeshObject, Plane, Sphere, Wave, Wedge
+
+Float = NDArray[np.float64]
+
+FORMAT, VERSION = "finger3d condensed body", 2
+_SHAPES: dict[str, type] = {kind.__name__: kind for kind in (Plane, Cylinder, Sphere, Wedge, Wave, MeshObject)}
+_MAX_STEPS = 1_000_000
+"""Largest number of increments of a leg in a file."""
+
+
+@dataclass(frozen=True)
+class DesignSummary:
+    """Size of a finger whose design is not kept: height and width, mm."""
+
+    height_mm: float
+    width_mm: float
+
+
+def write(path: str | Path, problem: Problem, other: BoundarySurface, about: Mapping[str, Any]) -> Path:
+    """Write a reduced model, whole or not at all; return its path."""
+    arrays: dict[str, Any] = {**arrays_of(problem), **_face_arrays("other", other)}
+    if isinstance(problem.model.object, MeshObject):
+        shape = problem.model.object.surface
+        arrays |= {"object_points": shape.points, "object_faces": shape.faces}
+    header = {"format": FORMAT, "version": VERSION, "about": dict(about), **_header(problem)}
+    arrays["header"] = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
+    with atomic(path) as temporary, temporary.open("wb") as stream:
+        np.savez(stream, **arrays)
+    return Path(path)
+
+
+def read(path: str | Path) -> tuple[Problem, BoundarySurface, Mapping[str, Any]]:
+    """Read a reduced model: problem, points that are no candidates, and versions.
+
+    Raises
+    ------
+    Finger3dError
+        In one line, if the file is not there, of another kind or version, or damaged.
+    """
+    try:
+        arrays = read_arrays(path)
+        header = json.loads(arrays["header"].tobytes())
+    except FileNotFoundError:
+        raise Finger3dError(f"{path}: there is no such file") from None
+    except (
+        OSError,
+        ValueError,
+        KeyError,
+        AttributeError,
+        TypeError,
+        EOFError,
+        RecursionError,
+        zipfile.BadZipFile,
+        zlib.error,
+    ):
+        raise Finger3dError(f"{path}: no reduced model, or cut short; condense the scene again") from None
+    if not isinstance(header, dict) or header.get("format") != FORMAT:
+        raise Finger3dError(f"{path}: no reduced model; `finger3d calibrate` writes one, reduced.npz")
+    if header.get("version") != VERSION:
+        raise Finger3dError(
+            f"{path}: version {header.get('version')}, this finger3d reads version {VERSION}; condense it again"
+        )
+    try:
+        model = _model(header, arrays)
+        axes = tuple(header["axes"])
+        _check_arrays(arrays, 2 if model.domain != "solid" else 3, len(model.gauges))
+        problem = assembled(model, arrays, float(header["touch_mm"]), axes)
+        return problem, _face("other", arrays, problem.dim), header["about"]
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError):
+        raise Finger3dError(
+            f"{path}: parts of the reduced model are missing or damaged; condense the scene again"
+        ) from None
+
+
+def _face_arrays(name: str, face: BoundarySurface) -> dict[str, NDArray[Any]]:
+    mean = face.average.tocsr()
+    return {
+        f"{name}_nodes": face.nodes,
+        f"{name}_points": face.points,
+        f"{name}_area": face.area,
+        f"{name}_samples": face.samples,
+        f"{name}_mean": mean.data,
+        f"{name}_mean_at": mean.indices,
+        f"{name}_mean_rows": mean.indptr,
+    }
+
+
+def _face(name: str, arrays: Mapping[str, Any], dim: int) -> BoundarySurface:
+    """Return a surface with the quadrature points of the gap, and without traces of a mesh."""
+    samples, nodes = arrays[f"{name}_samples"].reshape(-1, dim), arrays[f"{name}_nodes"]
+    parts = (arrays[f"{name}_mean"], arrays[f"{name}_mean_at"], arrays[f"{name}_mean_rows"])
+    mean = sp.csr_matrix(parts, shape=(len(nodes), len(samples)))
+    mean.check_format(full_check=True)  # of a file: its indices must be in range
+    points = arrays[f"{name}_points"].reshape(-1, dim)
+    none = sp.csr_matrix((len(nodes), 0)), sp.csr_matrix((len(samples), 0))
+    return BoundarySurface(nodes, points, arrays[f"{name}_area"], none[0], samples, mean, none[1])
+
+
+def bare(face: BoundarySurface) -> BoundarySurface:
+    """Return the surface with only those quadrature points that its vertices use."""
+    used = np.unique(face.average.tocsr().indices)
+    light = replace(face, samples=face.samples[used], average=face.average.tocsr()[:, used])
+    return _face("it", _face_arrays("it", light), face.points.shape[1])
+
+
+def arrays_of(problem: Problem) -> dict[str, NDArray[Any]]:
+    """Return the arrays of a problem that a press needs, by their name in the file."""
+    c, d = problem.delassus.shape[:2]
+    arrays = {
+        "compliance": problem.delassus.reshape(c * d, c * d),
+        "gauge_rows": problem.gauge_rows,
+        "parent": problem.image_of,
+        "sign": problem.mirror_sign,
+        "share": problem.multiplicity,
+        "nodes": problem.points.nodes,
+        "points": problem.points.points,
+        "area": problem.points.area,
+        "band": np.array([problem.points.half_width_mm, problem.points.band_mm]),
+        "edges": problem.points.edges,
+        **_face_arrays("face", bare(problem.surface)),
+    }
+    if problem.without_inclusions:
+        arrays |= {
+            "bare_compliance": problem.without_inclusions.delassus.reshape(c * d, c * d),
+            "bare_gauge_rows": problem.without_inclusions.gauge_rows,
+        }
+    return arrays
+
+
+def assembled(model: Model, arrays: Mapping[str, Any], touch_mm: float, axes: tuple[str, ...]) -> Problem:
+    """Return a problem made from arrays; its mesh and its factor are empty."""
+    d = arrays["sign"].shape[1]
+    c = len(arrays["face_nodes"])
+    none, whole = np.zeros(0, dtype=np.int64), sp.csr_matrix((0, 0))
+    mesh = Mesh(np.zeros((0, d)), np.zeros((0, 1), dtype=np.int64), {})
+    report = MeshReport(0, 0, math.nan, math.nan, math.nan, "", False, None, {})
+    elastic = Elasticity.of(model.material.E_MPa, model.material.nu, model.domain == "plane-stress")
+    factored = Factored(np.zeros((0, 0)), 0, 0, 0.0, "none", whole, none, _no_mesh)
+    half_width, band = arrays["band"]
+    points = ContactPoints(
+        arrays["nodes"],
+        arrays["points"],
+        arrays["area"],
+        model.object.frame(d),
+        float(half_width),
+        float(band),
+        arrays["edges"],
+    )
+    problem = Problem(
+        model,
+        mesh,
+        report,
+        elastic,
+        Stiffness(whole, none, 1.0),
+        _face("face", arrays, d),
+        factored,
+        arrays["compliance"].reshape(c, d, c, d),
+        arrays["gauge_rows"].reshape(len(model.gauges), c * d),
+        none,
+        none,
+        1.0,
+        touch_mm,
+        axes,
+        points,
+        arrays["parent"],
+        arrays["sign"],
+        arrays["share"],
+        {},
+    )
+    if "bare_compliance" not in arrays:
+        return problem
+    rows = arrays["bare_gauge_rows"].reshape(len(model.gauges), c * d)
+    return replace(
+        problem,
+        without_inclusions=replace(problem, delassus=arrays["bare_compliance"].reshape(c, d, c, d), gauge_rows=rows),
+    )
+
+
+def _no_mesh(load: Float) -> Float:
+    raise Finger3dError("a reduced model has no mesh: fields need the scene itself (finger3d press)")
+
+
+def _header(problem: Problem) -> dict[str, Any]:
+    model = problem.model
+    thing = model.object
+    placed = {f.name: getattr(thing, f.name) for f in fields(thing) if f.name != "surface"}  # type: ignore[arg-type]
+    return {
+        "body": asdict(model.design),
+        "material": asdict(model.material),
+        "mesh": asdict(model.mesh),
+        "legs": [asdict(leg) for leg in model.legs],
+        "object": {"kind": type(thing).__name__, **placed},
+        "friction": {"kind": type(model.friction).__name__, **asdict(model.friction)},
+        "gauges": [asdict(g) for g in model.gauges],
+        "domain": model.domain,
+        "rule": model.rule,
+        "warnings": list(model.warnings),
+        "filled": [list(f) for f in model.filled],
+        "axes": list(problem.axes),
+        "touch_mm": problem.first_contact_mm,
+    }
+
+
+def _model(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> Model:
+    placed = dict(header["object"])
+    kind = placed.pop("kind")
+    if kind == "MeshObject":
+        from finger3d.geometry.surface import Triangles
+
+        placed["surface"] = Triangles(arrays["object_points"], arrays["object_faces"])
+    friction = dict(header["friction"])
+    law: FrictionLaw = _dataclass(_friction_laws()[friction.pop("kind")], friction)
+    if header["domain"] not in ("solid", "plane-strain", "plane-stress"):
+        raise ValueError("domain")
+    if header["rule"] not in RULES:
+        raise ValueError("rule")
+    if not header["legs"] or not set(header["axes"]) <= {"x", "z"} or _number(header["touch_mm"]) <= 0.0:
+        raise ValueError("legs, axes or touch_mm")
+    body, material = _dataclass(DesignSummary, header["body"]), _dataclass(Material, header["material"])
+    legs = tuple(_dataclass(Leg, leg) for leg in header["legs"])
+    if not (body.height_mm > 0.0 < body.width_mm and material.E_MPa > 0.0 <= material.nu <= 0.5):
+        raise ValueError("body or material")
+    if not all(0.0 <= leg.depth_mm <= 10.0 * body.height_mm for leg in legs):
+        raise ValueError("a depth")
+    return Model(
+        body,
+        material,
+        _dataclass(MeshOptions, header["mesh"]),
+        legs,
+        _dataclass(_SHAPES[kind], placed),
+        law,
+        gauges=tuple(_dataclass(Gauge, g) for g in header["gauges"]),
+        domain=header["domain"],
+        rule=header["rule"],
+        symmetry=tuple(header["axes"]),
+        warnings=tuple(map(str, header["warnings"])),
+        filled=tuple((str(slot), str(effect)) for slot, effect in header["filled"]),
+    )
+
+
+def _friction_laws() -> dict[str, type[FrictionLaw]]:
+    """Return the friction laws that a file may name."""
+    from finger3d.effects.kinetic_friction import TwoCoefficients
+
+    return {law.__name__: law for law in (Coulomb, TwoCoefficients)}
+
+
+def _number(value: Any) -> float:
+    """Return the value as a float.
+
+    Raises
+    ------
+    ValueError
+        If it is no finite number.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise ValueError(f"{value!r} is no finite number")
+    return float(value)
+
+
+def _dataclass(kind: Any, values: Mapping[str, Any]) -> Any:
+    """Return a dataclass made from the header, with fields of the declared types.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If a field is missing, unknown, or of another type.
+    """
+    result = kind(**values)
+    for field in fields(kind):
+        value, declared = getattr(result, field.name), str(field.type)
+        if value is None and declared.endswith("| None"):
+            continue
+        if declared.startswith("float"):
+            _number(value)
+        elif declared.startswith("int"):
+            if value != "auto" and (type(value) is not int or not 1 <= value <= _MAX_STEPS):
+                raise ValueError(f"{field.name} is no number of increments")
+        elif declared == "str" and not isinstance(value, str):
+            raise ValueError(f"{field.name} is no text")
+        elif field.name == "axis" and value not in ("x", "z"):
+            raise ValueError("axis is neither x nor z")
+    return result
+
+
+def _check_arrays(arrays: Mapping[str, Any], d: int, gauges: int) -> None:
+    """Raise ValueError or KeyError unless types and shapes of all arrays fit together, and numbers are finite."""
+    c, p = len(arrays["face_nodes"]), len(arrays["nodes"])
+    wanted: dict[str, tuple[int, ...]] = {
+        "compliance": (c * d, c * d),
+        "gauge_rows": (gauges, c * d),
+        "parent": (p,),
+        "sign": (p, d),
+        "share": (p,),
+        "nodes": (p,),
+        "points": (p, 3),
+        "area": (p,),
+        "band": (2,),
+    }
+    if "bare_compliance" in arrays:
+        wanted |= {"bare_compliance": (c * d, c * d), "bare_gauge_rows": (gauges, c * d)}
+    for face in ("face", "other"):
+        m, samples, entries = (len(arrays[f"{face}_{name}"]) for name in ("nodes", "samples", "mean"))
+        wanted |= {
+            f"{face}_nodes": (m,),
+            f"{face}_points": (m, d),
+            f"{face}_area": (m,),
+            f"{face}_samples": (samples, d),
+            f"{face}_mean": (entries,),
+            f"{face}_mean_at": (entries,),
+            f"{face}_mean_rows": (m + 1,),
+        }
+    if not c:
+        raise ValueError("no contact points")
+    whole = ("nodes", "parent", "mean_at", "mean_rows")
+    for name, shape in wanted.items():
+        values = arrays[name]
+        kinds = "iu" if name.endswith(whole) else "f"
+        if values.shape != shape or values.dtype.kind not in kinds:
+            raise ValueError(f"{name} does not fit")
+    for name, values in arrays.items():
+        if values.dtype.kind not in "iufb" or not np.isfinite(values).all():
+            raise ValueError(f"{name} holds other things than finite numbers")
+    if not ((arrays["parent"] >= 0) & (arrays["parent"] < c)).all():
+        raise ValueError("parent is out of range")
+    edges = arrays["edges"]
+    if edges.ndim != 2 or edges.shape[1] != 2 or edges.dtype.kind not in "iu" or not ((edges >= 0) & (edges < p)).all():
+        raise ValueError("edges do not fit")
+    faces = arrays.get("object_faces", np.zeros(0))
+    if faces.size and not 0 <= faces.min() <= faces.max() < len(arrays["object_points"]):
+        raise ValueError("object_faces is out of range")
