@@ -175,14 +175,14 @@ def written(tmp_path: Path, text: str = SCENE) -> str:
     "command",
     [
         ["press"], ["compare"], ["calibrate", "--gauge", "g"], ["sweep", "--vary", "friction.mu=0.1,0.2"],
-        ["design", "--free", "gauge.g.x_mm=10:30"],
+        ["optimise", "--free", "gauge.g.x_mm=10:30"],
     ],
     ids=lambda c: c[0],
 )  # fmt: skip
 def test_no_command_gives_numbers(tmp_path: Path, command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     code = main([command[0], written(tmp_path), "--out", str(tmp_path / "out"), *command[1:]])
     last = capsys.readouterr().err.strip().splitlines()[-1]
-    assert code == (2 if command[0] == "design" else 3)
+    assert code == (2 if command[0] == "optimise" else 3)
     assert "mesh.size_mm = 4" in last
     assert "mesh.size_mm = 0.25" in last
 
