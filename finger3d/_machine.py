@@ -1,4 +1,4 @@
-"""Versions and machine: what a reader of a result, or of a bug report, has to know."""
+"""Versions of the packages, number of cores and memory of this machine."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ PACKAGES = (
     "plotly",
     "pydantic",
 )
-"""finger3d and every package that shapes numbers or pictures, by its name on PyPI."""
+"""Names on PyPI of finger3d and of every package that shapes numbers or pictures."""
 
 
 def versions() -> dict[str, str]:
-    """Return name -> installed version, without importing any of them; a package that is absent is left out."""
+    """Return the installed version of each package by name, and that of Python; absent packages are left out."""
     return dict(_installed())
 
 
@@ -43,12 +43,12 @@ def _installed() -> dict[str, str]:
 
 
 def cores() -> int:
-    """Return the number of cores this process may use."""
+    """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def memory_bytes() -> tuple[int, int] | None:
-    """Return total and available memory, or None where the system does not tell."""
+    """Return total and available memory in bytes, or None if the system does not report them."""
     try:
         page = os.sysconf("SC_PAGE_SIZE")
         return page * os.sysconf("SC_PHYS_PAGES"), page * os.sysconf("SC_AVPHYS_PAGES")

@@ -1,4 +1,4 @@
-"""How a long job tells where it is: a progress bar on a terminal, plain lines elsewhere, nothing from Python."""
+"""Progress of a long job: a bar on a terminal, plain lines elsewhere, nothing in a script."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ import os
 import sys
 import time
 from types import TracebackType
-from typing import Any, TextIO
+from typing import TextIO
 
 from finger3d._ranges import printable
 
 
 class Progress:
-    """What a job calls while it works. This one is silent, and serves as the default.
+    """Receiver of a job's progress; this one, the default, prints nothing.
 
     Attributes
     ----------
-    steps_done, steps_total : how far the job came, for whoever has to tell after an interruption
+    steps_done, steps_total : number of finished steps and of all, for the message after an interruption
     """
 
     steps_done: int = 0
@@ -34,15 +34,15 @@ class Progress:
         """Begin a part of the job, for instance ``meshing``."""
 
     def step(self, done: int, total: int, text: str = "") -> None:
-        """Report that `done` of `total` steps are finished; `text` is a short remark on the last one."""
+        """Report that `done` of `total` steps are finished, with a short remark on the last one."""
         self.steps_done, self.steps_total = done, total
 
     def say(self, text: str) -> None:
-        """Tell something worth keeping, for instance that a mesh came from the cache."""
+        """Print a line that remains, for instance that a mesh came from the cache."""
 
 
 class PlainProgress(Progress):
-    """One line per event, with the seconds since the start: for logs and pipes."""
+    """One line per event with the seconds since the start, for logs and pipes."""
 
     def __init__(self, stream: TextIO | None = None) -> None:
         self.stream = stream if stream is not None else sys.stdout
@@ -70,10 +70,11 @@ class BarProgress(Progress):
 
     def __init__(self, stream: TextIO | None = None) -> None:
         from rich.console import Console
-        from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+        from rich.progress import BarColumn, SpinnerColumn, TextColumn, TimeElapsedColumn
+        from rich.progress import Progress as RichProgress
 
         self.console = Console(highlight=False, file=stream)
-        self.progress = Progress(
+        self.progress = RichProgress(
             SpinnerColumn(),
             TextColumn("{task.description}", markup=False),
             BarColumn(bar_width=30),
@@ -83,8 +84,8 @@ class BarProgress(Progress):
             console=self.console,
             transient=True,
         )
-        # A task without total pulses: nobody knows how long meshing takes.
-        self.task: Any = self.progress.add_task("starting", total=None, count="", remark="")
+        # A task without a total pulses: the duration of meshing is not known.
+        self.task = self.progress.add_task("starting", total=None, count="", remark="")
 
     def __enter__(self) -> BarProgress:
         self.progress.start()
@@ -111,13 +112,13 @@ class BarProgress(Progress):
 
 
 def reporter(stream: TextIO | None = None) -> Progress:
-    """Return a bar on an interactive terminal, plain lines in a pipe, a dumb terminal or CI.
+    """Return a bar for an interactive terminal, plain lines for a pipe, a dumb terminal or CI.
 
     Parameters
     ----------
-    stream : where to; standard output if it is not given
+    stream : where to print; None: standard output
     """
     target = stream or sys.stdout
-    unicode = (target.encoding or "utf-8").lower().startswith("utf")  # bar and spinner are no ASCII
+    unicode = (target.encoding or "utf-8").lower().startswith("utf")  # bar and spinner are not ASCII
     interactive = target.isatty() and unicode and os.environ.get("TERM") != "dumb" and not os.environ.get("CI")
     return BarProgress(stream) if interactive else PlainProgress(stream)

@@ -17,6 +17,8 @@ from finger3d.cli import app, main
 from finger3d.errors import MissingError, Outcome
 from finger3d.mechanics.model import MeshOptions
 from finger3d.scene import load
+from finger3d.scene.reference import reference
+from finger3d.scene.registry import effect_names
 
 HEAVY = ("OCP", "build123d", "vtk", "vtkmodules", "pyvista", "pytetwild", "trimesh", "scipy", "numpy", "pydantic")
 STEP = {
@@ -84,12 +86,19 @@ def test_new_writes_a_scene_that_loads_and_is_the_papers_finger(scene):
 
 def test_new_explains_every_key(scene):
     text = scene.read_text(encoding="utf-8")
-    for table in ("finger", "material", "object", "friction", "press", "contact", "model", "mesh", "gauge"):
-        assert re.search(rf"^\[+{table}\]+", text, re.MULTILINE)
-    for key in ("slide_x_mm", "duration_s", "wavelength_mm", "tip_radius_mm", "length_mm", "plane-strain", "swept"):
-        assert key in text
-    optional = [line for line in text.splitlines() if re.match(r"# \w+ = |# \[\[", line)]
-    assert len(optional) >= 10
+    keys = set(re.findall(r"^\| `(\w+)` \|", reference(), re.MULTILINE))
+    assert {"depth_mm", "prony", "tolerance"} <= keys
+    assert not [key for key in keys if not re.search(rf"\b{key}\b", text)]
+    assert not [name for name in effect_names() if f"\n# [effects.{name}]\n" not in text]
+
+
+@pytest.mark.parametrize("name", effect_names())
+def test_an_effect_of_the_new_scene_is_switched_on_by_uncommenting_it(scene, name):
+    before, block = scene.read_text(encoding="utf-8").split(f"# [effects.{name}]\n")
+    keys = re.match(r"(?:# \w+ = .*\n)*", block)[0].replace("# ", "", 1).replace("\n# ", "\n")
+    text = before.replace("length_mm = 0.0", "length_mm = 2.0").replace("[press]", "[press]\nduration_s = 1.0")
+    scene.write_text(f"{text}\n[effects.{name}]\n{keys}\n", encoding="utf-8")
+    assert set(load(scene).effects) == {name}
 
 
 def test_new_leaves_a_file_alone_that_is_there(scene, capsys):

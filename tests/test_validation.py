@@ -21,8 +21,10 @@ def test_study_quick(study: Study, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("study", STUDIES.values(), ids=STUDIES.keys())
-def test_study_tells_its_question_and_source(study: Study) -> None:
+def test_every_number_of_a_study_names_its_reference_and_why_its_tolerance_is_right(study: Study) -> None:
     assert study.question.endswith("?")
+    for row in kept_rows(study.path.parent, study):
+        assert min(len(row.what), len(row.reference), len(row.reason)) > 1, row
 
 
 @pytest.mark.parametrize("study", STUDIES.values(), ids=STUDIES.keys())
