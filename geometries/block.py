@@ -1,18 +1,15 @@
 """A block with a flat top. Runs alone: python geometries/block.py"""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import ClassVar
 
 from finger3d._ranges import Dimension
-from finger3d.geometry.rules import check_dimensions
+from finger3d.geometry.design import ExtrudedDesign
 from finger3d.geometry.section import Section, block_section
 
 
 @dataclass(frozen=True)
-class Block:
+class Block(ExtrudedDesign):
     """A rectangular block; its top face is the contact surface.
 
     Parameters
@@ -28,27 +25,9 @@ class Block:
     height_mm: Dimension
     width_mm: Dimension
 
-    def __post_init__(self) -> None:
-        check_dimensions(self)
-
-    @property
-    def volume_mm3(self) -> float:
-        """Closed-form volume."""
-        return self.section().area_mm2 * self.width_mm
-
     def section(self) -> Section:
-        """The half section, for structured meshes."""
+        """Return the section x >= 0."""
         return block_section(self.half_length_mm, self.height_mm)
-
-    def top(self, x: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Exact height y (n,) of the contact surface at x, z (n,), mm; nan outside the footprint."""
-        return self.section().top(x, z, self.width_mm)
-
-    def solid(self) -> Any:
-        """The build123d solid."""
-        from finger3d.geometry.cad import extruded
-
-        return extruded(self.section(), self.width_mm, self.name)
 
 
 if __name__ == "__main__":

@@ -1,18 +1,16 @@
 """The paper's Fig. 9 finger: a cylinder's top on straight walls. Runs alone: python geometries/clipped_cylinder.py"""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import ClassVar
 
 from finger3d._ranges import Dimension, Zero
-from finger3d.geometry.rules import check_at_most, check_dimensions
+from finger3d.geometry.design import ExtrudedDesign
+from finger3d.geometry.rules import check_at_most
 from finger3d.geometry.section import Section, cylinder_section
 
 
 @dataclass(frozen=True)
-class ClippedCylinder:
+class ClippedCylinder(ExtrudedDesign):
     """A cylinder's top (axis along z), clipped at x = +-half_length and carried by walls edge_height high.
 
     Parameters
@@ -24,6 +22,7 @@ class ClippedCylinder:
     """
 
     name: ClassVar[str] = "clipped_cylinder"
+    may_be_zero: ClassVar[tuple[str, ...]] = ("edge_height_mm",)
 
     radius_mm: Dimension
     half_length_mm: Dimension
@@ -31,33 +30,18 @@ class ClippedCylinder:
     width_mm: Dimension
 
     def __post_init__(self) -> None:
-        check_dimensions(self, zero_allowed=("edge_height_mm",))
-        check_at_most(self, "half_length_mm", "radius_mm")
-        check_at_most(self, "edge_height_mm", "radius_mm")
+        super().__post_init__()
+        for key in ("half_length_mm", "edge_height_mm"):
+            check_at_most(self.name, self.dimensions, key, "radius_mm")
 
     @property
     def height_mm(self) -> float:
         """Height on the axis."""
         return self.section().height_mm
 
-    @property
-    def volume_mm3(self) -> float:
-        """Closed-form volume."""
-        return self.section().area_mm2 * self.width_mm
-
     def section(self) -> Section:
-        """The half section, for structured meshes."""
+        """Return the section x >= 0."""
         return cylinder_section(self.radius_mm, self.half_length_mm, self.edge_height_mm)
-
-    def top(self, x: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Exact height y (n,) of the contact surface at x, z (n,), mm; nan outside the footprint."""
-        return self.section().top(x, z, self.width_mm)
-
-    def solid(self) -> Any:
-        """The build123d solid."""
-        from finger3d.geometry.cad import extruded
-
-        return extruded(self.section(), self.width_mm, self.name)
 
 
 if __name__ == "__main__":

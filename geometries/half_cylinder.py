@@ -1,18 +1,15 @@
 """The paper's R = 5 finger: half a cylinder on its flat side. Runs alone: python geometries/half_cylinder.py"""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import ClassVar
 
 from finger3d._ranges import Dimension
-from finger3d.geometry.rules import check_dimensions
+from finger3d.geometry.design import ExtrudedDesign
 from finger3d.geometry.section import Section, cylinder_section
 
 
 @dataclass(frozen=True)
-class HalfCylinder:
+class HalfCylinder(ExtrudedDesign):
     """Half a cylinder (axis along z) on its flat side.
 
     Parameters
@@ -26,9 +23,6 @@ class HalfCylinder:
     radius_mm: Dimension
     width_mm: Dimension
 
-    def __post_init__(self) -> None:
-        check_dimensions(self)
-
     @property
     def height_mm(self) -> float:
         """Height on the axis."""
@@ -39,24 +33,9 @@ class HalfCylinder:
         """Half the length along x."""
         return self.radius_mm
 
-    @property
-    def volume_mm3(self) -> float:
-        """Closed-form volume."""
-        return self.section().area_mm2 * self.width_mm
-
     def section(self) -> Section:
-        """The half section, for structured meshes."""
+        """Return the section x >= 0."""
         return cylinder_section(self.radius_mm, self.radius_mm, 0.0)
-
-    def top(self, x: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Exact height y (n,) of the contact surface at x, z (n,), mm; nan outside the footprint."""
-        return self.section().top(x, z, self.width_mm)
-
-    def solid(self) -> Any:
-        """The build123d solid."""
-        from finger3d.geometry.cad import extruded
-
-        return extruded(self.section(), self.width_mm, self.name)
 
 
 if __name__ == "__main__":

@@ -2,17 +2,20 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._ranges import Dimension
-from finger3d.geometry.rules import check_dimensions
+from finger3d.geometry.design import ParametricDesign
+
+if TYPE_CHECKING:
+    from build123d import Solid
 
 
 @dataclass(frozen=True)
-class Hemisphere:
+class Hemisphere(ParametricDesign):
     """Half a ball on its flat side. It has no section: a solid, for the ftetwild mesher, only.
 
     Parameters
@@ -23,9 +26,6 @@ class Hemisphere:
     name: ClassVar[str] = "hemisphere"
 
     radius_mm: Dimension
-
-    def __post_init__(self) -> None:
-        check_dimensions(self)
 
     @property
     def height_mm(self) -> float:
@@ -44,18 +44,18 @@ class Hemisphere:
 
     @property
     def volume_mm3(self) -> float:
-        """Closed-form volume."""
+        """Volume in closed form."""
         return 2.0 / 3.0 * math.pi * self.radius_mm**3
 
     def top(self, x: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Exact height y (n,) of the contact surface at x, z (n,), mm; nan outside the footprint."""
+        """Return the exact height y (n,) of the contact surface at x, z (n,), mm; nan outside the footprint."""
         square = self.radius_mm**2 - np.asarray(x, dtype=float) ** 2 - np.asarray(z, dtype=float) ** 2
         # Round-off from a mesh must not push a point on the rim out of the footprint.
         inside = square >= -1e-12 * self.radius_mm**2
         return np.where(inside, np.sqrt(np.maximum(square, 0.0)), np.nan)
 
-    def solid(self) -> Any:
-        """The build123d solid."""
+    def solid(self) -> "Solid":
+        """Return the build123d solid, its faces labelled."""
         from build123d import Rot, Sphere
 
         from finger3d.geometry.cad import sound

@@ -72,7 +72,7 @@ class Case:
         """The model at an edge length."""
         options = replace(self.model.mesh, size_mm=size, base_size_mm=self.grading * size)
         # the truth is structured where it can be, so that it is the same on every run
-        structured = size == self.truth and hasattr(self.model.design, "section")
+        structured = size == self.truth and self.model.design.section() is not None
         return replace(self.model, mesh=replace(options, mesher="swept") if structured else options)
 
 
@@ -97,7 +97,7 @@ class Judged:
 
 
 def _model(
-    design: Any, nu: float, domain: Domain, depth: float, gauges: tuple[Gauge, ...], rigid: Any = None,
+    design: Design, nu: float, domain: Domain, depth: float, gauges: tuple[Gauge, ...], rigid: Any = None,
     mesher: Any = "swept",
 ) -> Model:  # fmt: skip
     return Model(

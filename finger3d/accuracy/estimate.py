@@ -118,7 +118,7 @@ def coarser(model: Model, factor: float = FACTOR) -> Model:
     section = min(design.height_mm, 2.0 * design.half_length_mm)
     base = min(factor * options.base_size_mm, section)
     size = min(factor * options.size_mm, base, design.width_mm if model.domain == "solid" else math.inf)
-    mesher: Any = "swept" if hasattr(design, "section") else options.mesher
+    mesher: Any = "swept" if design.section() is not None else options.mesher
     return replace(model, mesh=replace(options, size_mm=size, base_size_mm=base, mesher=mesher, layers=1))
 
 

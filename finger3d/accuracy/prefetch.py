@@ -66,7 +66,7 @@ class MeshPrefetch:
 
 def _takes_long(model: Model) -> bool:
     """Whether pytetwild must make the body's mesh, and its companion's too."""
-    if model.domain != "solid" or model.mesh.mesher == "swept" or hasattr(model.design, "section"):
+    if model.domain != "solid" or model.mesh.mesher == "swept" or model.design.section() is not None:
         return False
     from finger3d.meshing import cache
     from finger3d.meshing.sizing import rounded_zone

@@ -237,7 +237,7 @@ def _shares(
 
 
 def _swept(problem: Problem, options: MeshOptions) -> MeshOptions:
-    return replace(options, mesher="swept") if hasattr(problem.model.design, "section") else options
+    return replace(options, mesher="swept") if problem.model.design.section() is not None else options
 
 
 def _affordable(now: MeshOptions, wanted: MeshOptions, seconds: float, left: float, dim: int) -> MeshOptions | None:

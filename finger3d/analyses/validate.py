@@ -129,13 +129,7 @@ class Study:
 
     def run(self, quick: bool) -> Result:
         """Import the file and answer its question."""
-        package = types.ModuleType("finger3d_validation")
-        package.__path__ = [str(self.path.parent)]
-        known = sys.modules.setdefault(package.__name__, package)
-        if list(known.__path__) != list(package.__path__):
-            sys.modules[package.__name__] = package
-            sys.modules.pop(f"{package.__name__}.{self.name}", None)
-        result: Result = importlib.import_module(f"{package.__name__}.{self.name}").run(quick)
+        result: Result = import_from(self.path.parent, "finger3d_validation", self.name).run(quick)
         return result
 
     def stamp(self) -> str:

@@ -1,40 +1,52 @@
-"""CAD of a design: extruded and cut solids, and the labels of their faces. build123d is imported inside functions."""
+"""CAD of designs: extruded and cut solids, and the labels of their faces.
+
+build123d takes a second to import and is imported inside functions.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from finger3d.errors import Finger3dError
 from finger3d.geometry.section import Arc, Section
 
+if TYPE_CHECKING:
+    from build123d import Edge, Face, Part, Shape, Solid, Wire
+
 LABELS = ("contact", "base", "ends", "walls", "symmetry_x", "symmetry_z")
 
-_ON = 1e-7  # mm; CAD's own tolerance
-_UPRIGHT = 1e-6  # a round wall's normal is level but for round-off
+_CAD_TOLERANCE_MM = 1e-7
+_LEAST_UPWARD_NORMAL = 1e-6  # of a contact face; round-off of a vertical round wall is smaller
 
 
-def extruded(section: Section, width_mm: float, name: str) -> Any:
+def extruded(section: Section, width_mm: float, name: str) -> Solid:
     """Extrude the whole section along z from -width/2 to width/2, with labelled faces."""
     from build123d import Line, Polyline, ThreePointArc, extrude, make_face
 
     length, edge = section.half_length_mm, section.edge_height_mm
     if isinstance(section.contact, Arc):
         # A half cylinder's wall has no height; CAD refuses edges shorter than its tolerance.
-        edges: list[Any] = [ThreePointArc((length, edge), (0.0, section.height_mm), (-length, edge))]
+        edges: list[Edge | Wire] = [ThreePointArc((length, edge), (0.0, section.height_mm), (-length, edge))]
     else:
         edges = [Line((length, edge), (-length, edge))]
-    if edge > _ON:
+    if edge > _CAD_TOLERANCE_MM:
         edges.append(Polyline((-length, edge), (-length, 0.0), (length, 0.0), (length, edge)))
     else:
         edges.append(Line((-length, 0.0), (length, 0.0)))
     return sound(extrude(make_face(edges), amount=0.5 * width_mm, both=True), name)
 
 
-def sound(shape: Any, name: str) -> Any:
-    """The one valid solid in a shape, or an error; its faces carry labels (see :func:`labelled_faces`)."""
+def sound(shape: Part | Shape, name: str) -> Solid:
+    """Return the one valid solid of a shape, its faces labelled by :func:`labelled_faces`.
+
+    Raises
+    ------
+    Finger3dError
+        If there are several solids or an invalid one, or no base or contact face.
+    """
     solids = shape.solids()
     if len(solids) != 1 or not solids[0].is_valid or not solids[0].volume > 0.0:
         raise Finger3dError(
@@ -48,11 +60,11 @@ def sound(shape: Any, name: str) -> Any:
     return solid
 
 
-def labelled_faces(solid: Any) -> list[Any]:
-    """Faces of a solid, each with its `label`, told from its place and normal; y is up, z the width.
+def labelled_faces(solid: Solid) -> list[Face]:
+    """Label the faces of a solid by place and normal; y points up, z along the width.
 
-    base: plane on y = 0 looking down. ends: planes looking along z. walls: planes looking along x, and whatever looks
-    down. symmetry_x, symmetry_z: the cuts on x = 0, z = 0. contact: the rest.
+    base: plane on y = 0 facing down. ends: planes normal to z. walls: planes normal to x, and other faces that do not
+    face up. symmetry_x, symmetry_z: the cuts on x = 0, z = 0. contact: the rest.
     """
     faces = list(solid.faces())
     for face in faces:
@@ -62,19 +74,19 @@ def labelled_faces(solid: Any) -> list[Any]:
     return faces
 
 
-def _label(centre: np.ndarray, normal: np.ndarray, planar: Any) -> str:
+def _label(centre: np.ndarray, normal: np.ndarray, planar: bool) -> str:
     along = int(np.argmax(np.abs(normal)))
     if planar and abs(normal[along]) > 1.0 - 1e-9:
         down = normal[along] < 0.0
         if along == 1:
-            return "base" if down and abs(centre[1]) < _ON else "walls" if down else "contact"
-        cut = down and abs(centre[along]) < _ON
+            return "base" if down and abs(centre[1]) < _CAD_TOLERANCE_MM else "walls" if down else "contact"
+        cut = down and abs(centre[along]) < _CAD_TOLERANCE_MM
         return ("symmetry_x" if cut else "walls") if along == 0 else ("symmetry_z" if cut else "ends")
-    return "contact" if normal[1] > _UPRIGHT else "walls"
+    return "contact" if normal[1] > _LEAST_UPWARD_NORMAL else "walls"
 
 
-def cut(solid: Any, symmetry: tuple[str, ...]) -> Any:
-    """The part x >= 0 and/or z >= 0 of a solid."""
+def cut(solid: Solid, symmetry: tuple[str, ...]) -> Solid:
+    """Return the part x >= 0 and/or z >= 0 of a solid."""
     if not symmetry:
         return solid
     from build123d import Align, Box

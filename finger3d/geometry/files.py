@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,10 @@ from finger3d._ranges import number
 from finger3d.errors import Finger3dError
 from finger3d.geometry.surface import Triangles
 from finger3d.geometry.surface_checks import mistake
+
+if TYPE_CHECKING:
+    from build123d import Face, Solid
+    from OCP.STEPControl import STEPControl_Reader
 
 Float = NDArray[np.float64]
 
@@ -120,12 +124,12 @@ def _proper(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     return faces[(a != b) & (b != c) & (c != a)]
 
 
-def read_solid(path: Path) -> Any:
+def read_solid(path: Path) -> Solid:
     """The one build123d solid of a STEP file, mm."""
     return read_named(path)[0]
 
 
-def read_named(path: Path) -> tuple[Any, dict[str, list[Any]]]:
+def read_named(path: Path) -> tuple[Solid, dict[str, list[Face]]]:
     """The one build123d solid of a STEP file, mm, and its faces by the names CAD gave them, in lower case.
 
     Raises
@@ -159,13 +163,13 @@ def read_named(path: Path) -> tuple[Any, dict[str, list[Any]]]:
     return solids[0], _named_faces(solids[0], reader)
 
 
-def _named_faces(solid: Any, reader: Any) -> dict[str, list[Any]]:
+def _named_faces(solid: Solid, reader: STEPControl_Reader) -> dict[str, list[Face]]:
     """Faces by the name in their ADVANCED_FACE entity: XCAF and build123d keep names of parts, but not of faces."""
     from OCP.StepRepr import StepRepr_RepresentationItem
     from OCP.TopLoc import TopLoc_Location
 
     transferred = reader.WS().TransferReader()
-    found: dict[str, list[Any]] = {}
+    found: dict[str, list[Face]] = {}
     for face in solid.faces():
         drawn = face.wrapped.Located(TopLoc_Location())  # the entity knows nothing of where an assembly puts its part
         entity = transferred.EntityFromShapeResult(drawn, 1)
@@ -174,7 +178,7 @@ def _named_faces(solid: Any, reader: Any) -> dict[str, list[Any]]:
     return found
 
 
-def tessellated(solid: Any) -> Triangles:
+def tessellated(solid: Solid) -> Triangles:
     """A CAD solid as triangles, within 5e-5 of its diagonal."""
     from finger3d.geometry.tessellate import tessellate
 

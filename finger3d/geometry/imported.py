@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,8 @@ from finger3d.geometry.surface import Triangles
 from finger3d.geometry.surface_checks import crossings, mistake
 
 if TYPE_CHECKING:
+    from build123d import Face, Solid
+
     from finger3d.geometry.tessellate import Tessellation
 
 Float = NDArray[np.float64]
@@ -55,7 +58,7 @@ class Imported:
     named_base: bool
     middle: Float = field(compare=False, repr=False)
     surface: Triangles = field(compare=False, repr=False)
-    cad: Any = field(compare=False, repr=False)
+    cad: Solid | None = field(compare=False, repr=False)
 
     @property
     def name(self) -> str:
@@ -63,10 +66,11 @@ class Imported:
         return Path(self.path).name
 
     @property
-    def cache_fields(self) -> dict[str, str]:
-        """What tells its meshes from those of other bodies; the name of the file does not."""
+    def cache_fields(self) -> Mapping[str, object]:
+        """Content of the file and how it was turned; the file's name does not matter."""
         turned = {"named_base": "True"} if self.named_base else {}
-        return {"content": self.content, "scale": repr(self.scale), "upside_down": repr(self.upside_down), **turned}
+        dimensions = {"content": self.content, "scale": repr(self.scale), "upside_down": repr(self.upside_down)}
+        return {"design": "imported", "dimensions": {**dimensions, **turned}}
 
     @property
     def height_mm(self) -> float:
@@ -87,6 +91,9 @@ class Imported:
     def volume_mm3(self) -> float:
         """Volume inside the triangles."""
         return self.surface.volume
+
+    def section(self) -> None:
+        """Return None: no constant section is known of a file."""
 
     def top(self, x: Float, z: Float) -> Float:
         """Height y (n,) of the highest point at x, z (n,), mm; nan beside the body."""
@@ -113,16 +120,16 @@ class Imported:
                 found.append(name)
         return tuple(found)
 
-    def solid(self) -> Any:
-        """The build123d solid, its faces labelled."""
+    def solid(self) -> Solid:
+        """Return the build123d solid, its faces labelled."""
         from finger3d.geometry.cad import sound
 
         if self.cad is None:
             raise Finger3dError(f"{self.path}: an STL file has triangles, and no CAD solid; export it as STL again")
         return sound(self.cad, self.name)
 
-    def body(self) -> Tessellation | None:
-        """The triangles in labelled patches, for meshing without CAD; None for STEP, which is meshed from CAD."""
+    def tessellation(self) -> Tessellation | None:
+        """Return the triangles of an STL file in labelled patches; None for STEP, which is meshed from CAD."""
         from finger3d.geometry.faceted import body
 
         return body(self.surface) if self.cad is None else None
@@ -149,7 +156,7 @@ def imported(path: str | Path, upside_down: bool = False, scale: float = 1.0) ->
     """
     path = Path(path)
     solid = None
-    base: list[Any] = []
+    base: list[Face] = []
     if path.suffix.lower() in STEP:
         solid, named = read_named(path)
         if base := named.get(_NAME, []):
@@ -179,7 +186,7 @@ def of_surface(surface: Triangles, name: str, upside_down: bool = False) -> Impo
     return _on_its_base(name, surface.digest, 1.0, upside_down, surface, None)
 
 
-def _on_its_base(path: str, told_by: str, scale: float, upside_down: bool, surface: Triangles, solid: Any) -> Imported:
+def _on_its_base(path: str, told_by: str, scale: float, upside_down: bool, surface: Triangles, solid: Solid | None) -> Imported:
     _check_size(path, surface)
     base = _base(path, surface, "highest" if upside_down else "lowest")
     corners = surface.corners[base].reshape(-1, 3)
@@ -197,7 +204,7 @@ def _on_its_base(path: str, told_by: str, scale: float, upside_down: bool, surfa
     return Imported(path, told_by, scale, upside_down, False, middle, moved, solid)
 
 
-def _turned(path: Path, solid: Any, base: list[Any]) -> Any:
+def _turned(path: Path, solid: Solid, base: list[Face]) -> Solid:
     """The solid, turned the shortest way (about z, if by half a turn) so that the faces named base look down."""
     normals = np.array([[*face.normal_at(face.center())] for face in base])
     out = normals[0]

@@ -174,7 +174,7 @@ class Model:
     warnings : for the summary
     """
 
-    design: Any
+    design: Design
     material: Material
     mesh: MeshOptions
     legs: tuple[Leg, ...]
@@ -201,5 +201,5 @@ class Model:
             at = end
         design = self.design
         half_width = design.width_mm / 2.0 if self.domain == "solid" else 0.0
-        marks = design.landmarks() if hasattr(design, "landmarks") else None
+        marks = design.landmarks()
         return design.top, self.object, design.half_length_mm, half_width, np.array(path), marks

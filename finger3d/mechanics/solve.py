@@ -76,7 +76,7 @@ def symmetry(model: Model) -> tuple[str, ...]:
         return model.symmetry
     slides = {"x": [leg.slide_x_mm for leg in model.legs], "z": [leg.slide_z_mm for leg in model.legs]}
     axes = ("x", "z") if model.domain == "solid" else ("x",)
-    body = model.design.mirrors() if hasattr(model.design, "mirrors") else axes
+    body = model.design.mirrors()
     inner = model.inclusions.mirrors(model) if model.inclusions else axes
     return tuple(a for a in axes if a in body and a in inner and a in model.object.mirrors() and not any(slides[a]))
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import hashlib
 import inspect
 import json
@@ -19,6 +18,8 @@ from typing import Any
 import numpy as np
 
 from finger3d.fem.simplex import Mesh
+from finger3d.geometry.design import Design
+from finger3d.meshing.options import MeshSizes, Zone
 from finger3d.meshing.report import content_hash
 
 FORMAT = 1
@@ -40,7 +41,7 @@ def folder() -> Path:
     return Path(os.environ.get("FINGER3D_CACHE") or user_cache_dir("finger3d")) / "meshes"
 
 
-def key(design: Any, options: Any, zone: tuple[float, ...], symmetry: tuple[str, ...]) -> str:
+def key(design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...]) -> str:
     """SHA-256 of the design (its dimensions and its file), the sizes, the zone, the symmetry, and the versions."""
     try:
         code = hashlib.sha256(Path(inspect.getfile(type(design))).read_bytes()).hexdigest()
@@ -49,7 +50,7 @@ def key(design: Any, options: Any, zone: tuple[float, ...], symmetry: tuple[str,
     text = json.dumps(
         {
             "format": FORMAT,
-            **_told_by(design),
+            **design.cache_fields,
             "code": code,
             "sizes": [repr(float(options.size_mm)), repr(float(options.base_size_mm))],
             "zone": [repr(float(z)) for z in zone],
@@ -59,16 +60,6 @@ def key(design: Any, options: Any, zone: tuple[float, ...], symmetry: tuple[str,
         sort_keys=True,
     )
     return hashlib.sha256(text.encode()).hexdigest()
-
-
-def _told_by(design: Any) -> dict[str, Any]:
-    """A design's name and dimensions; an imported body is told by its file's content, whatever its name."""
-    if hasattr(design, "cache_fields"):
-        return {"design": "imported", "dimensions": design.cache_fields}
-    return {
-        "design": design.name,
-        "dimensions": {f.name: repr(getattr(design, f.name)) for f in dataclasses.fields(design)},
-    }
 
 
 def _version(name: str) -> str:

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 from finger3d.fem.simplex import Mesh
+from finger3d.geometry.design import Design
+from finger3d.meshing.options import MeshSizes, Zone
 from finger3d.meshing.report import MeshReport
 from finger3d.meshing.swept import mesh_swept
 
 
 def mesh_solid(
-    design: Any,
-    options: Any,
-    zone: tuple[float, float, float, float],
+    design: Design,
+    options: MeshSizes,
+    zone: Zone,
     symmetry: tuple[str, ...] = (),
     say: Callable[[str], None] = lambda text: None,
 ) -> tuple[Mesh, MeshReport]:

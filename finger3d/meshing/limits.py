@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from finger3d._machine import memory_bytes
 from finger3d._ranges import at_most
 from finger3d.errors import Finger3dError
+from finger3d.geometry.design import Design
+from finger3d.meshing.options import MeshSizes
 
 MAX_TETS = 1_000_000
 """pytetwild was seen to take minutes below this and hours above."""
@@ -24,7 +25,7 @@ def memory_gb(cells: float, dim: int) -> float:
     return 8.4 * (_DOFS_PER_TET * cells / 522_540.0) ** 1.25
 
 
-def check_sizes(design: Any, options: Any, dim: int) -> None:
+def check_sizes(design: Design, options: MeshSizes, dim: int) -> None:
     """Refuse edge lengths that are no positive numbers, in the wrong order, or larger than the finger."""
     for key in ("size_mm", "base_size_mm"):
         value = getattr(options, key)
@@ -44,7 +45,7 @@ def check_sizes(design: Any, options: Any, dim: int) -> None:
         )
 
 
-def check_count(cells: float, dim: int, options: Any, cap: float = math.inf) -> None:
+def check_count(cells: float, dim: int, options: MeshSizes, cap: float = math.inf) -> None:
     """Refuse a mesh forecast to need more than most of this machine's memory, or more than `cap` cells."""
     need, have = memory_gb(cells, dim), _machine_gb()
     if need <= _SHARE * have and cells <= cap:

@@ -4,27 +4,27 @@ from __future__ import annotations
 
 import math
 import time
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.errors import Finger3dError
 from finger3d.fem.simplex import Mesh, boundary, quadratic, unfold
+from finger3d.geometry.design import Design
 from finger3d.geometry.section import Section
 from finger3d.meshing.grid import Grid, Sizes, folded_zone, rows, triangulate
 from finger3d.meshing.limits import check_count, check_sizes
+from finger3d.meshing.options import MeshSizes, Zone
 from finger3d.meshing.report import MeshReport, report
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
-Zone = tuple[float, float, float, float]
 
 _AXIS = {"x": 0, "z": 2}
 _FLATTEST_DEG = 0.5  # flatter ones come from a wall or an edge far thinner than the mesh
 
 
-def mesh_section(design: Any, options: Any, zone: Zone, symmetry: tuple[str, ...] = ()) -> tuple[Mesh, MeshReport]:
+def mesh_section(design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...] = ()) -> tuple[Mesh, MeshReport]:
     """Mesh the section of an extruded design with quadratic triangles, mirror-exact about x = 0.
 
     Parameters
@@ -45,7 +45,7 @@ def mesh_section(design: Any, options: Any, zone: Zone, symmetry: tuple[str, ...
     return whole, _fit(report(whole, multiple, section.area_mm2 * design.width_mm, seconds), design, options)
 
 
-def mesh_swept(design: Any, options: Any, zone: Zone, symmetry: tuple[str, ...] = ()) -> tuple[Mesh, MeshReport]:
+def mesh_swept(design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...] = ()) -> tuple[Mesh, MeshReport]:
     """Mesh an extruded design with quadratic tets, mirror-exact about x = 0 and z = 0; see :func:`mesh_section`.
 
     Layers along z are equal and at most ``size_mm`` thick; over half the width there are at least ``options.layers``.
@@ -65,7 +65,7 @@ def mesh_swept(design: Any, options: Any, zone: Zone, symmetry: tuple[str, ...] 
     return whole, _fit(report(whole, multiple, section.area_mm2 * design.width_mm, seconds), design, options)
 
 
-def _fit(made: MeshReport, design: Any, options: Any) -> MeshReport:
+def _fit(made: MeshReport, design: Design, options: MeshSizes) -> MeshReport:
     """The report, unless cells are too flat to trust."""
     if made.min_dihedral_deg >= _FLATTEST_DEG:
         return made
@@ -75,12 +75,12 @@ def _fit(made: MeshReport, design: Any, options: Any) -> MeshReport:
     )
 
 
-def _grid(design: Any, options: Any, zone: Zone, dim: int, copies: int) -> tuple[Grid, Section]:
+def _grid(design: Design, options: MeshSizes, zone: Zone, dim: int, copies: int) -> tuple[Grid, Section]:
     """Triangles of the half section, if the mesh made of `copies` cells for each of them may be afforded."""
-    if not hasattr(design, "section"):
+    section = design.section()
+    if section is None:
         what, allowed = ("model.domain", "'solid'") if dim == 2 else ("mesh.mesher = 'swept'", "'ftetwild'")
         raise Finger3dError(f"{what}: {design.name} has no constant section to mesh; allowed: {allowed}")
-    section = design.section()
     low, high = folded_zone(zone, section.half_length_mm)
     layout = rows(section, Sizes(options.size_mm, options.base_size_mm, low, high))
     check_count(2.0 * layout.count * copies, dim, options)

@@ -14,7 +14,7 @@ import sys
 import time
 from collections.abc import Callable
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,10 @@ from numpy.typing import NDArray
 from finger3d._process import child_environment
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.fem.simplex import Mesh, signed_volumes
+from finger3d.geometry.design import Design
 from finger3d.meshing import cache
 from finger3d.meshing.limits import MAX_TETS, check_count, check_sizes
+from finger3d.meshing.options import MeshSizes, Zone
 from finger3d.meshing.report import MeshReport, report
 from finger3d.meshing.sizing import Sizing, forecast, rounded_zone, sizing
 
@@ -32,7 +34,6 @@ if TYPE_CHECKING:
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
-Zone = tuple[float, float, float, float]
 
 STOP_ENERGY = 10.0
 ATTEMPTS = 3
@@ -44,8 +45,8 @@ _VOLUME = 0.01
 
 
 def mesh_tetwild(
-    design: Any,
-    options: Any,
+    design: Design,
+    options: MeshSizes,
     zone: Zone,
     symmetry: tuple[str, ...] = (),
     say: Callable[[str], None] = lambda text: None,
@@ -70,7 +71,7 @@ def mesh_tetwild(
 
 
 def _made(
-    design: Any, options: Any, zone: Zone, symmetry: tuple[str, ...], say: Callable[[str], None]
+    design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...], say: Callable[[str], None]
 ) -> tuple[Mesh, float, float]:
     """The mesh, the CAD volume (mm3) of the whole body, and the seconds CAD took."""
     from finger3d.meshing.snap import UnusableMeshError, snap
@@ -86,7 +87,7 @@ def _made(
     body, epsilon = _body(design, symmetry, field)
     cad_seconds = time.perf_counter() - start
     check_surface(body.points, body.triangles)
-    whole = getattr(design, "volume_mm3", body.volume_mm3 * 2 ** len(symmetry))
+    whole = design.volume_mm3
     if abs(body.volume_mm3 * 2 ** len(symmetry) / whole - 1.0) > _VOLUME:
         raise Finger3dError(
             f"{design.name}: the solid's volume is not the volume_mm3 it states, {whole:.6g}; mend the design"
@@ -109,20 +110,21 @@ def _made(
     )
 
 
-def box(design: Any, symmetry: tuple[str, ...]) -> tuple[Float, Float]:
+def box(design: Design, symmetry: tuple[str, ...]) -> tuple[Float, Float]:
+    """Return the lowest and the highest corner (3,) of the meshed part's bounding box, mm."""
     high = np.array([design.half_length_mm, design.height_mm, 0.5 * design.width_mm])
     low = np.array([0.0 if "x" in symmetry else -high[0], 0.0, 0.0 if "z" in symmetry else -high[2]])
     return low, high
 
 
-def _body(design: Any, symmetry: tuple[str, ...], field: Sizing) -> tuple[Tessellation, float]:
+def _body(design: Design, symmetry: tuple[str, ...], field: Sizing) -> tuple[Tessellation, float]:
     """The tessellated part, and the envelope fTetWild shall keep, per diagonal."""
     from finger3d.geometry.cad import cut, labelled_faces
     from finger3d.geometry.faceted import coarser
     from finger3d.geometry.implicit import surface_of
     from finger3d.geometry.tessellate import tessellate
 
-    faceted = design.body() if hasattr(design, "body") else None
+    faceted = design.tessellation()
     solid = None if faceted else cut(design.solid(), symmetry)
     surfaces = [f.surface for f in faceted.faces] if faceted else [surface_of(f) for f in labelled_faces(solid)]
     radius = min(getattr(surface, "radius", math.inf) for surface in surfaces)

@@ -142,6 +142,6 @@ def _volume(design: Any, solid: Any, body: Shell) -> float:
     """The finger's volume: closed form, or CAD's, or that of its triangles."""
     from finger3d.mold.shell import volume
 
-    if not hasattr(design, "cad"):
+    if not isinstance(design, Imported):
         return float(design.volume_mm3)
     return body.surface.volume if solid is None else volume(solid)

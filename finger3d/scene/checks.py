@@ -22,11 +22,11 @@ _ACROSS = 12.0  # elements across the overlap of a curved object, which is some 
 _FINEST = 0.2  # of the default: finer is left to those who ask for it
 
 
-def check(tables: SceneTable, legs: tuple[LegTable, ...], design: Any) -> list[str]:
+def check(tables: SceneTable, legs: tuple[LegTable, ...], design: Design) -> list[str]:
     """Return the mistakes that only the whole scene shows, each in one line."""
     solid = tables.model.domain == "solid"
     lines = []
-    if not hasattr(design, "section"):
+    if design.section() is None:
         lacks = f"finger.geometry = {shown(design.name)} has no constant section"
         if not solid:
             lines.append(f'model.domain = {shown(tables.model.domain)}: {lacks}; must be "solid"')
@@ -41,7 +41,7 @@ def check(tables: SceneTable, legs: tuple[LegTable, ...], design: Any) -> list[s
     return lines
 
 
-def _legs(press: dict[str, Any], legs: tuple[LegTable, ...], design: Any, solid: bool) -> list[str]:
+def _legs(press: dict[str, Any], legs: tuple[LegTable, ...], design: Design, solid: bool) -> list[str]:
     lines = []
     height, half_length = design.height_mm, design.half_length_mm
     for i, leg in enumerate(legs):
@@ -69,7 +69,7 @@ def _target(leg: LegTable) -> tuple[float, float, float]:
     return leg.depth_mm, leg.slide_x_mm, leg.slide_z_mm
 
 
-def smallest_mm(design: Any, solid: bool) -> float:
+def smallest_mm(design: Design, solid: bool) -> float:
     """Smallest extent of what is meshed, mm."""
     extents = [design.height_mm, 2.0 * design.half_length_mm]
     if solid:
@@ -77,7 +77,7 @@ def smallest_mm(design: Any, solid: bool) -> float:
     return min(extents)
 
 
-def _sizes(mesh: MeshTable, design: Any, solid: bool) -> list[str]:
+def _sizes(mesh: MeshTable, design: Design, solid: bool) -> list[str]:
     for key in ("size_mm", "base_size_mm"):
         if mesh.tolerance is not None and (size := getattr(mesh, key)) is not None:
             return [
@@ -134,7 +134,7 @@ def _rounded(value: float) -> float:
     return float(f"{value:.4g}")
 
 
-def _gauge(index: int, gauge: GaugeTable, design: Any) -> list[str]:
+def _gauge(index: int, gauge: GaugeTable, design: Design) -> list[str]:
     at = ("gauge", index)
     half_length, height = design.half_length_mm, design.height_mm
     half_width = design.width_mm / 2.0

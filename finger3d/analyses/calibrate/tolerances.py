@@ -306,7 +306,7 @@ def _coarser(problem: Problem) -> MeshOptions:
     """
     options, left = problem.model.mesh, len(problem.points.nodes) / _LEFT[problem.dim]
     times = min(2.0, max(1.0, left)) if problem.dim == 2 else min(1.5, max(1.25, math.sqrt(left)))
-    mesher: Any = "swept" if hasattr(problem.model.design, "section") else options.mesher
+    mesher: Any = "swept" if problem.model.design.section() is not None else options.mesher
     return replace(options, size_mm=times * options.size_mm, base_size_mm=times * options.base_size_mm, mesher=mesher)
 
 

@@ -128,7 +128,7 @@ def _widths(model: Model, widths: Sequence[float] | None) -> list[float]:
 
 def _check(model: Model, widths: Sequence[float]) -> None:
     """What a section cannot stand for is refused before any work."""
-    if not hasattr(model.design, "section"):
+    if model.design.section() is None:
         raise Finger3dError(
             f'compare: finger.geometry = "{model.design.name}" has no constant section, so there is no 2D model of it; '
             "take an extruded design"

@@ -1,0 +1,180 @@
+"""The shape of a finger: what a design states about itself, and what the designs of geometries/ share."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.errors import Finger3dError
+from finger3d.geometry.rules import check_dimensions
+from finger3d.geometry.section import Section
+
+if TYPE_CHECKING:
+    from build123d import Solid
+
+    from finger3d.geometry.tessellate import Tessellation
+
+Float = NDArray[np.float64]
+
+
+class Design(Protocol):
+    """Shape of a body in mm: y points up, the base lies on y = 0, and its middle is the origin."""
+
+    @property
+    def name(self) -> str:
+        """Name in scenes and messages."""
+
+    @property
+    def height_mm(self) -> float:
+        """Largest height above the base."""
+
+    @property
+    def half_length_mm(self) -> float:
+        """Largest abs(x)."""
+
+    @property
+    def width_mm(self) -> float:
+        """Twice the largest abs(z)."""
+
+    @property
+    def volume_mm3(self) -> float:
+        """Volume of the whole body."""
+
+    @property
+    def cache_fields(self) -> Mapping[str, object]:
+        """Key of the body's meshes in the cache: equal for equal shapes only."""
+
+    def section(self) -> Section | None:
+        """Return the section x >= 0 of a body extruded along z; None if the section is not constant."""
+
+    def top(self, x: Float, z: Float) -> Float:
+        """Return the height y (n,) of the contact surface at x, z (n,), mm; nan outside the body."""
+
+    def landmarks(self) -> Float | None:
+        """Return places (k, 2), x and z in mm, where an edge or a tip may touch first; None for a smooth surface."""
+
+    def mirrors(self) -> tuple[str, ...]:
+        """Return the axes, of "x" and "z", normal to planes of symmetry through the origin."""
+
+    def solid(self) -> Solid:
+        """Return the build123d solid of the whole body, its faces labelled."""
+
+    def tessellation(self) -> Tessellation | None:
+        """Return the body's own triangles if it has no CAD; None for a body that is meshed from CAD."""
+
+
+class ParametricDesign(ABC):
+    """Base of the designs in geometries/: frozen dataclasses of dimensions, mirror images of themselves about x and z.
+
+    A subclass states the properties of :class:`Design`, as fields or as properties, and `top` and `solid`.
+    """
+
+    name: ClassVar[str]
+    may_be_zero: ClassVar[tuple[str, ...]] = ()
+
+    def __post_init__(self) -> None:
+        check_dimensions(self.name, self.dimensions, self.may_be_zero)
+
+    @property
+    def dimensions(self) -> dict[str, float]:
+        """The fields, mm."""
+        assert dataclasses.is_dataclass(self)
+        return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+
+    @property
+    def cache_fields(self) -> Mapping[str, object]:
+        """Name and dimensions; the cache adds a hash of the design's file."""
+        return {"design": self.name, "dimensions": {key: repr(value) for key, value in self.dimensions.items()}}
+
+    def section(self) -> Section | None:
+        """Return None: the section is not constant along z."""
+        return None
+
+    @abstractmethod
+    def top(self, x: Float, z: Float) -> Float:
+        """See :meth:`Design.top`."""
+
+    def landmarks(self) -> Float | None:
+        """Return None: the contact surface is smooth."""
+        return None
+
+    def mirrors(self) -> tuple[str, ...]:
+        """Return both axes."""
+        return ("x", "z")
+
+    @abstractmethod
+    def solid(self) -> Solid:
+        """See :meth:`Design.solid`."""
+
+    def tessellation(self) -> Tessellation | None:
+        """Return None: the body is meshed from CAD."""
+        return None
+
+
+class ExtrudedDesign(ParametricDesign):
+    """Base of the designs with a constant section: `section` determines all but the width."""
+
+    width_mm: float
+
+    @abstractmethod
+    def section(self) -> Section:
+        """Return the section x >= 0."""
+
+    @property
+    def volume_mm3(self) -> float:
+        """Volume in closed form."""
+        return self.section().area_mm2 * self.width_mm
+
+    def top(self, x: Float, z: Float) -> Float:
+        """Return the exact height y (n,) of the contact surface at x, z (n,), mm; nan outside the footprint."""
+        return self.section().top(x, z, self.width_mm)
+
+    def solid(self) -> Solid:
+        """Return the extruded solid."""
+        from finger3d.geometry.cad import extruded
+
+        return extruded(self.section(), self.width_mm, self.name)
+
+
+@dataclasses.dataclass(frozen=True)
+class DesignSummary:
+    """Height and width (mm) of a body whose shape is not known, as in a reduced model."""
+
+    name: ClassVar[str] = "reduced"
+    half_length_mm: ClassVar[float] = math.nan
+    volume_mm3: ClassVar[float] = math.nan
+
+    height_mm: float
+    width_mm: float
+
+    @property
+    def cache_fields(self) -> Mapping[str, object]:
+        """See :attr:`Design.cache_fields`; there are no meshes."""
+        return {}
+
+    def section(self) -> None:
+        """Return None: the shape is not known."""
+
+    def top(self, x: Float, z: Float) -> Float:
+        """Return nan (n,): the shape is not known."""
+        return np.full(np.broadcast_shapes(np.shape(x), np.shape(z)), np.nan)
+
+    def landmarks(self) -> None:
+        """Return None: the shape is not known."""
+
+    def mirrors(self) -> tuple[str, ...]:
+        """Return no axes: the shape is not known."""
+        return ()
+
+    def solid(self) -> Solid:
+        """Raise a Finger3dError: the shape is not known."""
+        raise Finger3dError("a reduced model has no solid; use the scene that it was made of")
+
+    def tessellation(self) -> None:
+        """Return None: the shape is not known."""

@@ -1,0 +1,28 @@
+"""The options that the meshers read."""
+
+from __future__ import annotations
+
+from typing import Literal, Protocol
+
+Zone = tuple[float, float, float, float]
+"""x_min, x_max, z_min, z_max in mm: where contact is predicted."""
+
+
+class MeshSizes(Protocol):
+    """Edge lengths of a mesh, and the mesher of solids."""
+
+    @property
+    def size_mm(self) -> float:
+        """Edge length in the contact zone."""
+
+    @property
+    def base_size_mm(self) -> float:
+        """Edge length far from the contact zone."""
+
+    @property
+    def mesher(self) -> Literal["ftetwild", "swept"]:
+        """Unstructured or swept tetrahedra."""
+
+    @property
+    def layers(self) -> int:
+        """Least number of layers of a swept mesh over half the width."""
