@@ -22,6 +22,7 @@ from finger3d.accuracy.estimate import Grain, companion, compared, main_numbers,
 from finger3d.analyses.validate import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.elastic_object import SoftObject
+from finger3d.geometry.design import Design
 from finger3d.geometry.registry import designs
 from finger3d.io import AREAS, MAIN
 from finger3d.mechanics.history import StepResult

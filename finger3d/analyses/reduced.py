@@ -17,10 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._machine import versions
-from finger3d.analyses.reduced_file import DesignSummary, arrays_of, assembled, bare, read, write
+from finger3d.analyses.reduced_file import arrays_of, assembled, bare, read, write
 from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.errors import Finger3dError
 from finger3d.fem.traces import BoundarySurface, restrict, surface
+from finger3d.geometry.design import DesignSummary
 from finger3d.mechanics.history import History
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.problem import Problem, rigid_gap

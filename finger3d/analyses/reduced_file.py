@@ -7,7 +7,7 @@ import math
 import zipfile
 import zlib
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from finger3d.fem.assembly import Elasticity, Stiffness
 from finger3d.fem.condense import Condensation as Factored
 from finger3d.fem.simplex import Mesh
 from finger3d.fem.traces import BoundarySurface
+from finger3d.geometry.design import DesignSummary
 from finger3d.io import atomic, read_arrays
 from finger3d.mechanics.history import ContactPoints
 from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
@@ -35,14 +36,6 @@ FORMAT, VERSION = "finger3d condensed body", 2
 _SHAPES: dict[str, type] = {kind.__name__: kind for kind in (Plane, Cylinder, Sphere, Wedge, Wave, MeshObject)}
 _MAX_STEPS = 1_000_000
 """Largest number of increments of a leg in a file."""
-
-
-@dataclass(frozen=True)
-class DesignSummary:
-    """Size of a finger whose design is not kept: height and width, mm."""
-
-    height_mm: float
-    width_mm: float
 
 
 def write(path: str | Path, problem: Problem, other: BoundarySurface, about: Mapping[str, Any]) -> Path:

@@ -9,14 +9,11 @@ from __future__ import annotations
 import ast
 import csv
 import hashlib
-import importlib
 import json
 import math
 import re
-import sys
 import tempfile
 import time
-import types
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -27,6 +24,7 @@ from numpy.typing import ArrayLike
 
 from finger3d._machine import versions
 from finger3d.errors import Finger3dError, MissingError
+from finger3d.geometry.registry import import_from
 from finger3d.io import atomic, write_csv, write_json
 from finger3d.progress import Progress
 

@@ -24,6 +24,7 @@ from finger3d.fem.assembly import Elasticity, stiffness
 from finger3d.fem.condense import condense
 from finger3d.fem.simplex import Mesh, reflected
 from finger3d.fem.transfer import facing_trace
+from finger3d.geometry.design import Design
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import MeshOptions, Model, ObjectResponse
 from finger3d.mechanics.problem import Problem
@@ -120,7 +121,7 @@ class ObjectBody:
             return self._ball(obj, solid), False
         return self._block(), False
 
-    def _made(self, design: Any, zone: Zone, mesher: str = "swept", axes: tuple[str, ...] | None = None) -> Mesh:
+    def _made(self, design: Design, zone: Zone, mesher: str = "swept", axes: tuple[str, ...] | None = None) -> Mesh:
         """A design's mesh, as fine as the finger's, contact up."""
         extents = [design.height_mm, design.half_length_mm]
         solid = self.model.domain == "solid"

@@ -24,7 +24,9 @@ Float = NDArray[np.float64]
 
 
 class Design(Protocol):
-    """Shape of a body in mm: y points up, the base lies on y = 0, and its middle is the origin."""
+    """Shape of a body in mm, a frozen dataclass: y points up, the base lies on y = 0, and its middle is the origin."""
+
+    __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[object]]]
 
     @property
     def name(self) -> str:

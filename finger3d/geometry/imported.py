@@ -186,7 +186,9 @@ def of_surface(surface: Triangles, name: str, upside_down: bool = False) -> Impo
     return _on_its_base(name, surface.digest, 1.0, upside_down, surface, None)
 
 
-def _on_its_base(path: str, told_by: str, scale: float, upside_down: bool, surface: Triangles, solid: Solid | None) -> Imported:
+def _on_its_base(
+    path: str, told_by: str, scale: float, upside_down: bool, surface: Triangles, solid: Solid | None
+) -> Imported:
     _check_size(path, surface)
     base = _base(path, surface, "highest" if upside_down else "lowest")
     corners = surface.corners[base].reshape(-1, 3)

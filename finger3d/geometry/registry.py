@@ -31,7 +31,7 @@ def import_from(folder: Path, package: str, name: str) -> ModuleType:
 
 
 @functools.cache
-def designs() -> dict[str, type[ParametricDesign]]:
+def designs() -> dict[str, type]:
     """Return the designs by name: one file each in geometries/, beside the package in a checkout, inside it in a wheel.
 
     Raises
@@ -44,7 +44,7 @@ def designs() -> dict[str, type[ParametricDesign]]:
     folder = next((f for f in folders if f.is_dir()), None)
     if folder is None:
         raise MissingError(f"no folder of designs: looked for {folders[0]} and {folders[1]}; reinstall finger3d")
-    found: dict[str, type[ParametricDesign]] = {}
+    found: dict[str, type] = {}
     for file in sorted(folder.glob("[a-z]*.py")):
         module = import_from(folder, "finger3d.geometries", file.stem)
         for value in vars(module).values():

@@ -24,7 +24,6 @@ def check_dimensions(design: str, dimensions: Mapping[str, object], may_be_zero:
 
 def check_at_most(design: str, dimensions: Mapping[str, float], key: str, other: str) -> None:
     """Raise a Finger3dError if the dimension `key` is larger than the dimension `other`."""
-    if dimensions[key] > dimensions[other]:
-        raise Finger3dError(
-            f"{design}: {key} = {dimensions[key]:g} is too large; allowed: at most {other} = {at_most(dimensions[other])}"
-        )
+    value, limit = dimensions[key], dimensions[other]
+    if value > limit:
+        raise Finger3dError(f"{design}: {key} = {value:g} is too large; allowed: at most {other} = {at_most(limit)}")

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.contact.rules import RuleName
+from finger3d.geometry.design import Design
 from finger3d.mechanics.formulation import Formulation, SmallStrain
 from finger3d.objects import Plane, RigidObject
 

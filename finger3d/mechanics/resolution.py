@@ -21,6 +21,7 @@ from scipy.spatial import KDTree
 from finger3d.contact.friction import OPEN
 from finger3d.errors import UnresolvedError
 from finger3d.fem.traces import BoundarySurface
+from finger3d.geometry.design import DesignSummary
 from finger3d.mechanics.history import ObjectPose, StepResult
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.problem import Problem, rigid_gap, targets
@@ -104,7 +105,7 @@ def tips_of(model: Model, place: tuple[float, float] | None) -> Float | None:
 
     None where the finger's surface is not known between its samples.
     """
-    if place is None or not hasattr(model.design, "top"):
+    if place is None or isinstance(model.design, DesignSummary):
         return None
     at = np.vstack([model.object.landmarks(), [place]])
     return at if model.domain == "solid" else at * [1.0, 0.0]
@@ -329,7 +330,7 @@ def _sentence(model: Model, found: Hidden, size: float | None) -> str:
         what = f"at a depth of {depth:.4g} mm the object is between the contact points and reaches none of them"
     if size is not None:
         return f"{now}: {what}; mesh.size_mm = {size:g} resolves it"
-    if not hasattr(model.design, "top"):
+    if isinstance(model.design, DesignSummary):
         return f"{now}: {what}; condense the scene with a smaller mesh.size_mm"
     return f"{now}: {what}; no edge length above {_FINER**_TRIES * model.mesh.size_mm:.1g} mm resolves it"
 

@@ -24,7 +24,9 @@ _AXIS = {"x": 0, "z": 2}
 _FLATTEST_DEG = 0.5  # flatter ones come from a wall or an edge far thinner than the mesh
 
 
-def mesh_section(design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...] = ()) -> tuple[Mesh, MeshReport]:
+def mesh_section(
+    design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...] = ()
+) -> tuple[Mesh, MeshReport]:
     """Mesh the section of an extruded design with quadratic triangles, mirror-exact about x = 0.
 
     Parameters
@@ -45,7 +47,9 @@ def mesh_section(design: Design, options: MeshSizes, zone: Zone, symmetry: tuple
     return whole, _fit(report(whole, multiple, section.area_mm2 * design.width_mm, seconds), design, options)
 
 
-def mesh_swept(design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...] = ()) -> tuple[Mesh, MeshReport]:
+def mesh_swept(
+    design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...] = ()
+) -> tuple[Mesh, MeshReport]:
     """Mesh an extruded design with quadratic tets, mirror-exact about x = 0 and z = 0; see :func:`mesh_section`.
 
     Layers along z are equal and at most ``size_mm`` thick; over half the width there are at least ``options.layers``.

@@ -7,10 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from finger3d.errors import Finger3dError
+from finger3d.geometry.imported import Imported
 from finger3d.mold.options import MoldOptions
 from finger3d.progress import Progress
 
 if TYPE_CHECKING:
+    from build123d import Solid
+
+    from finger3d.geometry.design import Design
     from finger3d.mold.shell import Shell
     from finger3d.scene import Scene
 
@@ -83,17 +87,17 @@ def export(
             f"--tolerance-mm {tolerance_mm}: must be from {_SMALLEST_MM:g} to {_LARGEST * design.height_mm:.4g}, "
             "a fifth of the finger's height"
         )
-    triangles_only = getattr(design, "cad", True) is None
-    if triangles_only and mold is not None:
+    triangles = design.surface if isinstance(design, Imported) and design.cad is None else None
+    if triangles is not None and mold is not None:
         raise Finger3dError(
             f"--mold: {design.name} holds triangles, and a mold is cut from CAD; give the finger as a STEP file"
         )
-    source = Path(getattr(design, "path", "")).resolve()
-    if source in ((out / "finger.step").resolve(), (out / "finger.stl").resolve()):
+    source = Path(design.path).resolve() if isinstance(design, Imported) else None
+    if source is not None and source in ((out / "finger.step").resolve(), (out / "finger.stl").resolve()):
         raise Finger3dError(f"--out {out}: holds {source.name}, the finger's own file; name another folder")
     report.stage("finger")
-    if triangles_only:
-        body, solid = Shell(design.surface, 0.0, 0.0), None
+    if triangles is not None:
+        body, solid = Shell(triangles, 0.0, 0.0), None
     else:
         solid = design.solid()
         body = shell(solid, tolerance_mm, design.name)
@@ -138,7 +142,7 @@ def _mold(scene: Scene, solid: Any, options: MoldOptions) -> Any:
     return mold(solid, foils(scene.model().gauges, options, section), options)
 
 
-def _volume(design: Any, solid: Any, body: Shell) -> float:
+def _volume(design: Design, solid: Solid | None, body: Shell) -> float:
     """The finger's volume: closed form, or CAD's, or that of its triangles."""
     from finger3d.mold.shell import volume
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from finger3d._ranges import LONGEST_SLIDE, at_least, at_most
+from finger3d.geometry.design import Design
 from finger3d.mechanics.model import MeshOptions, Model
 from finger3d.objects import Plane, Wave
 from finger3d.scene.messages import dotted, shown

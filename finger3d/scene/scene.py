@@ -15,6 +15,7 @@ from pydantic import ValidationError
 from finger3d._ranges import PathName, one_line, printable
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
+from finger3d.geometry.design import Design
 from finger3d.geometry.files import SUFFIXES
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import Domain, Gauge, Leg, Material, MeshOptions, Model
@@ -53,7 +54,7 @@ class Scene:
     """
 
     tables: SceneTable
-    design: Any = field(compare=False)
+    design: Design = field(compare=False)
     object: RigidObject = field(compare=False)
     mesh: MeshOptions = field(compare=False)
     effects: Mapping[str, Any] = field(compare=False)
@@ -166,7 +167,7 @@ def parse(
     rigid = _object(placed, found)
     press = _press(given, found)
     effects = _effects(given, found)
-    if found or tables is None or dimensions is None or press is None or rigid is None:
+    if found or tables is None or dimensions is None or design is None or press is None or rigid is None:
         order = [*given]
         places = sorted(found, key=lambda p: order.index(p[0]) if p[0] in order else len(order))
         raise _refusal([found[p] for p in places], path, set_keys)
@@ -252,12 +253,13 @@ def _built(record: Any, settings: TomlTable, place: Place, found: dict[Place, st
         return None
 
 
-def _design(geometry: str, dimensions: TomlTable | None, found: dict[Place, str]) -> Any:
+def _design(geometry: str, dimensions: TomlTable | None, found: dict[Place, str]) -> Design | None:
     """Build the finger from a design, or read it from a file."""
     if dimensions is None:
         return None
     if not files.is_file(geometry):
-        return _built(designs()[geometry], dimensions, ("finger",), found)
+        design: Design | None = _built(designs()[geometry], dimensions, ("finger",), found)
+        return design
     try:
         return files.finger(geometry)
     except Finger3dError as error:
