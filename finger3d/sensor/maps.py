@@ -151,8 +151,8 @@ class StrainMap:
         design = problem.model.design
         half, top = design.half_length_mm, design.height_mm
         nx, ny = math.ceil(half / pixel_mm), math.ceil(top / pixel_mm)
-        x: Float = (np.arange(-nx, nx) + 0.5) * pixel_mm
-        y: Float = (np.arange(ny) + 0.5) * pixel_mm
+        x = np.arange(-nx + 0.5, nx, dtype=np.float64) * pixel_mm
+        y = np.arange(0.5, ny, dtype=np.float64) * pixel_mm
         grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
         points = np.insert(grid, 2, z_mm, axis=1)[:, : problem.dim]
         reader = Reader.at(problem.mesh, points, problem.axes)
