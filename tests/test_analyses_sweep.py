@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import errno
 import json
-import math
 import os
 import socket
 import subprocess
@@ -14,18 +13,14 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from finger3d.analyses.shared_body import _FREE
 from finger3d.analyses.sweep import run as running
+from finger3d.analyses.sweep import worker
 from finger3d.analyses.sweep.points import Sweep, Vary, combinations
 from finger3d.analyses.sweep.store import ResultStore
-from finger3d.analyses.sweep.table import write_parquet
-from finger3d.analyses.sweep.worker import press_all
 from finger3d.cli import main
-from finger3d.cli.sweep import _SHARED
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.plotting.layout import panels_of
 from finger3d.scene import load
@@ -45,10 +40,11 @@ def points_of(scene: Path, *vary: str) -> Sweep:
 
 def pressed_here(sweep: Sweep) -> list[dict]:
     """Rows of all points, without Dask."""
-    rows: list[dict] = []
-    for key, body in sweep.bodies.items():
-        press_all((key, body, [(p.number, p.variant) for p in sweep.points if p.body == key]), rows.append)
-    return rows
+    return [
+        row
+        for key, body in sweep.bodies.items()
+        for row in worker.rows(body, [p for p in sweep.points if p.body == key])
+    ]
 
 
 def lines(out: Path) -> list[dict]:
@@ -149,11 +145,10 @@ def test_rows_become_a_table_in_the_scenes_own_names(scene, tmp_path):
     rows = pressed_here(sweep)
     with ResultStore(sweep, tmp_path).open() as kept:
         for row in rows[:3]:
-            assert kept.add(row)
-        assert not kept.add(rows[0])
-        kept.lose(3, "its worker died")
+            kept.add(row)
+        kept.lose(sweep.points[3], "its worker died")
         kept.write()
-        assert kept.left() == [3]
+        assert kept.left() == [sweep.points[3]]
     found = pq.read_table(tmp_path / "results.parquet").to_pylist()
     assert [row["point"] for row in found] == [0, 1, 2, 3]
     assert found[2]["friction.mu"] == 1.0
@@ -175,7 +170,7 @@ def test_a_torn_line_is_dropped_and_its_point_done_again(scene, tmp_path):
     whole = journal.read_text()
     journal.write_text(whole + json.dumps(rows[1])[:50])
     with ResultStore(sweep, tmp_path).open() as kept:
-        assert kept.left() == [1]
+        assert kept.left() == [sweep.points[1]]
         kept.add(rows[1])
     assert lines(tmp_path) == rows
 
@@ -250,14 +245,14 @@ def test_a_folder_of_another_sweep_is_refused(scene, tmp_path, capsys):
     assert main(arguments) == 2
     err = capsys.readouterr().err
     assert len(err.splitlines()) == 1
-    assert "holds another sweep (its friction.mu is 0.06,1)" in err
+    assert 'holds the results of another task (its friction.mu is ["0.06", "1"])' in err
 
 
 @pytest.mark.parametrize(
     ("vary", "expected"),
     [
         (["friction.mu=0.06,1", "material.nu=0.4"], "does not vary material.nu"),
-        (["material.nu=0.4"], "its friction.mu is 0.06,1"),
+        (["material.nu=0.4"], "its friction.mu is"),
     ],
 )
 def test_what_makes_it_another_sweep_is_named(vary, expected, scene, tmp_path):
@@ -305,47 +300,13 @@ def test_a_folder_in_use_is_refused(scene, tmp_path):
             pass
 
 
-def test_columns_without_pandas_are_what_pyarrow_makes_of_them(tmp_path):
-    columns = {
-        "point": list(range(11)),
-        "nu": [0.3, math.nan, -0.0, math.inf, 1e-300, *[0.1] * 6],
-        "kept": [True, False, False, True, True, True, False, True, False, True, True],
-        "outcome": ["converged", "", "step 3 (depth 1.5 mm): \u03bc \U0001f91a", "a\nb", *["converged"] * 7],
-    }
-    write_parquet(tmp_path / "mine.parquet", columns)
-    pq.write_table(pa.table(columns), tmp_path / "its.parquet")
-    mine, its = (pq.read_table(tmp_path / name) for name in ("mine.parquet", "its.parquet"))
-    mine.validate(full=True)
-    assert mine.schema == its.schema
-    # as texts, as nan is not equal to itself
-    assert repr(mine.to_pydict()) == repr(its.to_pydict())
-
-
-def test_a_sweep_leaves_pandas_to_others(tmp_path):
-    code = "from pathlib import Path; from finger3d.analyses.sweep.table import write_parquet; import sys; "
-    code += "write_parquet(Path(sys.argv[1]), {'a': [1.0], 'b': ['x'], 'c': [True], 'd': [1]}); "
-    code += "sys.exit('pandas' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code, str(tmp_path / "a.parquet")], timeout=60).returncode == 0
-
-
-def test_a_sweep_of_one_body_waits_for_no_plotting_library(scene, tmp_path):
+def test_a_sweep_of_one_body_needs_neither_dask_nor_matplotlib(scene, tmp_path):
     code = "import sys; from finger3d.cli import main; main(sys.argv[1:]); "
-    code += "sys.exit(repr({'matplotlib', 'PIL', 'plotly', 'pandas', 'distributed'} & set(sys.modules)))"
+    code += "sys.exit(repr({'matplotlib', 'distributed'} & set(sys.modules)))"
     words = ["sweep", str(scene), *COARSE, "--vary", "friction.mu=0.1,0.2", "--out", str(tmp_path)]
     done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, timeout=120)
     assert done.stderr.splitlines()[-1] == "set()"
     assert 'class="chart"' in (tmp_path / "report.html").read_text(encoding="utf-8")
-
-
-def test_what_workers_are_copied_from_has_one_thread_and_what_they_need():
-    # a copy has no thread but the one that copies: locks that others held would be held for ever
-    code = "import os, sys, finger3d.analyses.sweep.preload; "
-    code += "print(len(os.listdir('/proc/self/task')), *(m in sys.modules for m in sys.argv[1:]), flush=True)"
-    env = {**os.environ, "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    command = [sys.executable, "-c", code, "distributed.worker", "finger3d.mechanics.solve", "pypardiso", "pandas"]
-    done = subprocess.run(command, env=env, capture_output=True, text=True, timeout=60)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.split() == ["1", "True", "True", "True", "False"]
 
 
 @pytest.mark.parametrize("name", ["points.jsonl", "results.parquet"])
@@ -366,7 +327,7 @@ def test_a_full_disk_is_one_line_that_says_what_is_kept(name, scene, tmp_path, m
             monkeypatch.setattr(os, "replace", full)
             act = kept.write
         else:
-            real_stream = kept._stream
+            real_stream = kept._journal._file
 
             class Full:
                 def write(self, line: bytes) -> int:
@@ -375,19 +336,19 @@ def test_a_full_disk_is_one_line_that_says_what_is_kept(name, scene, tmp_path, m
 
                 close = real_stream.close
 
-            kept._stream = Full()
+            kept._journal._file = Full()
             act = lambda: kept.add(rows[1])  # noqa: E731
         with pytest.raises(MissingError, match=r"No space left on device; 1 of 2 points are kept") as told:
             act()
     assert name in str(told.value)
     with ResultStore(sweep, tmp_path).open() as again:
-        assert again.left() == [1]
+        assert again.left() == [sweep.points[1]]
 
 
 def test_a_body_that_cannot_be_built_and_a_point_that_fails_are_rows(scene, monkeypatch):
     sweep = points_of(scene, "friction.mu=0.06,1")
     monkeypatch.setattr(
-        "finger3d.analyses.sweep.worker._built", lambda *a: (_ for _ in ()).throw(Finger3dError("no mesh"))
+        "finger3d.analyses.sweep.worker._build", lambda *a: (_ for _ in ()).throw(Finger3dError("no mesh"))
     )
     assert [row["outcome"] for row in pressed_here(sweep)] == ["no mesh", "no mesh"]
 
@@ -397,8 +358,8 @@ def test_a_body_that_cannot_be_built_and_a_point_that_fails_are_rows(scene, monk
         def presses(self, variants: list, most: int | None) -> list:
             return [MemoryError() for _ in variants]
 
-    monkeypatch.setattr("finger3d.analyses.sweep.worker._built", lambda *a: Weak())
-    assert [row["outcome"] for row in pressed_here(sweep)] == ["MemoryError: no further words"] * 2
+    monkeypatch.setattr("finger3d.analyses.sweep.worker._build", lambda *a: Weak())
+    assert [row["outcome"] for row in pressed_here(sweep)] == ["MemoryError: no further information"] * 2
 
 
 @pytest.mark.parametrize("threads", [1, None], ids=["a worker", "here"])
@@ -415,16 +376,11 @@ def test_workers_gain_no_threads(threads, scene, monkeypatch):
     monkeypatch.setattr("finger3d.mechanics.solve._WORTH", 1)
     monkeypatch.setattr("finger3d.mechanics.solve.cores", lambda: 2)
     sweep = points_of(scene, "friction.mu=0.06,0.3,1")
-    (body, how), rows = next(iter(sweep.bodies.items())), []
-    press_all((body, how, [(p.number, p.variant) for p in sweep.points]), rows.append, threads=threads)
+    (body,) = sweep.bodies.values()
+    rows = worker.batch(body, sweep.points, 3) if threads else list(worker.rows(body, sweep.points))
     assert [row["point"] for row in rows] == [0, 1, 2]
     assert {row["outcome"] for row in rows} == {"converged"}
     assert pools == ([] if threads else [2])
-
-
-def test_the_command_knows_which_keys_share_a_body():
-    """It says so before it loads what sorts scenes by body; if they part, workers are prepared for nothing."""
-    assert {key.removesuffix(".") for key in _SHARED} == set(_FREE) - {"title"}
 
 
 def test_the_scene_of_these_tests_is_small(scene):

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from finger3d.analyses.sweep.store import ResultStore
 
 _SHOWN, _GAUGES = 10, 3  # points and gauges
-_SHARED = ("friction.", "press.", "contact.", "gauge.")  # keys that leave one body, which is pressed without workers
 
 
 @app.command
@@ -61,10 +60,6 @@ def sweep(
         raise Finger3dError(f"--workers {workers}: must be at least 1")
     if workers is not None and scheduler is not None:
         raise Finger3dError("--workers and --scheduler: give one of them; a cluster has its own workers")
-    from finger3d.analyses.sweep.cluster import prepare
-
-    if scheduler is None and any("," in text and not text.strip().startswith(_SHARED) for text in vary):
-        prepare()  # workers load what they need while the points are checked
     from finger3d.analyses.sweep.points import combinations
     from finger3d.analyses.sweep.run import sweep as run
 
@@ -134,8 +129,11 @@ def _print_points(kept: ResultStore) -> None:
 
 
 def _rows(kept: ResultStore, out: Path) -> list[tuple[str, str]]:
-    seconds = sum(row.get("seconds") or 0.0 for row in kept.rows.values())
-    built = {row["body"]: row.get("build_seconds") or 0.0 for row in kept.rows.values()}
+    from finger3d.results.journal import number_in
+
+    solved = [row for row in kept.rows.values() if "seconds" in row]
+    seconds = sum(number_in(row, "seconds") for row in solved)
+    built = {row["body"]: number_in(row, "build_seconds") for row in solved}
     return [
         ("points", f"{len(kept.sweep.points)}, of them {len(kept.rows)} kept"),
         ("bodies", f"{len(kept.sweep.bodies)}, each condensed once"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +45,7 @@ class Vary:
         return cls(key, texts)
 
     @property
-    def values(self) -> tuple[Any, ...]:
+    def values(self) -> tuple[object, ...]:
         """The values as the scene reads them."""
         return tuple(tree.parsed(text) for text in self.texts)
 
@@ -95,28 +95,38 @@ def numbered(key: str, given: Mapping[str, Any], option: str) -> str:
 
 @dataclass(frozen=True)
 class Point:
-    """One combination.
+    """One combination of values.
 
     Attributes
     ----------
-    number : from 0, the last key varying fastest
+    number : from 0; the last key varies fastest
     values : by key, as the scene reads them
     body : key of its body
-    variant : what it is of that body
+    variant : friction, path, contact rule and gauges
     """
 
     number: int
-    values: dict[str, Any]
+    values: Mapping[str, object]
     body: str
     variant: Variant
 
 
 @dataclass(frozen=True)
 class BodySpec:
-    """What a worker is sent to build a body: a scene of the family, and the mesh that all share."""
+    """What is needed to build a body that several points share.
 
-    given: Mapping[str, Any]
+    Attributes
+    ----------
+    key : hash of everything that shapes the body
+    variants : of all its points, also of those that are finished: the mesh is graded for the union of their paths
+    mesh : with the smallest sizes of the points
+    given : the scene of one of the points
+    """
+
+    key: str
+    variants: tuple[Variant, ...]
     mesh: MeshOptions
+    given: Mapping[str, Any] = field(compare=False, repr=False)
 
 
 @dataclass(frozen=True)
@@ -185,11 +195,19 @@ def combinations(
         scenes.append(scene)
         say(len(scenes), count)
     values = itertools.product(*(v.values for v in vary))
-    points, members = [], dict[str, list[Scene]]()
+    points, members = [], dict[str, list[tuple[Scene, Variant]]]()
     for number, (scene, here) in enumerate(zip(scenes, values, strict=True)):
-        body = body_key(scene)
-        members.setdefault(body, []).append(scene)
+        body, variant = body_key(scene), Variant.of(scene.model())
+        members.setdefault(body, []).append((scene, variant))
         named = {v.key: value for v, value in zip(vary, here, strict=True)}
-        points.append(Point(number, named, body, Variant.of(scene.model())))
-    shared = {key: BodySpec(s[0].given, finest([m.model() for m in s])) for key, s in members.items()}
+        points.append(Point(number, named, body, variant))
+    shared = {
+        key: BodySpec(
+            key=key,
+            variants=tuple(variant for _, variant in of),
+            mesh=finest([scene.model() for scene, _ in of]),
+            given=of[0][0].given,
+        )
+        for key, of in members.items()
+    }
     return Sweep(bodies.absolute(base, path), vary, tuple(points), shared, scenes[0].title)

@@ -1,27 +1,40 @@
-"""A sweep from its points to its tables: bodies go to workers, rows are kept as they come."""
+"""Sweeps: every point is pressed, bodies in parallel, and each row is stored as soon as it is known."""
 
 from __future__ import annotations
 
 import math
-import queue
 import time
-import uuid
-from contextlib import AbstractContextManager, suppress
+from collections import deque
+from collections.abc import Sequence
+from concurrent.futures import CancelledError
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from queue import Empty, SimpleQueue
+from typing import TYPE_CHECKING
 
-from finger3d.analyses.sweep import cluster
-from finger3d.analyses.sweep.points import Sweep
+from finger3d.analyses.sweep import worker
+from finger3d.analyses.sweep.points import BodySpec, Point, Sweep
 from finger3d.analyses.sweep.store import ResultStore
-from finger3d.analyses.sweep.worker import Task, on_worker, press_all
-from finger3d.errors import Finger3dError, MissingError
+from finger3d.errors import MissingError
 from finger3d.progress import Progress
 from finger3d.report.sweep import sweep_page
+from finger3d.results.journal import Row, number_in
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
 
 WAIT_S = 60.0
-"""How long a sweep goes on waiting without any worker."""
+"""Time limit without any worker on a cluster."""
 
-_LOOK_S, _SHOW_S = 0.5, 0.2
+_POLL_S = 0.5
+"""Interval at which the connection to the cluster is checked."""
+
+_SHOW_S = 0.2
+"""Interval of progress reports."""
+
+_BATCH_S = 2.0
+"""Time that the points sent to a worker at once should take; so much work is repeated if the worker dies."""
 
 
 def sweep(
@@ -31,205 +44,217 @@ def sweep(
     workers: int | None = None,
     report: Progress | None = None,
 ) -> ResultStore:
-    """Press every point of a sweep that is not kept yet.
+    """Press every point of a sweep that has no row yet.
 
     Parameters
     ----------
     points : from `finger3d.analyses.sweep.points.combinations`
-    out : folder for points.jsonl, results.parquet, results.csv and report.html; that of the same sweep is gone on with
+    out : folder for points.jsonl, results.parquet, results.csv and report.html; a sweep found there is continued
     scheduler : address of a Dask scheduler; None starts workers on this machine
-    workers : processes on this machine; None: one for each core, at most one for each body; a single body is pressed
-        by this process
-    report : told about every point
+    workers : processes on this machine; None: one for each core, at most one for each body. A single body is pressed
+        by this process.
+    report : shows the progress
 
     Returns
     -------
-    Kept
-        The rows: kept ones by number, and those lost with their worker, which the next run tries again.
+    ResultStore
+        The rows by point, and why other points have none.
 
     Raises
     ------
     Finger3dError
         If the folder holds another sweep.
     MissingError
-        If a file cannot be written, or the cluster is gone; what is finished is kept.
+        If a file cannot be written, or the cluster is lost; finished points are kept.
     """
     report = report or Progress()
     folder = Path(out)
-    with ResultStore(points, folder).open() as kept:
-        report.steps_done, report.steps_total = len(kept.rows), len(points.points)
-        if before := len(kept.rows):
-            report.say(f"{before} of {len(points.points)} points are kept from before")
+    with ResultStore(points, folder).open() as store:
+        progress = _SweepProgress(store, report)
         try:
-            _press(kept, _tasks(points, kept), scheduler, workers, report)
-        except BaseException:
-            # what ended the run is the news; tables that cannot be written beside it are not
-            with suppress(Finger3dError):
-                kept.write()
-            raise
-        kept.write()
-        with kept.room("report.html"):
+            _press(store, scheduler, workers, progress)
+        finally:
+            store.write()
+        with store.room("report.html"):
             sweep_page(folder)
-        return kept
+        return store
 
 
-def _press(kept: ResultStore, tasks: list[Task], scheduler: str | None, workers: int | None, report: Progress) -> None:
-    """Press what is left: a single body in this process, several, or any on a cluster, by workers."""
-    if len(tasks) > 1 or (tasks and scheduler):
-        with _cluster(scheduler, workers, len(tasks), report) as client:
-            _Run(client, kept, tasks, report).go()
-    elif tasks:
-        _Run(None, kept, tasks, report).here()
+class _SweepProgress:
+    """Stores rows, and reports how many points are finished and how long the others will take."""
+
+    def __init__(self, store: ResultStore, report: Progress) -> None:
+        self.store, self.report = store, report
+        self._before, self._failed = len(store.rows), 0
+        self._start = self._shown = time.monotonic()
+        report.steps_done, report.steps_total = self._before, len(store.sweep.points)
+        if self._before:
+            report.say(f"{self._before} of {report.steps_total} points are kept from an earlier run")
+
+    def add(self, row: Row) -> None:
+        """Store the row of a finished point."""
+        self.store.add(row)
+        self._failed += row["outcome"] != "converged"
+        done, total, now = len(self.store.rows), self.report.steps_total, time.monotonic()
+        self.report.steps_done = done
+        if done == total or now - self._shown > _SHOW_S:
+            self._shown = now
+            left = duration((total - done) * (now - self._start) / (done - self._before))
+            self.report.step(
+                done, total, f"about {left} left" + f", {self._failed} without numbers" * bool(self._failed)
+            )
 
 
-def _cluster(scheduler: str | None, workers: int | None, bodies: int, report: Progress) -> AbstractContextManager[Any]:
-    report.stage("starting workers" if scheduler is None else f"connecting to {scheduler}")
-    return cluster.local(workers or cluster.default_workers(bodies)) if scheduler is None else cluster.remote(scheduler)
+@dataclass
+class _BodyPoints:
+    """The points of a body that are not pressed yet, and how many of them the next batch has."""
+
+    spec: BodySpec
+    left: list[Point]
+    size: int = 1
+
+    def advance(self, rows: Sequence[Row]) -> None:
+        """Remove the points that have a row now, and let the next batch take `_BATCH_S`."""
+        done = {row["point"] for row in rows}
+        self.left = [point for point in self.left if point.number not in done]
+        seconds = sum(number_in(row, "seconds") for row in rows) / len(rows)
+        if seconds > 0.0:  # NaN if a point failed
+            self.size = max(1, int(_BATCH_S / seconds))
 
 
-def _tasks(points: Sweep, kept: ResultStore) -> list[Task]:
-    """A body with its points that are left, the largest first: they end the run last."""
-    members: dict[str, list[Any]] = {}
-    for number in kept.left():
-        point = points.points[number]
-        members.setdefault(point.body, []).append((number, point.variant))
-    return sorted(((key, points.bodies[key], of) for key, of in members.items()), key=lambda task: -len(task[2]))
+def _press(store: ResultStore, scheduler: str | None, workers: int | None, progress: _SweepProgress) -> None:
+    """Press the points that are left: those of a single body in this process, others on a cluster."""
+    bodies = _bodies(store)
+    if bodies and (scheduler or len(bodies) > 1):
+        progress.report.stage("starting workers" if scheduler is None else f"connecting to {scheduler}")
+        with _cluster(scheduler, workers, len(bodies)) as client:
+            _Cluster(client, progress).press(bodies)
+    elif bodies:
+        progress.report.stage("pressing")
+        for row in worker.rows(bodies[0].spec, bodies[0].left):
+            progress.add(row)
 
 
-class _Run:
-    """Bodies on their way: rows and ends arrive in one queue, filled by the client's own thread."""
+def _bodies(store: ResultStore) -> list[_BodyPoints]:
+    """The bodies with points that are left, those with most points first."""
+    members: dict[str, list[Point]] = {}
+    for point in store.left():
+        members.setdefault(point.body, []).append(point)
+    found = [_BodyPoints(store.sweep.bodies[key], points) for key, points in members.items()]
+    return sorted(found, key=lambda body: -len(body.left))
 
-    def __init__(self, client: Any, kept: ResultStore, tasks: list[Task], report: Progress) -> None:
-        self.client, self.kept, self.report = client, kept, report
-        self.arrived: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self.name = f"finger3d-sweep-{uuid.uuid4().hex[:12]}"
-        self.tasks = {self._topic(task[0]): task for task in tasks}
-        self.started = self._seen = time.monotonic()
-        self._shown = -math.inf
-        self.new = 0
 
-    def _topic(self, body: str) -> str:
-        return f"{self.name}-{body}"
+def _cluster(scheduler: str | None, workers: int | None, bodies: int) -> AbstractContextManager[Client]:
+    from finger3d.analyses.sweep import cluster
 
-    def here(self) -> None:
-        """Press all bodies in this process, with its threads, and keep the rows."""
-        self.report.stage("pressing")
-        for task in self.tasks.values():
-            press_all(task, self._row, threads=None)
+    if scheduler is not None:
+        return cluster.remote(scheduler)
+    return cluster.local(workers or cluster.default_workers(bodies))
 
-    def go(self) -> None:
-        """Submit all bodies, and keep what arrives until none is left.
+
+class _Cluster:
+    """Presses on a Dask cluster: as many bodies at a time as there are workers, one batch of points after another."""
+
+    def __init__(self, client: Client, progress: _SweepProgress) -> None:
+        self.client, self.progress = client, progress
+        self._running: dict[Future[list[Row]], _BodyPoints] = {}
+        self._finished: SimpleQueue[Future[list[Row]]] = SimpleQueue()
+        self._seen = time.monotonic()
+
+    def press(self, bodies: Sequence[_BodyPoints]) -> None:
+        """Press all points of some bodies.
 
         Raises
         ------
         MissingError
             If the scheduler cannot be reached any more, or no worker is left.
         """
-        self.report.stage("pressing")
+        self.progress.report.stage("pressing")
+        waiting = deque(bodies)
         try:
-            self._submit()
-        except OSError:  # of the connection: files that cannot be written are told by `ResultStore`
-            raise self._gone("no scheduler") from None
-
-    def _submit(self) -> None:
-        for topic in self.tasks:
-            self.client.subscribe_topic(topic, self._told)
-        futures = {
-            topic: self.client.submit(on_worker, task, topic, key=topic, pure=False)
-            for topic, task in self.tasks.items()
-        }
-        try:
-            for future in futures.values():
-                future.add_done_callback(self.arrived.put)
-            while futures:
-                self._take(futures)
+            while waiting or self._running:
+                while waiting and len(self._running) < max(1, self._workers()):
+                    self._submit(waiting.popleft())
+                self._receive()
+        except (OSError, CancelledError):  # of the connection; a file that cannot be written raises a Finger3dError
+            raise self._lost("scheduler") from None
         finally:
-            if futures and self.client.status == "running":  # interrupted: nobody waits for what is left
-                with suppress(OSError, TimeoutError):
-                    self.client.cancel(list(futures.values()), force=True)
+            if self._running and self.client.status == "running":
+                self.client.cancel(list(self._running), force=True)
 
-    def _told(self, event: tuple[float, Any]) -> None:
-        self.arrived.put(event[1]["row"])
+    def _submit(self, body: _BodyPoints, address: str | None = None) -> None:
+        """Send the next batch of a body, to the worker that has condensed it if that is still there."""
+        future = self.client.submit(
+            worker.batch, body.spec, body.left, body.size,
+            pure=False, workers=address and [address], allow_other_workers=address is not None,
+        )  # fmt: skip
+        self._running[future] = body
+        future.add_done_callback(self._finished.put)
 
-    def _take(self, futures: dict[str, Any]) -> None:
+    def _receive(self) -> None:
+        """Store the rows of one batch, and send the next one of its body."""
+        if self.client.status != "running":  # which cancels every future
+            raise self._lost("scheduler")
         try:
-            item = self.arrived.get(timeout=_LOOK_S)
-        except queue.Empty:
-            self._look()
+            future = self._finished.get(timeout=_POLL_S)
+        except Empty:
+            self._workers()
             return
-        if isinstance(item, dict):
-            self._row(item)
-        else:
-            self._ended(item.key, item)
-            futures.pop(item.key, None)
-
-    def _row(self, row: dict[str, Any]) -> None:
-        if not self.kept.add(row):
+        body = self._running.pop(future)
+        if future.status != "finished":
+            self._give_up(body, _reason(future))
             return
-        self.new += 1
-        done, total = len(self.kept.rows), len(self.kept.sweep.points)
-        self.report.steps_done = done
-        self.kept.refresh()
-        now = time.monotonic()
-        if done == total or now - self._shown > _SHOW_S:
-            self._shown = now
-            self.report.step(done, total, self._remark(total - done))
+        address = next(iter(self.client.who_has([future]).get(future.key, ())), None)
+        rows: list[Row] = future.result()
+        for row in rows:
+            self.progress.add(row)
+        body.advance(rows)
+        if body.left:
+            self._submit(body, address)
 
-    def _remark(self, left: int) -> str:
-        seconds = left * (time.monotonic() - self.started) / self.new
-        failed = sum(row["outcome"] != "converged" for row in self.kept.rows.values())
-        return f"about {duration(seconds)} left" + (f", {failed} without numbers" if failed else "")
-
-    def _ended(self, topic: str, future: Any) -> None:
-        """Fetch what the events did not bring, and say why points are missing."""
+    def _give_up(self, body: _BodyPoints, reason: str) -> None:
         if self.client.status != "running":  # a lost connection cancels every future
-            raise self._gone("no scheduler")
-        key, _, members = self.tasks[topic]
-        missing = [number for number, _ in members if number not in self.kept.rows]
-        if missing:
-            for _, event in self.client.get_events(topic):
-                self._row(event["row"])
-            missing = [number for number in missing if number not in self.kept.rows]
-        if missing:
-            reason = _why(future)
-            for number in missing:
-                self.kept.lose(number, reason)
-            self.report.say(f"{len(missing)} points lost: {reason}")
-        self.client.unsubscribe_topic(topic)
+            raise self._lost("scheduler")
+        for point in body.left:
+            self.progress.store.lose(point, reason)
+        self.progress.report.say(f"{len(body.left)} points lost: {reason}")
 
-    def _look(self) -> None:
-        """Nothing came for a while: is anybody there?"""
-        now = time.monotonic()
-        if self.client.status != "running":
-            raise self._gone("no scheduler")
-        if self.client.scheduler_info(n_workers=-1)["workers"]:
+    def _workers(self) -> int:
+        """Return the number of workers.
+
+        Raises
+        ------
+        MissingError
+            If there has been none for `WAIT_S`.
+        """
+        count, now = len(self.client.nthreads()), time.monotonic()
+        if count:
             self._seen = now
         elif now - self._seen > WAIT_S:
-            raise self._gone("no worker")
+            raise self._lost("worker")
+        return count
 
-    def _gone(self, what: str) -> MissingError:
-        return MissingError(f"sweep: {what} is left; {self.kept.said()}; the same command goes on")
+    def _lost(self, what: str) -> MissingError:
+        return MissingError(f"sweep: no {what} is left; {self.progress.store.said()}; run the same command again")
 
 
-def _why(future: Any) -> str:
-    """Reason, in one line, that a body ended without all of its points."""
+def _reason(future: Future[list[Row]]) -> str:
+    """Return in one line why a batch has no result."""
     from distributed import KilledWorker
 
-    if future.status == "cancelled":
-        return "its task was cancelled; the same command tries it again"
     error = future.exception() if future.status == "error" else None
     if isinstance(error, KilledWorker):
         return (
-            "every worker that was given this body died, the last try included; for lack of memory? "
+            "every worker that was given this body died, perhaps for lack of memory; "
             "try a coarser mesh or fewer --workers; the same command tries it again"
         )
     if error is None:
-        return "no row arrived; the same command tries it again"
+        return "its task was cancelled; the same command tries it again"
     return f"{type(error).__name__}: {' '.join(str(error).split())}"
 
 
 def duration(seconds: float) -> str:
-    """Time in words, short."""
+    """Return a short text such as "12 s", "3 min" or "1.5 h"."""
     if seconds < 90.0:
         return f"{math.ceil(seconds)} s"
     return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"

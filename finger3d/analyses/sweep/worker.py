@@ -1,78 +1,84 @@
-"""What a worker does: build one body, press it as every point that shares it, tell each point as it is finished."""
+"""Presses of the points of a sweep that share a body, in this process or in a Dask worker."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import signal
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING
 
-from finger3d.analyses.shared_body import TROUBLE, SharedBody, Variant, VariantResult
-from finger3d.analyses.sweep import points
+from threadpoolctl import threadpool_limits
+
+from finger3d.analyses.shared_body import TROUBLE, SharedBody, VariantResult
+from finger3d.analyses.sweep.points import BodySpec, Point
 from finger3d.errors import Finger3dError
+from finger3d.results.journal import Row
+from finger3d.scene import parse
 
-Task = tuple[str, points.BodySpec, Sequence[tuple[int, Variant]]]
+if TYPE_CHECKING:
+    from distributed import Worker
+
+_body: dict[BodySpec, SharedBody] = {}
+"""The body that this worker has condensed, for its next batch; one at a time."""
 
 
-def press_all(
-    task: Task, tell: Callable[[dict[str, Any]], object], done: frozenset[int] = frozenset(), threads: int | None = 1
-) -> None:
-    """Press a body as all its points.
+def dask_setup(worker: Worker) -> None:
+    """Let a worker process on this machine ignore Ctrl-C, which a terminal sends to it too: the sweep stops it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
-    Parameters
-    ----------
-    task : key of the body, how to build it, number and variant of every point
-    tell : given the row of each point as it is finished
-    done : numbers of the points that are finished already
-    threads : for the numerics; one, as workers share the machine, and None for all that are there
-    """
-    from threadpoolctl import threadpool_limits
 
-    key, how, members = task
-    members = [(n, v) for n, v in members if n not in done]
-    if not members:
+def rows(spec: BodySpec, points: Sequence[Point]) -> Iterator[Row]:
+    """Condense a body and yield the row of each point as soon as it is pressed."""
+    try:
+        body = _build(spec)
+    except TROUBLE as error:
+        yield from _failed(points, error)
         return
-    with threadpool_limits(limits=threads):
-        try:
-            body = _built(how, [v for _, v in members])
-        except TROUBLE as error:
-            for number, _ in members:
-                tell({"point": number, "body": key, "outcome": _reason(error)})
-            return
-        for (number, _), pressed in zip(members, body.presses([v for _, v in members], threads), strict=True):
-            tell({"point": number, "body": key, **_row(body, pressed)})
+    yield from _pressed(body, points, None)
 
 
-def _built(how: points.BodySpec, variants: Sequence[Variant]) -> SharedBody:
-    from finger3d.scene import parse
+def batch(spec: BodySpec, points: Sequence[Point], size: int) -> list[Row]:
+    """Press the first `size` points with one thread; called on a Dask worker.
 
-    return SharedBody(replace(parse(how.given).model(), mesh=how.mesh), variants)
+    The body is kept for the next batch. If it cannot be built, every point gets a row that says why.
+    """
+    with threadpool_limits(limits=1):
+        if spec not in _body:
+            _body.clear()
+            try:
+                _body[spec] = _build(spec)
+            except TROUBLE as error:
+                return _failed(points, error)
+        return list(_pressed(_body[spec], points[:size], 1))
 
 
-def _row(body: SharedBody, pressed: VariantResult | Exception) -> dict[str, Any]:
-    if isinstance(pressed, Exception):
-        return {"outcome": _reason(pressed)}
+def _build(spec: BodySpec) -> SharedBody:
+    return SharedBody(replace(parse(spec.given).model(), mesh=spec.mesh), spec.variants)
+
+
+def _pressed(body: SharedBody, points: Sequence[Point], threads: int | None) -> Iterator[Row]:
+    results = body.presses([point.variant for point in points], threads)
+    for point, result in zip(points, results, strict=True):
+        yield {"point": point.number, "body": point.body, **_columns(body, result)}
+
+
+def _columns(body: SharedBody, result: VariantResult | Exception) -> Row:
+    if isinstance(result, Exception):
+        return {"outcome": _reason(result)}
     return {
-        **pressed.numbers,
-        **{f"gauge_{name}": strain for name, strain in pressed.gauges.items()},
-        "outcome": pressed.outcome,
-        "residual": pressed.residual,
-        "seconds": pressed.seconds,
+        **result.numbers,
+        **{f"gauge_{name}": strain for name, strain in result.gauges.items()},
+        "outcome": result.outcome,
+        "residual": result.residual,
+        "seconds": result.seconds,
         "build_seconds": body.seconds,
     }
 
 
-def _reason(error: BaseException) -> str:
-    text = " ".join(str(error).split()) or "no further words"
+def _failed(points: Sequence[Point], error: Exception) -> list[Row]:
+    return [{"point": point.number, "body": point.body, "outcome": _reason(error)} for point in points]
+
+
+def _reason(error: Exception) -> str:
+    text = " ".join(str(error).split()) or "no further information"
     return text if isinstance(error, Finger3dError) else f"{type(error).__name__}: {text}"
-
-
-def on_worker(task: Task, topic: str) -> None:
-    """Run in a Dask worker: rows go to the scheduler as events, each as soon as it is there.
-
-    Dask starts a body again if its worker died: the points that were told then are left out.
-    """
-    from distributed import get_client, get_worker
-
-    worker = get_worker()
-    told = frozenset(int(event["row"]["point"]) for _, event in get_client().get_events(topic))
-    press_all(task, lambda row: worker.log_event(topic, {"row": row}), told)
