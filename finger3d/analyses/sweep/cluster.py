@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import signal
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from importlib.metadata import version
+from multiprocessing import resource_tracker
 
 from distributed import Client, LocalCluster
 from distributed.comm.core import connect
@@ -27,19 +29,34 @@ def local(workers: int) -> Iterator[Client]:
     MissingError
         If no process could be started.
     """
-    try:
-        cluster = LocalCluster(
-            n_workers=workers,
-            threads_per_worker=1,
-            host="127.0.0.1",
-            dashboard_address="127.0.0.1:0",
-            silence_logs=logging.CRITICAL,
-            preload="finger3d.analyses.sweep.worker",
-        )
-    except (OSError, RuntimeError, TimeoutError) as error:
-        raise MissingError(f"sweep: no worker could be started on this machine: {error}") from None
-    with cluster, Client(cluster) as client:
+    with ExitStack() as stack:
+        try:
+            with _interrupts_deferred():
+                cluster = LocalCluster(
+                    n_workers=workers,
+                    threads_per_worker=1,
+                    host="127.0.0.1",
+                    dashboard_address="127.0.0.1:0",
+                    silence_logs=logging.CRITICAL,
+                )
+                client = stack.enter_context(Client(stack.enter_context(cluster)))
+        except (OSError, RuntimeError, TimeoutError) as error:
+            raise MissingError(f"sweep: no worker could be started on this machine: {error}") from None
         yield client
+
+
+@contextmanager
+def _interrupts_deferred() -> Iterator[None]:
+    """Deliver Ctrl-C after the block, and never to processes and threads that the block starts.
+
+    A terminal sends it to every process; this one stops the workers.
+    """
+    resource_tracker.ensure_running()  # which would unblock the signal when it is started
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextmanager

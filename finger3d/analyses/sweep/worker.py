@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from threadpoolctl import threadpool_limits
 
@@ -15,16 +13,8 @@ from finger3d.errors import Finger3dError
 from finger3d.results.journal import Row
 from finger3d.scene import parse
 
-if TYPE_CHECKING:
-    from distributed import Worker
-
 _body: dict[BodySpec, SharedBody] = {}
 """The body that this worker has condensed, for its next batch; one at a time."""
-
-
-def dask_setup(worker: Worker) -> None:
-    """Let a worker process on this machine ignore Ctrl-C, which a terminal sends to it too: the sweep stops it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def rows(spec: BodySpec, points: Sequence[Point]) -> Iterator[Row]:
