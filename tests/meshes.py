@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from finger3d.fem.elements import physical_gradients, quadrature, shape, surface_measure
+from finger3d.fem.elements import quadrature
 from finger3d.fem.simplex import Mesh, boundary, quadratic, signed_volumes
 
 
@@ -38,15 +38,15 @@ def grid(counts: tuple[int, ...], shuffle: float = 0.0, seed: int = 0) -> Mesh:
 
 def mapped(mesh: Mesh, function: Callable[[np.ndarray], np.ndarray]) -> Mesh:
     """Quadratic mesh with its nodes moved by a function of the points (n, d)."""
-    whole = quadratic(mesh) if not mesh.is_quadratic else mesh
+    whole = quadratic(mesh) if not mesh.element.is_quadratic else mesh
     return Mesh(function(whole.points), whole.cells, whole.facets)
 
 
 def body_load(mesh: Mesh, force: Callable[[np.ndarray], np.ndarray], degree: int = 6) -> np.ndarray:
     """Consistent nodal loads (n, d) of a body force."""
     bary, w = quadrature(mesh.dim, degree)
-    _, det = physical_gradients(mesh.points[mesh.cells], bary, mesh.is_quadratic)
-    psi = shape(bary, mesh.is_quadratic)
+    _, det = mesh.element.physical_gradients(mesh.points[mesh.cells], bary)
+    psi = mesh.element.shape(bary)
     at = np.einsum("qk,ekd->eqd", psi, mesh.points[mesh.cells])
     value = force(at.reshape(-1, mesh.dim)).reshape(at.shape)
     load = np.zeros_like(mesh.points)
@@ -58,8 +58,8 @@ def edge_load(mesh: Mesh, label: str, traction: Callable[[np.ndarray], np.ndarra
     """Consistent nodal loads (n, d) of a traction, a function of the points (q, d), on a boundary."""
     facets = mesh.facets[label]
     bary, w = quadrature(mesh.dim - 1, degree)
-    weights = surface_measure(mesh.points[facets], bary, mesh.is_quadratic) * w
-    psi = shape(bary, mesh.is_quadratic)
+    weights = mesh.facet_element.surface_measure(mesh.points[facets], bary) * w
+    psi = mesh.facet_element.shape(bary)
     at = np.einsum("qk,mkd->mqd", psi, mesh.points[facets])
     value = traction(at.reshape(-1, mesh.dim)).reshape(at.shape)
     load = np.zeros_like(mesh.points)
@@ -70,8 +70,8 @@ def edge_load(mesh: Mesh, label: str, traction: Callable[[np.ndarray], np.ndarra
 def error_norms(mesh: Mesh, u: np.ndarray, exact: Callable, exact_slope: Callable) -> tuple[float, float]:
     """L2 norm of the error of u (n, d), and of its gradient; `exact_slope` gives (q, d, d), row the component."""
     bary, w = quadrature(mesh.dim, 6)
-    gradients, det = physical_gradients(mesh.points[mesh.cells], bary, mesh.is_quadratic)
-    psi = shape(bary, mesh.is_quadratic)
+    gradients, det = mesh.element.physical_gradients(mesh.points[mesh.cells], bary)
+    psi = mesh.element.shape(bary)
     at = np.einsum("qk,ekd->eqd", psi, mesh.points[mesh.cells]).reshape(-1, mesh.dim)
     value = np.einsum("qk,ekd->eqd", psi, u[mesh.cells]).reshape(-1, mesh.dim)
     slope = np.einsum("ekj,eqki->eqji", u[mesh.cells], gradients).reshape(-1, mesh.dim, mesh.dim)

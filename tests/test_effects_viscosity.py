@@ -175,13 +175,13 @@ def test_stress_carries_the_force(domain: str, nu: float, bulk: bool) -> None:
 
 
 def _nodal_volume(problem: Problem) -> np.ndarray:
-    from finger3d.fem.elements import physical_gradients, quadrature, shape
+    from finger3d.fem.elements import quadrature
 
     mesh = problem.mesh
     bary, w = quadrature(mesh.dim, 2)
-    _, det = physical_gradients(mesh.points[mesh.cells], bary, True)
+    _, det = mesh.element.physical_gradients(mesh.points[mesh.cells], bary)
     out = np.zeros(len(mesh.points))
-    np.add.at(out, mesh.cells, (det * w) @ shape(bary, True))
+    np.add.at(out, mesh.cells, (det * w) @ mesh.element.shape(bary))
     return out
 
 

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from finger3d.fem.elements import EDGES, TET4
 from finger3d.fem.quality import curved_volume
-from finger3d.fem.simplex import EDGES, Mesh, boundary, quadratic, signed_volumes, unfold
+from finger3d.fem.simplex import Mesh, boundary, quadratic, signed_volumes, unfold
 
 TRIANGLE = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), np.array([[0, 1, 2]]), {})
 TET = Mesh(np.vstack([np.zeros(3), np.eye(3)]), np.array([[0, 1, 2, 3]]), {})
@@ -67,4 +68,4 @@ def test_unfolded_cells_are_positive_and_facets_are_the_whole_boundary(
 
 def test_unfolded_mid_edge_nodes_stay_in_the_middle_of_their_edges() -> None:
     whole = unfold(quadratic(_labelled(TET)), (0, 2))[0]
-    np.testing.assert_allclose(whole.points[whole.cells[:, 4:]], whole.points[whole.cells[:, EDGES[3]]].mean(axis=2))
+    np.testing.assert_allclose(whole.points[whole.cells[:, 4:]], whole.points[whole.cells[:, TET4.edges]].mean(axis=2))

@@ -42,7 +42,7 @@ def zone(design: Any) -> tuple[float, float, float, float]:
 def check_whole(mesh: Mesh) -> None:
     """Cells positive, facets the boundary once and outward."""
     d = mesh.dim
-    assert mesh.is_quadratic
+    assert mesh.element.is_quadratic
     assert (signed_volumes(mesh) > 0.0).all()
     assert (curved_jacobians(mesh) > 0.0).all()
     assert np.array_equal(np.unique(mesh.cells), np.arange(len(mesh.points)))

@@ -16,7 +16,7 @@ from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.fem.assembly import Elasticity, stiffness
 from finger3d.fem.condense import condense
-from finger3d.fem.elements import physical_gradients, quadrature, shape, surface_measure
+from finger3d.fem.elements import quadrature
 from finger3d.fem.simplex import Mesh, boundary, quadratic, signed_volumes
 from finger3d.fem.traces import BoundarySurface, local_rows, restrict, surface
 from finger3d.objects import vertical_frame
@@ -76,7 +76,7 @@ def shuffled(mesh: Mesh, share: float, seed: int = 0) -> Mesh:
 
 def mapped(mesh: Mesh, function: Field) -> Mesh:
     """Quadratic mesh with all its nodes moved by a function of the points (n, d)."""
-    whole = mesh if mesh.is_quadratic else quadratic(mesh)
+    whole = mesh if mesh.element.is_quadratic else quadratic(mesh)
     return Mesh(function(whole.points), whole.cells, whole.facets)
 
 
@@ -96,8 +96,8 @@ def held_at(mesh: Mesh, sides: Mapping[str, Sequence[int]]) -> NDArray[np.bool_]
 def body_load(mesh: Mesh, force: Field) -> Float:
     """Consistent nodal loads (n, d) N of a body force (q, d) N/mm3 at points (q, d)."""
     bary, w = quadrature(mesh.dim, _DEGREE)
-    _, det = physical_gradients(mesh.points[mesh.cells], bary, mesh.is_quadratic)
-    psi = shape(bary, mesh.is_quadratic)
+    _, det = mesh.element.physical_gradients(mesh.points[mesh.cells], bary)
+    psi = mesh.element.shape(bary)
     at = np.einsum("qk,ekd->eqd", psi, mesh.points[mesh.cells])
     value = force(at.reshape(-1, mesh.dim)).reshape(at.shape)
     load = np.zeros_like(mesh.points)
@@ -109,8 +109,8 @@ def side_load(mesh: Mesh, label: str, traction: Field) -> Float:
     """Consistent nodal loads (n, d) N of a traction (q, d) MPa at points (q, d) of a side."""
     facets = mesh.facets[label]
     bary, w = quadrature(mesh.dim - 1, _DEGREE)
-    weights = surface_measure(mesh.points[facets], bary, mesh.is_quadratic) * w
-    psi = shape(bary, mesh.is_quadratic)
+    weights = mesh.facet_element.surface_measure(mesh.points[facets], bary) * w
+    psi = mesh.facet_element.shape(bary)
     at = np.einsum("qk,mkd->mqd", psi, mesh.points[facets])
     value = traction(at.reshape(-1, mesh.dim)).reshape(at.shape)
     load = np.zeros_like(mesh.points)
@@ -149,8 +149,8 @@ def solve(
 def error_norms(mesh: Mesh, u: Float, exact: Field, slope: Field) -> tuple[float, float]:
     """L2 norms of the error of u (n, d) and of its gradient; `slope` gives (q, d, d), first index the component."""
     bary, w = quadrature(mesh.dim, _DEGREE)
-    gradients, det = physical_gradients(mesh.points[mesh.cells], bary, mesh.is_quadratic)
-    psi = shape(bary, mesh.is_quadratic)
+    gradients, det = mesh.element.physical_gradients(mesh.points[mesh.cells], bary)
+    psi = mesh.element.shape(bary)
     d = mesh.dim
     at = np.einsum("qk,ekd->eqd", psi, mesh.points[mesh.cells]).reshape(-1, d)
     value = np.einsum("qk,ekd->eqd", psi, u[mesh.cells]).reshape(-1, d)
@@ -165,8 +165,8 @@ def error_norms(mesh: Mesh, u: Float, exact: Field, slope: Field) -> tuple[float
 def pressure_error(mesh: Mesh, pressure: Float, exact: Field) -> float:
     """L2 norm of the error of vertex pressures (n,), linear over each cell; `exact` gives (q,)."""
     bary, w = quadrature(mesh.dim, _DEGREE)
-    _, det = physical_gradients(mesh.points[mesh.cells], bary, mesh.is_quadratic)
-    at = np.einsum("qk,ekd->eqd", shape(bary, mesh.is_quadratic), mesh.points[mesh.cells])
+    _, det = mesh.element.physical_gradients(mesh.points[mesh.cells], bary)
+    at = np.einsum("qk,ekd->eqd", mesh.element.shape(bary), mesh.points[mesh.cells])
     value = pressure[mesh.cells[:, : mesh.dim + 1]] @ bary.T
     return float(np.sqrt(np.sum(det * w * (value - exact(at.reshape(-1, mesh.dim)).reshape(value.shape)) ** 2)))
 

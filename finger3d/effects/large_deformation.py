@@ -23,6 +23,7 @@ from finger3d.errors import Outcome
 from finger3d.fem.assembly import Pattern, Stiffness, on_places, pressure_scale
 from finger3d.fem.condense import Condensation, condense
 from finger3d.fem.finite_contact import DeformedContact, deformed_contact
+from finger3d.fem.locate import cells_at
 from finger3d.fem.neo_hooke import InvertedError, NeoHooke, assemble, nodal_fields, stretch
 from finger3d.fem.recover import displacement
 from finger3d.fem.simplex import Mesh
@@ -279,13 +280,10 @@ def _violation(
 
 def _moved(mesh: Mesh, u: Float, place: Float, axes: tuple[str, ...]) -> Float:
     """Where a material point (3,) went (d,), seen in the whole finger."""
-    from finger3d.fem.elements import shape
-    from finger3d.fem.traces import locate
-
     d = mesh.dim
     inside, ones = reflect_into_part(place, np.ones(3), axes, d)
-    cell, bary = locate(mesh, inside)[0]
-    return place[:d] + ones * (shape(bary[None], mesh.is_quadratic)[0] @ u[mesh.cells[cell]])
+    cell, bary = cells_at(mesh, inside)[0]
+    return place[:d] + ones * (mesh.element.shape(bary[None])[0] @ u[mesh.cells[cell]])
 
 
 def _contact(problem: Problem, face: BoundarySurface, u: Float, target: ObjectPose) -> DeformedContact:

@@ -14,7 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from finger3d.fem.elements import physical_gradients, quadrature, shape
+from finger3d.fem.elements import quadrature
 from finger3d.fem.simplex import Mesh
 
 Float = NDArray[np.float64]
@@ -255,14 +255,14 @@ def stiffness(mesh: Mesh, elastic: Elasticity, thickness: float = 1.0) -> Stiffn
         Width of a 2D section (1 for a solid), so that forces are N.
     """
     d = mesh.dim
-    bary, w = quadrature(d, 2 if mesh.is_quadratic else 1)
+    bary, w = quadrature(d, 2 if mesh.element.is_quadratic else 1)
     pattern = Pattern.of(mesh, elastic.mixed)
     data = np.zeros(len(pattern.indices))
-    hats = shape(bary, False)
+    hats = bary  # the linear shape functions
     scale = pressure_scale(mesh, elastic.shear) if elastic.mixed else 1.0
     lame = 0.0 if elastic.mixed else elastic.lame
     for part in cell_parts(mesh):
-        gradients, det = physical_gradients(mesh.points[mesh.cells[part]], bary, mesh.is_quadratic)
+        gradients, det = mesh.element.physical_gradients(mesh.points[mesh.cells[part]], bary)
         weights = det * (w * thickness)
         pattern.add(data, part, _cell_matrices(gradients, weights, elastic, lame))
         if elastic.mixed:

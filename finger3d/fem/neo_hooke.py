@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.fem.assembly import MIXED_FROM, Pattern, Stiffness, cell_parts, pressure_scale
-from finger3d.fem.elements import gradient, physical_gradients, quadrature, shape
-from finger3d.fem.simplex import EDGES, Mesh
-from finger3d.fem.traces import locate
+from finger3d.fem.elements import quadrature
+from finger3d.fem.locate import cells_at
+from finger3d.fem.recover import displacement, nodal_gradient, nodal_pressure
+from finger3d.fem.simplex import Mesh
 
 Float = NDArray[np.float64]
 
@@ -134,7 +135,7 @@ def assemble(
     """
     n, d = mesh.points.shape
     bary, w = quadrature(d, 2)
-    hats = shape(bary, False)
+    hats = bary  # the linear shape functions
     u = unknowns[: n * d].reshape(n, d)
     vertices = pattern.vertices
     scale = pressure_scale(mesh, law.shear) if law.mixed else 1.0
@@ -144,7 +145,7 @@ def assemble(
     force, p_force = np.zeros((n, d)), np.zeros(n)
     for part in cell_parts(mesh):
         cells = mesh.cells[part]
-        gradients, det = physical_gradients(mesh.points[cells], bary, mesh.is_quadratic)
+        gradients, det = mesh.element.physical_gradients(mesh.points[cells], bary)
         weights = det * (w * thickness)
         p = p_nodes[cells[:, : d + 1]] @ hats.T if law.mixed else None
         slope = np.einsum("eai,eqaJ->eqiJ", u[cells], gradients, optimize=True)
@@ -168,33 +169,18 @@ def assemble(
 def stretch(mesh: Mesh, u: Float, point: Float, direction: Float) -> float:
     """Relative elongation |F d| - 1 at `point` (d,) along the unit `direction` (d,), mean over cells that hold it."""
     found = []
-    for cell, bary in locate(mesh, point):
+    for cell, bary in cells_at(mesh, point):
         nodes = mesh.cells[cell]
-        reference = gradient(bary[None], mesh.is_quadratic)[0]
-        slope = u[nodes].T @ reference @ np.linalg.inv(mesh.points[nodes].T @ reference)
+        slope = u[nodes].T @ mesh.element.physical_gradients(mesh.points[nodes][None], bary[None])[0][0, 0]
         found.append(np.linalg.norm(direction + slope @ direction) - 1.0)
     return float(np.mean(found))
 
 
 def nodal_fields(mesh: Mesh, law: NeoHooke, unknowns: Float) -> tuple[Float, Float]:
     """Green-Lagrange strain and Cauchy stress (n, 3, 3) at the nodes, from the volume-weighted mean of F there."""
-    n, d = mesh.points.shape
-    k = mesh.cells.shape[1]
-    u = unknowns[: n * d].reshape(n, d)
-    corners = np.eye(d + 1)
-    bary = np.vstack([corners, corners[EDGES[d]].mean(axis=1)]) if mesh.is_quadratic else corners
-    gradients, det = physical_gradients(mesh.points[mesh.cells], bary, mesh.is_quadratic)
-    slope = np.einsum("eai,eqaJ->eqiJ", u[mesh.cells], gradients, optimize=True)
-    volume = np.broadcast_to(det.mean(axis=1)[:, None], (len(mesh.cells), k))
-    total, weight = np.zeros((n, d, d)), np.zeros(n)
-    np.add.at(total, mesh.cells, slope * volume[:, :, None, None])
-    np.add.at(weight, mesh.cells, volume)
-    f = deformation(law, total / weight[:, None, None])
-    p = None
-    if law.mixed:
-        p = np.zeros(n)
-        p[mesh.vertices] = pressure_scale(mesh, law.shear) * unknowns[n * d :]
-        p[mesh.cells[:, d + 1 :]] = p[mesh.cells[:, EDGES[d]]].mean(axis=2)
+    size = mesh.points.size
+    f = deformation(law, nodal_gradient(mesh, displacement(mesh, unknowns)))
+    p = nodal_pressure(mesh, pressure_scale(mesh, law.shear) * unknowns[size:]) if law.mixed else None
     stress, _ = first_piola_and_tangent(law, f, p)
     cauchy = stress @ np.swapaxes(f, 1, 2) / np.linalg.det(f)[:, None, None]
     return 0.5 * (np.swapaxes(f, 1, 2) @ f - np.eye(3)), cauchy

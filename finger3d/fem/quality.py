@@ -5,42 +5,22 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.fem.simplex import EDGES, FACETS, Mesh
+from finger3d.fem.elements import EDGES, quadrature
+from finger3d.fem.simplex import FACETS, Mesh
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
-_NODES = {  # reference coordinates of the nodes of a quadratic simplex
-    d: np.vstack([v := np.vstack([np.zeros(d), np.eye(d)]), v[EDGES[d]].mean(axis=1)]) for d in (2, 3)
-}
-# Exact for the Jacobian determinant of a quadratic simplex: degree 2 in the plane, degree 3 in space (Keast, 5 points).
-_A, _B = 1.0 / 6.0, 0.5
-_RULE = {
-    2: (np.array([[_A, _A], [4 * _A, _A], [_A, 4 * _A]]), np.full(3, 1.0 / 6.0)),
-    3: (
-        np.array([[0.25] * 3, [_A, _A, _A], [_B, _A, _A], [_A, _B, _A], [_A, _A, _B]]),
-        np.array([-2.0 / 15.0] + [3.0 / 40.0] * 4),
-    ),
-}
+_DEGREE = {2: 2, 3: 3}
+"""Degree of the Jacobian determinant of a quadratic element, by dimension."""
 
 
-def _gradients(at: Float) -> Float:
-    """Gradients (q, k, d) of the quadratic shape functions at reference points (q, d)."""
-    d = at.shape[1]
-    bary = np.hstack([1.0 - at.sum(axis=1, keepdims=True), at])
-    slope = np.vstack([-np.ones(d), np.eye(d)])
-    corners = (4.0 * bary - 1.0)[:, :, None] * slope
-    i, j = EDGES[d].T
-    mids = 4.0 * (bary[:, i, None] * slope[j] + bary[:, j, None] * slope[i])
-    return np.concatenate([corners, mids], axis=1)
-
-
-def _determinants(mesh: Mesh, at: Float) -> Float:
-    """Jacobian determinants (q, e) of a quadratic mesh at reference points (q, d)."""
+def _determinants(mesh: Mesh, bary: Float) -> Float:
+    """Jacobian determinants (q, e) of the cells at barycentric points (q, d + 1)."""
     nodes = mesh.points[mesh.cells]
-    out = np.empty((len(at), len(nodes)))
-    for q, gradient in enumerate(_gradients(at)):
-        j = np.einsum("ekx,kr->exr", nodes, gradient, optimize=True)
+    out = np.empty((len(bary), len(nodes)))
+    for q in range(len(bary)):  # one point at a time bounds the memory
+        j = mesh.element.jacobians(nodes, bary[q : q + 1])[:, 0]
         if mesh.dim == 2:
             out[q] = j[:, 0, 0] * j[:, 1, 1] - j[:, 0, 1] * j[:, 1, 0]
         else:
@@ -50,14 +30,14 @@ def _determinants(mesh: Mesh, at: Float) -> Float:
 
 def curved_volume(mesh: Mesh) -> float:
     """Volume (area in 2D) of a quadratic mesh, mm^d."""
-    at, weights = _RULE[mesh.dim]
-    return float((weights @ _determinants(mesh, at)).sum())
+    bary, weights = quadrature(mesh.dim, _DEGREE[mesh.dim])
+    return float((weights @ _determinants(mesh, bary)).sum())
 
 
 def curved_jacobians(mesh: Mesh) -> Float:
     """Smallest Jacobian determinant (e,) over the nodes and the centre of each quadratic cell, mm^d."""
     d = mesh.dim
-    return _determinants(mesh, np.vstack([_NODES[d], np.full((1, d), 1.0 / (d + 1))])).min(axis=0)
+    return _determinants(mesh, np.vstack([mesh.element.nodes, np.full((1, d + 1), 1.0 / (d + 1))])).min(axis=0)
 
 
 def cell_angles_deg(points: Float, cells: Int) -> Float:

@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.fem.assembly import Elasticity, Stiffness
-from finger3d.fem.elements import physical_gradients
-from finger3d.fem.simplex import EDGES, Mesh
+from finger3d.fem.simplex import Mesh
 
 Float = NDArray[np.float64]
+
+_CELLS_AT_ONCE = 4096  # bounds the memory of their gradients
 
 
 def displacement(mesh: Mesh, unknowns: Float) -> Float:
@@ -18,29 +19,37 @@ def displacement(mesh: Mesh, unknowns: Float) -> Float:
 
 
 def pressure(mesh: Mesh, stiffness: Stiffness, unknowns: Float) -> Float:
-    """Nodal p = lam div(u) (n,) MPa of the mixed form, linear over each cell."""
+    """Nodal pressure (n,) MPa of the mixed form, linear over each cell."""
+    return nodal_pressure(mesh, stiffness.pressure_scale * unknowns[mesh.points.size :])
+
+
+def nodal_pressure(mesh: Mesh, at_vertices: Float) -> Float:
+    """Values (n,) at all nodes of a field that is linear over each cell, from those at the vertices, ascending."""
     p = np.zeros(len(mesh.points))
-    p[stiffness.pressure_vertices] = stiffness.pressure_scale * unknowns[mesh.points.size :]
-    corners = mesh.cells[:, EDGES[mesh.dim]]
-    p[mesh.cells[:, mesh.dim + 1 :]] = p[corners].mean(axis=2)
+    p[mesh.vertices] = at_vertices
+    p[mesh.cells[:, mesh.dim + 1 :]] = p[mesh.cells[:, mesh.element.edges]].mean(axis=2)
     return p
 
 
-def nodal_strain(mesh: Mesh, u: Float) -> Float:
-    """Strain (n, d, d) at the nodes: mean over the cells that share them, weighted by their volume."""
+def nodal_gradient(mesh: Mesh, u: Float) -> Float:
+    """Displacement gradient (n, d, d) at the nodes, row the component: volume-weighted mean over the adjacent cells."""
     n, d = mesh.points.shape
     k = mesh.cells.shape[1]
-    corners = np.eye(d + 1)
-    bary = np.vstack([corners, corners[EDGES[d]].mean(axis=1)]) if mesh.is_quadratic else corners
     total, weight = np.zeros((n, d, d)), np.zeros(n)
-    for start in range(0, len(mesh.cells), 4096):
-        cells = mesh.cells[start : start + 4096]
-        gradients, det = physical_gradients(mesh.points[cells], bary, mesh.is_quadratic)
-        slope = np.einsum("ekj,eqki->eqij", u[cells], gradients, optimize=True)
+    for start in range(0, len(mesh.cells), _CELLS_AT_ONCE):
+        cells = mesh.cells[start : start + _CELLS_AT_ONCE]
+        gradients, det = mesh.element.physical_gradients(mesh.points[cells], mesh.element.nodes)
+        slope = np.einsum("eki,eqkj->eqij", u[cells], gradients, optimize=True)
         volume = np.broadcast_to(det.mean(axis=1)[:, None], (len(cells), k))
-        np.add.at(total, cells, 0.5 * (slope + np.swapaxes(slope, 2, 3)) * volume[:, :, None, None])
+        np.add.at(total, cells, slope * volume[:, :, None, None])
         np.add.at(weight, cells, volume)
     return total / weight[:, None, None]
+
+
+def nodal_strain(mesh: Mesh, u: Float) -> Float:
+    """Linear strain (n, d, d) at the nodes."""
+    slope = nodal_gradient(mesh, u)
+    return 0.5 * (slope + np.swapaxes(slope, 1, 2))
 
 
 def stress(strain: Float, elastic: Elasticity, p: Float | None = None) -> Float:

@@ -12,15 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d.fem.elements import EDGES, Element, element_of
+
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
-
-EDGES = {
-    1: np.array([[0, 1]]),
-    2: np.array([[0, 1], [1, 2], [2, 0]]),
-    3: np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]]),
-}
-"""Edges of a simplex of dimension 1, 2, 3, in the order of the mid-edge nodes."""
 
 FACETS = {
     2: np.array([[0, 1], [1, 2], [2, 0]]),
@@ -47,7 +42,7 @@ class Mesh:
 
     def __repr__(self) -> str:
         """One line: the arrays would fill pages."""
-        kind = "quadratic" if self.is_quadratic else "linear"
+        kind = "quadratic" if self.element.is_quadratic else "linear"
         labels = ", ".join(f"{label} {len(found)}" for label, found in self.facets.items())
         return f"<Mesh of {len(self.cells)} {kind} cells, {len(self.points)} points, {self.dim}D; facets: {labels}>"
 
@@ -57,9 +52,14 @@ class Mesh:
         return self.points.shape[1]
 
     @property
-    def is_quadratic(self) -> bool:
-        """Whether cells carry mid-edge nodes."""
-        return self.cells.shape[1] > self.dim + 1
+    def element(self) -> Element:
+        """Element of the cells."""
+        return element_of(self.dim, self.cells.shape[1])
+
+    @property
+    def facet_element(self) -> Element:
+        """Element of the facets."""
+        return self.element.facet
 
     @property
     def vertices(self) -> Int:
@@ -107,26 +107,12 @@ def quadratic(mesh: Mesh) -> Mesh:
     return Mesh(np.vstack([mesh.points, mids]), cells, facets)
 
 
-# A reflection swaps nodes 0 and 1 of every simplex, and the mid-edge nodes with them, to keep it positive.
-_MIRROR = {
-    2: [1, 0],
-    3: [1, 0, 2],
-    4: [1, 0, 2, 3],
-    6: [1, 0, 2, 3, 5, 4],
-    10: [1, 0, 2, 3, 4, 6, 5, 8, 7, 9],
-}
-
-
-def _mirrored(simplices: Int) -> Int:
-    # 3 columns are a linear triangle or a quadratic edge; the latter keeps its middle node, so one list serves both.
-    return simplices[:, _MIRROR[simplices.shape[1]]]
-
-
 def reflected(mesh: Mesh, axis: int) -> Mesh:
     """The mirror image of a mesh about ``x[axis] = 0``, its cells kept positive."""
     points = mesh.points.copy()
     points[:, axis] *= -1.0
-    return Mesh(points, _mirrored(mesh.cells), {label: _mirrored(f) for label, f in mesh.facets.items()})
+    of_cell, of_facet = mesh.element.mirrored, mesh.facet_element.mirrored
+    return Mesh(points, mesh.cells[:, of_cell], {label: f[:, of_facet] for label, f in mesh.facets.items()})
 
 
 def unfold(mesh: Mesh, axes: tuple[int, ...]) -> tuple[Mesh, Int, Float]:
@@ -140,6 +126,7 @@ def unfold(mesh: Mesh, axes: tuple[int, ...]) -> tuple[Mesh, Int, Float]:
     """
     parent = np.arange(len(mesh.points))
     sign = np.ones_like(mesh.points)
+    of_cell, of_facet = mesh.element.mirrored, mesh.facet_element.mirrored
     for axis in axes:
         n = len(mesh.points)
         off = np.abs(mesh.points[:, axis]) > 0.0
@@ -149,8 +136,8 @@ def unfold(mesh: Mesh, axes: tuple[int, ...]) -> tuple[Mesh, Int, Float]:
         flipped_sign = sign[off].copy()
         flipped_sign[:, axis] *= -1.0
         plane = "symmetry_" + "xyz"[axis]
-        facets = {label: np.vstack([f, _mirrored(image[f])]) for label, f in mesh.facets.items() if label != plane}
-        cells = np.vstack([mesh.cells, _mirrored(image[mesh.cells])])
+        facets = {label: np.vstack([f, image[f][:, of_facet]]) for label, f in mesh.facets.items() if label != plane}
+        cells = np.vstack([mesh.cells, image[mesh.cells][:, of_cell]])
         mesh = replace(mesh, points=np.vstack([mesh.points, flipped]), cells=cells, facets=facets)
         parent = np.concatenate([parent, parent[off]])
         sign = np.vstack([sign, flipped_sign])
@@ -162,6 +149,6 @@ def middles(facets: Int, dim: int) -> tuple[Int, Int]:
 
     What is known at vertices only, as contact is, is shown between them by what the ends have; linear facets have none.
     """
-    quadratic = facets.shape[1] > dim
-    edges = EDGES[dim - 1] if quadratic else np.zeros((0, 2), dtype=np.int64)
+    element = element_of(dim - 1, facets.shape[1])
+    edges = element.edges if element.is_quadratic else np.zeros((0, 2), dtype=np.int64)
     return facets[:, edges].reshape(-1, 2), facets[:, dim:].ravel()

@@ -13,14 +13,14 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from finger3d.errors import Finger3dError
-from finger3d.fem.elements import gradient, quadrature, shape, surface_measure
+from finger3d.fem.elements import quadrature
+from finger3d.fem.locate import cells_at
 from finger3d.fem.simplex import Mesh
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
 _SURFACE_DEGREE = 5  # hats times quadratic traces are cubic, curvature adds a little
-_INSIDE = -1e-8
 
 
 @dataclass(frozen=True)
@@ -57,11 +57,11 @@ class BoundarySurface:
 def surface(mesh: Mesh, label: str, thickness: float = 1.0) -> BoundarySurface:
     """Contact points of the boundary `label`; `thickness` (mm) is the width of a 2D section."""
     d = mesh.dim
-    facets = mesh.facets[label]
+    facets, element = mesh.facets[label], mesh.facet_element
     bary, w = quadrature(d - 1, _SURFACE_DEGREE)
     coords = mesh.points[facets]
-    weights = surface_measure(coords, bary, mesh.is_quadratic) * (w * thickness)
-    psi, phi = shape(bary, mesh.is_quadratic), shape(bary, False)
+    weights = element.surface_measure(coords, bary) * (w * thickness)
+    psi, phi = element.shape(bary), bary
     corners = facets[:, :d]
     nodes, number = np.unique(corners, return_inverse=True)
     number = number.reshape(corners.shape)
@@ -79,7 +79,7 @@ def surface(mesh: Mesh, label: str, thickness: float = 1.0) -> BoundarySurface:
         data = np.broadcast_to(nodal, spread.shape).ravel()
         return sp.csr_matrix((data, (sample, spread.ravel())), shape=(m * q, len(mesh.points)))
 
-    values, slopes = sampled(psi), gradient(bary, mesh.is_quadratic)
+    values, slopes = sampled(psi), element.gradient(bary)
     along = tuple(sampled(slopes[:, :, k]) for k in range(d - 1))
     return BoundarySurface(nodes, mesh.points[nodes], area, (average @ values).tocsr(), samples, average, values, along)
 
@@ -101,35 +101,13 @@ def local_rows(surface: BoundarySurface, frame: Float) -> sp.csr_matrix:
     return sp.kron(surface.trace, frame, format="csr")
 
 
-def locate(mesh: Mesh, point: Float) -> list[tuple[int, Float]]:
-    """Cells that hold a point (d,), with its barycentric coordinates; several on a shared facet, none outside."""
-    d = mesh.dim
-    corners = mesh.points[mesh.cells]
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    slack = 0.05 * (high - low).max(axis=1, keepdims=True)
-    near = np.flatnonzero(np.all((low - slack <= point) & (point <= high + slack), axis=1))
-    bary = np.full((len(near), d + 1), 1.0 / (d + 1))
-    for _ in range(8):  # Newton on the isoparametric map, exact at once in a straight cell
-        n = shape(bary, mesh.is_quadratic)
-        g = gradient(bary, mesh.is_quadratic)
-        nodes = corners[near]
-        miss = point - np.einsum("ek,ekd->ed", n, nodes)
-        jacobian = np.einsum("ekD,ekd->eDd", nodes, g)
-        step = np.linalg.solve(jacobian, miss[:, :, None])[:, :, 0]
-        step = np.clip(step, -1.0, 1.0)
-        bary = bary + np.hstack([-step.sum(axis=1, keepdims=True), step])
-    inside = bary.min(axis=1) >= _INSIDE
-    return [(int(cell), b) for cell, b in zip(near[inside], bary[inside], strict=True)]
-
-
 def strain_row(mesh: Mesh, point: Float, direction: Float) -> sp.csr_matrix:
     """Row (1, n d) of the normal strain at `point` (d,) along a unit `direction` (d,), mean over cells that hold it."""
     found = _holding(mesh, point)
     row = np.zeros(mesh.points.shape)
     for cell, bary in found:
         nodes = mesh.cells[cell]
-        reference = gradient(bary[None], mesh.is_quadratic)[0]
-        slope = reference @ np.linalg.inv(mesh.points[nodes].T @ reference)
+        slope = mesh.element.physical_gradients(mesh.points[nodes][None], bary[None])[0][0, 0]
         np.add.at(row, nodes, np.outer(slope @ direction, direction) / len(found))
     return sp.csr_matrix(row.reshape(1, -1))
 
@@ -139,13 +117,13 @@ def displacement_row(mesh: Mesh, point: Float, direction: Float) -> sp.csr_matri
     found = _holding(mesh, point)
     row = np.zeros(mesh.points.shape)
     for cell, bary in found:
-        values = shape(bary[None], mesh.is_quadratic)[0]
+        values = mesh.element.shape(bary[None])[0]
         np.add.at(row, mesh.cells[cell], np.outer(values, direction) / len(found))
     return sp.csr_matrix(row.reshape(1, -1))
 
 
 def _holding(mesh: Mesh, point: Float) -> list[tuple[int, Float]]:
-    found = locate(mesh, point)
+    found = cells_at(mesh, point)
     if not found:
         raise Finger3dError(f"gauge: the point {tuple(round(float(x), 6) for x in point)} mm lies outside the body")
     return found

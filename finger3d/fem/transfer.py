@@ -6,7 +6,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from finger3d.fem.elements import gradient, shape
+from finger3d.fem.elements import Element
+from finger3d.fem.locate import inverse_map
 from finger3d.fem.simplex import Mesh
 from finger3d.fem.traces import BoundarySurface
 from finger3d.geometry.surface import Triangles
@@ -14,7 +15,6 @@ from finger3d.geometry.surface import Triangles
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
-_NEWTON = 6
 _BEYOND = 0.25  # a curved facet's border bulges at most this far, in barycentric coordinates
 _COVERED = 0.5  # least share of a point's hat that must be under the other surface
 
@@ -39,8 +39,8 @@ def values_over(mesh: Mesh, label: str, places: Float) -> tuple[sp.csr_matrix, N
     face, bary = _edges_over(mesh.points[facets], places[:, 0]) if d == 2 else _triangles_over(mesh, facets, places)
     there = face >= 0
     nodes = mesh.points[facets[face[there]]][:, :, across]
-    bary = _curved(nodes, bary[there], places[there][:, across], mesh.is_quadratic)
-    values = shape(bary, mesh.is_quadratic)
+    element = mesh.facet_element
+    values = element.shape(_curved(element, nodes, bary[there], places[there][:, across]))
     row = np.repeat(np.flatnonzero(there), values.shape[1])
     column = facets[face[there]].ravel()
     return sp.csr_matrix((values.ravel(), (row, column)), shape=(len(places), len(mesh.points))), there
@@ -63,18 +63,13 @@ def _edges_over(coords: Float, x: Float) -> tuple[Int, Float]:
     return face, np.stack([1.0 - t, t], axis=1)
 
 
-def _curved(nodes: Float, bary: Float, at: Float, quadratic: bool) -> Float:
-    """Barycentric coordinates on curved facets (q, k, d - 1), seen from below, from those on the straight ones."""
-    if not quadratic or not len(bary):
-        return bary
-    found = bary.copy()
-    for _ in range(_NEWTON):
-        miss = at - np.einsum("qk,qkd->qd", shape(found, True), nodes)
-        jacobian = np.einsum("qkd,qkr->qdr", nodes, gradient(found, True))
-        upright = np.abs(np.linalg.det(jacobian)) > 1e-12 * np.abs(jacobian).max(axis=(1, 2)) ** jacobian.shape[1]
-        step = np.zeros_like(miss)
-        step[upright] = np.linalg.solve(jacobian[upright], miss[upright][:, :, None])[:, :, 0]
-        found = found + np.hstack([-step.sum(axis=1, keepdims=True), step])
+def _curved(element: Element, nodes: Float, straight: Float, at: Float) -> Float:
+    """Barycentric coordinates on curved facets (q, k, d - 1), seen from below, from those on the straight ones.
+
+    A point that has none near its facet keeps those on the straight one.
+    """
+    if not element.is_quadratic:
+        return straight
+    found = inverse_map(element, nodes, at, straight)
     lost = ~np.isfinite(found).all(axis=1) | (found.min(axis=1) < -_BEYOND)
-    found[lost] = bary[lost]
-    return found
+    return np.where(lost[:, None], straight, found)

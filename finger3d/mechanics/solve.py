@@ -229,7 +229,7 @@ def _unfolded(
     d = mesh.dim
     numbers = tuple("xyz".index(a) for a in axes)
     facets = {"contact": mesh.facets["contact"]}
-    shape, parent_all, sign_all = unfold(Mesh(mesh.points, np.zeros((0, d + 1), dtype=np.int64), facets), numbers)
+    shape, parent_all, sign_all = unfold(Mesh(mesh.points, mesh.cells[:0], facets), numbers)
     number = np.full(len(mesh.points), -1)
     number[face.nodes] = np.arange(len(face.nodes))
     nodes = np.flatnonzero(number[parent_all] >= 0)

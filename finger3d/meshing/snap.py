@@ -12,8 +12,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d.fem.elements import TET4, TRI3
 from finger3d.fem.quality import cell_angles_deg, curved_jacobians
-from finger3d.fem.simplex import EDGES, Mesh, boundary, quadratic
+from finger3d.fem.simplex import Mesh, boundary, quadratic
 from finger3d.geometry.faceted import Faceted, moved_onto
 from finger3d.geometry.implicit import ImplicitPlane
 from finger3d.geometry.tessellate import CadFace, Tessellation
@@ -64,7 +65,7 @@ def snap(points: Float, tets: Int, body: Tessellation) -> Mesh:
 
 def _edge_lengths(points: Float, faces: Int) -> Float:
     """Mean length (n,), mm, of the boundary edges at every node; 0 inside."""
-    edges = faces[:, EDGES[2]].reshape(-1, 2)
+    edges = faces[:, TRI3.edges].reshape(-1, 2)
     length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
     count = np.bincount(edges.ravel(), minlength=len(points))
     return np.asarray(np.bincount(edges.ravel(), np.repeat(length, 2), len(points)) / np.maximum(count, 1))
@@ -76,13 +77,13 @@ def _straightened(mesh: Mesh) -> Mesh:
     if not bad.any() or bad.mean() > _FEW:
         return mesh
     cells, points = mesh.cells[bad], mesh.points.copy()
-    points[cells[:, 4:]] = points[cells[:, EDGES[3]]].mean(axis=2)
+    points[cells[:, 4:]] = points[cells[:, TET4.edges]].mean(axis=2)
     return replace(mesh, points=points)
 
 
 def check_closed(faces: Int) -> None:
     """Refuse a boundary in which some edge does not belong to exactly two facets."""
-    edges = np.sort(faces[:, EDGES[2]].reshape(-1, 2), axis=1)
+    edges = np.sort(faces[:, TRI3.edges].reshape(-1, 2), axis=1)
     count = np.unique(edges, axis=0, return_counts=True)[1]
     if not len(faces) or (count != 2).any():
         raise UnusableMeshError("its boundary is not closed")
@@ -205,9 +206,9 @@ def repair(points: Float, tets: Int, sets: Bool) -> tuple[Float, Int, Bool]:
 
 def _collapsed(points: Float, tets: Int, sets: Bool, cell: Int) -> Int:
     """The tets after the shortest edge of a cell that may go has gone."""
-    edges = cell[EDGES[3]]
+    edges = cell[TET4.edges]
     faces = boundary(tets, 3)
-    outer = {tuple(e) for e in np.sort(faces[:, EDGES[2]].reshape(-1, 2), axis=1).tolist()}
+    outer = {tuple(e) for e in np.sort(faces[:, TRI3.edges].reshape(-1, 2), axis=1).tolist()}
     for u, v in edges[np.argsort(np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1))]:
         on_surface = sets[u].any() and sets[v].any()
         if on_surface and (min(u, v), max(u, v)) not in outer:
@@ -236,7 +237,7 @@ def _curve(mesh: Mesh, owner: Int, known: Bool, seams: Seams) -> Mesh:
     sets = np.zeros((len(mesh.points), len(seams.faces)), dtype=bool)
     sets[faces[:, 3:].ravel(), np.repeat(owner, 3)] = True
     beside, reach = np.zeros_like(sets), np.zeros(len(sets))
-    for middle, (a, b) in zip(faces[:, 3:].T, faces[:, EDGES[2]].transpose(1, 2, 0), strict=True):
+    for middle, (a, b) in zip(faces[:, 3:].T, faces[:, TRI3.edges].transpose(1, 2, 0), strict=True):
         beside[middle] = known[a] | known[b]
         reach[middle] = 0.5 * _REACH * np.linalg.norm(mesh.points[a] - mesh.points[b], axis=1)
     return replace(mesh, points=placed(mesh.points, sets, seams, reach, beside)[0])

@@ -319,7 +319,7 @@ def _section(
     value, state = np.zeros(len(moved)), np.full(len(moved), OPEN)
     value[nodes], state[nodes] = pressure, status
     arc = mesh.facets["contact"]
-    middle = moved[arc[:, 2]] if mesh.is_quadratic else moved[arc].mean(axis=1)
+    middle = moved[arc[:, 2]] if mesh.element.is_quadratic else moved[arc].mean(axis=1)
     # Each facet in two halves, one for each end: pressure is the mean over a half, status that of its end.
     halves = np.stack([moved[arc[:, :2]], np.repeat(middle[:, None], 2, axis=1)], axis=2).reshape(-1, 2, 2)
     of_half = (0.75 * value[arc[:, :2]] + 0.25 * value[arc[:, 1::-1]]).ravel()

@@ -80,27 +80,26 @@ def marks_of(mesh: Mesh, gauges: Sequence[Gauge], near: bool = False) -> tuple[M
 
 def _near(mesh: Mesh, point: Float, outside: float) -> Float:
     """The point (3,) moved along z to the surface, where no other part of the body is before the z outside."""
-    from finger3d.fem.traces import locate
+    from finger3d.fem.locate import cells_at
 
     inside = point[2]
-    if locate(mesh, np.array([*point[:2], outside])):
+    if cells_at(mesh, np.array([*point[:2], outside])):
         inside = outside
     for _ in range(_HALVINGS if inside < outside else 0):
         half = 0.5 * (inside + outside)
-        inside, outside = (half, outside) if locate(mesh, np.array([*point[:2], half])) else (inside, half)
+        inside, outside = (half, outside) if cells_at(mesh, np.array([*point[:2], half])) else (inside, half)
     return np.array([*point[:2], inside])
 
 
 def _weights(mesh: Mesh, point: Float) -> tuple[Int, Float] | None:
     # not above: a process that only draws marks needs no SciPy
-    from finger3d.fem.elements import shape
-    from finger3d.fem.traces import locate
+    from finger3d.fem.locate import cells_at
 
-    found = locate(mesh, point)
+    found = cells_at(mesh, point)
     if not found:
         return None
     cell, bary = found[0]
-    return mesh.cells[cell], shape(bary[None], mesh.is_quadratic)[0]
+    return mesh.cells[cell], mesh.element.shape(bary[None])[0]
 
 
 def draw_marks(axes: Axes, marks: Sequence[tuple[str, Float]]) -> None:

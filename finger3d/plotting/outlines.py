@@ -30,7 +30,9 @@ def edges_of(mesh: Mesh, moved: Float) -> Path:
     """The cells' edges, each once; of a fine mesh none, which would be a grey area and no picture of it."""
     if len(mesh.cells) > _MANY_CELLS:
         return _runs(np.zeros((0, 2, 2)))
-    sides = [(0, 1), (1, 2), (2, 0)] if not mesh.is_quadratic else [(0, 3, 1), (1, 4, 2), (2, 5, 0)]
+    sides = mesh.element.edges
+    if mesh.element.is_quadratic:
+        sides = np.insert(sides, 1, range(3, 6), axis=1)
     edges = mesh.cells[:, sides].reshape(-1, len(sides[0]))
     ends = np.sort(edges[:, [0, -1]], axis=1)
     return _runs(moved[edges[np.unique(ends, axis=0, return_index=True)[1]]])
@@ -41,7 +43,7 @@ def outline_of(mesh: Mesh, moved: Float) -> Path:
     from matplotlib.path import Path
 
     facets = np.concatenate([f for f in mesh.facets.values() if len(f)])
-    facets = facets[:, [0, 2, 1]] if mesh.is_quadratic else facets
+    facets = facets[:, [0, 2, 1]] if mesh.element.is_quadratic else facets
     following = {int(a): i for i, a in enumerate(facets[:, 0])}
     ring = [0]
     while (after := following[int(facets[ring[-1], -1])]) != 0:

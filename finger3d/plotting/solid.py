@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from finger3d._process import child_environment
 from finger3d.contact.friction import OPEN, SLIP, STICK
 from finger3d.errors import MissingError
-from finger3d.fem.simplex import EDGES, Mesh
+from finger3d.fem.elements import TRI3, TRI6
+from finger3d.fem.simplex import Mesh
 from finger3d.plotting.camera import AXES, WINDOW, flat, framed, half_height
 
 if TYPE_CHECKING:
@@ -151,14 +152,14 @@ def skin_of(
 def _six_nodes(facets: Int, points: Float) -> Float:
     """Points (m, 6, 3) of facets, with chord middles where the facets are linear."""
     corners = points[facets[:, :3]]
-    if facets.shape[1] == 6:
+    if facets.shape[1] == TRI6.node_count:
         return points[facets]
     return np.concatenate([corners, 0.5 * (corners + np.roll(corners, -1, axis=1))], axis=1)
 
 
 def _rim(facets: Int) -> Int:
     """Edges (k, 2 or 3) that belong to one of these facets only."""
-    ends = facets[:, EDGES[2]].reshape(-1, 2)
+    ends = facets[:, TRI3.edges].reshape(-1, 2)
     middles = facets[:, 3:].reshape(len(ends), -1)
     _, first, count = np.unique(np.sort(ends, axis=1), axis=0, return_index=True, return_counts=True)
     return np.hstack([ends, middles])[first[count == 1]]

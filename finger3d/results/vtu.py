@@ -17,9 +17,6 @@ from finger3d.io import atomic
 if TYPE_CHECKING:
     import pyvista
 
-_CELL_TYPES = {(2, 3): 5, (2, 6): 22, (3, 4): 10, (3, 10): 24}
-"""VTK's number for a cell, by dimension and number of nodes."""
-
 _VTK_NAMES = {"f8": "Float64", "f4": "Float32", "i8": "Int64", "i4": "Int32", "i1": "Int8", "u1": "UInt8"}
 
 
@@ -40,7 +37,6 @@ def write_vtu(
     cell_data : name -> (e,) or (e, k), or (e, d, d)
     """
     n, e, nodes = len(mesh.points), *mesh.cells.shape
-    kind = _CELL_TYPES[mesh.dim, nodes]
     file = _Appended()
     file.open("Piece", NumberOfPoints=n, NumberOfCells=e)
     for tag, count, fields in (("PointData", n, point_data), ("CellData", e, cell_data or {})):
@@ -54,7 +50,7 @@ def write_vtu(
     file.open("Cells")
     file.array("connectivity", mesh.cells.astype(np.int64).ravel())
     file.array("offsets", np.arange(nodes, (e + 1) * nodes, nodes, dtype=np.int64)[:e])
-    file.array("types", np.full(e, kind, dtype=np.uint8))
+    file.array("types", np.full(e, mesh.element.vtk_type, dtype=np.uint8))
     file.close("Cells")
     file.close("Piece")
     with atomic(path) as temporary:

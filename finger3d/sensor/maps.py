@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.errors import Finger3dError
-from finger3d.fem.elements import gradient, shape
+from finger3d.fem.locate import locate
 from finger3d.fem.recover import displacement
 from finger3d.fem.simplex import Mesh
 from finger3d.io import write_csv
@@ -31,12 +31,6 @@ PIXEL_MM = 1.0
 
 ANGLES = np.radians(np.arange(0.0, 180.0, 5.0))
 """Gauge directions that are compared for the best one."""
-
-_NEAR = {2: 12, 3: 40}  # cells whose middle is near a point, among which the one that holds it is looked for
-
-_INSIDE = -1e-6
-
-_NEWTON = 6
 
 
 def check(model: Model) -> None:
@@ -72,10 +66,10 @@ class Reader:
         for axis in axes:
             i = "xyz".index(axis)
             turn[:, i] = np.where(points[:, i] < 0.0, -1.0, 1.0)
-        cells, bary = _located(mesh, points * turn)
+        cells, bary = locate(mesh, points * turn)
         inside = cells >= 0
-        reference = gradient(bary[inside], mesh.is_quadratic)
         nodes = mesh.points[mesh.cells[cells[inside]]]
+        reference = mesh.element.gradient(bary[inside])
         jacobian = np.einsum("ekD,ekd->eDd", nodes, reference)
         return cls(mesh, inside, cells[inside], reference @ np.linalg.inv(jacobian), turn[inside][:, :d])
 
@@ -88,42 +82,6 @@ class Reader:
             [slope[:, 0, 0], slope[:, 1, 1], 0.5 * (slope[:, 0, 1] + slope[:, 1, 0])], axis=1
         )  # fmt: skip
         return out
-
-
-def _located(mesh: Mesh, points: Float) -> tuple[Int, Float]:
-    """Cell (p,), -1 outside, and barycentric coordinates (p, d + 1), by Newton in the cells whose middles are near."""
-    from scipy.spatial import cKDTree
-
-    d = mesh.dim
-    corners = mesh.points[mesh.cells]
-    count = min(_NEAR[d], len(mesh.cells))
-    _, near = cKDTree(corners[:, : d + 1].mean(axis=1)).query(points, k=count)
-    near = near.reshape(len(points), count)
-    best, where = np.full(len(points), -np.inf), np.full((len(points), d + 1), 1.0 / (d + 1))
-    cell = np.full(len(points), -1)
-    for k in range(count):
-        left = np.flatnonzero(best < _INSIDE)
-        if not len(left):
-            break
-        bary = _barycentric(corners[near[left, k]], points[left], mesh.is_quadratic)
-        least = bary.min(axis=1)
-        better = left[least > best[left]]
-        where[better], cell[better] = bary[least > best[left]], near[better, k]
-        best[better] = least[least > best[left]]
-    cell[best < _INSIDE] = -1
-    return cell, where
-
-
-def _barycentric(nodes: Float, points: Float, quadratic: bool) -> Float:
-    """Barycentric coordinates (p, d + 1) of points (p, d) in cells with nodes (p, k, d)."""
-    d = points.shape[1]
-    bary = np.full((len(points), d + 1), 1.0 / (d + 1))
-    for _ in range(_NEWTON if quadratic else 1):
-        miss = points - np.einsum("ek,ekd->ed", shape(bary, quadratic), nodes)
-        jacobian = np.einsum("ekD,ekd->eDd", nodes, gradient(bary, quadratic))
-        step = np.clip(np.linalg.solve(jacobian, miss[:, :, None])[:, :, 0], -1.0, 1.0)
-        bary = bary + np.hstack([-step.sum(axis=1, keepdims=True), step])
-    return bary
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,77 @@
+"""Shape functions, quadrature and the inverse isoparametric map of every element."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from finger3d.fem.elements import LINE2, LINE3, TET4, TET10, TRI3, TRI6, Element, quadrature
+from finger3d.fem.locate import cells_at, inverse_map, locate
+from finger3d.fem.simplex import Mesh, quadratic
+
+ELEMENTS = [LINE2, LINE3, TRI3, TRI6, TET4, TET10]
+
+
+def points(element: Element) -> np.ndarray:
+    return np.random.default_rng(1).dirichlet(np.ones(element.dim + 1), 7)
+
+
+@pytest.mark.parametrize("element", ELEMENTS, ids=lambda e: e.name)
+def test_shape_functions_are_one_at_their_own_node_and_sum_to_one(element: Element) -> None:
+    np.testing.assert_allclose(element.shape(element.nodes), np.eye(element.node_count), atol=1e-15)
+    np.testing.assert_allclose(element.shape(points(element)).sum(axis=1), 1.0)
+
+
+@pytest.mark.parametrize("element", ELEMENTS, ids=lambda e: e.name)
+def test_gradient_is_the_difference_quotient_of_the_shape_functions(element: Element) -> None:
+    bary, h = points(element), 1e-6
+    for axis in range(element.dim):
+        step = np.zeros(element.dim + 1)
+        step[[0, axis + 1]] = -h, h
+        slope = (element.shape(bary + step) - element.shape(bary - step)) / (2.0 * h)
+        np.testing.assert_allclose(element.gradient(bary)[:, :, axis], slope, atol=1e-8)
+
+
+@pytest.mark.parametrize("element", ELEMENTS, ids=lambda e: e.name)
+def test_mirrored_nodes_keep_a_reflected_cell_positive(element: Element) -> None:
+    assert element.mirrored.tolist() == element.mirrored[element.mirrored[element.mirrored]].tolist()
+    nodes = element.nodes[:, 1:].copy()
+    nodes[:, 0] *= -1.0
+    jacobian = element.jacobians(nodes[element.mirrored][None], points(element))
+    assert (np.linalg.det(jacobian) > 0.0).all()
+
+
+@pytest.mark.parametrize("element", [TRI3, TET4, TRI6, TET10], ids=lambda e: e.name)
+def test_facets_have_the_order_of_the_cell(element: Element) -> None:
+    assert (element.facet.dim, element.facet.order) == (element.dim - 1, element.order)
+
+
+@pytest.mark.parametrize("dim", [1, 2, 3])
+@pytest.mark.parametrize("degree", [1, 2, 3, 5, 6])
+def test_quadrature_is_exact_to_its_degree(dim: int, degree: int) -> None:
+    bary, w = quadrature(dim, degree)
+    # integral of a product of powers of barycentric coordinates: prod(a_i!) / (sum(a_i) + dim)!
+    assert w @ bary[:, 1] ** degree == pytest.approx(math.factorial(degree) / math.factorial(degree + dim), rel=1e-12)
+
+
+@pytest.mark.parametrize("element", [TRI3, TRI6, TET4, TET10], ids=lambda e: e.name)
+def test_inverse_map_recovers_points_of_a_curved_cell(element: Element) -> None:
+    nodes = element.nodes[:, 1:].copy()
+    if element.is_quadratic:
+        nodes[element.dim + 1 :] += np.random.default_rng(2).uniform(-0.05, 0.05, nodes[element.dim + 1 :].shape)
+    bary = points(element)
+    at = element.shape(bary) @ nodes
+    found = inverse_map(element, np.broadcast_to(nodes, (len(at), *nodes.shape)), at)
+    np.testing.assert_allclose(found, bary, atol=1e-12)
+
+
+def test_a_shared_edge_lies_in_two_cells_and_an_outer_point_in_none() -> None:
+    square = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]), np.array([[0, 1, 2], [0, 2, 3]]), {})
+    mesh = quadratic(square)
+    assert [cell for cell, _ in cells_at(mesh, np.array([0.5, 0.5]))] == [0, 1]
+    assert cells_at(mesh, np.array([1.5, 0.5])) == []
+    cell, bary = locate(mesh, np.array([[0.75, 0.25], [0.25, 0.75], [1.5, 0.5]]))
+    assert cell.tolist() == [0, 1, -1]
+    np.testing.assert_allclose(bary[0], [0.25, 0.5, 0.25])
