@@ -20,6 +20,15 @@ LONGEST_SLIDE = 100.0
 FARTHEST_MM = 1e6
 """Largest coordinate of anything."""
 
+
+class Radians:
+    """Marks a field that holds radians: its key in a scene ends in ``_deg`` and has these bounds, in degrees."""
+
+    def __init__(self, *bounds: Ge | Gt | Le | Lt) -> None:
+        """Keep the bounds."""
+        self.bounds = bounds
+
+
 Zero = Annotated[float, Ge(0), Le(0)]
 Modulus = Annotated[float, Ge(1e-9), Le(1e9)]  # MPa
 Poisson = Annotated[float, Ge(0), Le(0.5)]

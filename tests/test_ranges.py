@@ -15,10 +15,10 @@ from finger3d.cli import main
 from finger3d.errors import Finger3dError
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.solve import build, march
+from finger3d.objects import OBJECTS
 from finger3d.scene import parse
 from finger3d.scene.registry import effect_names, effect_type
 from finger3d.scene.tables import (
-    SHAPES,
     FrictionTable,
     GaugeTable,
     LegTable,
@@ -32,7 +32,7 @@ from finger3d.scene.tables import (
 OF_DESIGNS = [table_of(design) for design in designs().values()]
 OF_EFFECTS = [table_of(effect_type(name)) for name in effect_names()]
 TABLES: list[type[TomlTable]] = [
-    *OF_DESIGNS, *OF_EFFECTS, *SHAPES.values(),
+    *OF_DESIGNS, *OF_EFFECTS, *map(table_of, OBJECTS.values()),
     FrictionTable, GaugeTable, LegTable, MaterialTable, MeshTable, PressTable,
 ]  # fmt: skip
 

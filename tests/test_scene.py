@@ -352,12 +352,13 @@ def test_the_template_names_every_design_shape_and_key_of_an_object():
     from importlib import resources
 
     from finger3d.geometry.registry import designs
-    from finger3d.scene.tables import SHAPES, table_of
+    from finger3d.objects import OBJECTS
+    from finger3d.scene.tables import table_of
 
     text = resources.files("finger3d").joinpath("new_scene.toml").read_text(encoding="utf-8")
     words = set(re.findall(r"\w+", text))
-    assert {*designs(), *SHAPES} <= words
-    assert {key for table in SHAPES.values() for key in table.model_fields} <= words
+    assert {*designs(), *OBJECTS} <= words
+    assert {key for record in OBJECTS.values() for key in table_of(record).model_fields} <= words
     assert {key for design in designs().values() for key in table_of(design).model_fields} <= words
 
 

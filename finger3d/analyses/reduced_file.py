@@ -9,7 +9,7 @@ import zlib
 from collections.abc import Mapping
 from dataclasses import asdict, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 import numpy as np
 import scipy.sparse as sp
@@ -28,12 +28,12 @@ from finger3d.mechanics.history import ContactPoints
 from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.meshing.report import MeshReport
-from finger3d.objects import Cylinder, MeshObject, Plane, Sphere, Wave, Wedge
+from finger3d.objects import OBJECTS, MeshObject, RigidObject
 
 Float = NDArray[np.float64]
 
 FORMAT, VERSION = "finger3d condensed body", 2
-_SHAPES: dict[str, type] = {kind.__name__: kind for kind in (Plane, Cylinder, Sphere, Wedge, Wave, MeshObject)}
+_SHAPES: dict[str, type[RigidObject]] = {r.__name__: r for r in OBJECTS.values()} | {"MeshObject": MeshObject}
 _MAX_STEPS = 1_000_000
 """Largest number of increments of a leg in a file."""
 
@@ -205,7 +205,7 @@ def _no_mesh(load: Float) -> Float:
 def _header(problem: Problem) -> dict[str, Any]:
     model = problem.model
     thing = model.object
-    placed = {f.name: getattr(thing, f.name) for f in fields(thing) if f.name != "surface"}  # type: ignore[arg-type]
+    placed = {f.name: getattr(thing, f.name) for f in fields(thing) if f.name != "surface"}
     return {
         "body": asdict(model.design),
         "material": asdict(model.material),
@@ -288,9 +288,9 @@ def _dataclass(kind: Any, values: Mapping[str, Any]) -> Any:
     ValueError, TypeError
         If a field is missing, unknown, or of another type.
     """
-    result = kind(**values)
+    result, hints = kind(**values), get_type_hints(kind)
     for field in fields(kind):
-        value, declared = getattr(result, field.name), str(field.type)
+        value, declared = getattr(result, field.name), "float" if hints[field.name] is float else str(field.type)
         if value is None and declared.endswith("| None"):
             continue
         if declared.startswith("float"):

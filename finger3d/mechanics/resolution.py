@@ -25,7 +25,7 @@ from finger3d.geometry.design import DesignSummary
 from finger3d.mechanics.history import ObjectPose, StepResult
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.problem import Problem, rigid_gap, targets
-from finger3d.objects import Cylinder, MeshObject, Sphere, Wave, Wedge, initial_contact
+from finger3d.objects import MeshObject, RigidObject, initial_contact
 
 Float = NDArray[np.float64]
 Box = tuple[float, float, float, float]
@@ -246,7 +246,7 @@ def needed_mm(model: Model, touch_mm: float, found: Hidden, tips: Float | None) 
         box = (at[0] - reach, at[0] + reach, at[1] - reach, at[1] + reach)
         tips = _within(tips + [end.slide_x_mm, end.slide_z_mm], box) - [end.slide_x_mm, end.slide_z_mm]
         if hidden(there, regular(model, box, size, at), touch_mm, tips).share <= _AIM:
-            return _rounded(min(size, _detail(model.object)[1]))
+            return _rounded(min(size, _resolving(model.object)))
     return None
 
 
@@ -337,12 +337,11 @@ def _sentence(model: Model, found: Hidden, size: float | None) -> str:
 
 def _details(model: Model) -> list[str]:
     """Lengths of the object that are short beside the edges."""
-    name, largest = _detail(model.object)
-    size = model.mesh.size_mm
-    if size <= largest * (1.0 + 1e-9):
+    detail, size, largest = model.object.detail, model.mesh.size_mm, _resolving(model.object)
+    if detail is None or size <= largest * (1.0 + 1e-9):
         return []
     return [
-        f"object.{name} = {getattr(model.object, name):g}: contact points {size:g} mm apart (mesh.size_mm) see only "
+        f"object.{detail.key} = {detail.length_mm:g}: contact points {size:g} mm apart (mesh.size_mm) see only "
         f"averages of it; mesh.size_mm = {_rounded(largest):g} resolves it"
     ]
 
@@ -353,12 +352,8 @@ def _rounded(size: float) -> float:
     return float(f"{math.floor(size / unit * (1.0 + 1e-12)) * unit:.2g}")
 
 
-def _detail(thing: Any) -> tuple[str, float]:
-    """The object's shortest length by name, and the largest edge length (mm) that resolves it."""
-    if isinstance(thing, Wave):
-        return "wavelength_mm", thing.wavelength_mm / _PER_WAVE
-    if isinstance(thing, Sphere | Cylinder):
-        return "radius_mm", thing.radius_mm / _PER_RADIUS
-    if isinstance(thing, Wedge) and thing.tip_radius_mm > 0.0:
-        return "tip_radius_mm", thing.tip_radius_mm / _PER_RADIUS
-    return "", math.inf
+def _resolving(obj: RigidObject) -> float:
+    """Return the largest edge length (mm) that resolves the object's shortest length."""
+    if obj.detail is None:
+        return math.inf
+    return obj.detail.length_mm / (_PER_WAVE if obj.detail.kind == "wavelength" else _PER_RADIUS)

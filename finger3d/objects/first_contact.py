@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.errors import Finger3dError
-from finger3d.objects.shapes import Plane, RigidObject
+from finger3d.objects.shapes import RigidObject
 
 Float = NDArray[np.float64]
 Top = Callable[[Float, Float], Float]
@@ -133,7 +133,7 @@ def initial_contact(
             f"object: no part of it is above the finger (|x| <= {half_length:g}, |z| <= {half_width:g} mm), so that it "
             "never touches; change x_mm, z_mm"
         )
-    if isinstance(obj, Plane):  # it has no end that could hang down, and its gap is measured along its own normal
+    if obj.is_flat:  # it has no end that could hang down, and its gap is measured along its own normal
         return InitialContact(touch, _box(top, obj, half_length, half_width, touch, place, path), _pair(place))
     deepest = float(path[:, 0].max())
     if touch <= deepest:

@@ -2,53 +2,41 @@
 
 An object is a height function over the x-z plane, 0 at its lowest point, and one frame of directions.  In small
 strain the gap is measured along the frame's normal: vertical, as in the paper, and a plane's own normal when it tilts.
+
+The fields of an object's dataclass are its keys under ``[object]`` in a scene; an angle (`Radians`) is given there in
+degrees.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Literal, Protocol
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
+from annotated_types import Gt, Lt
 from numpy.typing import NDArray
+
+from finger3d._ranges import Length, Place, Radians, Zero
 
 Float = NDArray[np.float64]
 Axis = Literal["x", "z"]
 
 
-class RigidObject(Protocol):
-    """What the contact problem asks of an object."""
+class Detail(NamedTuple):
+    """The shortest length of an object's surface, which the contact points must resolve.
 
-    @property
-    def x_mm(self) -> float:
-        """Place of the lowest point along x, mm."""
-        ...
+    Attributes
+    ----------
+    key : name of the object's field
+    length_mm : its value
+    kind : radius of curvature, or wavelength
+    """
 
-    @property
-    def z_mm(self) -> float:
-        """Place of the lowest point along z, mm."""
-        ...
-
-    def height(self, x: Float, z: Float) -> Float:
-        """Height (n,) mm of the surface above its lowest point, at x (n,), z (n,) mm; nan where there is no surface."""
-        ...
-
-    def frame(self, dim: int) -> Float:
-        """Directions (d, d): row 0 the normal into the finger, then the tangents."""
-        ...
-
-    def mirrors(self) -> tuple[str, ...]:
-        """Axes along which the object is its own mirror image about the finger's middle."""
-        ...
-
-    def lowest(self, slide_x: float, slide_z: float) -> tuple[float, float]:
-        """Place (x, z) mm of the lowest point after a slide."""
-        ...
-
-    def landmarks(self) -> Float:
-        """Places (k, 2), x and z mm, of tips and corners that may touch first and that a search could step over."""
-        ...
+    key: str
+    length_mm: float
+    kind: Literal["radius", "wavelength"]
 
 
 def vertical_frame(dim: int) -> Float:
@@ -63,117 +51,196 @@ def _circle(r: Float, radius: float) -> Float:
 
 
 @dataclass(frozen=True)
-class Placed:
-    """What objects share: the place (mm) of their lowest point, and the vertical frame."""
+class RigidObject(ABC):
+    """A rigid object, by default with a vertical gap and one lowest point.
 
-    x_mm: float = 0.0
-    z_mm: float = 0.0
+    Attributes
+    ----------
+    x_mm, z_mm : where the object's lowest point is
+    """
+
+    x_mm: Place = 0.0
+    z_mm: Place = 0.0
+
+    @abstractmethod
+    def height(self, x: Float, z: Float) -> Float:
+        """Return the height (n,) mm of the surface above its lowest point at x (n,), z (n,) mm; nan where there is no
+        surface.
+        """
 
     def frame(self, dim: int) -> Float:
-        """Vertical normal."""
+        """Return the directions (d, d): row 0 the normal into the finger, then the tangents."""
         return vertical_frame(dim)
 
+    def mirrors(self) -> tuple[str, ...]:
+        """Return the axes along which the object is its own mirror image about the finger's middle."""
+        return tuple(a for a, c in (("x", self.x_mm), ("z", self.z_mm)) if c == 0.0)
+
     def lowest(self, slide_x: float, slide_z: float) -> tuple[float, float]:
-        """The placed point, carried along."""
+        """Return the place (x, z) mm of the lowest point after a slide."""
         return self.x_mm + slide_x, self.z_mm + slide_z
 
     def landmarks(self) -> Float:
-        """The lowest point."""
+        """Return the places (k, 2), x and z mm, of tips and corners that may touch first and that a search on a grid
+        could miss.
+        """
         return np.array([[self.x_mm, self.z_mm]])
 
-    def _across(self, x: Float, z: Float, axis: Axis) -> Float:
-        """Distance (n,) from the object's line along `axis`."""
-        return np.abs(x - self.x_mm) if axis == "z" else np.abs(z - self.z_mm)
+    @property
+    def is_flat(self) -> bool:
+        """Whether the surface is one plane."""
+        return False
+
+    @property
+    def detail(self) -> Detail | None:
+        """The shortest length of the surface, or None."""
+        return None
+
+    def read(self) -> RigidObject:
+        """Return the object that a scene's table stands for: the object itself, unless a file holds it."""
+        return self
+
+
+class Prism(RigidObject):
+    """An object whose section is the same all along its field `axis`."""
+
+    axis: Axis
+
+    def across(self, x: Float, z: Float) -> Float:
+        """Return the distance (n,) mm from the line of lowest points."""
+        return np.abs(x - self.x_mm) if self.axis == "z" else np.abs(z - self.z_mm)
 
     def mirrors(self) -> tuple[str, ...]:
-        """Mirror axes of a centred object."""
-        return tuple(a for a, c in (("x", self.x_mm), ("z", self.z_mm)) if c == 0.0)
+        """Return both axes if the object is centred, else the one along which it is constant."""
+        return tuple(sorted({self.axis, *super().mirrors()}))
 
 
 @dataclass(frozen=True)
-class Plane(Placed):
-    """A plane, turned by `tilt` (radians) about z."""
+class Plane(RigidObject):
+    """A plane.
 
-    tilt: float = 0.0
+    Attributes
+    ----------
+    tilt : about z
+    """
+
+    tilt: Annotated[float, Radians(Gt(-90), Lt(90))] = 0.0
 
     def height(self, x: Float, z: Float) -> Float:
-        """Height above the point (x_mm, z_mm)."""
+        """Return the height above the point (x_mm, z_mm)."""
         return math.tan(self.tilt) * (x - self.x_mm) + 0.0 * z
 
     def frame(self, dim: int) -> Float:
-        """The plane's own normal and tangents."""
+        """Return the plane's own normal and tangents."""
         c, s = math.cos(self.tilt), math.sin(self.tilt)
         return np.array([[s, -c, 0.0], [c, s, 0.0], [0.0, 0.0, 1.0]])[:dim, :dim]
 
     def mirrors(self) -> tuple[str, ...]:
-        """A level plane is the same everywhere, a tilted one along z."""
+        """Return both axes for a level plane, z for a tilted one."""
         return ("x", "z") if self.tilt == 0.0 else ("z",)
 
     def lowest(self, slide_x: float, slide_z: float) -> tuple[float, float]:
-        """A plane that slides in itself has no point to carry along."""
+        """Return the placed point: a plane that slides in itself stays what it is."""
         return self.x_mm, self.z_mm
 
-
-@dataclass(frozen=True)
-class Cylinder(Placed):
-    """A round bar along `axis`."""
-
-    radius_mm: float = 1.0
-    axis: Axis = "z"
-
-    def height(self, x: Float, z: Float) -> Float:
-        """Circle across the axis."""
-        return _circle(self._across(x, z, self.axis), self.radius_mm)
-
-    def mirrors(self) -> tuple[str, ...]:
-        """Invariant along its axis."""
-        return tuple(sorted({self.axis, *super().mirrors()}))
+    @property
+    def is_flat(self) -> bool:
+        """Whether the surface is one plane: yes."""
+        return True
 
 
 @dataclass(frozen=True)
-class Sphere(Placed):
-    """A ball."""
+class Cylinder(Prism):
+    """A circular cylinder.
 
-    radius_mm: float = 1.0
+    Attributes
+    ----------
+    radius_mm : radius
+    axis : direction of the cylinder's line
+    """
+
+    radius_mm: Length = field(kw_only=True)
+    axis: Axis = field(default="z", kw_only=True)
 
     def height(self, x: Float, z: Float) -> Float:
-        """Circle around the lowest point."""
+        """Return the height of the circle across the axis."""
+        return _circle(self.across(x, z), self.radius_mm)
+
+    @property
+    def detail(self) -> Detail:
+        """The radius."""
+        return Detail("radius_mm", self.radius_mm, "radius")
+
+
+@dataclass(frozen=True)
+class Sphere(RigidObject):
+    """A sphere.
+
+    Attributes
+    ----------
+    radius_mm : radius
+    """
+
+    radius_mm: Length = field(kw_only=True)
+
+    def height(self, x: Float, z: Float) -> Float:
+        """Return the height of the circle around the lowest point."""
         return _circle(np.hypot(x - self.x_mm, z - self.z_mm), self.radius_mm)
 
+    @property
+    def detail(self) -> Detail:
+        """The radius."""
+        return Detail("radius_mm", self.radius_mm, "radius")
+
 
 @dataclass(frozen=True)
-class Wedge(Placed):
-    """An edge along `axis`; `angle` (radians) between a face and the horizontal, tip rounded by a circle."""
+class Wedge(Prism):
+    """An edge between two faces, rounded by a circle.
 
-    angle: float = math.pi / 6
-    tip_radius_mm: float = 0.0
-    axis: Axis = "z"
+    Attributes
+    ----------
+    angle : between a face and the horizontal
+    tip_radius_mm : of the rounded edge
+    axis : direction of the edge
+    """
+
+    angle: Annotated[float, Radians(Gt(0), Lt(90))] = field(kw_only=True)
+    tip_radius_mm: Zero | Length = field(default=0.0, kw_only=True)
+    axis: Axis = field(default="z", kw_only=True)
 
     def height(self, x: Float, z: Float) -> Float:
-        """Tip circle, then the tangent face."""
-        r = self._across(x, z, self.axis)
+        """Return the height of the tip's circle and of the face tangent to it."""
+        r = self.across(x, z)
         edge = self.tip_radius_mm * math.sin(self.angle)
         tip = self.tip_radius_mm - np.sqrt(self.tip_radius_mm**2 - np.minimum(r, edge) ** 2)
         return tip + math.tan(self.angle) * np.maximum(r - edge, 0.0)
 
-    def mirrors(self) -> tuple[str, ...]:
-        """Invariant along its axis."""
-        return tuple(sorted({self.axis, *super().mirrors()}))
+    @property
+    def detail(self) -> Detail | None:
+        """The radius of a rounded tip."""
+        return Detail("tip_radius_mm", self.tip_radius_mm, "radius") if self.tip_radius_mm > 0.0 else None
 
 
 @dataclass(frozen=True)
-class Wave(Placed):
-    """A cosine of `amplitude_mm` (half of peak to valley) with crests along `axis`, lowest at (x_mm, z_mm)."""
+class Wave(Prism):
+    """A cosine, lowest at (x_mm, z_mm): height = amplitude (1 - cos(2 pi r / wavelength)).
 
-    wavelength_mm: float = 1.0
-    amplitude_mm: float = 0.1
-    axis: Axis = "z"
+    Attributes
+    ----------
+    wavelength_mm : from crest to crest
+    amplitude_mm : half of crest to valley
+    axis : direction of the crests
+    """
+
+    wavelength_mm: Length = field(kw_only=True)
+    amplitude_mm: Zero | Length = field(kw_only=True)
+    axis: Axis = field(default="z", kw_only=True)
 
     def height(self, x: Float, z: Float) -> Float:
-        """amplitude (1 - cos(2 pi r / wavelength))."""
-        r = self._across(x, z, self.axis)
-        return self.amplitude_mm * (1.0 - np.cos(2.0 * math.pi * r / self.wavelength_mm))
+        """Return amplitude (1 - cos(2 pi r / wavelength)), r the distance from a valley's line."""
+        return self.amplitude_mm * (1.0 - np.cos(2.0 * math.pi * self.across(x, z) / self.wavelength_mm))
 
-    def mirrors(self) -> tuple[str, ...]:
-        """Invariant along its crests."""
-        return tuple(sorted({self.axis, *super().mirrors()}))
+    @property
+    def detail(self) -> Detail:
+        """The wavelength."""
+        return Detail("wavelength_mm", self.wavelength_mm, "wavelength")

@@ -8,8 +8,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._ranges import PathName, Scale
 from finger3d.geometry.surface import Triangles
-from finger3d.objects.shapes import Placed
+from finger3d.objects.shapes import RigidObject
 
 Float = NDArray[np.float64]
 
@@ -19,7 +20,7 @@ _MOST = 2_000  # points that are compared with their mirror images
 
 
 @dataclass(frozen=True)
-class MeshObject(Placed):
+class MeshObject(RigidObject):
     """A closed triangulated body, y up as in the scene, moved so that its lowest point lies over (x_mm, z_mm).
 
     Where several points are lowest, the middle of the box around them counts.
@@ -94,3 +95,28 @@ class MeshObject(Placed):
         """The corners of the triangles that look down."""
         down = self.surface.normals[:, 1] < 0.0
         return self.moved.points[np.unique(self.surface.faces[down])][:, ::2]
+
+
+@dataclass(frozen=True)
+class ObjectFile(RigidObject):
+    """A triangulated object in a file.
+
+    Attributes
+    ----------
+    path : .stl, .step and the like, relative to the scene
+    scale : what its lengths are multiplied with, to be mm
+    """
+
+    path: PathName = field(kw_only=True)
+    scale: Scale = field(default=1.0, kw_only=True)
+
+    def height(self, x: Float, z: Float) -> Float:
+        """Refuse: the file is not read yet."""
+        raise TypeError("read() the object first")
+
+    def read(self) -> MeshObject:
+        """Return the object; reads and checks its file."""
+        from finger3d.geometry.files import read_surface
+
+        surface = read_surface(self.path, self.scale)
+        return MeshObject(self.x_mm, self.z_mm, surface=surface, path=self.path, scale=self.scale)

@@ -11,7 +11,6 @@ import numpy as np
 from finger3d._ranges import LONGEST_SLIDE, at_least, at_most
 from finger3d.geometry.design import Design
 from finger3d.mechanics.model import MeshOptions, Model
-from finger3d.objects import Plane, Wave
 from finger3d.scene.messages import dotted, shown
 from finger3d.scene.tables import GaugeTable, LegTable, MeshTable, SceneTable
 
@@ -123,11 +122,12 @@ def chosen(mesh: MeshTable, model: Model, zone: tuple[float, float, float, float
 
 def _detail(model: Model, zone: tuple[float, float, float, float]) -> float:
     """Edge length, mm, at which an object that is not flat has some elements across its contact, or a crest."""
-    if isinstance(model.object, Plane):
+    if model.object.is_flat:
         return math.inf
     x0, x1, z0, z1 = zone
     across = min(x1 - x0, z1 - z0) if model.domain == "solid" else x1 - x0
-    wave = model.object.wavelength_mm if isinstance(model.object, Wave) else math.inf
+    detail = model.object.detail
+    wave = detail.length_mm if detail and detail.kind == "wavelength" else math.inf
     return min(across, wave) / _ACROSS
 
 

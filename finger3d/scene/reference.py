@@ -8,10 +8,10 @@ import typing
 from collections.abc import Iterator
 
 from finger3d.geometry.registry import designs
+from finger3d.objects import OBJECTS, RigidObject
 from finger3d.scene.messages import described, listed, shown
 from finger3d.scene.registry import effect_names, effect_type
 from finger3d.scene.tables import (
-    SHAPES,
     ContactTable,
     DomainTable,
     FrictionTable,
@@ -19,7 +19,6 @@ from finger3d.scene.tables import (
     LegTable,
     MaterialTable,
     MeshTable,
-    ObjectTable,
     TomlTable,
     table_of,
 )
@@ -46,10 +45,10 @@ def _tables() -> Iterator[tuple[str, list[_Row]]]:
     for name, design in designs().items():
         yield f'[finger] geometry = "{name}"', _rows(table_of(design), design)
     yield "[material]", _rows(MaterialTable)
-    common = _rows(ObjectTable)
-    yield "[object]", [("shape", listed(SHAPES), '`"plane"`', "what the finger is pressed on"), *common]
-    for shape, table in SHAPES.items():
-        yield f'[object] shape = "{shape}"', [row for row in _rows(table) if row not in common]
+    common = _rows(table_of(RigidObject), RigidObject)
+    yield "[object]", [("shape", listed(OBJECTS), '`"plane"`', "what the finger is pressed on"), *common]
+    for shape, record in OBJECTS.items():
+        yield f'[object] shape = "{shape}"', [row for row in _rows(table_of(record), record) if row not in common]
     yield "[friction]", _rows(FrictionTable)
     yield "[press] or [[press.leg]]", _rows(LegTable)
     yield "[contact]", _rows(ContactTable)
@@ -66,7 +65,12 @@ def _rows(table: type[TomlTable], documented: type | None = None) -> list[_Row]:
     hints = typing.get_type_hints(table, include_extras=True)
     said = _said(documented or table)
     return [
-        (name, described(hints[name]).replace("|", "\\|"), _default(field), said[name])
+        (
+            name,
+            described(hints[name]).replace("|", "\\|"),
+            _default(field),
+            said.get(name) or said[name.removesuffix("_deg")],
+        )
         for name, field in table.model_fields.items()
     ]
 

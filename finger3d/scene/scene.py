@@ -19,19 +19,18 @@ from finger3d.geometry.design import Design
 from finger3d.geometry.files import SUFFIXES
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import Domain, Gauge, Leg, Material, MeshOptions, Model
-from finger3d.objects import RigidObject, initial_contact
+from finger3d.objects import OBJECTS, RigidObject, initial_contact
 from finger3d.scene import checks, files, tree
 from finger3d.scene.messages import Place, choose, described, dotted, listed, nearest, shown, unknown, worded
 from finger3d.scene.registry import effect_names, effect_type
 from finger3d.scene.tables import (
-    SHAPES,
     FileTable,
     LegsTable,
     LegTable,
-    ObjectTable,
     PressTable,
     SceneTable,
     TomlTable,
+    record_of,
     table_of,
 )
 
@@ -163,8 +162,8 @@ def parse(
     tables = _checked(SceneTable, given, (), found)
     geometry, dimensions = _named(given, "finger", "geometry", designs(), found)
     design = _design(geometry, dimensions, found)
-    shape, placed = _named({**given, "object": _shaped(given.get("object", {}))}, "object", "shape", SHAPES, found)
-    rigid = _object(placed, found)
+    shape, placed = _named({**given, "object": _shaped(given.get("object", {}))}, "object", "shape", OBJECTS, found)
+    rigid = _object(shape, placed, found)
     press = _press(given, found)
     effects = _effects(given, found)
     if found or tables is None or dimensions is None or design is None or press is None or rigid is None:
@@ -247,7 +246,7 @@ def _checked(
 def _built(record: Any, settings: TomlTable, place: Place, found: dict[Place, str]) -> Any:
     """Build a design or an effect; what its own rules refuse is a mistake like any other."""
     try:
-        return record(**dict(settings))
+        return record_of(record, settings)
     except Finger3dError as error:
         found[place] = f"{dotted(place)}: {error}"
         return None
@@ -267,12 +266,12 @@ def _design(geometry: str, dimensions: TomlTable | None, found: dict[Place, str]
         return None
 
 
-def _object(placed: TomlTable | None, found: dict[Place, str]) -> RigidObject | None:
+def _object(shape: str, placed: TomlTable | None, found: dict[Place, str]) -> RigidObject | None:
     """Build the object; what is wrong with its file is a mistake like any other."""
-    if not isinstance(placed, ObjectTable):
+    if placed is None:
         return None
     try:
-        return placed.build()
+        return record_of(OBJECTS[shape], placed).read()
     except Finger3dError as error:
         hint = "; give its path from the scene's folder" if str(error).endswith("there is no such file") else ""
         found["object", "path"] = f"object.path: {error}{hint}"
@@ -325,9 +324,8 @@ def _named(
     elif not isinstance(value, str) or value not in known:
         found[name, key] = choose((name, key), value, list(known))
     else:
-        kind = known[value] if issubclass(known[value], TomlTable) else table_of(known[value])
         rest = {k: v for k, v in given_table.items() if k != key}
-        return value, _checked(kind, rest, (name,), found, also=(key,))
+        return value, _checked(table_of(known[value]), rest, (name,), found, also=(key,))
     return "", None
 
 

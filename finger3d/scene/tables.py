@@ -7,7 +7,7 @@ import functools
 import math
 import types
 import typing
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 from annotated_types import Ge, Gt, Interval, Le, Lt, MinLen
 from pydantic import BaseModel, ConfigDict, create_model
@@ -20,18 +20,17 @@ from finger3d._ranges import (
     Length,
     Modulus,
     Name,
-    PathName,
     Place,
     Poisson,
-    Scale,
+    Radians,
     Seconds,
     Title,
     Zero,
 )
 from finger3d.contact.rules import RuleName
 from finger3d.mechanics.model import Domain
-from finger3d.objects import Axis, Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
 
+Record = TypeVar("Record")
 Steps = Count | Literal["auto"]
 LARGEST = 1e12
 """Largest magnitude of a number of a design or an effect that states no bound of its own."""
@@ -173,153 +172,41 @@ class SceneTable(TomlTable):
     effects: dict[str, Any] = {}
 
 
-class ObjectTable(TomlTable):
-    """What every object has: the place of its lowest point.
-
-    Attributes
-    ----------
-    x_mm, z_mm : where the object's lowest point is
-    """
-
-    x_mm: Place = 0.0
-    z_mm: Place = 0.0
-
-    def build(self) -> RigidObject:
-        """Return the object, angles in radians; every shape says how."""
-        raise TypeError(f"{type(self).__name__} has no shape")
-
-
-class PlaneTable(ObjectTable):
-    """shape = "plane".
-
-    Attributes
-    ----------
-    tilt_deg : about z
-    """
-
-    tilt_deg: Annotated[float, Gt(-90), Lt(90)] = 0.0
-
-    def build(self) -> RigidObject:
-        """Return the plane."""
-        return Plane(self.x_mm, self.z_mm, tilt=math.radians(self.tilt_deg))
-
-
-class CylinderTable(ObjectTable):
-    """shape = "cylinder".
-
-    Attributes
-    ----------
-    radius_mm : radius
-    axis : direction of the cylinder's line
-    """
-
-    radius_mm: Length
-    axis: Axis = "z"
-
-    def build(self) -> RigidObject:
-        """Return the cylinder."""
-        return Cylinder(self.x_mm, self.z_mm, radius_mm=self.radius_mm, axis=self.axis)
-
-
-class SphereTable(ObjectTable):
-    """shape = "sphere".
-
-    Attributes
-    ----------
-    radius_mm : radius
-    """
-
-    radius_mm: Length
-
-    def build(self) -> RigidObject:
-        """Return the sphere."""
-        return Sphere(self.x_mm, self.z_mm, radius_mm=self.radius_mm)
-
-
-class WedgeTable(ObjectTable):
-    """shape = "wedge".
-
-    Attributes
-    ----------
-    angle_deg : between a face and the horizontal
-    tip_radius_mm : of the rounded edge
-    axis : direction of the edge
-    """
-
-    angle_deg: Annotated[float, Gt(0), Lt(90)]
-    tip_radius_mm: Zero | Length = 0.0
-    axis: Axis = "z"
-
-    def build(self) -> RigidObject:
-        """Return the wedge."""
-        angle = math.radians(self.angle_deg)
-        return Wedge(self.x_mm, self.z_mm, angle=angle, tip_radius_mm=self.tip_radius_mm, axis=self.axis)
-
-
-class WaveTable(ObjectTable):
-    """shape = "wave".
-
-    Attributes
-    ----------
-    wavelength_mm : from crest to crest
-    amplitude_mm : half of crest to valley
-    axis : direction of the crests
-    """
-
-    wavelength_mm: Length
-    amplitude_mm: Zero | Length
-    axis: Axis = "z"
-
-    def build(self) -> RigidObject:
-        """Return the wave."""
-        return Wave(
-            self.x_mm, self.z_mm, wavelength_mm=self.wavelength_mm, amplitude_mm=self.amplitude_mm, axis=self.axis
-        )
-
-
-class MeshObjectTable(ObjectTable):
-    """shape = "mesh": any closed surface.
-
-    Attributes
-    ----------
-    path : .stl, .step and the like, relative to the scene
-    scale : what its lengths are multiplied with, to be mm
-    """
-
-    path: PathName
-    scale: Scale = 1.0
-
-    def build(self) -> RigidObject:
-        """Return the object; reads and checks its file."""
-        from finger3d.geometry.files import read_surface
-
-        surface = read_surface(self.path, self.scale)
-        return MeshObject(self.x_mm, self.z_mm, surface=surface, path=self.path, scale=self.scale)
-
-
 class FileTable(TomlTable):
     """[finger] with a file as its geometry: all dimensions are the file's."""
 
 
-SHAPES: dict[str, type[ObjectTable]] = {
-    "plane": PlaneTable,
-    "cylinder": CylinderTable,
-    "sphere": SphereTable,
-    "wedge": WedgeTable,
-    "wave": WaveTable,
-    "mesh": MeshObjectTable,
-}
-
-
 @functools.cache
 def table_of(record: type) -> type[TomlTable]:
-    """Return the strict table of a dataclass: a design's dimensions, or an effect's settings."""
+    """Return the strict table of a dataclass: a design's dimensions, an object's, or an effect's settings."""
     hints = typing.get_type_hints(record, include_extras=True)
     fields: dict[str, Any] = {}
     for f in dataclasses.fields(record):
         default = f.default if f.default_factory is dataclasses.MISSING else f.default_factory()
-        fields[f.name] = (_bounded(hints[f.name]), ... if default is dataclasses.MISSING else default)
+        name, hint = f.name, hints[f.name]
+        if (bounds := _degrees(hint)) is not None:
+            name, hint = f"{name}_deg", Annotated[float, *bounds]
+            default = default if default is dataclasses.MISSING else math.degrees(default)
+        fields[name] = (_bounded(hint), ... if default is dataclasses.MISSING else default)
     return create_model(record.__name__, __base__=TomlTable, **fields)
+
+
+def _degrees(hint: Any) -> tuple[Any, ...] | None:
+    """Return the bounds, in degrees, of a field that holds radians; None for any other."""
+    return next((m.bounds for m in getattr(hint, "__metadata__", ()) if isinstance(m, Radians)), None)
+
+
+def record_of(record: type[Record], settings: TomlTable) -> Record:
+    """Return the dataclass that a table of `table_of` stands for, its angles in radians."""
+    hints = typing.get_type_hints(record, include_extras=True)
+    return record(
+        **{
+            f.name: math.radians(getattr(settings, f"{f.name}_deg"))
+            if _degrees(hints[f.name])
+            else getattr(settings, f.name)
+            for f in dataclasses.fields(record)  # type: ignore[arg-type]
+        }
+    )
 
 
 def _bounded(hint: Any) -> Any:
