@@ -75,14 +75,14 @@ def test_gauges_of_a_body_that_relaxes_are_read_as_a_press_reads_them(problem, b
 def test_a_search_goes_on_with_what_is_kept_and_is_the_same_every_time(problem, tmp_path):
     whole = optimise(replace(problem, budget=10), tmp_path / "whole")
     first = optimise(replace(problem, budget=4), tmp_path / "parts")
-    kept = tmp_path / "parts" / "evaluations.csv"
+    kept = tmp_path / "parts" / "evaluations.jsonl"
     torn = kept.read_text()
-    kept.write_text(torn + "12.5,3")
+    kept.write_text(torn + '{"values": [12.5], "obj')
     second = optimise(replace(problem, budget=10), tmp_path / "parts")
-    assert kept.read_text() == (tmp_path / "whole" / "evaluations.csv").read_text()
+    assert kept.read_text() == (tmp_path / "whole" / "evaluations.jsonl").read_text()
     assert [e.values for e in second.evaluations] == [e.values for e in whole.evaluations]
     assert second.evaluations[: len(first.evaluations)] == first.evaluations
-    with pytest.raises(Finger3dError, match="holds another search"):
+    with pytest.raises(Finger3dError, match="holds the results of another task"):
         optimise(replace(problem, noise=1.0), tmp_path / "parts")
 
 

@@ -70,7 +70,7 @@ def optimise(
         with aside, report:
             found = optimise(problem, out, report)
     except KeyboardInterrupt:
-        complain(f"interrupted; every design judged is kept in {out / 'evaluations.csv'}; the same command goes on")
+        complain(f"interrupted; every design judged is kept in {out}; the same command continues")
         return 130
     if json_:
         print_json(json.loads((out / "design.json").read_text(encoding="utf-8")))

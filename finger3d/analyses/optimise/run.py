@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -25,13 +24,14 @@ from finger3d.analyses.optimise.task import (
 )
 from finger3d.analyses.shared_body import SharedBody, Variant, body_key
 from finger3d.errors import Finger3dError
-from finger3d.io import atomic, claimed, write_json
+from finger3d.io import atomic, claimed, write_csv, write_json
 from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.model import Gauge, Leg, Model
 from finger3d.mechanics.solve import gauge_row
 from finger3d.plotting.optimise import draw
 from finger3d.progress import Progress
 from finger3d.report.optimise import optimise_page
+from finger3d.results.journal import Journal, Row, number_in, opened
 from finger3d.scene import Scene
 
 _INNER = 60  # readings of gauges in one body
@@ -118,9 +118,9 @@ class _Spent(Exception):
 @dataclass
 class _Search:
     problem: OptimisationProblem
-    folder: Path
     report: Progress
     judge: Objective
+    journal: Journal
     known: dict[tuple[float, ...], Evaluation] = field(default_factory=dict)
     done: list[Evaluation] = field(default_factory=list)
     bodies: int = 0
@@ -129,12 +129,10 @@ class _Search:
     _pressed: dict[str, _Pressed] = field(default_factory=dict)
 
     def evaluate(self, values: Sequence[float] | Float) -> Evaluation:
-        """Judge a design, or remember it; every new one is a line of evaluations.csv at once."""
+        """Judge a design, unless that was done before; a new one is appended to the journal at once."""
         place = tuple(float(v) for v in values)
         if place not in self.known:
-            found = self._judged(place)
-            self.known[place] = found
-            self._write(found)
+            self._keep(self._judged(place))
         found = self.known[place]
         self.done.append(found)
         return found
@@ -218,30 +216,22 @@ class _Search:
         left = increment_error(problem, strain(problem), legs != model.legs, strain)
         return {"steps": [leg.steps for leg in legs], "chosen": legs != model.legs, "strain_error": float(left.max())}
 
-    def _write(self, found: Evaluation) -> None:
-        path = self.folder / "evaluations.csv"
+    def _keep(self, found: Evaluation) -> None:
+        self.known[found.values] = found
         try:
-            with path.open("a", newline="", encoding="utf-8") as file:
-                writer = csv.writer(file, lineterminator="\n")
-                if file.tell() == 0:
-                    writer.writerow([*(f.key for f in self.problem.free), "objective", "outcome"])
-                writer.writerow([*found.values, found.value, found.outcome])
+            self.journal.append({"values": list(found.values), "objective": found.value, "outcome": found.outcome})
         except OSError as error:
-            raise Finger3dError(f"cannot write {path}: {error.strerror}; choose another place with --out") from None
+            raise Finger3dError(
+                f"cannot write {self.journal.path}: {error.strerror}; choose another place with --out"
+            ) from None
 
-    def load(self) -> None:
-        """Remember what an earlier run has judged; a line that was cut short is left out, and the file mended."""
-        path, count = self.folder / "evaluations.csv", len(self.problem.free)
-        if not path.exists():
-            return
-        with path.open(newline="", encoding="utf-8") as file:
-            lines = list(csv.reader(file))
-        kept = [line for line in lines[1:] if len(line) == count + 2 and line[-1]]
-        for line in kept:
-            numbers = tuple(float(v) for v in line[: count + 1])
-            self.known[numbers[:-1]] = Evaluation(numbers[:-1], numbers[-1], line[-1])
-        with atomic(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-            csv.writer(file, lineterminator="\n").writerows([*lines[:1], *kept])
+    def write_table(self, path: Path) -> None:
+        """Write every design that was judged as a line of a CSV file."""
+        judged = list(self.known.values())
+        columns: dict[str, list[float] | list[str]] = {
+            key.key: [e.values[i] for e in judged] for i, key in enumerate(self.problem.free)
+        }
+        write_csv(path, {**columns, "objective": [e.value for e in judged], "outcome": [e.outcome for e in judged]})
 
     def best(self) -> Evaluation | None:
         """The largest objective so far."""
@@ -316,77 +306,121 @@ def _minimise(method: str, cost: Callable[[Float], float], free: Sequence[FreeKe
 
 
 def optimise(problem: OptimisationProblem, out: str | Path, report: Progress | None = None) -> OptimisationResult:
-    """Search within the bounds for the largest objective; every design judged is kept at once.
+    """Search within the bounds for the design with the largest objective.
 
     Parameters
     ----------
-    out : folder for evaluations.csv, best.toml, design.json, design.png and report.html; that of the same search is
-        gone on with
+    out : folder for evaluations.jsonl (every design as soon as it is judged), evaluations.csv, best.toml, design.json,
+        design.png and report.html; the same search is continued there
 
     Raises
     ------
     Finger3dError
-        For a mistake in the problem, or if no design within the bounds could be built.
+        For a mistake in the problem, or if no design within the bounds can be built.
     """
     report = report or Progress()
     judge = objective_of(problem.objective)
     start = checked_start(problem)
-    with claimed(out, "optimise") as folder:
-        return _searched(problem, folder, report, judge, start)
+    with (
+        claimed(out, "optimise") as folder,
+        opened(folder / "evaluations.jsonl", folder / "search.json", problem.identity(), _mistake(problem)) as journal,
+    ):
+        for name in ("design.png", "report.html"):
+            (folder / name).unlink(missing_ok=True)
+        known = {e.values: e for e in map(_evaluation, journal.rows)}
+        search = _Search(problem, report, judge, journal, known)
+        first = _searched(search, folder, start)
+        return _written(search, folder, first)
 
 
-def _searched(
-    problem: OptimisationProblem, folder: Path, report: Progress, judge: Objective, start: tuple[float, ...]
-) -> OptimisationResult:
-    _same(problem, folder)
-    for name in ("design.png", "report.html"):
-        (folder / name).unlink(missing_ok=True)
-    run = _Search(problem, folder, report, judge)
-    run.load()
-    if run.known:
-        report.say(f"{len(run.known)} designs are kept from before")
-        run.begin(start)
-    report.stage("searching")
-    first = run.evaluate(start)
+def _searched(search: _Search, folder: Path, start: tuple[float, ...]) -> Evaluation:
+    """Search, and write the best design even if interrupted; return the evaluation of the start."""
+    if search.known:
+        search.report.say(f"{len(search.known)} designs are kept from an earlier run")
+        search.begin(start)
+    search.report.stage("searching")
     try:
-        run.run(start)
+        first = search.evaluate(start)
+        search.run(start)
     finally:
-        best = run.best()
+        if search.known:
+            search.write_table(folder / "evaluations.csv")
+        best = search.best()
         if best is not None:
-            _write_best(problem, folder, best, first, run)
+            _write_best(search, folder, best, search.done[0])
+    return first
+
+
+def _written(search: _Search, folder: Path, first: Evaluation) -> OptimisationResult:
+    """Write the best design with its increments, the figure and the page."""
+    problem, best = search.problem, search.best()
     if best is None:
         raise Finger3dError(f"optimise: no design within the bounds gives a number; the first: {first.outcome}")
-    report.stage("increments of the best")
-    _write_best(problem, folder, best, first, run, run.increments(best.values))
-    judged = tuple(run.known.values())
+    search.report.stage("increments of the best")
+    _write_best(search, folder, best, first, search.increments(best.values))
+    judged = tuple(search.known.values())
     draw(
-        folder / "design.png", [f.key for f in problem.free], [e.values for e in judged], [e.value for e in judged],
-        first.values, Path(problem.objective).stem,
-    )  # fmt: skip
+        folder / "design.png",
+        [f.key for f in problem.free],
+        [e.values for e in judged],
+        [e.value for e in judged],
+        first.values,
+        Path(problem.objective).stem,
+    )
     optimise_page(folder)
-    return OptimisationResult(best, first, tuple(run.done), len(judged), run.bodies, problem.scene(best.values))
+    return OptimisationResult(
+        best=best,
+        start=first,
+        evaluations=tuple(search.done),
+        judged=len(judged),
+        bodies=search.bodies,
+        scene=problem.scene(best.values),
+    )
 
 
-def _same(problem: OptimisationProblem, folder: Path) -> None:
-    wanted = json.loads(json.dumps(problem.identity()))
-    path = folder / "search.json"
-    if path.exists() and json.loads(path.read_text(encoding="utf-8")) != wanted:
-        raise Finger3dError(f"--out {folder}: holds another search; name another folder")
-    write_json(path, wanted)
+def _mistake(problem: OptimisationProblem) -> Callable[[object], str]:
+    """Return what finds a mistake in a line of evaluations.jsonl."""
+
+    def found(row: object) -> str:
+        if not isinstance(row, dict):
+            return "is no JSON object"
+        values = row.get("values")
+        if not isinstance(values, list) or len(values) != len(problem.free):
+            return f"values must be {len(problem.free)} numbers"
+        if not all(isinstance(v, float) for v in (*values, row.get("objective"))):
+            return "values and objective must be numbers"
+        return "" if isinstance(row.get("outcome"), str) else "outcome must be text"
+
+    return found
+
+
+def _evaluation(row: Row) -> Evaluation:
+    values = row["values"]
+    assert isinstance(values, list)
+    return Evaluation(tuple(values), number_in(row, "objective"), str(row["outcome"]))
 
 
 def _write_best(
-    problem: OptimisationProblem, folder: Path, best: Evaluation, first: Evaluation, run: _Search,
-    increments: Mapping[str, Any] | None = None,
-) -> None:  # fmt: skip
+    search: _Search,
+    folder: Path,
+    best: Evaluation,
+    first: Evaluation,
+    increments: Mapping[str, object] | None = None,
+) -> None:
+    problem = search.problem
     with atomic(folder / "best.toml") as path:
         path.write_text(problem.scene(best.values).to_toml(defaults=False), encoding="utf-8")
     names = [f.key for f in problem.free]
     write_json(
         folder / "design.json",
         {
-            "objective": problem.objective, "best": best.value, "values": dict(zip(names, best.values, strict=True)),
-            "start": first.value, "start_values": dict(zip(names, first.values, strict=True)),
-            "designs": len(run.done), "bodies": run.bodies, "increments": increments or {},
+            "objective": problem.objective,
+            "best": best.value,
+            "values": dict(zip(names, best.values, strict=True)),
+            "start": first.value,
+            "start_values": dict(zip(names, first.values, strict=True)),
+            "designs": len(search.done),
+            "bodies": search.bodies,
+            "increments": increments or {},
         },
-    )  # fmt: skip
+    )
