@@ -17,7 +17,7 @@ from finger3d.analyses.calibrate import tolerances as slopes
 from finger3d.analyses.calibrate.run import calibrate, calibrated
 from finger3d.analyses.calibrate.tolerances import TOLERANCES, with_modulus
 from finger3d.analyses.reduced import ReducedModel
-from finger3d.contact import initial_guess
+from finger3d.contact import acceleration
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Leg
@@ -78,8 +78,8 @@ def test_presses_started_from_their_neighbours_end_where_cold_ones_do(
     sizes = {"size_mm": mesh[0], "base_size_mm": mesh[1], "mesher": "swept"}
     problem = build(scene(model={"domain": domain}, mesh=sizes).model())
     sought: list[Any] = []
-    active_set = initial_guess._normal
-    monkeypatch.setattr(initial_guess, "_normal", lambda *args: (sought.append(args), active_set(*args))[1])
+    active_set = acceleration._normal_contact
+    monkeypatch.setattr(acceleration, "_normal_contact", lambda *args: (sought.append(args), active_set(*args))[1])
     cold = {mu: pressing.press(problem, mu) for mu in runs.MUS}
     alone = len(sought)
     assert alone == 4 * len(runs.MUS)  # each of four increments

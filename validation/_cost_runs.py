@@ -22,12 +22,12 @@ def prepare() -> None:
     import scipy.special  # noqa: F401 - a quadrature rule of linear elements takes it, and half a second
     from pypardiso import PyPardisoSolver
 
-    from finger3d.contact.threads import threads_for
+    from finger3d.contact.acceleration import threads_for
     from finger3d.fem.pardiso import available
 
     if available():
         PyPardisoSolver().libmkl.MKL_Get_Max_Threads()
-    threads_for(1, lapack=True)
+    threads_for(1)
     designs()
 
 

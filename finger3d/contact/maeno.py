@@ -1,7 +1,7 @@
-"""The paper's rule to the letter: swap every node that violates its equation, and solve again (Maeno 2004, Sec. II-A).
+"""Active-set rule of Maeno 2004, Sec. II-A: change every point that violates its equation, and solve again.
 
-Kept for reproduction.  It has no way back from slip to stick within an increment, does not ask that friction oppose
-slip, and repeats states where the mesh is fine or nu is high; an increment that does so is reported as cycled.
+Kept for reproduction.  Within an increment a slipping point never returns to stick, friction need not oppose slip, and
+on fine meshes or at high nu the active sets repeat; such an increment is reported as cycled.
 """
 
 from __future__ import annotations
@@ -9,15 +9,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.contact.conditions import TOLERANCE, ContactProblem, augmentation_parameters, residual
+from finger3d.contact.conditions import TOLERANCE, ContactProblem, residual
 from finger3d.contact.friction import OPEN, SLIP, STICK, FrictionLaw
 from finger3d.contact.newton import force_of_sets
-from finger3d.contact.state import ContactSolution, ContactState, invalid_input, next_state, pressure
+from finger3d.contact.state import ContactSolution, ContactState, invalid_input, next_state
 from finger3d.errors import Outcome
 
 Float = NDArray[np.float64]
 
-_LIMIT = 500
+_MAX_ITERATIONS = 500
 
 
 def maeno_active_set(
@@ -30,53 +30,40 @@ def maeno_active_set(
     weights: Float | None = None,
     area: Float | None = None,
 ) -> ContactSolution:
-    """Solve one increment by the paper's swaps; arguments as for `advance`; the guess is not used.
+    """Solve one increment by the paper's rule.
 
-    A cycled increment hands on the last state it tried, so that a run can go on and show what became of it.
+    Arguments as in `finger3d.contact.solve.solve_increment`; the guess is not used, and the friction coefficients stay
+    those at the beginning of the increment.  A cycled increment returns the last state that was tried.
     """
     c, d = free.shape
-    matrix = compliance.reshape(c * d, c * d)
-    refused = invalid_input(free, matrix, weights is None)
+    refused = invalid_input(free, compliance, weights is None)
     if refused:
         return ContactSolution(previous, refused, np.inf, 0, "none")
-    change = free.copy()
-    change[:, 1:] -= previous.tangential_displacement
-    mu = law.coefficients(previous.status, pressure(previous.force, area))
-    rho = augmentation_parameters(matrix, d) if weights is None else weights
-    problem = ContactProblem(change, matrix, mu, rho, length_scale)
-    # in the last time frame's contact: stuck; all others: free
+    problem = ContactProblem.of(previous, free, compliance, law, length_scale, weights, area)
+    mu = problem.friction
+    # points that touched at the end of the last increment stick, all others are open
     status = np.where(previous.status == OPEN, OPEN, STICK).astype(np.int8)
     direction = np.zeros((c, d))
-    seen = set()
-    for iteration in range(1, _LIMIT + 1):
+    seen: set[bytes] = set()
+    outcome = Outcome.CYCLED
+    for iteration in range(1, _MAX_ITERATIONS + 1):  # noqa: B007  the count is part of the result
         seen.add(status.tobytes())
         force = force_of_sets(problem, status, direction)
-        moved = problem.relative_displacement(force)
+        displacement = problem.relative_displacement(force)
         length = np.linalg.norm(force[:, 1:], axis=1)
-        swapped = status.copy()
-        swapped[(status == OPEN) & (moved[:, 0] < 0.0)] = STICK
-        swapped[(status != OPEN) & (force[:, 0] <= 0.0)] = OPEN
-        slips = (status == STICK) & (swapped == STICK) & ((length >= mu * force[:, 0]) | (mu == 0.0))
-        swapped[slips] = SLIP
+        changed = status.copy()
+        changed[(status == OPEN) & (displacement[:, 0] < 0.0)] = STICK
+        changed[(status != OPEN) & (force[:, 0] <= 0.0)] = OPEN
+        slips = (status == STICK) & (changed == STICK) & ((length >= mu * force[:, 0]) | (mu == 0.0))
+        changed[slips] = SLIP
         direction[slips, 1:] = force[slips, 1:]
-        if np.array_equal(swapped, status):
-            return _judged(previous, problem, force, moved, status, iteration)
-        status = swapped
+        if np.array_equal(changed, status):  # Eqs. (1)-(4) hold, but friction need not oppose slip
+            outcome = Outcome.CONVERGED
+            break
+        status = changed
         if status.tobytes() in seen:
             break
-    error = residual(force, moved, status, mu, length_scale)
-    return ContactSolution(next_state(previous, force, moved, status), Outcome.CYCLED, error, iteration, "paper")
-
-
-def _judged(
-    previous: ContactState,
-    problem: ContactProblem,
-    force: Float,
-    moved: Float,
-    status: NDArray[np.int8],
-    iterations: int,
-) -> ContactSolution:
-    """Eqs. (1)-(4) hold; whether friction also opposes slip decides if the step may call itself converged."""
-    error = residual(force, moved, status, problem.friction, problem.length_scale)
-    outcome = Outcome.CONVERGED if error <= TOLERANCE else Outcome.WRONG_WAY
-    return ContactSolution(next_state(previous, force, moved, status), outcome, error, iterations, "paper")
+    error = residual(force, displacement, status, mu, length_scale)
+    if outcome is Outcome.CONVERGED and error > TOLERANCE:
+        outcome = Outcome.WRONG_WAY
+    return ContactSolution(next_state(previous, force, displacement, status), outcome, error, iteration, "paper")

@@ -84,9 +84,9 @@ def next_state(previous: ContactState, force: Float, moved: Float, status: NDArr
 
 
 def invalid_input(free: Float, compliance: Float, definite: bool = True) -> Outcome | None:
-    """Why an increment cannot be tried at all: NaN, or a compliance (c d, c d) with a direction that is not held."""
+    """Why an increment cannot be tried at all: NaN, or a compliance (c, d, c, d) with a direction that is not held."""
     if not (np.isfinite(free).all() and np.isfinite(compliance).all()):
         return Outcome.NOT_FINITE
-    if definite and np.diagonal(compliance).min(initial=np.inf) <= 0.0:
+    if definite and np.diagonal(compliance.reshape(free.size, free.size)).min(initial=np.inf) <= 0.0:
         return Outcome.INDEFINITE
     return None

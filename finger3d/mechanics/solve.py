@@ -16,10 +16,10 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from finger3d._machine import cores
+from finger3d.contact.acceleration import one_thread
 from finger3d.contact.friction import SLIP
 from finger3d.contact.rules import STEP_DEPENDENT_RULES
 from finger3d.contact.state import ContactSolution, ContactState
-from finger3d.contact.threads import one_thread
 from finger3d.fem.assembly import Elasticity, stiffness
 from finger3d.fem.condense import condense, stiffened
 from finger3d.fem.simplex import Mesh, unfold
@@ -340,7 +340,7 @@ def map_parallel(
         return
     waiting = iter(variants)
     # The limit on threads is set once around the pool: a limit set by a press would undo that of another.
-    with one_thread(problem.dim > 2), ThreadPoolExecutor(at_once) as pool:
+    with one_thread(), ThreadPoolExecutor(at_once) as pool:
 
         def submitted(count: int) -> list[Future[Result]]:
             return [
