@@ -4,10 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from build123d import Face
+    from OCP.Geom import Geom_Surface
+    from OCP.gp import gp_Dir, gp_Pnt
+    from OCP.ShapeAnalysis import ShapeAnalysis_Surface
 
 Float = NDArray[np.float64]
 
@@ -73,12 +79,12 @@ def _round(out: Float, radius: float) -> tuple[Float, Float]:
 
 @dataclass(frozen=True)
 class Freeform:
-    """Any other CAD surface, by projection: some 0.1 to 0.5 ms a point. Past its border it goes on as its tangents."""
+    """Another CAD surface, by projection: some 0.1 to 0.5 ms a point. Past its border it goes on as its tangents."""
 
-    geometry: Any
+    geometry: Geom_Surface
 
     @cached_property
-    def _nearest(self) -> Any:
+    def _nearest(self) -> ShapeAnalysis_Surface:
         from OCP.ShapeAnalysis import ShapeAnalysis_Surface
 
         return ShapeAnalysis_Surface(self.geometry)
@@ -99,7 +105,7 @@ class Freeform:
         return distance, normal
 
 
-def surface_of(face: Any, exact: tuple[float, ...] = (0.0,)) -> ImplicitSurface:
+def surface_of(face: Face, exact: tuple[float, ...] = (0.0,)) -> ImplicitSurface:
     """The surface under a build123d face; a plane's constant coordinate becomes the number in `exact` it stands for."""
     from OCP.BRep import BRep_Tool
     from OCP.BRepAdaptor import BRepAdaptor_Surface
@@ -126,5 +132,5 @@ def surface_of(face: Any, exact: tuple[float, ...] = (0.0,)) -> ImplicitSurface:
     return Freeform(BRep_Tool.Surface_s(face.wrapped))
 
 
-def _vector(v: Any) -> Float:
+def _vector(v: gp_Pnt | gp_Dir) -> Float:
     return np.array([v.X(), v.Y(), v.Z()])

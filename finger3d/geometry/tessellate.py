@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.geometry.cad import labelled_faces
 from finger3d.geometry.implicit import ImplicitSurface, surface_of
+
+if TYPE_CHECKING:
+    from build123d import Face, Solid
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -59,7 +62,9 @@ class Tessellation:
         return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
 
 
-def tessellate(solid: Any, tolerance_mm: float, angle: float = 0.5, exact: tuple[float, ...] = (0.0,)) -> Tessellation:
+def tessellate(
+    solid: Solid, tolerance_mm: float, angle: float = 0.5, exact: tuple[float, ...] = (0.0,)
+) -> Tessellation:
     """Tessellate a build123d solid within `tolerance_mm` (absolute) and `angle` radians between facets.
 
     build123d's own `tessellate` and `export_stl` take a relative tolerance and reuse what was tessellated before.
@@ -74,7 +79,7 @@ def tessellate(solid: Any, tolerance_mm: float, angle: float = 0.5, exact: tuple
     return Tessellation(points, triangles, face, known, points[many], sets)
 
 
-def triangulated(solid: Any, faces: list[Any], tolerance_mm: float, angle: float) -> tuple[Float, Int, Int]:
+def triangulated(solid: Solid, faces: list[Face], tolerance_mm: float, angle: float) -> tuple[Float, Int, Int]:
     """Points (n, 3) mm and outward triangles (m, 3) of a solid, welded, and the number (m,) of each one's face.
 
     Absolute tolerances: mm, and radians between facets; nothing cached is used.
@@ -99,7 +104,7 @@ def triangulated(solid: Any, faces: list[Any], tolerance_mm: float, angle: float
     return points, triangles[good], face[good]
 
 
-def _triangulation(face: Any) -> tuple[Float, Int]:
+def _triangulation(face: Face) -> tuple[Float, Int]:
     """Points (n, 3) and outward triangles (m, 3) of one face."""
     from OCP.BRep import BRep_Tool
     from OCP.TopAbs import TopAbs_REVERSED
@@ -114,7 +119,7 @@ def _triangulation(face: Any) -> tuple[Float, Int]:
     return points, triangles[:, ::-1] if face.wrapped.Orientation() == TopAbs_REVERSED else triangles
 
 
-def _cad_face(face: Any, points: Float, triangles: Int, surface: ImplicitSurface) -> CadFace:
+def _cad_face(face: Face, points: Float, triangles: Int, surface: ImplicitSurface) -> CadFace:
     corners = points[triangles]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     largest = int(np.argmax(np.linalg.norm(area, axis=1)))

@@ -1,48 +1,38 @@
-"""Unstructured meshes on disk, by a hash of everything that shaped them; fTetWild gives another mesh every time."""
+"""Cache of unstructured meshes, keyed by everything that shapes them; fTetWild does not reproduce its meshes."""
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import inspect
 import json
 import os
-import struct
-import tempfile
-import zipfile
-import zlib
 from importlib import metadata
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from finger3d.errors import Finger3dError
 from finger3d.fem.simplex import Mesh
 from finger3d.geometry.design import Design
+from finger3d.io import atomic, read_arrays
 from finger3d.meshing.options import MeshSizes, Zone
 from finger3d.meshing.report import content_hash
 
 FORMAT = 1
-"""Raise this when meshes made by an older finger3d must not be used any more."""
+"""Version of the stored meshes; a new number makes all cached meshes unused."""
 
 _PACKAGES = ("pytetwild", "build123d")
 
-# What np.load and Mesh raise for a file that is cut short, no archive, a single array (.npy), or of other arrays.
-_DAMAGED = (
-    OSError, EOFError, AttributeError, IndexError, KeyError, NotImplementedError, RuntimeError, TypeError, ValueError,
-    struct.error, zipfile.BadZipFile, zlib.error,
-)  # fmt: skip
-
 
 def folder() -> Path:
-    """Where meshes are kept: FINGER3D_CACHE, or the user's cache folder."""
+    """Return the folder of cached meshes: in FINGER3D_CACHE, or in the user's cache folder."""
     from platformdirs import user_cache_dir
 
     return Path(os.environ.get("FINGER3D_CACHE") or user_cache_dir("finger3d")) / "meshes"
 
 
 def key(design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...]) -> str:
-    """SHA-256 of the design (its dimensions and its file), the sizes, the zone, the symmetry, and the versions."""
+    """Return the SHA-256 of the design and its source file, the sizes, the zone, the symmetry, and the versions."""
     try:
         code = hashlib.sha256(Path(inspect.getfile(type(design))).read_bytes()).hexdigest()
     except (OSError, TypeError):  # a design typed at a prompt has no file
@@ -70,45 +60,35 @@ def _version(name: str) -> str:
 
 
 def load(path: Path) -> tuple[Mesh, float] | None:
-    """A mesh and the CAD volume (mm3) of the whole body; None if there is none, or the file is damaged."""
+    """Return a mesh and the CAD volume (mm3) of the whole body; None if there is no file, or a damaged one."""
     try:
-        with np.load(path, allow_pickle=False) as data:
-            facets = {name[7:]: data[name] for name in data.files if name.startswith("facets_")}
-            mesh = Mesh(data["points"], data["cells"], facets)
-            if str(data["hash"]) != _sealed(mesh):
-                return None
-            return mesh, float(data["cad_volume_mm3"])
-    except _DAMAGED:
+        arrays = read_arrays(path)
+        facets = {name[7:]: array for name, array in arrays.items() if name.startswith("facets_")}
+        mesh = Mesh(arrays["points"], arrays["cells"], facets)
+        return (mesh, float(arrays["cad_volume_mm3"])) if str(arrays["hash"]) == _checksum(mesh) else None
+    except (OSError, ValueError, TypeError, KeyError, IndexError, AttributeError):  # or an archive of other arrays
         return None
 
 
 def save(path: Path, mesh: Mesh, cad_volume_mm3: float) -> bool:
-    """Write a mesh under another name, then rename it, so that nobody reads half a file; False if the disk refuses."""
-    arrays: dict[str, Any] = {f"facets_{label}": f for label, f in mesh.facets.items()}
-    temporary = None
+    """Write a mesh whole or not at all; return False if it cannot be written."""
+    arrays = {
+        "points": mesh.points,
+        "cells": mesh.cells,
+        "hash": np.array(_checksum(mesh)),
+        "cad_volume_mm3": np.array(cad_volume_mm3),
+        **{f"facets_{label}": facets for label, facets in mesh.facets.items()},
+    }
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(suffix=".npz", prefix=".", dir=path.parent)
-        with os.fdopen(handle, "wb") as file:
-            np.savez(
-                file,
-                points=mesh.points,
-                cells=mesh.cells,
-                hash=np.array(_sealed(mesh)),
-                cad_volume_mm3=np.array(cad_volume_mm3),
-                **arrays,
-            )
-        os.replace(temporary, path)
-    except OSError:
-        if temporary is not None:
-            with contextlib.suppress(OSError):
-                os.unlink(temporary)
+        with atomic(path) as temporary, temporary.open("wb") as file:
+            np.savez(file, allow_pickle=False, **arrays)
+    except Finger3dError:
         return False
     return True
 
 
-def _sealed(mesh: Mesh) -> str:
-    """A hash over facets too."""
+def _checksum(mesh: Mesh) -> str:
+    """Return the SHA-256 of points, cells and facets."""
     digest = hashlib.sha256(content_hash(mesh).encode())
     for label in sorted(mesh.facets):
         digest.update(label.encode())

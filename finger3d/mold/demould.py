@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from build123d import Face, Shape, Solid
 
 Float = NDArray[np.float64]
 
@@ -13,18 +16,18 @@ _LEVEL = 1e-6  # mm
 _BEHIND = 1e-6  # of a unit normal
 
 
-def box(body: Any) -> tuple[Float, Float]:
+def box(body: Shape) -> tuple[Float, Float]:
     """Low and high corner (3,), mm, of a build123d shape."""
     found = body.bounding_box(optimal=True)
     return np.array([*found.min]), np.array([*found.max])
 
 
-def is_base(face: Any) -> bool:
+def is_base(face: Face) -> bool:
     """Whether a face is the finger's base, which the lid covers."""
     return bool(face.is_planar) and abs(face.center().Y) < _LEVEL and face.normal_at(face.center()).Y < -0.5
 
 
-def undercuts(solid: Any, split: str, at_mm: float) -> str:
+def undercuts(solid: Solid, split: str, at_mm: float) -> str:
     """Where a body reaches behind a half that opens along an axis, in words; empty if it does not.
 
     A half can be drawn off along +d if the normal n of the body it encloses has n . d >= 0 everywhere, the lid's side
@@ -55,7 +58,7 @@ def undercuts(solid: Any, split: str, at_mm: float) -> str:
     return ""
 
 
-def _normals(face: Any) -> tuple[Float, Float]:
+def _normals(face: Face) -> tuple[Float, Float]:
     """Points (n, 3) mm of a face, and outward unit normals (n, 3)."""
     from OCP.BRep import BRep_Tool
     from OCP.BRepGProp import BRepGProp_Face

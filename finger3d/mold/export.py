@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from finger3d.errors import Finger3dError
 from finger3d.geometry.imported import Imported
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from build123d import Solid
 
     from finger3d.geometry.design import Design
+    from finger3d.mold.parts import Mold
     from finger3d.mold.shell import Shell
     from finger3d.scene import Scene
 
@@ -134,7 +135,7 @@ def _clear(out: Path) -> None:
         (out / name).unlink(missing_ok=True)
 
 
-def _mold(scene: Scene, solid: Any, options: MoldOptions) -> Any:
+def _mold(scene: Scene, solid: Solid, options: MoldOptions) -> Mold:
     from finger3d.mold.parts import foils, mold
 
     embedded = scene.effects.get("embedded_gauge")

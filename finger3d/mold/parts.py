@@ -20,7 +20,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,9 @@ from finger3d.mechanics.model import Gauge
 from finger3d.mold.demould import box, is_base, undercuts
 from finger3d.mold.options import RIM_MM, MoldOptions
 from finger3d.mold.shell import volume
+
+if TYPE_CHECKING:
+    from build123d import Shape, Solid
 
 Float = NDArray[np.float64]
 
@@ -92,15 +95,15 @@ class Mold:
     """
 
     options: MoldOptions
-    body: Any
-    parts: dict[str, Any]
-    slots: tuple[Any, ...]
+    body: Solid
+    parts: dict[str, Solid]
+    slots: tuple[Solid, ...]
     foils: tuple[FoilSlot, ...]
     ports: Ports
-    pegs: tuple[Any, ...]
-    holes: tuple[Any, ...]
-    lid_pegs: tuple[Any, ...]
-    lid_holes: tuple[Any, ...]
+    pegs: tuple[Solid, ...]
+    holes: tuple[Solid, ...]
+    lid_pegs: tuple[Solid, ...]
+    lid_holes: tuple[Solid, ...]
     outline: tuple[Float, Float]
 
     @property
@@ -109,7 +112,7 @@ class Mold:
         return volume(self.body)
 
 
-def mold(solid: Any, gauges: Sequence[FoilSlot], options: MoldOptions) -> Mold:
+def mold(solid: Solid, gauges: Sequence[FoilSlot], options: MoldOptions) -> Mold:
     """Build a mold around a finger (y up, base on y = 0, mm).
 
     Raises
@@ -142,7 +145,7 @@ def mold(solid: Any, gauges: Sequence[FoilSlot], options: MoldOptions) -> Mold:
     return made
 
 
-def _assemble(body: Any, foils: tuple[FoilSlot, ...], options: MoldOptions) -> Mold:
+def _assemble(body: Solid, foils: tuple[FoilSlot, ...], options: MoldOptions) -> Mold:
     low, high = box(body)
     w, split = options.wall_mm, options.split_mm * options.scale
     places, top = _peg_places(low, high, options)
@@ -172,14 +175,14 @@ def _assemble(body: Any, foils: tuple[FoilSlot, ...], options: MoldOptions) -> M
     return Mold(options, body, parts, slots, foils, ports, pegs, holes, lid_pegs, lid_holes, (outer_low, outer_high))
 
 
-def _between(low: Float, high: Float) -> Any:
+def _between(low: Float, high: Float) -> Solid:
     from build123d import Box, Pos
 
     size, middle = high - low, 0.5 * (low + high)
     return Pos(*map(float, middle)) * Box(*map(float, size))
 
 
-def _peg(at: tuple[float, float, float], diameter: float, length: float) -> Any:
+def _peg(at: tuple[float, float, float], diameter: float, length: float) -> Solid:
     """A cylinder along z from a point."""
     from build123d import Align, Cylinder, Pos
 
@@ -187,7 +190,7 @@ def _peg(at: tuple[float, float, float], diameter: float, length: float) -> Any:
     return Pos(*map(float, at)) * Cylinder(diameter / 2.0, length, align=centre)
 
 
-def _upright(at: tuple[float, float, float], diameter: float, length: float) -> Any:
+def _upright(at: tuple[float, float, float], diameter: float, length: float) -> Solid:
     """A cylinder along y from a point."""
     from build123d import Align, Cylinder, Pos, Rot
 
@@ -205,20 +208,20 @@ def _peg_places(low: Float, high: Float, options: MoldOptions) -> tuple[list[tup
     return [(x, y) for y in rows for x in sides], max(float(high[1]) + w, far + around)
 
 
-def _slot(foil: FoilSlot, options: MoldOptions, z_low: float, z_high: float) -> Any:
+def _slot(foil: FoilSlot, options: MoldOptions, z_low: float, z_high: float) -> Solid:
     """The strip with its gaps, through both walls; where it lies is scaled, the strip itself does not shrink."""
     gap = 2.0 * options.slot_gap_mm
     return _strip(foil, options.scale, foil.length_mm + gap, foil.thickness_mm + gap, float(z_low), float(z_high))
 
 
-def _strip(foil: FoilSlot, scale: float, length: float, thickness: float, z_low: float, z_high: float) -> Any:
+def _strip(foil: FoilSlot, scale: float, length: float, thickness: float, z_low: float, z_high: float) -> Solid:
     from build123d import Box, Pos, Rot
 
     at = Pos(foil.x_mm * scale, foil.y_mm * scale, 0.5 * (z_low + z_high))
     return at * Rot(0, 0, float(np.degrees(foil.angle))) * Box(length, thickness, z_high - z_low)
 
 
-def _ports(body: Any, options: MoldOptions) -> Ports:
+def _ports(body: Solid, options: MoldOptions) -> Ports:
     """Openings as large as the base allows, or as asked for."""
     base = [f for f in body.faces() if is_base(f)]
     corners = np.array([[*getattr(f.bounding_box(optimal=True), end)] for f in base for end in ("min", "max")])
@@ -249,7 +252,7 @@ def _ports(body: Any, options: MoldOptions) -> Ports:
     return ports
 
 
-def _openings(ports: Ports, options: MoldOptions) -> list[Any]:
+def _openings(ports: Ports, options: MoldOptions) -> list[Solid]:
     """The funnel, wider outside, and the vents, as solids through the lid."""
     from build123d import Align, Cone, Pos, Rot
 
@@ -262,7 +265,7 @@ def _openings(ports: Ports, options: MoldOptions) -> list[Any]:
     return [funnel, *(_upright((x, -options.lid_mm, z), ports.vent_mm, options.lid_mm) for x, z in ports.vents)]
 
 
-def _one(name: str, shape: Any) -> Any:
+def _one(name: str, shape: Shape) -> Solid:
     solids = shape.solids()
     if len(solids) != 1 or not solids[0].is_valid:
         raise Finger3dError(f"mold: {name} falls into {len(solids)} pieces; choose a thicker --wall-mm")
@@ -270,7 +273,7 @@ def _one(name: str, shape: Any) -> Any:
     return solids[0]
 
 
-def _common(a: Any, b: Any) -> float:
+def _common(a: Shape, b: Shape) -> float:
     """Volume that two solids share, mm3."""
     shared = a & b
     return sum(float(s.volume) for s in shared.solids()) if shared is not None else 0.0
@@ -279,7 +282,7 @@ def _common(a: Any, b: Any) -> float:
 # --- refusals ---------------------------------------------------------------------------------------------------------
 
 
-def _check_split(solid: Any, options: MoldOptions) -> None:
+def _check_split(solid: Solid, options: MoldOptions) -> None:
     low, high = box(solid)
     axis = 0 if options.split == "x" else 2
     if not low[axis] < options.split_mm < high[axis]:
@@ -312,7 +315,7 @@ def foils(
     return tuple(strip(on) for on in strips.values())
 
 
-def _check_foils(body: Any, foils: tuple[FoilSlot, ...], options: MoldOptions) -> None:
+def _check_foils(body: Solid, foils: tuple[FoilSlot, ...], options: MoldOptions) -> None:
     gap = 2.0 * options.slot_gap_mm
     low, high = box(body)
     slots = []

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger3d.mold.parts import Mold
 from finger3d.mold.shell import Shell
+
+Sizes = tuple[float, float, float] | NDArray[np.float64]
 
 SPARE = 1.15
 """Silicone to mix over what the cavity and the openings take."""
@@ -16,7 +18,7 @@ SPARE = 1.15
 NAMES = {"half_a": "half A (holes)", "half_b": "half B (pegs)", "lid": "lid"}
 
 
-def oversize(part: Shell, bed: Any) -> str:
+def oversize(part: Shell, bed: Sizes) -> str:
     """Why a part does not fit on a printer's bed, in words; empty if it does, turned on the bed or not."""
     long, short = sorted(part.extent[:2], reverse=True)
     most, least = sorted(bed[:2], reverse=True)
@@ -25,7 +27,7 @@ def oversize(part: Shell, bed: Any) -> str:
     return f"{_sizes(part.extent)} mm is too large for {_sizes(bed)} mm"
 
 
-def sheet(title: str, made: Mold, printed: Mapping[str, Shell], plate: Any) -> str:
+def sheet(title: str, made: Mold, printed: Mapping[str, Shell], plate: Sizes) -> str:
     """The sheet's text.
 
     Parameters
@@ -116,9 +118,9 @@ def _port_volumes(made: Mold) -> tuple[float, float]:
     return np.pi * t / 3.0 * (a * a + a * b + b * b), 2.0 * np.pi * t * p.vent_mm**2 / 4.0
 
 
-def _fits(size: Any, bed: Any) -> bool:
+def _fits(size: Sizes, bed: Sizes) -> bool:
     return bool(np.all(np.sort(size[:2]) <= np.sort(bed[:2])) and size[2] <= bed[2])
 
 
-def _sizes(size: Any) -> str:
+def _sizes(size: Sizes) -> str:
     return " x ".join(f"{s:.1f}".removesuffix(".0") for s in size)

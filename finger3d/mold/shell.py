@@ -6,7 +6,7 @@ import ctypes
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,9 @@ from finger3d.errors import Finger3dError
 from finger3d.geometry.surface import Triangles
 from finger3d.geometry.surface_checks import mistake
 from finger3d.io import atomic
+
+if TYPE_CHECKING:
+    from build123d import Shape, Solid
 
 Float = NDArray[np.float64]
 
@@ -45,7 +48,7 @@ class Shell:
         return replace(self, surface=Triangles(self.surface.points @ rotation.T + shift, self.surface.faces))
 
 
-def shell(solid: Any, tolerance_mm: float, name: str, angle: float = ANGLE) -> Shell:
+def shell(solid: Solid, tolerance_mm: float, name: str, angle: float = ANGLE) -> Shell:
     """Triangles within `tolerance_mm` and `angle` of a build123d solid, or finer: their volume is within 1e-3 of its.
 
     CAD's own volume is taken where it can be trusted, on planes, cylinders, cones and spheres. With other faces (a
@@ -70,13 +73,13 @@ def shell(solid: Any, tolerance_mm: float, name: str, angle: float = ANGLE) -> S
     raise Finger3dError(f"{name}: the volume of its triangles does not settle; mend the body where it was drawn")
 
 
-def known_volume(solid: Any) -> float | None:
+def known_volume(solid: Solid) -> float | None:
     """CAD's volume (mm3) of a build123d solid, if its faces are such that CAD integrates it exactly."""
     exact = all(face.geom_type.name in _EXACT for face in solid.faces())
     return float(solid.volume) if exact else None
 
 
-def volume(solid: Any) -> float:
+def volume(solid: Solid) -> float:
     """Volume (mm3) of a build123d solid, by Gauss-Kronrod integration where CAD's own is not exact.
 
     It agrees with the tessellated volume and the closed form on the splines of the tests.
@@ -92,7 +95,7 @@ def volume(solid: Any) -> float:
     return float(found.Mass())
 
 
-def _triangles(solid: Any, tolerance_mm: float, angle: float, name: str) -> Triangles:
+def _triangles(solid: Solid, tolerance_mm: float, angle: float, name: str) -> Triangles:
     from finger3d.geometry.tessellate import triangulated
 
     points, faces, _ = triangulated(solid, list(solid.faces()), tolerance_mm, angle)
@@ -112,7 +115,7 @@ def write_stl(path: Path, surface: Triangles, text: bool) -> None:
         temporary.write_bytes(data.encode("ascii") if isinstance(data, str) else data)
 
 
-def write_step(path: Path, shape: Any) -> None:
+def write_step(path: Path, shape: Shape) -> None:
     """Write a build123d shape as STEP, mm."""
     from build123d import export_step
 
