@@ -96,7 +96,8 @@ def puck_distance(p: Float, puck: Float) -> Float:
     off = p - puck[:, :3]
     along = np.einsum("ij,ij->i", off, puck[:, 3:6])
     across = np.sqrt(np.maximum(np.einsum("ij,ij->i", off, off) - along**2, 0.0))
-    return np.hypot(np.maximum(np.abs(along) - puck[:, 7], 0.0), np.maximum(across - puck[:, 6], 0.0))
+    value: Float = np.hypot(np.maximum(np.abs(along) - puck[:, 7], 0.0), np.maximum(across - puck[:, 6], 0.0))
+    return value
 
 
 def _morton(points: Float) -> Int:

@@ -58,7 +58,8 @@ class Network:
         if not corners:
             return None
         known = self.surface.points[corners]
-        return known[np.argmin(np.linalg.norm(points[:, None] - known, axis=2), axis=1)]
+        value: Float = known[np.argmin(np.linalg.norm(points[:, None] - known, axis=2), axis=1)]
+        return value
 
 
 def _on_segments(points: Float, segments: Float) -> Float:
@@ -155,7 +156,8 @@ def _joined(surface: Triangles, kind: Int) -> Int:
     a, b, _ = _neighbours(surface)
     joined = (kind[a] == kind[b]) & (np.einsum("ij,ij->i", surface.normals[a], surface.normals[b]) > _CREASE)
     links = coo_matrix((np.ones(int(joined.sum())), (a[joined], b[joined])), shape=(len(kind), len(kind)))
-    return connected_components(links, directed=False)[1].astype(np.int64)
+    value: Int = connected_components(links, directed=False)[1].astype(np.int64)
+    return value
 
 
 def _neighbours(surface: Triangles) -> tuple[Int, Int, Int]:

@@ -121,7 +121,8 @@ def welded(points: Float, faces: NDArray[np.int64]) -> Triangles:
 
 def _proper(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     a, b, c = faces.T
-    return faces[(a != b) & (b != c) & (c != a)]
+    value: NDArray[np.int64] = faces[(a != b) & (b != c) & (c != a)]
+    return value
 
 
 def read_solid(path: Path) -> Solid:

@@ -240,7 +240,7 @@ def _check_size(path: str, surface: Triangles) -> None:
 def _base(path: str, surface: Triangles, which: str) -> NDArray[np.bool_]:
     """Mask (m,) of the triangles of the lowest plane."""
     near = surface.corners[:, :, 1].max(axis=1) <= surface.low[1] + _LEVEL * surface.size
-    base = near & (surface.normals[:, 1] < -_DOWN)
+    base: NDArray[np.bool_] = near & (surface.normals[:, 1] < -_DOWN)
     area = float(np.linalg.norm(surface.area_vectors[base], axis=1).sum())
     footprint = float(np.maximum(-surface.area_vectors[:, 1], 0.0).sum())
     if area < _BASE_SHARE * footprint:

@@ -70,12 +70,14 @@ class Triangles:
     @property
     def low(self) -> Float:
         """Smallest coordinates (3,) of the triangles, mm."""
-        return self.corners.min(axis=(0, 1))
+        value: Float = self.corners.min(axis=(0, 1))
+        return value
 
     @property
     def high(self) -> Float:
         """Largest coordinates (3,) of the triangles, mm."""
-        return self.corners.max(axis=(0, 1))
+        value: Float = self.corners.max(axis=(0, 1))
+        return value
 
     @cached_property
     def size(self) -> float:
@@ -148,7 +150,10 @@ class Triangles:
 
         def inside(query: Int, level: int, node: Int) -> NDArray[np.bool_]:
             p, box = at[query], boxes[level][node]
-            return (box[:, 0] <= p[:, 0]) & (box[:, 1] <= p[:, 1]) & (p[:, 0] <= box[:, 2]) & (p[:, 1] <= box[:, 3])
+            inside: NDArray[np.bool_] = (
+                (box[:, 0] <= p[:, 0]) & (box[:, 1] <= p[:, 1]) & (p[:, 0] <= box[:, 2]) & (p[:, 1] <= box[:, 3])
+            )
+            return inside
 
         face = np.full(len(at), -1, dtype=np.int64)
         bary = np.zeros((len(at), 3))
@@ -214,7 +219,8 @@ class Triangles:
             there = item >= 0
             p = _on_triangle(points[there], self.corners[item[there]], self.normals[item[there]])[0]
             reach[there] = np.minimum(reach[there], np.linalg.norm(points[there] - p, axis=1))
-        return reach * (1.0 + 1e-9) + 1e-12 * self.size
+        value: Float = reach * (1.0 + 1e-9) + 1e-12 * self.size
+        return value
 
     def signed_distance(self, points: Float) -> tuple[Float, Float]:
         """Distance (n,) mm of points (n, 3), negative inside, and its gradient (n, 3), the outward unit normal.
@@ -237,7 +243,8 @@ class Triangles:
 
 def _unit(vectors: Float) -> Float:
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0)
+    value: Float = np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0)
+    return value
 
 
 def _in_triangle(p: Float, corner: Float, slack: float) -> tuple[Float, NDArray[np.bool_]]:

@@ -76,7 +76,8 @@ def crossings(surface: Triangles) -> Int:
 
     def overlap(query: Int, level: int, node: Int) -> NDArray[np.bool_]:
         box = surface.tree.boxes[level][node]
-        return np.all((box[:, :3] <= high[query]) & (low[query] <= box[:, 3:]), axis=1)
+        inside: NDArray[np.bool_] = np.all((box[:, :3] <= high[query]) & (low[query] <= box[:, 3:]), axis=1)
+        return inside
 
     found = []
     for query, item in surface.tree.pairs(len(ends), overlap):
@@ -93,7 +94,7 @@ def _pierced(start: Float, stop: Float, corner: Float, slack: float) -> NDArray[
     normal = normal / np.maximum(length, 1e-300)[:, None]
     a = np.einsum("ij,ij->i", start - corner[:, 0], normal)
     b = np.einsum("ij,ij->i", stop - corner[:, 0], normal)
-    through = (np.minimum(a, b) < -slack) & (np.maximum(a, b) > slack) & (length > 0.0)
+    through: NDArray[np.bool_] = (np.minimum(a, b) < -slack) & (np.maximum(a, b) > slack) & (length > 0.0)
     at = start + (a / np.where(through, a - b, 1.0))[:, None] * (stop - start)
     for i, j in ((0, 1), (1, 2), (2, 0)):
         along = corner[:, j] - corner[:, i]

@@ -46,7 +46,7 @@ class Sizes:
         sample = np.unique(sample)
         total = count(sample)
         n = max(2, int(round(total[-1])))
-        depth = np.interp(np.linspace(0.0, total[-1], n + 1), total, sample)
+        depth: Float = np.interp(np.linspace(0.0, total[-1], n + 1), total, sample)
         depth[-1] = length
         return depth
 

@@ -83,7 +83,7 @@ class Seams:
         order = np.lexsort([self.distance(points, node, face), node])
         node, face = node[order], face[order]
         first = np.unique(node, return_index=True)[1]
-        rows = sets & self.pinned
+        rows: NDArray[np.bool_] = sets & self.pinned
         rows[node[first], face[first]] = True
         return rows
 

@@ -46,7 +46,8 @@ class Sizing:
         from scipy.spatial import cKDTree
 
         reach = cKDTree(self.zone).query(points)[0]
-        return np.minimum(self.base_mm, self.size_mm + RATE * np.maximum(0.0, reach - _PLATEAU * self.step))
+        value: Float = np.minimum(self.base_mm, self.size_mm + RATE * np.maximum(0.0, reach - _PLATEAU * self.step))
+        return value
 
     def grid(self) -> tuple[list[Float], Float]:
         """Coordinates of the background grid along x, y, z, and the edge length (nx, ny, nz) on it."""

@@ -109,7 +109,8 @@ def _cad_faces(points: Float, faces: Int, body: Tessellation, sets: Bool | None 
         shared = np.logical_and.reduce(sets[faces], axis=1)
         none = np.logical_not(shared.any(axis=1))
         cost += np.where(shared | none[:, None], 0.0, 1e3).T
-    return np.argmin(cost, axis=0)
+    value: Int = np.argmin(cost, axis=0)
+    return value
 
 
 def _node_sets(points: Float, faces: Int, owner: Int, body: Tessellation) -> Bool:

@@ -1,4 +1,4 @@
-"""Whether the halves of a mold come off the body that was cast in them."""
+"""Undercuts: whether the halves of a mold can be removed from the cast body."""
 
 from __future__ import annotations
 
@@ -12,27 +12,26 @@ if TYPE_CHECKING:
 
 Float = NDArray[np.float64]
 
-_LEVEL = 1e-6  # mm
-_BEHIND = 1e-6  # of a unit normal
+_ON_PLANE_MM = 1e-6  # distance at which a face lies on a plane
+_NORMAL_TOLERANCE = 1e-6  # component of a unit normal against the opening direction
 
 
 def box(body: Shape) -> tuple[Float, Float]:
-    """Low and high corner (3,), mm, of a build123d shape."""
+    """Return the lowest and highest corner (3,), mm, of a build123d shape."""
     found = body.bounding_box(optimal=True)
     return np.array([*found.min]), np.array([*found.max])
 
 
 def is_base(face: Face) -> bool:
-    """Whether a face is the finger's base, which the lid covers."""
-    return bool(face.is_planar) and abs(face.center().Y) < _LEVEL and face.normal_at(face.center()).Y < -0.5
+    """Return whether a face is the finger's base, which the lid covers."""
+    return bool(face.is_planar) and abs(face.center().Y) < _ON_PLANE_MM and face.normal_at(face.center()).Y < -0.5
 
 
 def undercuts(solid: Solid, split: str, at_mm: float) -> str:
-    """Where a body reaches behind a half that opens along an axis, in words; empty if it does not.
+    """Return a description of the worst undercut of a body whose halves open along an axis; empty without undercut.
 
-    A half can be drawn off along +d if the normal n of the body it encloses has n . d >= 0 everywhere, the lid's side
-    left out: a straight line along d then leaves the body once and never enters it again. Normals are CAD's own, at
-    the points of a tessellation.
+    A half can be removed along d if the normals n of the body inside it satisfy n . d >= 0 everywhere but on the base.
+    The normals are those of CAD at the points of a tessellation.
     """
     from build123d import Axis, Box, Pos
 
@@ -46,12 +45,12 @@ def undercuts(solid: Solid, split: str, at_mm: float) -> str:
         for piece in (solid & Pos(*map(float, middle)) * Box(reach, reach, reach)).solids():
             for face in piece.faces():
                 centre = np.array([*face.center()])
-                on_split = bool(face.is_planar) and abs(centre[axis] - at_mm) < _LEVEL
+                on_split = bool(face.is_planar) and abs(centre[axis] - at_mm) < _ON_PLANE_MM
                 if is_base(face) or (on_split and abs(face.normal_at(face.center()).dot(direction.direction)) > 0.5):
                     continue
                 points, normals = _normals(face)
                 depth = sign * normals[:, axis]
-                if depth.min() < -_BEHIND:
+                if depth.min() < -_NORMAL_TOLERANCE:
                     where = ", ".join(f"{c:.4g}" for c in points[int(np.argmin(depth))])
                     side = f"{'+' if sign > 0 else '-'}{split}"
                     return f"the half on the {side} side is locked by the body near ({where}) mm"

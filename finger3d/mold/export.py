@@ -1,4 +1,4 @@
-"""From a scene to things one can hold: the finger as STEP and STL, and a printable mold of it."""
+"""Export of a scene's finger as STEP and STL, and of a printable mold."""
 
 from __future__ import annotations
 
@@ -20,21 +20,22 @@ if TYPE_CHECKING:
     from finger3d.scene import Scene
 
 
-_SMALLEST_MM, _LARGEST = 1e-4, 0.2
+_LEAST_TOLERANCE_MM = 1e-4
+_LARGEST_TOLERANCE = 0.2  # of the finger's height
 
 
 @dataclass(frozen=True)
 class Exported:
-    """What an export wrote.
+    """Files and volumes of an export.
 
     Attributes
     ----------
-    files : what was written, in `out`
+    files : paths of the files in `out`
     volume_mm3 : of the finger, by its closed form or by CAD
     stl_volume_mm3 : inside the triangles of finger.stl
     tolerance_mm : largest distance of these triangles from the finger; for a body of triangles that of the file, 0
-    silicone_ml : what fills the mold's cavity; None without a mold
-    remarks : what a user should know, a line each
+    silicone_ml : volume of the cavity; None without a mold
+    remarks : remarks for the user, a line each
     """
 
     files: tuple[Path, ...]
@@ -83,9 +84,9 @@ def export(
     from finger3d.mold.shell import Shell, shell, write_step, write_stl
 
     out, report, design = Path(out), report or Progress(), scene.design
-    if not _SMALLEST_MM <= tolerance_mm <= _LARGEST * design.height_mm:
+    if not _LEAST_TOLERANCE_MM <= tolerance_mm <= _LARGEST_TOLERANCE * design.height_mm:
         raise Finger3dError(
-            f"--tolerance-mm {tolerance_mm}: must be from {_SMALLEST_MM:g} to {_LARGEST * design.height_mm:.4g}, "
+            f"--tolerance-mm {tolerance_mm}: must be from {_LEAST_TOLERANCE_MM:g} to {_LARGEST_TOLERANCE * design.height_mm:.4g}, "
             "a fifth of the finger's height"
         )
     triangles = design.surface if isinstance(design, Imported) and design.cad is None else None
@@ -128,7 +129,7 @@ def export(
 
 
 def _clear(out: Path) -> None:
-    """Take away what an earlier export left: it may be another finger's."""
+    """Remove the files of an earlier export, which may be of another finger."""
     from finger3d.mold.output import FILES
 
     for name in ("finger.step", "finger.stl", *FILES):
@@ -144,7 +145,7 @@ def _mold(scene: Scene, solid: Solid, options: MoldOptions) -> Mold:
 
 
 def _volume(design: Design, solid: Solid | None, body: Shell) -> float:
-    """The finger's volume: closed form, or CAD's, or that of its triangles."""
+    """Return the finger's volume (mm3): in closed form, by CAD, or of its triangles."""
     from finger3d.mold.shell import volume
 
     if not isinstance(design, Imported):

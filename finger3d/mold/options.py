@@ -1,4 +1,4 @@
-"""What a user may choose about a mold, checked one by one; nothing heavy is imported here."""
+"""Options of a mold and the checks of their values."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from typing import Literal
 from finger3d.errors import Finger3dError
 
 RIM_MM = 1.2
-"""Thinnest wall that is left around a peg, a hole or a slot: three lines of a 0.4 mm nozzle."""
+"""Least wall around a peg, a hole or a slot: three lines of a 0.4 mm nozzle."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class MoldOptions:
-    """Choices for a mold; lengths in mm.
+    """Dimensions of a mold; lengths in mm.
 
     Parameters
     ----------
@@ -24,20 +24,20 @@ class MoldOptions:
     clearance_mm
         Gap all around a peg in its hole.
     shrinkage
-        Share of every length that the silicone loses in curing, for instance 0.001; the cavity is larger by
+        Relative shrinkage of lengths when the silicone cures, for instance 0.001; the cavity is larger by
         1 / (1 - shrinkage).
     split
         Axis of the finger along which the halves open. With gauges it must be z, the axis of their strips.
     split_mm
         Where along this axis the halves meet, in the finger's coordinates.
     peg_mm
-        Diameter and length of the pegs; one of each pattern is thinner, so that no part fits the wrong way round.
+        Diameter and length of the pegs; one peg of each pattern is thinner, so that parts fit one way only.
     lid_mm
         Thickness of the lid.
     pour_mm
-        Diameter of the pour hole at the sensor; chosen from the base if it is not given, at most 6.
+        Diameter of the pour hole at the sensor; None chooses 0.3 times the base's shorter side, at most 6.
     vent_mm
-        Diameter of the two vents; chosen from the base if it is not given, at most 2.
+        Diameter of the two vents; None chooses 0.1 times the base's shorter side, at most 2.
     foil_length_mm
         Length of a gauge's foil where the scene has length_mm = 0.
     foil_thickness_mm
@@ -77,7 +77,7 @@ class MoldOptions:
                 self._within(name, 0.0, math.inf, "above 0", open_low=True)
         if not 0.0 <= self.shrinkage < 0.2:
             raise _refused("shrinkage", self.shrinkage, "a share from 0 up to 0.2: 0.001 is a tenth of a percent")
-        # With more, a full peg would slip into the thin one's hole, and the halves could be joined the wrong way.
+        # With more clearance a full peg would fit the thin peg's hole.
         self._within("clearance_mm", 0.0, self.peg_mm / 10.0, f"from 0 to a tenth of the peg, {self.peg_mm / 10:g}")
         self._within("slot_gap_mm", 0.0, 1.0, "from 0 to 1")
         self._within("lid_mm", RIM_MM, math.inf, f"at least {RIM_MM:g}, or the lid bends")
@@ -109,7 +109,7 @@ class MoldOptions:
 
     @property
     def scale(self) -> float:
-        """Cavity over sensor, in length."""
+        """Ratio of the cavity's lengths to those of the sensor."""
         return 1.0 / (1.0 - self.shrinkage)
 
     @property

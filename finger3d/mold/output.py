@@ -18,29 +18,29 @@ from finger3d.progress import Progress
 Float = NDArray[np.float64]
 
 GAP_MM = 8.0
-"""Between parts on the plate."""
+"""Distance between parts on the plate."""
 
 FILES = (
     "mold_half_a.stl", "mold_half_b.stl", "mold_lid.stl", "mold.3mf", "mold.step", "sheet.txt", "mold.png",
 )  # fmt: skip
-"""What a mold writes."""
+"""Files of a mold."""
 
 _LYING = {
     "half_a": np.diag([-1.0, 1.0, -1.0]),
     "half_b": np.eye(3),
     "lid": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
 }
-"""Rotation of each part onto the bed: its outer face down, z up."""
+"""Rotation of each part onto the bed, its outer face down and z up."""
 
 
 def as_printed(parts: dict[str, Shell]) -> dict[str, Shell]:
-    """Parts as they lie on the bed, each with its lowest corner at the origin."""
+    """Return the parts as they lie on the bed, each with its lowest corner at the origin."""
     lying = {name: part.moved(_LYING[name], np.zeros(3)) for name, part in parts.items()}
     return {name: part.moved(np.eye(3), -part.surface.low) for name, part in lying.items()}
 
 
 def plate(printed: dict[str, Shell]) -> tuple[dict[str, Shell], Float]:
-    """Parts side by side along y, and the size (3,) of the whole, mm."""
+    """Return the parts in a row along y, and the size (3,) of the row, mm."""
     at, placed = 0.0, {}
     for name, part in printed.items():
         placed[name] = part.moved(np.eye(3), np.array([0.0, at, 0.0]))
@@ -65,7 +65,7 @@ def write_mold(
     shells = {name: shell(part, body.tolerance_mm, name, body.angle) for name, part in made.parts.items()}
     printed = as_printed(shells)
     placed, size = plate(printed)
-    with ThreadPoolExecutor(1) as pool:  # PyVista needs some seconds, in a process of its own
+    with ThreadPoolExecutor(1) as pool:  # PyVista renders in a process of its own for some seconds
         drawn = pool.submit(_picture, out / "mold.png", title, made, body, shells, printed)
         for name, part in printed.items():
             write_stl(out / f"mold_{name}.stl", part.surface, text)

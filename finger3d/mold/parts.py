@@ -1,18 +1,15 @@
 """A printable mold of the sensor: two halves and a lid, built from the finger's CAD by booleans.
 
-The sensor is poured upside down. Its base is a plane that will be bonded to a carrier, so it can take the marks of a
-pour hole and of vents; the contact surface and the walls cannot. The dome therefore lies at the bottom of the cavity,
-where no air is trapped, and the lid closes the open base, the highest level of the silicone, with the vents at its
-ends.
+The sensor is cast upside down: the contact surface lies at the bottom of the cavity, where no air is trapped, and the
+lid closes the base. The base will be bonded to a carrier, so marks of the pour hole and the vents do no harm there.
 
-The halves part along z (the default). An extruded finger has the same section everywhere along z, and a half ball's
-section only shrinks away from its middle: nothing of the halves reaches behind the silicone, whatever the dome. The
-strips that carry the gauges run along z too, so the halves slide off along them; along x they would be locked.
-Parting along x at the middle is offered for bodies that narrow on both sides. A body that reaches behind a half is
-refused, see `undercuts`.
+The halves open along z by default. The section of an extruded finger is constant along z, and that of a half ball
+shrinks away from the middle, so neither has undercuts. The strips that carry the gauges run along z as well, and the
+halves slide off along them. ``split = "x"`` serves bodies that narrow towards both ends of x. A body with undercuts
+is refused, see `undercuts`.
 
-The mold's own axes are the finger's; with ``split = "x"`` they are turned about y, so that the halves always open
-along z. y = 0 is where the halves end and the lid begins.
+The axes of the mold are those of the finger; with ``split = "x"`` they are rotated about y, so that the halves always
+open along z. The lid begins at y = 0.
 """
 
 from __future__ import annotations
@@ -39,22 +36,23 @@ if TYPE_CHECKING:
 Float = NDArray[np.float64]
 
 COVER_MM = 0.5
-"""Silicone that must be left between a foil and the cavity's surface."""
+"""Least cover of silicone between a foil and the surface of the cavity."""
 
 THIN = 0.7
-"""Diameter of the odd peg of a pattern over that of the others."""
+"""Ratio of the diameter of a pattern's thin peg to that of the other pegs."""
 
-_TOUCH = 1e-6  # relative volume: what booleans leave of faces that touch
-_PROBE = 0.01  # mm
+_OVERLAP_TOLERANCE = 1e-6  # relative volume that booleans leave between faces in contact
+_PROBE_HEIGHT_MM = 0.01  # of the disc that tests whether an opening lies over the cavity
 
 
 @dataclass(frozen=True)
 class FoilSlot:
-    """The strip that carries one gauge's foil, or several, through both walls: its section in x and y, unshrunk, mm.
+    """Slot of the strip that carries the foils of one or several gauges through both walls, mm before shrinkage.
 
     Attributes
     ----------
-    names : of the gauges on it, and `z_mm`, where the middles of their foils are
+    names, z_mm : names of the gauges on the strip, and z of the middles of their foils
+    x_mm, y_mm : middle of the strip's section
     angle : radians, from x towards y
     length_mm, thickness_mm : section of the strip
     width_mm : of the foil, along z
@@ -86,10 +84,10 @@ class Mold:
 
     Attributes
     ----------
-    body : what will be cast: the finger, larger by the shrinkage
+    body : the cavity: the finger enlarged by the shrinkage
     parts : half_a (z above the split), half_b (below, with the pegs), lid
-    slots : what the strips take of the walls, one solid each
-    pegs : of half_b, and `holes`, of half_a for them
+    slots : the volumes of the strips, with their gaps
+    pegs, holes : pegs of half_b, and their holes in half_a
     lid_pegs, lid_holes : between the lid and both halves
     outline : low and high corner (3,), mm, of the two halves together
     """
@@ -118,7 +116,7 @@ def mold(solid: Solid, gauges: Sequence[FoilSlot], options: MoldOptions) -> Mold
     Raises
     ------
     Finger3dError
-        If the split plane misses the body, the body reaches behind a half, a foil does not fit, the lid has no room
+        If the split plane misses the body, the body has an undercut, a foil does not fit, the lid has no room
         for its openings, or two parts of the mold would overlap.
     """
     from build123d import Rot
@@ -146,6 +144,7 @@ def mold(solid: Solid, gauges: Sequence[FoilSlot], options: MoldOptions) -> Mold
 
 
 def _assemble(body: Solid, foils: tuple[FoilSlot, ...], options: MoldOptions) -> Mold:
+    """Build all parts: outer box, cavity, slots, pegs and holes, openings; then cut the box into halves and lid."""
     low, high = box(body)
     w, split = options.wall_mm, options.split_mm * options.scale
     places, top = _peg_places(low, high, options)
@@ -172,7 +171,19 @@ def _assemble(body: Solid, foils: tuple[FoilSlot, ...], options: MoldOptions) ->
     )
     lid = plate + list(lid_pegs) - _openings(ports, options)
     parts = {name: _one(name, part) for name, part in (("half_a", front), ("half_b", back), ("lid", lid))}
-    return Mold(options, body, parts, slots, foils, ports, pegs, holes, lid_pegs, lid_holes, (outer_low, outer_high))
+    return Mold(
+        options=options,
+        body=body,
+        parts=parts,
+        slots=slots,
+        foils=foils,
+        ports=ports,
+        pegs=pegs,
+        holes=holes,
+        lid_pegs=lid_pegs,
+        lid_holes=lid_holes,
+        outline=(outer_low, outer_high),
+    )
 
 
 def _between(low: Float, high: Float) -> Solid:
@@ -183,7 +194,7 @@ def _between(low: Float, high: Float) -> Solid:
 
 
 def _peg(at: tuple[float, float, float], diameter: float, length: float) -> Solid:
-    """A cylinder along z from a point."""
+    """Return a cylinder along z that starts at a point."""
     from build123d import Align, Cylinder, Pos
 
     centre = (Align.CENTER, Align.CENTER, Align.MIN)
@@ -191,7 +202,7 @@ def _peg(at: tuple[float, float, float], diameter: float, length: float) -> Soli
 
 
 def _upright(at: tuple[float, float, float], diameter: float, length: float) -> Solid:
-    """A cylinder along y from a point."""
+    """Return a cylinder along y that starts at a point."""
     from build123d import Align, Cylinder, Pos, Rot
 
     centre = (Align.CENTER, Align.CENTER, Align.MIN)
@@ -199,7 +210,7 @@ def _upright(at: tuple[float, float, float], diameter: float, length: float) -> 
 
 
 def _peg_places(low: Float, high: Float, options: MoldOptions) -> tuple[list[tuple[float, float]], float]:
-    """Places (x, y) of the halves' pegs, beside the body and clear of the lid's pegs; and the top of the halves."""
+    """Return the places (x, y) of the pegs between the halves, clear of body and lid pegs, and the top of the halves."""
     w, around = options.wall_mm, options.peg_mm / 2.0 + options.clearance_mm + RIM_MM
     near = options.hole_depth_mm + around
     far = max(float(high[1]) + w / 2.0, near)
@@ -209,7 +220,7 @@ def _peg_places(low: Float, high: Float, options: MoldOptions) -> tuple[list[tup
 
 
 def _slot(foil: FoilSlot, options: MoldOptions, z_low: float, z_high: float) -> Solid:
-    """The strip with its gaps, through both walls; where it lies is scaled, the strip itself does not shrink."""
+    """Return the strip with its gaps through both walls; its place is scaled by the shrinkage, its section is not."""
     gap = 2.0 * options.slot_gap_mm
     return _strip(foil, options.scale, foil.length_mm + gap, foil.thickness_mm + gap, float(z_low), float(z_high))
 
@@ -243,7 +254,7 @@ def _ports(body: Solid, options: MoldOptions) -> Ports:
         )
     ports = Ports(pour, max(pour, min(2.0 * pour, 2.0 * room, size)), vent, (vents[0], vents[1]))
     for name, (x, z), d in (("pour", (0.0, 0.0), pour), *(("vent", v, vent) for v in vents)):
-        probe = _upright((x, 0.0, z), d, _PROBE)
+        probe = _upright((x, 0.0, z), d, _PROBE_HEIGHT_MM)
         if _common(probe, body) < (1.0 - 1e-3) * probe.volume:
             raise Finger3dError(
                 f"--{name}-mm {d:g}: at x = {x:.4g}, z = {z:.4g} mm the hole does not open into the cavity whole; "
@@ -253,7 +264,7 @@ def _ports(body: Solid, options: MoldOptions) -> Ports:
 
 
 def _openings(ports: Ports, options: MoldOptions) -> list[Solid]:
-    """The funnel, wider outside, and the vents, as solids through the lid."""
+    """Return the funnel, wider outside, and the vents as solids through the lid."""
     from build123d import Align, Cone, Pos, Rot
 
     centre = (Align.CENTER, Align.CENTER, Align.MIN)
@@ -274,7 +285,7 @@ def _one(name: str, shape: Shape) -> Solid:
 
 
 def _common(a: Shape, b: Shape) -> float:
-    """Volume that two solids share, mm3."""
+    """Return the common volume of two solids, mm3."""
     shared = a & b
     return sum(float(s.volume) for s in shared.solids()) if shared is not None else 0.0
 
@@ -295,7 +306,7 @@ def _check_split(solid: Solid, options: MoldOptions) -> None:
 def foils(
     gauges: Sequence[Gauge], options: MoldOptions, section_mm: tuple[float, float] | None
 ) -> tuple[FoilSlot, ...]:
-    """Strips of a scene's gauges; gauges that differ in z only share one.
+    """Return the slots of a scene's gauges; gauges that differ in z only are on one strip.
 
     Parameters
     ----------
@@ -309,8 +320,16 @@ def foils(
 
     def strip(on: list[Gauge]) -> FoilSlot:
         g, length = on[0], on[0].length_mm or options.foil_length_mm
-        names, z = tuple(g.name for g in on), tuple(g.z_mm for g in on)
-        return FoilSlot(names, g.x_mm, g.y_mm, z, g.angle, length, thickness, width)
+        return FoilSlot(
+            names=tuple(gauge.name for gauge in on),
+            x_mm=g.x_mm,
+            y_mm=g.y_mm,
+            z_mm=tuple(gauge.z_mm for gauge in on),
+            angle=g.angle,
+            length_mm=length,
+            thickness_mm=thickness,
+            width_mm=width,
+        )
 
     return tuple(strip(on) for on in strips.values())
 
@@ -325,7 +344,7 @@ def _check_foils(body: Solid, foils: tuple[FoilSlot, ...], options: MoldOptions)
             ends = z * options.scale - foil.width_mm / 2.0, z * options.scale + foil.width_mm / 2.0
             around = 2.0 * COVER_MM
             room = _strip(foil, options.scale, foil.length_mm + around, foil.thickness_mm + around, *ends)
-            if _common(room, body) < (1.0 - _TOUCH) * room.volume:
+            if _common(room, body) < (1.0 - _OVERLAP_TOLERANCE) * room.volume:
                 raise Finger3dError(
                     f"{name}: its foil, {foil.length_mm:g} x {foil.width_mm:g} x {foil.thickness_mm:g} mm, is not in "
                     f"the silicone with {COVER_MM:g} mm around it; move it inwards, or choose a shorter foil"
@@ -341,20 +360,20 @@ def _check_foils(body: Solid, foils: tuple[FoilSlot, ...], options: MoldOptions)
 
 
 def overlaps(made: Mold) -> dict[str, float]:
-    """Volume, mm3, that each pair of parts shares in the assembled position, the cast body among them."""
+    """Return the common volume (mm3) of each pair of parts in the assembled position, the cast body included."""
     solids = {**made.parts, "sensor": made.body}
     return {f"{a}, {b}": _common(solids[a], solids[b]) for a, b in itertools.combinations(solids, 2)}
 
 
 def _check_parts(made: Mold) -> None:
-    bad = {pair: v for pair, v in overlaps(made).items() if v > _TOUCH * made.silicone_mm3}
+    bad = {pair: v for pair, v in overlaps(made).items() if v > _OVERLAP_TOLERANCE * made.silicone_mm3}
     if bad:
         pair = max(bad, key=lambda p: bad[p])
         raise Finger3dError(f"mold: {pair} would overlap by {bad[pair]:.3g} mm3; choose other sizes of wall or pegs")
 
 
 def strips(made: Mold) -> Triangles | None:
-    """The strips of all gauges in the mold, sticking out of both walls, for a picture; None without gauges."""
+    """Return the strips of all gauges, longer than the mold, for a picture; None without gauges."""
     if not made.foils:
         return None
     low, high = made.outline

@@ -1,4 +1,4 @@
-"""The text that goes with a mold to the bench: what to print, what to pour, and in which order."""
+"""Instructions for a mold: what to print, what to cast, and in which order."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from finger3d.mold.shell import Shell
 Sizes = tuple[float, float, float] | NDArray[np.float64]
 
 SPARE = 1.15
-"""Silicone to mix over what the cavity and the openings take."""
+"""Ratio of the silicone to mix to the volume of cavity and openings."""
 
 NAMES = {"half_a": "half A (holes)", "half_b": "half B (pegs)", "lid": "lid"}
 
 
 def oversize(part: Shell, bed: Sizes) -> str:
-    """Why a part does not fit on a printer's bed, in words; empty if it does, turned on the bed or not."""
+    """Return why a part does not fit the printer in either orientation on the bed; empty if it fits."""
     long, short = sorted(part.extent[:2], reverse=True)
     most, least = sorted(bed[:2], reverse=True)
     if long <= most and short <= least and part.extent[2] <= bed[2]:
@@ -28,7 +28,7 @@ def oversize(part: Shell, bed: Sizes) -> str:
 
 
 def sheet(title: str, made: Mold, printed: Mapping[str, Shell], plate: Sizes) -> str:
-    """The sheet's text.
+    """Return the instructions.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def _gauge_lines(made: Mold) -> list[str]:
 
 
 def _port_volumes(made: Mold) -> tuple[float, float]:
-    """Volume, mm3, of the funnel and of both vents."""
+    """Return the volumes (mm3) of the funnel and of both vents."""
     p, t = made.ports, made.options.lid_mm
     a, b = p.pour_mm / 2.0, p.funnel_mm / 2.0
     return np.pi * t / 3.0 * (a * a + a * b + b * b), 2.0 * np.pi * t * p.vent_mm**2 / 4.0

@@ -1,4 +1,4 @@
-"""Solids as closed triangles fine enough to print, and the files that hold them: STL and 3MF, in mm."""
+"""Tessellation of solids for printing, and STL, 3MF and STEP files, in mm."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ if TYPE_CHECKING:
 Float = NDArray[np.float64]
 
 ANGLE = 0.2
-"""Largest angle between facets to start with, radians, so that pegs and holes stay round."""
+"""First tessellation's largest angle between facets, radians; it keeps pegs and holes round."""
 
-_VOLUME = 8e-4  # relative; promised is 1e-3
-_TRIES = 14
-_QUADRATURE = 1e-4
-_EXACT = ("PLANE", "CYLINDER", "CONE", "SPHERE")
+_VOLUME_TOLERANCE = 8e-4  # relative error of the tessellated volume; the documentation states 1e-3
+_MAX_REFINEMENTS = 14
+_QUADRATURE_TOLERANCE = 1e-4  # relative, of the Gauss-Kronrod volume
+_EXACTLY_INTEGRATED = ("PLANE", "CYLINDER", "CONE", "SPHERE")
 
 
 @dataclass(frozen=True)
 class Shell:
-    """A solid's surface, closed, and the absolute tolerance (mm) and largest angle (radians) it was made with."""
+    """Closed surface of a solid, with the absolute tolerance (mm) and the largest angle (radians) of its tessellation."""
 
     surface: Triangles
     tolerance_mm: float
@@ -44,16 +44,15 @@ class Shell:
         return self.surface.high - self.surface.low
 
     def moved(self, rotation: Float, shift: Float) -> Shell:
-        """Turned, then shifted."""
+        """Return the surface rotated, then translated."""
         return replace(self, surface=Triangles(self.surface.points @ rotation.T + shift, self.surface.faces))
 
 
 def shell(solid: Solid, tolerance_mm: float, name: str, angle: float = ANGLE) -> Shell:
-    """Triangles within `tolerance_mm` and `angle` of a build123d solid, or finer: their volume is within 1e-3 of its.
+    """Tessellate a build123d solid within `tolerance_mm` and `angle`, and finer until the volume is within 1e-3.
 
-    CAD's own volume is taken where it can be trusted, on planes, cylinders, cones and spheres. With other faces (a
-    spline's body was seen 42 % wrong) the tolerance is halved until the volume changes by less than half as much: its
-    error falls with the tolerance.
+    CAD integrates the volume under planes, cylinders, cones and spheres exactly; under splines errors of 42 % occur.
+    With other faces the tolerance is therefore halved until the volume changes by less than 4e-4.
 
     Raises
     ------
@@ -62,28 +61,25 @@ def shell(solid: Solid, tolerance_mm: float, name: str, angle: float = ANGLE) ->
     """
     exact = known_volume(solid)
     coarse = _triangles(solid, tolerance_mm, angle, name)
-    for _ in range(_TRIES):
-        if exact is not None and abs(coarse.volume - exact) <= _VOLUME * exact:
+    for _ in range(_MAX_REFINEMENTS):
+        if exact is not None and abs(coarse.volume - exact) <= _VOLUME_TOLERANCE * exact:
             return Shell(coarse, tolerance_mm, angle)
-        # Without a finer angle, coarse facets of a small radius would stay.
+        # Facets on small radii are limited by the angle, not by the tolerance.
         fine = _triangles(solid, tolerance_mm / 2.0, angle / 2.0**0.5, name)
-        if exact is None and abs(coarse.volume - fine.volume) <= _VOLUME / 2.0 * fine.volume:
+        if exact is None and abs(coarse.volume - fine.volume) <= _VOLUME_TOLERANCE / 2.0 * fine.volume:
             return Shell(coarse, tolerance_mm, angle)
         coarse, tolerance_mm, angle = fine, tolerance_mm / 2.0, angle / 2.0**0.5
     raise Finger3dError(f"{name}: the volume of its triangles does not settle; mend the body where it was drawn")
 
 
 def known_volume(solid: Solid) -> float | None:
-    """CAD's volume (mm3) of a build123d solid, if its faces are such that CAD integrates it exactly."""
-    exact = all(face.geom_type.name in _EXACT for face in solid.faces())
+    """Return CAD's volume (mm3) of a build123d solid; None if CAD does not integrate all its faces exactly."""
+    exact = all(face.geom_type.name in _EXACTLY_INTEGRATED for face in solid.faces())
     return float(solid.volume) if exact else None
 
 
 def volume(solid: Solid) -> float:
-    """Volume (mm3) of a build123d solid, by Gauss-Kronrod integration where CAD's own is not exact.
-
-    It agrees with the tessellated volume and the closed form on the splines of the tests.
-    """
+    """Return the volume (mm3) of a build123d solid, by Gauss-Kronrod integration where CAD's own is not exact."""
     exact = known_volume(solid)
     if exact is not None:
         return exact
@@ -91,7 +87,7 @@ def volume(solid: Solid) -> float:
     from OCP.GProp import GProp_GProps
 
     found = GProp_GProps()
-    BRepGProp.VolumePropertiesGK_s(solid.wrapped, found, _QUADRATURE)
+    BRepGProp.VolumePropertiesGK_s(solid.wrapped, found, _QUADRATURE_TOLERANCE)
     return float(found.Mass())
 
 
@@ -120,7 +116,7 @@ def write_step(path: Path, shape: Shape) -> None:
     from build123d import export_step
 
     with atomic(path) as temporary:
-        temporary.parent.joinpath(temporary.name).touch()  # CAD says nothing of a folder that refuses
+        temporary.parent.joinpath(temporary.name).touch()  # CAD reports no error of a folder that cannot be written
         export_step(shape, str(temporary))
 
 
