@@ -1,7 +1,7 @@
-"""The child process that calls pytetwild, which crashes or hangs on bad input: python -m ... PARENT_PID.
+"""Child process that calls pytetwild, which crashes or hangs on bad input: python -m ... PARENT_PID.
 
-It reads an .npz from standard input and writes one to standard output. It leaves no file behind, however it ends. On
-Linux it ends with its parent.
+The process reads an .npz from standard input and writes one to standard output. It leaves no files behind. On Linux it
+ends with its parent.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from finger3d._process import end_with
 
 
 def main() -> None:
-    """Read points, triangles, background and settings; write points (n, 3) and positive tets (m, 4)."""
-    # pytetwild prints to descriptor 1
+    """Read points, triangles, background mesh and settings; write points (n, 3) and positive tets (m, 4)."""
+    # pytetwild prints to file descriptor 1.
     output = os.dup(1)
     os.dup2(2, 1)
     import pytetwild
@@ -45,7 +45,7 @@ def main() -> None:
 
 
 def _leave_no_files() -> None:
-    """Work in a folder that is removed already: pytetwild writes files into the working folder, which then fails."""
+    """Enter a removed folder, so that pytetwild cannot write files into the working folder."""
     folder = tempfile.mkdtemp(prefix="finger3d_")
     os.chdir(folder)
     os.rmdir(folder)

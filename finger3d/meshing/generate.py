@@ -1,4 +1,4 @@
-"""From a design to a mesh, by the mesher that the options name."""
+"""Mesh of a design, by the mesher that the options name."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ def mesh_solid(
     symmetry: tuple[str, ...] = (),
     say: Callable[[str], None] = lambda text: None,
 ) -> tuple[Mesh, MeshReport]:
-    """Mesh a design with quadratic tets.
+    """Mesh a design with quadratic tetrahedra.
 
     Parameters
     ----------
     design : from geometries/
-    options : size_mm in the zone, base_size_mm far from it, mesher "ftetwild" or "swept"
+    options : edge lengths and mesher
     zone : (x_min, x_max, z_min, z_max) mm where contact is predicted
     symmetry : "x", "z": mesh only x >= 0, z >= 0
-    say : told what is being done
+    say : called with a line at every stage
 
     Returns
     -------

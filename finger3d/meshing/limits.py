@@ -1,4 +1,4 @@
-"""Mesh sizes that make no sense, or too large a mesh, refused before any meshing."""
+"""Limits of edge lengths and memory, checked before meshing."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from finger3d.geometry.design import Design
 from finger3d.meshing.options import MeshSizes
 
 MAX_TETS = 1_000_000
-"""pytetwild was seen to take minutes below this and hours above."""
+"""Largest number of tets for pytetwild, which takes minutes below and hours above."""
 
-_DOFS_PER_TET = 4.5  # tet10 meshes measured have 1.5 nodes a tet
-_DOFS_PER_TRIANGLE = 4.1
-_SHARE = 0.8
+_DOFS_PER_TET = 4.5  # measured: 1.5 nodes a tet in quadratic meshes
+_DOFS_PER_TRIANGLE = 4.1  # measured
+_MEMORY_SHARE = 0.8  # largest share of the machine's memory that a solution may need
 
 
 def memory_gb(cells: float, dim: int) -> float:
-    """Forecast of the memory of a solution, GB: measured 8.4 GB at 522 540 unknowns in 3D, about 2 kB each in 2D."""
+    """Estimate the memory of a solution, GB; measured: 8.4 GB for 522 540 unknowns in 3D, about 2 kB each in 2D."""
     if dim == 2:
         return 2e-6 * _DOFS_PER_TRIANGLE * cells
     return 8.4 * math.pow(_DOFS_PER_TET * cells / 522_540.0, 1.25)
 
 
 def check_sizes(design: Design, options: MeshSizes, dim: int) -> None:
-    """Refuse edge lengths that are no positive numbers, in the wrong order, or larger than the finger."""
+    """Raise a Finger3dError for edge lengths that are not positive, in the wrong order, or exceed the finger."""
     for key in ("size_mm", "base_size_mm"):
         value = getattr(options, key)
         if not (isinstance(value, (int, float)) and math.isfinite(value) and value > 0.0):
@@ -46,12 +46,16 @@ def check_sizes(design: Design, options: MeshSizes, dim: int) -> None:
 
 
 def check_count(cells: float, dim: int, options: MeshSizes, cap: float = math.inf) -> None:
-    """Refuse a mesh forecast to need more than most of this machine's memory, or more than `cap` cells."""
+    """Raise a Finger3dError for a mesh estimated to need too much memory or more than `cap` cells."""
     need, have = memory_gb(cells, dim), _machine_gb()
-    if need <= _SHARE * have and cells <= cap:
+    if need <= _MEMORY_SHARE * have and cells <= cap:
         return
     kind = "triangles" if dim == 2 else "tetrahedra"
-    limit = f"at most {_SHARE * have:.1f} GB of {have:.1f} GB" if need > _SHARE * have else f"at most {cap:.0f} {kind}"
+    limit = (
+        f"at most {_MEMORY_SHARE * have:.1f} GB of {have:.1f} GB"
+        if need > _MEMORY_SHARE * have
+        else f"at most {cap:.0f} {kind}"
+    )
     raise Finger3dError(
         f"mesh.size_mm = {options.size_mm:g} with base_size_mm = {options.base_size_mm:g} gives about "
         f"{cells:.2g} {kind}, forecast {need:.2g} GB; allowed: {limit}; choose larger sizes"
@@ -59,28 +63,28 @@ def check_count(cells: float, dim: int, options: MeshSizes, cap: float = math.in
 
 
 def rows_gb(rows: float) -> float:
-    """Forecast of the memory of the dense compliance of `rows` condensed rows and its copies, GB."""
+    """Estimate the memory of the dense compliance of `rows` condensed rows and its copies, GB."""
     return 40e-9 * rows**2
 
 
 def check_rows(contact: int, gauges: int) -> None:
-    """Refuse a condensation to more rows than most of this machine's memory holds as a dense matrix."""
+    """Raise a Finger3dError if the dense compliance of the condensed rows is estimated to need too much memory."""
     need, have = rows_gb(contact + gauges), _machine_gb()
-    if need > _SHARE * have:
+    if need > _MEMORY_SHARE * have:
         cure = "fewer gauges" if gauges > contact else "a larger mesh.size_mm"
         raise Finger3dError(
             f"mesh.size_mm: {contact} rows of contact points and {gauges} of gauges are condensed to, forecast "
-            f"{need:.2g} GB; allowed: at most {_SHARE * have:.1f} GB of {have:.1f} GB; choose {cure}"
+            f"{need:.2g} GB; allowed: at most {_MEMORY_SHARE * have:.1f} GB of {have:.1f} GB; choose {cure}"
         )
 
 
 def check_memory(need_gb: float, what: str) -> None:
-    """Refuse a press forecast to need more than most of this machine's memory."""
+    """Raise a Finger3dError if a press is estimated to need too much memory."""
     have = _machine_gb()
-    if need_gb > _SHARE * have:
+    if need_gb > _MEMORY_SHARE * have:
         raise Finger3dError(
-            f"{what}: forecast {need_gb:.2g} GB; allowed: at most {_SHARE * have:.1f} GB of {have:.1f} GB; choose a "
-            "larger mesh.size_mm, fewer steps or fewer gauges"
+            f"{what}: forecast {need_gb:.2g} GB; allowed: at most {_MEMORY_SHARE * have:.1f} GB of {have:.1f} GB; "
+            "choose a larger mesh.size_mm, fewer steps or fewer gauges"
         )
 
 

@@ -1,4 +1,4 @@
-"""What a mesher says of its mesh."""
+"""Size and quality of a mesh."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class MeshReport:
     min_dihedral_deg : smallest dihedral angle (2D: smallest angle) of the straight cells
     volume_mm3 : of the curved quadratic mesh, times its symmetry: the whole body (2D: area times width)
     cad_volume_mm3 : of the whole body, from CAD or in closed form
-    hash : of points and cells; two runs with the same hash used the same mesh
-    from_cache, cache_path : whether it was read from the cache, and where it lies there (None: not cached)
-    seconds : "cad", "mesh"
+    hash : of points and cells; equal for equal meshes only
+    from_cache, cache_path : whether the mesh was read from the cache, and its file there; None if it is not cached
+    seconds : duration of "cad" and "mesh"
     """
 
     points: int
@@ -39,7 +39,7 @@ class MeshReport:
 
 
 def content_hash(mesh: Mesh) -> str:
-    """Sixteen hexadecimal digits of the SHA-256 of points and cells."""
+    """Return sixteen hexadecimal digits of the SHA-256 of points and cells."""
     digest = hashlib.sha256(np.ascontiguousarray(mesh.points).tobytes())
     digest.update(np.ascontiguousarray(mesh.cells).tobytes())
     return digest.hexdigest()[:16]
@@ -54,7 +54,7 @@ def report(
     from_cache: bool = False,
     cache_path: str | None = None,
 ) -> MeshReport:
-    """Report on a quadratic mesh whose volume counts `multiple` times in the whole body's."""
+    """Return the report on a quadratic mesh, the `multiple`-th part of the whole body."""
     return MeshReport(
         points=len(mesh.points),
         cells=len(mesh.cells),

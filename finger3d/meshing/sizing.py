@@ -1,4 +1,4 @@
-"""The graded edge length of unstructured meshes: small in the predicted contact zone, growing away from it."""
+"""Graded edge length of unstructured meshes: small in the predicted contact zone, larger away from it."""
 
 from __future__ import annotations
 
@@ -16,22 +16,23 @@ Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
 RATE = 0.3
-"""Growth of the edge length per length away from the zone."""
+"""Growth of the edge length per distance from the zone."""
 
-_PLATEAU = 1.2  # background steps; without it the zone falls between grid points and comes out coarse
-_TETS = 10.0  # tets per (edge length)^3, measured 9.6 to 11
-_FINEST = 60  # background cells along the longest side, at most
+_PLATEAU_STEPS = 1.2  # constant size around the zone, in background steps; the grid would miss a narrower zone
+_TETS_PER_CUBE = 10.0  # tets per (edge length)^3; measured 9.6 to 11
+_MAX_BACKGROUND_CELLS = 60  # along the longest side
 
 
 @dataclass(frozen=True)
 class Sizing:
-    """Edge length as a function of place (mm), on a background grid.
+    """Edge length (mm) as a function of position, sampled on a background grid.
 
     Attributes
     ----------
-    low, high : (3,) box around the meshed body
-    zone : (n, 3) points on the contact surface, in the zone
-    step : spacing of the background grid
+    size_mm, base_mm : edge length in the zone, and the largest one
+    low, high : (3,) corners of the box around the meshed body, mm
+    zone : (n, 3) points of the contact surface in the zone, mm
+    step : spacing of the background grid, mm
     """
 
     size_mm: float
@@ -42,15 +43,17 @@ class Sizing:
     step: float
 
     def at(self, points: Float) -> Float:
-        """Edge length (n,) at points (n, 3)."""
+        """Return the edge length (n,) at points (n, 3)."""
         from scipy.spatial import cKDTree
 
         reach = cKDTree(self.zone).query(points)[0]
-        value: Float = np.minimum(self.base_mm, self.size_mm + RATE * np.maximum(0.0, reach - _PLATEAU * self.step))
+        value: Float = np.minimum(
+            self.base_mm, self.size_mm + RATE * np.maximum(0.0, reach - _PLATEAU_STEPS * self.step)
+        )
         return value
 
     def grid(self) -> tuple[list[Float], Float]:
-        """Coordinates of the background grid along x, y, z, and the edge length (nx, ny, nz) on it."""
+        """Return the coordinates of the background grid along x, y, z, and its edge lengths (nx, ny, nz)."""
         low, high = self.low - self.step, self.high + self.step
         counts = np.maximum(1, np.ceil((high - low) / self.step - 1e-9)).astype(int)
         if self._fills_width:
@@ -62,7 +65,7 @@ class Sizing:
         return axes, self.at(at).reshape(counts + 1)
 
     def background(self) -> tuple[Float, Int, Float]:
-        """Background mesh for pytetwild: points (n, 3), tets (m, 4) (Kuhn split), edge length at the points (n,)."""
+        """Return the background mesh: points (n, 3), tets (m, 4) by Kuhn's subdivision, edge lengths (n,)."""
         axes, values = self.grid()
         points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
         nodes = np.array(values.shape)
@@ -74,13 +77,13 @@ class Sizing:
 
     @property
     def _fills_width(self) -> bool:
-        # Then the field does not depend on z, and one layer of background cells is exact.
+        # One layer of background cells is exact then, since the field does not depend on z.
         inner = self.low[2] + self.step, self.high[2] - self.step
         return bool(self.zone[:, 2].min() <= inner[0] and self.zone[:, 2].max() >= inner[1])
 
 
 def rounded_zone(design: Design, options: MeshSizes, zone: Zone) -> Zone:
-    """The zone widened to whole edge lengths within the footprint, so that near zones share one cached mesh."""
+    """Return the zone widened to multiples of the edge length in the footprint, so that similar zones share a mesh."""
     size = options.size_mm
     reach = (design.half_length_mm, design.half_length_mm, 0.5 * design.width_mm, 0.5 * design.width_mm)
     grid = [
@@ -91,8 +94,14 @@ def rounded_zone(design: Design, options: MeshSizes, zone: Zone) -> Zone:
 
 
 def sizing(design: Design, options: MeshSizes, zone: Zone, low: Float, high: Float) -> Sizing:
-    """The size field for a body in the box `low` to `high` (3,), mm."""
-    step = float(max(2.0 * options.size_mm, design.half_length_mm / 50.0, (high - low).max() / _FINEST))
+    """Return the size field of a body in the box from `low` to `high` (3,), mm.
+
+    Raises
+    ------
+    Finger3dError
+        If the zone lies outside the box or the footprint.
+    """
+    step = float(max(2.0 * options.size_mm, design.half_length_mm / 50.0, (high - low).max() / _MAX_BACKGROUND_CELLS))
     x0, x1 = max(zone[0], low[0]), min(zone[1], high[0])
     z0, z1 = max(zone[2], low[2]), min(zone[3], high[2])
     near = 0.5 * step
@@ -108,13 +117,13 @@ def sizing(design: Design, options: MeshSizes, zone: Zone, low: Float, high: Flo
 
 
 def forecast(design: Design, field: Sizing, samples: int = 40) -> float:
-    """Number of tets the field asks for, 10 times the integral of dV / h^3 over the body.
+    """Estimate the number of tets as 10 times the integral of dV / h^3 over the body.
 
-    Measured against meshes made: 0.96 to 1.1 times their number at base/size = 4, up to 1.9 times at 20.
+    The estimate was 0.96 to 1.1 times the actual number at base/size = 4, and up to 1.9 times at 20.
     """
     from scipy.interpolate import RegularGridInterpolator
 
-    # fTetWild sees the field between the grid's points, where it is coarser than the field itself.
+    # fTetWild interpolates between the grid points, which gives larger edges than the field itself.
     seen = RegularGridInterpolator(*field.grid())
     middle = (np.arange(samples) + 0.5) / samples
     spans = field.high - field.low
@@ -128,4 +137,4 @@ def forecast(design: Design, field: Sizing, samples: int = 40) -> float:
     for d, w in zip(depth, weight, strict=True):
         h = seen(np.stack([x.ravel(), top * (1.0 - d), z.ravel()], axis=1))
         total += w * float(column @ h**-3.0)
-    return _TETS * total
+    return _TETS_PER_CUBE * total

@@ -1,4 +1,4 @@
-"""The structured, deterministic mesher: quadratic triangles of a section, and tets swept from them along z."""
+"""Structured, reproducible meshes: quadratic triangles of a section, and tetrahedra swept from them along z."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
 _AXIS = {"x": 0, "z": 2}
-_FLATTEST_DEG = 0.5  # flatter ones come from a wall or an edge far thinner than the mesh
+_LEAST_ANGLE_DEG = 0.5  # of a cell; smaller angles occur where a wall or an edge is far thinner than the mesh
 
 
 def mesh_section(
     design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...] = ()
 ) -> tuple[Mesh, MeshReport]:
-    """Mesh the section of an extruded design with quadratic triangles, mirror-exact about x = 0.
+    """Mesh the section of an extruded design with quadratic triangles, an exact mirror image of itself about x = 0.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def mesh_section(
 def mesh_swept(
     design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...] = ()
 ) -> tuple[Mesh, MeshReport]:
-    """Mesh an extruded design with quadratic tets, mirror-exact about x = 0 and z = 0; see :func:`mesh_section`.
+    """Mesh an extruded design with quadratic tets, exactly symmetric about x = 0 and z = 0; see :func:`mesh_section`.
 
     Layers along z are equal and at most ``size_mm`` thick; over half the width there are at least ``options.layers``.
     """
@@ -70,17 +70,17 @@ def mesh_swept(
 
 
 def _fit(made: MeshReport, design: Design, options: MeshSizes) -> MeshReport:
-    """The report, unless cells are too flat to trust."""
-    if made.min_dihedral_deg >= _FLATTEST_DEG:
+    """Return the report, or raise a Finger3dError for cells that are too flat."""
+    if made.min_dihedral_deg >= _LEAST_ANGLE_DEG:
         return made
     raise Finger3dError(
         f"{design.name}: mesh.size_mm = {options.size_mm:g} gives cells of {made.min_dihedral_deg:.2g} deg, flatter "
-        f"than {_FLATTEST_DEG:g}; a wall or an edge is too thin for it: choose smaller sizes, or edge_height_mm = 0"
+        f"than {_LEAST_ANGLE_DEG:g}; a wall or an edge is too thin for it: choose smaller sizes, or edge_height_mm = 0"
     )
 
 
 def _grid(design: Design, options: MeshSizes, zone: Zone, dim: int, copies: int) -> tuple[Grid, Section]:
-    """Triangles of the half section, if the mesh made of `copies` cells for each of them may be afforded."""
+    """Return the triangles of the half section; a mesh of `copies` cells per triangle must fit the memory."""
     section = design.section()
     if section is None:
         what, allowed = ("model.domain", "'solid'") if dim == 2 else ("mesh.mesher = 'swept'", "'ftetwild'")
@@ -99,7 +99,7 @@ def _on_curve(mesh: Mesh, section: Section, arc: Float) -> Mesh:
     points = mesh.points.copy()
     for k, (i, j) in enumerate(pairs):
         ends, middle = arc[facets[:, [i, j]]], facets[:, d + k]
-        bent = ends[:, 0] != ends[:, 1]  # edges along z lie where their ends lie, to the last bit
+        bent = ends[:, 0] != ends[:, 1]  # edges along z are straight
         points[middle[bent], :2] = section.contact.at(ends[bent].mean(axis=1))
     points[mesh.facets["symmetry_x"].ravel(), 0] = 0.0
     return Mesh(points, mesh.cells, mesh.facets)

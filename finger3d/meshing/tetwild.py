@@ -1,7 +1,7 @@
-"""Unstructured tets by pytetwild, graded, snapped to CAD, cached.
+"""Graded unstructured tetrahedra by pytetwild, with boundary nodes moved onto the CAD surface; meshes are cached.
 
-pytetwild crashes or hangs on bad input and gives another mesh every time, so its input is checked first, it runs in a
-child process under a time limit, its output is checked, and it gets three attempts.
+pytetwild crashes or hangs on bad input and does not reproduce its meshes. Its input and output are checked, and it runs
+in a child process under a time limit, up to three times.
 """
 
 from __future__ import annotations
@@ -38,10 +38,14 @@ Int = NDArray[np.int64]
 STOP_ENERGY = 10.0
 ATTEMPTS = 3
 
-_EPSILON = (2e-4, 1e-3, 3e-3)  # envelope per diagonal: least, usual, most; tighter costs steeply, nodes are snapped
-_FINE = 0.2  # the envelope is at most this share of the contact edge length, and holds chords this much finer
-_COARSER = 0.02  # of the envelope, each triangle left out of an STL body may move the surface
-_VOLUME = 0.01
+_ENVELOPE = (
+    2e-4,
+    1e-3,
+    3e-3,
+)  # fTetWild's epsilon over the diagonal: least, default, largest; cost rises steeply below
+_ENVELOPE_SHARE = 0.2  # largest envelope over the contact edge length, and chord error of CAD over the envelope
+_DECIMATION_SHARE = 0.02  # of the envelope: displacement of an STL surface by the removal of one triangle
+_VOLUME_TOLERANCE = 0.01  # relative difference between the volumes of mesh, tessellation and design
 
 
 def mesh_tetwild(
@@ -51,7 +55,7 @@ def mesh_tetwild(
     symmetry: tuple[str, ...] = (),
     say: Callable[[str], None] = lambda text: None,
 ) -> tuple[Mesh, MeshReport]:
-    """Mesh a design with quadratic tets by pytetwild, or read the mesh from the cache; see `design.mesh_solid`."""
+    """Mesh a design with quadratic tetrahedra, or read the mesh from the cache; see `finger3d.meshing.generate`."""
     check_sizes(design, options, 3)
     zone = rounded_zone(design, options, zone)
     path = cache.folder() / f"{cache.key(design, options, zone, symmetry)}.npz"
@@ -62,7 +66,7 @@ def mesh_tetwild(
         say(f"mesh from the cache, {path}")
         seconds = {"cad": 0.0, "mesh": time.perf_counter() - start}
         return mesh, report(mesh, multiple, volume, seconds, from_cache=True, cache_path=str(path))
-    mesh, volume, cad_seconds = _made(design, options, zone, symmetry, say)
+    mesh, volume, cad_seconds = _new_mesh(design, options, zone, symmetry, say)
     stored = cache.save(path, mesh, volume)
     if not stored:
         say(f"the mesh could not be kept in {path.parent}; the next run will mesh again")
@@ -70,10 +74,10 @@ def mesh_tetwild(
     return mesh, report(mesh, multiple, volume, seconds, cache_path=str(path) if stored else None)
 
 
-def _made(
+def _new_mesh(
     design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...], say: Callable[[str], None]
 ) -> tuple[Mesh, float, float]:
-    """The mesh, the CAD volume (mm3) of the whole body, and the seconds CAD took."""
+    """Return the mesh, the volume (mm3) of the whole body, and the seconds spent on CAD."""
     from finger3d.meshing.snap import UnusableMeshError, snap
 
     if find_spec("pytetwild") is None:
@@ -88,7 +92,7 @@ def _made(
     cad_seconds = time.perf_counter() - start
     check_surface(body.points, body.triangles)
     whole = design.volume_mm3
-    if abs(body.volume_mm3 * 2 ** len(symmetry) / whole - 1.0) > _VOLUME:
+    if abs(body.volume_mm3 * 2 ** len(symmetry) / whole - 1.0) > _VOLUME_TOLERANCE:
         raise Finger3dError(
             f"{design.name}: the solid's volume is not the volume_mm3 it states, {whole:.6g}; mend the design"
         )
@@ -118,7 +122,7 @@ def box(design: Design, symmetry: tuple[str, ...]) -> tuple[Float, Float]:
 
 
 def _body(design: Design, symmetry: tuple[str, ...], field: Sizing) -> tuple[Tessellation, float]:
-    """The tessellated part, and the envelope fTetWild shall keep, per diagonal."""
+    """Return the tessellated part, and fTetWild's envelope over its diagonal."""
     from finger3d.geometry.cad import cut, labelled_faces
     from finger3d.geometry.faceted import coarser
     from finger3d.geometry.implicit import surface_of
@@ -129,25 +133,28 @@ def _body(design: Design, symmetry: tuple[str, ...], field: Sizing) -> tuple[Tes
     surfaces = [f.surface for f in faceted.faces] if faceted else [surface_of(f) for f in labelled_faces(solid)]
     radius = min(getattr(surface, "radius", math.inf) for surface in surfaces)
     diagonal = float(np.linalg.norm(field.high - field.low))
-    # An envelope below the sagitta of the longest edge makes a hemisphere take 20 times as long, and come out too fine.
-    least, usual, most = _EPSILON
-    epsilon = min(max(usual, field.base_mm**2 / (8.0 * radius * diagonal)), most, _FINE * field.size_mm / diagonal)
+    # With an envelope below the sagitta of the longest edge a hemisphere takes 20 times as long and gets too fine.
+    least, usual, most = _ENVELOPE
+    epsilon = min(
+        max(usual, field.base_mm**2 / (8.0 * radius * diagonal)), most, _ENVELOPE_SHARE * field.size_mm / diagonal
+    )
     epsilon = max(epsilon, least)
     if faceted:
-        return coarser(faceted, _COARSER * epsilon * diagonal), epsilon
+        return coarser(faceted, _DECIMATION_SHARE * epsilon * diagonal), epsilon
     half_width, half_length = 0.5 * design.width_mm, design.half_length_mm
     exact = (0.0, half_width, -half_width, half_length, -half_length, design.height_mm)
-    return tessellate(solid, _FINE * epsilon * diagonal, exact=exact), epsilon
+    return tessellate(solid, _ENVELOPE_SHARE * epsilon * diagonal, exact=exact), epsilon
 
 
 def check_surface(points: Float, triangles: Int) -> None:
-    """Refuse a surface that makes pytetwild crash, hang, or mesh something else."""
-    reason = _mistake(points, triangles)
+    """Raise a Finger3dError for a surface on which pytetwild crashes, hangs, or meshes another body."""
+    reason = surface_defect(points, triangles)
     if reason:
         raise Finger3dError(f"the finger's surface cannot be meshed: {reason}; mend the design or the file")
 
 
-def _mistake(points: Float, triangles: Int) -> str:
+def surface_defect(points: Float, triangles: Int) -> str:
+    """Return what makes a surface unfit for pytetwild; empty if nothing does."""
     if points.ndim != 2 or points.shape[1] != 3 or triangles.ndim != 2 or triangles.shape[1] != 3 or len(triangles) < 4:
         return f"it needs (n, 3) points and at least 4 triangles (m, 3), and has {points.shape} and {triangles.shape}"
     if not np.isfinite(points).all():
@@ -174,8 +181,11 @@ def _mistake(points: Float, triangles: Int) -> str:
 
 
 def _limit_seconds(cells: float, triangles: int) -> float:
-    """Five times what meshing took on a busy 2-core machine: 6 s at 4 700 tets, 149 s at 219 000, the surface being
-    coarse; 27 s over 5 500 triangles, 197 s over 34 000, the tets being few."""
+    """Return five times the duration measured on a loaded machine of two cores.
+
+    With a coarse surface: 6 s for 4 700 tets, 149 s for 219 000. With few tets: 27 s for 5 500
+    triangles, 197 s for 34 000.
+    """
     return 5.0 * (10.0 + 8e-4 * cells + 5e-3 * triangles)
 
 
@@ -212,7 +222,7 @@ def _child(points: Float, triangles: Int, field: Sizing, epsilon: float, limit: 
 
 
 def check_tets(points: Float, tets: Int, volume_mm3: float) -> None:
-    """Refuse tets that are none, inverted, or do not fill the body."""
+    """Raise an UnusableMeshError for no tets, inverted ones, or ones that do not fill the body."""
     from finger3d.meshing.snap import UnusableMeshError
 
     if not len(tets):
@@ -220,5 +230,5 @@ def check_tets(points: Float, tets: Int, volume_mm3: float) -> None:
     volumes = signed_volumes(Mesh(points, tets, {}))
     if not (volumes > 0.0).all():
         raise UnusableMeshError("pytetwild returned flat or inverted cells")
-    if not math.isclose(float(volumes.sum()), volume_mm3, rel_tol=_VOLUME):
+    if not math.isclose(float(volumes.sum()), volume_mm3, rel_tol=_VOLUME_TOLERANCE):
         raise UnusableMeshError(f"its volume is {volumes.sum():.6g} mm3, the body's {volume_mm3:.6g}")

@@ -84,9 +84,10 @@ def export(
     from finger3d.mold.shell import Shell, shell, write_step, write_stl
 
     out, report, design = Path(out), report or Progress(), scene.design
-    if not _LEAST_TOLERANCE_MM <= tolerance_mm <= _LARGEST_TOLERANCE * design.height_mm:
+    largest = _LARGEST_TOLERANCE * design.height_mm
+    if not _LEAST_TOLERANCE_MM <= tolerance_mm <= largest:
         raise Finger3dError(
-            f"--tolerance-mm {tolerance_mm}: must be from {_LEAST_TOLERANCE_MM:g} to {_LARGEST_TOLERANCE * design.height_mm:.4g}, "
+            f"--tolerance-mm {tolerance_mm}: must be from {_LEAST_TOLERANCE_MM:g} to {largest:.4g}, "
             "a fifth of the finger's height"
         )
     triangles = design.surface if isinstance(design, Imported) and design.cad is None else None

@@ -210,7 +210,7 @@ def _upright(at: tuple[float, float, float], diameter: float, length: float) -> 
 
 
 def _peg_places(low: Float, high: Float, options: MoldOptions) -> tuple[list[tuple[float, float]], float]:
-    """Return the places (x, y) of the pegs between the halves, clear of body and lid pegs, and the top of the halves."""
+    """Return the places (x, y) of the halves' pegs, clear of body and lid pegs, and the top of the halves."""
     w, around = options.wall_mm, options.peg_mm / 2.0 + options.clearance_mm + RIM_MM
     near = options.hole_depth_mm + around
     far = max(float(high[1]) + w / 2.0, near)

@@ -32,7 +32,7 @@ _EXACTLY_INTEGRATED = ("PLANE", "CYLINDER", "CONE", "SPHERE")
 
 @dataclass(frozen=True)
 class Shell:
-    """Closed surface of a solid, with the absolute tolerance (mm) and the largest angle (radians) of its tessellation."""
+    """Closed surface of a solid, with the tolerance (mm) and the largest angle (radians) of its tessellation."""
 
     surface: Triangles
     tolerance_mm: float
