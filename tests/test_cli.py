@@ -96,7 +96,7 @@ def test_new_explains_every_key(scene):
 def test_an_effect_of_the_new_scene_is_switched_on_by_uncommenting_it(scene, name):
     before, block = scene.read_text(encoding="utf-8").split(f"# [effects.{name}]\n")
     keys = re.match(r"(?:# \w+ = .*\n)*", block)[0].replace("# ", "", 1).replace("\n# ", "\n")
-    text = before.replace("length_mm = 0.0", "length_mm = 2.0").replace("[press]", "[press]\nduration_s = 1.0")
+    text = before.replace("length_mm = 0.0", "length_mm = 2.0").replace("[press]", "[press]\nduration_s = 1.0", 1)
     scene.write_text(f"{text}\n[effects.{name}]\n{keys}\n", encoding="utf-8")
     assert set(load(scene).effects) == {name}
 
