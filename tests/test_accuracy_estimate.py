@@ -25,7 +25,6 @@ from finger3d.accuracy.estimate import (
 )
 from finger3d.accuracy.refine import judged
 from finger3d.cli import main
-from finger3d.cli.press import with_error
 from finger3d.contact.friction import STICK, Coulomb
 from finger3d.effects.elastic_object import SoftObject
 from finger3d.errors import Finger3dError
@@ -216,19 +215,6 @@ def test_an_estimate_that_fails_spoils_nothing_and_says_why(
     assert summary["error_estimate"]["method"] == "no estimate: neither mesh can be made"
     assert summary["outcome"] == "converged"
     assert "no estimate: " in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(
-    ("value", "error", "text"),
-    [
-        (304.4123, 0.6, "304.41 +- 0.60"),
-        (304.4123, 12.3, "304 +- 12"),
-        (0.0324, 0.00331, "0.0324 +- 0.0033"),
-        (3.0, None, "3"),
-    ],
-)
-def test_a_number_is_printed_to_its_bar(value: float, error: float | None, text: str) -> None:
-    assert with_error(value, error, 5) == text
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from finger3d.cli import main
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Gauge
 from finger3d.plotting.layout import panels_of, sheet
-from finger3d.report.build import CITE, PAPER, Code, Figure, HeadlineRow, PageSection, Table, number, write_page
+from finger3d.report.build import CITE, PAPER, Code, Figure, HeadlineRow, PageSection, Table, write_page
 from finger3d.report.compare import compare_page
 from finger3d.report.press import press_page
 from finger3d.report.view3d import view_of
@@ -147,18 +147,6 @@ def test_the_builder_takes_what_calibrate_and_sweep_have(tmp_path: Path) -> None
         assert said in text
     assert "never seen" not in text
     assert 'alt="the &quot;fit&quot;"' in page.read_text(encoding="utf-8")
-
-
-@pytest.mark.parametrize(
-    ("value", "error", "text"),
-    [
-        (304.36368, None, "304.36"), (304.36368, 1.94, "304.4 ± 1.9"), (1266.4, 130.0, "1270 ± 130"),
-        (0.034024, 0.0005, "0.03402 ± 0.00050"), (3.4024e-8, 2e-9, "(3.40 ± 0.20) 1e-8"), (2.0, 0.0, "2"),
-        (12, None, "12"), ("text", 1.0, "text"),
-    ],
-)  # fmt: skip
-def test_numbers_have_the_digits_their_error_leaves(value: object, error: float | None, text: str) -> None:
-    assert number(value, error) == text
 
 
 def test_a_picture_stands_in_the_page_once_and_each_panel_is_a_window_on_it(tmp_path: Path) -> None:

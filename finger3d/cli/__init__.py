@@ -1,4 +1,4 @@
-"""The command line. Each command imports what it needs, so that ``finger3d --help`` is quick."""
+"""Command line. Each command imports what it needs, so that ``finger3d --help`` is quick."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from finger3d.cli import (  # noqa: F401
     sweep,
     validate,
 )
-from finger3d.cli.common import app, complain
+from finger3d.cli.common import Interrupted, app, complain
 from finger3d.cli.terminal import safe_streams, termination_interrupts
 from finger3d.errors import OUT_OF_MEMORY, Finger3dError, MissingError, out_of_memory
 
@@ -30,7 +30,7 @@ from finger3d.errors import OUT_OF_MEMORY, Finger3dError, MissingError, out_of_m
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code; a user's mistake is one line on standard error.
 
-    SIGTERM ends a command as Ctrl-C does.
+    SIGTERM and SIGHUP interrupt a command like Ctrl-C.
     """
     with safe_streams(), termination_interrupts():
         return _run(arguments)
@@ -42,7 +42,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     except CycloptsError as error:
         complain(f"{error} (finger3d --help lists the commands and options)")
         return Finger3dError.exit_code
-    except Finger3dError as error:
+    except (Finger3dError, Interrupted) as error:
         complain(str(error))
         return error.exit_code
     except KeyboardInterrupt:

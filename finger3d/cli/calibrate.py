@@ -9,7 +9,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
-from finger3d.cli.common import Json, Set, app, check_writable, complain, load, print_json, print_rows, reporting
+from finger3d.cli.common import Json, Set, app, job, load, print_json, print_rows
 from finger3d.errors import Finger3dError, MissingError
 
 Tolerances = Annotated[
@@ -17,8 +17,8 @@ Tolerances = Annotated[
     Parameter(
         name="--tolerance",
         negative=(),
-        help="Standard deviation of something not known exactly, for instance depth_mm=0.05; 0 leaves it out; may be "
-        f"repeated. Of {', '.join(TOLERANCES)}.",
+        help="Standard deviation of a quantity that is not known exactly, for instance depth_mm=0.05; 0: exact; may be "
+        f"repeated. One of {', '.join(TOLERANCES)}.",
     ),
 ]
 
@@ -39,8 +39,8 @@ def calibrate(
     ] = False,
     set_: Set = None,
     json_: Json = False,
-) -> int:
-    """Strain of a gauge against mu: curve, second-order fit, resolution, usable range, and what else moves it.
+) -> None:
+    """Calibrate a gauge: its strain against mu, second-order fit, resolution, usable range, and other influences.
 
     Example: finger3d calibrate scene.toml --gauge g36 --out cal
 
@@ -49,35 +49,27 @@ def calibrate(
     scene
         The scene file (TOML); its own friction.mu does not matter.
     """
-    loaded = load(scene, set_)
-    check_writable(out, scene)
+    loaded = load(scene, set_, out)
     from finger3d.analyses.calibrate.run import calibrate as run
     from finger3d.analyses.calibrate.run import parsed_mus
     from finger3d.sensor.curve import summary
     from finger3d.sensor.files import as_dict
 
-    report, aside = reporting(json_)
-    try:
-        with aside, report:
-            found = run(
-                loaded, gauge, out, parsed_mus(mu), noise, resolution, _tolerances(tolerance), report, maps=map_
-            )  # fmt: skip
-    except KeyboardInterrupt:
-        complain(f"interrupted; {report.steps_done} of {report.steps_total} values of mu are kept in {out}")
-        return 130
+    with job(json_, lambda done: f"{done.steps_done} of {done.steps_total} values of mu are kept in {out}") as report:
+        found = run(
+            loaded, gauge, out, parsed_mus(mu), noise, resolution, _tolerances(tolerance), report=report, maps=map_
+        )
     if json_:
         print_json(as_dict(found))
     else:
         print_rows(loaded.title, [*summary(found), ("results", str(out))])
         print(found.verdict())
-    if not found.failed:
-        return 0
-    first = found.failed[0]
-    complain(
-        f"{scene}: {len(found.failed)} of {report.steps_total} values of mu gave no strain, the first mu = "
-        f"{first[0]:.4g} {first[1]}"
-    )
-    return MissingError.exit_code
+    if found.failed:
+        mu_failed, why = found.failed[0]
+        raise MissingError(
+            f"{scene}: {len(found.failed)} of {report.steps_total} values of mu gave no strain, the first mu = "
+            f"{mu_failed:.4g} {why}"
+        )
 
 
 def _tolerances(texts: Sequence[str] | None) -> dict[str, float]:

@@ -1,12 +1,12 @@
-"""What the commands share: the app, refusals before any work, one line of complaint, tables."""
+"""Parts that the commands share: the app, common options, checks of folders, the frame of a job, and tables."""
 
 from __future__ import annotations
 
 import json
 import sys
 import tempfile
-from collections.abc import Iterable, Sequence
-from contextlib import AbstractContextManager, nullcontext, redirect_stdout
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext, redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -18,6 +18,8 @@ from finger3d.errors import Finger3dError
 from finger3d.progress import Progress, reporter
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from finger3d.scene import Scene
 
 EPILOGUE = """Examples:
@@ -55,15 +57,36 @@ Json = Annotated[
 ]
 
 
-def reporting(json_: bool) -> tuple[Progress, AbstractContextManager[Any]]:
-    """A report for a job, and what to run the job in: with --json all it prints goes to standard error."""
-    if json_:
-        return reporter(sys.stderr), redirect_stdout(sys.stderr)
-    return reporter(), nullcontext()
+class Interrupted(Exception):
+    """A job was interrupted; the text says what is kept. Exit code 130."""
+
+    exit_code = 130
+
+
+@contextmanager
+def job(json_: bool, kept: Callable[[Progress], str]) -> Iterator[Progress]:
+    """Report the progress of a job within the block.
+
+    Parameters
+    ----------
+    json_ : whether standard output is left to the JSON of the result; all that is printed within goes to standard error
+    kept : says after an interruption which results are kept
+
+    Raises
+    ------
+    Interrupted
+        For Ctrl-C, SIGTERM or SIGHUP.
+    """
+    report = reporter(sys.stderr if json_ else None)
+    try:
+        with redirect_stdout(sys.stderr) if json_ else nullcontext(), report:
+            yield report
+    except KeyboardInterrupt:
+        raise Interrupted(f"interrupted; {kept(report)}") from None
 
 
 def print_json(data: Any) -> None:
-    """Print for a script; what the terminal cannot encode is escaped."""
+    """Print JSON for a script; characters that the terminal cannot encode are escaped."""
     from finger3d.io import json_text
 
     text = json_text(data)
@@ -74,21 +97,25 @@ def print_json(data: Any) -> None:
     print(text)
 
 
-def load(path: Path, overrides: list[str] | None) -> Scene:
+def load(path: Path, overrides: list[str] | None, out: Path | None = None) -> Scene:
+    """Load a scene with the keys of --set; refuse an output folder that cannot take the results."""
     from finger3d.scene import load
 
-    return load(path, overrides or [])
+    scene = load(path, overrides or [])
+    if out is not None:
+        check_writable(out, path)
+    return scene
 
 
 def check_writable(out: Path, scene: Path) -> None:
-    """Refuse an output folder that cannot take the results, before any work."""
+    """Raise Finger3dError for an output folder that cannot take the results of a scene."""
     if (out / "scene.toml").resolve() == scene.resolve():
         raise Finger3dError(f"--out {out}: holds {scene.name}, which the results would overwrite; name another folder")
     check_folder(out)
 
 
 def check_folder(out: Path) -> None:
-    """Refuse a folder that cannot be written; one that is not there yet is left to those who write into it."""
+    """Raise Finger3dError for a folder that cannot be written; one that does not exist is made later."""
     try:
         there = next(p for p in (out, *out.parents, Path()) if p.exists())
         if there == out and not out.is_dir():
@@ -99,45 +126,45 @@ def check_folder(out: Path) -> None:
         raise Finger3dError(f"--out {out}: cannot be written: {error.strerror}") from None
 
 
-def kept(out: Path, total: int) -> str:
-    """Say how many good steps the results hold; what is on disk counts, not what was computed."""
-    try:
-        steps = json.loads((out / "summary.json").read_text(encoding="utf-8"))["steps"]
-    except (OSError, ValueError, KeyError):
-        steps = []
-    good = sum(step["outcome"] == "converged" for step in steps)
-    return f"{good} of {total} steps are kept in {out}" if good else "no step was finished, none is kept"
-
-
 def complain(text: str) -> None:
+    """Print one line on standard error."""
     print(f"finger3d: {printable(' '.join(text.split()))}", file=sys.stderr)
 
 
-def print_rows(title: str, rows: Iterable[tuple[str, Any]]) -> None:
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
+def print_rows(title: str, rows: Iterable[tuple[str, object]]) -> None:
+    """Print a title and a table of names and values."""
     from rich.text import Text
 
-    table = Table(title=Text(printable(title), style="bold"), title_justify="left", box=box.SIMPLE, show_header=False)
+    bold = Text(printable(title), style="bold")
+    table = _table(title=bold, title_justify="left", show_header=False)
     table.add_column(no_wrap=True)
     table.add_column(overflow="fold")
     for key, value in rows:
         table.add_row(Text(printable(key)), Text(printable(str(value))))
-    # In a pipe nothing limits the width: a folded path could not be copied.
-    width = None if sys.stdout.isatty() else 500
-    Console(file=sys.stdout, highlight=False, width=width).print(table)
+    # a path that is folded could not be copied: a pipe has no width
+    _print(table, 500)
 
 
 def print_columns(head: Sequence[str], lines: Iterable[Sequence[str]]) -> None:
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
+    """Print a table with a heading."""
     from rich.text import Text
 
-    table = Table(box=box.SIMPLE)
+    table = _table()
     for name in head:
         table.add_column(name, overflow="fold")
     for line in lines:
         table.add_row(*(Text(printable(cell.replace("**", ""))) for cell in line))
-    Console(file=sys.stdout, highlight=False, width=None if sys.stdout.isatty() else 240).print(table)
+    _print(table, 240)
+
+
+def _table(**options: Any) -> Table:
+    from rich import box
+    from rich.table import Table
+
+    return Table(box=box.SIMPLE, **options)
+
+
+def _print(table: Table, piped_width: int) -> None:
+    from rich.console import Console
+
+    Console(file=sys.stdout, highlight=False, width=None if sys.stdout.isatty() else piped_width).print(table)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
-from finger3d.cli.common import Json, Set, app, check_writable, complain, load, print_json, reporting
+from finger3d.cli.common import Json, Set, app, job, load, print_json
 from finger3d.errors import Finger3dError, MissingError
 
 
@@ -23,8 +22,8 @@ def compare(
     ] = None,
     set_: Set = None,
     json_: Json = False,
-) -> int:
-    """Solve a scene as plane stress, plane strain and solid: would 2D have done, and by how much not?
+) -> None:
+    """Solve a scene as plane stress, plane strain and solid, and judge whether 2D would have been enough.
 
     Example: finger3d compare scene.toml --out out --widths 5,20,50,200
 
@@ -34,32 +33,25 @@ def compare(
         The scene file (TOML).
     """
     chosen = None if widths is None else [_width(text) for text in widths.split(",")]
-    loaded = load(scene, set_)
+    loaded = load(scene, set_, out)
     if loaded.tables.mesh.tolerance is not None:
         raise Finger3dError(
             f"{scene}: mesh.tolerance = {loaded.tables.mesh.tolerance:g}: compare solves on equal sizes; press finds "
             "them and writes them to its scene.toml, take that one"
         )
-    check_writable(out, scene)
     from finger3d.analyses.compare.run import compare as run
+    from finger3d.results.summary import read_json
 
-    report, aside = reporting(json_)
-    try:
-        with aside, report:
-            result = run(loaded, out, chosen, report)
-    except KeyboardInterrupt:
-        complain(f"interrupted; {report.steps_done} of {report.steps_total} cases are kept in {out}")
-        return 130
+    with job(json_, lambda done: f"{done.steps_done} of {done.steps_total} cases are kept in {out}") as report:
+        result = run(loaded, out, chosen, report)
     if json_:
-        print_json(json.loads((out / "compare.json").read_text(encoding="utf-8")))
+        print_json(read_json(out / "compare.json"))
     else:
         print("\n".join(result.verdict))
         print(f"results: {out}")
-    if result.outcome.ok:
-        return 0
-    failed = sum(not case.ok for case in result.cases)
-    complain(f"{scene}: {failed} of {len(result.cases)} cases gave no numbers: {result.outcome}")
-    return MissingError.exit_code
+    if not result.outcome.ok:
+        failed = sum(not case.ok for case in result.cases)
+        raise MissingError(f"{scene}: {failed} of {len(result.cases)} cases gave no numbers: {result.outcome}")
 
 
 def _width(text: str) -> float:

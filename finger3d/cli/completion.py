@@ -8,7 +8,7 @@ from finger3d.cli.common import app
 
 
 @app.command
-def completion(shell: Literal["bash", "zsh", "fish"], /) -> int:
+def completion(shell: Literal["bash", "zsh", "fish"], /) -> None:
     """Print a script that lets a shell complete commands and options.
 
     For bash, add the line of the example to ~/.bashrc. For zsh, write the script to a file _finger3d in a folder of
@@ -22,4 +22,3 @@ def completion(shell: Literal["bash", "zsh", "fish"], /) -> int:
         The shell.
     """
     print(app.generate_completion(shell=shell), end="")
-    return 0

@@ -34,7 +34,7 @@ def estimate(
     tolerances: Annotated[
         bool, Parameter(negative="--no-tolerances", help="Whether what the calibration does not know exactly counts.")
     ] = True,
-) -> int:
+) -> None:
     """Mu with its standard deviation from a strain reading, or why the strain does not tell it.
 
     Example: finger3d estimate cal/calibration.json --strain 0.052
@@ -58,7 +58,7 @@ def estimate(
             print_json(asdict(found[0]))
         else:
             print(found[0].verdict)
-        return 0
+        return
     assert csv_ is not None
     strains, stds = _readings(csv_, std)
     try:
@@ -75,7 +75,6 @@ def estimate(
         write_csv(out, {name: [_line(e)[i] for e in found] for i, name in enumerate(_COLUMNS)})
         told = sum(e.status in ("ok", "coarse") for e in found)
         print(f"{told} of {len(found)} readings tell mu; results: {out}")
-    return 0
 
 
 _COLUMNS = ("strain", "reading_std", "mu", "std", "low", "high", "status", "verdict")

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from finger3d.cli.common import Json, Set, app, check_folder, complain, load, print_json, print_rows, reporting
+from finger3d.cli.common import Json, Set, app, check_folder, job, load, print_json, print_rows
 from finger3d.errors import Finger3dError
 from finger3d.mold.options import MoldOptions
 
@@ -25,7 +25,7 @@ def export(
     options: Annotated[MoldOptions | None, Parameter(name="*", group="Mold (with --mold)")] = None,
     set_: Set = None,
     json_: Json = False,
-) -> int:
+) -> None:
     """Write the finger as STEP and STL, and with --mold everything to cast it: parts, plate, sheet, picture.
 
     Example: finger3d export scene.toml --out print --mold --shrinkage 0.001 --bed 180x180x180
@@ -37,21 +37,16 @@ def export(
     """
     chosen = options or MoldOptions()
     if not mold and chosen != MoldOptions():
-        raise Finger3dError("export: options of a mold are given without --mold; add it, or take them out")
+        raise Finger3dError("export: options of a mold need --mold")
     loaded = load(scene, set_)
     check_folder(out)
     from finger3d.mold.export import export as run
 
-    report, aside = reporting(json_)
-    try:
-        with aside, report:
-            done = run(loaded, out, chosen if mold else None, ascii_, tolerance_mm, report)
-    except KeyboardInterrupt:
-        complain(f"interrupted; the files that are in {out} are whole")
-        return 130
+    with job(json_, lambda _: f"the files that are in {out} are complete") as report:
+        done = run(loaded, out, chosen if mold else None, ascii_, tolerance_mm, report)
     if json_:
         print_json({"results": out, **asdict(done)})
-        return 0
+        return
     off = done.stl_volume_mm3 / done.volume_mm3 - 1.0
     rows = [
         ("volume", f"{done.volume_mm3:.6g} mm3; finger.stl {off:+.1e} of it"),
@@ -64,4 +59,3 @@ def export(
     print_rows(loaded.title, rows)
     for text in done.remarks:
         print(f"remark: {text}")
-    return 0

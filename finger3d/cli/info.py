@@ -6,7 +6,7 @@ from finger3d.cli.common import Json, app, print_json, print_rows
 
 
 @app.command
-def info(*, json_: Json = False) -> int:
+def info(*, json_: Json = False) -> None:
     """Print versions, machine and folders: what a bug report needs.
 
     Example: finger3d info --json
@@ -27,7 +27,7 @@ def info(*, json_: Json = False) -> int:
             "pardiso": pardiso.available(),
         }
         print_json({"versions": versions(), "machine": machine})
-        return 0
+        return
     print_rows("versions", versions().items())
     print_rows(
         "machine",
@@ -39,4 +39,3 @@ def info(*, json_: Json = False) -> int:
             ("PARDISO", "available" if pardiso.available() else "not available; SuperLU is used, which is slower"),
         ],
     )
-    return 0

@@ -10,7 +10,7 @@ from finger3d.errors import Finger3dError
 
 
 @app.command
-def new(file: Path = Path("scene.toml"), /) -> int:
+def new(file: Path = Path("scene.toml"), /) -> None:
     """Write a commented scene to start from: the paper's Fig. 9 finger.
 
     Example: finger3d new my_scene.toml
@@ -29,4 +29,3 @@ def new(file: Path = Path("scene.toml"), /) -> int:
     except OSError as error:
         raise Finger3dError(f"{file}: cannot be written: {error.strerror}") from None
     print(f"{file} written; next: finger3d press {file} --out out")
-    return 0

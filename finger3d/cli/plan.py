@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 @app.command
-def plan(scene: Path, /, *, set_: Set = None, json_: Json = False) -> int:
+def plan(scene: Path, /, *, set_: Set = None, json_: Json = False) -> None:
     """Tell which effects are on, how large the model is, and what time and memory it will take; solve nothing.
 
     Example: finger3d plan scene.toml --set mesh.size_mm=1
@@ -28,12 +28,11 @@ def plan(scene: Path, /, *, set_: Set = None, json_: Json = False) -> int:
     found = run(loaded)
     if json_:
         print_json(found.summary())
-        return 0
+        return
     print_rows("effects", effect_rows(loaded))
     print_rows(loaded.title, [(key.replace("_", " "), value) for key, value in found.forecast.items()])
     for text in found.warnings:
         print(f"warning: {text}")
-    return 0
 
 
 def effect_rows(scene: Scene) -> list[tuple[str, str]]:

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from finger3d.cli.common import Json, Set, app, check_writable, complain, kept, load, print_json, print_rows, reporting
-from finger3d.errors import MissingError
+from finger3d.cli.common import Json, Set, app, job, load, print_json, print_rows
+from finger3d.errors import Finger3dError, MissingError
 
 
 @app.command
@@ -26,7 +25,7 @@ def press(
         bool, Parameter(negative="--no-error", help="Estimate errors, from a run on another mesh.")
     ] = True,
     json_: Json = False,
-) -> int:
+) -> None:
     """Solve a scene: CAD, mesh, contact, results.
 
     Example: finger3d press scene.toml --out out --set friction.mu=0.5
@@ -36,76 +35,73 @@ def press(
     scene
         The scene file (TOML); `finger3d new` writes one.
     """
-    loaded = load(scene, set_)
-    check_writable(out, scene)
+    loaded = load(scene, set_, out)
     from finger3d.analyses.press import press as run
 
-    report, aside = reporting(json_)
-    try:
-        with aside, report:
-            result = run(loaded, out, report, figures=figures, error=error)
-    except KeyboardInterrupt:
-        complain(f"interrupted; {kept(out, report.steps_total)}")
-        return 130
+    with job(json_, lambda report: _kept(out, report.steps_total)) as report:
+        result = run(loaded, out, report, figures=figures, error=error)
+    summary = result.summary()
     if json_:
-        print_json(result.summary())
+        print_json(summary)
     else:
-        print_rows(loaded.title, summary_rows(result.summary(), out))
+        print_rows(loaded.title, _rows(summary, out))
     for kind in ("warnings", "advice"):
-        for text in result.summary().get(kind, ()):
+        for text in summary.get(kind, ()):
             print(f"{kind.removesuffix('s')}: {text}", file=sys.stderr if json_ else sys.stdout)
-    if result.outcome.ok:
-        return 0
-    complain(f"{scene}: {result.summary()['outcome']} ({kept(out, report.steps_total)})")
-    return MissingError.exit_code
+    if not result.outcome.ok:
+        raise MissingError(f"{scene}: {summary['outcome']} ({_kept(out, report.steps_total)})")
 
 
-def summary_rows(summary: Mapping[str, Any], out: Path) -> list[tuple[str, str]]:
-    """Return the closing table of a press: what was found in the last step, and where the files are."""
-    rows = [("outcome", summary["outcome"])]
-    bars = summary.get("error_estimate") or {}
-    if summary["steps"]:
-        last = summary["steps"][-1]
+def _kept(out: Path, total: int) -> str:
+    """Say how many converged steps are in the files."""
+    from finger3d.results.summary import read_json
 
-        def told(name: str, digits: int, times: float = 1.0) -> str:
-            return with_error(times * (last | gauges)[name], error_of(bars, name), digits, times)
+    try:
+        steps = read_json(out / "summary.json")["steps"]
+    except (Finger3dError, KeyError):
+        steps = []
+    good = sum(step["outcome"] == "converged" for step in steps)
+    return f"{good} of {total} steps are kept in {out}" if good else "no step was finished, none is kept"
 
-        gauges = {f"gauge_{name}": strain for name, strain in last["gauges"].items()}
-        rows += [
-            ("depth", f"{last['depth_mm']:.4g} mm, step {len(summary['steps'])}"),
-            ("normal force", f"{told('normal_force_N', 5)} N"),
-            ("friction sum", f"{told('friction_sum_N', 5)} N"),
-            ("contact length", f"{told('contact_half_length_mm', 4, 2.0)} mm at z = 0"),
-            ("stick length", f"{told('stick_half_length_mm', 4, 2.0)} mm at z = 0"),
-            ("contact area", f"{told('contact_area_mm2', 4)} mm2"),
-            ("stick area", f"{told('stick_area_mm2', 4)} mm2"),
-            ("residual", f"{max(s['residual'] for s in summary['steps']):.1e}, the largest of all steps"),
-        ]
-        rows += [(f"strain {name.removeprefix('gauge_')}", told(name, 5)) for name in gauges]
-    if bars and not bars["discretisation"]:
-        rows.append(("error", bars["method"]))
-    elif bars:
-        rows.append(("+-", f"mesh and steps, not the model; estimated in {bars['seconds']:.1f} s; --no-error skips it"))
+
+_NUMBERS = {
+    "normal force": ("normal_force_N", 1.0, 5, " N"),
+    "friction sum": ("friction_sum_N", 1.0, 5, " N"),
+    "contact length": ("contact_half_length_mm", 2.0, 4, " mm at z = 0"),
+    "stick length": ("stick_half_length_mm", 2.0, 4, " mm at z = 0"),
+    "contact area": ("contact_area_mm2", 1.0, 4, " mm2"),
+    "stick area": ("stick_area_mm2", 1.0, 4, " mm2"),
+}
+"""Name of a row -> key of a step, factor, digits, unit."""
+
+
+def _rows(summary: Mapping[str, Any], out: Path) -> Iterator[tuple[str, str]]:
+    """Yield the closing table of a press: the numbers of the last step, the errors, and the files."""
+    from finger3d.results.format import with_error
+    from finger3d.results.summary import errors_of
+
+    errors, estimate, steps = errors_of(summary), summary.get("error_estimate") or {}, summary["steps"]
+
+    def number(value: float, key: str, digits: int, factor: float = 1.0) -> str:
+        error = errors.get(key)
+        return with_error(factor * value, None if error is None else factor * error, digits, "+-")
+
+    yield "outcome", summary["outcome"]
+    if steps:
+        last = steps[-1]
+        yield "depth", f"{last['depth_mm']:.4g} mm, step {len(steps)}"
+        for name, (key, factor, digits, unit) in _NUMBERS.items():
+            yield name, number(last[key], key, digits, factor) + unit
+        yield "residual", f"{max(step['residual'] for step in steps):.1e}, the largest of all steps"
+        for name, strain in last["gauges"].items():
+            yield f"strain {name}", number(strain, f"gauge_{name}", 5)
+    if errors:
+        yield "+-", f"mesh and steps, not the model; estimated in {estimate['seconds']:.1f} s; --no-error skips it"
+    elif estimate:
+        yield "error", estimate["method"]
     if summary.get("cost"):
-        rows.append(("time", f"{summary['cost']['seconds']['total']:.1f} s"))
-    rows.append(("results", str(out)))
-    rows += [("", p.name) for p in sorted(out.iterdir()) if p.is_file() and not p.name.startswith(".")]
-    return rows
-
-
-def error_of(bars: Mapping[str, Any], name: str) -> float | None:
-    """Both estimated errors of a number together, None where there is no estimate."""
-    if name not in bars.get("discretisation", {}):
-        return None
-    return float(bars["discretisation"][name] + bars["steps"].get(name, 0.0))
-
-
-def with_error(value: float, error: float | None, digits: int, times: float = 1.0) -> str:
-    """Return a number with its error bar, to the bar's second digit, or to `digits` digits where there is none."""
-    if error is None:
-        return f"{value:.{digits}g}"
-    bar = times * error
-    if not bar:
-        return f"{value:.{digits}g} +- 0"
-    places = min(9, max(0, 1 - math.floor(math.log10(bar))))
-    return f"{value:.{places}f} +- {bar:.{places}f}"
+        yield "time", f"{summary['cost']['seconds']['total']:.1f} s"
+    yield "results", str(out)
+    for path in sorted(out.iterdir()):
+        if path.is_file() and not path.name.startswith("."):
+            yield "", path.name

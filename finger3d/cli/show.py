@@ -19,7 +19,7 @@ def show(
     png: Annotated[Path | None, Parameter(help="Write a picture (of a step) instead of opening a window.")] = None,
     gif: Annotated[Path | None, Parameter(help="Write an animation of the steps instead.")] = None,
     step: Annotated[int | None, Parameter(help="Number of the step in the picture; default the last.")] = None,
-) -> int:
+) -> None:
     """Look at a result: a window with fields, steps and a clip plane; --png and --gif need no display.
 
     Example: finger3d show out --png finger.png --gif press.gif
@@ -30,14 +30,15 @@ def show(
         What `finger3d press` wrote; or `finger3d sweep`, for the --png of its charts.
     """
     if (folder / "sweep.json").is_file():
-        return _show_sweep(folder, png, gif, step)
+        _show_sweep(folder, png, gif, step)
+        return
     from finger3d.plotting import show as run
 
     if png is None and gif is None:
         if step is not None:
             raise Finger3dError("show: --step goes with --png; the window has a slider")
         run.show_window(folder)
-        return 0
+        return
     run.found(folder)
     _check(png, ".png")
     _check(gif, ".gif")
@@ -45,20 +46,18 @@ def show(
     for path in (png, gif):
         if path is not None:
             print(f"{path} written")
-    return 0
 
 
-def _show_sweep(folder: Path, png: Path | None, gif: Path | None, step: int | None) -> int:
+def _show_sweep(folder: Path, png: Path | None, gif: Path | None, step: int | None) -> None:
     if png is None or gif is not None or step is not None:
         page = folder / "report.html"
-        look = f"open {page}" if page.exists() else "it is not finished, and the same command goes on"
+        look = f"open {page}" if page.exists() else "it is not finished; the same command continues"
         raise Finger3dError(f"show: {folder} holds a sweep: {look}, or give --png alone")
     _check(png, ".png")
     from finger3d.report.sweep_figure import picture
 
     picture(folder, png)
     print(f"{png} written")
-    return 0
 
 
 def _check(path: Path | None, ending: str) -> None:

@@ -8,18 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from finger3d.cli.common import (
-    Json,
-    Set,
-    app,
-    check_writable,
-    complain,
-    print_columns,
-    print_json,
-    print_rows,
-    reporting,
-)
+from finger3d.cli.common import Json, Set, app, check_writable, job, print_columns, print_json, print_rows
 from finger3d.errors import Finger3dError, MissingError
+from finger3d.progress import Progress
 
 if TYPE_CHECKING:
     from finger3d.analyses.sweep.store import ResultStore
@@ -36,16 +27,16 @@ def sweep(
         list[str],
         Parameter(negative=(), help="A key and its values, for instance friction.mu=0.06,0.25,1; may be repeated."),
     ],
-    out: Annotated[Path, Parameter(help="Folder for the results; that of the same sweep is gone on with.")],
+    out: Annotated[Path, Parameter(help="Folder for the results; an interrupted sweep continues there.")],
     set_: Set = None,
     scheduler: Annotated[str | None, Parameter(help="Address of a Dask scheduler, instead of processes here.")] = None,
     workers: Annotated[
         int | None,
-        Parameter(help="Processes on this machine; default one for each core, and none beside this one for one body."),
+        Parameter(help="Processes on this machine; default: one for each core, for a single body none."),
     ] = None,
     json_: Json = False,
-) -> int:
-    """Press every combination of some values, in parallel; the same command goes on after an interruption.
+) -> None:
+    """Press every combination of some values in parallel; the same command continues after an interruption.
 
     Friction, depths, slides, steps and gauges share one condensation; every other key needs one for each value.
 
@@ -63,54 +54,45 @@ def sweep(
     from finger3d.analyses.sweep.points import combinations
     from finger3d.analyses.sweep.run import sweep as run
 
-    report, aside = reporting(json_)
-    try:
-        with aside, report:
-            report.stage("checking every point")
-            points = combinations(scene, set_ or [], vary)
-            check_writable(out, scene)
-            kept = run(points, out, scheduler, workers, report)
-        _tell(kept, out, json_)
-    except KeyboardInterrupt:
-        complain(f"interrupted; {_said(report.steps_done, report.steps_total, out)}")
-        return 130
-    failed = [row for row in (kept.rows | kept.lost).values() if row["outcome"] != "converged"]
-    if not failed:
-        return 0
-    complain(
-        f"{scene}: {len(failed)} of {len(points.points)} points gave no numbers, the first: {failed[0]['outcome']}"
-    )
-    return MissingError.exit_code
-
-
-def _tell(kept: ResultStore, out: Path, json_: bool) -> None:
+    with job(json_, lambda done: _kept(done, out)) as report:
+        report.stage("checking every point")
+        points = combinations(scene, set_ or [], vary)
+        check_writable(out, scene)
+        store = run(points, out, scheduler, workers, report)
     if json_:
-        print_json(_as_dict(kept, out))
+        print_json(_as_dict(store, out))
     else:
-        _print_points(kept)
-        print_rows(kept.sweep.title, _rows(kept, out))
+        _print_points(store)
+        print_rows(store.sweep.title, _rows(store, out))
+    failed = [row for row in (store.rows | store.lost).values() if row["outcome"] != "converged"]
+    if failed:
+        raise MissingError(
+            f"{scene}: {len(failed)} of {len(points.points)} points gave no numbers, the first: {failed[0]['outcome']}"
+        )
 
 
-def _said(done: int, total: int, out: Path) -> str:
-    return f"{done} of {total} points are kept in {out}; the same command goes on" if done else "no point was finished"
+def _kept(done: Progress, out: Path) -> str:
+    if not done.steps_done:
+        return "no point was finished"
+    return f"{done.steps_done} of {done.steps_total} points are kept in {out}; the same command continues"
 
 
-def _points(kept: ResultStore) -> list[dict[str, Any]]:
+def _points(store: ResultStore) -> list[dict[str, Any]]:
     """Every point as a row of the table in the results."""
-    columns = kept.columns()
+    columns = store.columns()
     return [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
 
 
-def _as_dict(kept: ResultStore, out: Path) -> dict[str, Any]:
-    points = _points(kept)
+def _as_dict(store: ResultStore, out: Path) -> dict[str, Any]:
+    points = _points(store)
     failed = sum(row["outcome"] != "converged" for row in points)
     return {
-        "results": out, "points": len(kept.sweep.points), "kept": len(kept.rows), "failed": failed,
-        "bodies": len(kept.sweep.bodies), "rows": points,
+        "results": out, "points": len(store.sweep.points), "kept": len(store.rows), "failed": failed,
+        "bodies": len(store.sweep.bodies), "rows": points,
     }  # fmt: skip
 
 
-def _print_points(kept: ResultStore) -> None:
+def _print_points(store: ResultStore) -> None:
     """The varied keys and the main numbers of the first points."""
     from finger3d.io import MAIN
     from finger3d.report.build import number
@@ -118,25 +100,25 @@ def _print_points(kept: ResultStore) -> None:
     def cell(value: Any) -> str:
         return "" if isinstance(value, float) and math.isnan(value) else number(value)
 
-    points = _points(kept)
+    points = _points(store)
     if not points:
         return
     gauges = [name for name in points[0] if name.startswith("gauge_")][:_GAUGES]
-    head = [*(v.key for v in kept.sweep.vary), *(name for name in (*MAIN, *gauges, "outcome") if name in points[0])]
+    head = [*(v.key for v in store.sweep.vary), *(name for name in (*MAIN, *gauges, "outcome") if name in points[0])]
     print_columns(head, ([cell(row[name]) for name in head] for row in points[:_SHOWN]))
     if len(points) > _SHOWN:
         print(f"  the first {_SHOWN} of {len(points)} points; all are in results.csv")
 
 
-def _rows(kept: ResultStore, out: Path) -> list[tuple[str, str]]:
+def _rows(store: ResultStore, out: Path) -> list[tuple[str, str]]:
     from finger3d.results.journal import number_in
 
-    solved = [row for row in kept.rows.values() if "seconds" in row]
+    solved = [row for row in store.rows.values() if "seconds" in row]
     seconds = sum(number_in(row, "seconds") for row in solved)
     built = {row["body"]: number_in(row, "build_seconds") for row in solved}
     return [
-        ("points", f"{len(kept.sweep.points)}, of them {len(kept.rows)} kept"),
-        ("bodies", f"{len(kept.sweep.bodies)}, each condensed once"),
+        ("points", f"{len(store.sweep.points)}, of them {len(store.rows)} kept"),
+        ("bodies", f"{len(store.sweep.bodies)}, each condensed once"),
         ("time of workers", f"{sum(built.values()):.1f} s meshing and condensing, {seconds:.1f} s contact"),
         ("results", str(out / "results.csv")),
         ("", str(out / "results.parquet")),

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from finger3d.cli.common import Json, app, check_folder, complain, print_columns, print_json, reporting
+from finger3d.cli.common import Json, app, check_folder, job, print_columns, print_json
 from finger3d.errors import MissingError
 
 
@@ -20,11 +20,11 @@ def validate(
     quick: Annotated[bool, Parameter(negative=())] = False,
     out: Annotated[Path | None, Parameter(help="Folder for the results instead of validation/.")] = None,
     json_: Json = False,
-) -> int:
-    """Run studies of validation/: does the code reproduce closed forms, other codes, and the paper?
+) -> None:
+    """Run the studies of validation/ against closed forms, other codes, and the paper.
 
-    Without names all studies run whose results were made by other sources than those that are there now; but those
-    that time the machine (cost_of_accuracy, scaling, beside_calculix) run in full only by name.
+    Without names, all studies run whose results are out of date; those that time the machine (cost_of_accuracy,
+    scaling, beside_calculix) run in full only by name.
 
     Example: finger3d validate press_line --quick
 
@@ -33,7 +33,7 @@ def validate(
     studies
         Names of studies.
     quick
-        Small meshes and few steps; the committed results are left alone.
+        Small meshes and few steps; the committed results do not change.
     """
     from finger3d.analyses import validate as study
 
@@ -41,13 +41,8 @@ def validate(
     selected = study.chosen(studies or [], known, quick)
     folder = study.results_folder(known, quick, out)
     check_folder(folder)
-    report, aside = reporting(json_)
-    try:
-        with aside, report:
-            found = study.run_studies(selected, quick, folder, report, not studies and not quick, known)
-    except KeyboardInterrupt:
-        complain(f"interrupted; {report.steps_done} of {len(selected)} studies are kept in {folder}")
-        return 130
+    with job(json_, lambda done: f"{done.steps_done} of {len(selected)} studies are kept in {folder}") as report:
+        found = study.run_studies(selected, quick, folder, report, not studies and not quick, known)
     if json_:
         rows = {
             name: [{**asdict(row), "error": row.error, "passed": row.passed} for row in rows]
@@ -58,7 +53,5 @@ def validate(
         print_columns("study what kind reference wanted got error tolerance verdict".split(), study.table(found))
         print(f"results: {folder}")
     failed = [name for name, rows in found.items() if not all(row.passed for row in rows)]
-    if not failed:
-        return 0
-    complain(f"validate: outside the tolerance: {', '.join(failed)} (see the rows marked FAIL)")
-    return MissingError.exit_code
+    if failed:
+        raise MissingError(f"validate: outside the tolerance: {', '.join(failed)} (see the rows marked FAIL)")

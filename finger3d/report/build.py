@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import base64
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from finger3d._machine import versions as installed
 from finger3d.io import atomic
 from finger3d.plotting.layout import panels_of
+from finger3d.report.html import asset
+from finger3d.results.format import with_error
 
 if TYPE_CHECKING:
     from finger3d.report.chart import Chart
     from finger3d.report.view3d import View3D
-from finger3d.report.html import asset
 
 # The page may run its own script and show its own pictures, and may not ask any machine for anything.
 _POLICY = "default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
@@ -163,33 +162,17 @@ def write_page(
 
 
 def number(value: object, error: float | None = None) -> str:
-    """A number with five digits, or with as many as its error leaves; text as it is.
-
-    >>> number(304.36368, 1.9)
-    '304.4 ± 1.9'
-    >>> number(0.034024128)
-    '0.034024'
-    """
+    """Return a number with its error, or with five digits; text as it is."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return str(value)
-    if error is None or not (math.isfinite(error) and error > 0.0 and math.isfinite(value)):
-        return f"{value:.5g}"
-    digits = 1 - math.floor(math.log10(error))
-    if digits > 6:
-        power = math.floor(math.log10(max(abs(value), error)))
-        return f"({number(value / 10.0**power, error / 10.0**power)}) 1e{power}"
-    if digits < 0:
-        return f"{round(value, digits):.0f} ± {round(error, digits):.0f}"
-    return f"{value:.{digits}f} ± {error:.{digits}f}"
+    return with_error(value, error)
 
 
 def _plotly() -> bytes:
-    """plotly.js from plotly's wheel, as it is on disk: to import plotly, or to make 5 MB text, would take longer."""
-    found = find_spec("plotly")
-    assert found is not None
-    assert found.origin is not None
-    library = Path(found.origin).with_name("package_data") / "plotly.min.js"
-    return library.read_bytes().replace(b"</script", b"<\\/script")
+    """Return the text of plotly.js, which comes with plotly; no "</script" in it, which would end the element."""
+    from plotly.offline import get_plotlyjs
+
+    return str(get_plotlyjs()).encode().replace(b"</script", b"<\\/script")
 
 
 def _card(row: HeadlineRow) -> str:

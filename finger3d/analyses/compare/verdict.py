@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from finger3d.accuracy.estimate import FACTOR, gain
 from finger3d.results.comparison import FORCE, Case
+from finger3d.results.format import with_error
 
 Float = NDArray[np.float64]
 
@@ -133,11 +134,7 @@ def _force(planes: Sequence[Case], solid: Case, height: float) -> str:
 
 
 def _with_error(case: Case, key: str, unit: str = "") -> str:
-    value, error = case.numbers[key], case.errors.get(key, math.nan)
-    if not math.isfinite(error):
-        return f"{value:.4g}{unit}"
-    digits = 2 if error == 0.0 else max(0, 1 - math.floor(math.log10(error)))
-    return f"{value:.{digits}f} ± {error:.{digits}f}{unit}"
+    return with_error(case.numbers[key], case.errors.get(key), digits=4) + unit
 
 
 def _ends(own: dict[str, Case]) -> list[str]:
