@@ -372,9 +372,9 @@ def test_workers_gain_no_threads(threads, scene, monkeypatch):
             pools.append(most)
             super().__init__(most, **settings)
 
-    monkeypatch.setattr("finger3d.mechanics.solve.ThreadPoolExecutor", Pool)
-    monkeypatch.setattr("finger3d.mechanics.solve._WORTH", 1)
-    monkeypatch.setattr("finger3d.mechanics.solve.cores", lambda: 2)
+    monkeypatch.setattr("finger3d.mechanics.parallel.ThreadPoolExecutor", Pool)
+    monkeypatch.setattr("finger3d.mechanics.parallel._ROWS_FOR_THREADS", 1)
+    monkeypatch.setattr("finger3d.mechanics.parallel.cores", lambda: 2)
     sweep = points_of(scene, "friction.mu=0.06,0.3,1")
     (body,) = sweep.bodies.values()
     rows = worker.batch(body, sweep.points, 3) if threads else list(worker.rows(body, sweep.points))

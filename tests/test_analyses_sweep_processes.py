@@ -178,8 +178,8 @@ def load_points(scene: Path) -> list:
     return list(combinations(scene, COARSE[1::2], ["friction.mu=0.02", f"material.nu={nu}"]).points)
 
 
-AT_ONCE = "import finger3d.mechanics.solve as s; s._WORTH = 1; s.cores = lambda: 2; from finger3d.cli import main; "
-AT_ONCE += "import sys; sys.exit(main())"
+AT_ONCE = "import finger3d.mechanics.parallel as s; s._ROWS_FOR_THREADS = 1; s.cores = lambda: 2; "
+AT_ONCE += "from finger3d.cli import main; import sys; sys.exit(main())"
 
 
 @pytest.mark.parametrize("bodies", [1, 2, 0], ids=["here", "workers", "threads"])

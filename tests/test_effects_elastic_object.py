@@ -157,9 +157,9 @@ def test_energy_goes_into_both_bodies() -> None:
     problem, frames = run(
         Effect(1.0, 0.3).apply(pad(object=Cylinder(radius_mm=4.0), friction=Coulomb(0.0), legs=(Leg(0.3, steps=20),)))
     )
-    own = np.all(problem.mirror_sign == 1.0, axis=1)
+    own = np.all(problem.symmetry.mirror_sign == 1.0, axis=1)
     part = np.zeros((len(problem.surface.nodes), 3))
-    part[problem.image_of[own]] = frames[-1].state.force[own] / problem.multiplicity[own, None]
+    part[problem.symmetry.image_of[own]] = frames[-1].state.force[own] / problem.symmetry.multiplicity[own, None]
     stored = 0.5 * 4.0 * np.einsum("id,idje,je->", part, problem.delassus, part)
     assert frames[-1].external_work_mJ == pytest.approx(stored, rel=1e-10)
 

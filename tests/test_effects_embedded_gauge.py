@@ -78,8 +78,8 @@ def test_condensed_foils_are_foils_in_the_stiffness(domain: str, nu: float) -> N
     rows = problem.condensed._rows[: len(problem.active_dofs) + 2, : problem.mesh.points.size]
     direct = condense(stiffer, problem.fixed_dofs, rows).compliance
     r, mesh_alone = len(problem.active_dofs), problem.condensed.compliance.copy()
-    mesh_alone[r:, r:] -= problem.subgrid_compliance
-    found = stiffened(mesh_alone, problem.bar_stiffness)[: r + 2, : r + 2]
+    mesh_alone[r:, r:] -= problem.inclusions.subgrid_compliance
+    found = stiffened(mesh_alone, problem.inclusions.bar_stiffness)[: r + 2, : r + 2]
     assert found == pytest.approx(direct, abs=1e-8 * direct.max())
 
 
@@ -91,7 +91,8 @@ def test_the_rows_of_gauges_are_means_of_their_bars() -> None:
     assert inlay.gauge_weights.sum(axis=1) == pytest.approx(1.0)
     assert whole[r : r + 2] == pytest.approx(inlay.gauge_weights @ whole[r + 2 :], abs=1e-12 * whole.max())
     assert (
-        np.linalg.eigvalsh(problem.subgrid_compliance).min() > -1e-3 * np.abs(problem.subgrid_compliance).max()
+        np.linalg.eigvalsh(problem.inclusions.subgrid_compliance).min()
+        > -1e-3 * np.abs(problem.inclusions.subgrid_compliance).max()
     )  # finer is more compliant
 
 

@@ -171,7 +171,7 @@ def stored(problem: Problem, frame: StepResult) -> float:
     """Elastic energy (mJ), f C f / 2, summed over the whole finger's points."""
     force = frame.part.force
     each = 0.5 * np.einsum("id,idje,je->i", force, problem.delassus, force)
-    return float((each[problem.image_of] * problem.multiplicity).sum())
+    return float((each[problem.symmetry.image_of] * problem.symmetry.multiplicity).sum())
 
 
 SLIDE_OVER_A_BALL = (Leg(0.3), Leg(0.3, slide_x_mm=0.4))
@@ -356,11 +356,11 @@ def test_most_automatic_increments_fall_with_the_size_of_the_contact(domain: Dom
 
 
 def test_presses_at_once_are_the_presses_in_turn(monkeypatch: pytest.MonkeyPatch) -> None:
-    from finger3d.mechanics import solve
-    from finger3d.mechanics.solve import map_parallel
+    from finger3d.mechanics import parallel
+    from finger3d.mechanics.parallel import map_parallel
 
-    monkeypatch.setattr(solve, "_WORTH", 1)
-    monkeypatch.setattr(solve, "cores", lambda: 2)
+    monkeypatch.setattr(parallel, "_ROWS_FOR_THREADS", 1)
+    monkeypatch.setattr(parallel, "cores", lambda: 2)
     design = designs()["half_cylinder"](radius_mm=5.0, width_mm=2.0)
     legs = (Leg(0.5, steps=4), Leg(0.5, slide_x_mm=0.1, steps=3))
     problem = build(Model(design, Material(1.0, 0.3), MeshOptions(0.3, 1.5), legs, domain="plane-stress"))
@@ -380,11 +380,11 @@ def test_presses_at_once_are_the_presses_in_turn(monkeypatch: pytest.MonkeyPatch
 
 def test_presses_nobody_waits_for_end_with_their_increment(monkeypatch: pytest.MonkeyPatch) -> None:
     """As after Ctrl-C: a long press at once with a short one, after which no more is asked."""
-    from finger3d.mechanics import solve
-    from finger3d.mechanics.solve import map_parallel
+    from finger3d.mechanics import parallel
+    from finger3d.mechanics.parallel import map_parallel
 
-    monkeypatch.setattr(solve, "_WORTH", 1)
-    monkeypatch.setattr(solve, "cores", lambda: 2)
+    monkeypatch.setattr(parallel, "_ROWS_FOR_THREADS", 1)
+    monkeypatch.setattr(parallel, "cores", lambda: 2)
     problem = build(block())
     increments = {1: 0, 2000: 0}
 

@@ -21,12 +21,12 @@ from finger3d.fem.condense import condense
 from finger3d.fem.simplex import Mesh
 from finger3d.fem.traces import BoundarySurface, local_rows, surface
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.build import MARGIN, candidate_points, contact_rows
 from finger3d.mechanics.history import ContactPoints, StepResult, measure
 from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
-from finger3d.mechanics.problem import Problem, scatter_to_points
-
-# The steps of `build`, not public, since the product has no other elements.
-from finger3d.mechanics.solve import MARGIN, _candidates, _held, _kept_rows, _unfolded, gauge_row, march, symmetry
+from finger3d.mechanics.problem import ContactSystem, Part, Problem
+from finger3d.mechanics.solve import march
+from finger3d.mechanics.symmetry import active_dofs, held_dofs, symmetry, unfold_points
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.report import MeshReport
 from finger3d.meshing.swept import mesh_section
@@ -131,12 +131,12 @@ def assembled(model: Model, element: str) -> Parts:
     elastic = replace(constants, mixed=element == "mixed")
     thickness = 1.0 if mesh.dim == 3 else model.design.width_mm
     matrix = stiffness(mesh, elastic, thickness)
-    face = _candidates(model, surface(mesh, "contact", thickness), way.first_contact_mm, MARGIN)
-    kept = _kept_rows(face, axes)
+    face = candidate_points(model, surface(mesh, "contact", thickness), way.first_contact_mm, MARGIN)
+    kept = active_dofs(face, axes)
     rows = local_rows(face, model.object.frame(mesh.dim))[kept]
-    gauges = sp.vstack([gauge_row(mesh, g, axes) for g in model.gauges], format="csr")
+    gauges = sp.vstack([g.row(mesh, axes) for g in model.gauges], format="csr")
     seconds = {**report.seconds, "assembly": time.perf_counter() - start}
-    held = _held(model, mesh, axes)
+    held = held_dofs(mesh, axes, model.held_ends)
     return Parts(
         model, mesh, report, elastic, matrix, face, kept, rows, gauges, held, way.first_contact_mm, axes, seconds
     )  # fmt: skip
@@ -145,30 +145,29 @@ def assembled(model: Model, element: str) -> Parts:
 def condensed(parts: Parts, solver: str | None = None) -> Problem:
     """The problem, as `build` makes it."""
     small = condense(parts.stiffness, parts.fixed_dofs, sp.vstack([parts.rows, parts.gauges], format="csr"), solver)
-    count, d = parts.surface.points.shape
-    strain = np.zeros((len(parts.model.gauges), count * d))
-    strain[:, parts.active_dofs] = small.compliance[len(parts.active_dofs) :, : len(parts.active_dofs)]
-    parent, sign, share, points = _unfolded(parts.model, parts.mesh, parts.surface, parts.axes)
+    delassus, gauge_rows = contact_rows(small.compliance, parts.active_dofs, parts.surface, len(parts.model.gauges))
+    mirrored, points = unfold_points(parts.model, parts.mesh, parts.surface, parts.axes)
     return Problem(
-        parts.model,
-        parts.mesh,
-        parts.report,
-        parts.elastic,
-        parts.stiffness,
-        parts.surface,
-        small,
-        scatter_to_points(small.compliance, parts.active_dofs, count, d),
-        strain,
-        parts.active_dofs,
-        parts.fixed_dofs,
-        parts.thickness,
-        parts.first_contact_mm,
-        parts.axes,
-        points,
-        parent,
-        sign,
-        share,
-        {**parts.seconds, "condensation": small.seconds},
+        model=parts.model,
+        body=Part(
+            mesh=parts.mesh,
+            report=parts.report,
+            elastic=parts.elastic,
+            stiffness=parts.stiffness,
+            thickness=parts.thickness,
+            fixed_dofs=parts.fixed_dofs,
+            condensed=small,
+        ),
+        symmetry=mirrored,
+        system=ContactSystem(
+            surface=parts.surface,
+            points=points,
+            delassus=delassus,
+            gauge_rows=gauge_rows,
+            active_dofs=parts.active_dofs,
+            first_contact_mm=parts.first_contact_mm,
+        ),
+        seconds={**parts.seconds, "condensation": small.seconds},
     )
 
 

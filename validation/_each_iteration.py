@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from finger3d.contact.conditions import TOLERANCE, ContactProblem, project_on_friction_cone, residual
 from finger3d.contact.friction import SLIP, STICK
 from finger3d.contact.state import ContactState, next_state
-from finger3d.mechanics.problem import Problem, targets
+from finger3d.mechanics.path import targets
+from finger3d.mechanics.problem import Problem
 
 from ._cost import MU, Parts
 

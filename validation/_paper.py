@@ -192,9 +192,9 @@ def strains(frame: StepResult, count: int) -> Float:
 
 def moved(problem: Problem, frame: StepResult) -> Float:
     """Displacement (n, d) mm of the meshed part, recovered from the contact forces of a frame."""
-    own = np.flatnonzero(np.all(problem.mirror_sign == 1.0, axis=1))
-    first = own[np.argsort(problem.image_of[own])]
-    force = frame.state.force[first] / problem.multiplicity[first][:, None]
+    own = np.flatnonzero(np.all(problem.symmetry.mirror_sign == 1.0, axis=1))
+    first = own[np.argsort(problem.symmetry.image_of[own])]
+    force = frame.state.force[first] / problem.symmetry.multiplicity[first][:, None]
     return displacement(problem.mesh, problem.unknowns(force))
 
 

@@ -68,7 +68,7 @@ def balance(problem: Problem, frame: StepResult) -> Balance:
     push = problem.points.to_global(frame.state.force)
     # a contact force acts where its hat's mean is, which for a moment is the hat's mean place
     place = np.zeros_like(push)
-    place[:, :d] = (problem.surface.trace @ problem.mesh.points)[problem.image_of]  # no symmetry here: no sign
+    place[:, :d] = (problem.surface.trace @ problem.mesh.points)[problem.symmetry.image_of]  # no symmetry here: no sign
     scale = np.linalg.norm(push.sum(axis=0))
     turning = np.cross(arm, reaction).sum(axis=0) + np.cross(place, push).sum(axis=0)
     stored = 0.5 * float(unknowns @ inner)

@@ -63,7 +63,7 @@ def at_equal_radius(problem: Problem, radius: float, modulus: float) -> tuple[fl
     smooth = replace(problem, model=replace(problem.model, friction=Coulomb(0.0)))
     f = _marched(smooth)[-1].state.force[:, 0]
     square = problem.surface.average @ np.sum(problem.surface.samples[:, [0, 2]] ** 2, axis=1)
-    a = float(np.sqrt(2.5 * (f @ square[problem.image_of]) / f.sum()))
+    a = float(np.sqrt(2.5 * (f @ square[problem.symmetry.image_of]) / f.sum()))
     return float(f.sum()) * 3.0 * radius / (4.0 * modulus * a**3), a
 
 

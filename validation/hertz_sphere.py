@@ -73,7 +73,7 @@ def own_path(nu: float, count: int) -> float:
     model = Model(block, Material(1.0, nu), MeshOptions(1.0 / count, 4.0), legs, Sphere(radius_mm=RADIUS))
     problem = build(model)
     samples = problem.surface.samples
-    square = (problem.surface.average @ (samples[:, 0] ** 2 + samples[:, 2] ** 2))[problem.image_of]
+    square = (problem.surface.average @ (samples[:, 0] ** 2 + samples[:, 2] ** 2))[problem.symmetry.image_of]
     ratios = []
     for frame in march(problem):
         f = frame.state.force[:, 0] if frame.outcome.ok else np.full(len(square), np.nan)

@@ -33,6 +33,7 @@ from finger3d.fem.traces import BoundarySurface, local_rows, restrict, surface
 from finger3d.mechanics.formulation import Formulation, SmallStrain
 from finger3d.mechanics.history import ObjectPose
 from finger3d.mechanics.model import Leg
+from finger3d.mechanics.problem import AddedStiffness
 from finger3d.objects import Sphere, vertical_frame
 
 from . import _rings
@@ -67,8 +68,7 @@ class StandIn:
     elastic: Elasticity | None = None
     stiffness: Stiffness | None = None
     thickness: float = 1.0
-    bar_stiffness: Float = field(default_factory=lambda: np.zeros(0))
-    subgrid_compliance: Float = field(default_factory=lambda: np.zeros((0, 0)))
+    inclusions: AddedStiffness = field(default_factory=AddedStiffness)
     origin: ObjectPose = ObjectPose(0.0)
 
     @property

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.contact.friction import STICK
-from finger3d.fem.simplex import Mesh, middles, unfold
+from finger3d.fem.simplex import Mesh, axis_numbers, middles, unfold
 from finger3d.io import atomic, write_csv, write_json
 from finger3d.mechanics.history import StepResult, contact_table, measure
 from finger3d.results.states import states_of, write_states
@@ -61,7 +61,7 @@ class Fields:
     def of(cls, record: PressRecord, u: Float, strain: Float, stress: Float) -> Fields:
         """Unfold fields of the meshed part: displacements (p, d) mm, strain and stress (p, 3, 3)."""
         problem = record.problem
-        mesh, image_of, sign = unfold(problem.mesh, tuple("xyz".index(axis) for axis in problem.axes))
+        mesh, image_of, sign = unfold(problem.mesh, axis_numbers(problem.axes))
         flip = np.ones((len(image_of), 3))
         flip[:, : problem.dim] = sign
         both = flip[:, :, None] * flip[:, None, :]

@@ -18,16 +18,13 @@ from numpy.typing import NDArray
 from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.contact.rules import RULES
 from finger3d.errors import Finger3dError
-from finger3d.fem.assembly import Elasticity, Stiffness
-from finger3d.fem.condense import Condensation as Factored
-from finger3d.fem.simplex import Mesh
 from finger3d.fem.traces import BoundarySurface
 from finger3d.geometry.design import DesignSummary
 from finger3d.io import atomic, read_arrays
 from finger3d.mechanics.history import ContactPoints
 from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
-from finger3d.mechanics.problem import Problem
-from finger3d.meshing.report import MeshReport
+from finger3d.mechanics.problem import ContactSystem, Problem
+from finger3d.mechanics.symmetry import Symmetry
 from finger3d.objects import OBJECTS, MeshObject, RigidObject
 
 Float = NDArray[np.float64]
@@ -131,9 +128,9 @@ def arrays_of(problem: Problem) -> dict[str, NDArray[Any]]:
     arrays = {
         "compliance": problem.delassus.reshape(c * d, c * d),
         "gauge_rows": problem.gauge_rows,
-        "parent": problem.image_of,
-        "sign": problem.mirror_sign,
-        "share": problem.multiplicity,
+        "parent": problem.symmetry.image_of,
+        "sign": problem.symmetry.mirror_sign,
+        "share": problem.symmetry.multiplicity,
         "nodes": problem.points.nodes,
         "points": problem.points.points,
         "area": problem.points.area,
@@ -150,56 +147,36 @@ def arrays_of(problem: Problem) -> dict[str, NDArray[Any]]:
 
 
 def assembled(model: Model, arrays: Mapping[str, Any], touch_mm: float, axes: tuple[str, ...]) -> Problem:
-    """Return a problem made from arrays; its mesh and its factor are empty."""
+    """Return a problem without a meshed part, made from arrays."""
     d = arrays["sign"].shape[1]
     c = len(arrays["face_nodes"])
-    none, whole = np.zeros(0, dtype=np.int64), sp.csr_matrix((0, 0))
-    mesh = Mesh(np.zeros((0, d)), np.zeros((0, 1), dtype=np.int64), {})
-    report = MeshReport(0, 0, math.nan, math.nan, math.nan, "", False, None, {})
-    elastic = Elasticity.of(model.material.E_MPa, model.material.nu, model.domain == "plane-stress")
-    factored = Factored(np.zeros((0, 0)), 0, 0, 0.0, "none", whole, none, _no_mesh)
     half_width, band = arrays["band"]
-    points = ContactPoints(
-        arrays["nodes"],
-        arrays["points"],
-        arrays["area"],
-        model.object.frame(d),
-        float(half_width),
-        float(band),
-        arrays["edges"],
+    system = ContactSystem(
+        surface=_face("face", arrays, d),
+        points=ContactPoints(
+            nodes=arrays["nodes"],
+            points=arrays["points"],
+            area=arrays["area"],
+            basis=model.object.frame(d),
+            half_width_mm=float(half_width),
+            band_mm=float(band),
+            edges=arrays["edges"],
+        ),
+        delassus=arrays["compliance"].reshape(c, d, c, d),
+        gauge_rows=arrays["gauge_rows"].reshape(len(model.gauges), c * d),
+        active_dofs=np.zeros(0, dtype=np.int64),
+        first_contact_mm=touch_mm,
     )
-    problem = Problem(
-        model,
-        mesh,
-        report,
-        elastic,
-        Stiffness(whole, none, 1.0),
-        _face("face", arrays, d),
-        factored,
-        arrays["compliance"].reshape(c, d, c, d),
-        arrays["gauge_rows"].reshape(len(model.gauges), c * d),
-        none,
-        none,
-        1.0,
-        touch_mm,
-        axes,
-        points,
-        arrays["parent"],
-        arrays["sign"],
-        arrays["share"],
-        {},
-    )
+    symmetry = Symmetry(axes=axes, image_of=arrays["parent"], mirror_sign=arrays["sign"], multiplicity=arrays["share"])
+    problem = Problem(model=model, body=None, symmetry=symmetry, system=system)
     if "bare_compliance" not in arrays:
         return problem
-    rows = arrays["bare_gauge_rows"].reshape(len(model.gauges), c * d)
-    return replace(
-        problem,
-        without_inclusions=replace(problem, delassus=arrays["bare_compliance"].reshape(c, d, c, d), gauge_rows=rows),
+    without = replace(
+        system,
+        delassus=arrays["bare_compliance"].reshape(c, d, c, d),
+        gauge_rows=arrays["bare_gauge_rows"].reshape(len(model.gauges), c * d),
     )
-
-
-def _no_mesh(load: Float) -> Float:
-    raise Finger3dError("a reduced model has no mesh: fields need the scene itself (finger3d press)")
+    return replace(problem, without_inclusions=replace(problem, system=without))
 
 
 def _header(problem: Problem) -> dict[str, Any]:

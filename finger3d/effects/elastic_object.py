@@ -22,12 +22,13 @@ from finger3d.effects.base import fill, warn
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import Elasticity, stiffness
 from finger3d.fem.condense import condense
-from finger3d.fem.simplex import Mesh, reflected
+from finger3d.fem.simplex import Mesh, axis_numbers, reflected
 from finger3d.fem.transfer import facing_trace
 from finger3d.geometry.design import Design
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import MeshOptions, Model, ObjectResponse
 from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.symmetry import held_dofs
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.swept import mesh_section
 from finger3d.objects import Cylinder, MeshObject, Plane, Sphere
@@ -64,7 +65,7 @@ class SoftObject:
         elastic = Elasticity.of(self.E_MPa, self.nu, model.domain == "plane-stress")
         say(f"condensing the object's {mesh.points.size} unknowns")
         matrix = stiffness(mesh, elastic, problem.thickness)
-        held = _held(mesh, () if whole else axes, model.held_ends)
+        held = held_dofs(mesh, () if whole else axes, model.held_ends)
         condensed = condense(matrix, held, rows[problem.active_dofs])
         c = len(problem.surface.nodes)
         out = np.zeros((c * d, c * d))
@@ -78,23 +79,13 @@ def _all_images(problem: Problem, mesh: Mesh, frame: Float) -> sp.csr_matrix:
     d = problem.dim
     total: Any = 0.0
     signs = [np.ones(d)]
-    for axis in problem.axes:
-        flip = np.where(np.arange(d) == "xyz".index(axis), -1.0, 1.0)
+    for axis in axis_numbers(problem.axes):
+        flip = np.where(np.arange(d) == axis, -1.0, 1.0)
         signs += [s * flip for s in signs]
     for sign in signs:
         image = replace(problem.surface, samples=problem.surface.samples * sign)
         total = total + sp.kron(facing_trace(image, mesh, "contact"), frame * sign, format="csr")
     return sp.csr_matrix(total)
-
-
-def _held(mesh: Mesh, axes: tuple[str, ...], held_ends: bool) -> NDArray[np.int64]:
-    d = mesh.dim
-    grip = np.unique(mesh.facets["base"])
-    held = [(grip[:, None] * d + np.arange(d)).ravel()]
-    held += [np.unique(mesh.facets["symmetry_" + a]) * d + "xyz".index(a) for a in axes]
-    if held_ends and d == 3:
-        held.append(np.unique(mesh.facets["ends"]) * d + 2)
-    return np.unique(np.concatenate(held))
 
 
 @dataclass(frozen=True)

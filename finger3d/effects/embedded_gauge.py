@@ -24,10 +24,9 @@ from finger3d._ranges import Length, Modulus, at_most
 from finger3d.effects.base import fill
 from finger3d.errors import Finger3dError
 from finger3d.fem.kelvin import FoilPatches, InfiniteBody
-from finger3d.fem.simplex import Mesh
+from finger3d.fem.simplex import Mesh, reflect_into_part
 from finger3d.fem.traces import displacement_row
 from finger3d.mechanics.model import EmbeddedBars, Gauge, Model
-from finger3d.mechanics.problem import reflect_into_part
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -142,7 +141,7 @@ class Effect:
             raise Finger3dError(f"{here}: the scene has no [[gauge]]; add one, or take the effect out")
         names = {gauge.name for gauge in model.gauges}
         for i, gauge in enumerate(model.gauges):
-            if gauge.length_mm == 0.0:
+            if gauge.is_point:
                 raise Finger3dError(f"gauge.{i}.length_mm = 0.0: must be above 0 with {here}: a foil has a length")
             if f"{gauge.name}_free" in names:
                 raise Finger3dError(

@@ -23,15 +23,13 @@ from finger3d.errors import Outcome
 from finger3d.fem.assembly import Pattern, Stiffness, on_places, pressure_scale
 from finger3d.fem.condense import Condensation, condense
 from finger3d.fem.finite_contact import DeformedContact, deformed_contact
-from finger3d.fem.locate import cells_at
-from finger3d.fem.neo_hooke import InvertedError, NeoHooke, assemble, nodal_fields, stretch
+from finger3d.fem.neo_hooke import InvertedError, NeoHooke, assemble, nodal_fields
 from finger3d.fem.recover import displacement
-from finger3d.fem.simplex import Mesh
 from finger3d.fem.traces import BoundarySurface
 from finger3d.mechanics.formulation import Workspace, length_scale, solve_contact
 from finger3d.mechanics.history import ObjectPose
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.problem import Problem, reflect_into_part, scatter_to_points
+from finger3d.mechanics.problem import Problem, scatter_to_points
 
 Float = NDArray[np.float64]
 
@@ -151,14 +149,7 @@ class FiniteStrain:
         """Relative elongation of a line along the gauge, at its point or between its ends."""
         mesh, axes = problem.mesh, problem.axes
         u = displacement(mesh, self.unknowns(problem, state))
-        out = {}
-        for gauge in problem.model.gauges:
-            if gauge.length_mm == 0.0:
-                out[gauge.name] = stretch(mesh, u, *reflect_into_part(gauge.middle, gauge.direction, axes, mesh.dim))
-                continue
-            ends = [_moved(mesh, u, end, axes) for end in gauge.ends]
-            out[gauge.name] = float(np.linalg.norm(ends[1] - ends[0])) / gauge.length_mm - 1.0
-        return out
+        return {gauge.name: gauge.finite_strain(mesh, u, axes) for gauge in problem.model.gauges}
 
     def gaps(
         self, problem: Problem, states: Sequence[ContactState], targets: Sequence[ObjectPose], face: BoundarySurface
@@ -246,7 +237,7 @@ def _moved_by(
     """Gap and change of tangential position (c, d) of a body that moved from `before` to x, and on by `relaxed`."""
     (before, x, relaxed), (a, b) = motion, path
     n, d = problem.mesh.points.size, problem.dim
-    travel = np.array([b.slide_x_mm - a.slide_x_mm, a.depth_mm - b.depth_mm, b.slide_z_mm - a.slide_z_mm])[:d]
+    travel = (b.displacement - a.displacement)[:d]
     there = x if relaxed is None else x + relaxed
     out = np.empty((len(contact.gap), d))
     out[:, 0] = contact.gap + (0.0 if relaxed is None else (contact.rows @ relaxed[:n])[::d])
@@ -276,14 +267,6 @@ def _violation(
     volume *= problem.thickness / math.factorial(mesh.dim) * pressure_scale(mesh, scales[1])
     swollen = float(np.abs(astray[n:]).max(initial=0.0)) / volume
     return max(residual(force, moved, found.status, mu, scales[0]), unbalanced, swollen)
-
-
-def _moved(mesh: Mesh, u: Float, place: Float, axes: tuple[str, ...]) -> Float:
-    """Where a material point (3,) went (d,), seen in the whole finger."""
-    d = mesh.dim
-    inside, ones = reflect_into_part(place, np.ones(3), axes, d)
-    cell, bary = cells_at(mesh, inside)[0]
-    return place[:d] + ones * (mesh.element.shape(bary[None])[0] @ u[mesh.cells[cell]])
 
 
 def _contact(problem: Problem, face: BoundarySurface, u: Float, target: ObjectPose) -> DeformedContact:

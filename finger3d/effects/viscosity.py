@@ -208,7 +208,7 @@ class ConstantBulkModulus:
     @property
     def size(self) -> int:
         """Number of unknowns, and of rows that yield beyond the mesh."""
-        return self._own + len(self.problem.subgrid_compliance)
+        return self._own + len(self.problem.inclusions.subgrid_compliance)
 
     @property
     def _bulk(self) -> float:
@@ -223,11 +223,11 @@ class ConstantBulkModulus:
         alpha = Step(step.prony, float(f"{step.seconds:.12g}")).alpha
         problem = self.problem
         body = workspace.condensation(alpha, lambda: problem.condensed.again(self._stiffness(alpha, workspace)))
-        past, first = step.history_load(memory), len(body.compliance) - len(problem.subgrid_compliance)
+        past, first = step.history_load(memory), len(body.compliance) - len(problem.inclusions.subgrid_compliance)
         settled = body.solve(self._shear_force(past[: self._own], workspace))
         compliance, moved = body.compliance.copy(), body.read(settled)
-        compliance[first:, first:] += problem.subgrid_compliance / alpha
-        moved[first:] += problem.subgrid_compliance @ past[self._own :] / alpha
+        compliance[first:, first:] += problem.inclusions.subgrid_compliance / alpha
+        moved[first:] += problem.inclusions.subgrid_compliance @ past[self._own :] / alpha
 
         def shape(rows: Float) -> Float:
             found = settled + body.unknowns(rows)
@@ -276,7 +276,7 @@ class ConstantBulkModulus:
 
     def read(self, now: Float) -> Float:
         """From the displacements, and what the mesh does not see."""
-        rows, beyond = self.problem.condensed.read(now[: self._own]), self.problem.subgrid_compliance
+        rows, beyond = self.problem.condensed.read(now[: self._own]), self.problem.inclusions.subgrid_compliance
         rows[len(rows) - len(beyond) :] += beyond @ now[self._own :]
         return rows
 
@@ -355,7 +355,8 @@ class Viscoelastic(SmallStrain):
         assert isinstance(workspace, RelaxationWorkspace)
         memory, step = self._memory(state), Step(self.prony, b.time_s - a.time_s)
         body = self._body(problem).respond(step, memory, workspace)
-        own, springs, first = body.compliance, problem.bar_stiffness, len(body.compliance) - len(problem.bar_stiffness)
+        own, springs = body.compliance, problem.inclusions.bar_stiffness
+        first = len(own) - len(springs)
         moved = body.moved
         if len(springs):
             moved = moved + own[:, first:] @ spring_forces(own, springs, moved)

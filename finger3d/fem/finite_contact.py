@@ -10,6 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from finger3d.fem.simplex import axis_numbers
 from finger3d.fem.traces import BoundarySurface
 
 Float = NDArray[np.float64]
@@ -70,8 +71,7 @@ def deformed_contact(
     size = face.average @ growth
     mean = (face.average @ (normal * growth[:, None])) / size[:, None]
     gap = (face.average @ (sampled * growth)) / size
-    for axis in axes:
-        k = "xyz".index(axis)
+    for k in axis_numbers(axes):
         mean[face.points[:, k] == 0.0, k] = 0.0
     frames = _frames(mean)
     approach = _rows([sp.diags_array(normal[:, k]) @ face.interpolate for k in range(d)])

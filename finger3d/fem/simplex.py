@@ -6,7 +6,7 @@ edges (0,1) (1,2) (2,0) for a triangle, and (0,1) (1,2) (2,0) (0,3) (1,3) (2,3) 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -113,6 +113,17 @@ def reflected(mesh: Mesh, axis: int) -> Mesh:
     points[:, axis] *= -1.0
     of_cell, of_facet = mesh.element.mirrored, mesh.facet_element.mirrored
     return Mesh(points, mesh.cells[:, of_cell], {label: f[:, of_facet] for label, f in mesh.facets.items()})
+
+
+def axis_numbers(axes: Iterable[str]) -> tuple[int, ...]:
+    """Return the numbers of the axes named "x", "y" and "z"."""
+    return tuple("xyz".index(axis) for axis in axes)
+
+
+def reflect_into_part(point: Float, direction: Float, axes: tuple[str, ...], dim: int) -> tuple[Float, Float]:
+    """Return a place and a direction (3,) in the meshed part (d,), reflected if they lie in a mirror image."""
+    sign = np.array([-1.0 if a in axes and v < 0.0 else 1.0 for a, v in zip("xyz", point, strict=True)])
+    return (point * sign)[:dim], (direction * sign)[:dim]
 
 
 def unfold(mesh: Mesh, axes: tuple[int, ...]) -> tuple[Mesh, Int, Float]:

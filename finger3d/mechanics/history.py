@@ -27,6 +27,16 @@ class ObjectPose:
     slide_z_mm: float = 0.0
     time_s: float = 0.0
 
+    @property
+    def displacement(self) -> Float:
+        """Displacement (3,) mm along x, y and z since first touch."""
+        return np.array([self.slide_x_mm, -self.depth_mm, self.slide_z_mm])
+
+    @property
+    def coordinates(self) -> Float:
+        """Depth and slides (mm), and time (s): array (4,)."""
+        return np.array([self.depth_mm, self.slide_x_mm, self.slide_z_mm, self.time_s])
+
 
 @dataclass(frozen=True)
 class ContactPoints:

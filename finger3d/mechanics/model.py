@@ -13,6 +13,7 @@ from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.contact.rules import RuleName
 from finger3d.geometry.design import Design
 from finger3d.mechanics.formulation import Formulation, SmallStrain
+from finger3d.mechanics.gauges import Gauge
 from finger3d.objects import Plane, RigidObject
 
 if TYPE_CHECKING:
@@ -43,34 +44,6 @@ class Leg:
     slide_z_mm: float = 0.0
     steps: int | Literal["auto"] = 10
     duration_s: float | None = None
-
-
-@dataclass(frozen=True)
-class Gauge:
-    """Normal strain at a point along a direction in the x-y plane; over `length_mm` its mean. Angle in radians."""
-
-    name: str
-    x_mm: float
-    y_mm: float
-    z_mm: float = 0.0
-    angle: float = 0.0
-    length_mm: float = 0.0
-
-    @property
-    def middle(self) -> Float:
-        """Place (3,) mm."""
-        return np.array([self.x_mm, self.y_mm, self.z_mm])
-
-    @property
-    def direction(self) -> Float:
-        """Unit vector (3,)."""
-        return np.array([np.cos(self.angle), np.sin(self.angle), 0.0])
-
-    @property
-    def ends(self) -> tuple[Float, Float]:
-        """Both ends (3,) mm."""
-        half = 0.5 * self.length_mm * self.direction
-        return self.middle - half, self.middle + half
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,8 @@ from finger3d.fem.traces import BoundarySurface
 from finger3d.geometry.design import DesignSummary
 from finger3d.mechanics.history import ObjectPose, StepResult
 from finger3d.mechanics.model import Leg, Model
-from finger3d.mechanics.problem import Problem, rigid_gap, targets
+from finger3d.mechanics.path import targets
+from finger3d.mechanics.problem import Problem, rigid_gap
 from finger3d.objects import MeshObject, RigidObject, initial_contact
 
 Float = NDArray[np.float64]

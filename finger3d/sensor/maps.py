@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from finger3d.errors import Finger3dError
 from finger3d.fem.locate import locate
 from finger3d.fem.recover import displacement
-from finger3d.fem.simplex import Mesh
+from finger3d.fem.simplex import Mesh, axis_numbers
 from finger3d.io import write_csv
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Model
@@ -63,8 +63,7 @@ class Reader:
         """Find the cells of points (p, d)."""
         d = mesh.dim
         turn = np.ones_like(points)
-        for axis in axes:
-            i = "xyz".index(axis)
+        for i in axis_numbers(axes):
             turn[:, i] = np.where(points[:, i] < 0.0, -1.0, 1.0)
         cells, bary = locate(mesh, points * turn)
         inside = cells >= 0

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.mechanics.model import Leg
-from finger3d.mechanics.problem import AUTO_START, Problem
+from finger3d.mechanics.path import AUTO_START
+from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.step_halving import with_steps
 
 Float = NDArray[np.float64]

@@ -285,7 +285,9 @@ def _write(
     report.stage("writing")
     write_table(calibration, folder / "calibration.csv")
     own = replace(
-        problem, model=replace(problem.model, gauges=model.gauges), gauge_rows=problem.gauge_rows[: len(model.gauges)]
+        problem,
+        model=replace(problem.model, gauges=model.gauges),
+        system=replace(problem.system, gauge_rows=problem.gauge_rows[: len(model.gauges)]),
     )
     if model.formulation.is_linear_elastic:
         ReducedModel.of(own).save(folder / "reduced.npz")

@@ -28,7 +28,8 @@ from finger3d.fem.assembly import MIXED_FROM
 from finger3d.fem.condense import stiffened
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.problem import Problem, scatter_to_points, targets
+from finger3d.mechanics.path import targets
+from finger3d.mechanics.problem import Problem, scatter_to_points
 from finger3d.mechanics.solve import build
 from finger3d.objects import Plane
 from finger3d.sensor.curve import Tolerance
@@ -259,14 +260,15 @@ def with_modulus(problem: Problem, times: float) -> Problem:
     c, d = problem.delassus.shape[:2]
 
     def soft(one: Problem) -> Problem:
-        own = stiffened(one.condensed.compliance, one.bar_stiffness)
+        own = stiffened(one.condensed.compliance, one.inclusions.bar_stiffness)
         rest = one.delassus - scatter_to_points(own, one.active_dofs, c, d)  # of the object
-        changed = stiffened(one.condensed.compliance / times, one.bar_stiffness)
+        changed = stiffened(one.condensed.compliance / times, one.inclusions.bar_stiffness)
         rows = np.zeros_like(one.gauge_rows)
         rows[:, one.active_dofs] = changed[
             len(one.active_dofs) : len(one.active_dofs) + len(rows), : len(one.active_dofs)
         ]
-        return replace(one, delassus=scatter_to_points(changed, one.active_dofs, c, d) + rest, gauge_rows=rows)
+        delassus = scatter_to_points(changed, one.active_dofs, c, d) + rest
+        return replace(one, system=replace(one.system, delassus=delassus, gauge_rows=rows))
 
     changed = soft(problem)
     return (

@@ -27,7 +27,6 @@ from finger3d.errors import Finger3dError
 from finger3d.io import atomic, claimed, write_csv, write_json
 from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.model import Gauge, Leg, Model
-from finger3d.mechanics.solve import gauge_row
 from finger3d.plotting.optimise import draw
 from finger3d.progress import Progress
 from finger3d.report.optimise import optimise_page
@@ -103,7 +102,7 @@ class _Bench:
         mesh, axes = body.problem.mesh, body.problem.axes
         fields = body.problem.model.formulation.all_unknowns(body.problem, [f.part for f in ends])
         u = np.array([x[: mesh.points.size] for x in fields])
-        return lambda g: np.asarray(gauge_row(mesh, g, axes)[:, : mesh.points.size] @ u.T).ravel()
+        return lambda g: np.asarray(g.row(mesh, axes)[:, : mesh.points.size] @ u.T).ravel()
 
     def strain(self, gauge: Gauge, mus: Sequence[float], legs: tuple[Leg, ...]) -> Float:
         """Strain (m,) of a gauge under mus (m,), nan where a press failed."""

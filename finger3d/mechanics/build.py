@@ -1,0 +1,195 @@
+"""Build of a problem: mesh, part, candidate points, inclusions, condensation, contact system."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from finger3d.fem.assembly import Elasticity, stiffness
+from finger3d.fem.condense import condense, stiffened
+from finger3d.fem.simplex import Mesh
+from finger3d.fem.traces import BoundarySurface, local_rows, restrict, surface
+from finger3d.mechanics.model import EmbeddedBars, Leg, Model, ObjectResponse
+from finger3d.mechanics.path import targets
+from finger3d.mechanics.problem import (
+    AddedStiffness,
+    ContactSystem,
+    Part,
+    Problem,
+    rigid_gap,
+    scatter_to_points,
+)
+from finger3d.mechanics.resolution import check
+from finger3d.mechanics.symmetry import active_dofs, held_dofs, symmetry, unfold_points
+from finger3d.meshing.generate import mesh_solid
+from finger3d.meshing.limits import check_rows
+from finger3d.meshing.report import MeshReport
+from finger3d.meshing.swept import mesh_section
+from finger3d.objects import initial_contact
+
+Float = NDArray[np.float64]
+Say = Callable[[str], None]
+
+MARGIN = 0.3
+"""Rigid gap that candidate points reach to, in depths of the press; checked after the solution."""
+
+_STATIONS = 20
+"""Poses along a leg at which rigid gaps are taken to find the candidate points, at most."""
+
+_WHOLE_FACE = 0.95
+"""Share of the contact face from which all its points are candidates: a few more rows cost less than the check."""
+
+_MANY_GAUGES = 100
+"""Gauges whose placing is announced: each takes some milliseconds."""
+
+
+def contact_box(model: Model) -> tuple[float, float, float, float]:
+    """Return the box (x_min, x_max, z_min, z_max) mm over which the rigid object would overlap the finger at rest."""
+    return initial_contact(*model.approach).contact_box
+
+
+def build(model: Model, say: Say = lambda text: None, margin: float = MARGIN) -> Problem:
+    """Mesh, assemble and condense a model.
+
+    Parameters
+    ----------
+    say : called with a line about each stage
+    margin : rigid gap that candidate points reach to, in depths of the press; infinite for all of the contact face
+
+    Raises
+    ------
+    UnresolvedError
+        If the object passes between the contact points.
+    """
+    contact, axes = initial_contact(*model.approach), symmetry(model)
+    mesh, report = _mesh(model, contact.contact_box, axes, say)
+    thickness = 1.0 if mesh.dim == 3 else model.design.width_mm
+    face = surface(mesh, "contact", thickness)
+    check(model, face, contact.first_contact_mm, contact.place, axes)
+    say("assembling")
+    start = time.perf_counter()
+    elastic = Elasticity.of(model.material.E_MPa, model.material.nu, model.domain == "plane-stress")
+    matrix = stiffness(mesh, elastic, thickness)
+    candidates = candidate_points(model, face, contact.first_contact_mm, margin)
+    active = active_dofs(candidates, axes)
+    check_rows(len(active), len(model.gauges))
+    bars = model.inclusions.discretise(model, mesh, axes) if model.inclusions else None
+    rows = local_rows(candidates, model.object.frame(mesh.dim))[active]
+    rows = sp.vstack([rows, *_readings(model, mesh, axes, bars, say)], format="csr")
+    assembly = time.perf_counter() - start
+    say(f"condensing {matrix.upper.shape[0]} unknowns to {len(candidates.nodes)} contact points")
+    fixed = held_dofs(mesh, axes, model.held_ends)
+    condensed = condense(matrix, fixed, rows)
+    delassus, gauge_rows = contact_rows(condensed.compliance, active, candidates, len(model.gauges))
+    mirrored, points = unfold_points(model, mesh, candidates, axes)
+    problem = Problem(
+        model=model,
+        body=Part(
+            mesh=mesh,
+            report=report,
+            elastic=elastic,
+            stiffness=matrix,
+            thickness=thickness,
+            fixed_dofs=fixed,
+            condensed=condensed,
+        ),
+        symmetry=mirrored,
+        system=ContactSystem(
+            surface=candidates,
+            points=points,
+            delassus=delassus,
+            gauge_rows=gauge_rows,
+            active_dofs=active,
+            first_contact_mm=contact.first_contact_mm,
+            place_mm=contact.place,
+        ),
+        seconds={**report.seconds, "assembly": assembly, "condensation": condensed.seconds},
+    )
+    response = model.object_compliance.respond(problem, contact.contact_box, say) if model.object_compliance else None
+    whole = with_bars(problem, bars) if bars else problem
+    return with_object_compliance(whole, response) if response else whole
+
+
+def with_bars(problem: Problem, bars: EmbeddedBars) -> Problem:
+    """Return the problem with the stiffness of its inclusions added to the condensed rows."""
+    condensed, active, count = problem.part.condensed, problem.system.active_dofs, len(bars.bar_stiffness)
+    compliance = condensed.compliance.copy()
+    subgrid = bars.subgrid_compliance(compliance[-count:, -count:])
+    compliance[len(active) :, len(active) :] += subgrid
+    delassus, gauge_rows = contact_rows(
+        stiffened(compliance, bars.bar_stiffness), active, problem.system.surface, len(bars.gauge_weights)
+    )
+    return replace(
+        problem,
+        body=replace(problem.part, condensed=replace(condensed, compliance=compliance)),
+        system=replace(problem.system, delassus=delassus, gauge_rows=gauge_rows),
+        inclusions=AddedStiffness(bar_stiffness=bars.bar_stiffness, subgrid_compliance=subgrid),
+        without_inclusions=problem,
+    )
+
+
+def with_object_compliance(problem: Problem, response: ObjectResponse) -> Problem:
+    """Return the problem with the compliance of an elastic object added to that of the contact points."""
+    bare = problem.without_inclusions
+    return replace(
+        problem,
+        system=replace(
+            problem.system,
+            delassus=problem.system.delassus + response.compliance,
+            object_factorizations=response.factorizations,
+        ),
+        seconds=problem.seconds | response.seconds,
+        without_inclusions=with_object_compliance(bare, response) if bare else None,
+    )
+
+
+def _mesh(
+    model: Model, zone: tuple[float, float, float, float], axes: tuple[str, ...], say: Say
+) -> tuple[Mesh, MeshReport]:
+    if model.domain == "solid":
+        return mesh_solid(model.design, model.mesh, zone, axes, say)
+    return mesh_section(model.design, model.mesh, zone, axes)
+
+
+def _readings(
+    model: Model, mesh: Mesh, axes: tuple[str, ...], bars: EmbeddedBars | None, say: Say
+) -> list[sp.csr_matrix]:
+    """Rows of the gauges, and of the bars if there are any."""
+    if len(model.gauges) >= _MANY_GAUGES:
+        say(f"placing {len(model.gauges)} gauges")
+    if bars:
+        return [bars.gauge_weights @ bars.rows, bars.rows]
+    return [gauge.row(mesh, axes) for gauge in model.gauges]
+
+
+def contact_rows(rows: Float, active: NDArray[np.int64], face: BoundarySurface, gauges: int) -> tuple[Float, Float]:
+    """Return compliance of contact points and strain of gauges per contact force, from the compliance of rows."""
+    count, dim = face.points.shape
+    strain = np.zeros((gauges, count * dim))
+    strain[:, active] = rows[len(active) : len(active) + gauges, : len(active)]
+    return scatter_to_points(rows, active, count, dim), strain
+
+
+def candidate_points(model: Model, face: BoundarySurface, touch: float, margin: float) -> BoundarySurface:
+    """Return the points of a contact face that the path brings near the object, the nearest first.
+
+    Parameters
+    ----------
+    touch : height of the object's lowest point at first touch, mm
+    margin : rigid gap that the points reach to, in depths of the press
+    """
+    path = targets(tuple(replace(leg, steps=_stations(leg)) for leg in model.legs))
+    nearest = np.min([rigid_gap(model, face, touch, pose) for pose in path], axis=0)
+    reach = margin * max(pose.depth_mm for pose in path) + max(float(nearest.min()), 0.0)
+    order = np.argsort(nearest, kind="stable")  # so that points which touch come before those which do not
+    near = order[nearest[order] < reach]
+    return restrict(face, order if len(near) >= _WHOLE_FACE * len(order) else near)
+
+
+def _stations(leg: Leg) -> int:
+    return min(leg.steps, _STATIONS) if isinstance(leg.steps, int) else _STATIONS
