@@ -10,7 +10,7 @@ from threading import Event
 from typing import TypeVar
 
 from finger3d._machine import cores
-from finger3d.contact.threads import one_thread
+from finger3d.contact.acceleration import one_thread
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.problem import Problem
 
@@ -54,7 +54,7 @@ def map_parallel(
         return
     waiting = iter(variants)
     # The limit on threads is set once around the pool: a limit set by a press would undo that of another.
-    with one_thread(problem.dim > 2), ThreadPoolExecutor(at_once) as pool:
+    with one_thread(), ThreadPoolExecutor(at_once) as pool:
 
         def submitted(count: int) -> list[Future[Result]]:
             return [
