@@ -16,6 +16,7 @@ from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
 from finger3d.mechanics.solve import build, march
 from finger3d.objects import (
+    ContactPath,
     Cylinder,
     MeshObject,
     Plane,
@@ -34,7 +35,7 @@ PRESS = np.array([[10.0, 0.0, 0.0]])
 
 
 def near(obj: RigidObject, path: np.ndarray = PRESS) -> float:
-    return initial_contact(FIG9.top, obj, 50.0, 10.0, np.asarray(path, dtype=float)).first_contact_mm
+    return initial_contact(ContactPath(FIG9.top, obj, 50.0, 10.0, np.asarray(path, dtype=float))).first_contact_mm
 
 
 # heights at (x, z) = (3, 4) above the lowest point at (0, 0), and one mm beside it along x
@@ -124,7 +125,7 @@ def test_approaches_that_are_not(obj: RigidObject) -> None:
 
 def test_the_zone_finds_a_tip_between_the_points_of_its_grid() -> None:
     tip = Sphere(0.1317, 0.077, radius_mm=1e-3)
-    x0, x1, z0, z1 = initial_contact(FIG9.top, tip, 50.0, 10.0, np.array([[1e-4, 0, 0]])).contact_box
+    x0, x1, z0, z1 = initial_contact(ContactPath(FIG9.top, tip, 50.0, 10.0, np.array([[1e-4, 0, 0]]))).contact_box
     assert x0 <= 0.1317 <= x1 < x0 + 2e-3
     assert z0 <= 0.077 <= z1 < z0 + 2e-3
 

@@ -121,7 +121,7 @@ class Parts:
 
 def assembled(model: Model, element: str) -> Parts:
     """Mesh and assemble a model with elements of a kind."""
-    way, axes = initial_contact(*model.approach), symmetry(model)
+    way, axes = initial_contact(model.contact_path), symmetry(model)
     make = mesh_solid if model.domain == "solid" else mesh_section
     mesh, report = make(model.design, model.mesh, way.contact_box, axes)
     start = time.perf_counter()

@@ -50,7 +50,7 @@ _MANY_GAUGES = 100
 
 def contact_box(model: Model) -> tuple[float, float, float, float]:
     """Return the box (x_min, x_max, z_min, z_max) mm over which the rigid object would overlap the finger at rest."""
-    return initial_contact(*model.approach).contact_box
+    return initial_contact(model.contact_path).contact_box
 
 
 def build(model: Model, say: Say = lambda text: None, margin: float = MARGIN) -> Problem:
@@ -66,7 +66,7 @@ def build(model: Model, say: Say = lambda text: None, margin: float = MARGIN) ->
     UnresolvedError
         If the object passes between the contact points.
     """
-    contact, axes = initial_contact(*model.approach), symmetry(model)
+    contact, axes = initial_contact(model.contact_path), symmetry(model)
     mesh, report = _mesh(model, contact.contact_box, axes, say)
     thickness = 1.0 if mesh.dim == 3 else model.design.width_mm
     face = surface(mesh, "contact", thickness)

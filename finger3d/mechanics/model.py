@@ -14,7 +14,7 @@ from finger3d.contact.rules import RuleName
 from finger3d.geometry.design import Design
 from finger3d.mechanics.formulation import Formulation, SmallStrain
 from finger3d.mechanics.gauges import Gauge
-from finger3d.objects import Plane, RigidObject
+from finger3d.objects import ContactPath, Plane, RigidObject
 
 if TYPE_CHECKING:
     from finger3d.mechanics.problem import Problem
@@ -166,14 +166,23 @@ class Model:
     warnings: tuple[str, ...] = ()
 
     @property
-    def approach(self) -> tuple[Any, ...]:
-        """What `finger3d.objects.initial_contact` takes: top, object, half extents, path, the finger's corners."""
-        at, path = np.zeros(3), []
-        for leg in self.legs:
-            end = np.array([leg.depth_mm, leg.slide_x_mm, leg.slide_z_mm])
-            path += [at + share * (end - at) for share in (0.25, 0.5, 0.75, 1.0)]
-            at = end
-        design = self.design
-        half_width = design.width_mm / 2.0 if self.domain == "solid" else 0.0
-        marks = design.landmarks()
-        return design.top, self.object, design.half_length_mm, half_width, np.array(path), marks
+    def contact_path(self) -> ContactPath:
+        """The object's way into the finger."""
+        return contact_path(self.design, self.object, self.legs, self.domain)
+
+
+def contact_path(design: Design, obj: RigidObject, legs: tuple[Leg, ...], domain: Domain) -> ContactPath:
+    """Return an object's way into a finger, by the quarters of every leg."""
+    at, targets = np.zeros(3), []
+    for leg in legs:
+        end = np.array([leg.depth_mm, leg.slide_x_mm, leg.slide_z_mm])
+        targets += [at + share * (end - at) for share in (0.25, 0.5, 0.75, 1.0)]
+        at = end
+    return ContactPath(
+        top=design.top,
+        object=obj,
+        half_length_mm=design.half_length_mm,
+        half_width_mm=design.width_mm / 2.0 if domain == "solid" else 0.0,
+        targets=np.array(targets),
+        landmarks=design.landmarks(),
+    )

@@ -138,7 +138,7 @@ def warnings(problem: Problem) -> list[str]:
 
 def foreseen(model: Model, axes: tuple[str, ...]) -> list[str]:
     """The same before there is a mesh, for regular contact points around first touch, as far apart as its edges."""
-    way, size = initial_contact(*model.approach), model.mesh.size_mm
+    way, size = initial_contact(model.contact_path), model.mesh.size_mm
     reach = _FORESEEN * size
     (x0, x1, z0, z1), (x, z) = way.contact_box, way.place
     box = (max(x0, x - reach), min(x1, x + reach), max(z0, z - reach), min(z1, z + reach))

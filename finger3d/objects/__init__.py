@@ -1,6 +1,6 @@
 """Rigid objects: the shape of the surface that is pressed on the finger, analytic or triangulated; where it touches."""
 
-from finger3d.objects.first_contact import InitialContact, first_contact_height, initial_contact
+from finger3d.objects.first_contact import ContactPath, InitialContact, first_contact_height, initial_contact
 from finger3d.objects.registry import OBJECTS
 from finger3d.objects.shapes import Axis, Cylinder, Plane, RigidObject, Sphere, Wave, Wedge, vertical_frame
 from finger3d.objects.slope import Slopes, slope_of
@@ -9,6 +9,7 @@ from finger3d.objects.triangulated import MeshObject
 __all__ = [
     "OBJECTS",
     "Axis",
+    "ContactPath",
     "Cylinder",
     "InitialContact",
     "MeshObject",

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +23,27 @@ _PLACES = 8  # best places that are searched further: bumps and teeth may be equ
 _STEEP = math.tan(math.radians(80.0))  # a flank that runs into the finger faster than this is a wall
 _STRIDES = 60
 _NOTHING = 1e-9  # of the finger's extent: a contact as narrow as this has no area
+
+
+@dataclass(frozen=True)
+class ContactPath:
+    """An object and its way into the finger.
+
+    Attributes
+    ----------
+    top : the finger's height over (x, z), nan beside it
+    object : the rigid object
+    half_length_mm, half_width_mm : half extents of the finger; a section has half width 0
+    targets : (n, 3) depth, slide along x, slide along z, mm
+    landmarks : (k, 2) mm, corners of the finger that a search on a grid could miss
+    """
+
+    top: Top
+    object: RigidObject
+    half_length_mm: float
+    half_width_mm: float
+    targets: Float
+    landmarks: Float | None = None
 
 
 @dataclass(frozen=True)
@@ -107,27 +127,17 @@ def first_contact_height(
     return _touching(top, obj, half_length, half_width, marks)[0]
 
 
-def initial_contact(
-    top: Top,
-    obj: RigidObject,
-    half_length: float,
-    half_width: float,
-    path: Float,
-    marks: Float | None = None,
-) -> InitialContact:
-    """First touch, as in :func:`first_contact_height`, of an object that then goes a way which the vertical gap can
-    describe.
-
-    Parameters
-    ----------
-    path : (n, 3) depth, slide along x, slide along z of every target, mm
+def initial_contact(way: ContactPath) -> InitialContact:
+    """Return the first touch, as in :func:`first_contact_height`, of a path that the vertical gap can describe.
 
     Raises
     ------
     Finger3dError
         If the object is nowhere above the finger, reaches the base beside it, or runs into its side.
     """
-    touch, place = _touching(top, obj, half_length, half_width, marks)
+    top, obj, path = way.top, way.object, way.targets
+    half_length, half_width = way.half_length_mm, way.half_width_mm
+    touch, place = _touching(top, obj, half_length, half_width, way.landmarks)
     if not math.isfinite(touch):
         raise Finger3dError(
             f"object: no part of it is above the finger (|x| <= {half_length:g}, |z| <= {half_width:g} mm), so that it "
@@ -175,7 +185,7 @@ def _box(
     return float(x0), float(x1), float(z0), float(z1)
 
 
-def _overlap(top: Top, obj: RigidObject, at: Float, touch: float, target: Any) -> Float:
+def _overlap(top: Top, obj: RigidObject, at: Float, touch: float, target: Sequence[float] | Float) -> Float:
     """How deep (n,) the object would reach into the finger at rest, mm; -inf where there is one of them only."""
     depth, slide_x, slide_z = target
     over = top(*at.T) - (obj.height(at[:, 0] - slide_x, at[:, 1] - slide_z) + touch - depth)

@@ -10,9 +10,12 @@ import numpy as np
 
 from finger3d._ranges import LONGEST_SLIDE, at_least, at_most
 from finger3d.geometry.design import Design
-from finger3d.mechanics.model import MeshOptions, Model
+from finger3d.mechanics.model import Domain, MeshOptions
+from finger3d.objects import RigidObject
 from finger3d.scene.messages import dotted, shown
 from finger3d.scene.tables import GaugeTable, LegTable, MeshTable, SceneTable
+
+Box = tuple[float, float, float, float]
 
 SIZE_SHARE, BASE_SHARE = 1 / 25, 1 / 6.25
 """Default edge lengths in a solid as shares of the finger's height; sections take a quarter of them. They leave less
@@ -106,27 +109,27 @@ def _sizes(mesh: MeshTable, design: Design, solid: bool) -> list[str]:
     return []
 
 
-def chosen(mesh: MeshTable, model: Model, zone: tuple[float, float, float, float]) -> MeshOptions:
-    """Return the mesh options, with sizes chosen where they are absent, from all else and the zone of contact."""
-    design, solid = model.design, model.domain == "solid"
+def chosen(mesh: MeshTable, design: Design, domain: Domain, obj: RigidObject, box: Box) -> MeshOptions:
+    """Return the mesh options, with sizes chosen where they are absent, from all else and the box of contact."""
+    solid = domain == "solid"
     share = design.height_mm * (1.0 if solid else 0.25)
     size, base = mesh.size_mm, mesh.base_size_mm
     if size is None:
         # A thin finger gets two elements across its width; four significant digits keep scene.toml readable.
         coarse = min(share * SIZE_SHARE, smallest_mm(design, solid) / 2.0, base or math.inf)
-        size = _rounded(max(min(coarse, _detail(model, zone)), coarse * _FINEST))
+        size = _rounded(max(min(coarse, _detail(obj, box, solid)), coarse * _FINEST))
     if base is None:
         base = max(_rounded(min(share * BASE_SHARE, smallest_mm(design, solid=False))), size)
     return MeshOptions(size, base, mesh.mesher)
 
 
-def _detail(model: Model, zone: tuple[float, float, float, float]) -> float:
+def _detail(obj: RigidObject, box: Box, solid: bool) -> float:
     """Edge length, mm, at which an object that is not flat has some elements across its contact, or a crest."""
-    if model.object.is_flat:
+    if obj.is_flat:
         return math.inf
-    x0, x1, z0, z1 = zone
-    across = min(x1 - x0, z1 - z0) if model.domain == "solid" else x1 - x0
-    detail = model.object.detail
+    x0, x1, z0, z1 = box
+    across = min(x1 - x0, z1 - z0) if solid else x1 - x0
+    detail = obj.detail
     wave = detail.length_mm if detail and detail.kind == "wavelength" else math.inf
     return min(across, wave) / _ACROSS
 

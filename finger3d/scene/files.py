@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from finger3d.geometry.design import Design
 from finger3d.geometry.files import SUFFIXES
 from finger3d.objects import MeshObject, RigidObject
 
@@ -38,7 +39,7 @@ def finger(path: str) -> Imported:
     return imported(path)
 
 
-def unit_mistake(design: Any, obj: RigidObject) -> str:
+def unit_mistake(design: Design, obj: RigidObject) -> str:
     """Say in one line that a triangulated object is far too large or far too small beside the finger; else nothing."""
     if not isinstance(obj, MeshObject):
         return ""

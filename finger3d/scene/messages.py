@@ -164,10 +164,10 @@ def _value(tree: Any, place: Place) -> Any:
     return tree
 
 
-def worded(
+def messages_from(
     error: ValidationError, table: type[TomlTable], tree: Any, under: Place, also: Sequence[str] = ()
 ) -> dict[Place, str]:
-    """Word the findings of a check of `tree` (which stands at `under` in the file) against `table`.
+    """Return a message for every finding of a check of `tree` (which stands at `under` in the file) against `table`.
 
     Parameters
     ----------

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 import re
 from collections.abc import Iterable, Mapping
@@ -18,16 +17,17 @@ from finger3d.errors import Finger3dError
 from finger3d.geometry.design import Design
 from finger3d.geometry.files import SUFFIXES
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.model import Domain, Gauge, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Domain, Gauge, Leg, Material, MeshOptions, Model, contact_path
 from finger3d.objects import OBJECTS, RigidObject, initial_contact
 from finger3d.scene import checks, files, tree
-from finger3d.scene.messages import Place, choose, described, dotted, listed, nearest, shown, unknown, worded
+from finger3d.scene.messages import Place, choose, described, dotted, listed, messages_from, nearest, shown, unknown
 from finger3d.scene.registry import effect_names, effect_type
 from finger3d.scene.tables import (
     FileTable,
     LegsTable,
     LegTable,
     PressTable,
+    Record,
     SceneTable,
     TomlTable,
     record_of,
@@ -159,67 +159,97 @@ def parse(
     """
     given = tree.frozen(files.absolute(given, path))
     found: dict[Place, str] = {}
+    parts = _read(given, found)
+    if parts is None:
+        order = [*given]
+        places = sorted(found, key=lambda p: order.index(p[0]) if p[0] in order else len(order))
+        raise _refusal([found[p] for p in places], path, set_keys)
+    if lines := parts.contradictions():
+        raise _refusal(lines, path, set_keys)
+    try:
+        mesh = parts.mesh()
+        scene = Scene(parts.filled_in(mesh), parts.design, parts.object, mesh, parts.effects, given, path)
+        scene.model()  # effects may refuse what the rest of the scene asks for
+    except Finger3dError as error:
+        raise _refusal([str(error)], path, set_keys) from None
+    return scene
+
+
+@dataclass(frozen=True)
+class _Parts:
+    """The tables of a scene, each checked by itself, and what is built from them."""
+
+    tables: SceneTable
+    geometry: str
+    dimensions: TomlTable
+    design: Design
+    shape: str
+    placed: TomlTable
+    object: RigidObject
+    press: PressTable | LegsTable
+    settings: Mapping[str, TomlTable]
+    effects: Mapping[str, Any]
+
+    @property
+    def legs(self) -> tuple[LegTable, ...]:
+        return self.press.leg if isinstance(self.press, LegsTable) else (self.press,)
+
+    def contradictions(self) -> list[str]:
+        """Return the mistakes that show only when tables are read together."""
+        unit = files.unit_mistake(self.design, self.object)
+        return checks.check(self.tables, self.legs, self.design) + ([unit] if unit else [])
+
+    def mesh(self) -> MeshOptions:
+        """Return the edge lengths, given or chosen.
+
+        Raises
+        ------
+        Finger3dError
+            If the object's way into the finger is none that the contact conditions can describe.
+        """
+        domain = self.tables.model.domain
+        way = contact_path(self.design, self.object, tuple(Leg(**dict(leg)) for leg in self.legs), domain)
+        return checks.chosen(self.tables.mesh, self.design, domain, self.object, initial_contact(way).contact_box)
+
+    def filled_in(self, mesh: MeshOptions) -> SceneTable:
+        """Return the tables with every default."""
+        return self.tables.model_copy(
+            update={
+                "finger": {"geometry": self.geometry, **self.dimensions.model_dump()},
+                "object": {"shape": self.shape, **dict(self.placed)},
+                "press": self.press.model_dump(),
+                # with a tolerance the press finds the sizes
+                "mesh": self.tables.mesh
+                if self.tables.mesh.tolerance
+                else self.tables.mesh.model_copy(update=mesh.as_table()),
+                "effects": {name: settings.model_dump() for name, settings in self.settings.items()},
+            }
+        )
+
+
+def _read(given: Mapping[str, Any], found: dict[Place, str]) -> _Parts | None:
+    """Check every table by itself; None if there are mistakes, which are put into `found`."""
     tables = _checked(SceneTable, given, (), found)
     geometry, dimensions = _named(given, "finger", "geometry", designs(), found)
     design = _design(geometry, dimensions, found)
     shape, placed = _named({**given, "object": _shaped(given.get("object", {}))}, "object", "shape", OBJECTS, found)
     rigid = _object(shape, placed, found)
     press = _press(given, found)
-    effects = _effects(given, found)
-    if found or tables is None or dimensions is None or design is None or press is None or rigid is None:
-        order = [*given]
-        places = sorted(found, key=lambda p: order.index(p[0]) if p[0] in order else len(order))
-        raise _refusal([found[p] for p in places], path, set_keys)
-    legs = press.leg if isinstance(press, LegsTable) else (press,)
-    lines = checks.check(tables, legs, design)
-    lines += [line for line in [files.unit_mistake(design, rigid)] if line]
-    if lines:
-        raise _refusal(lines, path, set_keys)
-    try:
-        # How the object comes near is told before any work; so is what effects ask of the rest of the scene, below.
-        way = Model(
-            design,
-            Material(1.0, 0.3),
-            MeshOptions(1.0, 1.0),
-            tuple(Leg(**dict(leg)) for leg in legs),
-            rigid,
-            domain=tables.model.domain,
-        )
-        zone = _zone(way)
-        mesh = checks.chosen(tables.mesh, way, zone)
-    except Finger3dError as error:
-        raise _refusal([str(error)], path, set_keys) from None
-    tables = tables.model_copy(
-        update={
-            "finger": {"geometry": geometry, **dimensions.model_dump()},
-            "object": {"shape": shape, **dict(placed or {})},
-            "press": press.model_dump(),
-            # with a tolerance the sizes are found by the press
-            "mesh": tables.mesh if tables.mesh.tolerance else tables.mesh.model_copy(update=mesh.as_table()),
-            "effects": {name: settings.model_dump() for name, (settings, _) in effects.items()},
-        }
+    settings, effects = _effects(given, found)
+    if found or not (tables and dimensions and design and placed and rigid and press):
+        return None
+    return _Parts(
+        tables=tables,
+        geometry=geometry,
+        dimensions=dimensions,
+        design=design,
+        shape=shape,
+        placed=placed,
+        object=rigid,
+        press=press,
+        settings=settings,
+        effects=effects,
     )
-    on = {name: effect for name, (_, effect) in effects.items()}
-    scene = Scene(tables, design, rigid, mesh, on, given, path)
-    try:
-        scene.model()
-    except Finger3dError as error:
-        raise _refusal([str(error)], path, set_keys) from None
-    return scene
-
-
-def _zone(way: Model) -> tuple[float, float, float, float]:
-    """The box of contact; scenes of a sweep mostly share theirs."""
-    try:
-        return _kept_zone(way)
-    except TypeError:
-        # a surface from a file cannot be looked up
-        return initial_contact(*way.approach).contact_box
-
-
-@functools.lru_cache(maxsize=64)
-def _kept_zone(way: Model) -> tuple[float, float, float, float]:
-    return initial_contact(*way.approach).contact_box
 
 
 def _refusal(lines: list[str], path: Path | None, set_keys: Iterable[str] | Mapping[str, str]) -> Finger3dError:
@@ -239,11 +269,11 @@ def _checked(
     try:
         return table.model_validate(given)
     except ValidationError as error:
-        found |= worded(error, table, given, under, also)
+        found |= messages_from(error, table, given, under, also)
         return None
 
 
-def _built(record: Any, settings: TomlTable, place: Place, found: dict[Place, str]) -> Any:
+def _built(record: type[Record], settings: TomlTable, place: Place, found: dict[Place, str]) -> Record | None:
     """Build a design or an effect; what its own rules refuse is a mistake like any other."""
     try:
         return record_of(record, settings)
@@ -344,9 +374,10 @@ def _press(given: Mapping[str, Any], found: dict[Place, str]) -> PressTable | Le
     return _checked(LegsTable, press, ("press",), found)
 
 
-def _effects(given: Mapping[str, Any], found: dict[Place, str]) -> dict[str, tuple[TomlTable, Any]]:
-    """Check the effects that are present; those that are absent are not even imported."""
-    effects: dict[str, tuple[TomlTable, Any]] = {}
+def _effects(given: Mapping[str, Any], found: dict[Place, str]) -> tuple[dict[str, TomlTable], dict[str, Any]]:
+    """Check the effects that are present, the only ones that are imported; return their tables and their settings."""
+    tables: dict[str, TomlTable] = {}
+    effects: dict[str, Any] = {}
     present = given.get("effects")
     for name, settings in present.items() if isinstance(present, Mapping) else ():
         place = ("effects", name)
@@ -354,9 +385,6 @@ def _effects(given: Mapping[str, Any], found: dict[Place, str]) -> dict[str, tup
             found[place] = unknown(place, settings, effect_names(), kind="effect")
         elif not isinstance(settings, Mapping):
             found[place] = f"{dotted(place)} = {shown(settings)}: must be a table, [{dotted(place)}]"
-        else:
-            kind = effect_type(name)
-            table = _checked(table_of(kind), settings, place, found)
-            if table is not None:
-                effects[name] = (table, _built(kind, table, place, found))
-    return effects
+        elif table := _checked(table_of(effect_type(name)), settings, place, found):
+            tables[name], effects[name] = table, _built(effect_type(name), table, place, found)
+    return tables, effects
