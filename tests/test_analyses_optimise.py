@@ -15,7 +15,6 @@ from finger3d.analyses.optimise.task import FreeKey, ObjectiveTable, Optimisatio
 from finger3d.cli import main
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.solve import build, march
-from finger3d.plotting.layout import panels_of
 from finger3d.scene import load, tree
 from tests.test_report import words
 
@@ -104,9 +103,7 @@ def test_a_design_that_cannot_be_built_is_a_line_with_its_reason(problem, tmp_pa
     assert f"objective (sensitivity) {found.best.value:.5g}" in page
     assert f"gauge.0.y_mm 40 60 {found.start.values[0]:.5g} {found.best.values[0]:.5g}" in page
     assert f"{failed} of {len(rows)} designs have no number" in page
-    assert [panel.name for panel in panels_of(tmp_path / "design.png")[1]] == [
-        "The best design so far", "Every design against gauge.0.y_mm"
-    ]  # fmt: skip
+    assert (tmp_path / "design.png").read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize("method", ["dual-annealing", "nelder-mead"])

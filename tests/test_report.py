@@ -17,7 +17,7 @@ import pytest
 from finger3d.cli import main
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Gauge
-from finger3d.plotting.layout import panels_of, sheet
+from finger3d.plotting.layout import sheet
 from finger3d.report.build import CITE, PAPER, Code, Figure, HeadlineRow, PageSection, Table, write_page
 from finger3d.report.compare import compare_page
 from finger3d.report.press import press_page
@@ -149,17 +149,12 @@ def test_the_builder_takes_what_calibrate_and_sweep_have(tmp_path: Path) -> None
     assert 'alt="the &quot;fit&quot;"' in page.read_text(encoding="utf-8")
 
 
-def test_a_picture_stands_in_the_page_once_and_each_panel_is_a_window_on_it(tmp_path: Path) -> None:
-    sheet(1, 2, (3.0, 2.0), (0.5, 0.1, 0.5, 0.1), "title").save(tmp_path / "two.png", ('<left> & "l"', "right"))
-    page = write_page(tmp_path, "t", figures=[Figure("two.png", "not shown")]).read_text(encoding="utf-8")
-    (width, height), panels = panels_of(tmp_path / "two.png")
-    boxes = re.findall(r'<svg role="img" aria-label="([^"]*)" viewBox="([^"]*)">(<image|<use) ', page)
-    assert boxes == [
-        ("&lt;left&gt; &amp; &quot;l&quot;", f"0 {height - 240} 360 240", "<image"),
-        ("right", f"360 {height - 240} 360 240", "<use"),
-    ]
-    assert f'<image id="picture-two" width="{width}" height="{height}" href="data:image/png;base64,' in page
-    assert page.count("data:image/png") == 1
+def test_a_picture_stands_in_the_page_with_its_caption(tmp_path: Path) -> None:
+    sheet(1, 2, (3.0, 2.0), (0.5, 0.1, 0.5, 0.1), "title").save(tmp_path / "two.png")
+    figures = [Figure("two.png", '<left> & "right"'), Figure("none.png", "not shown")]
+    page = write_page(tmp_path, "t", figures=figures).read_text(encoding="utf-8")
+    assert page.count("data:image/png;base64,") == 1
+    assert 'alt="&lt;left&gt; &amp; &quot;right&quot;"' in page
     assert "not shown" not in page
 
 

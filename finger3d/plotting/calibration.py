@@ -22,8 +22,7 @@ def draw(path: Path, calibration: Calibration) -> None:
     curve_panel(left, calibration)
     _resolution(middle, calibration)
     _causes(right, calibration)
-    made.save(path, ("Strain against friction, and its fit", "How finely mu is told",
-                     "What the uncertainty of mu is made of"))  # fmt: skip
+    made.save(path)
 
 
 def _plain(axes: Any) -> None:

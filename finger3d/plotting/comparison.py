@@ -24,8 +24,7 @@ def draw(path: Path, cases: Sequence[Case], own_width_mm: float, title: str) -> 
     _bars(bars, own)
     _along(pressure, own, "pressure_MPa", "pressure (MPa)")
     _along(shear, own, "shear_x_MPa", "shear along x on the finger (MPa)")
-    made.save(path, ("Force for each mm of width", "Every quantity beside the solid's", "Pressure along x",
-                     "Friction along x on the finger"))  # fmt: skip
+    made.save(path)
 
 
 def _plain(axes: Any) -> None:

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
 from finger3d.fem.simplex import Mesh
 from finger3d.plotting.gauges import Mark, draw_marks
-from finger3d.plotting.layout import WIDEST, blank, cells, save, sheet
+from finger3d.plotting.layout import WIDEST, blank, save, sheet
 from finger3d.plotting.outlines import edges_of, outline_of
 from finger3d.plotting.solid import BODY, COLOURS, LINE, OBJECT, REST, Skin, draw_solid, flat, render_solid, skin_of
 
@@ -69,9 +69,7 @@ def finger_picture(
         shear = np.column_stack([_column(table, "shear_x_MPa"), _column(table, "shear_z_MPa")])
         skin = skin_of(mesh, displacement, pressure, shear, status, nodes, profile)
         figure, renderer = _solid(skin, title, lines)
-    top = 0.4 / figure.get_figheight() if title else 0.0
-    names = ("Contact pressure on the deformed finger, at true scale", "The zones that stick and slip")
-    save(figure, path, dict(zip(names, cells(1, 2, top), strict=True)))
+    save(figure, path)
     return renderer
 
 
@@ -113,9 +111,7 @@ def contact_figure(
     reach = max(axes.get_xlim()[1] for axes in made.axes)
     for axes in made.axes:
         axes.set_xlim(-reach, reach)
-    made.save(
-        path, [f"Traction along x{', ' if where else ''}{where}, with the limit of friction" for where, _ in lines]
-    )
+    made.save(path)
 
 
 def force_figure(path: str | Path, steps: Sequence[Mapping[str, Any]], title: str = "") -> None:
@@ -151,8 +147,7 @@ def force_figure(path: str | Path, steps: Sequence[Mapping[str, Any]], title: st
         axes.set_ylim(bottom=0.0, top=1.15 * axes.get_ylim()[1])  # room for the legend
         _plain(axes)
         axes.legend(frameon=False, loc="upper left")
-    way = "way of the object" if slides else "depth"
-    made.save(path, (f"Forces against {way}", f"Half lengths of contact and stick zone against {way}"))
+    made.save(path)
 
 
 # --- shared -------------------------------------------------------------------------------------------------------

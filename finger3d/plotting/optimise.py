@@ -52,8 +52,7 @@ def draw(
         _finish(axes, objective)
     for axes in made.axes[1 + len(shown) :]:
         axes.set_axis_off()
-    names = ["The best design so far", *(f"Every design against {key}" for key in shown)]
-    made.save(path, names)
+    made.save(path)
 
 
 def _finish(axes: Any, objective: str) -> None:

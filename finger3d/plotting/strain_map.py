@@ -42,8 +42,7 @@ def draw_map(path: Path, found: StrainMap, gauge: Gauge, calibration: Calibratio
         axes.plot(gauge.x_mm, gauge.y_mm, "o", ms=8, mfc="none", mec="#000000", mew=1.4)
         axes.set_xlabel("x (mm)")
         axes.set_ylabel("y (mm)")
-    made.save(path, (f"How strongly a gauge along {degrees:.4g}° follows mu", "The worst resolution along the gauge",
-                     "The worst resolution along the best direction"))  # fmt: skip
+    made.save(path)
 
 
 def _positive(slope: Float) -> Float:

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 from finger3d._machine import versions as installed
 from finger3d.io import atomic
-from finger3d.plotting.layout import panels_of
 from finger3d.report.html import asset
 from finger3d.results.format import with_error
 
@@ -60,10 +59,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Figure:
-    """A PNG file, in the page's folder unless its path says otherwise; one that is not there is left out.
-
-    A picture that knows its panels (`finger3d.plotting.layout`) is shown as these, under their own names.
-    """
+    """A PNG file in the page's folder unless its path says otherwise; a file that does not exist is left out."""
 
     path: str | Path
     caption: str = ""
@@ -215,7 +211,7 @@ def _cell(value: object) -> str:
 
 
 def _figures(folder: Path, figures: Sequence[Figure]) -> str:
-    """Pictures in a grid, each panel of one in a place of its own; a picture's data stand in the page once."""
+    """Return the pictures in a grid."""
     return _grid(_figure(folder / figure.path, figure.caption) for figure in figures)
 
 
@@ -225,22 +221,14 @@ def _grid(figures: Iterable[str]) -> str:
 
 
 def _figure(path: Path, caption: str) -> str:
+    """Return a picture with its data; a wide one scrolls in its own box on a narrow screen."""
     if not path.exists():
         return ""
-    data = f"data:image/png;base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"
-    (width, height), panels = panels_of(path)
-    if not panels:
-        text = escape(caption, quote=True)
-        return f'<figure><img alt="{text}" src="{data}"><figcaption>{text}</figcaption></figure>'
-    name = escape(f"picture-{path.stem}", quote=True)
-    whole = f'<image id="{name}" width="{width}" height="{height}" href="{data}"/>'
-    shown = []
-    for panel in panels:
-        text, box = escape(panel.name, quote=True), f"{panel.left} {panel.top} {panel.width} {panel.height}"
-        picture = f'<svg role="img" aria-label="{text}" viewBox="{box}">{whole}</svg>'
-        shown.append(f"<figure>{picture}<figcaption>{text}</figcaption></figure>")
-        whole = f'<use href="#{name}"/>'
-    return "".join(shown)
+    data, text = base64.b64encode(path.read_bytes()).decode("ascii"), escape(caption, quote=True)
+    image = f'<img alt="{text}" src="data:image/png;base64,{data}">'
+    return (
+        f'<figure class="picture"><div class="wide" tabindex="0">{image}</div><figcaption>{text}</figcaption></figure>'
+    )
 
 
 def _document(title: str, body: str) -> tuple[str, str]:

@@ -51,7 +51,7 @@ def draw(path: str | Path, charts: Sequence[Chart]) -> None:
     made = sheet(len(charts) // columns, columns, (5.6, 3.5 + below), (0.9, 0.15, below, 0.2))
     for axes, chart in zip(made.axes, charts, strict=True):
         _panel(axes, chart)
-    made.save(path, [chart.caption for chart in charts])
+    made.save(path)
 
 
 def _abreast(chart: Chart) -> int:
