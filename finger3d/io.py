@@ -59,9 +59,12 @@ _LOCK = ".finger3d.lock"
 
 
 _RESULTS = {
-    "press": "summary.json", "compare": "compare.json", "calibrate": "calibration.json", "sweep": "sweep.json",
+    "press": "summary.json",
+    "compare": "compare.json",
+    "calibrate": "calibration.json",
+    "sweep": "sweep.json",
     "optimise": "search.json",
-}  # fmt: skip
+}
 """By command, the file that tells its results."""
 
 
@@ -109,9 +112,20 @@ def claimed(folder: str | Path, command: str = "") -> Iterator[Path]:
 
 
 _DAMAGED = (
-    ValueError, TypeError, KeyError, AttributeError, EOFError, MemoryError, NotImplementedError, OverflowError,
-    RuntimeError, SyntaxError, tokenize.TokenError, zipfile.BadZipFile, zlib.error,
-)  # fmt: skip
+    ValueError,
+    TypeError,
+    KeyError,
+    AttributeError,
+    EOFError,
+    MemoryError,
+    NotImplementedError,
+    OverflowError,
+    RuntimeError,
+    SyntaxError,
+    tokenize.TokenError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
 """What NumPy raises for an .npz file that is cut short, changed, or of another kind."""
 
 

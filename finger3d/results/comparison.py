@@ -55,7 +55,14 @@ class Case:
     def as_dict(self) -> dict[str, Any]:
         """For compare.json."""
         return {
-            "model": self.model, "width_mm": self.width_mm, "size_mm": self.size_mm, "mesher": self.mesher,
-            "outcome": str(self.outcome), "numbers": dict(self.numbers), "errors": dict(self.errors),
-            "lines": {k: dict(v) for k, v in self.lines.items()}, "seconds": self.seconds, "error_method": self.method,
-        }  # fmt: skip
+            "model": self.model,
+            "width_mm": self.width_mm,
+            "size_mm": self.size_mm,
+            "mesher": self.mesher,
+            "outcome": str(self.outcome),
+            "numbers": dict(self.numbers),
+            "errors": dict(self.errors),
+            "lines": {k: dict(v) for k, v in self.lines.items()},
+            "seconds": self.seconds,
+            "error_method": self.method,
+        }

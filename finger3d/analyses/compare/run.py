@@ -221,9 +221,13 @@ def _write(folder: Path, scene: Scene, model: Model, cases: Sequence[Case], outc
 
 def _row(case: Case, height: float) -> dict[str, Any]:
     row: dict[str, Any] = {
-        "model": case.model, "width_mm": case.width_mm, "width_over_height": case.width_mm / height,
-        "size_mm": case.size_mm, "mesher": case.mesher, "outcome": str(case.outcome),
-    }  # fmt: skip
+        "model": case.model,
+        "width_mm": case.width_mm,
+        "width_over_height": case.width_mm / height,
+        "size_mm": case.size_mm,
+        "mesher": case.mesher,
+        "outcome": str(case.outcome),
+    }
     for key, value in case.numbers.items():
         row[key] = value
         row[f"{key}_error"] = case.errors.get(key, "")

@@ -213,9 +213,12 @@ def _others(planes: Sequence[Case], solid: Case) -> list[str]:
 def _would_have_done(planes: Sequence[Case], solid: Case) -> str:
     """Which quantities each plane model has within the limit, or within the error bars where those are wider."""
     names = {
-        FORCE: "force", "contact_length_mm": "contact length", "stick_length_mm": "stick length",
-        "friction_sum_N_per_mm": "friction sum", "peak_pressure_MPa": "peak pressure",
-    }  # fmt: skip
+        FORCE: "force",
+        "contact_length_mm": "contact length",
+        "stick_length_mm": "stick length",
+        "friction_sum_N_per_mm": "friction sum",
+        "peak_pressure_MPa": "peak pressure",
+    }
     names |= {k: f"gauge {k.removeprefix('gauge_')}" for k in solid.numbers if k.startswith("gauge_")}
     parts = []
     for plane in planes:

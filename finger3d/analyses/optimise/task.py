@@ -151,9 +151,15 @@ class OptimisationProblem:
         path = Path(self.objective)
         judged = hashlib.sha256(path.read_bytes()).hexdigest()[:16] if path.is_file() else self.objective
         return {
-            "scene": tree.plain(self.given), "free": [[f.key, f.low, f.high] for f in self.free], "objective": judged,
-            "gauge": self.gauge, "mu": list(self.mus), "noise": self.noise, "method": self.method, "seed": self.seed,
-        }  # fmt: skip
+            "scene": tree.plain(self.given),
+            "free": [[f.key, f.low, f.high] for f in self.free],
+            "objective": judged,
+            "gauge": self.gauge,
+            "mu": list(self.mus),
+            "noise": self.noise,
+            "method": self.method,
+            "seed": self.seed,
+        }
 
 
 def checked_start(problem: OptimisationProblem) -> tuple[float, ...]:

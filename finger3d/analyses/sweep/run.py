@@ -185,9 +185,14 @@ class _Cluster:
     def _submit(self, body: _BodyPoints, address: str | None = None) -> None:
         """Send the next batch of a body, to the worker that has condensed it if that is still there."""
         future = self.client.submit(
-            worker.batch, body.spec, body.left, body.size,
-            pure=False, workers=address and [address], allow_other_workers=address is not None,
-        )  # fmt: skip
+            worker.batch,
+            body.spec,
+            body.left,
+            body.size,
+            pure=False,
+            workers=address and [address],
+            allow_other_workers=address is not None,
+        )
         self._running[future] = body
         future.add_done_callback(self._finished.put)
 
