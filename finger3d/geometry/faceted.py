@@ -1,4 +1,4 @@
-"""Bodies given by triangles alone: smooth patches stand for CAD faces, and the creases between them for edges."""
+"""Bodies of triangles without CAD: smooth patches replace CAD faces, and creases between patches replace edges."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from finger3d.geometry.tessellate import CadFace, Tessellation
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
-_CREASE = math.cos(math.radians(35.0))
-_MOST = 150  # patches; beyond, a texture's patches are taken together by label
-_UP = 1e-3
-_FLAT = 1e-6
-_BENT = math.radians(0.3)  # below, neighbours lie in one plane but for round-off
-_MANY = 2000  # triangles; fTetWild took 3 minutes over 34 000 of them
-_RARE = 0.1  # of a smooth patch's area
+_CREASE_COSINE = math.cos(math.radians(35.0))  # between normals; smaller ones separate patches
+_MAX_PATCHES = 150  # with more, patches of one label are merged
+_LEAST_UPWARD_NORMAL = 1e-3  # of a contact triangle
+_NORMAL_TOLERANCE = 1e-6  # of a plane end
+_LEAST_BEND = math.radians(0.3)  # angle below which neighbours are coplanar but for round-off
+_DECIMATE_FROM = 2000  # triangles; fTetWild needed 3 minutes for 34 000
+_MINORITY = 0.1  # of a smooth patch's area: a smaller share takes the label of the rest
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +92,7 @@ class Faceted:
         """A small radius of curvature on the patch, mm: from the angles between neighbours; inf where it is flat."""
         a, b, edge = _neighbours(self.triangles)
         angle = np.arccos(np.clip(np.einsum("ij,ij->i", self.triangles.normals[a], self.triangles.normals[b]), -1, 1))
-        bent = (angle > _BENT) & (angle < math.acos(_CREASE))
+        bent = (angle > _LEAST_BEND) & (angle < math.acos(_CREASE_COSINE))
         if not bent.any():
             return math.inf
         area = np.linalg.norm(self.triangles.area_vectors, axis=1)
@@ -122,13 +122,13 @@ def body(surface: Triangles) -> Tessellation:
     base = (surface.corners[:, :, 1] == 0.0).all(axis=1)
     up = _looks_up(surface, base)
     patch = _joined(surface, 2 * base + up)
-    if patch.max() + 1 > _MOST:
+    if patch.max() + 1 > _MAX_PATCHES:
         patch = np.unique(2 * base + up, return_inverse=True)[1].reshape(-1)
     network = Network(surface, patch)
     faces = []
     for number in range(int(patch.max()) + 1):
         mine = surface.corners[patch == number].reshape(-1, 3)
-        along_z = np.abs(surface.normals[patch == number, 2]).min() > 1.0 - _FLAT
+        along_z = np.abs(surface.normals[patch == number, 2]).min() > 1.0 - _NORMAL_TOLERANCE
         first = int(np.argmax(patch == number))
         label = "base" if base[first] else "contact" if up[first] else "ends" if along_z else "walls"
         faces.append(CadFace(label, Faceted(network, number), mine.min(axis=0), mine.max(axis=0), 1.0))
@@ -139,12 +139,12 @@ def body(surface: Triangles) -> Tessellation:
 
 def _looks_up(surface: Triangles, base: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Mask (m,) of contact triangles: those that look up, less the few that differ from the smooth patch around."""
-    up = (surface.normals[:, 1] > _UP) & ~base
+    up = (surface.normals[:, 1] > _LEAST_UPWARD_NORMAL) & ~base
     smooth = _joined(surface, base.astype(np.int64))
     area = np.linalg.norm(surface.area_vectors, axis=1)
     share = np.bincount(smooth, area * up) / np.maximum(np.bincount(smooth, area), 1e-300)
-    up[(share > 1.0 - _RARE)[smooth]] = True
-    up[(share < _RARE)[smooth]] = False
+    up[(share > 1.0 - _MINORITY)[smooth]] = True
+    up[(share < _MINORITY)[smooth]] = False
     return up
 
 
@@ -154,7 +154,7 @@ def _joined(surface: Triangles, kind: Int) -> Int:
     from scipy.sparse.csgraph import connected_components
 
     a, b, _ = _neighbours(surface)
-    joined = (kind[a] == kind[b]) & (np.einsum("ij,ij->i", surface.normals[a], surface.normals[b]) > _CREASE)
+    joined = (kind[a] == kind[b]) & (np.einsum("ij,ij->i", surface.normals[a], surface.normals[b]) > _CREASE_COSINE)
     links = coo_matrix((np.ones(int(joined.sum())), (a[joined], b[joined])), shape=(len(kind), len(kind)))
     value: Int = connected_components(links, directed=False)[1].astype(np.int64)
     return value
@@ -175,7 +175,7 @@ def coarser(body: Tessellation, tolerance: float) -> Tessellation:
     `tolerance` (mm) is what one removal may move the surface; removals add up to some twenty times that. A surface
     that does not come out closed is made again with less, and left as it was in the end.
     """
-    if len(body.triangles) <= _MANY:
+    if len(body.triangles) <= _DECIMATE_FROM:
         return body
     for share in (1.0, 0.5, 0.2, 0.1):
         found = _decimated(body, share * tolerance)
@@ -191,7 +191,7 @@ def _decimated(body: Tessellation, tolerance: float) -> Triangles:
 
     decimate = vtkDecimatePro()
     decimate.SetInputData(PolyData(body.points, np.insert(body.triangles, 0, 3, axis=1).ravel()))
-    decimate.SetTargetReduction(1.0 - 0.25 * _MANY / len(body.triangles))
+    decimate.SetTargetReduction(1.0 - 0.25 * _DECIMATE_FROM / len(body.triangles))
     decimate.PreserveTopologyOn()
     decimate.SplittingOff()
     decimate.AccumulateErrorOn()

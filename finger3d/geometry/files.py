@@ -1,4 +1,4 @@
-"""Bodies from files: STL and STEP as closed triangles, every defect told in one line."""
+"""Bodies from STL and STEP files as closed triangles; a defect raises an error of one line."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ STL, STEP = (".stl",), (".step", ".stp")
 SUFFIXES = (*STL, *STEP)
 
 MOST_TRIANGLES = 300_000
-"""Of a body from an STL file: its checks take some 25 us a triangle."""
+"""Largest number of triangles of an STL file; the checks take about 25 us a triangle."""
 
-_TESSELLATION = 5e-5  # of the diagonal: a curved CAD face comes this near
-_ANGLE = 0.2
-_FARTHEST_MM = 1e12  # even of a body drawn far away, or of a triangle that is left out since it vanishes
-_WELD = 1e-6  # of the diagonal: gaps that single precision leaves between triangles that touch
+_CHORD_ERROR = 5e-5  # of the tessellation of a CAD solid, over its diagonal
+_FACET_ANGLE = 0.2  # radians, between facets of the tessellation
+_LARGEST_COORDINATE_MM = 1e12
+_WELD_DISTANCE = 1e-6  # over the diagonal: gaps that single precision leaves between neighbouring triangles
 
 
 def read_surface(path: str | Path, scale: float = 1.0) -> Triangles:
@@ -36,12 +36,12 @@ def read_surface(path: str | Path, scale: float = 1.0) -> Triangles:
 
     Parameters
     ----------
-    scale : what every coordinate is multiplied with, for instance 1000 for an STL drawn in metres
+    scale : factor of every coordinate, for instance 1000 for an STL drawn in metres
 
     Raises
     ------
     Finger3dError
-        If there is no such file, or not one closed body with triangles facing outward in it.
+        If there is no such file, or it does not hold one closed body with triangles facing outward.
     """
     path = Path(path)
     if path.suffix.lower() in STEP:
@@ -66,7 +66,7 @@ def _bytes(path: Path) -> bytes:
 
 
 def content(path: Path) -> str:
-    """SHA-256 of a file."""
+    """Return the SHA-256 of a file."""
     import hashlib
 
     return hashlib.sha256(_bytes(path)).hexdigest()
@@ -86,20 +86,20 @@ def _stl(path: Path, scale: float) -> Triangles:
     if len(mesh.faces) > MOST_TRIANGLES:
         raise Finger3dError(
             f"{path}: {len(mesh.faces)} triangles; must be at most {MOST_TRIANGLES}: triangles much smaller than "
-            "mesh.size_mm tell the mesh nothing; export it coarser, or simplify it"
+            "mesh.size_mm do not change the mesh; export it coarser, or simplify it"
         )
     points = np.asarray(mesh.vertices, dtype=float)
-    far = np.isfinite(points) & (np.abs(points) * scale > _FARTHEST_MM)
+    far = np.isfinite(points) & (np.abs(points) * scale > _LARGEST_COORDINATE_MM)
     if far.any():
         raise Finger3dError(
-            f"{path}: a point at {points[far].flat[0]:g}: coordinates must be numbers from -{number(_FARTHEST_MM)} to "
-            f"{number(_FARTHEST_MM)} mm; mend it where it was drawn"
+            f"{path}: a point at {points[far].flat[0]:g}: coordinates must be numbers from "
+            f"-{number(_LARGEST_COORDINATE_MM)} to {number(_LARGEST_COORDINATE_MM)} mm; mend it where it was drawn"
         )
     return welded(points, np.asarray(mesh.faces, dtype=np.int64))
 
 
 def welded(points: Float, faces: NDArray[np.int64]) -> Triangles:
-    """Join equal points, and near ones where a gap would stay open; triangles that vanish are left out."""
+    """Merge equal points, and near points along open edges; triangles without area are dropped."""
     _, first, number = np.unique(points, axis=0, return_index=True, return_inverse=True)
     points, faces = points[first], number.reshape(-1)[faces]
     surface = Triangles(points, _proper(faces))
@@ -112,7 +112,7 @@ def welded(points: Float, faces: NDArray[np.int64]) -> Triangles:
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
-    near = loose[cKDTree(points[loose]).query_pairs(_WELD * surface.size, output_type="ndarray")]
+    near = loose[cKDTree(points[loose]).query_pairs(_WELD_DISTANCE * surface.size, output_type="ndarray")]
     joined = coo_matrix((np.ones(len(near)), (near[:, 0], near[:, 1])), shape=(len(points), len(points)))
     _, number = connected_components(joined, directed=False)
     _, first = np.unique(number, return_index=True)
@@ -126,17 +126,17 @@ def _proper(faces: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def read_solid(path: Path) -> Solid:
-    """The one build123d solid of a STEP file, mm."""
+    """Return the only build123d solid of a STEP file, mm."""
     return read_named(path)[0]
 
 
 def read_named(path: Path) -> tuple[Solid, dict[str, list[Face]]]:
-    """The one build123d solid of a STEP file, mm, and its faces by the names CAD gave them, in lower case.
+    """Return the only build123d solid of a STEP file, mm, and its faces by the names in the file, in lower case.
 
     Raises
     ------
     Finger3dError
-        If this is no STEP file, or has not exactly one valid solid.
+        If this is no STEP file, or does not hold exactly one valid solid.
     """
     _bytes(path)
     from build123d import Compound
@@ -145,7 +145,7 @@ def read_named(path: Path) -> tuple[Solid, dict[str, list[Face]]]:
     from OCP.Standard import Standard_Failure
     from OCP.STEPControl import STEPControl_Reader
 
-    # CAD writes its complaints past Python onto the terminal.
+    # OCCT prints messages to the terminal directly.
     Message.DefaultMessenger_s().RemovePrinters(Message_PrinterOStream.get_type_descriptor_s())
     reader = STEPControl_Reader()
     try:
@@ -165,14 +165,14 @@ def read_named(path: Path) -> tuple[Solid, dict[str, list[Face]]]:
 
 
 def _named_faces(solid: Solid, reader: STEPControl_Reader) -> dict[str, list[Face]]:
-    """Faces by the name in their ADVANCED_FACE entity: XCAF and build123d keep names of parts, but not of faces."""
+    """Return the faces by the name of their ADVANCED_FACE; XCAF and build123d keep the names of parts only."""
     from OCP.StepRepr import StepRepr_RepresentationItem
     from OCP.TopLoc import TopLoc_Location
 
     transferred = reader.WS().TransferReader()
     found: dict[str, list[Face]] = {}
     for face in solid.faces():
-        drawn = face.wrapped.Located(TopLoc_Location())  # the entity knows nothing of where an assembly puts its part
+        drawn = face.wrapped.Located(TopLoc_Location())  # the entity has no location of an assembly
         entity = transferred.EntityFromShapeResult(drawn, 1)
         if isinstance(entity, StepRepr_RepresentationItem) and entity.Name() is not None:
             found.setdefault(entity.Name().ToCString().strip().lower(), []).append(face)
@@ -180,9 +180,9 @@ def _named_faces(solid: Solid, reader: STEPControl_Reader) -> dict[str, list[Fac
 
 
 def tessellated(solid: Solid) -> Triangles:
-    """A CAD solid as triangles, within 5e-5 of its diagonal."""
+    """Return a CAD solid as triangles, within 5e-5 of its diagonal."""
     from finger3d.geometry.tessellate import tessellate
 
     box = solid.bounding_box()
-    body = tessellate(solid, _TESSELLATION * box.diagonal, _ANGLE)
+    body = tessellate(solid, _CHORD_ERROR * box.diagonal, _FACET_ANGLE)
     return Triangles(body.points, body.triangles)

@@ -1,4 +1,4 @@
-"""Surfaces as implicit functions: signed distance and normal, for labels and for snapping."""
+"""Surfaces as implicit functions: signed distance and normal, for labels and for moving nodes onto CAD."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 Float = NDArray[np.float64]
 
-_PRECISION = 1e-9  # mm
+_PROJECTION_TOLERANCE_MM = 1e-9
 
 
 class ImplicitSurface(Protocol):
@@ -79,7 +79,7 @@ def _round(out: Float, radius: float) -> tuple[Float, Float]:
 
 @dataclass(frozen=True)
 class Freeform:
-    """Another CAD surface, by projection: some 0.1 to 0.5 ms a point. Past its border it goes on as its tangents."""
+    """Another CAD surface, by projection in 0.1 to 0.5 ms a point; beyond its border it continues along tangents."""
 
     geometry: Geom_Surface
 
@@ -96,7 +96,7 @@ class Freeform:
 
         distance, normal = np.zeros(len(points)), np.zeros_like(points)
         for i, p in enumerate(points):
-            at = self._nearest.ValueOfUV(gp_Pnt(*map(float, p)), _PRECISION)
+            at = self._nearest.ValueOfUV(gp_Pnt(*map(float, p)), _PROJECTION_TOLERANCE_MM)
             local = GeomLProp_SLProps(self.geometry, at.X(), at.Y(), 1, 1e-9)
             near = local.Value()
             if local.IsNormalDefined():  # not at the tip of a cone
@@ -106,7 +106,7 @@ class Freeform:
 
 
 def surface_of(face: Face, exact: tuple[float, ...] = (0.0,)) -> ImplicitSurface:
-    """The surface under a build123d face; a plane's constant coordinate becomes the number in `exact` it stands for."""
+    """Return the surface of a build123d face; a plane's constant coordinate is rounded to the nearest of `exact`."""
     from OCP.BRep import BRep_Tool
     from OCP.BRepAdaptor import BRepAdaptor_Surface
     from OCP.GeomAbs import GeomAbs_Cylinder, GeomAbs_Plane, GeomAbs_Sphere

@@ -1,4 +1,4 @@
-"""A finger (or the soft half of an object) from a file: base found, moved onto it, described like the designs."""
+"""Designs from STEP and STL files; the base is found and placed on y = 0."""
 
 from __future__ import annotations
 
@@ -25,30 +25,30 @@ Float = NDArray[np.float64]
 
 SMALLEST_MM, LARGEST_MM = 0.2, 5000.0
 
-_NAME = "base"
-_LEVEL = 1e-5  # of the size: the base is what lies this near to the lowest point and looks down
-_DOWN = 1.0 - 1e-6
-_BASE_SHARE = 0.02  # of the footprint, at least
-_MIRROR = 2e-4  # of the size: a few times what tessellation leaves
-_MOST = 2_000  # points that are compared with their mirror images
+_BASE_NAME = "base"  # of a face in a STEP file
+_BASE_FLATNESS = 1e-5  # largest distance of the base from its plane, over the size
+_DOWNWARD = 1.0 - 1e-6  # least component along -y of the base's unit normal
+_LEAST_BASE_SHARE = 0.02  # of the footprint
+_MIRROR_TOLERANCE = 2e-4  # over the size: a few times the error of the tessellation
+_MAX_MIRRORED_POINTS = 2_000  # that are compared with their mirror images
 
 
 @dataclass(frozen=True)
 class Imported:
     """A body from a STEP or STL file, y up, with the middle of its base at the origin.
 
-    The base is the lowest plane, or the plane of the face that a STEP file calls "base", turned down.
+    The base is the lowest plane, or the plane of the face named "base" in a STEP file, rotated to face down.
 
     Attributes
     ----------
     path : the file
-    content : SHA-256 of the file; equal files are equal bodies
-    scale : what an STL file's numbers were multiplied with
-    upside_down : turned about z by half a turn, so that its highest plane is the base
-    named_base : turned so that the face named "base" looks down
-    middle : (3,) mm, the middle of the base as it was drawn (and turned)
-    surface : closed triangles, mm, in place
-    cad : the build123d solid in place; None for STL
+    content : SHA-256 of the file
+    scale : factor of the coordinates in the file
+    upside_down : rotated about z by half a turn, so that the highest plane is the base
+    named_base : rotated so that the face named "base" faces down
+    middle : (3,) middle of the base in the file's coordinates after the rotation, mm
+    surface : closed triangles in the final position, mm
+    cad : the build123d solid in the final position; None for STL
     """
 
     path: str = field(compare=False)
@@ -62,7 +62,7 @@ class Imported:
 
     @property
     def name(self) -> str:
-        """The file's name."""
+        """Name of the file."""
         return Path(self.path).name
 
     @property
@@ -79,12 +79,12 @@ class Imported:
 
     @property
     def half_length_mm(self) -> float:
-        """Farthest reach along x from the middle of the base."""
+        """Largest abs(x)."""
         return float(max(-self.surface.low[0], self.surface.high[0]))
 
     @property
     def width_mm(self) -> float:
-        """Twice the farthest reach along z from the middle of the base."""
+        """Twice the largest abs(z)."""
         return 2.0 * float(max(-self.surface.low[2], self.surface.high[2]))
 
     @property
@@ -96,27 +96,27 @@ class Imported:
         """Return None: no constant section is known of a file."""
 
     def top(self, x: Float, z: Float) -> Float:
-        """Height y (n,) of the highest point at x, z (n,), mm; nan beside the body."""
+        """Return the height y (n,) of the highest point at x, z (n,), mm; nan outside the body."""
         return self.surface.height(x, z, lowest=False)
 
     def landmarks(self) -> Float:
-        """Corners (k, 2), x and z mm, of the triangles that look up: one of them may touch first."""
+        """Return the corners (k, 2), x and z in mm, of the triangles that face up; one of them may touch first."""
         up = self.surface.normals[:, 1] > 0.0
         return self.surface.points[np.unique(self.surface.faces[up])][:, ::2]
 
     def mirrors(self) -> tuple[str, ...]:
-        """Planes about which the body is its own image; none for STL, which cannot be cut exactly."""
+        """Return the axes normal to planes of symmetry; none for STL, which cannot be cut exactly."""
         return () if self.cad is None else self._mirrors
 
     @cached_property
     def _mirrors(self) -> tuple[str, ...]:
         points = self.surface.points[np.unique(self.surface.faces)]
-        points = points[:: len(points) // _MOST + 1]
+        points = points[:: len(points) // _MAX_MIRRORED_POINTS + 1]
         found = []
         for axis, name in ((0, "x"), (2, "z")):
             image = points.copy()
             image[:, axis] *= -1.0
-            if np.abs(self.surface.signed_distance(image)[0]).max() <= _MIRROR * self.surface.size:
+            if np.abs(self.surface.signed_distance(image)[0]).max() <= _MIRROR_TOLERANCE * self.surface.size:
                 found.append(name)
         return tuple(found)
 
@@ -136,7 +136,7 @@ class Imported:
 
 
 def imported(path: str | Path, upside_down: bool = False, scale: float = 1.0) -> Imported:
-    """Read a body from a file and put it on its base.
+    """Read a body from a file and place its base on y = 0.
 
     Parameters
     ----------
@@ -147,19 +147,19 @@ def imported(path: str | Path, upside_down: bool = False, scale: float = 1.0) ->
     Raises
     ------
     Finger3dError
-        If the file is none, the body not closed, or there is no level base or nothing above it.
+        If the file cannot be read, the body is not closed, or it has no level base or nothing above it.
 
     Notes
     -----
-    A texture wants edges of less than half its radius: of five ridges of radius 0.7 mm, pressed by 0.25 mm, STEP and
-    STL gave forces 0.5 % apart with `mesh.size_mm` = 0.3, and up to 2 % with 0.45.
+    A texture needs an edge length below half its radius: for five ridges of radius 0.7 mm, pressed by 0.25 mm, STEP and
+    STL gave forces that differ by 0.5 % with `mesh.size_mm` = 0.3, and by up to 2 % with 0.45.
     """
     path = Path(path)
     solid = None
     base: list[Face] = []
     if path.suffix.lower() in STEP:
         solid, named = read_named(path)
-        if base := named.get(_NAME, []):
+        if base := named.get(_BASE_NAME, []):
             solid = _turned(path, solid, base)
         if scale != 1.0:
             solid = solid.scale(scale)
@@ -180,14 +180,14 @@ def imported(path: str | Path, upside_down: bool = False, scale: float = 1.0) ->
 
 
 def of_surface(surface: Triangles, name: str, upside_down: bool = False) -> Imported:
-    """A closed surface as a body, like :func:`imported`."""
+    """Return a closed surface as a body, like :func:`imported`."""
     if upside_down:
         surface = Triangles(surface.points * [-1.0, -1.0, 1.0], surface.faces)
     return _on_its_base(name, surface.digest, 1.0, upside_down, surface, None)
 
 
 def _on_its_base(
-    path: str, told_by: str, scale: float, upside_down: bool, surface: Triangles, solid: Solid | None
+    path: str, digest: str, scale: float, upside_down: bool, surface: Triangles, solid: Solid | None
 ) -> Imported:
     _check_size(path, surface)
     base = _base(path, surface, "highest" if upside_down else "lowest")
@@ -203,26 +203,28 @@ def _on_its_base(
     moved = Triangles(points, surface.faces)
     if not (moved.normals[~base, 1] > 1e-3).any():
         raise Finger3dError(f"{path}: nothing of the body looks up; is it drawn with y up?")
-    return Imported(path, told_by, scale, upside_down, False, middle, moved, solid)
+    return Imported(path, digest, scale, upside_down, False, middle, moved, solid)
 
 
 def _turned(path: Path, solid: Solid, base: list[Face]) -> Solid:
-    """The solid, turned the shortest way (about z, if by half a turn) so that the faces named base look down."""
+    """Return the solid rotated by the smallest angle (about z, if by 180 degrees) so that the named faces face down."""
     normals = np.array([[*face.normal_at(face.center())] for face in base])
     out = normals[0]
-    if not all(face.is_planar for face in base) or (normals @ out).min() < _DOWN:
-        raise Finger3dError(f"{path}: the {len(base)} faces named '{_NAME}' are not one plane; name one plane face so")
-    if out[1] > -_DOWN:
+    if not all(face.is_planar for face in base) or (normals @ out).min() < _DOWNWARD:
+        raise Finger3dError(
+            f"{path}: the {len(base)} faces named '{_BASE_NAME}' are not one plane; name one plane face so"
+        )
+    if out[1] > -_DOWNWARD:
         from build123d import Axis
 
         around = np.cross(out, [0.0, -1.0, 0.0])
-        axis = around / np.linalg.norm(around) if out[1] < _DOWN else np.array([0.0, 0.0, 1.0])
+        axis = around / np.linalg.norm(around) if out[1] < _DOWNWARD else np.array([0.0, 0.0, 1.0])
         solid = solid.rotate(Axis((0, 0, 0), tuple(axis)), float(np.degrees(np.arccos(np.clip(-out[1], -1.0, 1.0)))))
     surface = tessellated(solid)
     level = -out @ np.array([*base[0].center()])
-    if abs(surface.low[1] - level) > _LEVEL * surface.size:
+    if abs(surface.low[1] - level) > _BASE_FLATNESS * surface.size:
         raise Finger3dError(
-            f"{path}: the body reaches {level - surface.low[1]:.4g} mm beyond the face named '{_NAME}'; the base "
+            f"{path}: the body reaches {level - surface.low[1]:.4g} mm beyond the face named '{_BASE_NAME}'; the base "
             "must be its outermost plane"
         )
     return solid
@@ -238,12 +240,12 @@ def _check_size(path: str, surface: Triangles) -> None:
 
 
 def _base(path: str, surface: Triangles, which: str) -> NDArray[np.bool_]:
-    """Mask (m,) of the triangles of the lowest plane."""
-    near = surface.corners[:, :, 1].max(axis=1) <= surface.low[1] + _LEVEL * surface.size
-    base: NDArray[np.bool_] = near & (surface.normals[:, 1] < -_DOWN)
+    """Return the mask (m,) of the triangles of the lowest plane."""
+    near = surface.corners[:, :, 1].max(axis=1) <= surface.low[1] + _BASE_FLATNESS * surface.size
+    base: NDArray[np.bool_] = near & (surface.normals[:, 1] < -_DOWNWARD)
     area = float(np.linalg.norm(surface.area_vectors[base], axis=1).sum())
     footprint = float(np.maximum(-surface.area_vectors[:, 1], 0.0).sum())
-    if area < _BASE_SHARE * footprint:
+    if area < _LEAST_BASE_SHARE * footprint:
         raise Finger3dError(
             f"{path}: no base: the {which} point of the body lies on no level plane (area {area:.3g} of "
             f"{footprint:.3g} mm2 seen from there); draw it with y up and a flat base"
@@ -252,7 +254,7 @@ def _base(path: str, surface: Triangles, which: str) -> NDArray[np.bool_]:
 
 
 def _stl_only(path: Path, surface: Triangles) -> None:
-    """CAD vouches for its solids; triangles may run through each other."""
+    """Raise a Finger3dError if triangles intersect; CAD checks its solids itself."""
     crossed = crossings(surface)
     if len(crossed):
         at = surface.corners[crossed[0]].mean(axis=0)

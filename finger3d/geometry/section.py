@@ -1,4 +1,4 @@
-"""The half section (x >= 0) of an extruded design: a contact curve from the axis to the edge, a wall to the base."""
+"""Half sections (x >= 0) of extruded designs: a contact curve from the axis to the edge, and a wall to the base."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Arc:
     angle: float
 
     def at(self, u: Float) -> Float:
-        """Points (n, 2), mm, at arc-length fractions u (n,) in [0, 1]; u = 0 is the top, exactly on x = 0."""
+        """Return points (n, 2), mm, at arc-length fractions u (n,) in [0, 1]; u = 0 is the top, exactly on x = 0."""
         t = np.asarray(u, dtype=float) * self.angle
         return np.stack([self.radius_mm * np.sin(t), self.centre_y_mm + self.radius_mm * np.cos(t)], axis=-1)
 
@@ -30,20 +30,20 @@ class Arc:
         return self.radius_mm * self.angle
 
     def height(self, x: Float) -> Float:
-        """Height y (n,) at x (n,), mm; nan beyond the radius."""
+        """Return the height y (n,) at x (n,), mm; nan beyond the radius."""
         with np.errstate(invalid="ignore"):
             return self.centre_y_mm + np.sqrt(self.radius_mm**2 - np.asarray(x, dtype=float) ** 2)
 
 
 @dataclass(frozen=True)
 class Flat:
-    """A level line (mm) at `y_mm`, from x = 0 to `half_length_mm`."""
+    """A horizontal line at y = `y_mm`, from x = 0 to `half_length_mm`."""
 
     half_length_mm: float
     y_mm: float
 
     def at(self, u: Float) -> Float:
-        """Points (n, 2), mm, at fractions u (n,) in [0, 1]."""
+        """Return points (n, 2), mm, at fractions u (n,) in [0, 1]."""
         u = np.asarray(u, dtype=float)
         return np.stack([u * self.half_length_mm, np.full_like(u, self.y_mm)], axis=-1)
 
@@ -53,13 +53,13 @@ class Flat:
         return self.half_length_mm
 
     def height(self, x: Float) -> Float:
-        """Height y (n,) at x (n,), mm."""
+        """Return the height y (n,) at x (n,), mm."""
         return np.full_like(np.asarray(x, dtype=float), self.y_mm)
 
 
 @dataclass(frozen=True)
 class Section:
-    """The part x >= 0 of a section that is its own mirror image; base on y = 0, wall at x = half_length.
+    """The part x >= 0 of a section symmetric about x = 0; base on y = 0, wall at x = half_length.
 
     Attributes
     ----------
@@ -80,9 +80,9 @@ class Section:
         return float(self.contact.at(np.zeros(1))[0, 1])
 
     def top(self, x: Float, z: Float, width_mm: float) -> Float:
-        """Height y (n,) of the contact surface extruded to `width_mm`; nan outside the footprint."""
+        """Return the height y (n,) of the contact surface extruded to `width_mm`; nan outside the footprint."""
         x, z = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(z, dtype=float))
-        # Round-off from a mesh or a file must not push a point on the rim out of the footprint.
+        # Points on the rim are inside in spite of round-off.
         inside = (np.abs(x) <= self.half_length_mm * (1 + 1e-12)) & (np.abs(z) <= 0.5 * width_mm * (1 + 1e-12))
         return np.where(inside, self.contact.height(np.clip(x, -self.half_length_mm, self.half_length_mm)), np.nan)
 

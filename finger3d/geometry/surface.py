@@ -14,13 +14,13 @@ from finger3d.geometry.bvh import Tree, puck_distance
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
-_SLACK = 1e-12  # of the surface's size: a vertical line through a shared edge must not slip between its triangles
+_SLACK = 1e-12  # over the surface's size: tolerance that makes vertical lines through shared edges hit a triangle
 _EDGES = ((0, 1), (1, 2), (2, 0))
 
 
 @dataclass(frozen=True, eq=False)
 class Triangles:
-    """A triangulated surface; equal to another one with the same points and triangles.
+    """A triangulated surface; surfaces with the same points and triangles are equal.
 
     Attributes
     ----------
@@ -91,7 +91,7 @@ class Triangles:
 
     @cached_property
     def _facing_down(self) -> tuple[Int, Tree]:
-        """Triangles that look down, the only ones that a line from below meets first, and a tree over them."""
+        """Triangles that face down, the only ones that a line from below can meet first, and their tree."""
         facing = np.flatnonzero(self.area_vectors[:, 1] < 0.0)
         return facing, Tree.over(self.corners[facing])
 
@@ -114,9 +114,9 @@ class Triangles:
 
     @cached_property
     def _corner_normals(self) -> tuple[Float, Float]:
-        """Pseudonormals of every triangle's edges (m, 3, 3) and corners (m, 3, 3), which tell inside from outside.
+        """Pseudonormals of every triangle's edges (m, 3, 3) and corners (m, 3, 3), which give the sign of the distance.
 
-        A vertex weighs the normals around it with their angles (Baerentzen and Aanaes 2005); an edge, by halves.
+        A vertex normal is weighted by the angles of its triangles (Baerentzen and Aanaes 2005), an edge normal equally.
         """
         n = len(self.points)
         ends = self.faces[:, _EDGES]
@@ -135,7 +135,7 @@ class Triangles:
         return _unit(edge)[number], _unit(vertex)[self.faces]
 
     def hits(self, x: Float, z: Float, lowest: bool = True) -> tuple[Int, Float]:
-        """Where vertical lines meet a surface with outward triangles first, from below or from above.
+        """Find the first intersection of vertical lines with a closed surface, from below or from above.
 
         Returns
         -------
@@ -170,14 +170,14 @@ class Triangles:
         return face, bary
 
     def height(self, x: Float, z: Float, lowest: bool = True) -> Float:
-        """Height (mm) of the surface's lowest or highest point over x, z, exact on its triangles; nan beside it."""
+        """Return the height (mm) of the lowest or highest point at x, z, exact on the triangles; nan outside."""
         x, z = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(z, dtype=float))
         face, bary = self.hits(x.ravel(), z.ravel(), lowest)
         found = np.where(face < 0, np.nan, np.einsum("ij,ij->i", bary, self.corners[face, :, 1]))
         return found.reshape(x.shape)
 
     def closest(self, points: Float) -> tuple[Float, Int, Int]:
-        """Closest points of the surface.
+        """Find the closest points of the surface.
 
         Returns
         -------
@@ -204,12 +204,12 @@ class Triangles:
         return closest, face, feature
 
     def _bound(self, points: Float) -> Float:
-        """An upper bound (n,) of the distance: that of the nearest corner, or of what a walk down the tree finds."""
+        """Return an upper bound (n,) of the distance, from the nearest corner and from one descent of the tree."""
         from scipy.spatial import cKDTree
 
         vertices = self.points[np.unique(self.faces)]
         reach = cKDTree(vertices, balanced_tree=False, compact_nodes=False).query(points)[0]
-        # A large triangle has no corner near: what its leaf of the tree holds bounds the distance better.
+        # The corners of a large triangle may be far away; the triangles in a leaf of the tree give a better bound.
         node = np.zeros(len(points), dtype=np.int64)
         for puck in self._pucks[1:]:
             children = np.stack([puck_distance(points, puck[4 * node + i]) for i in range(4)])
@@ -223,9 +223,9 @@ class Triangles:
         return value
 
     def signed_distance(self, points: Float) -> tuple[Float, Float]:
-        """Distance (n,) mm of points (n, 3), negative inside, and its gradient (n, 3), the outward unit normal.
+        """Return the distance (n,) mm of points (n, 3), negative inside, and its gradient (n, 3), a unit vector.
 
-        Right at edges and vertices too, where the normal of the nearest triangle alone may take outside for inside.
+        Pseudonormals make the sign exact where the closest point lies on an edge or a vertex.
         """
         closest, face, feature = self.closest(points)
         edge, vertex = self._corner_normals

@@ -1,4 +1,4 @@
-"""Why a triangulated surface is no body: holes, flipped triangles, several pieces, no volume, crossing itself."""
+"""Defects of triangulated surfaces: holes, flipped triangles, several pieces, no volume, self-intersection."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _FLAT = 1e-9  # thickness over length
 
 
 def mistake(surface: Triangles) -> str:
-    """What keeps a surface from being one closed body with triangles facing outward; empty if nothing does."""
+    """Return the defect of a surface that is not one closed body with triangles facing outward; empty if it is."""
     points, faces = surface.points, surface.faces
     if len(faces) < 4:
         return f"has {len(faces)} triangles, which enclose nothing"
