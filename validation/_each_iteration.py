@@ -13,7 +13,8 @@ from finger3d.contact.conditions import TOLERANCE, ContactProblem, project_on_fr
 from finger3d.contact.friction import SLIP, STICK
 from finger3d.contact.state import ContactState, next_state
 from finger3d.mechanics.path import targets
-from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.problem import ContactSystem, Problem
+from finger3d.mechanics.symmetry import unfold_points
 
 from ._cost import MU, Parts
 
@@ -53,10 +54,16 @@ class EachIteration:
         parts = self.parts
         c, d = parts.surface.points.shape
         legs = tuple(replace(leg, steps=count) for leg in parts.model.legs)
-        # only for its gaps: nothing of it is condensed
-        shell: Any = Problem.__new__(Problem)
-        for name in ("model", "surface", "first_contact_mm", "mesh"):
-            object.__setattr__(shell, name, getattr(parts, name))
+        symmetry, points = unfold_points(parts.model, parts.mesh, parts.surface, parts.axes)
+        system = ContactSystem(  # for the gaps; nothing is condensed
+            surface=parts.surface,
+            points=points,
+            delassus=np.zeros((0, 0, 0, 0)),
+            gauge_rows=np.zeros((0, 0)),
+            active_dofs=parts.active_dofs,
+            first_contact_mm=parts.first_contact_mm,
+        )
+        shell = Problem(model=parts.model, body=None, symmetry=symmetry, system=system)
         state = ContactState.at_rest(np.maximum(shell.gap(targets(legs)[0]), 0.0), d)
         for target in targets(legs):
             free = shell.free_motion(target)
