@@ -34,9 +34,10 @@ if TYPE_CHECKING:
     from finger3d.analyses.validate import validate
     from finger3d.contact.friction import Coulomb
     from finger3d.errors import Finger3dError, MissingError, Outcome
+    from finger3d.fem.material import Isotropic
     from finger3d.fem.simplex import Mesh
     from finger3d.geometry.registry import designs
-    from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
+    from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
     from finger3d.mold.options import MoldOptions
     from finger3d.objects import Cylinder, Plane, Sphere, Wave, Wedge
     from finger3d.scene import Scene, load, parse
@@ -50,7 +51,7 @@ _HOME = {
     "Finger3dError": "errors",
     "Gauge": "mechanics.model",
     "Leg": "mechanics.model",
-    "Material": "mechanics.model",
+    "Isotropic": "fem.material",
     "Mesh": "fem.simplex",
     "MeshOptions": "mechanics.model",
     "MissingError": "errors",
@@ -85,7 +86,7 @@ __all__ = [
     "Finger3dError",
     "Gauge",
     "Leg",
-    "Material",
+    "Isotropic",
     "Mesh",
     "MeshOptions",
     "MissingError",

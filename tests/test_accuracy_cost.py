@@ -13,8 +13,9 @@ import pytest
 from finger3d.accuracy.cost import forecast
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
+from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.model import Domain, Gauge, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.solve import build, march
 from finger3d.scene import load
 from finger3d.scene.registry import effect_names, effect_type
@@ -31,7 +32,7 @@ SETTINGS: dict[str, dict[str, Any]] = {
 def baseline(domain: Domain) -> Model:
     body = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     return Model(
-        body, Material(1.0, 0.45), MeshOptions(3.0, 8.0, "swept"), (Leg(10.0, steps=5, duration_s=1.0),),
+        body, Isotropic(1.0, 0.45), MeshOptions(3.0, 8.0, "swept"), (Leg(10.0, steps=5, duration_s=1.0),),
         friction=Coulomb(0.25), domain=domain, gauges=(Gauge("g", 36.0, 38.0, length_mm=4.0),),
     )  # fmt: skip
 

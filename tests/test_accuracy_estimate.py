@@ -28,10 +28,11 @@ from finger3d.cli import main
 from finger3d.contact.friction import STICK, Coulomb
 from finger3d.effects.elastic_object import SoftObject
 from finger3d.errors import Finger3dError
+from finger3d.fem.material import Isotropic
 from finger3d.fem.simplex import Mesh
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.history import StepResult
-from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.solve import Problem, build, march
 from finger3d.mechanics.step_halving import step_error
 from finger3d.meshing import tetwild
@@ -47,7 +48,7 @@ SCENE = changed(HALF_CYLINDER, domain="plane-strain")
 def half_cylinder(size: float, steps: int = 10) -> Model:
     design = designs()["half_cylinder"](radius_mm=5.0, width_mm=1.0)
     return Model(
-        design, Material(1.0, 0.45), MeshOptions(size, 5.0 * size, "swept"), (Leg(1.0, steps=steps),),
+        design, Isotropic(1.0, 0.45), MeshOptions(size, 5.0 * size, "swept"), (Leg(1.0, steps=steps),),
         friction=Coulomb(0.25), gauges=(Gauge("g", 1.5, 4.0, angle=0.5),), domain="plane-strain",
     )  # fmt: skip
 
@@ -127,7 +128,7 @@ def test_where_marching_is_dear_increments_are_judged_on_the_companion() -> None
 def test_the_companion_stays_within_the_finger() -> None:
     design = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=3.0)
     options = MeshOptions(2.0, 40.0, "ftetwild")
-    model = Model(design, Material(1.0, 0.3), options, (Leg(1.0),))
+    model = Model(design, Isotropic(1.0, 0.3), options, (Leg(1.0),))
     found = coarser(model).mesh
     # as wide as the finger is, and as high: the 36.6 mm of its edge are rounded, its top lies at 49.997 mm
     assert (found.size_mm, found.base_size_mm, found.mesher) == (3.0, design.height_mm, "swept")
@@ -252,7 +253,7 @@ def made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
 def unstructured(**more: Any) -> Model:
     block = designs()["block"](half_length_mm=4.0, height_mm=4.0, width_mm=8.0)
     return Model(
-        Lump(block), Material(0.5, 0.45), MeshOptions(0.4, 1.0, "ftetwild"), (Leg(0.3, steps=2),),
+        Lump(block), Isotropic(0.5, 0.45), MeshOptions(0.4, 1.0, "ftetwild"), (Leg(0.3, steps=2),),
         object=Sphere(radius_mm=4.0), friction=Coulomb(0.5), **more,
     )  # fmt: skip
 
@@ -322,7 +323,7 @@ FIG9 = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_
 
 def fig9(size: float, mu: float = 0.125, nu: float = 0.4) -> Model:
     return Model(
-        FIG9, Material(1.0, nu), MeshOptions(size, 4.0 * size, "swept"), (Leg(10.0, steps=10),), friction=Coulomb(mu)
+        FIG9, Isotropic(1.0, nu), MeshOptions(size, 4.0 * size, "swept"), (Leg(10.0, steps=10),), friction=Coulomb(mu)
     )  # fmt: skip
 
 

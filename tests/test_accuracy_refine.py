@@ -11,8 +11,9 @@ import pytest
 from finger3d.accuracy.refine import Refinement, Round, _affordable, refined
 from finger3d.cli import main
 from finger3d.contact.friction import Coulomb
+from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.solve import build, march
 from finger3d.scene import load
 
@@ -40,7 +41,7 @@ OPTIONS = MeshOptions(1.0, 4.0, "swept")
 def section(size: float) -> Model:
     design = designs()["half_cylinder"](radius_mm=5.0, width_mm=1.0)
     return Model(
-        design, Material(1.0, 0.45), MeshOptions(size, 4.0 * size, "swept"), (Leg(1.0, steps=5),),
+        design, Isotropic(1.0, 0.45), MeshOptions(size, 4.0 * size, "swept"), (Leg(1.0, steps=5),),
         friction=Coulomb(0.25), domain="plane-strain",
     )  # fmt: skip
 

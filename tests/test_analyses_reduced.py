@@ -22,9 +22,10 @@ from finger3d.effects.kinetic_friction import Effect as Kinetic
 from finger3d.effects.large_deformation import Effect as Large
 from finger3d.effects.viscosity import Effect as Viscous
 from finger3d.errors import Finger3dError
+from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.history import measure
-from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.solve import build, march
 from finger3d.objects import Cylinder, MeshObject, Plane, Sphere, Wave, Wedge
 from tests.bodies import ball
@@ -36,7 +37,7 @@ MUS = (0.0, 0.1, 0.7)
 def model(**changes: Any) -> Model:
     finger = designs()["clipped_cylinder"](radius_mm=10.0, half_length_mm=5.0, edge_height_mm=4.0, width_mm=3.0)
     base = Model(
-        finger, Material(1.0, 0.45), MeshOptions(0.6, 1.5, "swept"), (Leg(0.5, steps=4),), friction=Coulomb(0.25),
+        finger, Isotropic(1.0, 0.45), MeshOptions(0.6, 1.5, "swept"), (Leg(0.5, steps=4),), friction=Coulomb(0.25),
         gauges=(Gauge("g", 2.0, 4.5, angle=0.5), Gauge("long", -1.0, 4.5, length_mm=1.0)), domain="plane-strain",
     )  # fmt: skip
     return replace(base, **changes)

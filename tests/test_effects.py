@@ -13,8 +13,9 @@ import pytest
 
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
+from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.solve import build, march
 from finger3d.scene.registry import effect_names, effect_type
 
@@ -44,7 +45,7 @@ LIGHT = {"large_deformation": (2e-3, 2e-3), "elastic_object": (0.5, 1e-11)}
 def baseline() -> Model:
     finger = designs()["half_cylinder"](radius_mm=5.0, width_mm=2.0)
     return Model(
-        finger, Material(1.0, 0.3), MeshOptions(0.3, 1.0, "swept"), (Leg(0.5, steps=5, duration_s=1.0),),
+        finger, Isotropic(1.0, 0.3), MeshOptions(0.3, 1.0, "swept"), (Leg(0.5, steps=5, duration_s=1.0),),
         friction=Coulomb(0.1), domain="plane-strain", gauges=(Gauge("g", 0.0, 4.5, length_mm=2.0),),
     )  # fmt: skip
 

@@ -13,13 +13,14 @@ from finger3d.contact.friction import Coulomb
 from finger3d.effects import elastic_object
 from finger3d.effects.elastic_object import Effect
 from finger3d.errors import Finger3dError
+from finger3d.fem.material import Isotropic
 from finger3d.fem.simplex import Mesh, reflected, signed_volumes
 from finger3d.fem.traces import surface
 from finger3d.fem.transfer import facing_trace, values_over
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.history import StepResult, measure
-from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import build, march
 from finger3d.meshing.generate import mesh_solid
@@ -38,7 +39,7 @@ SHAPES: list[RigidObject] = [
 def pad(**changes: Any) -> Model:
     body = DESIGNS["block"](half_length_mm=4.0, height_mm=3.0, width_mm=6.0)
     model = Model(
-        body, Material(1.0, 0.3), MeshOptions(0.6, 1.2, "swept"), (Leg(0.3, steps=2),), friction=Coulomb(0.3)
+        body, Isotropic(1.0, 0.3), MeshOptions(0.6, 1.2, "swept"), (Leg(0.3, steps=2),), friction=Coulomb(0.3)
     )  # fmt: skip
     return replace(model, **changes)
 
@@ -138,7 +139,7 @@ def test_equal_bodies_do_not_rub() -> None:
 
 def test_compliances_add_under_a_rigid_punch_of_uniform_pressure() -> None:
     # nu = 0, flat on flat: two bars in series, E A d / (h1 / E1 + h2 / E2)
-    model = pad(material=Material(1.0, 0.0), friction=Coulomb(0.0), object=Plane())
+    model = pad(material=Isotropic(1.0, 0.0), friction=Coulomb(0.0), object=Plane())
     got = last(Effect(2.0, 0.0, height_mm=5.0).apply(model))
     assert got["normal_force_N"] == pytest.approx(0.3 * 48.0 / (3.0 / 1.0 + 5.0 / 2.0), rel=1e-10)
     default = last(Effect(2.0, 0.0).apply(model))  # as thick as the finger

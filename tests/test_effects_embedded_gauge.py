@@ -18,9 +18,10 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import Stiffness
 from finger3d.fem.condense import condense, spring_forces, stiffened
 from finger3d.fem.kelvin import FoilPatches, InfiniteBody
+from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.history import StepResult, measure
-from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.solve import Problem, build, march, symmetry
 from finger3d.objects import Plane, Sphere
 from finger3d.scene import parse
@@ -34,7 +35,7 @@ ASIDE = Gauge("a", 1.3, 1.7, 0.4, 0.5, 1.5)
 def block(**changes: object) -> Model:
     body = designs()["block"](half_length_mm=4.0, height_mm=3.0, width_mm=4.0)
     model = Model(
-        body, Material(1.0, 0.3), MeshOptions(0.8, 1.2, "swept"), LEGS[:1], object=Sphere(radius_mm=4.0),
+        body, Isotropic(1.0, 0.3), MeshOptions(0.8, 1.2, "swept"), LEGS[:1], object=Sphere(radius_mm=4.0),
         friction=Coulomb(0.25), gauges=(MIDDLE,),
     )  # fmt: skip
     return replace(model, **changes)
@@ -65,7 +66,7 @@ def test_springs_on_rows_are_those_of_the_stiffer_body() -> None:
 @pytest.mark.parametrize("nu", [0.3, 0.49])
 @pytest.mark.parametrize("domain", ["plane-strain", "plane-stress", "solid"])
 def test_condensed_foils_are_foils_in_the_stiffness(domain: str, nu: float) -> None:
-    model = FOIL.apply(block(domain=domain, material=Material(1.0, nu), gauges=(MIDDLE, ASIDE)))
+    model = FOIL.apply(block(domain=domain, material=Isotropic(1.0, nu), gauges=(MIDDLE, ASIDE)))
     problem = build(model)
     assert problem.factorizations == 1
     inlay = model.inclusions.discretise(model, problem.mesh, problem.axes)
@@ -100,7 +101,7 @@ def test_a_foil_across_a_bar_shares_its_load() -> None:
     # nu = 0 between plates: strain is uniform, so a foil along the height only adds to the stiffness if it spans it;
     # one of half the height reads between 0 and the free strain, and the less the stiffer it is
     model = block(
-        object=Plane(), material=Material(1.0, 0.0), friction=Coulomb(0.0), domain="plane-strain",
+        object=Plane(), material=Isotropic(1.0, 0.0), friction=Coulomb(0.0), domain="plane-strain",
         gauges=(Gauge("v", 0.0, 1.5, 0.0, np.pi / 2, 1.5),),
     )  # fmt: skip
     reads = []
@@ -235,10 +236,10 @@ def test_a_foil_in_a_relaxing_body_does_not_relax(bulk: bool) -> None:
     model = block(gauges=(MIDDLE,), friction=Coulomb(0.0), legs=(Leg(0.3, steps=1, duration_s=1e6),))
     slow = run(build(Viscosity(prony, bulk).apply(FOIL.apply(model))))[-1]
     # at last: the body of a tenth of the shear modulus, around the same foil
-    soft = Material(0.1, 0.3)
+    soft = Isotropic(0.1, 0.3)
     if not bulk:
         low, volume = 0.1 / 2.6, 1.0 / 1.2
-        soft = Material(9.0 * volume * low / (3.0 * volume + low), (1.5 * volume - low) / (3.0 * volume + low))
+        soft = Isotropic(9.0 * volume * low / (3.0 * volume + low), (1.5 * volume - low) / (3.0 * volume + low))
     wanted = run(build(FOIL.apply(replace(model, material=soft))))[-1]
     close = 1e-6 if bulk else 0.01  # the foil's neighbourhood relaxes as if nu were constant
     assert slow.gauges["g"] == pytest.approx(wanted.gauges["g"], rel=close)
@@ -247,7 +248,7 @@ def test_a_foil_in_a_relaxing_body_does_not_relax(bulk: bool) -> None:
 
 
 def test_viscosity_with_and_without_bulk_agree_around_a_foil_in_an_incompressible_body() -> None:
-    model = FOIL.apply(block(gauges=(MIDDLE,), material=Material(1.0, 0.5), legs=LEGS))
+    model = FOIL.apply(block(gauges=(MIDDLE,), material=Isotropic(1.0, 0.5), legs=LEGS))
     problem = build(model)
     prony = ((0.5, 1.0), (0.2, 0.1))
     a, b = (run(replace(problem, model=Viscosity(prony, bulk).apply(model)))[-1] for bulk in (True, False))

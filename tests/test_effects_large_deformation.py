@@ -10,10 +10,11 @@ import pytest
 from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.effects.large_deformation import Effect
 from finger3d.errors import Outcome
+from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.formulation import SmallStrain
 from finger3d.mechanics.history import measure
-from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.solve import build, march
 from finger3d.objects import Cylinder, Plane
 
@@ -21,7 +22,8 @@ from finger3d.objects import Cylinder, Plane
 def fig9(nu: float, size: float = 2.0, **changes: object) -> Model:
     finger = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     model = Model(
-        finger, Material(1.0, nu), MeshOptions(size, 4 * size, "swept"), (Leg(10.0, steps=10),), friction=Coulomb(0.25),
+        finger, Isotropic(1.0, nu), MeshOptions(size, 4 * size, "swept"), (Leg(10.0, steps=10),),
+        friction=Coulomb(0.25),
         gauges=(Gauge("g", 36.0, 40.0, 0.0, 0.5236), Gauge("mirror", -36.0, 40.0, 0.0, np.pi - 0.5236)),
         domain="plane-strain",
     )  # fmt: skip
@@ -99,7 +101,7 @@ def test_half_the_height() -> None:
 def test_quarter_and_whole_agree_in_3d_and_curved_objects_are_followed() -> None:
     body = designs()["block"](half_length_mm=4.0, height_mm=3.0, width_mm=4.0)
     model = Model(
-        body, Material(1.0, 0.3), MeshOptions(1.0, 1.5, "swept"), (Leg(0.6, steps=3),),
+        body, Isotropic(1.0, 0.3), MeshOptions(1.0, 1.5, "swept"), (Leg(0.6, steps=3),),
         object=Cylinder(radius_mm=3.0), friction=Coulomb(0.3),
     )  # fmt: skip
     ends = []
@@ -124,7 +126,7 @@ def test_quarter_and_whole_agree_in_3d_and_curved_objects_are_followed() -> None
 def test_slide_of_several_contact_lengths_reaches_mu_n() -> None:
     finger = designs()["half_cylinder"](radius_mm=5.0, width_mm=1.0)
     model = Model(
-        finger, Material(1.0, 0.45), MeshOptions(0.3, 1.0), (Leg(0.3, steps=3), Leg(0.3, slide_x_mm=4.0, steps=20)),
+        finger, Isotropic(1.0, 0.45), MeshOptions(0.3, 1.0), (Leg(0.3, steps=3), Leg(0.3, slide_x_mm=4.0, steps=20)),
         object=Plane(), friction=Coulomb(0.3), domain="plane-strain",
     )  # fmt: skip
     problem = build(Effect().apply(model), margin=np.inf)

@@ -20,10 +20,11 @@ from finger3d.effects.viscosity import (
     Viscoelastic,
 )
 from finger3d.errors import Finger3dError, Outcome
+from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics import formulation
 from finger3d.mechanics.history import StepResult, measure
-from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.solve import Problem, build, march
 from finger3d.objects import Cylinder, Plane, Sphere
 from finger3d.scene import parse
@@ -37,7 +38,7 @@ UP_AND_DOWN = (*RAMP_AND_HOLD, Leg(0.0, steps=4, duration_s=0.5), Leg(0.0, steps
 def block(**changes: object) -> Model:
     body = designs()["block"](half_length_mm=4.0, height_mm=3.0, width_mm=4.0)
     model = Model(
-        body, Material(1.0, 0.3), MeshOptions(0.8, 1.2, "swept"), UP_AND_DOWN, object=Sphere(radius_mm=4.0),
+        body, Isotropic(1.0, 0.3), MeshOptions(0.8, 1.2, "swept"), UP_AND_DOWN, object=Sphere(radius_mm=4.0),
         friction=Coulomb(0.25), gauges=(Gauge("g", 0.0, 1.5, 0.0, 0.0, 2.0),),
     )  # fmt: skip
     return replace(model, **changes)
@@ -103,13 +104,13 @@ def test_a_hold_is_exact_in_one_step() -> None:
 @pytest.mark.parametrize("bulk", [True, False])
 @pytest.mark.parametrize("nu", [0.3, 0.49])
 def test_quick_presses_are_instantaneous_and_slow_ones_relaxed(nu: float, bulk: bool) -> None:
-    model = block(friction=Coulomb(0.0), material=Material(1.0, nu))
+    model = block(friction=Coulomb(0.0), material=Isotropic(1.0, nu))
     shear, volume = 0.5 / (1.0 + nu), 1.0 / (3.0 * (1.0 - 2.0 * nu))
     left = 1.0 - sum(g for g, _ in TWO)
     low = left * shear
-    soft = Material(left, nu)
+    soft = Isotropic(left, nu)
     if not bulk:
-        soft = Material(
+        soft = Isotropic(
             9.0 * volume * low / (3.0 * volume + low), (3.0 * volume - 2.0 * low) / (6.0 * volume + 2.0 * low)
         )
     quick, slow = ((Leg(0.3, steps=2, duration_s=s),) for s in (1e-9, 1e9))
@@ -126,7 +127,7 @@ def test_quick_presses_are_instantaneous_and_slow_ones_relaxed(nu: float, bulk: 
 
 def test_in_an_incompressible_body_both_kinds_are_one() -> None:
     # two ways to the same numbers: row forces over the compliance, and displacements over new factors
-    problem = build(block(material=Material(1.0, 0.5)))
+    problem = build(block(material=Isotropic(1.0, 0.5)))
     a, b = (run(viscous(problem, TWO, bulk)) for bulk in (True, False))
     largest = max(np.abs(f.part.force).max() for f in a)
     for f, g in zip(a, b, strict=True):
@@ -139,7 +140,7 @@ def test_in_an_incompressible_body_both_kinds_are_one() -> None:
 
 def test_uniform_compression_relaxes_as_the_series_says() -> None:
     # nu = 0 under a flat plate: a bar, stress = E int r(t - s) d'(s) ds / h
-    problem = build(block(material=Material(2.0, 0.0), object=Plane(), friction=Coulomb(0.0), legs=RAMP_AND_HOLD))
+    problem = build(block(material=Isotropic(2.0, 0.0), object=Plane(), friction=Coulomb(0.0), legs=RAMP_AND_HOLD))
     held = viscous(problem)
     for frame in run(held):
         t = frame.target.time_s
@@ -158,7 +159,7 @@ def test_uniform_compression_relaxes_as_the_series_says() -> None:
 ])  # fmt: skip
 def test_stress_carries_the_force(domain: str, nu: float, bulk: bool) -> None:
     # virtual work of y: int s_yy dV = - force * height under a flat plate without friction
-    problem = build(block(material=Material(1.0, nu), object=Plane(), friction=Coulomb(0.0), domain=domain,
+    problem = build(block(material=Isotropic(1.0, nu), object=Plane(), friction=Coulomb(0.0), domain=domain,
                           legs=RAMP_AND_HOLD))  # fmt: skip
     held = viscous(problem, TWO, bulk)
     frame = run(held)[-1]
@@ -191,7 +192,7 @@ def _nodal_volume(problem: Problem) -> np.ndarray:
 def test_the_compliance_of_a_step_is_the_difference_quotient_of_its_response(
     kind: type, nu: float, domain: str
 ) -> None:
-    problem = build(block(domain=domain, material=Material(1.0, nu), legs=RAMP))
+    problem = build(block(domain=domain, material=Isotropic(1.0, nu), legs=RAMP))
     body = kind(problem)
     rng = np.random.default_rng(0)
     rows = len(problem.condensed.compliance)
@@ -341,7 +342,7 @@ def test_a_model_turned_to_plane_stress_is_refused_too() -> None:
 
 def test_what_is_elastic_beside_the_body_stays_elastic() -> None:
     # a foundation in series under every point of the object: its compliance is not divided by alpha
-    problem = build(block(object=Plane(), material=Material(1.0, 0.0), friction=Coulomb(0.0), legs=RAMP_AND_HOLD))
+    problem = build(block(object=Plane(), material=Isotropic(1.0, 0.0), friction=Coulomb(0.0), legs=RAMP_AND_HOLD))
     c, d = problem.delassus.shape[:2]
     soft = 3.0 / problem.surface.area  # as soft as the bar below, of E = 1 and height 3
     series = problem.delassus.reshape(c * d, c * d).copy()
@@ -378,5 +379,5 @@ def test_an_elastic_object_does_not_relax_with_the_finger() -> None:
     model = ElasticObject(0.5, 0.3).apply(block(friction=Coulomb(0.0), legs=slow, object=Plane()))
     problem = build(model)
     relaxed = viscous(problem, ((0.7, 1.0),))
-    wanted = build(replace(model, material=Material(0.3, 0.3)))
+    wanted = build(replace(model, material=Isotropic(0.3, 0.3)))
     assert forces(problem, run(relaxed))[-1] == pytest.approx(forces(wanted, run(wanted))[-1], rel=1e-7)

@@ -7,8 +7,9 @@ import pytest
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from finger3d.fem.assembly import _CHUNK, Elasticity, stiffness
+from finger3d.fem.assembly import _CHUNK, stiffness
 from finger3d.fem.elements import quadrature
+from finger3d.fem.material import Elasticity
 from finger3d.fem.simplex import Mesh, quadratic
 from tests.meshes import body_load, edge_load, error_norms, grid, mapped
 

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from finger3d.fem.assembly import Elasticity, stiffness
+from finger3d.fem.assembly import stiffness
 from finger3d.fem.condense import condense
+from finger3d.fem.material import Elasticity
 from finger3d.fem.pardiso import available
 from finger3d.fem.simplex import quadratic
 from finger3d.fem.traces import displacement_row, local_rows, strain_row, surface

@@ -9,7 +9,8 @@ import pytest
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from finger3d.fem.assembly import Elasticity, Pattern, stiffness
+from finger3d.fem.assembly import Pattern, stiffness
+from finger3d.fem.material import Elasticity
 from finger3d.fem.neo_hooke import InvertedError, NeoHooke, assemble, cell_response, first_piola_and_tangent
 from finger3d.fem.simplex import quadratic
 from tests.meshes import edge_load, grid, mapped

@@ -9,9 +9,10 @@ from finger3d.accuracy.point_resolution import least_bars
 from finger3d.contact.friction import OPEN, STICK, Coulomb
 from finger3d.contact.state import ContactState
 from finger3d.errors import Outcome
+from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.history import ContactPoints, ObjectPose, StepResult, measure
-from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.solve import build, march
 from finger3d.objects import Sphere
 
@@ -56,7 +57,7 @@ def test_a_zone_is_resolved_where_it_is_three_points_wide(rows: int, resolved: i
 def test_a_length_does_not_depend_on_the_half_that_is_meshed(symmetry: tuple[str, ...] | None) -> None:
     block = designs()["block"](half_length_mm=4.0, height_mm=3.0, width_mm=8.0)
     model = Model(
-        block, Material(1.0, 0.4), MeshOptions(0.8, 2.0, "swept"), (Leg(0.3, steps=2),),
+        block, Isotropic(1.0, 0.4), MeshOptions(0.8, 2.0, "swept"), (Leg(0.3, steps=2),),
         object=Sphere(radius_mm=6.0), friction=Coulomb(0.25), symmetry=symmetry,
     )  # fmt: skip
     problem = build(model)

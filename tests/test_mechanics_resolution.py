@@ -17,10 +17,11 @@ from finger3d.cli import main
 from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.effects.large_deformation import Effect
 from finger3d.errors import UnresolvedError
+from finger3d.fem.material import Isotropic
 from finger3d.fem.recover import displacement
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.history import measure
-from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.resolution import Hidden, foreseen, hidden, inside, penetration, tips_of
 from finger3d.mechanics.solve import build, march, symmetry
@@ -54,7 +55,7 @@ y_mm = 30.0
 
 def fig9(obj: RigidObject, depth: float, size: float, **changes: object) -> Model:
     model = Model(
-        FIG9, Material(1.0, 0.45), MeshOptions(size, 8.0, "swept"), (Leg(depth, steps=2),), object=obj,
+        FIG9, Isotropic(1.0, 0.45), MeshOptions(size, 8.0, "swept"), (Leg(depth, steps=2),), object=obj,
         friction=Coulomb(0.25), domain="plane-strain",
     )  # fmt: skip
     return replace(model, **changes)

@@ -16,13 +16,14 @@ from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.effects.kinetic_friction import TwoCoefficients
 from finger3d.effects.large_deformation import FiniteStrain
 from finger3d.errors import Outcome
+from finger3d.fem.material import Isotropic
 from finger3d.fem.recover import displacement
 from finger3d.fem.traces import displacement_row
 from finger3d.geometry.registry import designs
 from finger3d.mechanics import formulation
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.history import StepResult, measure
-from finger3d.mechanics.model import Domain, Gauge, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.solve import Problem, build, march, targets
 from finger3d.mechanics.step_halving import automatic, limits, marched, refine, remaining, step_error
 from finger3d.objects import Plane, Sphere
@@ -31,7 +32,7 @@ from finger3d.objects import Plane, Sphere
 def fig9(**changes: object) -> Model:
     finger = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     model = Model(
-        finger, Material(1.0, 0.49), MeshOptions(2.0, 8.0, "swept"), (Leg(10.0, steps=10),), friction=Coulomb(0.25),
+        finger, Isotropic(1.0, 0.49), MeshOptions(2.0, 8.0, "swept"), (Leg(10.0, steps=10),), friction=Coulomb(0.25),
         gauges=(Gauge("g36", 36.0, 40.0, 0.0, np.deg2rad(30.0)),),
     )  # fmt: skip
     return replace(model, **changes)
@@ -40,7 +41,7 @@ def fig9(**changes: object) -> Model:
 def block(**changes: object) -> Model:
     body = designs()["block"](half_length_mm=4.0, height_mm=3.0, width_mm=4.0)
     model = Model(
-        body, Material(1.0, 0.3), MeshOptions(0.8, 1.2, "swept"), (Leg(0.3, steps=3),), object=Sphere(radius_mm=4.0),
+        body, Isotropic(1.0, 0.3), MeshOptions(0.8, 1.2, "swept"), (Leg(0.3, steps=3),), object=Sphere(radius_mm=4.0),
         friction=Coulomb(0.25),
     )  # fmt: skip
     return replace(model, **changes)
@@ -77,7 +78,7 @@ def test_half_cylinder_in_plane_stress(depth: float, force: float, a: float, c: 
     size = 0.04
     finger = designs()["half_cylinder"](radius_mm=5.0, width_mm=1.0)
     model = Model(
-        finger, Material(1.0, 0.3), MeshOptions(size, 0.5), (Leg(depth, steps=100),), friction=Coulomb(0.25),
+        finger, Isotropic(1.0, 0.3), MeshOptions(size, 0.5), (Leg(depth, steps=100),), friction=Coulomb(0.25),
         domain="plane-stress",
     )  # fmt: skip
     got = last(model)
@@ -110,7 +111,7 @@ def test_swept_and_pytetwild_meshes_agree_within_one_percent() -> None:
 
 @pytest.mark.parametrize("nu", [0.3, 0.49, 0.5])
 def test_quarter_and_whole_model_agree_on_a_mirrored_mesh(nu: float) -> None:
-    quarter, whole = (block(material=Material(1.0, nu), symmetry=axes) for axes in (("x", "z"), ()))
+    quarter, whole = (block(material=Isotropic(1.0, nu), symmetry=axes) for axes in (("x", "z"), ()))
     (p, f), (q, g) = run(quarter), run(whole)
     a, b = measure(p.points, f[-1]), measure(q.points, g[-1])
     assert (p.axes, q.axes) == (("x", "z"), ())
@@ -137,7 +138,7 @@ def test_contact_forces_and_base_reaction_balance() -> None:
 
 def test_flat_block_under_a_flat_plate_has_uniform_pressure() -> None:
     # nu = 0: the clamped base does not disturb the bar, so p = E d / h everywhere
-    problem, frames = run(block(material=Material(2.0, 0.0), object=Plane(), friction=Coulomb(0.0)))
+    problem, frames = run(block(material=Isotropic(2.0, 0.0), object=Plane(), friction=Coulomb(0.0)))
     pressure = frames[-1].state.force[:, 0] / problem.points.area
     assert (frames[-1].state.status != OPEN).all()
     assert np.abs(pressure - 2.0 * 0.3 / 3.0).max() < 1e-10
@@ -271,7 +272,7 @@ def test_automatic_increments_end_within_their_estimate() -> None:
 def stuck(**changes: object) -> Model:
     """The Fig. 9 section in plane stress at a large coefficient of friction: nearly all of it sticks."""
     model = fig9(
-        domain="plane-stress", material=Material(1.0, 0.485), friction=Coulomb(0.988), mesh=MeshOptions(2.9, 11.6),
+        domain="plane-stress", material=Isotropic(1.0, 0.485), friction=Coulomb(0.988), mesh=MeshOptions(2.9, 11.6),
     )  # fmt: skip
     return replace(model, **changes)
 
@@ -363,7 +364,7 @@ def test_presses_at_once_are_the_presses_in_turn(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(parallel, "cores", lambda: 2)
     design = designs()["half_cylinder"](radius_mm=5.0, width_mm=2.0)
     legs = (Leg(0.5, steps=4), Leg(0.5, slide_x_mm=0.1, steps=3))
-    problem = build(Model(design, Material(1.0, 0.3), MeshOptions(0.3, 1.5), legs, domain="plane-stress"))
+    problem = build(Model(design, Isotropic(1.0, 0.3), MeshOptions(0.3, 1.5), legs, domain="plane-stress"))
     mus = (0.1, 0.3, 0.6, 1.2)
 
     def press(mu: float, before: Sequence[Any] = (), *_: object) -> list[np.ndarray]:

@@ -11,9 +11,10 @@ from bodies import ball, box, channel
 
 from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.errors import Finger3dError
+from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.history import measure
-from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.solve import build, march
 from finger3d.objects import (
     ContactPath,
@@ -178,7 +179,7 @@ def test_mirrors_of_a_mesh_object() -> None:
 def pad(**changes: object) -> Model:
     body = designs()["block"](half_length_mm=4.0, height_mm=3.0, width_mm=4.0)
     model = Model(
-        body, Material(1.0, 0.3), MeshOptions(0.8, 1.2, "swept"), (Leg(0.3, steps=2),), friction=Coulomb(0.25)
+        body, Isotropic(1.0, 0.3), MeshOptions(0.8, 1.2, "swept"), (Leg(0.3, steps=2),), friction=Coulomb(0.25)
     )  # fmt: skip
     return replace(model, **changes)
 

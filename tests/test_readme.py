@@ -73,7 +73,8 @@ def test_the_python_example_runs(root: Path, folder: Path) -> None:
 
 
 def test_the_examples_of_adding_work_and_are_short(root: Path, folder: Path) -> None:
-    from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+    from finger3d.fem.material import Isotropic
+    from finger3d.mechanics.model import Leg, MeshOptions, Model
     from finger3d.mechanics.solve import build, march
 
     geometry, effect, study = python(root, "How to add", "CONTRIBUTING.md")
@@ -83,7 +84,7 @@ def test_the_examples_of_adding_work_and_are_short(root: Path, folder: Path) -> 
         execute(example, names)
     pad = names["Pad"](10.0, 5.0)
     assert pad.solid().volume == pytest.approx(pad.volume_mm3, rel=1e-12)
-    model = Model(pad, Material(1.0, 0.3), MeshOptions(1.0, 3.0), (Leg(1.0, steps=1),), domain="plane-strain")
+    model = Model(pad, Isotropic(1.0, 0.3), MeshOptions(1.0, 3.0), (Leg(1.0, steps=1),), domain="plane-strain")
     forces = [
         next(iter(march(build(m)))).state.force[:, 0].sum() for m in (model, names["Effect"](kelvin=50.0).apply(model))
     ]

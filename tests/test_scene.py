@@ -17,7 +17,8 @@ from hypothesis import strategies as st
 import finger3d.effects
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.model import Leg, Material, MeshOptions
+from finger3d.fem.material import Isotropic
+from finger3d.mechanics.model import Leg, MeshOptions
 from finger3d.objects import Cylinder, Plane, Sphere, Wave, Wedge
 from finger3d.scene import load, parse
 
@@ -46,7 +47,7 @@ def test_the_least_scene_is_frictionless_on_a_plane_as_a_solid():
     assert model.rule == "projection"
     assert model.legs == (Leg(10.0, steps="auto"),)
     assert model.gauges == ()
-    assert model.material == Material(1.0, 0.49)
+    assert model.material == Isotropic(1.0, 0.49)
     assert model.design.height_mm == pytest.approx(HEIGHT)
 
 

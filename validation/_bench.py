@@ -29,8 +29,9 @@ from finger3d._machine import cores
 from finger3d.analyses.calibrate.presses import presses
 from finger3d.analyses.validate import Row
 from finger3d.contact.friction import Coulomb
+from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.model import Domain, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import build, contact_box, march, symmetry
 from finger3d.meshing.generate import mesh_solid
@@ -73,7 +74,7 @@ def fig9(size: float, domain: Domain = "solid", mesher: Any = "swept") -> Model:
     """The finger at an edge length."""
     design = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     options = MeshOptions(size, GRADING.get(size, 4.0) * size, mesher)
-    return Model(design, Material(1.0, 0.49), options, (Leg(10.0, steps=10),), friction=Coulomb(0.25), domain=domain)
+    return Model(design, Isotropic(1.0, 0.49), options, (Leg(10.0, steps=10),), friction=Coulomb(0.25), domain=domain)
 
 
 def measured(size: float) -> dict[str, float]:

@@ -14,9 +14,10 @@ from scipy import sparse
 from finger3d.contact.friction import Coulomb
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactSolution, ContactState
-from finger3d.fem.assembly import Elasticity, stiffness
+from finger3d.fem.assembly import stiffness
 from finger3d.fem.condense import condense
 from finger3d.fem.elements import quadrature
+from finger3d.fem.material import Elasticity
 from finger3d.fem.simplex import Mesh, boundary, quadratic, signed_volumes
 from finger3d.fem.traces import BoundarySurface, local_rows, restrict, surface
 from finger3d.objects import vertical_frame

@@ -16,14 +16,15 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from finger3d.contact.friction import OPEN, STICK, Coulomb
-from finger3d.fem.assembly import Elasticity, Stiffness, stiffness
+from finger3d.fem.assembly import Stiffness, stiffness
 from finger3d.fem.condense import condense
+from finger3d.fem.material import Elasticity, Isotropic
 from finger3d.fem.simplex import Mesh
 from finger3d.fem.traces import BoundarySurface, local_rows, surface
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import MARGIN, candidate_points, contact_rows
 from finger3d.mechanics.history import ContactPoints, StepResult, measure
-from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.problem import ContactSystem, Part, Problem
 from finger3d.mechanics.solve import march
 from finger3d.mechanics.symmetry import active_dofs, held_dofs, symmetry, unfold_points
@@ -75,12 +76,12 @@ def model_of(case: Case) -> Model:
         design = designs()["half_cylinder"](radius_mm=5.0, width_mm=1.0)
         gauge = Gauge("g", 1.5, 4.2, angle=math.pi / 4)
         return Model(
-            design, Material(1.0, nu), mesh, (Leg(1.0),), friction=Coulomb(MU), gauges=(gauge,), domain="plane-stress"
+            design, Isotropic(1.0, nu), mesh, (Leg(1.0),), friction=Coulomb(MU), gauges=(gauge,), domain="plane-stress"
         )
     design = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     gauge = Gauge("g", 36.0, 40.0, angle=math.pi / 6)
     domain: Any = "solid" if case.body == SOLID else "plane-strain"
-    return Model(design, Material(1.0, nu), mesh, (Leg(10.0),), friction=Coulomb(MU), gauges=(gauge,), domain=domain)
+    return Model(design, Isotropic(1.0, nu), mesh, (Leg(10.0),), friction=Coulomb(MU), gauges=(gauge,), domain=domain)
 
 
 def straight(mesh: Mesh) -> Mesh:
@@ -127,7 +128,7 @@ def assembled(model: Model, element: str) -> Parts:
     start = time.perf_counter()
     if element == "linear":
         mesh = straight(mesh)
-    constants = Elasticity.of(model.material.E_MPa, model.material.nu, model.domain == "plane-stress")
+    constants = model.material.elasticity(model.domain == "plane-stress")
     elastic = replace(constants, mixed=element == "mixed")
     thickness = 1.0 if mesh.dim == 3 else model.design.width_mm
     matrix = stiffness(mesh, elastic, thickness)

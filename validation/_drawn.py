@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from finger3d.contact.friction import Coulomb
+from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.objects import Cylinder, Plane, Wave, Wedge
 
 NEAR = (Gauge("a", 1.5, 4.0, angle=0.5), Gauge("b", 3.0, 3.0, angle=0.7), Gauge("c", 0.0, 3.5))
@@ -45,7 +46,7 @@ def drawn(count: int, seed: int = 2026) -> Iterator[tuple[str, Model]]:
         if kind == 6:
             path += (Leg(part * depth, slide_x_mm=(0.02 + 0.48 * u[6]) * part * depth),)
         model = Model(
-            design, Material(1.0, nu), MeshOptions(size * edge, 4.0 * size * edge), path, object=rigid,
+            design, Isotropic(1.0, nu), MeshOptions(size * edge, 4.0 * size * edge), path, object=rigid,
             friction=Coulomb(mu), gauges=gauges, domain=plane,
         )  # fmt: skip
         yield f"{number}: {type(rigid).__name__} on {design.name}, {plane}, nu = {nu:.3g}, mu = {mu:.3g}", model

@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from finger3d.effects.embedded_gauge import Strips
-from finger3d.fem.assembly import Elasticity, stiffness
+from finger3d.fem.assembly import stiffness
 from finger3d.fem.condense import condense, stiffened
+from finger3d.fem.material import Elasticity, Isotropic
 from finger3d.fem.simplex import Mesh, quadratic
 from finger3d.fem.traces import displacement_row
-from finger3d.mechanics.model import Gauge, Material
+from finger3d.mechanics.model import Gauge
 
 from ._common import box, graded, held_at, side_load
 
@@ -87,7 +88,7 @@ def _axis(inner: float, first: float, far: float) -> Float:
 def _model(length: float, E: float, nu: float, dim: int) -> Any:
     """As much of a model as foils ask for."""
     return SimpleNamespace(
-        gauges=(Gauge("g", 0.0, 0.0, 0.0, 0.0, length),), material=Material(E, nu),
+        gauges=(Gauge("g", 0.0, 0.0, 0.0, 0.0, length),), material=Isotropic(E, nu),
         domain="solid" if dim == 3 else "plane-strain", design=SimpleNamespace(width_mm=1.0),
     )  # fmt: skip
 

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb, FrictionLaw
+from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.history import StepResult
-from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.solve import Problem, build, march
 from finger3d.objects import Cylinder
 
@@ -49,7 +50,7 @@ def line(nu: float, points: float, legs: tuple[Leg, ...], height: float = DEPTH_
     block = designs()["block"](half_length_mm=height, height_mm=height, width_mm=1.0)
     mesh = MeshOptions(1.0 / points, height / 8.0, "swept")
     model = Model(
-        block, Material(1.0, nu), mesh, legs, object=Cylinder(radius_mm=RADIUS), domain="plane-strain",
+        block, Isotropic(1.0, nu), mesh, legs, object=Cylinder(radius_mm=RADIUS), domain="plane-strain",
     )  # fmt: skip
     return build(model, margin=_CANDIDATES)
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
-from finger3d.fem.assembly import Elasticity
+from finger3d.fem.material import Elasticity
 from finger3d.fem.simplex import quadratic
 from finger3d.objects import Sphere
 

@@ -19,9 +19,10 @@ from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
 from finger3d.effects.kinetic_friction import TwoCoefficients
 from finger3d.errors import Finger3dError, Outcome
+from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.history import measure
-from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.solve import Problem, build, march, targets
 from finger3d.objects import Plane
 from finger3d.scene import load
@@ -107,7 +108,7 @@ def _admissible(compliance: np.ndarray, load: np.ndarray, mu: float) -> list[np.
 def _block(nu: float, legs: tuple[Leg, ...], design: Any = None, mu: float = 0.25, **more: Any) -> Problem:
     body = design or designs()["block"](half_length_mm=10.0, height_mm=10.0, width_mm=1.0)
     mesh = MeshOptions(1.0, 3.0, "swept")
-    return build(Model(body, Material(1.0, nu), mesh, legs, friction=Coulomb(mu), domain="plane-strain", **more))
+    return build(Model(body, Isotropic(1.0, nu), mesh, legs, friction=Coulomb(mu), domain="plane-strain", **more))
 
 
 def touch(quick: bool) -> Iterator[Row]:
@@ -259,7 +260,7 @@ def turned(quick: bool) -> Iterator[Row]:
     block = designs()["block"](half_length_mm=5.0, height_mm=5.0, width_mm=10.0)
     size = 5.0 if quick else 2.5
     legs = (Leg(0.3, steps=3), Leg(0.3, 0.1, 0.05, steps=4))
-    model = Model(block, Material(1.0, 0.3), MeshOptions(size, 5.0, "swept"), legs, friction=Coulomb(0.25))
+    model = Model(block, Isotropic(1.0, 0.3), MeshOptions(size, 5.0, "swept"), legs, friction=Coulomb(0.25))
     problem = build(model)
     states = []
     for angle in (0.0, np.pi / 6.0):

@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 
 from finger3d.analyses.validate import Measure, Row
 from finger3d.contact.friction import OPEN, STICK, Coulomb, FrictionLaw
+from finger3d.fem.material import Isotropic
 from finger3d.fem.recover import displacement
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.history import StepResult, contact_table
-from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.solve import Problem, build, march
 
 Float = NDArray[np.float64]
@@ -63,7 +64,7 @@ def _built(
 ) -> Problem:
     domain: Any = plane.replace(" ", "-")
     model = Model(
-        design, Material(1.0, nu), mesh, (leg,), friction=Coulomb(mu), gauges=tuple(gauges), domain=domain
+        design, Isotropic(1.0, nu), mesh, (leg,), friction=Coulomb(mu), gauges=tuple(gauges), domain=domain
     )  # fmt: skip
     return build(model)
 

@@ -21,9 +21,10 @@ from scipy import sparse
 
 from finger3d.analyses.validate import Result, Row
 from finger3d.contact.friction import Coulomb
+from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.history import StepResult
-from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.solve import Problem, build, march
 
 from ._common import convergence, rate
@@ -38,7 +39,7 @@ def finger(domain: Any, nu: float) -> Problem:
     """The whole finger, ready for any path that presses 10 mm at first."""
     body = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     mesh = MeshOptions(SIZES[domain], 2.0 * SIZES[domain], "swept")
-    return build(Model(body, Material(1.0, nu), mesh, (Leg(10.0),), domain=domain, symmetry=()))
+    return build(Model(body, Isotropic(1.0, nu), mesh, (Leg(10.0),), domain=domain, symmetry=()))
 
 
 def along(problem: Problem, steps: int, mu: float, slide: float) -> list[StepResult]:

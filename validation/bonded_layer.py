@@ -20,9 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.analyses.validate import Result, Row
-from finger3d.fem.assembly import Elasticity
+from finger3d.fem.material import Elasticity, Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.solve import build, march
 from finger3d.objects import Cylinder, Sphere
 
@@ -52,7 +52,7 @@ def _model(a: float, nu: float, sizes: tuple[float, float], indenter: Any, meshe
     flat = isinstance(indenter, Cylinder)
     block = designs()["block"](half_length_mm=reach, height_mm=1.0, width_mm=1.0 if flat else 2.0 * reach)
     mesh = MeshOptions(*sizes, mesher)
-    return Model(block, Material(1.0, nu), mesh, legs, object=indenter, domain="plane-strain" if flat else "solid")
+    return Model(block, Isotropic(1.0, nu), mesh, legs, object=indenter, domain="plane-strain" if flat else "solid")
 
 
 def forces(model: Model) -> Float:

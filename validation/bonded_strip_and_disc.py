@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.analyses.validate import Result, Row
-from finger3d.fem.assembly import Elasticity
+from finger3d.fem.material import Elasticity
 from finger3d.fem.simplex import Mesh
 
 from ._common import box, convergence, held_at, mapped, nodes_of, solve

@@ -19,9 +19,10 @@ import numpy as np
 from finger3d.analyses.validate import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect
+from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.history import measure
-from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.solve import Problem, build, march
 
 from ._calculix import deck, program, solve
@@ -41,7 +42,7 @@ def problem(size: float) -> Problem:
     """The finger as half a section."""
     body = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=WIDTH)
     model = Model(
-        body, Material(E, NU), MeshOptions(size, 4.0 * size, "swept"), (Leg(10.0, steps=10),), friction=Coulomb(MU),
+        body, Isotropic(E, NU), MeshOptions(size, 4.0 * size, "swept"), (Leg(10.0, steps=10),), friction=Coulomb(MU),
         domain="plane-strain",
     )  # fmt: skip
     return build(Effect().apply(model))

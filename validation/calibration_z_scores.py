@@ -21,8 +21,9 @@ from finger3d.analyses.calibrate.increments import error_left
 from finger3d.analyses.calibrate.run import calibrated
 from finger3d.analyses.calibrate.tolerances import TOLERANCES, read
 from finger3d.analyses.validate import Result, Row
+from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.solve import build
 from finger3d.sensor import Calibration, estimate
 
@@ -68,7 +69,7 @@ def model(nu: float, size: float, steps: Steps) -> Model:
     body = designs()["half_cylinder"](radius_mm=5.0, width_mm=1.0)
     legs = (Leg(1.0, steps=steps),)
     return Model(
-        body, Material(1.0, nu), MeshOptions(size, 5.0 * size, "swept"), legs, gauges=gauges(), domain="plane-strain"
+        body, Isotropic(1.0, nu), MeshOptions(size, 5.0 * size, "swept"), legs, gauges=gauges(), domain="plane-strain"
     )  # fmt: skip
 
 

@@ -22,8 +22,9 @@ import numpy as np
 from finger3d.analyses.validate import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.embedded_gauge import Effect, Strips
+from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.model import Domain, Gauge, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.solve import Problem, build, march
 
 from ._foil import alone, by_mesh, wing
@@ -43,7 +44,7 @@ def finger(domain: Domain, length: float, size: float, steps: int) -> Problem:
     turn = math.radians(30.0)
     gauges = (Gauge("g", 36.0, 38.0, 0.0, turn, length), Gauge("m", -36.0, 38.0, 0.0, math.pi - turn, length))
     model = Model(
-        body, Material(1.0, NU), MeshOptions(size, size, "swept"), (Leg(10.0, steps=steps),), friction=Coulomb(0.25),
+        body, Isotropic(1.0, NU), MeshOptions(size, size, "swept"), (Leg(10.0, steps=steps),), friction=Coulomb(0.25),
         gauges=gauges, domain=domain,
     )  # fmt: skip
     return build(FOIL.apply(model))

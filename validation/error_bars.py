@@ -22,11 +22,12 @@ from finger3d.accuracy.estimate import Grain, companion, compared, main_numbers,
 from finger3d.analyses.validate import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.elastic_object import SoftObject
+from finger3d.fem.material import Isotropic
 from finger3d.geometry.design import Design
 from finger3d.geometry.registry import designs
 from finger3d.io import AREAS, MAIN
 from finger3d.mechanics.history import StepResult
-from finger3d.mechanics.model import Domain, Gauge, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.solve import Problem, build, march
 from finger3d.mechanics.step_halving import DISSIPATION_TOLERANCE, TOLERANCE, error_by_count, marched, step_error
 from finger3d.objects import Cylinder, Plane, Sphere
@@ -102,7 +103,7 @@ def _model(
     mesher: Any = "swept",
 ) -> Model:  # fmt: skip
     return Model(
-        design, Material(1.0, nu), MeshOptions(1.0, 1.0, mesher), (Leg(depth, steps=10),),
+        design, Isotropic(1.0, nu), MeshOptions(1.0, 1.0, mesher), (Leg(depth, steps=10),),
         object=rigid or Plane(), gauges=gauges, domain=domain,
     )  # fmt: skip
 

@@ -22,9 +22,10 @@ import numpy as np
 from finger3d.analyses.validate import Result, Row
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
 from finger3d.errors import Outcome
+from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.history import StepResult
-from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.solve import Problem, build, march
 
 from . import _hard
@@ -81,7 +82,7 @@ def finger(dim: int, nu: float, size: float) -> Problem:
     domain = "plane-strain" if dim == 2 else "solid"
     mesh = MeshOptions(size, max(size, 6.0 if dim == 2 else 12.0), "swept")
     return build(
-        Model(designs()["clipped_cylinder"](**shape), Material(1.0, nu), mesh, path(dim, 1.0, 1), domain=domain)
+        Model(designs()["clipped_cylinder"](**shape), Isotropic(1.0, nu), mesh, path(dim, 1.0, 1), domain=domain)
     )
 
 

@@ -21,9 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.analyses.validate import Result, Row
+from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.history import StepResult
-from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.solve import Problem, build, march
 from finger3d.objects import Cylinder
 
@@ -77,7 +78,7 @@ def press(
     mesh = MeshOptions(1.0 / count, 0.25 * height, "swept")
     legs = tuple(Leg(d, steps=1) for d in depths)
     held = domain == "solid"
-    model = Model(block, Material(1.0, nu), mesh, legs, Cylinder(radius_mm=RADIUS), domain=domain, held_ends=held)
+    model = Model(block, Isotropic(1.0, nu), mesh, legs, Cylinder(radius_mm=RADIUS), domain=domain, held_ends=held)
     # points that the rigid cylinder overlaps by 0.2 of the depth reach to 2 a here, far beyond the contact
     problem = build(model, margin=-0.2)
     return problem, list(march(problem))

@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.analyses.validate import Result, Row
-from finger3d.fem.assembly import Elasticity
+from finger3d.fem.material import Elasticity, Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.solve import build, march
 from finger3d.objects import Sphere
 
@@ -70,7 +70,7 @@ def own_path(nu: float, count: int) -> float:
     """P/P_Hertz(a), mean over depths, by the product's own path: CAD, pytetwild, a quarter by symmetry."""
     block = designs()["block"](half_length_mm=HEIGHT, height_mm=HEIGHT, width_mm=2.0 * HEIGHT)
     legs = tuple(Leg(depth(v, nu), steps=1) for v in PLACES)
-    model = Model(block, Material(1.0, nu), MeshOptions(1.0 / count, 4.0), legs, Sphere(radius_mm=RADIUS))
+    model = Model(block, Isotropic(1.0, nu), MeshOptions(1.0 / count, 4.0), legs, Sphere(radius_mm=RADIUS))
     problem = build(model)
     samples = problem.surface.samples
     square = (problem.surface.average @ (samples[:, 0] ** 2 + samples[:, 2] ** 2))[problem.symmetry.image_of]

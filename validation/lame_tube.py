@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.analyses.validate import Result, Row
-from finger3d.fem.assembly import Elasticity
+from finger3d.fem.material import Elasticity
 
 from ._common import box, convergence, error_norms, held_at, mapped, rate, side_load, solve
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.analyses.validate import Result, Row
-from finger3d.fem.assembly import Elasticity
+from finger3d.fem.material import Elasticity
 from finger3d.fem.simplex import quadratic
 
 from ._common import body_load, convergence, cube, error_norms, held_at, pressure_error, rate, solve

@@ -22,9 +22,10 @@ from scipy.optimize import brentq
 
 from finger3d.analyses.validate import Result, Row
 from finger3d.contact.friction import Coulomb
+from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.history import measure
-from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.solve import Problem, build, march
 from finger3d.objects import Cylinder, Plane, RigidObject
 
@@ -38,7 +39,7 @@ def finger(obj: RigidObject, size: float, solid: bool = False) -> Problem:
     """The Fig. 9 finger under an object, deep enough for the force on any of them."""
     body = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     model = Model(
-        body, Material(1.0, 0.49), MeshOptions(size, 4.0 * size, "swept"), (Leg(14.0, steps=1),), object=obj,
+        body, Isotropic(1.0, 0.49), MeshOptions(size, 4.0 * size, "swept"), (Leg(14.0, steps=1),), object=obj,
         gauges=(GAUGE,), domain="solid" if solid else "plane-strain",
     )  # fmt: skip
     return build(model)

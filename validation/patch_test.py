@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from finger3d.analyses.validate import Result, Row
 from finger3d.contact.friction import Coulomb
-from finger3d.fem.assembly import Elasticity
+from finger3d.fem.material import Elasticity, Isotropic
 from finger3d.fem.simplex import Mesh, quadratic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.solve import build, march
 
 from ._common import body, body_load, cube, held_at, shuffled, solve
@@ -81,7 +81,7 @@ def fixed_block(mesher: str, domain: str) -> float:
     """The same by the product's own path, CAD and mesher included; with nu = 0 the fixed base is not felt."""
     design = designs()["block"](half_length_mm=10.0, height_mm=8.0, width_mm=12.0)
     mesh, legs = MeshOptions(2.0, 4.0, mesher), (Leg(0.4, steps=2),)
-    problem = build(Model(design, Material(2.0, 0.0), mesh, legs, friction=Coulomb(0.25), domain=domain))
+    problem = build(Model(design, Isotropic(2.0, 0.0), mesh, legs, friction=Coulomb(0.25), domain=domain))
     *_, last = march(problem)
     pressure = last.state.force[:, 0] / problem.points.area
     return float(np.abs(pressure / (2.0 * 0.4 / 8.0) - 1.0).max()) if last.outcome.ok else np.inf

@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 
 from finger3d.analyses.validate import Result, Row
 from finger3d.contact.friction import Coulomb
+from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.history import measure
-from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.solve import build, march
 
 from ._common import convergence, rate
@@ -37,7 +38,7 @@ def press(size: float, nu: float, mesher: str = "swept", **changes: Any) -> list
     """Numbers of every increment."""
     finger = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     mesh, legs = MeshOptions(size, 2.0 * size, mesher), (Leg(10.0, steps=STEPS),)
-    problem = build(Model(finger, Material(1.0, nu), mesh, legs, friction=Coulomb(0.25), **changes))
+    problem = build(Model(finger, Isotropic(1.0, nu), mesh, legs, friction=Coulomb(0.25), **changes))
     frames = list(march(problem))
     if len(frames) < STEPS or not frames[-1].outcome.ok:
         return [{"normal_force_N": np.nan, "friction_sum_N": np.nan}] * STEPS

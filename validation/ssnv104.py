@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from finger3d.analyses.validate import Result, Row
-from finger3d.fem.assembly import Elasticity
+from finger3d.fem.material import Elasticity
 
 from ._common import Body, body, box, contact_axis, convergence, graded, held_at, mapped, rate
 

@@ -20,8 +20,9 @@ from finger3d.contact.friction import SLIP, STATUS_NAMES, Coulomb
 from finger3d.contact.maeno import maeno_active_set
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
-from finger3d.fem.assembly import Elasticity, stiffness
+from finger3d.fem.assembly import stiffness
 from finger3d.fem.condense import Condensation, condense
+from finger3d.fem.material import Elasticity
 from finger3d.fem.simplex import quadratic
 from finger3d.fem.traces import BoundarySurface, local_rows, surface
 

@@ -25,13 +25,14 @@ from finger3d.analyses.validate import Result, Row
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
-from finger3d.fem.assembly import Elasticity, stiffness
+from finger3d.fem.assembly import stiffness
 from finger3d.fem.condense import condense
+from finger3d.fem.material import Elasticity, Isotropic
 from finger3d.fem.simplex import Mesh, quadratic
 from finger3d.fem.traces import local_rows, surface
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.history import measure
-from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.solve import build, march
 
 from ._common import cube, side_load
@@ -110,7 +111,7 @@ def plate(dim: int, size: float) -> tuple[list[tuple[float, float, float]], floa
     far = (0.4, 0.0) if dim == 2 else (0.4 * np.cos(TURN), 0.4 * np.sin(TURN))
     legs = (Leg(0.2, steps=4), Leg(0.2, *far, steps=20))
     mesh = MeshOptions(size, 2.0 * size, "swept")
-    problem = build(Model(design, Material(1.0, 0.3), mesh, legs, friction=Coulomb(MU), domain=domain))
+    problem = build(Model(design, Isotropic(1.0, 0.3), mesh, legs, friction=Coulomb(MU), domain=domain))
     curve, slipping = [], 0.0
     for frame in march(problem):
         if not frame.outcome.ok:

@@ -24,8 +24,9 @@ from finger3d.analyses.calibrate.tolerances import TOLERANCES
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.analyses.validate import Result, Row
 from finger3d.effects.embedded_gauge import Effect
+from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.model import Domain, Gauge, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.solve import Problem, build
 from finger3d.plotting.strain_map import resolution_panel, slope_panel
 from finger3d.sensor import Calibration, estimate
@@ -52,7 +53,7 @@ def model(domain: Domain, sizes: tuple[float, float], length: float, quick: bool
     body = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     gauges = (Gauge("g", 36.0, 40.0, 0.0, TURN, length), Gauge("m", -36.0, 40.0, 0.0, math.pi - TURN, length))
     leg = Leg(10.0, steps=4 if quick else "auto")
-    return Model(body, Material(1.0, NU), MeshOptions(*sizes, "swept"), (leg,), gauges=gauges, domain=domain)
+    return Model(body, Isotropic(1.0, NU), MeshOptions(*sizes, "swept"), (leg,), gauges=gauges, domain=domain)
 
 
 def run(quick: bool) -> Result:

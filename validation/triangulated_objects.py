@@ -21,10 +21,11 @@ from numpy.typing import NDArray
 
 from finger3d.analyses.validate import Result, Row
 from finger3d.contact.friction import Coulomb
+from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.history import measure
-from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.solve import build, march
 from finger3d.objects import Cylinder, MeshObject, RigidObject, Sphere, first_contact_height
 
@@ -80,7 +81,7 @@ def pressed(obj: RigidObject, size: float) -> dict[str, Any]:
     """Numbers of a press off the middle of a block."""
     pad = designs()["block"](half_length_mm=5.0, height_mm=4.0, width_mm=8.0)
     model = Model(
-        pad, Material(1.0, 0.3), MeshOptions(size, 2.0, "swept"), (Leg(0.4, steps=2),), object=obj,
+        pad, Isotropic(1.0, 0.3), MeshOptions(size, 2.0, "swept"), (Leg(0.4, steps=2),), object=obj,
         friction=Coulomb(0.3),
     )  # fmt: skip
     problem = build(model)

@@ -18,7 +18,7 @@ from finger3d.analyses.validate import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
-from finger3d.fem.assembly import Elasticity
+from finger3d.fem.material import Elasticity
 from finger3d.fem.simplex import Mesh
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles

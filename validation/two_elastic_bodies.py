@@ -24,12 +24,12 @@ from scipy.optimize import brentq
 from finger3d.analyses.validate import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.elastic_object import Effect, ObjectBody
-from finger3d.fem.assembly import Elasticity
+from finger3d.fem.material import Elasticity, Isotropic
 from finger3d.fem.traces import local_rows
 from finger3d.fem.transfer import facing_trace
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.history import measure
-from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.solve import Problem, build, contact_box, march
 from finger3d.objects import Cylinder, Plane
 
@@ -63,7 +63,7 @@ def line(pair: Any, points: float, size: float, steps: int) -> Problem:
     block = designs()["block"](half_length_mm=size, height_mm=size, width_mm=1.0)
     mesh = MeshOptions(1.0 / points, size / 8.0, "swept")
     model = Model(
-        block, Material(*pair[0]), mesh, legs(steps, size), object=Cylinder(radius_mm=size), domain="plane-strain",
+        block, Isotropic(*pair[0]), mesh, legs(steps, size), object=Cylinder(radius_mm=size), domain="plane-strain",
     )  # fmt: skip
     return build(Effect(*pair[1]).apply(model), margin=-0.2)
 
@@ -125,7 +125,7 @@ def _half(modulus: float, nu: float, size: float, obj: Any, depth: float, mu: fl
     design = designs()["half_cylinder"](radius_mm=5.0, width_mm=2.0) if not body else designs()["block"](**body)
     mesh = MeshOptions(size, 4.0 * size, "swept")
     return Model(
-        design, Material(modulus, nu), mesh, (Leg(depth, steps=5),), object=obj, friction=Coulomb(mu),
+        design, Isotropic(modulus, nu), mesh, (Leg(depth, steps=5),), object=obj, friction=Coulomb(mu),
         domain="plane-strain",
     )  # fmt: skip
 
@@ -217,7 +217,7 @@ def _nafems_rows(quick: bool) -> list[Row]:
     size = 0.6 if quick else 0.25
     block = designs()["block"](half_length_mm=100.0, height_mm=200.0, width_mm=1.0)
     model = Model(
-        block, Material(70e3, 0.3), MeshOptions(size, 25.0, "swept"), (Leg(2.0, steps=1),),
+        block, Isotropic(70e3, 0.3), MeshOptions(size, 25.0, "swept"), (Leg(2.0, steps=1),),
         object=Cylinder(radius_mm=50.0), domain="plane-strain",
     )  # fmt: skip
     problem = build(Effect(210e3, 0.3).apply(model))

@@ -26,8 +26,9 @@ from scipy.signal import residue
 from finger3d.analyses.validate import Result, Row
 from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.effects.viscosity import Viscoelastic
-from finger3d.fem.assembly import Elasticity, Stiffness, stiffness
+from finger3d.fem.assembly import Stiffness, stiffness
 from finger3d.fem.condense import Condensation, condense
+from finger3d.fem.material import Elasticity
 from finger3d.fem.simplex import Mesh, quadratic
 from finger3d.fem.traces import BoundarySurface, local_rows, restrict, surface
 from finger3d.mechanics.formulation import Formulation, SmallStrain

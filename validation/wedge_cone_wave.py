@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from finger3d.analyses.validate import Result, Row
-from finger3d.fem.assembly import Elasticity
+from finger3d.fem.material import Elasticity, Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.model import Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.solve import build, march
 from finger3d.objects import Wave, Wedge
 
@@ -82,7 +82,7 @@ def own_path(count: int) -> float:
     block = designs()["block"](half_length_mm=HEIGHT, height_mm=HEIGHT, width_mm=1.0)
     mesh = MeshOptions(1.0 / count, 0.25 * HEIGHT, "swept")
     legs = tuple(Leg(d, steps=1) for d in WEDGE_DEPTHS)
-    problem = build(Model(block, Material(1.0, NU), mesh, legs, TIP, domain="plane-strain"), margin=-0.2)
+    problem = build(Model(block, Isotropic(1.0, NU), mesh, legs, TIP, domain="plane-strain"), margin=-0.2)
     right = np.flatnonzero(problem.points.points[:, 0] >= 0.0)
     right = right[np.argsort(problem.points.points[right, 0])]
     at, area = problem.points.points[right, 0], problem.points.area[right]

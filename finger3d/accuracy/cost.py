@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from finger3d.fem.assembly import MIXED_FROM
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.solve import AUTO_START, contact_box, symmetry
 from finger3d.mechanics.step_halving import automatic, condensation_s, contact_s, limits
@@ -47,7 +46,7 @@ def forecast(model: Model) -> dict[str, Any]:
     d = 3 if model.domain == "solid" else 2
     axes = symmetry(model)
     zone = contact_box(model)
-    mixed = model.domain != "plane-stress" and model.material.nu >= MIXED_FROM
+    mixed = model.domain != "plane-stress" and model.material.is_nearly_incompressible
     size = _size(model, zone, axes, mixed)
     runs, free = _runs(model, size, d), sum(leg.steps == "auto" for leg in model.legs)
     fixed = sum(leg.steps for leg in model.legs if isinstance(leg.steps, int))

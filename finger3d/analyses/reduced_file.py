@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.contact.rules import RULES
 from finger3d.errors import Finger3dError
+from finger3d.fem.material import Isotropic
 from finger3d.fem.traces import BoundarySurface
 from finger3d.geometry.design import DesignSummary
 from finger3d.io import atomic, read_arrays
 from finger3d.mechanics.history import ContactPoints
-from finger3d.mechanics.model import Gauge, Leg, Material, MeshOptions, Model
+from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.problem import ContactSystem, Problem
 from finger3d.mechanics.symmetry import Symmetry
 from finger3d.objects import OBJECTS, MeshObject, RigidObject
@@ -185,7 +186,7 @@ def _header(problem: Problem) -> dict[str, Any]:
     placed = {f.name: getattr(thing, f.name) for f in fields(thing) if f.name != "surface"}
     return {
         "body": asdict(model.design),
-        "material": asdict(model.material),
+        "material": asdict(model.material.isotropic("a reduced model")),
         "mesh": asdict(model.mesh),
         "legs": [asdict(leg) for leg in model.legs],
         "object": {"kind": type(thing).__name__, **placed},
@@ -215,7 +216,7 @@ def _model(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> Model:
         raise ValueError("rule")
     if not header["legs"] or not set(header["axes"]) <= {"x", "z"} or _number(header["touch_mm"]) <= 0.0:
         raise ValueError("legs, axes or touch_mm")
-    body, material = _dataclass(DesignSummary, header["body"]), _dataclass(Material, header["material"])
+    body, material = _dataclass(DesignSummary, header["body"]), _dataclass(Isotropic, header["material"])
     legs = tuple(_dataclass(Leg, leg) for leg in header["legs"])
     if not (body.height_mm > 0.0 < body.width_mm and material.E_MPa > 0.0 <= material.nu <= 0.5):
         raise ValueError("body or material")

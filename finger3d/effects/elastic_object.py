@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from finger3d._ranges import Length, Modulus, Poisson
 from finger3d.effects.base import fill, warn
 from finger3d.errors import Finger3dError
-from finger3d.fem.assembly import Elasticity, stiffness
+from finger3d.fem.assembly import stiffness
 from finger3d.fem.condense import condense
+from finger3d.fem.material import Isotropic
 from finger3d.fem.simplex import Mesh, axis_numbers, reflected
 from finger3d.fem.transfer import facing_trace
 from finger3d.geometry.design import Design
@@ -62,7 +63,7 @@ class SoftObject:
         images = 1
         if whole and axes:  # the body is meshed whole: all images of a point are pressed alike
             rows, images = _all_images(problem, mesh, frame), 2 ** len(axes)
-        elastic = Elasticity.of(self.E_MPa, self.nu, model.domain == "plane-stress")
+        elastic = Isotropic(self.E_MPa, self.nu).elasticity(model.domain == "plane-stress")
         say(f"condensing the object's {mesh.points.size} unknowns")
         matrix = stiffness(mesh, elastic, problem.thickness)
         held = held_dofs(mesh, () if whole else axes, model.held_ends)

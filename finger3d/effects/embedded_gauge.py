@@ -79,7 +79,8 @@ class Strips:
 def _alone(model: Model, foils: list[FoilPatches]) -> Float:
     """Compliance of all bars in a body without end."""
     section = None if model.domain == "solid" else model.design.width_mm
-    body = InfiniteBody(model.material.E_MPa, model.material.nu, model.domain == "plane-stress", section)
+    material = model.material.isotropic("effects.embedded_gauge")
+    body = InfiniteBody(material.E_MPa, material.nu, model.domain == "plane-stress", section)
     whole = np.block([[a.strained_by(b, body) for b in foils] for a in foils])
     return 0.5 * (whole + whole.T)
 

@@ -62,7 +62,7 @@ class FiniteStrain:
         return NewtonWorkspace()
 
     def _law(self, problem: Problem) -> NeoHooke:
-        material = problem.model.material
+        material = problem.model.material.isotropic("effects.large_deformation")
         return NeoHooke.of(material.E_MPa, material.nu, problem.model.domain == "plane-stress")
 
     def start(self, problem: Problem) -> DeformedState:
@@ -296,4 +296,5 @@ class Effect:
 
     def apply(self, model: Model) -> Model:
         """Fill the kinematics slot."""
+        model.material.isotropic("effects.large_deformation")
         return fill(model, "formulation", FiniteStrain(), "large_deformation")

@@ -28,8 +28,9 @@ from finger3d._ranges import Fraction, Seconds
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.effects.base import fill
 from finger3d.errors import Finger3dError
-from finger3d.fem.assembly import Elasticity, Stiffness, stiffness
+from finger3d.fem.assembly import Stiffness, stiffness
 from finger3d.fem.condense import Condensation, spring_forces, stiffened
+from finger3d.fem.material import Elasticity
 from finger3d.fem.recover import across, displacement, nodal_strain, pressure, stress
 from finger3d.mechanics.formulation import SmallStrain, Workspace, length_scale, solve_contact
 from finger3d.mechanics.history import ObjectPose
@@ -211,11 +212,15 @@ class ConstantBulkModulus:
         return self._own + len(self.problem.inclusions.subgrid_compliance)
 
     @property
+    def _elastic(self) -> Elasticity:
+        return self.problem.model.material.isotropic("effects.viscosity.bulk = false").elasticity()
+
+    @property
     def _bulk(self) -> float:
-        return self.problem.elastic.lame + 2.0 / 3.0 * self.problem.elastic.shear
+        return self._elastic.lame + 2.0 / 3.0 * self._elastic.shear
 
     def _lame(self, alpha: float) -> float:
-        return self._bulk - 2.0 / 3.0 * alpha * self.problem.elastic.shear
+        return self._bulk - 2.0 / 3.0 * alpha * self._elastic.shear
 
     def respond(self, step: Step, memory: InternalVariables, workspace: RelaxationWorkspace) -> Response:
         """The body with its shear modulus times alpha; the past is a load on all of it."""
@@ -239,7 +244,7 @@ class ConstantBulkModulus:
     def _shear_part(self, workspace: RelaxationWorkspace) -> sp.csr_matrix:
         """K_s (displacement form): the deviatoric stiffness, in the plane of a section too."""
         if workspace.shear_part is None:
-            problem, shear = self.problem, self.problem.elastic.shear
+            problem, shear = self.problem, self._elastic.shear
             part = Elasticity(shear, -2.0 / 3.0 * shear, False)
             workspace.shear_part = stiffness(problem.mesh, part, problem.thickness).upper
         return workspace.shear_part
@@ -253,7 +258,7 @@ class ConstantBulkModulus:
         upper, n = whole.upper.copy(), problem.mesh.points.size
         row = np.repeat(np.arange(upper.shape[0]), np.diff(upper.indptr))
         upper.data[upper.indices < n] *= alpha
-        upper.data[row >= n] *= problem.elastic.lame / self._lame(alpha)
+        upper.data[row >= n] *= self._elastic.lame / self._lame(alpha)
         return Stiffness(upper, whole.pressure_vertices, whole.pressure_scale)
 
     def _shear_force(self, shape: Float, workspace: RelaxationWorkspace) -> Float:
@@ -262,7 +267,7 @@ class ConstantBulkModulus:
         if not problem.elastic.mixed:
             return _times(self._shear_part(workspace), shape)
         deviator = shape.copy()
-        deviator[n:] *= -2.0 / 3.0 * problem.elastic.shear / problem.stiffness.pressure_scale
+        deviator[n:] *= -2.0 / 3.0 * self._elastic.shear / problem.stiffness.pressure_scale
         load = _times(problem.stiffness.upper, deviator)
         load[n:] = 0.0
         return load
@@ -271,7 +276,7 @@ class ConstantBulkModulus:
         """The displacements as they are."""
         n = self.problem.mesh.points.size
         out = now[: self._own].copy()
-        out[n:] *= self.problem.elastic.lame / self.problem.stiffness.pressure_scale
+        out[n:] *= self._elastic.lame / self.problem.stiffness.pressure_scale
         return out
 
     def read(self, now: Float) -> Float:
@@ -282,7 +287,7 @@ class ConstantBulkModulus:
 
     def stress(self, prony: Prony, memory: InternalVariables) -> Float:
         """2 G dev(eps) of what has not relaxed, and the bulk modulus times the dilatation as it is; (n, 3, 3)."""
-        shear, left = self.problem.elastic.shear, relaxed(prony, memory)
+        shear, left = self._elastic.shear, relaxed(prony, memory)
         strain, swelling = self._strain(left[: self._own])
         spherical = self._bulk * self._strain(memory.elastic[: self._own])[1] - 2.0 / 3.0 * shear * swelling
         d = self.problem.dim
@@ -395,7 +400,7 @@ class Viscoelastic(SmallStrain):
         if problem.dim == 3:
             return u, strain, sigma
         material, plane_strain = problem.model.material, problem.model.domain == "plane-strain"
-        whole = across(strain, sigma[:, :2, :2], material.E_MPa, material.nu, plane_strain)
+        whole = across(strain, sigma[:, :2, :2], material, plane_strain)
         return u, whole[0], (whole[1] if self.bulk else sigma)
 
 

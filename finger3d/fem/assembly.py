@@ -1,7 +1,7 @@
-"""Stiffness of linear isotropic elasticity, displacement or mixed, in 2D and 3D by the same text.
+"""Stiffness of linear elasticity in the displacement form or the mixed form, in two and three dimensions.
 
-Displacement form: ``lam div(u) div(v) + 2 G eps(u):eps(v)``.  Mixed form (Taylor-Hood, quadratic u and linear p):
-``2 G eps(u):eps(v) + p div(v) + q div(u) - p q / lam`` with p = lam div(u), which stays finite at nu = 0.5.
+Displacement form: ``eps(v) : C : eps(u)``. Mixed form (Taylor-Hood, quadratic u and linear p):
+``eps(v) : C : eps(u) + p div(v) + q div(u) - p q / lam`` with p = lam div(u), which stays finite at nu = 0.5.
 """
 
 from __future__ import annotations
@@ -15,42 +15,15 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from finger3d.fem.elements import quadrature
+from finger3d.fem.material import LinearElasticity
 from finger3d.fem.simplex import Mesh
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 AnyInt = NDArray[np.int32] | NDArray[np.int64]
 
-MIXED_FROM = 0.48
-"""Poisson's ratio from which the mixed form is used: near 1/2 linear elements lock (validation/cook.py), and the
-pressure of quadratic ones oscillates."""
-
-# The compressibility 1/lam never falls below this share of 1/G: it keeps every pivot away from zero at nu = 0.5,
-# where it changes results by about 1e-7 (relative), below any mesh error.
-_LEAST_COMPRESSIBILITY = 1e-7
-
 # Cells at a time: so few that their matrices stay in a core's cache, and that the next ones find the memory at hand.
 _CHUNK = 256
-
-
-@dataclass(frozen=True)
-class Elasticity:
-    """Lame constants (MPa) as the assembled form uses them, for a state of 2D or 3D strain."""
-
-    shear: float
-    lame: float
-    mixed: bool
-
-    @classmethod
-    def of(cls, E_MPa: float, nu: float, plane_stress: bool = False, mixed: bool | None = None) -> Elasticity:
-        """From Young's modulus and Poisson's ratio; plane stress condenses the thickness strain into `lame`."""
-        shear = E_MPa / (2.0 * (1.0 + nu))
-        if plane_stress:
-            return cls(shear, E_MPa * nu / (1.0 - nu**2), False)
-        compressibility = (
-            max((1.0 - 2.0 * nu) * (1.0 + nu) / (E_MPa * nu), _LEAST_COMPRESSIBILITY / shear) if nu else np.inf
-        )
-        return cls(shear, 1.0 / compressibility, nu >= MIXED_FROM if mixed is None else mixed)
 
 
 @dataclass(frozen=True)
@@ -230,27 +203,20 @@ def _rows(start: Int, length: Int, count: int) -> Iterator[Int]:
         start = start + length
 
 
-def _cell_matrices(gradients: Float, weights: Float, elastic: Elasticity, lame: float) -> Float:
-    """Element stiffness (e, k, d, k, d) from gradients (e, q, k, d) and weights (e, q)."""
+def _outer_products(gradients: Float, weights: Float) -> Float:
+    """Integrals (e, k, d, k, d) of G_am G_bn, from gradients G (e, q, k, d) and weights (e, q)."""
     e, q, k, d = gradients.shape
     flat = gradients.reshape(e, q, k * d)
-    outer = np.matmul(np.swapaxes(flat * weights[:, :, None], 1, 2), flat).reshape(e, k, d, k, d)
-    cell = elastic.shear * np.swapaxes(outer, 2, 4)  # outer[e, a, i, b, j] = sum_q w G_ai G_bj
-    if lame:
-        cell += lame * outer
-    laplace = elastic.shear * np.einsum("eaibi->eab", outer)
-    for i in range(d):
-        cell[:, :, i, :, i] += laplace
-    return cell
+    return np.matmul(np.swapaxes(flat * weights[:, :, None], 1, 2), flat).reshape(e, k, d, k, d)
 
 
-def stiffness(mesh: Mesh, elastic: Elasticity, thickness: float = 1.0) -> Stiffness:
+def stiffness(mesh: Mesh, elastic: LinearElasticity, thickness: float = 1.0) -> Stiffness:
     """Assemble the upper triangle.
 
     Parameters
     ----------
     mesh : linear or quadratic mesh
-    elastic : constants; `mixed` needs a quadratic mesh
+    elastic : the law; the mixed form needs a quadratic mesh
     thickness : mm
         Width of a 2D section (1 for a solid), so that forces are N.
     """
@@ -259,17 +225,17 @@ def stiffness(mesh: Mesh, elastic: Elasticity, thickness: float = 1.0) -> Stiffn
     pattern = Pattern.of(mesh, elastic.mixed)
     data = np.zeros(len(pattern.indices))
     hats = bary  # the linear shape functions
-    scale = pressure_scale(mesh, elastic.shear) if elastic.mixed else 1.0
-    lame = 0.0 if elastic.mixed else elastic.lame
+    scale = pressure_scale(mesh, elastic.shear_modulus) if elastic.mixed else 1.0
     for part in cell_parts(mesh):
         gradients, det = mesh.element.physical_gradients(mesh.points[mesh.cells[part]], bary)
         weights = det * (w * thickness)
-        pattern.add(data, part, _cell_matrices(gradients, weights, elastic, lame))
+        pattern.add(data, part, elastic.contract(_outer_products(gradients, weights)))
         if elastic.mixed:
             weighted = np.swapaxes(weights[:, :, None] * hats, 1, 2)  # (e, p, q)
             e, q, k, _ = gradients.shape
             coupling = np.matmul(scale * weighted, gradients.reshape(e, q, k * d)).reshape(e, -1, k, d)
-            pattern.add_pressure(data, part, coupling, -(scale**2) / elastic.lame * np.matmul(weighted, hats))
+            mass = -(scale**2) / elastic.pressure_modulus * np.matmul(weighted, hats)
+            pattern.add_pressure(data, part, coupling, mass)
     return Stiffness(pattern.matrix(data), pattern.vertices, scale)
 
 

@@ -13,15 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.fem.assembly import MIXED_FROM, Pattern, Stiffness, cell_parts, pressure_scale
+from finger3d.fem.assembly import Pattern, Stiffness, cell_parts, pressure_scale
 from finger3d.fem.elements import quadrature
 from finger3d.fem.locate import cells_at
+from finger3d.fem.material import LEAST_COMPRESSIBILITY, MIXED_FROM
 from finger3d.fem.recover import displacement, nodal_gradient, nodal_pressure
 from finger3d.fem.simplex import Mesh
 
 Float = NDArray[np.float64]
 
-_LEAST_COMPRESSIBILITY = 1e-7  # 1 / K in units of 1 / G, as in the linear form
 _THICKNESS_ITERATIONS = 30
 
 
@@ -42,7 +42,7 @@ class NeoHooke:
     def of(cls, E_MPa: float, nu: float, plane_stress: bool = False) -> NeoHooke:
         """Same small-strain limit as Young's modulus and Poisson's ratio."""
         shear = E_MPa / (2.0 * (1.0 + nu))
-        compressibility = max(3.0 * (1.0 - 2.0 * nu) / E_MPa, _LEAST_COMPRESSIBILITY / shear)
+        compressibility = max(3.0 * (1.0 - 2.0 * nu) / E_MPa, LEAST_COMPRESSIBILITY / shear)
         return cls(shear, 1.0 / compressibility, nu >= MIXED_FROM and not plane_stress, plane_stress)
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.fem.assembly import Elasticity, Stiffness
+from finger3d.fem.assembly import Stiffness
+from finger3d.fem.material import LinearElasticity, Material
 from finger3d.fem.simplex import Mesh
 
 Float = NDArray[np.float64]
@@ -52,20 +53,15 @@ def nodal_strain(mesh: Mesh, u: Float) -> Float:
     return 0.5 * (slope + np.swapaxes(slope, 1, 2))
 
 
-def stress(strain: Float, elastic: Elasticity, p: Float | None = None) -> Float:
-    """Stress (n, d, d) MPa from strain; with `p` (n,) MPa of the mixed form in place of lam tr(strain)."""
-    d = strain.shape[-1]
-    spherical = elastic.lame * np.trace(strain, axis1=1, axis2=2) if p is None else p
-    return 2.0 * elastic.shear * strain + spherical[:, None, None] * np.eye(d)
+def stress(strain: Float, elastic: LinearElasticity, p: Float | None = None) -> Float:
+    """Stress (n, d, d) MPa from strain, with the pressure `p` (n,) MPa of the mixed form."""
+    out = elastic.stress(strain)
+    return out if p is None else out + p[:, None, None] * np.eye(strain.shape[-1])
 
 
-def across(strain: Float, sigma: Float, modulus: float, nu: float, plane_strain: bool) -> tuple[Float, Float]:
+def across(strain: Float, sigma: Float, material: Material, plane_strain: bool) -> tuple[Float, Float]:
     """Strain and stress (n, 3, 3) of a section (n, 2, 2), with what plane strain or plane stress implies across it."""
     e, s = np.zeros((len(strain), 3, 3)), np.zeros((len(strain), 3, 3))
     e[:, :2, :2], s[:, :2, :2] = strain, sigma
-    in_plane = np.trace(sigma, axis1=1, axis2=2)
-    if plane_strain:
-        s[:, 2, 2] = nu * in_plane
-    else:
-        e[:, 2, 2] = -nu / modulus * in_plane
+    e[:, 2, 2], s[:, 2, 2] = material.across(strain, sigma, plane_strain)
     return e, s

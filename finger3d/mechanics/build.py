@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from finger3d.fem.assembly import Elasticity, stiffness
+from finger3d.fem.assembly import stiffness
 from finger3d.fem.condense import condense, stiffened
 from finger3d.fem.simplex import Mesh
 from finger3d.fem.traces import BoundarySurface, local_rows, restrict, surface
@@ -73,7 +73,7 @@ def build(model: Model, say: Say = lambda text: None, margin: float = MARGIN) ->
     check(model, face, contact.first_contact_mm, contact.place, axes)
     say("assembling")
     start = time.perf_counter()
-    elastic = Elasticity.of(model.material.E_MPa, model.material.nu, model.domain == "plane-stress")
+    elastic = model.material.elasticity(model.domain == "plane-stress")
     matrix = stiffness(mesh, elastic, thickness)
     candidates = candidate_points(model, face, contact.first_contact_mm, margin)
     active = active_dofs(candidates, axes)

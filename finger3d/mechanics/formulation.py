@@ -202,4 +202,4 @@ class SmallStrain:
         if problem.dim == 3:
             return u, strain, sigma
         material, plane_strain = problem.model.material, problem.model.domain == "plane-strain"
-        return u, *across(strain, sigma, material.E_MPa, material.nu, plane_strain)
+        return u, *across(strain, sigma, material, plane_strain)

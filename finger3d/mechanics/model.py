@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.contact.rules import RuleName
+from finger3d.fem.material import Material
 from finger3d.geometry.design import Design
 from finger3d.mechanics.formulation import Formulation, SmallStrain
 from finger3d.mechanics.gauges import Gauge
@@ -21,14 +22,6 @@ if TYPE_CHECKING:
 
 Float = NDArray[np.float64]
 Domain = Literal["solid", "plane-strain", "plane-stress"]
-
-
-@dataclass(frozen=True)
-class Material:
-    """Isotropic elasticity: Young's modulus (MPa) and Poisson's ratio, 0 <= nu <= 0.5."""
-
-    E_MPa: float
-    nu: float
 
 
 @dataclass(frozen=True)

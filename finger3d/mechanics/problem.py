@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from finger3d.contact.newton import uniqueness
 from finger3d.contact.state import ContactState
 from finger3d.errors import Finger3dError
-from finger3d.fem.assembly import Elasticity, Stiffness
+from finger3d.fem.assembly import Stiffness
 from finger3d.fem.condense import Condensation, spring_forces
+from finger3d.fem.material import LinearElasticity
 from finger3d.fem.simplex import Mesh
 from finger3d.fem.traces import BoundarySurface
 from finger3d.mechanics.history import ContactPoints, ObjectPose
@@ -40,7 +41,7 @@ class Part:
 
     mesh: Mesh
     report: MeshReport
-    elastic: Elasticity
+    elastic: LinearElasticity
     stiffness: Stiffness
     thickness: float
     fixed_dofs: NDArray[np.int64]
@@ -133,7 +134,7 @@ class Problem:
         return self.part.report
 
     @property
-    def elastic(self) -> Elasticity:
+    def elastic(self) -> LinearElasticity:
         """Elastic constants."""
         return self.part.elastic
 

@@ -14,10 +14,11 @@ from pydantic import ValidationError
 from finger3d._ranges import PathName, one_line, printable
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
+from finger3d.fem.material import Isotropic
 from finger3d.geometry.design import Design
 from finger3d.geometry.files import SUFFIXES
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.model import Domain, Gauge, Leg, Material, MeshOptions, Model, contact_path
+from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model, contact_path
 from finger3d.objects import OBJECTS, RigidObject, initial_contact
 from finger3d.scene import checks, files, tree
 from finger3d.scene.messages import Place, choose, described, dotted, listed, messages_from, nearest, shown, unknown
@@ -104,7 +105,7 @@ class Scene:
         t = self.tables
         model = Model(
             design=self.design,
-            material=Material(t.material.E_MPa, t.material.nu),
+            material=Isotropic(t.material.E_MPa, t.material.nu),
             mesh=self.mesh,
             legs=self.legs,
             object=self.object,

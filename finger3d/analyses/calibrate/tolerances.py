@@ -24,8 +24,8 @@ from finger3d.analyses.calibrate.increments import Increments, increment_error
 from finger3d.analyses.calibrate.presses import Like, presses
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.errors import Finger3dError
-from finger3d.fem.assembly import MIXED_FROM
 from finger3d.fem.condense import stiffened
+from finger3d.fem.material import MIXED_FROM
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.path import targets
@@ -221,8 +221,9 @@ def _steps(body: ReferenceBody, name: str, sd: float) -> Iterator[tuple[float, F
         # strains do not know the modulus unless something else in the scene has a stiffness too
         yield sd, np.zeros(len(body.mu)) if alone else body.change(with_modulus(problem, 1.0 + 0.01 * sd))
     elif name == "nu":
-        step = _step_of_nu(model.material.nu, sd)
-        yield step, body.change(body.rebuilt(material=replace(model.material, nu=model.material.nu + step)))
+        material = model.material.isotropic("the tolerance of nu")
+        step = _step_of_nu(material.nu, sd)
+        yield step, body.change(body.rebuilt(material=replace(material, nu=material.nu + step)))
     elif name == "tilt_deg":
         yield from _tilted(body, sd)
     elif name in _PLACES and model.inclusions:  # a foil stiffens the body where it lies
@@ -255,8 +256,8 @@ def _step_of_nu(nu: float, sd: float) -> float:
 def with_modulus(problem: Problem, times: float) -> Problem:
     """The problem with its Young's modulus multiplied, in small strain from the same condensation."""
     if not problem.model.formulation.is_linear_elastic:
-        material = replace(problem.model.material, E_MPa=problem.model.material.E_MPa * times)
-        return build(replace(problem.model, material=material))
+        material = problem.model.material.isotropic("the tolerance of E_MPa")
+        return build(replace(problem.model, material=replace(material, E_MPa=material.E_MPa * times)))
     c, d = problem.delassus.shape[:2]
 
     def soft(one: Problem) -> Problem:
