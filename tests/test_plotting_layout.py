@@ -26,7 +26,7 @@ from finger3d.sensor.curve import Calibration, Tolerance
 from finger3d.sensor.maps import StrainMap
 from tests.test_plotting_figures import MU, STEPS, finger, pressed
 
-SHOWN = 704  # CSS pixels of the narrowest picture in a page: 44 rem
+SHOWN = 960  # CSS pixels of the narrowest picture in a page: 60 rem
 LEGIBLE = 7  # CSS pixels of an em: below, lower-case letters have less than four pixels
 
 GAUGE = Gauge("g36", 36.0, 40.0)

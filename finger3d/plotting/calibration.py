@@ -50,7 +50,7 @@ def curve_panel(axes: Any, c: Calibration) -> None:
         axes.axvline(at, color="#888888", ls=":", lw=1.0, label="did not converge" if i == 0 else None)
     axes.set_ylabel("strain along the gauge")
     _plain(axes)
-    axes.legend(frameon=False, fontsize=8.5, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2)
+    axes.legend(frameon=False, fontsize=9, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2)
 
 
 def _resolution(axes: Any, c: Calibration) -> None:
@@ -68,7 +68,7 @@ def _resolution(axes: Any, c: Calibration) -> None:
     axes.set_ylim(low, max(_MOST * c.limit, 2.0 * float(np.median(np.minimum(whole, 1e3)))))
     axes.set_ylabel("standard deviation of mu")
     _plain(axes)
-    axes.legend(frameon=False, fontsize=8.5, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2)
+    axes.legend(frameon=False, fontsize=9, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2)
 
 
 def _causes(axes: Any, c: Calibration) -> None:
@@ -99,6 +99,6 @@ def _causes(axes: Any, c: Calibration) -> None:
     axes.set_ylabel("share of the variance of mu")
     _plain(axes)
     axes.legend(
-        fontsize=8.5, loc="upper right", bbox_to_anchor=(1.02, -0.14), ncols=3, frameon=False, columnspacing=1.0,
+        fontsize=9, loc="upper right", bbox_to_anchor=(1.02, -0.14), ncols=3, frameon=False, columnspacing=1.0,
         handlelength=1.4,
     )  # fmt: skip
