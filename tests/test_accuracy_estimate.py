@@ -12,18 +12,13 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from finger3d.accuracy import estimate as accuracy
-from finger3d.accuracy.estimate import (
-    ORDER,
-    Grain,
-    coarser,
-    companion,
-    estimate,
-    main_numbers,
-    mesh_error,
-    strain_error,
-)
+from finger3d.accuracy import companions
+from finger3d.accuracy.companions import coarser, companion
+from finger3d.accuracy.error_bars import ErrorBars
+from finger3d.accuracy.estimate import estimate, main_numbers, strain_error
+from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.accuracy.refine import judged
+from finger3d.accuracy.richardson import ORDER, mesh_error
 from finger3d.cli import main
 from finger3d.contact.friction import STICK, Coulomb
 from finger3d.effects.elastic_object import SoftObject
@@ -41,7 +36,6 @@ from finger3d.objects import Sphere
 from finger3d.scene import load
 from tests.scenes import HALF_CYLINDER, changed, solid
 
-FAST = {"assembly": 1.0, "contact": 0.1}
 SCENE = changed(HALF_CYLINDER, domain="plane-strain")
 
 
@@ -76,19 +70,21 @@ def test_an_error_of_the_assumed_order_is_found_exactly() -> None:
     exact, scale = 7.0, 0.3
     fine, coarse = ({"normal_force_N": exact + scale * h**ORDER, "gauge_g": 0.0} for h in (1.0, 2.0))
     # the grain is so fine that its floor, 0.1 * share^2 of the force, lies far below
-    found = mesh_error(fine, coarse, 2.0, (Grain(1e-3, 1e-3), Grain(2e-3, 2e-3)))
+    found = mesh_error(fine, coarse, 2.0, (PointResolution(1e-3, 1e-3), PointResolution(2e-3, 2e-3)))
     assert found["normal_force_N"] == pytest.approx(scale, rel=1e-12)
 
 
 def test_a_length_is_never_better_than_half_the_distance_of_points() -> None:
     same = {"contact_half_length_mm": 3.0}
-    assert mesh_error(same, same, 2.0, (Grain(0.2, 0.1), Grain(0.4, 0.2))) == {"contact_half_length_mm": 0.1}
+    assert mesh_error(same, same, 2.0, (PointResolution(0.2, 0.1), PointResolution(0.4, 0.2))) == {
+        "contact_half_length_mm": 0.1
+    }
 
 
 def test_the_true_error_of_every_number_is_below_twice_the_estimate() -> None:
     # error bars claim a factor 2 in 90 % of cases, which validation/error_bars.py judges; these are typical ones
     problem, frames = pressed(half_cylinder(0.2))
-    found = estimate(problem, frames, FAST)
+    found = estimate(problem, frames)
     truth = last_of(half_cylinder(0.05))
     told = main_numbers(problem, frames[-1])
     assert set(found.discretisation) == set(found.steps) == set(told)
@@ -119,10 +115,27 @@ def test_few_increments_are_judged_by_more() -> None:
 
 
 def test_where_marching_is_dear_increments_are_judged_on_the_companion() -> None:
-    problem, frames = pressed(half_cylinder(0.1))
-    found = estimate(problem, frames, {"assembly": 9.0, "contact": 1.0})
-    assert "steps: twice and four times as many on the coarse mesh" in found.method
+    problem, frames = pressed(half_cylinder(0.1, steps=40))
+    found = estimate(problem, frames)
+    assert "on the coarse mesh" in found.method
     assert found.steps["friction_sum_N"] > 0.0
+
+
+def test_error_bars_do_not_depend_on_how_long_the_press_takes(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem, frames = pressed(half_cylinder(0.2, steps=40))
+    found = estimate(problem, frames)
+    clock = iter(range(0, 10_000_000, 1000))
+    monkeypatch.setattr("time.perf_counter", lambda: float(next(clock)))
+    slow = estimate(problem, frames)
+    assert (slow.discretisation, slow.steps, slow.method) == (found.discretisation, found.steps, found.method)
+
+
+def test_an_error_bar_is_the_sum_of_both_errors() -> None:
+    bars = ErrorBars(discretisation={"normal_force_N": 0.3, "gauge_g": 0.1}, steps={"normal_force_N": 0.2})
+    assert bars.totals() == {"normal_force_N": 0.5, "gauge_g": 0.1}
+    assert bars.total("friction_sum_N") is None
+    assert ErrorBars.of_summary({"error_estimate": bars.as_dict()}) == bars
+    assert ErrorBars.of_summary({"error_estimate": None}).totals() == {}
 
 
 def test_the_companion_stays_within_the_finger() -> None:
@@ -151,7 +164,7 @@ def test_press_prints_error_bars_and_keeps_them(tmp_path: Path, capsys: pytest.C
 def test_a_mesh_than_which_none_is_coarser_is_judged_by_a_finer_one() -> None:
     model = half_cylinder(3.0)
     problem, frames = pressed(replace(model, mesh=MeshOptions(3.0, 5.0, "swept")))
-    found = estimate(problem, frames, FAST)
+    found = estimate(problem, frames)
     assert "(structured, 1.5 and 2.5 mm) beside, finer, order 1.2" in found.method
     told, truth = main_numbers(problem, frames[-1]), last_of(half_cylinder(0.05))
     assert set(found.discretisation) == set(told)
@@ -165,7 +178,7 @@ def test_a_mesh_than_which_none_is_coarser_is_judged_by_a_finer_one() -> None:
 def test_an_error_is_found_exactly_from_a_finer_mesh_too() -> None:
     exact, scale = 7.0, 0.3
     own, finer = ({"normal_force_N": exact + scale * h**ORDER} for h in (1.0, 0.5))
-    found = mesh_error(own, finer, 0.5, (Grain(1e-3, 1e-3), Grain(5e-4, 5e-4)))
+    found = mesh_error(own, finer, 0.5, (PointResolution(1e-3, 1e-3), PointResolution(5e-4, 5e-4)))
     assert found["normal_force_N"] == pytest.approx(scale, rel=1e-12)
 
 
@@ -174,7 +187,7 @@ def test_one_point_that_touches_tells_nothing_of_friction(mu: float, least: floa
     # on the plane of symmetry it has none, on the companion either; with friction on, "0 +- 0" would be a lie
     model = replace(half_cylinder(3.0), mesh=MeshOptions(3.0, 5.0, "swept"), legs=(Leg(0.6, steps=10),))
     problem, frames = pressed(replace(model, friction=Coulomb(mu)))
-    told, found = main_numbers(problem, frames[-1]), estimate(problem, frames, FAST)
+    told, found = main_numbers(problem, frames[-1]), estimate(problem, frames)
     assert told["friction_sum_N"] == pytest.approx(0.0, abs=1e-12)
     # a tenth of the force, the floor of a contact no longer than the distance of its points
     assert found.discretisation["friction_sum_N"] == pytest.approx(least * told["normal_force_N"], abs=1e-12)
@@ -188,7 +201,7 @@ def test_a_gauges_error_at_several_coefficients_is_that_of_several_gauges() -> N
     # the first from the change and the ratio of edges, the second from the floor, a share of the largest strain
     ratio = (problem.mesh.points.size / beside.mesh.points.size) ** 0.5
     assert found[0] == pytest.approx(0.01 / (ratio**ORDER - 1.0), rel=1e-12)
-    assert found[1] == pytest.approx(0.1 * Grain.of(problem, frames[-1]).share * 0.03, rel=1e-12)
+    assert found[1] == pytest.approx(0.1 * PointResolution.of(problem, frames[-1]).share * 0.03, rel=1e-12)
 
 
 def test_a_press_on_the_coarsest_of_meshes_prints_its_bars(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -207,7 +220,7 @@ def test_an_estimate_that_fails_spoils_nothing_and_says_why(
     def none(problem: Problem, say: object) -> Problem:
         raise Finger3dError("neither mesh can be made")
 
-    monkeypatch.setattr(accuracy, "companion", none)
+    monkeypatch.setattr("finger3d.accuracy.estimate.companion", none)
     scene = tmp_path / "scene.toml"
     scene.write_text(changed(SCENE, size_mm=0.4), encoding="utf-8")
     assert main(["press", str(scene), "--out", str(tmp_path / "out"), "--no-figures"]) == 0
@@ -226,9 +239,12 @@ class Lump:
     name: ClassVar[str] = "lump"
 
     def __getattr__(self, name: str) -> Any:
-        if name in ("section", "block"):
+        if name == "block":
             raise AttributeError(name)
         return getattr(self.block, name)
+
+    def section(self) -> None:
+        """A body without a section cannot be swept."""
 
 
 @pytest.fixture
@@ -259,23 +275,23 @@ def unstructured(**more: Any) -> Model:
 
 
 def test_a_cached_mesh_without_its_companion_gets_one_and_pays_once(made: list[str], monkeypatch: Any) -> None:
-    monkeypatch.setattr(accuracy, "_LEAST_UNSTRUCTURED", 0)
+    monkeypatch.setattr(companions, "_LEAST_UNSTRUCTURED_UNKNOWNS", 0)
     pressed(unstructured())
     problem, frames = pressed(unstructured())
     assert problem.report.from_cache
     assert made == ["lump"]
-    found = estimate(problem, frames, FAST)
+    found = estimate(problem, frames)
     assert "(ftetwild, 0.8 and 2 mm) beside, order" in found.method
     assert found.discretisation["normal_force_N"] > 0.0
     assert made == ["lump", "lump"]
-    again = estimate(problem, frames, FAST)
+    again = estimate(problem, frames)
     assert again.discretisation == found.discretisation
     assert made == ["lump", "lump"]
 
 
 def test_a_small_unstructured_mesh_is_judged_by_a_finer_one(made: list[str]) -> None:
     problem, frames = pressed(unstructured())
-    found = estimate(problem, frames, FAST)
+    found = estimate(problem, frames)
     assert "(ftetwild, 0.2 and 0.5 mm) beside, finer, order" in found.method
     assert made == ["lump", "lump"]
 
@@ -289,7 +305,7 @@ def test_a_body_meshed_finer_than_asked_for_is_judged_by_one_still_finer(made: l
         return build(replace(model, mesh=mesh), *more)
 
     model = replace(unstructured(), mesh=MeshOptions(0.8, 2.0, "ftetwild"))
-    monkeypatch.setattr(accuracy, "build", no_coarser_than)
+    monkeypatch.setattr(companions, "build", no_coarser_than)
     problem = replace(no_coarser_than(model), model=model)
     assert companion(problem).mesh.points.size > 1.5 * problem.mesh.points.size
     assert asked == [0.8, 0.4, 0.2]
@@ -299,11 +315,11 @@ def test_an_elastic_ball_is_meshed_anew_for_the_companion_and_kept(made: list[st
     soft = replace(unstructured(object_compliance=SoftObject(1.0, 0.45)), mesh=MeshOptions(0.4, 1.0, "swept"))
     problem, frames = pressed(replace(soft, design=soft.design.block))
     assert made == ["hemisphere"]
-    found = estimate(problem, frames, FAST)
+    found = estimate(problem, frames)
     assert "of both bodies" in found.method
     assert made == ["hemisphere", "hemisphere"]
     assert 0.0 < found.discretisation["normal_force_N"] < 0.1 * main_numbers(problem, frames[-1])["normal_force_N"]
-    assert estimate(problem, frames, FAST).discretisation == found.discretisation
+    assert estimate(problem, frames).discretisation == found.discretisation
     assert made == ["hemisphere", "hemisphere"]
 
 
@@ -349,7 +365,7 @@ def test_the_friction_sum_of_a_swept_solid_is_within_two_bars() -> None:
     # truth: 34.61 at 1 mm (34.6 at 0.75 mm), 10 increments in both; nine tenths of the sum are friction along z
     for size in (4.0, 2.8):
         problem, frames = pressed(fig9(size))
-        bar = estimate(problem, frames, FAST).discretisation["friction_sum_N"]
+        bar = estimate(problem, frames).discretisation["friction_sum_N"]
         assert abs(main_numbers(problem, frames[-1])["friction_sum_N"] - 34.61) <= 2.0 * bar
         assert bar <= 0.2 * 34.61
 
@@ -369,7 +385,7 @@ def test_a_stick_zone_one_row_wide_is_not_resolved() -> None:
     # Fig. 9 at 2 mm: the points that stick are a single row at z = 0; at 0.75 mm, 10 increments, the stick length is
     # 62.1 mm and the area 171.5 mm2
     problem, frames = pressed(fig9(2.0, mu=0.25, nu=0.49))
-    told, found = main_numbers(problem, frames[-1]), estimate(problem, frames, FAST).discretisation
+    told, found = main_numbers(problem, frames[-1]), estimate(problem, frames).discretisation
     points, sticks = problem.points, frames[-1].state.status == STICK
     assert (points.points[sticks, 2] == 0.0).all()
     assert abs(2.0 * told["stick_half_length_mm"] - 62.1) <= 2.0 * 2.0 * found["stick_half_length_mm"]
@@ -391,7 +407,7 @@ def test_in_solids_a_tolerance_leaves_out_the_stick_zone() -> None:
 def test_friction_in_a_section_is_not_known_better_than_its_points_allow() -> None:
     # a companion may agree by chance; a quarter of the spacing over the half-length covers that, see the constant
     problem, frames = pressed(replace(half_cylinder(0.2), domain="plane-stress"))
-    told, grain = main_numbers(problem, frames[-1]), Grain.of(problem, frames[-1])
+    told, grain = main_numbers(problem, frames[-1]), PointResolution.of(problem, frames[-1])
     same = mesh_error(told, told, 2.0, (grain, grain))
     share = grain.spacing_mm / told["contact_half_length_mm"]
     assert same["friction_sum_N"] == pytest.approx(0.25 * share * told["friction_sum_N"], rel=1e-9)
@@ -403,9 +419,9 @@ def test_scenes_that_pytetwild_meshes_get_bars_that_tell_something(name: str) ->
     # edges longer than the scene's, to be quick; validation/error_bars.py judges the bars
     scene = load(Path(__file__).parents[1] / "geometries" / f"{name}.toml", ["mesh.size_mm=0.4"])
     problem, frames = pressed(scene.model())
-    found, told = estimate(problem, frames, FAST), main_numbers(problem, frames[-1])
+    found, told = estimate(problem, frames), main_numbers(problem, frames[-1])
     assert set(found.discretisation) == set(told)
     assert 0.0 < found.discretisation["normal_force_N"] < 0.1 * told["normal_force_N"]
-    again = estimate(problem, frames, FAST)
+    again = estimate(problem, frames)
     assert again.discretisation == pytest.approx(found.discretisation)
     assert "paid once" not in again.method

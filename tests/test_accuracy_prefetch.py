@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from finger3d.accuracy import prefetch
-from finger3d.accuracy.estimate import companion
+from finger3d.accuracy.companions import companion
 from finger3d.accuracy.prefetch import MeshPrefetch
 from finger3d.analyses.press import press
 from finger3d.mechanics.solve import build

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finger3d.accuracy.estimate import companion
+from finger3d.accuracy.companions import companion
 from finger3d.analyses.calibrate import presses as pressing
 from finger3d.analyses.calibrate import run as runs
 from finger3d.analyses.calibrate import tolerances as slopes

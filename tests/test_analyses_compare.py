@@ -12,7 +12,8 @@ import pytest
 from scenes import FIG9
 
 import finger3d.analyses.compare.run as compare_module
-from finger3d.accuracy.estimate import FACTOR, estimate
+from finger3d.accuracy.companions import FACTOR
+from finger3d.accuracy.estimate import estimate
 from finger3d.analyses.compare import cases
 from finger3d.analyses.compare.cases import resized, solved, widened
 from finger3d.analyses.compare.run import compare
@@ -142,11 +143,11 @@ def test_a_case_has_the_very_bars_of_a_press(scene, domain):
     problem = build(model)
     # what a press spends decides how its increments are judged: so much that four times as many are affordable here
     frames = tuple(march(problem))
-    bars = estimate(problem, frames, {"all": 60.0, "contact": 0.1})
+    bars = estimate(problem, frames)
     main = {FORCE: "normal_force_N", "friction_sum_N_per_mm": "friction_sum_N", "gauge_g36": "gauge_g36"}
     main |= {"contact_length_mm": "contact_half_length_mm", "stick_length_mm": "stick_half_length_mm"}
     # the same problem but for the points that never touch: round-off apart, the error of the mesh is the very same
-    found = estimate(problem, frames, {"all": 60.0, "contact": 0.1}, told=lambda p, f: cases.measured(p.points, f))
+    found = estimate(problem, frames, numbers=lambda p, f: cases.measured(p.points, f))
     for key, name in main.items():
         times = 2.0 if "length" in key else 1.0 if "gauge" in key else 1.0 / model.design.width_mm
         assert found.discretisation[key] == pytest.approx(times * bars.discretisation[name], rel=1e-6), key

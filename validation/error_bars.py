@@ -18,7 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.accuracy.estimate import Grain, companion, compared, main_numbers, press_numbers
+from finger3d.accuracy.companions import companion
+from finger3d.accuracy.estimate import compared, main_numbers, press_numbers
+from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.analyses.validate import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.elastic_object import SoftObject
@@ -221,7 +223,7 @@ def _by_steps(name: str, model: Model) -> Iterator[Judged]:
         if not ends[n].outcome.ok:
             return
     exact = press_numbers(problem, ends.pop(TRUE_STEPS))
-    spacing = Grain.of(problem, ends[STEPS[0]]).spacing_mm
+    spacing = PointResolution.of(problem, ends[STEPS[0]]).spacing_mm
     runs = [
         (f"{n} steps", press_numbers(problem, end), step_error(in_steps(n), press_numbers(problem, end), press_numbers))
         for n, end in ends.items()

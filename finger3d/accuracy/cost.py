@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from finger3d.accuracy.estimate import FACTORISATIONS
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.solve import AUTO_START, contact_box, symmetry
 from finger3d.mechanics.step_halving import automatic, condensation_s, contact_s, limits
@@ -19,7 +20,6 @@ _TETWILD_MB = 500.0  # while it meshes, however little
 _IMPORT_S = 0.4
 _FIGURES_S = {2: 1.0, 3: 4.5}
 _GAUGE_S, _GAUGE_CELL_S = 3e-3, 7e-7  # a gauge, and for every cell that is searched for it
-_NEWTON = 3  # factorisations in a step at finite strain
 _NUMERIC = 0.8  # of a condensation, once the ordering is known; with two solutions
 _TANGENT = 0.8  # assemblies of the linear stiffness
 _NEWTON_S = {2: 0.008, 3: 0.12}  # besides, in each step
@@ -109,9 +109,11 @@ def _costs(name: str, model: Model, size: _Size, seconds: dict[str, float], step
     condensation, assembly = seconds["condensation"], seconds["assembly"]
     factor_mb = _memory(size, d) - _BASE_MB
     if name == "large_deformation":
-        each = _NEWTON * _NUMERIC * condensation + (_NEWTON + 1) * _TANGENT * assembly + _NEWTON_S[d]
-        pressed = (_NEWTON - 1) * seconds["contact"]
-        return _Cost(steps * each + pressed, factor_mb, f"about {_NEWTON} factorisations in each of {steps} steps")
+        each = FACTORISATIONS * _NUMERIC * condensation + (FACTORISATIONS + 1) * _TANGENT * assembly + _NEWTON_S[d]
+        pressed = (FACTORISATIONS - 1) * seconds["contact"]
+        return _Cost(
+            steps * each + pressed, factor_mb, f"about {FACTORISATIONS} factorisations in each of {steps} steps"
+        )
     if name == "viscosity" and not getattr(model.formulation, "bulk", True):
         lengths = {leg.duration_s / leg.steps for leg in model.legs if leg.duration_s and leg.steps != "auto"}
         lengths_in_all = len(lengths) + runs * len({leg.duration_s for leg in model.legs if leg.steps == "auto"})

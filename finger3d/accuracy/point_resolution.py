@@ -23,7 +23,7 @@ bars, and 89 % with 0.1."""
 
 
 @dataclass(frozen=True)
-class Grain:
+class PointResolution:
     """How finely the contact points tell: their distance (mm) along x, and the larger of that over the half-length of
     the contact and of their distance along z over the half width.
 
@@ -37,7 +37,7 @@ class Grain:
     least: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, problem: Problem, frame: StepResult) -> Grain:
+    def of(cls, problem: Problem, frame: StepResult) -> PointResolution:
         """Of a frame; medians where points touch."""
         points, reach = problem.points, measure(problem.points, frame)["contact_half_length_mm"]
         alone = reach == 0.0 and problem.model.friction.largest > 0.0

@@ -16,7 +16,7 @@ from dataclasses import replace
 from typing import Self
 
 from finger3d._process import child_environment, end_with
-from finger3d.accuracy.estimate import companions
+from finger3d.accuracy.companions import companions
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.solve import build, contact_box, symmetry
 from finger3d.scene import Scene, parse, tree

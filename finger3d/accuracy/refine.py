@@ -13,11 +13,13 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
-from finger3d.accuracy.estimate import FACTOR, ORDER, companion, compared, is_length, last_frame, main_numbers
+from finger3d.accuracy.companions import FACTOR, companion
+from finger3d.accuracy.estimate import compared, main_numbers
+from finger3d.accuracy.richardson import ORDER, Kind, Quantity, largest_strain
 from finger3d.errors import Finger3dError, UnresolvedError
-from finger3d.io import AREAS
 from finger3d.mechanics.model import MeshOptions, Model
 from finger3d.mechanics.solve import Problem, build
+from finger3d.mechanics.step_halving import last_frame
 
 MOST_ROUNDS = 8
 _PART = 0.3  # of the change: a length that makes less of it is left alone
@@ -154,13 +156,14 @@ def refined(
 
 def relative(numbers: Mapping[str, float], errors: Mapping[str, float]) -> dict[str, float]:
     """Errors as shares: of a force, of itself; of a length, of the contact's; of a strain, of the largest read."""
-    strain = max((abs(v) for k, v in numbers.items() if k.startswith("gauge_")), default=0.0)
+    strain = largest_strain(numbers)
     found = {}
     for name, error in errors.items():
-        if is_length(name):
+        kind = Quantity.of(name).kind
+        if kind.is_length:
             scale = numbers["contact_half_length_mm"]
         else:
-            scale = strain if name.startswith("gauge_") else abs(numbers[name])
+            scale = strain if kind is Kind.STRAIN else abs(numbers[name])
         found[name] = error / scale if scale > 0.0 else (math.inf if error > 0.0 else 0.0)
     return found
 
@@ -178,8 +181,8 @@ def judged(problem: Problem, names: Iterable[str]) -> list[str]:
     The stick zone of a solid is often less than three points wide on any affordable mesh, and then of unknown length.
     Areas have bars of the same kind as lengths.
     """
-    left_out = {*AREAS, *(["stick_half_length_mm"] if problem.dim == 3 else [])}
-    return [name for name in names if name not in left_out]
+    left_out = {"stick_half_length_mm"} if problem.dim == 3 else set()
+    return [name for name in names if name not in left_out and Quantity.of(name).kind is not Kind.AREA]
 
 
 def _round(model: Model, tolerance: float) -> tuple[Problem, Round, MeshOptions]:
@@ -213,8 +216,9 @@ def _next(
     options = problem.model.mesh
     if error <= tolerance:
         return options
-    shares = (1.0, 0.0) if number.endswith("_length_mm") else _shares(problem, number, fine, coarse)
-    power = 1.0 if number.endswith("_length_mm") else ORDER
+    is_length = Quantity.of(number).kind.is_length
+    shares = (1.0, 0.0) if is_length else _shares(problem, number, fine, coarse)
+    power = 1.0 if is_length else ORDER
     factor = min(max((_AIM * tolerance / error) ** (1.0 / power), _STEP[0]), _STEP[1])
     size = options.size_mm * (factor if shares[0] >= _PART else 1.0)
     base = options.base_size_mm * (factor if shares[1] >= _PART else 1.0)

@@ -221,4 +221,4 @@ def _estimate_errors(record: PressRecord, companion: MeshPrefetch, report: Progr
     companion.wait()
     runs = record.step_estimate.levels if record.step_estimate else ()
     levels = [(count, ends[-1]) for count, ends in runs]
-    record.error_estimate = estimate(record.problem, record.steps, record.seconds, report.say, press_numbers, levels)
+    record.error_estimate = estimate(record.problem, record.steps, report.say, press_numbers, levels)

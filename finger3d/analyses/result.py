@@ -8,6 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Literal
 
+from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.analyses.press_files import history_table
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.io import atomic
@@ -211,11 +212,10 @@ class PressResult:
         from finger3d._notebook import card
         from finger3d.report.build import number
         from finger3d.report.press import headline
-        from finger3d.results.summary import errors_of
 
         good = self._good()
         rows = [
             (row.name, f"{number(row.value, row.error)} {row.unit}".strip())
-            for row in (headline(asdict(good[-1]), errors_of(self._numbers)) if good else ())
+            for row in (headline(asdict(good[-1]), ErrorBars.of_summary(self._numbers).totals()) if good else ())
         ]
         return card(self._title, self._status(), rows, self._numbers["warnings"], self._numbers["advice"])

@@ -77,13 +77,13 @@ _NUMBERS = {
 
 def _rows(summary: Mapping[str, Any], out: Path) -> Iterator[tuple[str, str]]:
     """Yield the closing table of a press: the numbers of the last step, the errors, and the files."""
+    from finger3d.accuracy.error_bars import ErrorBars
     from finger3d.results.format import with_error
-    from finger3d.results.summary import errors_of
 
-    errors, estimate, steps = errors_of(summary), summary.get("error_estimate") or {}, summary["steps"]
+    bars, estimate, steps = ErrorBars.of_summary(summary), summary.get("error_estimate"), summary["steps"]
 
     def number(value: float, key: str, digits: int, factor: float = 1.0) -> str:
-        error = errors.get(key)
+        error = bars.total(key)
         return with_error(factor * value, None if error is None else factor * error, digits, "+-")
 
     yield "outcome", summary["outcome"]
@@ -95,10 +95,10 @@ def _rows(summary: Mapping[str, Any], out: Path) -> Iterator[tuple[str, str]]:
         yield "residual", f"{max(step['residual'] for step in steps):.1e}, the largest of all steps"
         for name, strain in last["gauges"].items():
             yield f"strain {name}", number(strain, f"gauge_{name}", 5)
-    if errors:
-        yield "+-", f"mesh and steps, not the model; estimated in {estimate['seconds']:.1f} s; --no-error skips it"
+    if bars.discretisation:
+        yield "+-", f"mesh and steps, not the model; estimated in {bars.seconds:.1f} s; --no-error skips it"
     elif estimate:
-        yield "error", estimate["method"]
+        yield "error", bars.method
     if summary.get("cost"):
         yield "time", f"{summary['cost']['seconds']['total']:.1f} s"
     yield "results", str(out)

@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.contact.conditions import TOLERANCE
 from finger3d.contact.friction import OPEN, STATUS_NAMES
 from finger3d.report.build import Figure, HeadlineRow, PageSection, Table, write_page
 from finger3d.report.scene import how_modelled
 from finger3d.report.view3d import view_of
 from finger3d.results.states import States, load_states
-from finger3d.results.summary import errors_of, gauges_of, read_json, title_of
+from finger3d.results.summary import gauges_of, read_json, title_of
 
 _HEADLINE = {
     "normal_force_N": ("normal force", 1.0, "N"),
@@ -63,7 +64,7 @@ def press_page(folder: str | Path) -> Path:
     return write_page(
         folder,
         title_of(summary["scene"]),
-        headline(good[-1], errors_of(summary)) if good else (),
+        headline(good[-1], ErrorBars.of_summary(summary).totals()) if good else (),
         sections,
         [Figure(name, text) for name, text in _PICTURES.items()],
         view_of(states, gauges_of(summary["scene"])) if states else None,
@@ -96,13 +97,12 @@ def _what_bars_leave_out(summary: Mapping[str, Any]) -> list[str]:
 
 def _error_bars(summary: Mapping[str, Any]) -> list[PageSection]:
     """How each error splits into that of the mesh and that of the increments, and how they were found."""
-    estimate = summary.get("error_estimate") or {}
-    if not estimate:
+    if not summary.get("error_estimate"):
         return []
-    mesh, steps = estimate.get("discretisation") or {}, estimate.get("steps") or {}
-    rows = [(name, value, steps.get(name)) for name, value in mesh.items() if value is not None]
+    bars = ErrorBars.of_summary(summary)
+    rows = [(name, value, bars.steps.get(name)) for name, value in bars.discretisation.items()]
     table = [Table(("error, in the unit of the name", "of the mesh", "of the increments"), rows)] if rows else []
-    return [PageSection("Error bars", [f"What follows ± is both added. How: {estimate.get('method', '')}", *table])]
+    return [PageSection("Error bars", [f"What follows ± is both added. How: {bars.method}", *table])]
 
 
 def _proof(steps: Sequence[Mapping[str, Any]], states: States | None, good: Sequence[Mapping[str, Any]]) -> PageSection:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from finger3d.accuracy.estimate import FACTOR
+from finger3d.accuracy.companions import FACTOR
 from finger3d.errors import Outcome
 
 FORCE = "force_N_per_mm"

@@ -76,10 +76,3 @@ def gauges_of(scene: Mapping[str, Any]) -> list[Gauge]:
         )
         for g in scene.get("gauge") or ()
     ]  # fmt: skip
-
-
-def errors_of(summary: Mapping[str, Any]) -> dict[str, float]:
-    """Errors of a summary by name, in the unit of each number: what the mesh and the increments leave unsaid, added."""
-    estimate = summary.get("error_estimate") or {}
-    mesh, steps = estimate.get("discretisation") or {}, estimate.get("steps") or {}
-    return {name: value + (steps.get(name) or 0.0) for name, value in mesh.items() if value is not None}

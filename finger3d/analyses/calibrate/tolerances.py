@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from finger3d._ranges import LARGEST_SD
-from finger3d.accuracy.estimate import built_like, companion, strain_error
+from finger3d.accuracy.companions import built_like, companion
+from finger3d.accuracy.estimate import strain_error
 from finger3d.analyses.calibrate.increments import Increments, increment_error
 from finger3d.analyses.calibrate.presses import Like, presses
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES

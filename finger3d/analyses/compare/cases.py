@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.accuracy.estimate import FACTOR, estimate
+from finger3d.accuracy.companions import FACTOR
+from finger3d.accuracy.estimate import estimate
 from finger3d.mechanics.history import ContactPoints, StepResult, contact_table, measure
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.solve import Problem, build
@@ -52,10 +53,10 @@ def solved(name: str, model: Model) -> Case:
     start = time.perf_counter()
     problem, frames, levels, case = _pressed(name, model)
     if case.ok:
-        spent = {**problem.seconds, "contact": case.seconds - sum(problem.seconds.values())}
-        found = estimate(problem, frames, spent, told=lambda p, f: measured(p.points, f), levels=levels)
-        errors = {key: error for key in case.numbers if (error := found.of(key)) is not None}
-        case = replace(case, errors=errors, companion=found.beside, ratio=found.ratio, method=found.method)
+        found = estimate(problem, frames, numbers=lambda p, f: measured(p.points, f), levels=levels)
+        case = replace(
+            case, errors=found.totals(), companion=found.companion_numbers, ratio=found.ratio, method=found.method
+        )
     return replace(case, seconds=time.perf_counter() - start)
 
 

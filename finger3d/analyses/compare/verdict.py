@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.accuracy.estimate import FACTOR, gain
+from finger3d.accuracy.companions import FACTOR
+from finger3d.accuracy.richardson import gain
 from finger3d.results.comparison import FORCE, Case
 from finger3d.results.format import with_error
 

@@ -1,0 +1,146 @@
+"""Companion of a press: the same scene on another mesh, from which the discretisation error is estimated.
+
+The companion has about twice the edge lengths, hence at best an eighth of the cells of a solid and a quarter of those
+of a section.  A mesh too small to be coarsened gets a finer companion.  An elastic object is meshed anew together with
+the finger, so that the estimate covers both.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from finger3d.errors import Finger3dError, UnresolvedError
+from finger3d.fem.traces import surface
+from finger3d.mechanics.model import MeshOptions, Model
+from finger3d.mechanics.solve import Problem, build, contact_box, symmetry
+from finger3d.meshing.generate import mesh_solid
+from finger3d.meshing.swept import mesh_section
+from finger3d.objects import Sphere
+from finger3d.objects.triangulated import MeshObject
+
+Say = Callable[[str], None]
+
+FACTOR = 2.0
+"""Edge length of the coarser companion over that of the mesh."""
+
+_FINER_FACTOR = 0.5
+"""Edge length of the finer companion over that of the mesh; its square is tried next, since a curved body may already
+be meshed finer than requested."""
+
+_GRADED_FACTOR = 3.0
+"""Edge length of a swept companion of an unstructured mesh, if at `FACTOR` it has as many unknowns: a swept mesh is
+fine along the whole of x and z."""
+
+_LEAST_UNSTRUCTURED_UNKNOWNS = 15_000
+"""Unknowns below which an unstructured mesh is not coarsened: pytetwild resolves a curved body with little fewer."""
+
+_FINITE_STRAIN_FACTOR = 2.5
+"""Edge length of the companion of a section at finite strain, where every increment factorises the tangent: at `FACTOR`
+the companion would take half the time of the press."""
+
+_LEAST_RATIO = 1.25
+"""Smallest ratio of edge lengths from which an error is estimated."""
+
+
+def coarser(model: Model, factor: float = FACTOR) -> Model:
+    """Return the model with edge lengths times a factor, bounded by the finger; swept where the design has a section.
+
+    A swept companion may have a single layer over half the width: with two it would be no coarser along z than a mesh
+    whose edges are longer than a quarter of the width.
+    """
+    design, options = model.design, model.mesh
+    section = min(design.height_mm, 2.0 * design.half_length_mm)
+    base = min(factor * options.base_size_mm, section)
+    size = min(factor * options.size_mm, base, design.width_mm if model.domain == "solid" else math.inf)
+    mesher = "swept" if design.section() is not None else options.mesher
+    return replace(model, mesh=replace(options, size_mm=size, base_size_mm=base, mesher=mesher, layers=1))
+
+
+def companion(problem: Problem, say: Say = lambda text: None) -> Problem:
+    """Return the condensed problem on the companion mesh: coarser, or finer where no coarser mesh can be made.
+
+    Unstructured meshes are kept in the cache of meshes.
+
+    Raises
+    ------
+    Finger3dError
+        Where neither mesh can be made, or none differs enough for an estimate.
+    """
+    coarse, fine = companions(problem.model, problem.mesh.points.size)
+    for chosen, enough in ((coarse, lambda r: r >= _LEAST_RATIO), (fine, lambda r: r <= 1.0 / _LEAST_RATIO)):
+        for options in chosen:
+            if beside := _built_if(problem, replace(problem.model, mesh=options), enough, say):
+                return beside
+    raise Finger3dError("no other mesh differs enough from this one for an estimate; change mesh.size_mm")
+
+
+def companions(model: Model, unknowns: float) -> tuple[list[MeshOptions], list[MeshOptions]]:
+    """Return the candidate companions, coarser and finer, of a mesh of so many unknowns; the preferred one first."""
+    own, enough = model.mesh, unknowns >= _LEAST_UNSTRUCTURED_UNKNOWNS
+    costly = model.domain != "solid" and model.formulation.finite_strain
+    longer = coarser(model, _FINITE_STRAIN_FACTOR if costly else FACTOR).mesh
+    chosen = [longer] if longer.mesher == "swept" or enough else []
+    if model.domain == "solid" and own.mesher != longer.mesher:
+        chosen.append(coarser(model, _GRADED_FACTOR).mesh)
+        chosen += [replace(longer, mesher=own.mesher)] if enough else []
+    finer = [
+        replace(own, size_mm=f * own.size_mm, base_size_mm=f * own.base_size_mm, layers=round(own.layers / f))
+        for f in (_FINER_FACTOR, _FINER_FACTOR**2)
+    ]
+    return chosen, finer
+
+
+def _built_if(problem: Problem, model: Model, enough: Callable[[float], bool], say: Say) -> Problem | None:
+    """Return a condensed companion if the ratio of edge lengths is enough and its points resolve the contact.
+
+    A structured mesh is counted before it is condensed.
+    """
+    if model.domain != "solid" or model.mesh.mesher == "swept":
+        made = mesh_solid if model.domain == "solid" else mesh_section
+        mesh = made(model.design, model.mesh, contact_box(model), symmetry(model))[0]
+        if not enough((problem.mesh.points.size / mesh.points.size) ** (1.0 / problem.dim)):
+            return None
+    try:
+        beside = built_like(problem, model, say if is_unstructured(model) else lambda text: None)
+    except UnresolvedError:
+        return None
+    return beside if enough(edge_ratio(problem, beside)) else None
+
+
+def built_like(problem: Problem, model: Model, say: Say = lambda text: None) -> Problem:
+    """Return another model condensed, onto its whole contact face if the problem keeps its whole contact face."""
+    everything = len(surface(problem.mesh, "contact", problem.thickness).nodes) == len(problem.surface.nodes)
+    return build(model, say, margin=math.inf) if everything else build(model, say)
+
+
+def edge_ratio(problem: Problem, beside: Problem) -> float:
+    """Return the ratio of edge lengths, companion over mesh.
+
+    Between swept meshes the ratio follows from the numbers of unknowns, since edges at the base are bounded by the
+    finger; between unstructured meshes from the distance of contact points, since both grow alike away from the
+    contact; between an unstructured and a swept mesh it is the geometric mean of the two.
+    """
+    by_unknowns = float((problem.stiffness.upper.shape[0] / beside.stiffness.upper.shape[0]) ** (1.0 / problem.dim))
+    wild = sum(p.dim == 3 and p.model.mesh.mesher != "swept" for p in (problem, beside))
+    if not wild:
+        return by_unknowns
+    at_contact = _spacing(beside) / _spacing(problem)
+    return at_contact if wild == 2 else math.sqrt(by_unknowns * at_contact)
+
+
+def _spacing(problem: Problem) -> float:
+    """Return the typical distance (mm) of contact points where contact is predicted."""
+    x0, x1, z0, z1 = contact_box(problem.model)
+    at = problem.points.points
+    inside = (at[:, 0] >= x0) & (at[:, 0] <= x1) & (at[:, 2] >= z0) & (at[:, 2] <= z1)
+    return float(np.sqrt(np.median(problem.points.area[inside if inside.any() else slice(None)])))
+
+
+def is_unstructured(model: Model) -> bool:
+    """Return whether pytetwild meshes the finger or the object."""
+    soft = model.object_compliance is not None and isinstance(model.object, Sphere | MeshObject)
+    return model.domain == "solid" and (soft or model.mesh.mesher != "swept")

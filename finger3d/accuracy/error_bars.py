@@ -1,0 +1,55 @@
+"""Error bars of the numbers of a press: the discretisation error plus the error of the increments."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Self
+
+
+@dataclass(frozen=True, kw_only=True)
+class ErrorBars:
+    """Estimated errors by name, each in the unit of its number.
+
+    Attributes
+    ----------
+    discretisation : error of the mesh
+    steps : error of the increments
+    method : one line that says how the errors were estimated, or ``no estimate: ...``
+    seconds : wall time of the estimate
+    """
+
+    discretisation: Mapping[str, float] = field(default_factory=dict)
+    steps: Mapping[str, float] = field(default_factory=dict)
+    method: str = ""
+    seconds: float = 0.0
+
+    @classmethod
+    def of_summary(cls, summary: Mapping[str, Any]) -> Self:
+        """Read the error bars of a summary.json; without names if the press made no estimate."""
+        known = summary.get("error_estimate") or {}
+        mesh, steps = (
+            {name: float(error) for name, error in (known.get(part) or {}).items() if error is not None}
+            for part in ("discretisation", "steps")
+        )
+        method, seconds = str(known.get("method", "")), float(known.get("seconds") or 0.0)
+        return cls(discretisation=mesh, steps=steps, method=method, seconds=seconds)
+
+    def total(self, name: str) -> float | None:
+        """Return the sum of both errors of a number, None without an estimate of its discretisation error."""
+        if name not in self.discretisation:
+            return None
+        return self.discretisation[name] + self.steps.get(name, 0.0)
+
+    def totals(self) -> dict[str, float]:
+        """Return the sums of both errors by name."""
+        return {name: error + self.steps.get(name, 0.0) for name, error in self.discretisation.items()}
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the entries of summary.json."""
+        return {
+            "discretisation": dict(self.discretisation),
+            "steps": dict(self.steps),
+            "method": self.method,
+            "seconds": self.seconds,
+        }

@@ -1,0 +1,131 @@
+"""Discretisation error by Richardson extrapolation from two meshes.
+
+If the error of a number x falls as h^p with the edge length h, the number x' on a mesh of edge length r h gives ::
+
+    error of x = |x - x'| / |r^p - 1|
+
+The order p is that of quadratic elements at a bonded corner, p = 2 lambda, where displacements go as distance^lambda
+(Williams 1952).  Lengths and areas are resolved no better than the distance of contact points.
+``validation/error_bars.py`` measures how often the true error lies within twice the estimate.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum, auto
+
+from finger3d.accuracy.point_resolution import PointResolution
+
+ORDER = 1.2
+"""Order of convergence at the bonded corners of the base for nu = 0.49, the lowest of all (validation/bonded_layer)."""
+
+_RESOLUTION_FLOOR = 0.1
+"""Points of distance h at the edge of a contact of half-length a leave a relative error of about this times (h/a)^2 in
+the normal force, and of this times h/a in friction and strains (validation/error_bars.py)."""
+
+
+class Kind(Enum):
+    """Kind of a number, which determines the bounds of its error from below."""
+
+    NORMAL_FORCE = auto()
+    FRICTION_SUM = auto()
+    FORCE = auto()
+    PRESSURE = auto()
+    ENERGY = auto()
+    STRAIN = auto()
+    HALF_LENGTH = auto()
+    LENGTH = auto()
+    AREA = auto()
+
+    @property
+    def is_length(self) -> bool:
+        """Return whether the number is a length of a zone of contact points."""
+        return self in (Kind.LENGTH, Kind.HALF_LENGTH)
+
+
+_KINDS = {
+    "normal_force_N": Kind.NORMAL_FORCE,
+    "force_N_per_mm": Kind.NORMAL_FORCE,
+    "friction_sum_N": Kind.FRICTION_SUM,
+    "friction_sum_N_per_mm": Kind.FRICTION_SUM,
+    "friction_along_x_N_per_mm": Kind.FORCE,
+    "friction_along_z_N_per_mm": Kind.FORCE,
+    "outward_friction_x_N_per_mm": Kind.FORCE,
+    "peak_pressure_MPa": Kind.PRESSURE,
+    "external_work_mJ": Kind.ENERGY,
+    "dissipation_mJ": Kind.ENERGY,
+    "contact_half_length_mm": Kind.HALF_LENGTH,
+    "stick_half_length_mm": Kind.HALF_LENGTH,
+    "contact_length_mm": Kind.LENGTH,
+    "contact_length_end_mm": Kind.LENGTH,
+    "stick_length_mm": Kind.LENGTH,
+    "contact_area_mm2": Kind.AREA,
+    "stick_area_mm2": Kind.AREA,
+}
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number of a press and its kind."""
+
+    name: str
+    kind: Kind
+
+    @classmethod
+    def of(cls, name: str) -> Quantity:
+        """Return the quantity of a name of a press or a comparison; ``gauge_<name>`` is a strain."""
+        return cls(name, Kind.STRAIN if name.startswith("gauge_") else _KINDS[name])
+
+
+def largest_strain(numbers: Mapping[str, float]) -> float:
+    """Return the largest magnitude of all gauge strains, 0 without gauges."""
+    return max((abs(v) for k, v in numbers.items() if Quantity.of(k).kind is Kind.STRAIN), default=0.0)
+
+
+def gain(ratio: float) -> float:
+    """Return the change of a number to the companion over its error; `ratio` of edge lengths, companion over mesh."""
+    return abs(math.pow(ratio, ORDER) - 1.0)
+
+
+def mesh_error(
+    numbers: Mapping[str, float],
+    companion: Mapping[str, float],
+    ratio: float,
+    resolutions: tuple[PointResolution, PointResolution],
+) -> dict[str, float]:
+    """Return the discretisation error by name.
+
+    Parameters
+    ----------
+    numbers, companion : of the mesh and of its companion, names as in `Quantity.of`
+    ratio : edge length of the companion over that of the mesh; below 1 for a finer companion
+    resolutions : of the contact points of both
+
+    Returns
+    -------
+    dict
+        Errors in the units of the numbers; names without a finite error are left out.
+    """
+    own, other = resolutions
+    strain = largest_strain(numbers)
+    normal_force = max((abs(v) for k, v in numbers.items() if Quantity.of(k).kind is Kind.NORMAL_FORCE), default=0.0)
+    found = {}
+    for name, value in numbers.items():
+        kind, change, bound = Quantity.of(name).kind, abs(value - companion[name]), own.least.get(name, 0.0)
+        if kind.is_length:
+            ends = 0.5 if kind is Kind.HALF_LENGTH else 1.0
+            # the distance of points in the companion is not a change of the length
+            change = max(0.0, change - ends * other.spacing_mm)
+            bound = max(bound, ends * own.spacing_mm)
+        elif kind is Kind.AREA:
+            change = max(0.0, change - other.least.get(name, 0.0))
+        else:
+            scale = strain if kind is Kind.STRAIN else abs(value)
+            if own.alone and kind is Kind.FRICTION_SUM:
+                scale = max(scale, normal_force)
+            power = 2 if kind is Kind.NORMAL_FORCE else 1
+            bound = max(bound, _RESOLUTION_FLOOR * own.share**power * scale)
+        found[name] = max(change / gain(ratio), bound)
+    return {name: float(error) for name, error in found.items() if math.isfinite(error)}
