@@ -3,10 +3,32 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar, Protocol
 
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Model
+
+
+class Effect(Protocol):
+    """Settings of an effect: a frozen dataclass whose fields are the keys of its table.
+
+    Attributes
+    ----------
+    slot : str
+        Field of the model that the effect sets.
+    """
+
+    slot: ClassVar[str]
+
+    def apply(self, model: Model) -> Model:
+        """Return the model with the effect in its slot.
+
+        Raises
+        ------
+        Finger3dError
+            If the model does not allow the effect.
+        """
+        ...
 
 
 def fill(model: Model, slot: str, value: Any, effect: str) -> Model:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -225,6 +225,8 @@ class Effect:
     E_MPa, nu : the object's material
     height_mm : thickness of the block behind a plane, wedge or wave; the finger's height unless given
     """
+
+    slot: ClassVar[str] = "object_compliance"
 
     E_MPa: Modulus
     nu: Poisson

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -130,6 +131,8 @@ class Effect:
     E_MPa : Young's modulus along the foil
     thickness_mm, width_mm : its section
     """
+
+    slot: ClassVar[str] = "inclusions"
 
     E_MPa: Modulus
     thickness_mm: Length

@@ -294,6 +294,8 @@ def _contact(problem: Problem, face: BoundarySurface, u: Float, target: ObjectPo
 class Effect:
     """Settings of [effects.large_deformation]: none. Neo-Hookean, W = G/2 (J^(-2/3) I1 - 3) + K/2 (J - 1)^2."""
 
+    slot: ClassVar[str] = "formulation"
+
     def apply(self, model: Model) -> Model:
         """Fill the kinematics slot."""
         model.material.isotropic("effects.large_deformation")

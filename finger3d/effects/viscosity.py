@@ -422,6 +422,8 @@ class Effect:
     bulk : whether the bulk modulus relaxes too, so that nu is constant; else only the shear modulus does
     """
 
+    slot: ClassVar[str] = "formulation"
+
     prony: Annotated[tuple[tuple[Fraction, Seconds], ...], MinLen(1)]
     bulk: bool = True
 

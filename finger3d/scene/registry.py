@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from typing import Any
 
 import finger3d.effects
+from finger3d.effects.base import Effect
 
 
 def effect_names() -> tuple[str, ...]:
@@ -15,6 +15,7 @@ def effect_names() -> tuple[str, ...]:
     return tuple(sorted(n for n in found if n != "base" and not n.startswith("_")))
 
 
-def effect_type(name: str) -> Any:
+def effect_type(name: str) -> type[Effect]:
     """Import one effect and return its settings: a frozen dataclass with ``apply(model) -> model``."""
-    return importlib.import_module(f"finger3d.effects.{name}").Effect
+    found: type[Effect] = importlib.import_module(f"finger3d.effects.{name}").Effect
+    return found
