@@ -82,7 +82,7 @@ class StandIn:
 
     @property
     def surface(self) -> Any:
-        return SimpleNamespace(nodes=np.arange(len(self.rest)))
+        return SimpleNamespace(nodes=np.arange(len(self.rest)), area=self.area)
 
     def gap(self, target: ObjectPose) -> Float:
         return self.rest - target.depth_mm
