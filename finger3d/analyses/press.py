@@ -16,7 +16,6 @@ from finger3d.mechanics.history import StepResult, measure
 from finger3d.progress import Progress
 
 if TYPE_CHECKING:
-    from finger3d.accuracy.prefetch import MeshPrefetch
     from finger3d.accuracy.refine import Refinement
     from finger3d.mechanics.problem import Problem
     from finger3d.scene import Scene
@@ -53,31 +52,26 @@ def press(
     >>> len(finger3d.press(stiff).steps)
     4
     """
-    from finger3d.accuracy.prefetch import MeshPrefetch
     from finger3d.scene import load
 
     started = time.perf_counter()
     scene = load(scene) if isinstance(scene, str | Path) else scene
     temporary = TemporaryDirectory(prefix="finger3d-") if out is None else None
     figures = temporary is None if figures is None else figures
-    with (
-        claimed(temporary.name if temporary else str(out), "press") as folder,
-        MeshPrefetch(scene if error else None) as prefetch,
-    ):
-        companion = prefetch if error else None
-        record, summary = run_press(scene, ResultWriter(folder), report or Progress(), started, companion, figures)
+    with claimed(temporary.name if temporary else str(out), "press") as folder:
+        record, summary = run_press(scene, ResultWriter(folder), report or Progress(), started, error, figures)
     return PressResult(record.history, folder, summary, temporary)
 
 
 def run_press(
-    scene: Scene, writer: ResultWriter, report: Progress, started: float, companion: MeshPrefetch | None, figures: bool
+    scene: Scene, writer: ResultWriter, report: Progress, started: float, error: bool, figures: bool
 ) -> tuple[PressRecord, dict[str, Any]]:
     """Solve a scene, recover its fields, estimate its errors; write and draw each as it is known.
 
     Parameters
     ----------
     started : `time.perf_counter()` at the start of the job, s
-    companion : prepares the mesh of the error estimate; None: no estimate
+    error, figures : whether to estimate the errors; whether to draw
 
     Returns
     -------
@@ -86,8 +80,8 @@ def run_press(
     record = _solve(scene, writer, report, started)
     fields = _recover(record, writer, report)
     summary = writer.summary(record, record.outcome())
-    if companion:
-        _estimate_errors(record, companion, report)
+    if error:
+        _estimate_errors(record, report)
         summary = writer.summary(record, record.outcome())
     if figures:
         from finger3d.report.press import press_page
@@ -213,12 +207,11 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fie
     return fields
 
 
-def _estimate_errors(record: PressRecord, companion: MeshPrefetch, report: Progress) -> None:
+def _estimate_errors(record: PressRecord, report: Progress) -> None:
     """Estimate the errors by mesh and increments, from a run on another mesh."""
     from finger3d.accuracy.estimate import estimate, press_numbers
 
     report.stage("estimating the error")
-    companion.wait()
     runs = record.step_estimate.levels if record.step_estimate else ()
     levels = [(count, ends[-1]) for count, ends in runs]
     record.error_estimate = estimate(record.problem, record.steps, report.say, press_numbers, levels)
