@@ -22,10 +22,10 @@ import numpy as np
 import scipy.sparse as sp
 from annotated_types import MinLen
 from numpy.typing import NDArray
-from scipy.special import exprel
 
 from finger3d._ranges import Fraction, Seconds
 from finger3d.contact.state import ContactSolution, ContactState
+from finger3d.effects._prony import InternalVariables, Prony, Step, relaxed
 from finger3d.effects.base import fill
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import Stiffness, stiffness
@@ -38,64 +38,9 @@ from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem, scatter_to_points
 
 Float = NDArray[np.float64]
-Prony = tuple[tuple[float, float], ...]
 
 _FACTORS_KEPT = 5
 """Condensations kept at once: each holds a factor, and a path rarely has more than four lengths of step."""
-
-
-@dataclass(frozen=True)
-class InternalVariables:
-    """What a body remembers: a vector (k,) that says its shape, and each branch's share of it that has not relaxed."""
-
-    elastic: Float
-    branches: Float
-
-
-@dataclass(frozen=True)
-class Step:
-    """A Prony series over a step of `seconds`, in which the shape moves at a constant rate."""
-
-    prony: Prony
-    seconds: float
-
-    @property
-    def _rates(self) -> Float:
-        return self.seconds / np.array([time for _, time in self.prony])
-
-    @property
-    def decay(self) -> Float:
-        """e_i: what is left of a branch at the end."""
-        return np.exp(-self._rates)
-
-    @property
-    def gain(self) -> Float:
-        """g_i gamma_i: what a branch takes of a change of shape."""
-        return np.array([share for share, _ in self.prony]) * exprel(-self._rates)
-
-    @property
-    def alpha(self) -> float:
-        """Stiffness against what moves in this step, in those of an instantaneous one."""
-        return long_time_share(self.prony) + float(self.gain.sum())
-
-    def history_load(self, memory: InternalVariables) -> Float:
-        """Vector (k,) with ``alpha now' - past`` the stress at the end of the step."""
-        return self.gain.sum() * memory.elastic - self.decay @ memory.branches
-
-    def after(self, memory: InternalVariables, now: Float) -> InternalVariables:
-        """The memory once the shape is `now`."""
-        branches = self.decay[:, None] * memory.branches + self.gain[:, None] * (now - memory.elastic)
-        return InternalVariables(now, branches)
-
-
-def long_time_share(prony: Prony) -> float:
-    """r_inf."""
-    return 1.0 - math.fsum(share for share, _ in prony)
-
-
-def relaxed(prony: Prony, memory: InternalVariables) -> Float:
-    """Vector (k,) of which the present stress is the instantaneous elastic one."""
-    return long_time_share(prony) * memory.elastic + memory.branches.sum(axis=0)
 
 
 @dataclass(frozen=True)
