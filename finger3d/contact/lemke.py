@@ -1,4 +1,4 @@
-"""Lemke's pivoting on the friction problem as a linear complementarity problem: slow, and it cannot cycle.
+"""Lemke's method for the friction problem as a linear complementarity problem: slow, and it cannot cycle.
 
 With the friction circle as a polygon of directions D, find n, beta, lam >= 0 with ``0 <= n _|_ gap >= 0``,
 ``0 <= beta _|_ D^T slip + lam >= 0``, ``0 <= lam _|_ mu n - sum(beta) >= 0``.  Its matrix is copositive, and Lemke's
@@ -18,7 +18,7 @@ Float = NDArray[np.float64]
 
 _PIVOT = 1e-11
 LARGEST = 2000
-"""Rows beyond which the tableau costs more than cutting the step."""
+"""Largest number of rows of the tableau; beyond it halving the increment is cheaper."""
 
 
 def directions(tangents: int, facets: int = 8) -> Float:

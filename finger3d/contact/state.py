@@ -1,4 +1,4 @@
-"""Contact states: what is known of every contact point at one instant."""
+"""Contact states: status, force and displacement of every contact point at one instant."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class ContactState:
 
 @dataclass(frozen=True)
 class ContactSolution:
-    """What one call of `advance` found.
+    """Solution of one increment.
 
     Attributes
     ----------
@@ -57,10 +57,9 @@ class ContactSolution:
     residual : float
         Largest violation of Eqs. (1)-(4) and of "friction opposes slip", dimensionless.
     iterations : int
-        Systems of equations set up and factored, all attempts together; corrections with a factor at hand are part of
-        its iteration.
+        Number of systems of equations that were factored, in all attempts.
     method : str
-        Which member of the ladder settled it: newton, damped or full steps, ramp, pivots, sweeps; or paper.
+        Attempt that succeeded: newton, damped or full steps, ramp, pivots, sweeps; or paper.
     """
 
     state: ContactState
@@ -76,7 +75,7 @@ def pressure(force: Float, area: Float | None) -> Float:
 
 
 def next_state(previous: ContactState, force: Float, moved: Float, status: NDArray[np.int8]) -> ContactState:
-    """State after an increment with forces (c, d), gaps and changes of position `moved` (c, d), and sets (c,)."""
+    """Return the state after an increment with forces, relative displacements `moved` (c, d) and status (c,)."""
     slid = np.where((status != OPEN)[:, None], moved[:, 1:], 0.0)
     return ContactState(
         status, force, moved[:, 0], previous.tangential_displacement + moved[:, 1:], previous.accumulated_slip + slid
@@ -84,7 +83,7 @@ def next_state(previous: ContactState, force: Float, moved: Float, status: NDArr
 
 
 def invalid_input(free: Float, compliance: Float, definite: bool = True) -> Outcome | None:
-    """Why an increment cannot be tried at all: NaN, or a compliance (c, d, c, d) with a direction that is not held."""
+    """Return why an increment cannot be solved: NaN, or a compliance (c, d, c, d) without a positive diagonal."""
     if not (np.isfinite(free).all() and np.isfinite(compliance).all()):
         return Outcome.NOT_FINITE
     if definite and np.diagonal(compliance.reshape(free.size, free.size)).min(initial=np.inf) <= 0.0:
