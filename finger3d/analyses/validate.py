@@ -1,7 +1,7 @@
-"""Studies: one question each, put to the code and judged against a reference; and the index of their verdicts.
+"""Studies of validation/: finding, running and storing them, and the index of their results.
 
-A study is a file validation/<name>.py: its docstring is the question and the source, ``run(quick) -> Result`` the
-answer.  Results are kept as tables in validation/results/, and the index is made from those.
+A study is a file validation/<name>.py.  Its docstring states a question and the source of the reference, and its
+function ``run(quick) -> Result`` answers it.  Results are stored in validation/results/; README.md is made from them.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ import ast
 import csv
 import hashlib
 import json
-import math
 import re
 import tempfile
 import time
@@ -18,93 +17,21 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any, Literal
-
-from numpy.typing import ArrayLike
+from typing import Any
 
 from finger3d._machine import versions
+from finger3d.analyses.study_rows import COLUMNS, Result, Row, score, table
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.geometry.registry import import_from
 from finger3d.io import atomic, write_csv, write_json
 from finger3d.progress import Progress
 
-Kind = Literal["verification", "validation", "sensitivity", "statement"]
-Measure = Literal["relative", "absolute", "at most", "at least"]
-
-_COLUMNS = ("what", "kind", "reference", "wanted", "got", "measure", "error", "tolerance", "reason", "verdict")
 _NO_NUMBERS = ("cli/*", "plotting/*", "report/*", "__main__.py", "_notebook.py", "progress.py", "py.typed")
 """Files of the package that only draw, write pages, report progress or parse commands. A change of any other one makes
 the results of all studies out of date."""
 
 _LIBRARIES = ("numpy", "scipy", "pypardiso", "mkl", "build123d", "cadquery-ocp-novtk", "pytetwild", "trimesh")
 """Packages that shape numbers."""
-
-
-@dataclass(frozen=True)
-class Row:
-    """One number, judged.
-
-    Attributes
-    ----------
-    what : what was measured, with its unit
-    reference : page, formula or code that `wanted` comes from
-    tolerance, reason : largest error that passes, and why that much is right
-    kind : of a statement it is told whether it holds; that it does not is a finding, and fails nothing
-    measure : what the error is: |got - wanted| over |wanted|, or as it is, or how far `got` is beyond a bound `wanted`
-    """
-
-    what: str
-    reference: str
-    wanted: float
-    got: float
-    tolerance: float
-    reason: str
-    kind: Kind = "verification"
-    measure: Measure = "relative"
-
-    @property
-    def error(self) -> float:
-        """The error in the sense of `measure`; never negative."""
-        away = self.got - self.wanted
-        if self.measure == "relative":
-            return abs(away) / abs(self.wanted)
-        # in this order max hands NaN on; adding 0 turns -0.0 into 0.0
-        return {"absolute": abs(away), "at most": max(away, 0.0), "at least": max(-away, 0.0) + 0.0}[self.measure]
-
-    @property
-    def within(self) -> bool:
-        """Whether the error is within the tolerance; never for NaN."""
-        return self.error <= self.tolerance
-
-    @property
-    def passed(self) -> bool:
-        """Whether the study may stand: the error is within the tolerance, or a statement was measured at all."""
-        return self.within or (self.kind == "statement" and math.isfinite(self.error))
-
-    @property
-    def verdict(self) -> str:
-        """One or two words."""
-        if self.kind == "statement" and self.passed:
-            return "holds" if self.within else "does not hold"
-        return "pass" if self.passed else "FAIL"
-
-    def columns(self) -> dict[str, Any]:
-        """The row as it is kept."""
-        return {k: getattr(self, k) for k in _COLUMNS}
-
-
-@dataclass(frozen=True)
-class Result:
-    """What a study found: judged numbers, a table of all else worth keeping, and a drawing on a matplotlib Figure."""
-
-    rows: tuple[Row, ...]
-    table: Mapping[str, ArrayLike] | None = None
-    figure: Callable[[Any], None] | None = None
-
-    @property
-    def passed(self) -> bool:
-        """Whether every row passes."""
-        return all(row.passed for row in self.rows)
 
 
 @dataclass(frozen=True)
@@ -283,7 +210,7 @@ def _keep(out: Path, study: Study, result: Result, stamp: str, seconds: float) -
     results, about = out / "results", _place(out, study)
     about.unlink(missing_ok=True)
     rows = [row.columns() for row in result.rows]
-    write_csv(results / f"{study.name}.csv", {k: [r[k] for r in rows] for k in _COLUMNS})
+    write_csv(results / f"{study.name}.csv", {k: [r[k] for r in rows] for k in COLUMNS})
     if result.table is not None:
         write_csv(results / f"{study.name}_table.csv", result.table)
     if result.figure is not None:
@@ -329,35 +256,17 @@ def _row(kept: Mapping[str, Any]) -> Row:
     )  # fmt: skip
 
 
-def number(value: float) -> str:
-    """A number for a reader: four digits, no more zeros than needed."""
-    if not math.isfinite(value) or value == 0.0 or 1e-3 <= abs(value) < 1e5:
-        return f"{value:.5g}"
-    return f"{value:.3e}"
+_HEAD = """# Verification and validation
 
+Generated by `finger3d validate` from results/; do not edit.
 
-def _shown(row: Row) -> list[str]:
-    sign = {"at most": "<= ", "at least": ">= "}.get(row.measure, "")
-    relative = row.measure == "relative"
-    error, tolerance = (f"{100 * v:.2g} %" if relative else number(v) for v in (row.error, row.tolerance))
-    return [
-        row.what, row.kind, row.reference, sign + number(row.wanted), number(row.got), error,
-        f"{tolerance}: {row.reason}", row.verdict if row.passed else "**FAIL**",
-    ]  # fmt: skip
+- *Verification*: are the equations solved right? Compared with a closed form or an independent computation.
+- *Validation*: are they the right equations? Compared with a measurement or the paper.
+- *Sensitivity*: how much does a result depend on what is not known?
+- *Statement*: what the paper or a goal of this project says. It holds or does not hold; neither fails.
 
-
-def table(found: Mapping[str, Sequence[Row]]) -> list[list[str]]:
-    """Lines of text of all rows: study, what, kind, reference, wanted, got, error, tolerance, verdict."""
-    return [[name, *_shown(row)] for name, rows in found.items() for row in rows]
-
-
-_HEAD = """# What to trust: the verification index
-
-Generated by `finger3d validate` from results/; do not edit.  *Verification*: the equations are solved right, against a
-closed form or an independent computation.  *Validation*: they are the right equations, against a measurement or the
-paper.  *Sensitivity*: how far an answer moves with what is not known.  *Statement*: what the paper says, measured: it
-holds or it does not, and neither fails.  The error is relative to what was wanted unless
-that is a bound or the error is a plain number.  To rebuild everything: `finger3d validate`; one study:
+The error is relative to the wanted value, unless that is a bound or the error is a plain number.  References such as
+*REFERENCES.md, 2.1* are sections of [REFERENCES.md](REFERENCES.md).  Run all studies with `finger3d validate`, one with
 `finger3d validate NAME`.
 """
 
@@ -368,7 +277,7 @@ def write_index(out: Path, known: Mapping[str, Study]) -> None:
     kept = {name: kept_rows(out, study) for name, study in known.items()}
     seconds = sum(_about(out, study).get("seconds", 0.0) for study in known.values() if not study.by_name)
     timed = [name for name, study in known.items() if study.by_name]
-    total = _score([row for rows in kept.values() for row in rows])
+    total = score([row for rows in kept.values() for row in rows])
     missing = [name for name, rows in kept.items() if not rows]
     lines.append(f"{total}; {len(kept) - len(missing)} studies, {seconds / 60.0:.1f} minutes.")
     if timed:
@@ -382,22 +291,12 @@ def write_index(out: Path, known: Mapping[str, Study]) -> None:
             picture = f", [figure](figures/{name}.png)" if (out / "figures" / f"{name}.png").is_file() else ""
             more = f", [table](results/{name}_table.csv)" if (out / "results" / f"{name}_table.csv").is_file() else ""
             links = f"[{name}]({name}.py){picture}{more}"
-            lines.append(f"| {links} | {_cell(known[name].question)} | {_score(rows)} | {about.get('seconds', '')} |")
+            lines.append(f"| {links} | {_cell(known[name].question)} | {score(rows)} | {about.get('seconds', '')} |")
     lines += ["", "| study | what | kind | reference | wanted | got | error | tolerance and its reason | verdict |"]
     lines.append("|---|---|---|---|---|---|---|---|---|")
     lines += ["| " + " | ".join(map(_cell, line)) + " |" for line in table(kept)]
     with atomic(out / "README.md") as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-def _score(rows: Sequence[Row]) -> str:
-    """How many rows pass, and apart from them how many of the paper's statements hold."""
-    judged = [row for row in rows if row.kind != "statement"]
-    said = [row for row in rows if row.kind == "statement"]
-    parts = [f"{sum(row.passed for row in judged)} of {len(judged)} rows pass"] if judged or not said else []
-    if said:
-        parts.append(f"{sum(row.within for row in said)} of {len(said)} statements hold")
-    return ", ".join(parts)
 
 
 def _cell(text: str) -> str:

@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from finger3d.analyses.calibrate.increments import found_increments, increment_error
+from finger3d.analyses.optimise.evaluation import Evaluation, evaluation_of, mistake
 from finger3d.analyses.optimise.task import (
     METHODS,
     Float,
@@ -30,21 +31,12 @@ from finger3d.mechanics.model import Gauge, Leg, Model
 from finger3d.plotting.optimise import draw
 from finger3d.progress import Progress
 from finger3d.report.optimise import optimise_page
-from finger3d.results.journal import Journal, Row, number_in, opened
+from finger3d.results.journal import Journal, opened
 from finger3d.scene import Scene
 
 _INNER = 60  # readings of gauges in one body
 _WORST = 1e30  # stands for what cannot be built: finite, as annealing asks
 _KEPT = 4
-
-
-@dataclass(frozen=True)
-class Evaluation:
-    """One design: values of the free keys, the objective (NaN where it has none) and why."""
-
-    values: tuple[float, ...]
-    value: float
-    outcome: str
 
 
 @dataclass(frozen=True)
@@ -322,11 +314,11 @@ def optimise(problem: OptimisationProblem, out: str | Path, report: Progress | N
     start = checked_start(problem)
     with (
         claimed(out, "optimise") as folder,
-        opened(folder / "evaluations.jsonl", folder / "search.json", problem.identity(), _mistake(problem)) as journal,
+        opened(folder / "evaluations.jsonl", folder / "search.json", problem.identity(), mistake(problem)) as journal,
     ):
         for name in ("design.png", "report.html"):
             (folder / name).unlink(missing_ok=True)
-        known = {e.values: e for e in map(_evaluation, journal.rows)}
+        known = {e.values: e for e in map(evaluation_of, journal.rows)}
         search = _Search(problem, report, judge, journal, known)
         first = _searched(search, folder, start)
         return _written(search, folder, first)
@@ -375,28 +367,6 @@ def _written(search: _Search, folder: Path, first: Evaluation) -> OptimisationRe
         bodies=search.bodies,
         scene=problem.scene(best.values),
     )
-
-
-def _mistake(problem: OptimisationProblem) -> Callable[[object], str]:
-    """Return what finds a mistake in a line of evaluations.jsonl."""
-
-    def found(row: object) -> str:
-        if not isinstance(row, dict):
-            return "is no JSON object"
-        values = row.get("values")
-        if not isinstance(values, list) or len(values) != len(problem.free):
-            return f"values must be {len(problem.free)} numbers"
-        if not all(isinstance(v, float) for v in (*values, row.get("objective"))):
-            return "values and objective must be numbers"
-        return "" if isinstance(row.get("outcome"), str) else "outcome must be text"
-
-    return found
-
-
-def _evaluation(row: Row) -> Evaluation:
-    values = row["values"]
-    assert isinstance(values, list)
-    return Evaluation(tuple(values), number_in(row, "objective"), str(row["outcome"]))
 
 
 def _write_best(

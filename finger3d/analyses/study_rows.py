@@ -1,0 +1,116 @@
+"""Rows of a study: numbers compared with a reference, and their text in tables."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from numpy.typing import ArrayLike
+
+Kind = Literal["verification", "validation", "sensitivity", "statement"]
+Measure = Literal["relative", "absolute", "at most", "at least"]
+
+COLUMNS = ("what", "kind", "reference", "wanted", "got", "measure", "error", "tolerance", "reason", "verdict")
+"""Columns of a results file."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """Comparison of one number with its reference.
+
+    Attributes
+    ----------
+    what : quantity that was measured, with its unit
+    reference : page, formula or code that `wanted` comes from
+    tolerance, reason : largest error that passes, and its justification
+    kind : a "statement" is reported as holding or not, and never fails
+    measure : definition of the error: |got - wanted| / |wanted|, |got - wanted|, or the excess of `got` over a bound
+        `wanted`
+    """
+
+    what: str
+    reference: str
+    wanted: float
+    got: float
+    tolerance: float
+    reason: str
+    kind: Kind = "verification"
+    measure: Measure = "relative"
+
+    @property
+    def error(self) -> float:
+        """Error as `measure` defines it; never negative."""
+        away = self.got - self.wanted
+        if self.measure == "relative":
+            return abs(away) / abs(self.wanted)
+        # in this order max hands NaN on; adding 0 turns -0.0 into 0.0
+        return {"absolute": abs(away), "at most": max(away, 0.0), "at least": max(-away, 0.0) + 0.0}[self.measure]
+
+    @property
+    def within(self) -> bool:
+        """Whether the error is within the tolerance; never for NaN."""
+        return self.error <= self.tolerance
+
+    @property
+    def passed(self) -> bool:
+        """Whether the error is within the tolerance, or the row is a statement with a finite error."""
+        return self.within or (self.kind == "statement" and math.isfinite(self.error))
+
+    @property
+    def verdict(self) -> str:
+        """Return "pass", "FAIL", "holds" or "does not hold"."""
+        if self.kind == "statement" and self.passed:
+            return "holds" if self.within else "does not hold"
+        return "pass" if self.passed else "FAIL"
+
+    def columns(self) -> dict[str, Any]:
+        """Return the columns of the results file."""
+        return {k: getattr(self, k) for k in COLUMNS}
+
+
+@dataclass(frozen=True)
+class Result:
+    """Outcome of a study: rows, an optional table, and an optional function that draws on a matplotlib Figure."""
+
+    rows: tuple[Row, ...]
+    table: Mapping[str, ArrayLike] | None = None
+    figure: Callable[[Any], None] | None = None
+
+    @property
+    def passed(self) -> bool:
+        """Whether every row passes."""
+        return all(row.passed for row in self.rows)
+
+
+def number(value: float) -> str:
+    """Format a number with five significant digits."""
+    if not math.isfinite(value) or value == 0.0 or 1e-3 <= abs(value) < 1e5:
+        return f"{value:.5g}"
+    return f"{value:.3e}"
+
+
+def _shown(row: Row) -> list[str]:
+    sign = {"at most": "<= ", "at least": ">= "}.get(row.measure, "")
+    relative = row.measure == "relative"
+    error, tolerance = (f"{100 * v:.2g} %" if relative else number(v) for v in (row.error, row.tolerance))
+    return [
+        row.what, row.kind, row.reference, sign + number(row.wanted), number(row.got), error,
+        f"{tolerance}: {row.reason}", row.verdict if row.passed else "**FAIL**",
+    ]  # fmt: skip
+
+
+def table(found: Mapping[str, Sequence[Row]]) -> list[list[str]]:
+    """Return text cells of all rows: study, what, kind, reference, wanted, got, error, tolerance, verdict."""
+    return [[name, *_shown(row)] for name, rows in found.items() for row in rows]
+
+
+def score(rows: Sequence[Row]) -> str:
+    """Return how many rows pass and how many statements hold."""
+    judged = [row for row in rows if row.kind != "statement"]
+    said = [row for row in rows if row.kind == "statement"]
+    parts = [f"{sum(row.passed for row in judged)} of {len(judged)} rows pass"] if judged or not said else []
+    if said:
+        parts.append(f"{sum(row.within for row in said)} of {len(said)} statements hold")
+    return ", ".join(parts)
