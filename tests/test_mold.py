@@ -381,7 +381,7 @@ def test_the_command_writes_a_mold(scene_file, tmp_path, capsys, monkeypatch) ->
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["--wall-mm", "20"], "without --mold"),
+        (["--wall-mm", "20"], "--mold"),
         (["--tolerance-mm", "0"], "--tolerance-mm 0.0: must be from 0.0001"),
         (["--tolerance-mm", "nan"], "--tolerance-mm nan"),
         (["--mold", "--split", "y"], "y"),
