@@ -84,20 +84,8 @@ def export(
     from finger3d.mold.shell import Shell, shell, write_step, write_stl
 
     out, report, design = Path(out), report or Progress(), scene.design
-    largest = _LARGEST_TOLERANCE * design.height_mm
-    if not _LEAST_TOLERANCE_MM <= tolerance_mm <= largest:
-        raise Finger3dError(
-            f"--tolerance-mm {tolerance_mm}: must be from {_LEAST_TOLERANCE_MM:g} to {largest:.4g}, "
-            "a fifth of the finger's height"
-        )
     triangles = design.surface if isinstance(design, Imported) and design.cad is None else None
-    if triangles is not None and mold is not None:
-        raise Finger3dError(
-            f"--mold: {design.name} holds triangles, and a mold is cut from CAD; give the finger as a STEP file"
-        )
-    source = Path(design.path).resolve() if isinstance(design, Imported) else None
-    if source is not None and source in ((out / "finger.step").resolve(), (out / "finger.stl").resolve()):
-        raise Finger3dError(f"--out {out}: holds {source.name}, the finger's own file; name another folder")
+    _check(design, out, tolerance_mm, may_mold=mold is None or triangles is None)
     report.stage("finger")
     if triangles is not None:
         body, solid = Shell(triangles, 0.0, 0.0), None
@@ -127,6 +115,23 @@ def export(
     return Exported(
         tuple(files), _volume(design, solid, body), body.surface.volume, body.tolerance_mm, silicone, tuple(remarks)
     )
+
+
+def _check(design: Design, out: Path, tolerance_mm: float, may_mold: bool) -> None:
+    """Refuse a tolerance out of range, a mold of triangles, and a folder that holds the finger's own file."""
+    largest = _LARGEST_TOLERANCE * design.height_mm
+    if not _LEAST_TOLERANCE_MM <= tolerance_mm <= largest:
+        raise Finger3dError(
+            f"--tolerance-mm {tolerance_mm}: must be from {_LEAST_TOLERANCE_MM:g} to {largest:.4g}, "
+            "a fifth of the finger's height"
+        )
+    if not may_mold:
+        raise Finger3dError(
+            f"--mold: {design.name} holds triangles, and a mold is cut from CAD; give the finger as a STEP file"
+        )
+    source = Path(design.path).resolve() if isinstance(design, Imported) else None
+    if source is not None and source in ((out / "finger.step").resolve(), (out / "finger.stl").resolve()):
+        raise Finger3dError(f"--out {out}: holds {source.name}, the finger's own file; name another folder")
 
 
 def _clear(out: Path) -> None:

@@ -9,12 +9,13 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from importlib.metadata import version
 from multiprocessing import resource_tracker
-
-from distributed import Client, LocalCluster
-from distributed.comm.core import connect
+from typing import TYPE_CHECKING
 
 from finger3d._machine import cores
 from finger3d.errors import Finger3dError, MissingError
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 CONNECT_S = 10.0
 """Time limit to reach a scheduler, and for the first worker to be there."""
@@ -29,6 +30,8 @@ def local(workers: int) -> Iterator[Client]:
     MissingError
         If no process could be started.
     """
+    from distributed import Client, LocalCluster
+
     with ExitStack() as stack:
         try:
             with _interrupts_deferred():
@@ -62,6 +65,8 @@ def _interrupts_deferred() -> Iterator[None]:
 @contextmanager
 def remote(address: str) -> Iterator[Client]:
     """Client of the cluster whose scheduler is at `address`, which has workers with this version of finger3d."""
+    from distributed import Client
+
     if ":" not in address.removeprefix("tcp://").removeprefix("tls://"):
         raise Finger3dError(f"--scheduler {address}: must be HOST:PORT, for instance tcp://127.0.0.1:8786")
     for name in ("distributed", "distributed.client"):  # the second has a level of its own in Dask's configuration
@@ -87,6 +92,8 @@ def remote(address: str) -> Iterator[Client]:
 
 async def _greet(address: str) -> None:
     """Reach a scheduler and leave: a Client waits without end for one that accepts and says nothing."""
+    from distributed.comm.core import connect
+
     comm = await connect(address, timeout=CONNECT_S)
     comm.abort()
 
