@@ -27,7 +27,7 @@ import numpy as np
 
 from finger3d._machine import cores
 from finger3d.analyses.calibrate.presses import presses
-from finger3d.analyses.validate import Row
+from finger3d.analyses.study_rows import Row
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
@@ -270,7 +270,7 @@ def main(arguments: Sequence[str]) -> None:
     if arguments and not arguments[0].startswith("-"):
         print(json.dumps(measured(json.loads(arguments[0]))))
         return
-    from finger3d.analyses.validate import table
+    from finger3d.analyses.study_rows import table
     from finger3d.cli.common import print_columns
 
     begin = time.perf_counter()

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from finger3d.analyses.press import press
-from finger3d.analyses.validate import Row
+from finger3d.analyses.study_rows import Row
 from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.contact.newton import uniqueness
 from finger3d.contact.solve import solve_increment

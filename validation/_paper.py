@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.analyses.validate import Measure, Row
+from finger3d.analyses.study_rows import Measure, Row
 from finger3d.contact.friction import OPEN, STICK, Coulomb, FrictionLaw
 from finger3d.fem.material import Isotropic
 from finger3d.fem.recover import displacement

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from finger3d._machine import versions
-from finger3d.analyses.validate import Result, Row
+from finger3d.analyses.study_rows import Result, Row
 from finger3d.errors import MissingError
 from finger3d.mechanics.solve import contact_box, symmetry
 from finger3d.meshing.generate import mesh_solid

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.analyses.validate import Result, Row
+from finger3d.analyses.study_rows import Result, Row
 from finger3d.fem.material import Elasticity, Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import Leg, MeshOptions, Model

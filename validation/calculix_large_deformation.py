@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.validate import Result, Row
+from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect
 from finger3d.fem.material import Isotropic

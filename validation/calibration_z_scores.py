@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from finger3d.analyses.calibrate.increments import error_left
 from finger3d.analyses.calibrate.run import calibrated
 from finger3d.analyses.calibrate.tolerances import TOLERANCES, read
-from finger3d.analyses.validate import Result, Row
+from finger3d.analyses.study_rows import Result, Row
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model

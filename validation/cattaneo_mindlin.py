@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.validate import Result, Row
+from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import STICK
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.solve import Problem

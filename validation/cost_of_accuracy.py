@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from finger3d._machine import memory_bytes
-from finger3d.analyses.validate import Result, Row
+from finger3d.analyses.study_rows import Result, Row
 from finger3d.scene.checks import BASE_SHARE, SIZE_SHARE
 
 from ._child import Bench, best_of

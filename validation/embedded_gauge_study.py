@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.validate import Result, Row
+from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.embedded_gauge import Effect, Strips
 from finger3d.fem.material import Isotropic

@@ -21,7 +21,7 @@ import numpy as np
 from finger3d.accuracy.companions import companion
 from finger3d.accuracy.estimate import compared, main_numbers, press_numbers
 from finger3d.accuracy.point_resolution import PointResolution
-from finger3d.analyses.validate import Result, Row
+from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.elastic_object import SoftObject
 from finger3d.fem.material import Isotropic

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.validate import Result, Row
+from finger3d.analyses.study_rows import Result, Row
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.solve import build
 

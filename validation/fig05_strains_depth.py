@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.validate import Result
+from finger3d.analyses.study_rows import Result
 
 from ._paper import BELOW_R5, STRAIN, STRESS, columns, half_cylinder, line_r5, said, strains, under
 

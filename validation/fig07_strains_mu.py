@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.validate import Result, Row
+from finger3d.analyses.study_rows import Result, Row
 
 from ._paper import (
     BELOW_R5,

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.validate import Result, Row
+from finger3d.analyses.study_rows import Result, Row
 from finger3d.effects.kinetic_friction import Branch, TwoCoefficients
 
 from ._paper import MUS, STRAIN, STRESS, columns, half_cylinder, line_r5, said, strains, under

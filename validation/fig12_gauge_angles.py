@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.validate import Result, Row
+from finger3d.analyses.study_rows import Result, Row
 from finger3d.mechanics.model import Gauge
 
 from ._paper import BELOW_FIG9, STRAIN, STRESS, columns, fig9, said, settled, steps_row

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.validate import Result, Row
+from finger3d.analyses.study_rows import Result, Row
 from finger3d.geometry.registry import designs
 
 from ._paper import BELOW_FIG9, MUS, Profile, columns, fig9, line, said, settled, steps_row, strains

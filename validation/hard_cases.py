@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.validate import Result, Row
+from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
 from finger3d.errors import Outcome
 from finger3d.fem.material import Isotropic

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.validate import Result, Row
+from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.mechanics.solve import Problem
 from finger3d.mechanics.step_halving import DISSIPATION_TOLERANCE, TOLERANCE, marched

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.validate import Result, Row
+from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import SLIP
 
 from ._halfplane import RADIUS, Profile, compliance, hertz, line, loading, under

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.validate import Result, Row
+from finger3d.analyses.study_rows import Result, Row
 
 from . import _halfspace, _rings
 from ._halfspace import RADIUS

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from finger3d._machine import cores, memory_bytes
-from finger3d.analyses.validate import Result, Row
+from finger3d.analyses.study_rows import Result, Row
 
 from ._child import Bench, best_of
 from ._scaling import BODIES, STAGES, Size, sweep_seconds

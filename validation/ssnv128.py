@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from finger3d.analyses.validate import Result, Row
+from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import SLIP, STATUS_NAMES, Coulomb
 from finger3d.contact.maeno import maeno_active_set
 from finger3d.contact.solve import solve_increment

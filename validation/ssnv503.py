@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from finger3d.analyses.validate import Result, Row
+from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState

@@ -22,7 +22,7 @@ import numpy as np
 from finger3d.analyses.calibrate.run import MUS, CurvePoints, calibrated
 from finger3d.analyses.calibrate.tolerances import TOLERANCES
 from finger3d.analyses.reduced import ReducedModel
-from finger3d.analyses.validate import Result, Row
+from finger3d.analyses.study_rows import Result, Row
 from finger3d.effects.embedded_gauge import Effect
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs

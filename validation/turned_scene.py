@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.analyses.validate import Result, Row
+from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState

@@ -21,7 +21,7 @@ import numpy as np
 from scipy import sparse
 from scipy.optimize import brentq
 
-from finger3d.analyses.validate import Result, Row
+from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.elastic_object import Effect, ObjectBody
 from finger3d.fem.material import Elasticity, Isotropic

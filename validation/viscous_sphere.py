@@ -23,7 +23,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.signal import residue
 
-from finger3d.analyses.validate import Result, Row
+from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.effects.viscosity import Viscoelastic
 from finger3d.fem.assembly import Stiffness, stiffness

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.validate import Result, Row
+from finger3d.analyses.study_rows import Result, Row
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.solve import build, march
 from finger3d.scene import parse
