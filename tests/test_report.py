@@ -73,7 +73,7 @@ def test_a_press_tells_its_numbers_proof_cost_versions_and_how_to_cite(section: 
     assert f"scipy {summary['versions']['scipy']}" in text
     assert CITE in text
     assert all(advice in text for advice in summary["advice"])
-    assert (section / "report.html").read_text(encoding="utf-8").count('href="data:image/png;base64,') == 3
+    assert (section / "report.html").read_text(encoding="utf-8").count('src="data:image/png;base64,') == 3
     assert "Contact pressure on the deformed finger, at true scale" in text
 
 

@@ -39,8 +39,8 @@ def scene_file(tmp_path: Path) -> Path:
 def test_points_that_fail_are_kept_as_failures(tmp_path: Path, monkeypatch: Any, scene_file: Path, capsys: Any) -> None:
     whole = pressing.press
 
-    def some(problem: Any, mu: float, near: Any = ()) -> Any:
-        found = whole(problem, mu, near)
+    def some(problem: Any, mu: float, *rest: Any) -> Any:
+        found = whole(problem, mu, *rest)
         failed = replace(found.frame, outcome=Outcome.NO_CONVERGENCE)
         return replace(found, frame=failed) if mu in (0.4, 0.9) else found
 
@@ -56,7 +56,7 @@ def test_points_that_fail_are_kept_as_failures(tmp_path: Path, monkeypatch: Any,
     with (out / "calibration.csv").open() as stream:
         rows = list(csv.DictReader(stream))
     assert sum("did not settle" in row["outcome"] for row in rows) == 2
-    monkeypatch.setattr(pressing, "press", lambda p, mu, near: replace(some(p, 0.4), mu=mu))
+    monkeypatch.setattr(pressing, "press", lambda p, mu, *rest: replace(some(p, 0.4), mu=mu))
     with pytest.raises(MissingError, match="only 0 of 6"):
         calibrate(scene(), "g36", out, FEW, tolerances=NONE)
     assert "did not settle" in (out / "calibration.csv").read_text()
@@ -67,10 +67,10 @@ def test_an_interruption_keeps_the_points_so_far(
 ) -> None:
     whole = pressing.press
 
-    def until(problem: Any, mu: float, near: Any) -> Any:
+    def until(problem: Any, mu: float, *rest: Any) -> Any:
         if mu > 0.5:
             raise KeyboardInterrupt
-        return whole(problem, mu, near)
+        return whole(problem, mu, *rest)
 
     monkeypatch.setattr(pressing, "press", until)
     out = tmp_path / "cal"
