@@ -36,6 +36,7 @@ def validate(
         Small meshes and few steps; the committed results do not change.
     """
     from finger3d.analyses import validate as study
+    from finger3d.analyses.study_rows import table
 
     known = study.studies()
     selected = study.chosen(studies or [], known, quick)
@@ -50,7 +51,7 @@ def validate(
         }
         print_json({"results": folder, "studies": rows})
     else:
-        print_columns("study what kind reference wanted got error tolerance verdict".split(), study.table(found))
+        print_columns("study what kind reference wanted got error tolerance verdict".split(), table(found))
         print(f"results: {folder}")
     failed = [name for name, rows in found.items() if not all(row.passed for row in rows)]
     if failed:

@@ -1,7 +1,7 @@
-"""Frames of a press at one scale: contact pressure on the left, stick and slip on the right.
+"""Pictures and animations of the steps of a press: contact pressure on the left, stick and slip on the right.
 
-``python -m finger3d.plotting.animation IN.npz OUT.npy`` renders solids in a child process, as `finger3d.plotting.solid`
-does.
+All frames share one camera and one scale of pressure. ``python -m finger3d.plotting.animation IN.npz OUT.npy`` renders
+solids in a child process, like `finger3d.plotting.solid`.
 """
 
 from __future__ import annotations
@@ -12,38 +12,44 @@ import sys
 from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.fem.simplex import Mesh
 from finger3d.io import atomic
-from finger3d.mechanics.model import Gauge
+from finger3d.mechanics.gauges import Gauge
 from finger3d.plotting import figures as view
 from finger3d.plotting import solid
-from finger3d.plotting.camera import framed
+from finger3d.plotting.camera import AXES, flat, framed
 from finger3d.plotting.gauges import draw_marks, marks_of
-from finger3d.plotting.solid import Skin, skin_of
+from finger3d.plotting.solid import BODY, LINE, REST, Skin, skin_of
 from finger3d.results.states import States
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from PIL.Image import Image
 
-Array = NDArray[Any]
+Float = NDArray[np.float64]
+Images = NDArray[np.uint8]
+Frame = tuple[Float, Float]
+"""Centre (3,), and width and height (2,), of what the camera sees, mm."""
 
-_DPI = {"png": 120, "gif": 65}
-_FRAME_MS, _LAST_MS = 450, 1500
+_DPI = {"png": 120, "gif": 65}  # pixels per inch
+_FRAME_MS, _LAST_MS = 450, 1500  # duration of a frame and of the last frame of an animation
+_WINDOW = {"picture": (1600, 1200), "animation": (1000, 750)}  # width and height of rendered frames, in pixels
 
 
 def frames(states: States, numbers: Sequence[int], title: str, gauges: Sequence[Gauge] = ()) -> list[Figure]:
-    """Figures of some of the kept steps, with one camera and one scale of pressure.
+    """Return figures of some of the stored steps, with one camera and one scale of pressure.
 
     Parameters
     ----------
-    numbers : which of the kept steps, from 0
-    gauges : marked where they are in each of them
+    states : stored steps of a press
+    numbers : indices of the stored steps to draw, from 0
+    title : title of the scene
+    gauges : gauges to mark in every frame
     """
     from finger3d.results.states import captions
 
@@ -67,20 +73,20 @@ def frames(states: States, numbers: Sequence[int], title: str, gauges: Sequence[
 
 
 def mesh_of(states: States) -> Mesh:
-    """The whole finger's mesh at rest, facets labelled contact and body."""
+    """Return the undeformed mesh of the whole finger, with its facets labelled contact and body."""
     on = states.on_contact
     facets = {"contact": states.facets[on].astype(int), "body": states.facets[~on].astype(int)}
     return Mesh(states.points.astype(float), states.cells.astype(int), facets)
 
 
 def write_png(path: str | Path, figure: Figure) -> None:
-    """Write one frame."""
+    """Write one frame as a PNG file."""
     with atomic(path) as temporary:
         figure.savefig(temporary, format="png", dpi=_DPI["png"])
 
 
 def write_gif(path: str | Path, figures: Sequence[Figure]) -> None:
-    """Write an animation that rests on its last frame."""
+    """Write the frames as an animation that repeats and holds its last frame longer."""
     images = [_pixels(figure) for figure in figures]
     durations = [_FRAME_MS] * (len(images) - 1) + [_LAST_MS]
     with atomic(path) as temporary:
@@ -92,13 +98,14 @@ def _pixels(figure: Figure) -> Image:
 
     stream = io.BytesIO()
     figure.savefig(stream, format="png", dpi=_DPI["gif"])
-    # The octree keeps small areas of a colour of their own, such as the keys.
+    # The octree method preserves the colours of small areas, such as the legend.
     return Image.open(stream).convert("RGB").quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
 
 
 def _sections(
     states: States, numbers: Sequence[int], titles: Sequence[str], highest: float, marks: Sequence[view.Marks]
 ) -> list[Figure]:
+    """Draw steps of a 2D model."""
     from matplotlib.collections import LineCollection, PolyCollection
 
     moved = states.points + states.displacement[list(numbers)]
@@ -115,29 +122,30 @@ def _sections(
         for axes, colours in zip(
             panels, (view.pressure_colours(pressure, highest), view.palette()[status.astype(int)]), strict=True
         ):
-            axes.add_collection(PolyCollection(list(at[corners]), facecolor=view.BODY, edgecolor=view.BODY, lw=0.3))
-            axes.add_collection(LineCollection(list(states.points[outline]), colors=view.REST, lw=0.8, linestyles=":"))
-            axes.add_collection(LineCollection(list(at[outline]), colors=view.LINE, lw=0.8))
+            axes.add_collection(PolyCollection(list(at[corners]), facecolor=BODY, edgecolor=BODY, lw=0.3))
+            axes.add_collection(LineCollection(list(states.points[outline]), colors=REST, lw=0.8, linestyles=":"))
+            axes.add_collection(LineCollection(list(at[outline]), colors=LINE, lw=0.8))
             axes.add_collection(LineCollection(list(halves), colors=colours, lw=5, capstyle="butt", zorder=3))
             axes.set(xlim=low[0] + span[0] * np.array([-0.04, 1.04]), ylim=low[1] + span[1] * np.array([-0.04, 1.1]))
             axes.set_xlabel("x (mm)", labelpad=1)
         panels[0].set_ylabel("y (mm)")
         draw_marks(panels[0], lines)
-        view.keys(figure, highest, {"finger at rest": view.REST})
+        view.keys(figure, highest, {"finger at rest": REST})
         figures.append(figure)
     return figures
 
 
 def _solids(
     skins: Sequence[Skin],
-    colours: Sequence[tuple[Array, Array]],
+    colours: Sequence[tuple[Float, Float]],
     titles: Sequence[str],
     highest: float,
     marks: Sequence[view.Marks],
 ) -> list[Figure]:
+    """Draw steps of a solid."""
     images, extent = _rendered(skins, colours) or (None, None)
-    flat = np.concatenate([solid.flat(skin.points) for skin in skins])
-    low, span = flat.min(axis=0), np.ptp(flat, axis=0)
+    seen = np.concatenate([flat(skin.points) for skin in skins])
+    low, span = seen.min(axis=0), np.ptp(seen, axis=0)
     aspect = float(span[1] / span[0]) if images is None else images.shape[2] / images.shape[3]
     figures = []
     for k, title in enumerate(titles):
@@ -149,17 +157,22 @@ def _solids(
                 solid.draw_solid(axes, skins[k], colours[k][number], arrows=False)
                 axes.set(xlim=(low[0], low[0] + span[0]), ylim=(low[1], low[1] + span[1]))
             axes.set_axis_off()
-        draw_marks(panels[0], [(name, solid.flat(line)) for name, line in marks[k]])
-        view.keys(figure, highest, {"finger at rest": view.REST})
+        draw_marks(panels[0], [(name, flat(line)) for name, line in marks[k]])
+        view.keys(figure, highest, {"finger at rest": REST})
         figures.append(figure)
     return figures
 
 
 def _rendered(
-    skins: Sequence[Skin], colours: Sequence[tuple[Array, Array]]
-) -> tuple[Array, tuple[float, float, float, float]] | None:
-    """Images (s, 2, h, w, 3) by PyVista in a child, without their common margin, and their extent in mm; or None where
-    it does not work or is not wanted.
+    skins: Sequence[Skin], colours: Sequence[tuple[Float, Float]]
+) -> tuple[Images, tuple[float, float, float, float]] | None:
+    """Render the skins by PyVista in a child process.
+
+    Returns
+    -------
+    tuple or None
+        Cropped images (s, 2, h, w, 3) and their left, right, lower and upper edge in mm; None if PyVista cannot render
+        or FINGER3D_RENDERER is ``matplotlib``.
     """
     wanted = os.environ.get("FINGER3D_RENDERER", "")
     if wanted == "matplotlib":
@@ -173,17 +186,17 @@ def _rendered(
     return images.reshape(-1, 2, *images.shape[1:]), extent
 
 
-def _frame(skins: Sequence[Skin]) -> tuple[Array, Array]:
-    """One frame around all of them: they must not move unless the finger does."""
-    flat = np.concatenate([solid.flat(skin.points) for skin in skins])
+def _frame(skins: Sequence[Skin]) -> Frame:
+    """Return one frame that holds all skins, so that the camera does not move between them."""
+    seen = np.concatenate([flat(skin.points) for skin in skins])
     first = skins[0].frame[0]
-    low, high = flat.min(axis=0), flat.max(axis=0)
-    shift = 0.5 * (low + high) - solid.flat(first)
-    return first + shift @ solid.AXES[:2], high - low
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    shift = 0.5 * (low + high) - flat(first)
+    return first + shift @ AXES[:2], high - low
 
 
 def _child(source: str, target: str) -> None:
-    """Render every skin twice with one camera, and save the images (s, 2, h, w, 3)."""
+    """Render every skin in both of its colourings with one camera, and save the images (s, 2, h, w, 3)."""
     import pyvista as pv
 
     data = np.load(source)
@@ -192,13 +205,12 @@ def _child(source: str, target: str) -> None:
     frame = _frame(skins)
     images = []
     for k, skin in enumerate(skins):
-        plotter = pv.Plotter(
-            off_screen=True, window_size=[1600, 1200] if count == 1 else [1000, 750], lighting="three lights"
-        )
+        window = list(_WINDOW["picture" if count == 1 else "animation"])
+        plotter = pv.Plotter(off_screen=True, window_size=window, lighting="three lights")
         contact = solid.stage(plotter, skin, frame)
         for colours in data[f"colours_{k}"]:
             contact["colour"] = np.round(255.0 * colours.reshape(-1, 3)).astype(np.uint8)
-            plotter.render()  # a screenshot alone repeats the picture before
+            plotter.render()  # without it, the screenshot would show the previous colours
             images.append(plotter.screenshot(return_img=True))
         plotter.close()
     stack = np.array(images)

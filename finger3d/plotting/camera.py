@@ -1,4 +1,4 @@
-"""From where a solid is looked at, and what of the window is kept."""
+"""Camera of the pictures of a solid: an oblique parallel projection, and the crop of the rendered window."""
 
 from __future__ import annotations
 
@@ -8,14 +8,15 @@ from numpy.typing import NDArray
 Float = NDArray[np.float64]
 
 WINDOW = (1600, 1200)
-"""Width and height of what PyVista renders, pixels."""
+"""Width and height of the window that PyVista renders, in pixels."""
 
-_VIEW = np.array([-0.45, 1.05, 1.0])  # From where the finger is looked at: above, in front, a little from the left.
-_MARGIN = 1.04
+_VIEW = np.array([-0.45, 1.05, 1.0])  # direction towards the viewer: in front, above, slightly left
+_MARGIN = 1.04  # height of the window over that of its contents
+_WHITE = 250  # least grey level of the background, of 255
 
 
 def _viewer_axes() -> Float:
-    """Rows: to the right, up, and towards the viewer."""
+    """Return the orthonormal axes of the viewer, shape (3, 3): right, up, and towards the viewer."""
     towards = _VIEW / np.linalg.norm(_VIEW)
     right = np.cross([0.0, 1.0, 0.0], towards)
     right /= np.linalg.norm(right)
@@ -23,24 +24,37 @@ def _viewer_axes() -> Float:
 
 
 AXES = _viewer_axes()
-"""Rows (3, 3): to the right, up, and towards the viewer."""
+"""Orthonormal axes of the viewer, shape (3, 3), one a row: right, up, and towards the viewer."""
 
 
 def flat(points: Float) -> Float:
-    """Points (..., 3) as the viewer sees them, (..., 2)."""
+    """Project points, shape (..., 3), onto the picture plane, shape (..., 2), mm."""
     return points @ AXES[:2].T
 
 
 def half_height(size: Float) -> float:
-    """Half the height (mm) of a window that holds this width and height (mm)."""
+    """Return half the height of a window, in mm, that holds the given width and height (2,), in mm."""
     return float(0.5 * _MARGIN * max(size[1], size[0] * WINDOW[1] / WINDOW[0]))
 
 
 def framed(
     images: NDArray[np.uint8], frame: tuple[Float, Float]
 ) -> tuple[NDArray[np.uint8], tuple[float, float, float, float]]:
-    """Images (s, h, w, 3) of a window around a frame, middle (3,) and width and height (2,), without white margins; and
-    the left, right, lower and upper end of what is kept, mm as `flat` gives them.
+    """Crop the common white margins of images.
+
+    Parameters
+    ----------
+    images : (s, h, w, 3) array
+        Images of one window.
+    frame : tuple of (3,) and (2,) array, mm
+        Centre of the window, and the width and height that it holds.
+
+    Returns
+    -------
+    images : (s, h', w', 3) array
+        Cropped images.
+    extent : tuple of four floats, mm
+        Left, right, lower and upper edge of the cropped images in the picture plane of `flat`.
     """
     kept, (top, left) = _cropped(images)
     middle, size = frame
@@ -50,9 +64,9 @@ def framed(
 
 
 def _cropped(images: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], tuple[int, int]]:
-    """Images (s, h, w, 3) without the margin that all of them leave white, and the first row and column kept."""
+    """Return images (s, h, w, 3) without their common white margins, and the first row and column kept."""
     stack = images[..., :3]
-    inked = np.min(stack, axis=(0, 3)) < 250
+    inked = np.min(stack, axis=(0, 3)) < _WHITE
     rows, columns = np.flatnonzero(inked.any(axis=1)), np.flatnonzero(inked.any(axis=0))
     kept = stack[:, rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
     return kept, (int(rows[0]), int(columns[0]))

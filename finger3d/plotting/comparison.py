@@ -1,21 +1,41 @@
-"""compare.png: force against width between the plane limits, tractions along x, lengths and gauges side by side."""
+"""compare.png: force per width against width, tractions along x, and the other quantities of each model."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from finger3d.plotting.layout import WIDEST, sheet
+from finger3d.plotting.layout import WIDEST, sheet, style
 from finger3d.results.comparison import FORCE, Case
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 _COLOURS = {"plane strain": "#b2182b", "plane stress": "#2166ac", "solid": "#222222", "solid, ends held": "#e08214"}
+_QUANTITIES = {
+    FORCE: "force",
+    "contact_length_mm": "contact\nlength",
+    "stick_length_mm": "stick\nlength",
+    "friction_sum_N_per_mm": "sum of\n|friction|",
+    "friction_along_x_N_per_mm": "|friction\nalong x|",
+    "peak_pressure_MPa": "peak\npressure",
+}
+_MOST_QUANTITIES = 9  # groups of bars
 
 
 def draw(path: Path, cases: Sequence[Case], own_width_mm: float, title: str) -> None:
-    """Draw the cases that converged."""
+    """Draw the converged cases and write the picture.
+
+    Parameters
+    ----------
+    path : PNG file to write
+    cases : models of one scene, at several widths
+    own_width_mm : width of the scene
+    title : title of the scene
+    """
     good = [c for c in cases if c.ok]
     own = [c for c in good if c.width_mm == own_width_mm]
     made = sheet(2, 2, (WIDEST, 4.2), (0.95, 0.15, 0.7, 0.2), f"{title}: 2D against 3D")
@@ -27,14 +47,8 @@ def draw(path: Path, cases: Sequence[Case], own_width_mm: float, title: str) -> 
     made.save(path)
 
 
-def _plain(axes: Any) -> None:
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.grid(True, color="#e4e4e4", lw=0.6)
-    axes.set_axisbelow(True)
-
-
-def _forces(axes: Any, cases: Sequence[Case], own: Sequence[Case]) -> None:
-    """Force per width: solids against their width, plane models and held ends as the limits."""
+def _forces(axes: Axes, cases: Sequence[Case], own: Sequence[Case]) -> None:
+    """Draw the force per width of solids against their width, with the plane models as horizontal lines."""
     from matplotlib.ticker import NullFormatter
 
     solids = sorted((c for c in cases if c.model == "solid"), key=lambda c: c.width_mm)
@@ -45,13 +59,20 @@ def _forces(axes: Any, cases: Sequence[Case], own: Sequence[Case]) -> None:
             axes.axhline(value, color=_COLOURS[case.model], ls="--", lw=1.2, label=case.model)
     width = [c.width_mm for c in solids]
     axes.errorbar(
-        width, [c.numbers[FORCE] for c in solids], [c.errors.get(FORCE, 0.0) for c in solids],
-        fmt="o-", ms=5, lw=1.3, capsize=3, color=_COLOURS["solid"], label="solid, ends free",
-    )  # fmt: skip
+        width,
+        [c.numbers[FORCE] for c in solids],
+        [c.errors.get(FORCE, 0.0) for c in solids],
+        fmt="o-",
+        ms=5,
+        lw=1.3,
+        capsize=3,
+        color=_COLOURS["solid"],
+        label="solid, ends free",
+    )
     for case in own:
         if case.model == "solid, ends held":
-            mark = {"ms": 7, "mfc": "none", "color": _COLOURS[case.model], "label": case.model}
-            axes.plot(case.width_mm, case.numbers[FORCE], "D", **mark)
+            colour = _COLOURS[case.model]
+            axes.plot(case.width_mm, case.numbers[FORCE], "D", ms=7, mfc="none", color=colour, label=case.model)
     if len(width) > 1:
         axes.set_xscale("log")
         axes.set_xticks(width, [f"{w:g}" for w in width])
@@ -61,22 +82,19 @@ def _forces(axes: Any, cases: Sequence[Case], own: Sequence[Case]) -> None:
     axes.set_xlabel("width (mm)")
     axes.set_ylabel("force per width (N/mm)")
     axes.legend(frameon=False, loc="lower right")
-    _plain(axes)
+    style(axes)
 
 
-def _bars(axes: Any, own: Sequence[Case]) -> None:
-    """Every quantity over that of the solid, side by side."""
+def _bars(axes: Axes, own: Sequence[Case]) -> None:
+    """Draw the quantities of each model as bars, relative to those of the solid."""
     solid = next((c for c in own if c.model == "solid"), None)
     if solid is None:
         axes.set_axis_off()
         return
-    names = {
-        FORCE: "force", "contact_length_mm": "contact\nlength", "stick_length_mm": "stick\nlength",
-        "friction_sum_N_per_mm": "sum of\n|friction|", "friction_along_x_N_per_mm": "|friction\nalong x|",
-        "peak_pressure_MPa": "peak\npressure",
-    }  # fmt: skip
-    names |= {k: f"gauge\n{k.removeprefix('gauge_')}" for k in list(solid.numbers) if k.startswith("gauge_")}
-    keys = [k for k in names if solid.numbers[k] != 0.0][:9]
+    names = _QUANTITIES | {
+        k: f"gauge\n{k.removeprefix('gauge_')}" for k in list(solid.numbers) if k.startswith("gauge_")
+    }
+    keys = [k for k in names if solid.numbers[k] != 0.0][:_MOST_QUANTITIES]
     shown = [c for c in own if c.model != "solid, ends held"]
     at, step = np.arange(len(keys)), 0.8 / max(len(shown), 1)
     for i, case in enumerate(shown):
@@ -84,30 +102,42 @@ def _bars(axes: Any, own: Sequence[Case]) -> None:
         value = np.array([case.numbers[k] for k in keys]) / scale
         error = np.array([case.errors.get(k, 0.0) for k in keys]) / np.abs(scale)
         axes.bar(
-            at + (i - 0.5 * (len(shown) - 1)) * step, value, 0.92 * step, yerr=error, capsize=2,
-            color=_COLOURS[case.model], error_kw={"lw": 0.9}, label=case.model,
-        )  # fmt: skip
+            at + (i - 0.5 * (len(shown) - 1)) * step,
+            value,
+            0.92 * step,
+            yerr=error,
+            capsize=2,
+            color=_COLOURS[case.model],
+            error_kw={"lw": 0.9},
+            label=case.model,
+        )
     axes.axhline(1.0, color="#888888", lw=0.8)
     axes.set_xticks(at, [names[k] for k in keys], fontsize=9)
-    axes.set_ylabel("in parts of the solid's (at z = 0)")
+    axes.set_ylabel("relative to the solid (at z = 0)")
     axes.margins(y=0.18)
     axes.legend(frameon=False, ncols=3, loc="upper center")
-    _plain(axes)
+    style(axes)
     axes.grid(False, axis="x")
 
 
-def _along(axes: Any, own: Sequence[Case], key: str, label: str) -> None:
-    """A traction along x for each model; the solid in its middle and at its end."""
+def _along(axes: Axes, own: Sequence[Case], key: str, label: str) -> None:
+    """Draw a traction against x for each model; for the solid at its middle and at its end."""
     for case in own:
         if case.model == "solid, ends held":
             continue
         for line, columns in case.lines.items():
-            style, where = ("-", "") if line == "z = 0" else (":", ", end")
+            dashes, where = ("-", "") if line == "z = 0" else (":", ", end")
             where = ", z = 0" if case.model == "solid" and line == "z = 0" else where
             axes.plot(
-                columns["x_mm"], columns[key], style, marker=".", ms=3, lw=1.3,
-                color=_COLOURS[case.model], label=case.model + where,
-            )  # fmt: skip
+                columns["x_mm"],
+                columns[key],
+                dashes,
+                marker=".",
+                ms=3,
+                lw=1.3,
+                color=_COLOURS[case.model],
+                label=case.model + where,
+            )
     reach = max((0.6 * c.numbers["contact_length_mm"] for c in own), default=0.0)
     if reach > 0.0:
         axes.set_xlim(-reach, reach)
@@ -115,4 +145,4 @@ def _along(axes: Any, own: Sequence[Case], key: str, label: str) -> None:
     axes.set_xlabel("x at rest (mm)")
     axes.set_ylabel(label)
     axes.legend(frameon=False, fontsize=9)
-    _plain(axes)
+    style(axes)

@@ -1,7 +1,7 @@
-"""Pictures of a result, drawn without a display: the pressed finger, the contact forces, the force against depth.
+"""Pictures of a press, drawn without a display: the deformed finger, the contact tractions, and force against depth.
 
-Solids are rendered by PyVista in a child process, because VTK ends the whole process where no OpenGL driver works;
-then, and with ``FINGER3D_RENDERER=matplotlib``, matplotlib draws them.
+Solids are rendered by PyVista in a child process, because VTK aborts the process if no OpenGL driver works. In that
+case, and with ``FINGER3D_RENDERER=matplotlib``, matplotlib draws them.
 """
 
 from __future__ import annotations
@@ -9,28 +9,31 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
 from finger3d.fem.simplex import Mesh
+from finger3d.plotting.camera import flat
 from finger3d.plotting.gauges import Mark, draw_marks
-from finger3d.plotting.layout import WIDEST, blank, save, sheet
+from finger3d.plotting.layout import WIDEST, blank, save, sheet, style
 from finger3d.plotting.outlines import edges_of, outline_of
-from finger3d.plotting.solid import BODY, COLOURS, LINE, OBJECT, REST, Skin, draw_solid, flat, render_solid, skin_of
+from finger3d.plotting.solid import BODY, COLOURS, LINE, OBJECT, REST, Skin, draw_solid, render_solid, skin_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.patches import Patch
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 Marks = Sequence[tuple[str, Float]]
-"""Label of a gauge, and its start, middle and end (3, d) mm."""
+"""Labels of gauges, and their start, middle and end, shape (3, d), mm."""
 
-_CMAP = "viridis"
+_CMAP = "viridis"  # of the contact pressure
+_FEWEST_POINTS = 5  # of a line z = const that is drawn
 _SHADES = {STICK: "#c9d9ee", SLIP: "#fde3c4"}
 
 
@@ -44,21 +47,25 @@ def finger_picture(
     profile: Float | None = None,
     marks: Sequence[Mark] = (),
 ) -> str:
-    """Draw the deformed finger at true scale: contact pressure on the left, stick and slip on the right.
+    """Draw the deformed finger to scale: contact pressure on the left, stick and slip on the right.
 
     Parameters
     ----------
-    mesh : the whole finger at rest (unfolded, if symmetry was used), mm
-    displacement : (n, d) mm
-    table : columns of contact.csv, of which pressure_MPa, shear_x_MPa, shear_z_MPa and status are read, each (c,)
-    contact_nodes : (c,) numbers of the contact points in `mesh`
-    profile : (k, 2) x and y in mm of the object's surface, drawn as a line (2D) or an outline (solid)
-    marks : of gauges (`finger3d.plotting.gauges.marks_of`), drawn where they lie, with name and angle
+    path : PNG file to write
+    mesh : undeformed mesh of the whole finger (unfolded, if symmetry was used), mm
+    displacement : (n, d) array, mm
+    table : columns of contact.csv, each (c,); pressure_MPa, shear_x_MPa, shear_z_MPa and status are used
+    contact_nodes : (c,) array
+        Nodes of `mesh` that are the contact points.
+    title : title of the picture
+    profile : (k, 2) array, mm
+        Coordinates x and y of the surface of the object, drawn as a line (2D) or as the outline of a slab (3D).
+    marks : gauges to draw, from `finger3d.plotting.gauges.marks_of`
 
     Returns
     -------
     str
-        What drew it: ``pyvista`` or ``matplotlib``.
+        The renderer, ``pyvista`` or ``matplotlib``.
     """
     nodes, status = np.asarray(contact_nodes, dtype=np.int64), _status(table)
     pressure = _column(table, "pressure_MPa")
@@ -81,23 +88,29 @@ def contact_figure(
     half_width_mm: float | None = None,
     title: str = "",
 ) -> None:
-    """Draw f_n, f_t and mu f_n along x with the zones that stick and slip, as in the paper's Fig. 4.
+    """Draw tractions f_n and f_t and the friction limit mu f_n along x, with stick and slip zones (Maeno 2004, Fig. 4).
 
     Parameters
     ----------
-    table : columns of contact.csv, of which x_mm, z_mm, pressure_MPa, shear_x_MPa, shear_z_MPa and status are read
-    mu : friction coefficient of a sticking point, one for all or one for each
-    band_mm : how far from z = 0 a point may lie if none are on that line; default 0.4 of the points' distance
-    half_width_mm : of a solid, whose line at the end z = half_width_mm is a second panel; None for a section
+    path : PNG file to write
+    table : columns of contact.csv, each (c,); x_mm, z_mm, pressure_MPa, shear_x_MPa, shear_z_MPa and status are used
+    mu : scalar or (c,) array
+        Coefficient of static friction.
+    band_mm : largest distance from z = 0 of the points that represent that line if the mesh has no points on it;
+        default 0.4 times the typical distance of neighbouring points
+    half_width_mm : half the width of a solid, which adds a panel for its end z = half_width_mm; None for a 2D model
+    title : title of the picture
     """
     x, z, status = _column(table, "x_mm"), _column(table, "z_mm"), _status(table)
     lines = [("", np.arange(len(x)))]
     if half_width_mm is not None:
         band = 0.4 * _spacing(x, z) if band_mm is None else band_mm
-        # A mesh has points exactly on the end, and on the middle if that is a symmetry plane; else those near it serve.
+        # A mesh always has points on its end, and on its middle only if that is a plane of symmetry.
         exact = 1e-6 * half_width_mm
         middle, end = np.flatnonzero(np.abs(z) <= exact), np.flatnonzero(np.abs(z - half_width_mm) <= exact)
-        lines = [("in the middle, z = 0", middle if len(middle) >= 5 else np.flatnonzero(np.abs(z) <= band))]
+        lines = [
+            ("in the middle, z = 0", middle if len(middle) >= _FEWEST_POINTS else np.flatnonzero(np.abs(z) <= band))
+        ]
         lines += [(f"at the end, z = {half_width_mm:g} mm", end)] if len(end) else []
     fn, fx, fz = (_column(table, name) for name in ("pressure_MPa", "shear_x_MPa", "shear_z_MPa"))
     coefficient = np.broadcast_to(np.asarray(mu, dtype=np.float64), x.shape)
@@ -114,38 +127,42 @@ def contact_figure(
     made.save(path)
 
 
-def force_figure(path: str | Path, steps: Sequence[Mapping[str, Any]], title: str = "") -> None:
-    """Draw forces (N) and the half lengths of contact and stick zone (mm) against depth (mm), a point a step.
+def force_figure(path: str | Path, steps: Sequence[Mapping[str, object]], title: str = "") -> None:
+    """Draw forces (N) and the half lengths (mm) of the contact and the stick zone against depth (mm).
 
-    Where the object slides, its way from first touch (mm) takes the place of the depth, which stands still then.
+    If the object slides, the length of its path (mm) since first contact replaces the depth.
 
     Parameters
     ----------
-    steps : entries of summary.json's ``steps``
+    path : PNG file to write
+    steps : the ``steps`` of summary.json
+    title : title of the picture
     """
-    depth, normal, friction, contact, stick = (
-        [float(step[key]) for step in steps]
-        for key in (
-            "depth_mm", "normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm",
-        )
-    )  # fmt: skip
-    at = np.array([[step["depth_mm"], step.get("slide_x_mm", 0.0), step.get("slide_z_mm", 0.0)] for step in steps])
+
+    def values(key: str) -> Float:
+        return np.array([step[key] for step in steps], dtype=np.float64)
+
+    depth = values("depth_mm")
+    at = np.array(
+        [[step["depth_mm"], step.get("slide_x_mm", 0.0), step.get("slide_z_mm", 0.0)] for step in steps],
+        dtype=np.float64,
+    )
     slides = bool(np.any(at[:, 1:] != 0.0))
     if slides:
-        depth = list(np.cumsum(np.linalg.norm(np.diff(at, axis=0, prepend=0.0), axis=1)))
+        depth = np.cumsum(np.linalg.norm(np.diff(at, axis=0, prepend=0.0), axis=1))
     made = sheet(1, 2, (WIDEST, 4.4), (0.8, 0.15, 0.55, 0.15), title)
     left, right = made.axes
-    left.plot(depth, normal, "o-", color="#222222", ms=4, label="normal force")
-    left.plot(depth, friction, "s-", color="#c0392b", ms=4, label="sum of |friction|")
+    left.plot(depth, values("normal_force_N"), "o-", color="#222222", ms=4, label="normal force")
+    left.plot(depth, values("friction_sum_N"), "s-", color="#c0392b", ms=4, label="sum of |friction|")
     left.set_ylabel("force (N)")
-    right.plot(depth, contact, "o-", color="#555555", ms=4, label="contact")
-    right.plot(depth, stick, "s-", color=COLOURS[STICK], ms=4, label="stick")
+    right.plot(depth, values("contact_half_length_mm"), "o-", color="#555555", ms=4, label="contact")
+    right.plot(depth, values("stick_half_length_mm"), "s-", color=COLOURS[STICK], ms=4, label="stick")
     right.set_ylabel("half length along x, z = 0 (mm)")
     for axes in (left, right):
-        axes.set_xlabel("way of the object, pressed and slid (mm)" if slides else "depth (mm)")
-        axes.set_xlim(left=min(0.0, *depth))
+        axes.set_xlabel("path length of the object (mm)" if slides else "depth (mm)")
+        axes.set_xlim(left=float(depth.min(initial=0.0)))
         axes.set_ylim(bottom=0.0, top=1.15 * axes.get_ylim()[1])  # room for the legend
-        _plain(axes)
+        style(axes)
         axes.legend(frameon=False, loc="upper left")
     made.save(path)
 
@@ -158,32 +175,34 @@ def _column(table: Mapping[str, ArrayLike], name: str) -> Float:
 
 
 def _status(table: Mapping[str, ArrayLike]) -> Int:
-    """Status (c,) as numbers, from names."""
+    """Return the contact status (c,) as integers."""
     return np.array([STATUS_NAMES.index(name) for name in np.asarray(table["status"]).tolist()], dtype=np.int64)
 
 
-def _plain(axes: Axes) -> None:
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.grid(True, color="#e4e4e4", lw=0.6)
-    axes.set_axisbelow(True)
-
-
 def _spacing(x: Float, z: Float) -> float:
-    """Typical distance of neighbouring points in the x-z plane, mm."""
+    """Return the median distance of nearest neighbours in the x-z plane, mm."""
     from scipy.spatial import KDTree
 
     points = np.column_stack([x, z])
     return float(np.median(KDTree(points).query(points, k=2)[0][:, 1])) if len(points) > 1 else 0.0
 
 
-def _patches(colours: dict[int, str], states: Sequence[int]) -> list[Any]:
+def _patches(colours: dict[int, str], states: Sequence[int]) -> list[Patch]:
+    """Return legend entries of contact states."""
     from matplotlib.patches import Patch
 
     return [Patch(facecolor=colours[s], edgecolor="#888888", lw=0.5, label=STATUS_NAMES[s]) for s in states]
 
 
 def two_panels(aspect: float, title: str, ticks: bool = False) -> tuple[Figure, list[Axes]]:
-    """Two panels of this height over width, with room for a key below each, and for ticks."""
+    """Return a figure with two panels of equal scale, with space for a legend below them.
+
+    Parameters
+    ----------
+    aspect : height over width of a panel
+    title : title of the figure
+    ticks : reserve space for tick labels
+    """
     width, panel, below = 2.0 * WIDEST, WIDEST - (0.8 if ticks else 0.2), 1.4 if ticks else 0.95
     above = 0.85 if title else 0.45
     high = panel * aspect
@@ -201,7 +220,14 @@ def two_panels(aspect: float, title: str, ticks: bool = False) -> tuple[Figure, 
 
 
 def keys(figure: Figure, highest: float, lines: dict[str, str]) -> None:
-    """The colour bar below the left panel, zones and lines (name -> colour) below the right one."""
+    """Draw the colour bar of the pressure below the left panel, and the legend below the right one.
+
+    Parameters
+    ----------
+    figure : figure from `two_panels`
+    highest : upper end of the pressure scale, MPa
+    lines : name -> colour of further lines in the legend
+    """
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
     from matplotlib.lines import Line2D
@@ -223,14 +249,14 @@ def keys(figure: Figure, highest: float, lines: dict[str, str]) -> None:
 
 
 def palette() -> Float:
-    """Colours (3, 3) of open, stick, slip."""
+    """Return the RGB colours of open, stick and slip, shape (3, 3)."""
     from matplotlib.colors import to_rgb
 
     return np.array([to_rgb(COLOURS[s]) for s in (OPEN, STICK, SLIP)])
 
 
 def pressure_colours(values: Float, highest: float) -> Float:
-    """Colours (..., 3) for pressures; the body's own where there is none."""
+    """Return RGB colours (..., 3) of pressures (...), in MPa; the colour of the body where the pressure is zero."""
     import matplotlib
     from matplotlib.colors import to_rgb
 
@@ -239,15 +265,15 @@ def pressure_colours(values: Float, highest: float) -> Float:
 
 
 def _highest(pressure: Float) -> float:
-    # A finger that does not touch has no pressure; any scale will do.
+    """Return the upper end of the pressure scale, MPa; 1 if nothing is in contact."""
     return float(pressure.max(initial=0.0)) or 1.0
 
 
-# --- the line of contact ------------------------------------------------------------------------------------------
+# --- contact tractions --------------------------------------------------------------------------------------------
 
 
 def zones(x: Float, status: Int) -> list[tuple[float, float, int]]:
-    """Intervals (from, to, status) of equal status along ascending x; they meet halfway between two points."""
+    """Return intervals (start, end, status) of equal status along ascending x; they meet midway between points."""
     if len(x) == 0:
         return []
     change = np.flatnonzero(np.diff(status))
@@ -258,6 +284,7 @@ def zones(x: Float, status: Int) -> list[tuple[float, float, int]]:
 
 
 def _contact_line(axes: Axes, x: Float, fn: Float, fx: Float, fz: Float, status: Int, mu: Float) -> None:
+    """Draw the tractions at the points of a line z = const, all arrays (n,), ascending in x."""
     from matplotlib.lines import Line2D
 
     for start, end, state in zones(x, status):
@@ -268,7 +295,7 @@ def _contact_line(axes: Axes, x: Float, fn: Float, fx: Float, fz: Float, status:
     axes.plot(x, mu * fn, "--", color="#777777", lw=1.2)
     axes.plot(x, -mu * fn, "--", color="#777777", lw=1.2)
     axes.plot(x, fx, "o-", color="#c0392b", lw=1.2, ms=3)
-    handles = [
+    handles: list[Line2D | Patch] = [
         Line2D([], [], color="#222222", lw=1.6, label="fₙ, pressure"),
         Line2D([], [], color="#777777", ls="--", lw=1.2, label="± μ fₙ" if np.ptp(mu) else f"± μ fₙ, μ = {mu[0]:g}"),
         Line2D([], [], color="#c0392b", marker="o", ms=3, lw=1.2, label="fₜ along x"),
@@ -278,7 +305,7 @@ def _contact_line(axes: Axes, x: Float, fn: Float, fx: Float, fz: Float, status:
         axes.plot(x, fz, ".:", color="#8e44ad", lw=1.0, ms=4)
         handles.append(Line2D([], [], color="#8e44ad", marker=".", ls=":", label="fₜ along z"))
         shown.append(fz)
-    # The limit lines of a large mu would flatten everything else, so they may leave the picture.
+    # The friction limit may leave the picture: with a large mu it would flatten the other curves.
     high = max([float(v.max(initial=0.0)) for v in shown] + [1e-12])
     low = min([float(v.min(initial=0.0)) for v in shown] + [-min(float(mu.max()), 0.5) * high])
     axes.set_ylim(1.12 * low, 1.12 * high)
@@ -289,12 +316,12 @@ def _contact_line(axes: Axes, x: Float, fn: Float, fx: Float, fz: Float, status:
     handles += _patches(_SHADES, [s for s in (STICK, SLIP) if np.any(status == s)])
     axes.legend(
         handles=handles, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=3, columnspacing=1.4
-    )  # fmt: skip
-    _plain(axes)
+    )
+    style(axes)
     axes.grid(False, axis="x")
 
 
-# --- a section ----------------------------------------------------------------------------------------------------
+# --- 2D models ----------------------------------------------------------------------------------------------------
 
 
 def _section(
@@ -307,6 +334,7 @@ def _section(
     title: str,
     marks: Marks,
 ) -> Figure:
+    """Draw a 2D model, with the pressure and the status along its contact line."""
     from matplotlib.collections import LineCollection
     from matplotlib.patches import PathPatch
 
@@ -315,7 +343,7 @@ def _section(
     value[nodes], state[nodes] = pressure, status
     arc = mesh.facets["contact"]
     middle = moved[arc[:, 2]] if mesh.element.is_quadratic else moved[arc].mean(axis=1)
-    # Each facet in two halves, one for each end: pressure is the mean over a half, status that of its end.
+    # Each facet is drawn in two halves, coloured by the mean pressure of the half and by the status of its end.
     halves = np.stack([moved[arc[:, :2]], np.repeat(middle[:, None], 2, axis=1)], axis=2).reshape(-1, 2, 2)
     of_half = (0.75 * value[arc[:, :2]] + 0.25 * value[arc[:, 1::-1]]).ravel()
     highest = _highest(pressure)
@@ -339,10 +367,11 @@ def _section(
     return figure
 
 
-# --- a solid ------------------------------------------------------------------------------------------------------
+# --- solids -------------------------------------------------------------------------------------------------------
 
 
 def _solid(skin: Skin, title: str, marks: Marks) -> tuple[Figure, str]:
+    """Draw a solid; return the figure and the name of the renderer."""
     highest = _highest(skin.pressure)
     by_pressure = pressure_colours(skin.pressure, highest)
     by_status = np.repeat(palette()[skin.status][:, None], 3, axis=1)
@@ -359,7 +388,7 @@ def _solid(skin: Skin, title: str, marks: Marks) -> tuple[Figure, str]:
         axes.set_axis_off()
     draw_marks(panels[0], [(label, flat(line)) for label, line in marks])
     if marks:
-        panels[0].set_title("contact pressure; gauges inside are marked on the near face", fontsize=11)
+        panels[0].set_title("contact pressure; gauges projected onto the front face", fontsize=11)
     if skin.largest_shear > 0.0:
         text = f"stick and slip; arrows: friction on the finger, at most {skin.largest_shear:.3g} MPa"
         panels[1].set_title(text, fontsize=11)

@@ -1,4 +1,4 @@
-"""Figures of axes in equal cells, without a display."""
+"""Figures with axes in cells of equal size, drawn without a display."""
 
 from __future__ import annotations
 
@@ -13,15 +13,17 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WIDEST = 6.2
-"""Largest width of a cell, inches."""
+"""Largest width of a cell, in inches."""
 
 DPI = 120
-_TITLE = 0.35  # inches above the cells, if there is a title
+"""Resolution of PNG files, in pixels per inch."""
+
+_TITLE_HEIGHT = 0.35  # inches, above the cells of a figure with a title
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """A figure without a display, and its axes row by row."""
+    """A figure and its axes, in row-major order."""
 
     figure: Figure
     axes: tuple[Axes, ...]
@@ -32,7 +34,7 @@ class Sheet:
 
 
 def blank(width: float, height: float) -> Figure:
-    """Return an empty figure of a width and a height in inches, without pyplot, which looks for a display."""
+    """Return an empty figure of the given size in inches, without pyplot, which would look for a display."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -44,14 +46,18 @@ def blank(width: float, height: float) -> Figure:
 def sheet(
     rows: int, columns: int, cell: tuple[float, float], margins: tuple[float, float, float, float], title: str = ""
 ) -> Sheet:
-    """Return axes in equal cells; the layout engines of matplotlib take as long as the drawing.
+    """Return a figure with axes in cells of equal size.
+
+    The positions are explicit because the layout engines of matplotlib take as long as the drawing itself.
 
     Parameters
     ----------
-    cell : width and height, inches
-    margins : from a cell's left, right, lower and upper end to its axes, inches
+    rows, columns : number of cells
+    cell : width and height of a cell, in inches
+    margins : distances from the left, right, lower and upper edge of a cell to its axes, in inches
+    title : title of the whole figure
     """
-    wide, high = columns * cell[0], rows * cell[1] + (_TITLE if title else 0.0)
+    wide, high = columns * cell[0], rows * cell[1] + (_TITLE_HEIGHT if title else 0.0)
     figure = blank(wide, high)
     left, right, below, above = margins
     axes = [
@@ -71,7 +77,14 @@ def sheet(
     return Sheet(figure, tuple(axes))
 
 
+def style(axes: Axes) -> None:
+    """Remove the upper and the right spine, and draw a light grid below the data."""
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(True, color="#e4e4e4", lw=0.6)
+    axes.set_axisbelow(True)
+
+
 def save(figure: Figure, path: str | Path) -> None:
-    """Write a figure as a PNG file, whole or not at all."""
+    """Write a figure atomically as a PNG file."""
     with atomic(path) as temporary:
         figure.savefig(temporary, format="png", dpi=DPI, pil_kwargs={"compress_level": 4})

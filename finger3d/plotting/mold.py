@@ -1,6 +1,6 @@
-"""A mold, taken apart: rendered by PyVista in a child process, or drawn by matplotlib where that does not work.
+"""Exploded view of a mold, rendered by PyVista in a child process, or drawn by matplotlib if PyVista cannot render.
 
-``python -m finger3d.plotting.mold IN.npz OUT.npy`` is the child.
+The child process runs ``python -m finger3d.plotting.mold IN.npz OUT.npy``.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,26 +21,41 @@ from finger3d.geometry.surface import Triangles
 from finger3d.io import atomic
 from finger3d.plotting.solid import run_child
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 Float = NDArray[np.float64]
 
 COLOURS = {"half_a": "#9db4c8", "half_b": "#c9d9ee", "lid": "#8d8a84", "sensor": "#f28e2b", "strips": "#222222"}
 OPACITY = {"half_b": 0.35}
-"""The half in front hides its own pegs, the strips and the sensor."""
+"""Opacity of parts that are not opaque: the front half would hide its pegs, the gauge strips and the sensor."""
 
 LABELS = {"half_a": "half A", "half_b": "half B", "lid": "lid", "sensor": "sensor", "strips": "gauge strips"}
 
-_VIEW = np.array([0.55, 0.5, 1.0])
-_POUR = np.diag([1.0, -1.0, -1.0])  # dome down, lid on top, as it is poured
-_APART = 0.45  # of the largest size
-_MARGIN = 1.08
-_WIDE, _TITLE, _DPI = 10.0, 0.5, 130  # inches
-_SIDES = 1.6  # of the parts' width, for the labels
-_PIXELS = round(_WIDE * _DPI / _SIDES)
+_VIEW = np.array([0.55, 0.5, 1.0])  # direction towards the viewer
+_POURING_AXES = np.diag([1.0, -1.0, -1.0])  # orientation while pouring: dome down, lid on top
+_SEPARATION = 0.45  # distance between the parts, relative to their largest extent
+_MARGIN = 1.08  # size of the window over that of the parts
+_WIDTH, _TITLE_HEIGHT = 10.0, 0.5  # of the figure and of its title, in inches
+_DPI = 130  # pixels per inch
+_LABEL_FACTOR = 1.6  # width of the figure over that of the parts; the rest holds the labels
+_PIXELS = round(_WIDTH * _DPI / _LABEL_FACTOR)  # width of the rendered image
 
 
 @dataclass(frozen=True)
 class Scenery:
-    """Parts where they are drawn, mm, and what the viewer sees: rows of `axes` are right, up, towards the viewer."""
+    """Parts of an exploded view and its camera.
+
+    Attributes
+    ----------
+    parts : triangles of each part, mm
+    axes : (3, 3) array
+        Orthonormal axes of the viewer, one a row: right, up, and towards the viewer.
+    middle : (3,) array, mm
+        Centre of the picture.
+    half : (2,) array, mm
+        Half the width and half the height of the picture.
+    """
 
     parts: dict[str, Triangles]
     axes: Float
@@ -48,18 +63,18 @@ class Scenery:
     half: Float
 
     def flat(self, points: Float) -> Float:
-        """Points (..., 3) as the viewer sees them, (..., 2), mm from the middle."""
+        """Project points, shape (..., 3), onto the picture plane, shape (..., 2), mm from the centre."""
         return (points - self.middle) @ self.axes[:2].T
 
 
 def exploded(assembled: Mapping[str, Triangles]) -> Scenery:
-    """Move the parts of an assembled mold apart: the halves along z, the lid up; the sensor stays."""
+    """Return the exploded view of an assembled mold: halves apart along z, the lid above, the sensor in place."""
     size = max(float(np.ptp(part.points, axis=0).max()) for part in assembled.values())
     thick = np.ptp(np.vstack([assembled["half_a"].points, assembled["half_b"].points])[:, 2])
-    step = max(_APART * size, 0.8 * float(thick))
-    shift = {"half_a": [0, 0, -step], "half_b": [0, 0, step], "lid": [0, 0.9 * _APART * size, 0]}
+    step = max(_SEPARATION * size, 0.8 * float(thick))
+    shift = {"half_a": [0, 0, -step], "half_b": [0, 0, step], "lid": [0, 0.9 * _SEPARATION * size, 0]}
     parts = {
-        name: Triangles(part.points @ _POUR.T + np.array(shift.get(name, [0, 0, 0]), dtype=float), part.faces)
+        name: Triangles(part.points @ _POURING_AXES.T + np.array(shift.get(name, [0, 0, 0]), dtype=float), part.faces)
         for name, part in assembled.items()
     }
     towards = _VIEW / np.linalg.norm(_VIEW)
@@ -72,17 +87,24 @@ def exploded(assembled: Mapping[str, Triangles]) -> Scenery:
 
 
 def picture(path: Path, assembled: Mapping[str, Triangles], title: str, sizes: Mapping[str, str]) -> str:
-    """Draw a mold taken apart, lid up as it is poured; returns what drew it, ``pyvista`` or ``matplotlib``.
+    """Write the exploded view of a mold, in the orientation in which it is poured.
 
     Parameters
     ----------
-    assembled : half_a, half_b, lid, sensor and, if there are any, strips, in the mold's axes
-    sizes : a remark on each part for its label
+    path : PNG file to write
+    assembled : surfaces of half_a, half_b, lid, sensor and, if the scene has gauges, strips, in the axes of the mold
+    title : title of the picture
+    sizes : remark on each part, shown below its name; a part without a remark has no label
+
+    Returns
+    -------
+    str
+        The renderer, ``pyvista`` or ``matplotlib``.
 
     Raises
     ------
     MissingError
-        If FINGER3D_RENDERER asks for pyvista, which does not work.
+        If FINGER3D_RENDERER is ``pyvista`` and PyVista cannot render.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -90,10 +112,10 @@ def picture(path: Path, assembled: Mapping[str, Triangles], title: str, sizes: M
     scenery = exploded(assembled)
     image = _rendered(scenery)
     width, height = scenery.half
-    high = _WIDE * height / (_SIDES * width) + _TITLE
-    figure = Figure(figsize=(_WIDE, high), dpi=_DPI)
+    high = _WIDTH * height / (_LABEL_FACTOR * width) + _TITLE_HEIGHT
+    figure = Figure(figsize=(_WIDTH, high), dpi=_DPI)
     FigureCanvasAgg(figure)
-    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0 - _TITLE / high))
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0 - _TITLE_HEIGHT / high))
     if image is None:
         _draw(axes, scenery)
     else:
@@ -101,30 +123,37 @@ def picture(path: Path, assembled: Mapping[str, Triangles], title: str, sizes: M
     for name, part in scenery.parts.items():
         if name in sizes:
             _label(axes, scenery, name, part, sizes[name])
-    axes.set(xlim=(-_SIDES * width, _SIDES * width), ylim=(-height, height), aspect="equal")
+    axes.set(xlim=(-_LABEL_FACTOR * width, _LABEL_FACTOR * width), ylim=(-height, height), aspect="equal")
     axes.set_axis_off()
-    figure.text(0.5, 1.0 - 0.5 * _TITLE / high, title, fontsize=11, ha="center", va="center")
+    figure.text(0.5, 1.0 - 0.5 * _TITLE_HEIGHT / high, title, fontsize=11, ha="center", va="center")
     with atomic(path) as temporary:
         figure.savefig(temporary)
     return "matplotlib" if image is None else "pyvista"
 
 
-def _label(axes: Any, scenery: Scenery, name: str, part: Triangles, remark: str) -> None:
-    """Name a part beside its outline: what lies left of the middle to its left, the rest to its right."""
+def _label(axes: Axes, scenery: Scenery, name: str, part: Triangles, remark: str) -> None:
+    """Write the name of a part and a remark next to the part: half B at its left, the other parts at their right."""
     seen = scenery.flat(part.points)
     left = name == "half_b"
-    low = name == "strips"  # its front end, where nothing hides it
+    low = name == "strips"  # their front end is not hidden by other parts
     at = seen[np.argmin(seen[:, 1] if low else seen[:, 0]) if left or low else np.argmax(seen[:, 0])]
     shift = (-14, -4) if left else (30, -40) if low else (14, -4)
     line = {"arrowstyle": "-", "color": "#777777", "lw": 0.8}
     axes.annotate(
-        f"{LABELS[name]}\n{remark}".strip(), at, shift, textcoords="offset points", fontsize=8.5, va="center",
-        ha="right" if left else "left", arrowprops=line, annotation_clip=False,
-    )  # fmt: skip
+        f"{LABELS[name]}\n{remark}".strip(),
+        (float(at[0]), float(at[1])),
+        shift,
+        textcoords="offset points",
+        fontsize=8.5,
+        va="center",
+        ha="right" if left else "left",
+        arrowprops=line,
+        annotation_clip=False,
+    )
 
 
-def _draw(axes: Any, scenery: Scenery) -> None:
-    """Draw with matplotlib: the parts one behind the other, and within each the far triangles first."""
+def _draw(axes: Axes, scenery: Scenery) -> None:
+    """Draw the parts with matplotlib from back to front, and likewise the triangles of each part."""
     from matplotlib.collections import PolyCollection
     from matplotlib.colors import to_rgb
 
@@ -138,7 +167,7 @@ def _draw(axes: Any, scenery: Scenery) -> None:
         shade = 0.6 + 0.4 * np.clip(normals @ light, 0.0, 1.0)
         fill = np.clip(np.array(to_rgb(COLOURS[name])) * shade[:, None], 0.0, 1.0)[far]
         alpha = OPACITY.get(name)
-        # An edge in the face's colour closes fine seams; through a transparent face it would show.
+        # Edges in the colour of the face close fine seams; a transparent face would show them.
         edge = fill if alpha is None else "none"
         faces = PolyCollection(list(scenery.flat(corners)[far]), facecolors=fill, edgecolors=edge, lw=0.3, alpha=alpha)
         faces.set(zorder=2 + layer, antialiased=alpha is None)
@@ -146,16 +175,16 @@ def _draw(axes: Any, scenery: Scenery) -> None:
 
 
 def _rendered(scenery: Scenery) -> NDArray[np.uint8] | None:
-    """The picture by PyVista, or None where it does not work."""
+    """Return the image (h, w, 3) by PyVista, or None if PyVista cannot render or matplotlib is asked for."""
     wanted = os.environ.get("FINGER3D_RENDERER", "")
     if wanted == "matplotlib":
         return None
     with tempfile.TemporaryDirectory(prefix="finger3d-") as folder:
         source, target = Path(folder) / "parts.npz", Path(folder) / "image.npy"
-        arrays: dict[str, Any] = {"axes": scenery.axes, "middle": scenery.middle, "half": scenery.half}
+        arrays: dict[str, NDArray[np.generic]] = {"axes": scenery.axes, "middle": scenery.middle, "half": scenery.half}
         for name, part in scenery.parts.items():
             arrays |= {f"points {name}": part.points, f"faces {name}": part.faces}
-        np.savez(source, **arrays)
+        np.savez(source, allow_pickle=False, **arrays)
         why = run_child([sys.executable, "-P", "-m", "finger3d.plotting.mold", str(source), str(target)])
         if why is None and target.exists():
             return np.asarray(np.load(target), dtype=np.uint8)
@@ -165,7 +194,7 @@ def _rendered(scenery: Scenery) -> NDArray[np.uint8] | None:
 
 
 def _child(source: str, target: str) -> None:
-    """Render the parts and save the image (h, w, 3)."""
+    """Render the parts in this process and save the image (h, w, 3)."""
     import pyvista as pv
 
     with np.load(source, allow_pickle=False) as data:

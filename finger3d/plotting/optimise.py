@@ -1,18 +1,21 @@
-"""design.png: the best design so far against the designs judged, and the objective against every free key."""
+"""design.png: convergence of a design search, and the objective against each free key."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from finger3d.plotting.layout import sheet
+from finger3d.plotting.layout import sheet, style
 
-_MOST_KEYS = 5
-_ROWS = 2
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_MOST_KEYS = 5  # free keys with a panel
+_ROWS = 2  # of panels, at most
 _JUDGED, _BEST, _START = "#9db7d5", "#c0392b", "#222222"
 
 
@@ -24,13 +27,17 @@ def draw(
     start: Sequence[float],
     objective: str,
 ) -> None:
-    """Draw the designs that have a number.
+    """Draw the designs with a finite objective and write the picture.
 
     Parameters
     ----------
-    places, values : free keys and objective (NaN where there is none) of every design, in the order they were judged
-    start : the free keys of the first design
-    """  # fmt: skip
+    path : PNG file to write
+    keys : names of the k free keys
+    places : (n, k) values of the free keys of every design, in order of evaluation
+    values : (n,) objective of every design; NaN if its solution failed
+    start : (k,) values of the free keys of the initial design
+    objective : label of the objective
+    """
     good = np.isfinite(values)
     at, value = np.array(places, dtype=float)[good], np.array(values, dtype=float)[good]
     best, shown = int(np.argmax(value)), list(keys[:_MOST_KEYS])
@@ -55,9 +62,7 @@ def draw(
     made.save(path)
 
 
-def _finish(axes: Any, objective: str) -> None:
+def _finish(axes: Axes, objective: str) -> None:
     axes.set_ylabel(objective)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.grid(True, color="#e4e4e4", lw=0.6)
-    axes.set_axisbelow(True)
+    style(axes)
     axes.legend(frameon=False, fontsize=9, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)

@@ -1,4 +1,4 @@
-"""The lines of a section that a picture shows, as matplotlib paths: the cells' edges, and the outline."""
+"""Edges and outline of a 2D mesh as matplotlib paths."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 
 Float = NDArray[np.float64]
 
-_MANY_CELLS = 4000
+_MOST_CELLS = 4000  # of a mesh whose edges are drawn; those of a finer mesh would merge into a grey area
 
 
 def _runs(lines: Float) -> Path:
-    """One path of separate polylines (k, p, 2): a thousand artists would take as long as the solution."""
+    """Return one path of k separate polylines, shape (k, p, 2): far faster to draw than k artists."""
     from matplotlib.path import Path
 
     codes = np.full(lines.shape[:2], Path.LINETO)
@@ -27,8 +27,8 @@ def _runs(lines: Float) -> Path:
 
 
 def edges_of(mesh: Mesh, moved: Float) -> Path:
-    """The cells' edges, each once; of a fine mesh none, which would be a grey area and no picture of it."""
-    if len(mesh.cells) > _MANY_CELLS:
+    """Return every edge of the cells once, at nodes moved to (n, 2) mm; an empty path for a very fine mesh."""
+    if len(mesh.cells) > _MOST_CELLS:
         return _runs(np.zeros((0, 2, 2)))
     sides = mesh.element.edges
     if mesh.element.is_quadratic:
@@ -39,7 +39,7 @@ def edges_of(mesh: Mesh, moved: Float) -> Path:
 
 
 def outline_of(mesh: Mesh, moved: Float) -> Path:
-    """The boundary of a section as a closed path."""
+    """Return the boundary of a section as a closed path, at nodes moved to (n, 2) mm."""
     from matplotlib.path import Path
 
     facets = np.concatenate([f for f in mesh.facets.values() if len(f)])

@@ -1,4 +1,4 @@
-"""Look at a result: a window with fields, steps and a clip plane, or a picture and an animation where there is none."""
+"""Display of the results of a press: an interactive window, or a picture and an animation without a display."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from finger3d.errors import Finger3dError, MissingError
-from finger3d.mechanics.model import Gauge
+from finger3d.mechanics.gauges import Gauge
 from finger3d.results.states import States, load_states
 from finger3d.results.summary import gauges_of, read_json
 
 
 def found(folder: str | Path) -> tuple[States, str, list[Gauge]]:
-    """The steps kept in a folder of results, and the title and the gauges of its scene.
+    """Read the stored steps of a results folder, and the title and the gauges of its scene.
 
     Raises
     ------
     Finger3dError
-        If the folder holds no results of a press, or damaged ones.
+        If the folder holds no results of a press, or they are damaged.
     MissingError
-        If its press was interrupted, so that there are numbers but no fields.
+        If the press was interrupted, so that there are numbers but no fields.
     """
     folder = Path(folder)
     if not folder.is_dir():
@@ -40,7 +40,7 @@ def found(folder: str | Path) -> tuple[States, str, list[Gauge]]:
             raise TypeError(title)
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
         raise Finger3dError(
-            f"{folder / 'summary.json'}: its scene is not as a press wrote it; press {folder}/scene.toml again"
+            f"{folder / 'summary.json'}: the scene in it is damaged; press {folder}/scene.toml again"
         ) from None
     return states, title, gauges
 
@@ -48,19 +48,19 @@ def found(folder: str | Path) -> tuple[States, str, list[Gauge]]:
 def show(
     folder: str | Path, png: str | Path | None = None, gif: str | Path | None = None, step: int | None = None
 ) -> None:
-    """Draw a result without a display.
+    """Write a picture and an animation of a result; neither needs a display.
 
     Parameters
     ----------
-    folder : what a press wrote
-    png : picture of one step: contact pressure, stick and slip
-    gif : animation of all steps that are kept, at one scale
-    step : number of the step in the picture (from 1); None: the last
+    folder : results folder of a press
+    png : file for a picture of one step: contact pressure, stick and slip
+    gif : file for an animation of all stored steps, with one scale of pressure
+    step : number of the step in the picture, from 1; None for the last
 
     Raises
     ------
     Finger3dError
-        If the folder or the step is not there, or a file cannot be written.
+        If the folder or the step does not exist, or a file cannot be written.
     """
     from finger3d.plotting.animation import frames, write_gif, write_png
 
@@ -81,12 +81,12 @@ def _number(folder: str | Path, states: States, step: int | None) -> int:
 
 
 def show_window(folder: str | Path) -> None:
-    """Open a window and return when it is closed; it runs in a child, which OpenGL may crash.
+    """Open a window and return when it is closed; it runs in a child process, as a faulty OpenGL driver may crash it.
 
     Raises
     ------
     MissingError
-        If there is no display, or no window can be opened on it.
+        If there is no display or no window can be opened.
     """
     from finger3d.plotting import solid
 

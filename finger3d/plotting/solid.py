@@ -1,6 +1,6 @@
-"""The surface of a pressed solid, and the two ways to draw it: PyVista in a child process, or matplotlib.
+"""Surface of a deformed solid, rendered by PyVista in a child process or drawn by matplotlib.
 
-``python -m finger3d.plotting.solid IN.npz OUT.npy`` is the child; nothing else calls it.
+The child process runs ``python -m finger3d.plotting.solid IN.npz OUT.npy``.
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from finger3d._process import child_environment
 from finger3d.contact.friction import OPEN, SLIP, STICK
@@ -24,6 +24,7 @@ from finger3d.fem.simplex import Mesh
 from finger3d.plotting.camera import AXES, WINDOW, flat, framed, half_height
 
 if TYPE_CHECKING:
+    import pyvista as pv
     from matplotlib.axes import Axes
 
 Float = NDArray[np.float64]
@@ -32,14 +33,16 @@ Int = NDArray[np.int64]
 BODY, LINE, REST, OBJECT = "#d9d6cf", "#8d8a84", "#777777", "#222222"
 COLOURS = {OPEN: "#c4c4c4", STICK: "#1f3f77", SLIP: "#f28e2b"}
 ARROWS = {STICK: "#ffffff", SLIP: "#000000"}
-"""Colour of a friction arrow, by the status of its point."""
+"""Contact status -> colour of friction arrows."""
 
-_ARROW = 0.045  # Length of the longest arrow, as a share of the finger's,
-_ARROW_STEPS = 1.6  # and at most so many distances between arrows.
+_ARROW_LENGTH = 0.045  # of the longest arrow, relative to the largest extent of the finger
+_ARROW_SPACINGS = 1.6  # largest length of an arrow, in multiples of the distance between arrows
+_ARROW_COUNT = 100.0  # approximate number of arrows
 
-_TIME_LIMIT_S = 180.0
-# A quadratic facet in six triangles around its centre (node 6): two for each corner, so that a corner's status
-# covers the area that is nearest to it.
+_TIME_LIMIT_S = 180.0  # of a child process that renders
+
+# A quadratic facet is split into six triangles around its centre (node 6), two for each corner, so that the status of
+# a corner is drawn on the area nearest to it.
 _SIX = np.array([[0, 3, 6], [3, 1, 6], [1, 4, 6], [4, 2, 6], [2, 5, 6], [5, 0, 6]])
 _OWNER = np.array([0, 1, 1, 2, 2, 0])
 _RING = np.array([0, 3, 1, 4, 2, 5])
@@ -49,21 +52,22 @@ _SIDES = np.array([[0, 3, 1], [1, 4, 2], [2, 5, 0]])
 
 @dataclass(frozen=True)
 class Skin:
-    """What is drawn of a solid, deformed, mm.
+    """Surfaces, lines and arrows of the picture of a solid, deformed, mm.
 
     Attributes
     ----------
-    body : (b, 6, 3) facets that are not part of the contact surface, VTK's order of nodes
+    body : (b, 6, 3) facets off the contact surface, nodes in VTK's order
     contact : (t, 3, 3) triangles of the contact surface
-    pressure : (t, 3) MPa at their corners
-    status : (t,) of the contact point each belongs to
-    lines : (k, 3, 3) edges of the body's facets: end, middle, end
-    features : (k, 3, 3) edges between faces of the body
-    rest : (k, 3, 3) edges of the contact surface, at rest
-    outline : (o, 3) closed line around the object's surface, or none
-    arrow_at, arrow, arrow_status : (a, 3), (a, 3), (a,) friction on the finger at some contact points; the longest
-        has length 1
-    largest_shear : MPa, of the longest arrow
+    pressure : (t, 3) contact pressure at their corners, MPa
+    status : (t,) status of the contact point that each triangle belongs to
+    lines : (k, 3, 3) edges of the facets of the body: end, middle, end
+    features : (k, 3, 3) edges between the faces of the body
+    rest : (k, 3, 3) edges of the undeformed contact surface
+    outline : (o, 3) closed line around the surface of the object; (0, 3) without one
+    arrow_at : (a, 3) contact points with a friction arrow
+    arrow : (a, 3) direction and relative size of friction on the finger; the longest has length 1
+    arrow_status : (a,) status of these contact points
+    largest_shear : friction that the longest arrow stands for, MPa
     """
 
     body: Float
@@ -81,25 +85,25 @@ class Skin:
 
     @property
     def size(self) -> float:
-        """Largest extent, mm."""
+        """Largest extent along an axis, mm."""
         return float(np.ptp(self.points, axis=0).max())
 
     @property
     def aspect(self) -> float:
-        """Height over width as the viewer sees it."""
+        """Height over width of the picture."""
         width, height = self.frame[1]
         return float(height / width)
 
     @property
     def arrow_length(self) -> float:
-        """Length of the longest arrow, mm: shorter where they stand close together."""
+        """Length of the longest arrow, mm; limited by the distance between arrows."""
         across = np.ptp(self.arrow_at[:, [0, 2]], axis=0) if len(self.arrow_at) else np.zeros(2)
         apart = max(np.sqrt(across.prod() / max(len(self.arrow_at), 1)), across.max() / max(len(self.arrow_at), 1))
-        return min(_ARROW * self.size, _ARROW_STEPS * float(apart) or np.inf)
+        return min(_ARROW_LENGTH * self.size, _ARROW_SPACINGS * float(apart) or np.inf)
 
     @property
     def frame(self) -> tuple[Float, Float]:
-        """Middle (3,) of what the viewer sees, and its width and height (2,), mm."""
+        """Centre (3,) of the picture, and its width and height (2,), mm."""
         seen = flat(self.points)
         low, high = seen.min(axis=0), seen.max(axis=0)
         deep = self.points.mean(axis=0) @ AXES[2]
@@ -107,7 +111,7 @@ class Skin:
 
     @property
     def points(self) -> Float:
-        """All points (p, 3) that are drawn, mm."""
+        """All points of surfaces and lines, shape (p, 3), mm."""
         parts = (self.body, self.contact, self.rest, self.outline)
         return np.concatenate([part.reshape(-1, 3) for part in parts])
 
@@ -115,7 +119,23 @@ class Skin:
 def skin_of(
     mesh: Mesh, u: Float, pressure: Float, shear: Float, status: Int, nodes: Int, profile: Float | None
 ) -> Skin:
-    """Collect what is drawn; arguments as in `finger3d.plotting.figures.finger_picture`."""
+    """Return the skin of a deformed solid.
+
+    Parameters
+    ----------
+    mesh : undeformed mesh of the whole finger, mm
+    u : (n, 3) array, mm
+        Displacement.
+    pressure : (c,) array, MPa
+    shear : (c, 2) array, MPa
+        Friction on the finger along x and z.
+    status : (c,) array
+        Contact status.
+    nodes : (c,) array
+        Nodes of the contact points.
+    profile : (k, 2) array, mm
+        Coordinates x and y of the surface of the object, or None.
+    """
     moved = mesh.points + u
     arc = mesh.facets["contact"]
     others = [f for label, f in mesh.facets.items() if label != "contact" and len(f)]
@@ -126,7 +146,7 @@ def skin_of(
     middle = 0.5 * (corner + np.roll(corner, -1, axis=1))
     seven = np.hstack([corner, middle, corner.mean(axis=1, keepdims=True)])
     rings = _six_nodes(arc, moved)
-    # The middle of a curved facet is where its quadratic shape functions put it.
+    # Quadratic shape functions at the centroid: 4/9 at the mid-side nodes, -1/9 at the corners.
     centre = (4.0 * rings[:, 3:].sum(axis=1) - rings[:, :3].sum(axis=1)) / 9.0
     points = np.concatenate([rings, centre[:, None]], axis=1)
 
@@ -150,7 +170,7 @@ def skin_of(
 
 
 def _six_nodes(facets: Int, points: Float) -> Float:
-    """Points (m, 6, 3) of facets, with chord middles where the facets are linear."""
+    """Return the nodes of facets, shape (m, 6, 3); linear facets get the middles of their edges."""
     corners = points[facets[:, :3]]
     if facets.shape[1] == TRI6.node_count:
         return points[facets]
@@ -158,20 +178,23 @@ def _six_nodes(facets: Int, points: Float) -> Float:
 
 
 def _rim(facets: Int) -> Int:
-    """Edges (k, 2 or 3) that belong to one of these facets only."""
+    """Return the boundary of a surface: edges (k, 2 or 3) that belong to one of its facets only."""
     ends = facets[:, TRI3.edges].reshape(-1, 2)
     middles = facets[:, 3:].reshape(len(ends), -1)
     _, first, count = np.unique(np.sort(ends, axis=1), axis=0, return_index=True, return_counts=True)
-    return np.hstack([ends, middles])[first[count == 1]]
+    rim: Int = np.hstack([ends, middles])[first[count == 1]]
+    return rim
 
 
 def _edge_points(edges: Int, points: Float) -> Float:
+    """Return end, middle and end of edges, shape (k, 3, 3)."""
     ends = points[edges[:, :2]]
     middle = points[edges[:, 2]] if edges.shape[1] == 3 else ends.mean(axis=1)
     return np.stack([ends[:, 0], middle, ends[:, 1]], axis=1)
 
 
 def _outline(profile: Float | None, points: Float) -> Float:
+    """Return the outline of an extruded profile over the width of the body, shape (o, 3)."""
     if profile is None:
         return np.zeros((0, 3))
     z = points[:, 2].min(), points[:, 2].max()
@@ -180,19 +203,23 @@ def _outline(profile: Float | None, points: Float) -> Float:
 
 
 def _arrows(points: Float, shear: Float, status: Int) -> tuple[Int, Float, float]:
-    """About a hundred arrows, spread evenly: the contact point nearest to the middle of each square of a grid.
+    """Select evenly distributed friction arrows: the contact point nearest to the centre of each square of a grid.
 
-    Numbers of the points (a,), arrows (a, 3) of which the longest has length 1, and its shear in MPa.
+    Returns
+    -------
+    chosen : (a,) indices of the contact points
+    arrow : (a, 3) friction relative to the largest
+    largest : largest friction, MPa
     """
     on = np.flatnonzero(status != OPEN)
     largest = float(np.linalg.norm(shear[on], axis=1).max(initial=0.0))
     if largest == 0.0:
         return on[:0], np.zeros((0, 3)), 0.0
-    flat = points[on][:, [0, 2]]
-    low, extent = flat.min(axis=0), np.ptp(flat, axis=0)
-    step = max(float(np.sqrt(extent.prod() / 100.0)), 1e-9)
-    square = np.floor((flat - low) / step)
-    order = np.argsort(np.linalg.norm((flat - low) / step - square - 0.5, axis=1), kind="stable")
+    plane = points[on][:, [0, 2]]
+    low, extent = plane.min(axis=0), np.ptp(plane, axis=0)
+    step = max(float(np.sqrt(extent.prod() / _ARROW_COUNT)), 1e-9)
+    square = np.floor((plane - low) / step)
+    order = np.argsort(np.linalg.norm((plane - low) / step - square - 0.5, axis=1), kind="stable")
     _, first = np.unique(square[order], axis=0, return_index=True)
     chosen = on[order[first]]
     return chosen, np.column_stack([shear[chosen, 0], np.zeros(len(chosen)), shear[chosen, 1]]) / largest, largest
@@ -202,7 +229,15 @@ def _arrows(points: Float, shear: Float, status: Int) -> tuple[Int, Float, float
 
 
 def draw_solid(axes: Axes, skin: Skin, colours: Float, arrows: bool) -> None:
-    """Draw on flat axes, far faces first; `colours` (t, 3, 3) at the corners of the contact triangles."""
+    """Draw a solid with matplotlib, far faces first.
+
+    Parameters
+    ----------
+    axes : axes of the picture plane
+    skin : solid to draw
+    colours : (t, 3, 3) RGB colours at the corners of the contact triangles
+    arrows : whether to draw friction arrows
+    """
     from matplotlib.collections import LineCollection, PolyCollection
     from matplotlib.colors import to_rgb
 
@@ -211,7 +246,7 @@ def draw_solid(axes: Axes, skin: Skin, colours: Float, arrows: bool) -> None:
     depth = np.concatenate([faces.mean(axis=1) @ AXES[2] for faces, _ in (body, contact)])
     polygons = [*flat(body[0]), *flat(contact[0])]
     fill = np.concatenate([body[1], contact[1]])
-    # The mesh is drawn on the body only; elsewhere an edge in the face's colour closes fine white seams.
+    # Mesh lines are drawn on the body only; on the contact surface, edges in the colour of the face close white seams.
     edge = np.concatenate([np.tile(to_rgb(LINE), (len(body[1]), 1)), contact[1]])
     order = np.argsort(depth, kind="stable")
     axes.add_collection(LineCollection(list(flat(skin.rest)), colors=REST, lw=0.8, linestyles="dotted", zorder=1))
@@ -224,13 +259,22 @@ def draw_solid(axes: Axes, skin: Skin, colours: Float, arrows: bool) -> None:
         for state, colour in ARROWS.items():
             on = skin.arrow_status == state
             at, by = flat(skin.arrow_at[on]), flat(skin.arrow_length * skin.arrow[on])
-            axes.quiver(*at.T, *by.T, color=colour, pivot="mid", angles="xy", scale_units="xy", scale=1.0,
-                        width=0.002, zorder=4)  # fmt: skip
+            axes.quiver(
+                *at.T,
+                *by.T,
+                color=colour,
+                pivot="mid",
+                angles="xy",
+                scale_units="xy",
+                scale=1.0,
+                width=0.002,
+                zorder=4,
+            )
     axes.autoscale_view()
 
 
 def _shaded(faces: Float, colours: Float) -> tuple[Float, Float]:
-    """The faces that look at the viewer, and their colours under a light above the viewer's shoulder."""
+    """Return the faces that point towards the viewer and their shaded colours; the light is above the viewer."""
     third = faces.shape[1] // 3
     normal = np.cross(faces[:, third] - faces[:, 0], faces[:, 2 * third] - faces[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
@@ -243,24 +287,31 @@ def _shaded(faces: Float, colours: Float) -> tuple[Float, Float]:
 # --- PyVista, in a child process ----------------------------------------------------------------------------------
 
 
-# Why the child failed in this process, once it did: a driver that crashed does not mend itself.
+# Reason of the first failure to render. Later calls do not try again, since a driver that crashed will crash again.
 _failure: list[str] = []
 
 
 def render_solid(
     skin: Skin, colours: list[Float], must: bool = False
 ) -> tuple[list[NDArray[np.uint8]], tuple[float, float, float, float]] | None:
-    """Render a picture for each set of colours (t, 3, 3), or None where rendering does not work.
+    """Render a solid in a child process.
+
+    Parameters
+    ----------
+    skin : solid to render
+    colours : arrays (t, 3, 3)
+        RGB colours at the corners of the contact triangles, one array for each picture; the second shows arrows.
+    must : raise an error if PyVista cannot render
 
     Returns
     -------
-    images : the pictures
-    extent : their left, right, lower and upper end, mm as `flat` gives them
+    tuple or None
+        Pictures (h, w, 3), and their left, right, lower and upper edge in mm; None if PyVista cannot render.
 
     Raises
     ------
     MissingError
-        If rendering does not work and `must` is set.
+        If PyVista cannot render and `must` is set.
     """
     arrays = {f.name: getattr(skin, f.name) for f in fields(skin)}
     found = rendered("finger3d.plotting.solid", {"colours": np.array(colours), **arrays}, must)
@@ -270,8 +321,14 @@ def render_solid(
     return list(images), extent
 
 
-def rendered(module: str, arrays: Mapping[str, Any], must: bool = False) -> NDArray[np.uint8] | None:
-    """What ``python -m MODULE IN.npz OUT.npy`` makes of arrays in a child, or None where rendering does not work."""
+def rendered(module: str, arrays: Mapping[str, ArrayLike], must: bool = False) -> NDArray[np.uint8] | None:
+    """Return the array that ``python -m MODULE IN.npz OUT.npy`` makes of `arrays`, or None if PyVista cannot render.
+
+    Raises
+    ------
+    MissingError
+        If PyVista cannot render and `must` is set.
+    """
     if not _failure:
         with tempfile.TemporaryDirectory(prefix="finger3d-") as folder:
             source, target = Path(folder) / "arrays.npz", Path(folder) / "image.npy"
@@ -286,11 +343,19 @@ def rendered(module: str, arrays: Mapping[str, Any], must: bool = False) -> NDAr
 
 
 def run_child(command: list[str], window: bool = False) -> str | None:
-    """Run a command that renders, where a crash does no harm; why it failed, in one line, or None.
+    """Run a rendering command in a child process, which isolates crashes of the OpenGL driver.
 
-    There is a time limit, unless it opens a window.
+    Parameters
+    ----------
+    command : program and its arguments
+    window : whether the command opens a window; if not, there is a time limit
+
+    Returns
+    -------
+    str or None
+        Why it failed, in one line; None if it succeeded.
     """
-    # EGL needs no display; asking for it first spares VTK's warning about a missing X server.
+    # EGL needs no display; choosing it avoids VTK's warning about a missing X server.
     hidden = {} if window else {"VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow"}
     env = {**hidden, **child_environment()}
     limit = None if window else _TIME_LIMIT_S
@@ -306,7 +371,7 @@ def run_child(command: list[str], window: bool = False) -> str | None:
 
 
 def _child(source: str, target: str) -> None:
-    """Render the skin in `source` once for each set of colours, and save the images (s, h, w, 3)."""
+    """Render the skin in `source` once for each set of colours in this process, and save the images (s, h, w, 3)."""
     import pyvista as pv
 
     data = np.load(source)
@@ -318,13 +383,13 @@ def _child(source: str, target: str) -> None:
         contact["colour"] = np.round(255.0 * colours.reshape(-1, 3)).astype(np.uint8)
         if number == 1:
             _add_arrows(plotter, skin)
-        plotter.render()  # a screenshot alone repeats the picture before
+        plotter.render()  # without it, the screenshot would show the previous colours
         images.append(plotter.screenshot(return_img=True))
     np.save(target, np.array(images))
 
 
-def stage(plotter: Any, skin: Skin, frame: tuple[Float, Float]) -> Any:
-    """Set up the body, and a camera that sees a frame as `Skin.frame` gives it; returns the contact surface."""
+def stage(plotter: pv.Plotter, skin: Skin, frame: tuple[Float, Float]) -> pv.PolyData:
+    """Add the body to a plotter and aim its camera at a frame, as from `Skin.frame`; return the contact surface."""
     plotter.set_background("white")
     contact = _add_body(plotter, skin)
     plotter.enable_parallel_projection()
@@ -335,18 +400,18 @@ def stage(plotter: Any, skin: Skin, frame: tuple[Float, Float]) -> Any:
     return contact
 
 
-def _poly(points: Float, lines: bool) -> Any:
-    """PyVista's mesh of polygons, or polylines, (m, corners, 3) that share no points."""
+def _poly(points: Float, lines: bool) -> pv.PolyData:
+    """Return a PyVista mesh of polygons, or of polylines, (m, corners, 3) that share no points."""
     import pyvista as pv
 
     count, corners = points.shape[:2]
     index = np.hstack([np.full((count, 1), corners), np.arange(count * corners).reshape(count, corners)]).ravel()
-    flat = np.ascontiguousarray(points.reshape(-1, 3))
-    return pv.PolyData(flat, lines=index) if lines else pv.PolyData(flat, index)
+    vertices = np.ascontiguousarray(points.reshape(-1, 3))
+    return pv.PolyData(vertices, lines=index) if lines else pv.PolyData(vertices, index)
 
 
-def _add_body(plotter: Any, skin: Skin) -> Any:
-    """Add all but the arrows; returns the contact surface, whose array "colour" may be changed."""
+def _add_body(plotter: pv.Plotter, skin: Skin) -> pv.PolyData:
+    """Add everything but the arrows; return the contact surface, whose array "colour" holds its colours."""
     shine = {"ambient": 0.25, "diffuse": 0.8, "specular": 0.1}
     if len(skin.body):
         plotter.add_mesh(_poly(skin.body[:, _FOUR].reshape(-1, 3, 3), lines=False), color=BODY, **shine)
@@ -364,7 +429,7 @@ def _add_body(plotter: Any, skin: Skin) -> Any:
     return contact
 
 
-def _add_arrows(plotter: Any, skin: Skin) -> None:
+def _add_arrows(plotter: pv.Plotter, skin: Skin) -> None:
     import pyvista as pv
 
     shape = pv.Arrow(start=(-0.5, 0.0, 0.0), tip_length=0.4, tip_radius=0.13, shaft_radius=0.045)

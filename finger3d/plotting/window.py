@@ -1,20 +1,26 @@
-"""The window of `finger3d show`, a process of its own: ``python -m finger3d.plotting.window FOLDER [PICTURE.png]``.
+"""Window of `finger3d show`, run in a child process: ``python -m finger3d.plotting.window FOLDER [PICTURE.png]``.
 
-With a picture it is drawn off-screen, its controls are used once, and the picture is what a user would see then.
+With a PNG file as second argument the window is drawn off-screen; each control is used once, and the final view saved.
 """
 
 from __future__ import annotations
 
 import sys
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger3d.plotting.animation import mesh_of
 from finger3d.plotting.gauges import COLOUR, marks_of
 from finger3d.plotting.show import found
 from finger3d.results.states import States, captions
 from finger3d.results.vtu import grid
+
+if TYPE_CHECKING:
+    import pyvista as pv
+
+Array = NDArray[np.floating]
 
 FIELDS = {
     "pressure": "contact pressure (MPa)",
@@ -23,11 +29,17 @@ FIELDS = {
     "shear": "friction (MPa)",
     "stress": "von Mises stress (MPa), last step only",
 }
-"""What can be shown, by its name among the controls."""
+"""Name of a field among the controls -> its description."""
 
 
 class Window:
-    """A finger that follows its controls: the step, the field, and a plane that cuts it open."""
+    """Interactive view of a deformed finger, with controls for the step, the field and a clip plane.
+
+    Parameters
+    ----------
+    folder : results folder of a press
+    off_screen : render without a display
+    """
 
     def __init__(self, folder: str, off_screen: bool = False) -> None:
         import pyvista as pv
@@ -35,30 +47,37 @@ class Window:
         self.states, title, gauges = found(folder)
         self.end = grid(folder)
         self.rest = np.array(self.end.points)
-        # Contact is known at vertices: straight cells, or every edge would dip to 0 in its middle.
+        # Contact fields are known at the vertices only: on quadratic cells they would drop to 0 at mid-side nodes.
         kind = pv.CellType.TETRA if self.states.dim == 3 else pv.CellType.TRIANGLE
         self.shown = pv.UnstructuredGrid({kind: self.states.cells[:, : self.states.dim + 1]}, self.rest.copy())
         self.step, self.field = len(self.states.step) - 1, "pressure"
         self.shown["value"] = np.zeros(self.shown.n_points)
-        self.plotter: Any = pv.Plotter(off_screen=off_screen, title=f"finger3d: {title}", window_size=[1280, 860])
+        self.plotter = pv.Plotter(off_screen=off_screen, title=f"finger3d: {title}", window_size=[1280, 860])
         self.plotter.set_background("white")
         look = {"scalars": "value", "cmap": "viridis", "scalar_bar_args": {"title": " ", "color": "black"}}
         if self.states.dim == 3:
             self.plotter.add_mesh_clip_plane(
                 self.shown, normal="z", invert=True, origin=self._front(), outline_translation=False, **look
             )
-        else:  # a section has nothing to cut
+        else:
             self.plotter.add_mesh(self.shown, **look)
-        self.mapper = self.plotter.mapper  # the plotter's own is that of the last mesh
+        self.mapper = self.plotter.mapper  # of the finger; the attribute of the plotter changes with the next mesh
         self.marks = marks_of(mesh_of(self.states), gauges, near=self.states.dim == 3)
         self.lines = [pv.lines_from_points(self.rest[:3]) for _ in self.marks]
         for line in self.lines:
             self.plotter.add_mesh(line, color=COLOUR, line_width=5, lighting=False)
         self.plotter.add_slider_widget(
-            self.to_step, rng=[1, max(len(self.states.step), 2)], value=len(self.states.step), title="kept step",
-            fmt="%.0f", style="modern",
-            pointa=(0.62, 0.92), pointb=(0.95, 0.92), color="black", interaction_event="always",
-        )  # fmt: skip
+            self.to_step,
+            rng=[1, max(len(self.states.step), 2)],
+            value=len(self.states.step),
+            title="stored step",
+            fmt="%.0f",
+            style="modern",
+            pointa=(0.62, 0.92),
+            pointb=(0.95, 0.92),
+            color="black",
+            interaction_event="always",
+        )
         for key, name in zip("12345", FIELDS, strict=True):
             self.plotter.add_key_event(key, lambda name=name: self.to_field(name))
         self.plotter.view_vector(
@@ -68,11 +87,11 @@ class Window:
         self.update()
 
     def _front(self) -> tuple[float, float, float]:
-        """Where the plane begins: before the front, so that nothing is cut off."""
+        """Return the initial origin of the clip plane, mm, in front of the finger, where it removes nothing."""
         return 0.0, float(self.rest[:, 1].mean()), float(self.rest[:, 2].max()) + 1e-3
 
     def to_step(self, value: float) -> None:
-        """Go to a kept step, counted from 1."""
+        """Show a stored step, counted from 1."""
         self.step = min(max(round(value) - 1, 0), len(self.states.step) - 1)
         self.update()
 
@@ -82,7 +101,7 @@ class Window:
         self.update()
 
     def update(self) -> None:
-        """Move the finger and colour it."""
+        """Apply the displacement and the colours of the current step and field."""
         u = padded(self.states.displacement[self.step])
         self.shown.points = self.rest + u
         value = values(self.states, self.end, self.field, self.step)
@@ -93,30 +112,47 @@ class Window:
         self.mapper.scalar_range = (0.0, highest)
         keys = "   ".join(f"{key} {name}" for key, name in zip("12345", FIELDS, strict=True))
         text = f"{captions(self.states)[self.step]}\n{FIELDS[self.field]}\nkeys: {keys}"
-        self.plotter.add_text(text, position="upper_left", font_size=10, color="black", name="told")
+        self.plotter.add_text(text, position="upper_left", font_size=10, color="black", name="caption")
         self.plotter.render()
 
-    def _mark(self, u: Any) -> None:
-        """Move the gauges' lines and names."""
+    def _mark(self, u: Array) -> None:
+        """Move the lines and the labels of the gauges with the displacement (n, d), mm."""
         for line, mark in zip(self.lines, self.marks, strict=True):
             line.points = padded(mark.of(self.states.points + u))
         if self.marks:
             self.plotter.add_point_labels(
-                np.array([line.points[1] for line in self.lines]), [mark.label for mark in self.marks], name="gauges",
-                text_color=COLOUR, font_size=14, bold=False, shape_color="white", shape_opacity=0.8, show_points=False,
-                always_visible=True, reset_camera=False,
-            )  # fmt: skip
+                np.array([line.points[1] for line in self.lines]),
+                [mark.label for mark in self.marks],
+                name="gauges",
+                text_color=COLOUR,
+                font_size=14,
+                bold=False,
+                shape_color="white",
+                shape_opacity=0.8,
+                show_points=False,
+                always_visible=True,
+                reset_camera=False,
+            )
 
 
-def padded(u: Any) -> Any:
-    """Displacements (n, 3) of a section or a solid."""
+def padded(u: Array) -> Array:
+    """Append zeros to vectors (n, 2) or (n, 3), so that they have the shape (n, 3)."""
     return np.pad(u, [(0, 0), (0, 3 - u.shape[1])])
 
 
-def values(states: States, end: Any, name: str, k: int) -> Any:
-    """One number a point (n,) for a field at a kept step; stress is known at the last one only, NaN elsewhere."""
+def values(states: States, end: pv.UnstructuredGrid, name: str, k: int) -> Array:
+    """Return a field at all points, shape (n,).
+
+    Parameters
+    ----------
+    states : stored steps
+    end : fields of the last step
+    name : key of `FIELDS`
+    k : index of the stored step; the stress is known at the last one only and NaN at the others
+    """
     if name == "displacement":
-        return np.linalg.norm(states.displacement[k], axis=1)
+        displacement: Array = np.linalg.norm(states.displacement[k], axis=1)
+        return displacement
     if name == "shear":
         return np.hypot(states.on_points("shear_x", k), states.on_points("shear_z", k))
     if name == "stress":
@@ -124,14 +160,15 @@ def values(states: States, end: Any, name: str, k: int) -> Any:
             return np.full(len(states.points), np.nan)
         xx, yy, zz, xy, yz, xz = np.asarray(end["stress"]).T
         normal = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
-        return np.sqrt(0.5 * normal + 3.0 * (xy**2 + yz**2 + xz**2))
+        von_mises: Array = np.sqrt(0.5 * normal + 3.0 * (xy**2 + yz**2 + xz**2))
+        return von_mises
     return states.on_points(name, k).astype(float)
 
 
 def _main(folder: str, picture: str | None = None) -> None:
     window = Window(folder, off_screen=picture is not None)
     if picture is None:
-        # Without a display that can be opened VTK draws where nobody sees it.
+        # If the display cannot be opened, VTK silently renders off-screen.
         if not any(kind in window.plotter.render_window.GetClassName() for kind in ("X", "Win32", "Cocoa", "Wayland")):
             sys.exit("the display cannot be opened")
         window.plotter.show()

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.fem.simplex import Mesh
-from finger3d.mechanics.model import Gauge
+from finger3d.mechanics.gauges import Gauge
 from finger3d.plotting.gauges import marks_of
 from finger3d.report.html import asset, embedded
 from finger3d.results.states import States, chosen, label
