@@ -1,4 +1,4 @@
-"""``python -m finger3d``, and the console command."""
+"""Entry point of ``python -m finger3d`` and of the console script ``finger3d``."""
 
 import sys
 

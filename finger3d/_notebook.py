@@ -1,11 +1,11 @@
-"""HTML of a result in a notebook: a title, a table, and remarks."""
+"""HTML representation of a result in a notebook: a title, a table and remarks."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from html import escape
 
-_CELL = ' style="text-align: left; vertical-align: top"'  # notebooks align cells to the right
+_CELL = ' style="text-align: left; vertical-align: top"'  # Jupyter aligns cells to the right
 
 
 def card(
@@ -16,15 +16,15 @@ def card(
     folded: Sequence[str] = (),
     head: Sequence[str] = (),
 ) -> str:
-    """Return the HTML of a result; all text is escaped.
+    """Return the HTML of a result. All text is escaped.
 
     Parameters
     ----------
-    title : printed in bold
-    status : one line beside the title
+    title : title, in bold
+    status : one line that follows the title
     rows : cells of each row of the table
     notes : lines below the table
-    folded : further lines, shown on a click
+    folded : further lines, which are collapsed
     head : names of the columns
     """
     names = f"<thead><tr>{''.join(f'<th{_CELL}>{escape(name)}</th>' for name in head)}</tr></thead>" if head else ""

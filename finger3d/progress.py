@@ -1,4 +1,4 @@
-"""Progress of a long job: a bar on a terminal, plain lines elsewhere, nothing in a script."""
+"""Progress of a long job: a bar on a terminal, plain lines in logs and pipes, nothing when called from Python."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from finger3d._ranges import printable
 
 
 class Progress:
-    """Receiver of a job's progress; this one, the default, prints nothing.
+    """Receiver of the progress of a job. This base class, the default, prints nothing.
 
     Attributes
     ----------
-    steps_done, steps_total : number of finished steps and of all, for the message after an interruption
+    steps_done, steps_total : number of finished steps and number of all steps
     """
 
     steps_done: int = 0
@@ -31,18 +31,18 @@ class Progress:
         """Leave the terminal as it was."""
 
     def stage(self, text: str) -> None:
-        """Begin a part of the job, for instance ``meshing``."""
+        """Announce a stage of the job, for instance ``meshing``."""
 
     def step(self, done: int, total: int, text: str = "") -> None:
-        """Report that `done` of `total` steps are finished, with a short remark on the last one."""
+        """Report that `done` of `total` steps are finished, with a remark on the last one."""
         self.steps_done, self.steps_total = done, total
 
     def say(self, text: str) -> None:
-        """Print a line that remains, for instance that a mesh came from the cache."""
+        """Print a permanent line, for instance that a mesh was read from the cache."""
 
 
 class PlainProgress(Progress):
-    """One line per event with the seconds since the start, for logs and pipes."""
+    """Progress as one line for each event, with the seconds since the start; for logs and pipes."""
 
     def __init__(self, stream: TextIO | None = None) -> None:
         self.stream = stream if stream is not None else sys.stdout
@@ -66,7 +66,7 @@ class PlainProgress(Progress):
 
 
 class BarProgress(Progress):
-    """A rich progress bar: the stage, a bar over the steps, the elapsed time and the last remark."""
+    """Progress bar with the stage, the number of steps, the elapsed time and the last remark."""
 
     def __init__(self, stream: TextIO | None = None) -> None:
         from rich.console import Console
@@ -84,7 +84,7 @@ class BarProgress(Progress):
             console=self.console,
             transient=True,
         )
-        # A task without a total pulses: the duration of meshing is not known.
+        # A task without a total pulses, because the duration of meshing is unknown.
         self.task = self.progress.add_task("starting", total=None, count="", remark="")
 
     def __enter__(self) -> BarProgress:
@@ -98,7 +98,7 @@ class BarProgress(Progress):
         self.progress.stop()
 
     def stage(self, text: str) -> None:
-        """Name the stage and let the bar pulse."""
+        """Show the stage; the bar pulses until the first step."""
         self.progress.update(self.task, description=printable(text), total=None, count="", remark="")
 
     def step(self, done: int, total: int, text: str = "") -> None:
@@ -112,11 +112,11 @@ class BarProgress(Progress):
 
 
 def reporter(stream: TextIO | None = None) -> Progress:
-    """Return a bar for an interactive terminal, plain lines for a pipe, a dumb terminal or CI.
+    """Return a progress bar for an interactive terminal, and plain lines for a pipe, a dumb terminal or CI.
 
     Parameters
     ----------
-    stream : where to print; None: standard output
+    stream : output stream; None for standard output
     """
     target = stream or sys.stdout
     unicode = (target.encoding or "utf-8").lower().startswith("utf")  # bar and spinner are not ASCII

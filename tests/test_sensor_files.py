@@ -114,7 +114,7 @@ def test_many_readings_from_a_csv(tmp_path: Path, capsys: Any) -> None:
     assert float(rows[0]["mu"]) == pytest.approx(0.3)
     assert rows[1]["status"] == "outside"
     assert run("estimate", kept, "--csv", readings, "--out", tmp_path / "mu.csv") == 0
-    assert "1 of 2 readings tell mu" in capsys.readouterr().out
+    assert "1 of 2 readings determine mu" in capsys.readouterr().out
     assert len((tmp_path / "mu.csv").read_text().splitlines()) == 3
     assert run("estimate", kept, "--csv", readings, "--json", "--curve", "fit") == 0
     assert [a["status"] for a in json.loads(capsys.readouterr().out)] == ["ok", "outside"]

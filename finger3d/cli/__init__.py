@@ -1,4 +1,4 @@
-"""Command line. Each command imports what it needs, so that ``finger3d --help`` is quick."""
+"""Command line. Each command imports its dependencies when it runs, so that ``finger3d --help`` starts quickly."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from cyclopts import CycloptsError
 
-# importing registers the commands
+# Importing a module registers its command.
 from finger3d.cli import (  # noqa: F401
     calibrate,
     compare,
@@ -28,9 +28,9 @@ from finger3d.errors import OUT_OF_MEMORY, Finger3dError, MissingError, out_of_m
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line and return its exit code; a user's mistake is one line on standard error.
+    """Run the command line and return its exit code.
 
-    SIGTERM and SIGHUP interrupt a command like Ctrl-C.
+    Errors are reported in one line on standard error. SIGTERM and SIGHUP interrupt a command like Ctrl-C.
     """
     with safe_streams(), termination_interrupts():
         return _run(arguments)
@@ -57,8 +57,8 @@ def _run(arguments: Sequence[str] | None) -> int:
         if out_of_memory(error):
             complain(OUT_OF_MEMORY)
             return MissingError.exit_code
-        # Ctrl-C while OCP or VTK initialise: their loaders turn it into an ImportError.
+        # The loaders of OCP and VTK turn a KeyboardInterrupt into an ImportError.
         if not isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
             raise
-        complain("interrupted while a package was loading; steps that were finished are kept")
+        complain("interrupted while a package was loading; finished steps are kept")
         return 130

@@ -1,4 +1,4 @@
-"""calibrate: from a scene to strain against mu."""
+"""Command ``calibrate``: the strain of a gauge as a function of mu."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ Tolerances = Annotated[
     Parameter(
         name="--tolerance",
         negative=(),
-        help="Standard deviation of a quantity that is not known exactly, for instance depth_mm=0.05; 0: exact; may be "
-        f"repeated. One of {', '.join(TOLERANCES)}.",
+        help="Standard deviation of an uncertain quantity, for instance depth_mm=0.05; 0: exact; may be repeated. "
+        f"Quantities: {', '.join(TOLERANCES)}.",
     ),
 ]
 
@@ -30,24 +30,30 @@ def calibrate(
     *,
     gauge: Annotated[str, Parameter(help="Name of a [[gauge]] of the scene.")],
     out: Annotated[Path, Parameter(help="Folder for the results.")],
-    mu: Annotated[str, Parameter(help="first:last:count, or numbers with commas.")] = "0.02:1.2:25",
-    noise: Annotated[float, Parameter(help="Standard deviation of a strain reading; the paper's.")] = 1.5e-4,
-    resolution: Annotated[float, Parameter(help="Resolution of mu beyond which the gauge is called blind.")] = 0.1,
+    mu: Annotated[
+        str, Parameter(help="Values of mu: first:last:count, or numbers separated by commas.")
+    ] = "0.02:1.2:25",
+    noise: Annotated[
+        float, Parameter(help="Standard deviation of a strain reading; the default is that of Maeno 2004.")
+    ] = 1.5e-4,
+    resolution: Annotated[
+        float, Parameter(help="Largest standard deviation of mu at which the gauge is usable.")
+    ] = 0.1,
     tolerance: Tolerances = None,
     map_: Annotated[
-        bool, Parameter(name="--map", negative=(), help="Also map how far strains follow mu over the section.")
+        bool, Parameter(name="--map", negative=(), help="Also map the sensitivity of strain to mu over the section.")
     ] = False,
     set_: Set = None,
     json_: Json = False,
 ) -> None:
-    """Calibrate a gauge: its strain against mu, second-order fit, resolution, usable range, and other influences.
+    """Calibrate a gauge: strain against mu, second-order fit, resolution, usable range, and effect of tolerances.
 
     Example: finger3d calibrate scene.toml --gauge g36 --out cal
 
     Parameters
     ----------
     scene
-        The scene file (TOML); its own friction.mu does not matter.
+        The scene file (TOML); its friction.mu is ignored.
     """
     loaded = load(scene, set_, out)
     from finger3d.analyses.calibrate.run import calibrate as run

@@ -1,14 +1,14 @@
-"""Parts that the commands share: the app, common options, checks of folders, the frame of a job, and tables."""
+"""Shared parts of the commands: the app, common options, checks of output folders, progress, and tables."""
 
 from __future__ import annotations
 
 import json
 import sys
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext, redirect_stdout
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
@@ -52,30 +52,32 @@ Set = Annotated[
 Json = Annotated[
     bool,
     Parameter(
-        name="--json", negative=(), help="JSON alone on standard output, for scripts; all else on standard error."
+        name="--json",
+        negative=(),
+        help="Write only JSON to standard output, for scripts; all other text goes to standard error.",
     ),
 ]
 
 
 class Interrupted(Exception):
-    """A job was interrupted; the text says what is kept. Exit code 130."""
+    """Interruption of a job; the message says which results are kept. Exit code 130."""
 
     exit_code = 130
 
 
 @contextmanager
 def job(json_: bool, kept: Callable[[Progress], str]) -> Iterator[Progress]:
-    """Report the progress of a job within the block.
+    """Report the progress of the job in the block.
 
     Parameters
     ----------
-    json_ : whether standard output is left to the JSON of the result; all that is printed within goes to standard error
-    kept : says after an interruption which results are kept
+    json_ : print everything in the block to standard error, since standard output is reserved for JSON
+    kept : function that describes, after an interruption, which results are kept
 
     Raises
     ------
     Interrupted
-        For Ctrl-C, SIGTERM or SIGHUP.
+        On Ctrl-C, SIGTERM or SIGHUP.
     """
     report = reporter(sys.stderr if json_ else None)
     try:
@@ -85,8 +87,8 @@ def job(json_: bool, kept: Callable[[Progress], str]) -> Iterator[Progress]:
         raise Interrupted(f"interrupted; {kept(report)}") from None
 
 
-def print_json(data: Any) -> None:
-    """Print JSON for a script; characters that the terminal cannot encode are escaped."""
+def print_json(data: Mapping[str, object] | Sequence[object]) -> None:
+    """Print JSON. Characters that standard output cannot encode are escaped."""
     from finger3d.io import json_text
 
     text = json_text(data)
@@ -98,7 +100,7 @@ def print_json(data: Any) -> None:
 
 
 def load(path: Path, overrides: list[str] | None, out: Path | None = None) -> Scene:
-    """Load a scene with the keys of --set; refuse an output folder that cannot take the results."""
+    """Load a scene with the overrides of --set, and check the output folder with `check_writable`."""
     from finger3d.scene import load
 
     scene = load(path, overrides or [])
@@ -108,14 +110,14 @@ def load(path: Path, overrides: list[str] | None, out: Path | None = None) -> Sc
 
 
 def check_writable(out: Path, scene: Path) -> None:
-    """Raise Finger3dError for an output folder that cannot take the results of a scene."""
+    """Raise Finger3dError if the output folder cannot be written, or holds the scene file itself."""
     if (out / "scene.toml").resolve() == scene.resolve():
         raise Finger3dError(f"--out {out}: holds {scene.name}, which the results would overwrite; name another folder")
     check_folder(out)
 
 
 def check_folder(out: Path) -> None:
-    """Raise Finger3dError for a folder that cannot be written; one that does not exist is made later."""
+    """Raise Finger3dError if a folder cannot be written, or cannot be created where it does not exist."""
     try:
         there = next(p for p in (out, *out.parents, Path()) if p.exists())
         if there == out and not out.is_dir():
@@ -136,17 +138,18 @@ def print_rows(title: str, rows: Iterable[tuple[str, object]]) -> None:
     from rich.text import Text
 
     bold = Text(printable(title), style="bold")
-    table = _table(title=bold, title_justify="left", show_header=False)
+    table = _table()
+    table.title, table.title_justify, table.show_header = bold, "left", False
     table.add_column(no_wrap=True)
     table.add_column(overflow="fold")
     for key, value in rows:
         table.add_row(Text(printable(key)), Text(printable(str(value))))
-    # a path that is folded could not be copied: a pipe has no width
+    # Output to a pipe is wide enough for paths, which could not be copied from two lines.
     _print(table, 500)
 
 
 def print_columns(head: Sequence[str], lines: Iterable[Sequence[str]]) -> None:
-    """Print a table with a heading."""
+    """Print a table with column names."""
     from rich.text import Text
 
     table = _table()
@@ -157,11 +160,11 @@ def print_columns(head: Sequence[str], lines: Iterable[Sequence[str]]) -> None:
     _print(table, 240)
 
 
-def _table(**options: Any) -> Table:
+def _table() -> Table:
     from rich import box
     from rich.table import Table
 
-    return Table(box=box.SIMPLE, **options)
+    return Table(box=box.SIMPLE)
 
 
 def _print(table: Table, piped_width: int) -> None:

@@ -1,4 +1,4 @@
-"""compare: a scene as plane stress, plane strain and solid."""
+"""Command ``compare``: a scene in plane stress, in plane strain and as a solid."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def compare(
     set_: Set = None,
     json_: Json = False,
 ) -> None:
-    """Solve a scene as plane stress, plane strain and solid, and judge whether 2D would have been enough.
+    """Solve a scene in plane stress, in plane strain and as a solid, and judge whether a 2D model is sufficient.
 
     Example: finger3d compare scene.toml --out out --widths 5,20,50,200
 
@@ -36,8 +36,8 @@ def compare(
     loaded = load(scene, set_, out)
     if loaded.tables.mesh.tolerance is not None:
         raise Finger3dError(
-            f"{scene}: mesh.tolerance = {loaded.tables.mesh.tolerance:g}: compare solves on equal sizes; press finds "
-            "them and writes them to its scene.toml, take that one"
+            f"{scene}: mesh.tolerance = {loaded.tables.mesh.tolerance:g}: compare needs fixed edge lengths; press "
+            "determines them and writes them to the scene.toml of its results, which compare accepts"
         )
     from finger3d.analyses.compare.run import compare as run
     from finger3d.results.summary import read_json
@@ -58,4 +58,4 @@ def _width(text: str) -> float:
     try:
         return float(text)
     except ValueError:
-        raise Finger3dError(f"--widths: {text.strip()!r} is no number; give mm and commas: 5,20,50,200") from None
+        raise Finger3dError(f"--widths: {text.strip()!r} is not a number; give mm with commas: 5,20,50,200") from None

@@ -1,4 +1,4 @@
-"""completion: a script for the shell."""
+"""Command ``completion``: a completion script for the shell."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from finger3d.cli.common import app
 
 @app.command
 def completion(shell: Literal["bash", "zsh", "fish"], /) -> None:
-    """Print a script that lets a shell complete commands and options.
+    """Print a script with which a shell completes commands and options.
 
-    For bash, add the line of the example to ~/.bashrc. For zsh, write the script to a file _finger3d in a folder of
+    For bash, add the line of the example to ~/.bashrc. For zsh, write the output to a file _finger3d in a folder of
     $fpath; for fish, to ~/.config/fish/completions/finger3d.fish.
 
     Example: source <(finger3d completion bash)
@@ -19,6 +19,6 @@ def completion(shell: Literal["bash", "zsh", "fish"], /) -> None:
     Parameters
     ----------
     shell
-        The shell.
+        Shell for which the script is written.
     """
     print(app.generate_completion(shell=shell), end="")

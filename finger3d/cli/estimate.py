@@ -1,11 +1,12 @@
-"""estimate: the friction coefficient from strains."""
+"""Command ``estimate``: the friction coefficient from strain readings."""
 
 from __future__ import annotations
 
 import csv
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -22,27 +23,34 @@ def estimate(
     /,
     *,
     strain: Annotated[float | None, Parameter(help="One strain reading.")] = None,
-    std: Annotated[float | None, Parameter(help="Its standard deviation; default the calibration's noise.")] = None,
-    csv_: Annotated[
-        Path | None, Parameter(name="--csv", help="Many readings: a column strain, and std if it is there.")
+    std: Annotated[
+        float | None, Parameter(help="Standard deviation of the readings; default: the noise of the calibration.")
     ] = None,
-    out: Annotated[Path | None, Parameter(help="CSV file for the answers to --csv; else they are printed.")] = None,
+    csv_: Annotated[
+        Path | None,
+        Parameter(name="--csv", help="CSV file of readings: a column strain and, optionally, a column std."),
+    ] = None,
+    out: Annotated[Path | None, Parameter(help="CSV file for the estimates from --csv; default: print them.")] = None,
     json_: Json = False,
     curve: Annotated[
-        Literal["interpolation", "fit"], Parameter(help="Invert the monotone interpolation or the second-order fit.")
+        Literal["interpolation", "fit"],
+        Parameter(help="Curve to invert: the monotone interpolation or the second-order fit."),
     ] = "interpolation",
     tolerances: Annotated[
-        bool, Parameter(negative="--no-tolerances", help="Whether what the calibration does not know exactly counts.")
+        bool,
+        Parameter(
+            negative="--no-tolerances", help="Include the tolerances of the calibration in the standard deviation."
+        ),
     ] = True,
 ) -> None:
-    """Mu with its standard deviation from a strain reading, or why the strain does not tell it.
+    """Estimate mu and its standard deviation from strain readings, or report why a reading does not determine mu.
 
     Example: finger3d estimate cal/calibration.json --strain 0.052
 
     Parameters
     ----------
     calibration
-        The calibration.json of `finger3d calibrate`.
+        The calibration.json that `finger3d calibrate` wrote.
     """
     from finger3d.sensor import estimate as run
     from finger3d.sensor import load as read
@@ -72,26 +80,27 @@ def estimate(
     else:
         from finger3d.io import write_csv
 
-        write_csv(out, {name: [_line(e)[i] for e in found] for i, name in enumerate(_COLUMNS)})
-        told = sum(e.status in ("ok", "coarse") for e in found)
-        print(f"{told} of {len(found)} readings tell mu; results: {out}")
+        write_csv(out, {name: [getattr(e, name) for e in found] for name in _COLUMNS})
+        determined = sum(e.status in ("ok", "coarse") for e in found)
+        print(f"{determined} of {len(found)} readings determine mu; results: {out}")
 
 
 _COLUMNS = ("strain", "reading_std", "mu", "std", "low", "high", "status", "verdict")
 
 
-def _line(found: Estimate) -> list[Any]:
+def _line(found: Estimate) -> list[object]:
     return [getattr(found, name) for name in _COLUMNS]
 
 
-def _cell(value: Any) -> str:
+def _cell(value: object) -> str:
     if isinstance(value, float):
         return repr(value)
-    return f'"{value}"' if "," in value else str(value)
+    text = str(value)
+    return f'"{text}"' if "," in text else text
 
 
 def _readings(path: Path, std: float | None) -> tuple[list[float], list[float] | float | None]:
-    """Strains and their standard deviations from a CSV file."""
+    """Read strains and their standard deviations from a CSV file; `std` if it has no column std."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as stream:
             rows = list(csv.DictReader(stream))
@@ -100,7 +109,9 @@ def _readings(path: Path, std: float | None) -> tuple[list[float], list[float] |
     except OSError as error:
         raise Finger3dError(f"{path}: cannot be read: {error.strerror}") from None
     except (UnicodeDecodeError, csv.Error):
-        raise Finger3dError(f"{path}: not a CSV file; a line of names, then a reading a line") from None
+        raise Finger3dError(
+            f"{path}: not a CSV file; it must have a line of names, then one line for each reading"
+        ) from None
     if not rows or "strain" not in rows[0]:
         names = ", ".join(str(k) for k in rows[0]) if rows else "nothing"
         raise Finger3dError(f"{path}: must have a column named strain and at least one reading; it has {names}")
@@ -110,8 +121,8 @@ def _readings(path: Path, std: float | None) -> tuple[list[float], list[float] |
     return strains, [_number(path, i, "std", row) for i, row in enumerate(rows, start=2)]
 
 
-def _number(path: Path, line: int, name: str, row: dict[str, Any]) -> float:
+def _number(path: Path, line: int, name: str, row: Mapping[str, str | None]) -> float:
     try:
-        return float(row[name])
-    except (TypeError, ValueError):
+        return float(row[name] or "")
+    except ValueError:
         raise Finger3dError(f"{path}: line {line}: {name} = {row[name]!r}: must be a number") from None

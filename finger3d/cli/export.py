@@ -1,4 +1,4 @@
-"""export: files to print, to pour, and for other CAD."""
+"""Command ``export``: files for CAD, 3D printing and casting."""
 
 from __future__ import annotations
 
@@ -19,14 +19,16 @@ def export(
     /,
     *,
     out: Annotated[Path, Parameter(help="Folder for the files.")],
-    mold: Annotated[bool, Parameter(negative=(), help="Also a printable mold: two halves and a lid.")] = False,
-    ascii_: Annotated[bool, Parameter(name="--ascii", negative=(), help="STL as text instead of binary.")] = False,
-    tolerance_mm: Annotated[float, Parameter(help="Largest distance of triangles from the surface.")] = 0.05,
+    mold: Annotated[bool, Parameter(negative=(), help="Also write a printable mold: two halves and a lid.")] = False,
+    ascii_: Annotated[
+        bool, Parameter(name="--ascii", negative=(), help="Write STL files as text instead of binary.")
+    ] = False,
+    tolerance_mm: Annotated[float, Parameter(help="Largest distance between triangles and surface, in mm.")] = 0.05,
     options: Annotated[MoldOptions | None, Parameter(name="*", group="Mold (with --mold)")] = None,
     set_: Set = None,
     json_: Json = False,
 ) -> None:
-    """Write the finger as STEP and STL, and with --mold everything to cast it: parts, plate, sheet, picture.
+    """Write the finger as STEP and STL, and with --mold also the parts of a mold, instructions and a picture.
 
     Example: finger3d export scene.toml --out print --mold --shrinkage 0.001 --bed 180x180x180
 
@@ -42,14 +44,14 @@ def export(
     check_folder(out)
     from finger3d.mold.export import export as run
 
-    with job(json_, lambda _: f"the files that are in {out} are complete") as report:
+    with job(json_, lambda _: f"the files in {out} are complete") as report:
         done = run(loaded, out, chosen if mold else None, ascii_, tolerance_mm, report)
     if json_:
         print_json({"results": out, **asdict(done)})
         return
     off = done.stl_volume_mm3 / done.volume_mm3 - 1.0
     rows = [
-        ("volume", f"{done.volume_mm3:.6g} mm3; finger.stl {off:+.1e} of it"),
+        ("volume", f"{done.volume_mm3:.6g} mm3; finger.stl differs by {off:+.1e}"),
         ("tolerance", f"{done.tolerance_mm:.3g} mm"),
     ]
     if done.silicone_ml is not None:

@@ -1,4 +1,4 @@
-"""info: versions, machine and folders."""
+"""Command ``info``: versions, machine and folders."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from finger3d.cli.common import Json, app, print_json, print_rows
 
 @app.command
 def info(*, json_: Json = False) -> None:
-    """Print versions, machine and folders: what a bug report needs.
+    """Print versions, machine and folders, as needed for a bug report.
 
     Example: finger3d info --json
     """

@@ -1,4 +1,4 @@
-"""new: a commented scene to start from."""
+"""Command ``new``: a commented example scene."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from finger3d.errors import Finger3dError
 
 @app.command
 def new(file: Path = Path("scene.toml"), /) -> None:
-    """Write a commented scene to start from: the paper's Fig. 9 finger.
+    """Write a commented example scene: the finger of Maeno 2004, Fig. 9.
 
     Example: finger3d new my_scene.toml
 
     Parameters
     ----------
     file
-        Where to write; a file that is there already is left alone.
+        File to write; an existing file is not overwritten.
     """
     text = resources.files("finger3d").joinpath("new_scene.toml").read_text(encoding="utf-8")
     try:

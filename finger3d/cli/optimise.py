@@ -1,4 +1,4 @@
-"""optimise: free keys of a scene, chosen for the largest objective."""
+"""Command ``optimise``: the values of free keys of a scene with the largest objective."""
 
 from __future__ import annotations
 
@@ -18,26 +18,34 @@ def optimise(
     *,
     free: Annotated[
         list[str],
-        Parameter(negative=(), help="A key and its bounds, for instance finger.radius_mm=60:200; may be repeated."),
+        Parameter(
+            negative=(), help="A free key and its bounds, for instance finger.radius_mm=60:200; may be repeated."
+        ),
     ],
     out: Annotated[Path, Parameter(help="Folder for the results; an interrupted search continues there.")],
     objective: Annotated[
-        str, Parameter(help="sensitivity, or a Python file with objective(table) -> number, larger is better.")
+        str, Parameter(help="sensitivity, or a Python file with objective(table) -> number; the largest is best.")
     ] = "sensitivity",
-    gauge: Annotated[str | None, Parameter(help="Gauge that the objective reads; default the first.")] = None,
-    mu: Annotated[str | None, Parameter(help="Values of mu, ascending, with commas; default nine, 0.05 to 1.")] = None,
-    noise: Annotated[float, Parameter(help="Standard deviation of a strain reading; the paper's.")] = 1.5e-4,
-    budget: Annotated[int, Parameter(help="Number of designs, or of bodies if gauges are searched in each.")] = 60,
+    gauge: Annotated[str | None, Parameter(help="Gauge that the objective uses; default: the first.")] = None,
+    mu: Annotated[
+        str | None, Parameter(help="Ascending values of mu, with commas; default: nine from 0.05 to 1.")
+    ] = None,
+    noise: Annotated[
+        float, Parameter(help="Standard deviation of a strain reading; the default is that of Maeno 2004.")
+    ] = 1.5e-4,
+    budget: Annotated[
+        int, Parameter(help="Number of designs; of bodies, if keys of gauges are optimised for each body.")
+    ] = 60,
     method: Annotated[
         str, Parameter(help="differential-evolution, dual-annealing or nelder-mead.")
     ] = "differential-evolution",
-    seed: Annotated[int, Parameter(help="Seed of the random numbers.")] = 0,
+    seed: Annotated[int, Parameter(help="Seed of the random number generator.")] = 0,
     set_: Set = None,
     json_: Json = False,
 ) -> None:
     """Search for the design with the largest objective, starting from the scene.
 
-    If only keys of gauges are free, the body is condensed once.
+    If only keys of gauges are free, all designs share one condensed body.
 
     Example: finger3d optimise scene.toml --free gauge.g36.x_mm=10:48 --free gauge.g36.angle_deg=0:90 --out best
 
@@ -64,7 +72,7 @@ def optimise(
         seed=seed,
     )
     check_writable(out, scene)
-    kept = f"every design judged is kept in {out}; the same command continues"
+    kept = f"every evaluated design is kept in {out}; the same command continues"
     with job(json_, lambda _: kept) as report:
         found = optimise(problem, out, report)
     if json_:
@@ -76,7 +84,7 @@ def optimise(
         [
             ("objective", f"{found.best.value:.5g}, at the start {found.start.value:.5g}"),
             *((key, f"{value:.5g}") for key, value in chosen),
-            ("judged", f"{found.judged} designs, {found.bodies} bodies condensed"),
+            ("evaluated", f"{found.judged} designs, {found.bodies} bodies condensed"),
             ("results", str(out / "best.toml")),
             ("", str(out / "evaluations.csv")),
             ("", str(out / "report.html")),

@@ -1,4 +1,4 @@
-"""plan: what solving a scene will take."""
+"""Command ``plan``: model size, time and memory of a press."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @app.command
 def plan(scene: Path, /, *, set_: Set = None, json_: Json = False) -> None:
-    """Tell which effects are on, how large the model is, and what time and memory it will take; solve nothing.
+    """Print the active effects, the size of the model, and the estimated time and memory, without solving.
 
     Example: finger3d plan scene.toml --set mesh.size_mm=1
 
@@ -36,7 +36,7 @@ def plan(scene: Path, /, *, set_: Set = None, json_: Json = False) -> None:
 
 
 def effect_rows(scene: Scene) -> list[tuple[str, str]]:
-    """Return each known effect with why it is on or off."""
+    """Return each known effect and the reason why it is on or off."""
     from finger3d.scene.registry import effect_names
 
     def why(name: str) -> str:

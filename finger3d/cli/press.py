@@ -1,4 +1,4 @@
-"""press: solve a scene."""
+"""Command ``press``: the solution of a scene."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ def press(
     set_: Set = None,
     figures: Annotated[bool, Parameter(negative="--no-figures", help="Draw the pictures.")] = True,
     error: Annotated[
-        bool, Parameter(negative="--no-error", help="Estimate errors, from a run on another mesh.")
+        bool, Parameter(negative="--no-error", help="Estimate errors from a solution on another mesh.")
     ] = True,
     json_: Json = False,
 ) -> None:
-    """Solve a scene: CAD, mesh, contact, results.
+    """Solve a scene: geometry, mesh, frictional contact, results.
 
     Example: finger3d press scene.toml --out out --set friction.mu=0.5
 
@@ -53,7 +53,7 @@ def press(
 
 
 def _kept(out: Path, total: int) -> str:
-    """Say how many converged steps are in the files."""
+    """Return how many converged steps are in the files."""
     from finger3d.results.summary import read_json
 
     try:
@@ -72,11 +72,11 @@ _NUMBERS = {
     "contact area": ("contact_area_mm2", 1.0, 4, " mm2"),
     "stick area": ("stick_area_mm2", 1.0, 4, " mm2"),
 }
-"""Name of a row -> key of a step, factor, digits, unit."""
+"""Name of a row -> key of a step, factor, significant digits, unit."""
 
 
 def _rows(summary: Mapping[str, Any], out: Path) -> Iterator[tuple[str, str]]:
-    """Yield the closing table of a press: the numbers of the last step, the errors, and the files."""
+    """Yield the rows of the closing table: numbers of the last step with their errors, cost, and files."""
     from finger3d.accuracy.error_bars import ErrorBars
     from finger3d.results.format import with_error
 
@@ -96,7 +96,7 @@ def _rows(summary: Mapping[str, Any], out: Path) -> Iterator[tuple[str, str]]:
         for name, strain in last["gauges"].items():
             yield f"strain {name}", number(strain, f"gauge_{name}", 5)
     if bars.discretisation:
-        yield "+-", f"mesh and steps, not the model; estimated in {bars.seconds:.1f} s; --no-error skips it"
+        yield "+-", f"error of mesh and steps, not of the model; estimated in {bars.seconds:.1f} s; --no-error skips it"
     elif estimate:
         yield "error", bars.method
     if summary.get("cost"):

@@ -1,4 +1,4 @@
-"""show: look at a result."""
+"""Command ``show``: a window, a picture or an animation of a result."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ def show(
     folder: Path,
     /,
     *,
-    png: Annotated[Path | None, Parameter(help="Write a picture (of a step) instead of opening a window.")] = None,
-    gif: Annotated[Path | None, Parameter(help="Write an animation of the steps instead.")] = None,
-    step: Annotated[int | None, Parameter(help="Number of the step in the picture; default the last.")] = None,
+    png: Annotated[Path | None, Parameter(help="Write a picture of one step instead of opening a window.")] = None,
+    gif: Annotated[Path | None, Parameter(help="Write an animation of the steps instead of opening a window.")] = None,
+    step: Annotated[int | None, Parameter(help="Number of the step in the picture; default: the last.")] = None,
 ) -> None:
-    """Look at a result: a window with fields, steps and a clip plane; --png and --gif need no display.
+    """Show a result in a window with fields, steps and a clip plane; --png and --gif need no display.
 
     Example: finger3d show out --png finger.png --gif press.gif
 
     Parameters
     ----------
     folder
-        What `finger3d press` wrote; or `finger3d sweep`, for the --png of its charts.
+        Results of `finger3d press`; or of `finger3d sweep`, whose charts --png draws.
     """
     if (folder / "sweep.json").is_file():
         _show_sweep(folder, png, gif, step)
@@ -51,8 +51,8 @@ def show(
 def _show_sweep(folder: Path, png: Path | None, gif: Path | None, step: int | None) -> None:
     if png is None or gif is not None or step is not None:
         page = folder / "report.html"
-        look = f"open {page}" if page.exists() else "it is not finished; the same command continues"
-        raise Finger3dError(f"show: {folder} holds a sweep: {look}, or give --png alone")
+        advice = f"open {page}" if page.exists() else "it is not finished; the same command continues"
+        raise Finger3dError(f"show: {folder} holds a sweep: {advice}, or give --png alone")
     _check(png, ".png")
     from finger3d.report.sweep_figure import picture
 

@@ -1,10 +1,10 @@
-"""sweep: every combination of some values of a scene's keys."""
+"""Command ``sweep``: presses for all combinations of given values of keys."""
 
 from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
@@ -15,7 +15,7 @@ from finger3d.progress import Progress
 if TYPE_CHECKING:
     from finger3d.analyses.sweep.store import ResultStore
 
-_SHOWN, _GAUGES = 10, 3  # points and gauges
+_MOST_POINTS, _MOST_GAUGES = 10, 3  # in the printed table
 
 
 @app.command
@@ -29,16 +29,18 @@ def sweep(
     ],
     out: Annotated[Path, Parameter(help="Folder for the results; an interrupted sweep continues there.")],
     set_: Set = None,
-    scheduler: Annotated[str | None, Parameter(help="Address of a Dask scheduler, instead of processes here.")] = None,
+    scheduler: Annotated[
+        str | None, Parameter(help="Address of a Dask scheduler that runs the presses, instead of processes here.")
+    ] = None,
     workers: Annotated[
         int | None,
-        Parameter(help="Processes on this machine; default: one for each core, for a single body none."),
+        Parameter(help="Number of processes on this machine; default: one for each core, none for a single body."),
     ] = None,
     json_: Json = False,
 ) -> None:
-    """Press every combination of some values in parallel; the same command continues after an interruption.
+    """Press all combinations of given values in parallel; the same command continues after an interruption.
 
-    Friction, depths, slides, steps and gauges share one condensation; every other key needs one for each value.
+    Values of friction, depths, slides, steps and gauges share one condensed body; other keys need one for each value.
 
     Example: finger3d sweep scene.toml --vary friction.mu=0.06,0.25,1 --vary gauge.g36.angle_deg=15,30,45 --out out
 
@@ -77,37 +79,41 @@ def _kept(done: Progress, out: Path) -> str:
     return f"{done.steps_done} of {done.steps_total} points are kept in {out}; the same command continues"
 
 
-def _points(store: ResultStore) -> list[dict[str, Any]]:
-    """Every point as a row of the table in the results."""
+def _points(store: ResultStore) -> list[dict[str, object]]:
+    """Return the rows of results.csv."""
     columns = store.columns()
     return [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
 
 
-def _as_dict(store: ResultStore, out: Path) -> dict[str, Any]:
+def _as_dict(store: ResultStore, out: Path) -> dict[str, object]:
     points = _points(store)
     failed = sum(row["outcome"] != "converged" for row in points)
     return {
-        "results": out, "points": len(store.sweep.points), "kept": len(store.rows), "failed": failed,
-        "bodies": len(store.sweep.bodies), "rows": points,
-    }  # fmt: skip
+        "results": out,
+        "points": len(store.sweep.points),
+        "kept": len(store.rows),
+        "failed": failed,
+        "bodies": len(store.sweep.bodies),
+        "rows": points,
+    }
 
 
 def _print_points(store: ResultStore) -> None:
-    """The varied keys and the main numbers of the first points."""
+    """Print the varied keys and the main numbers of the first points."""
     from finger3d.io import MAIN
     from finger3d.report.build import number
 
-    def cell(value: Any) -> str:
+    def cell(value: object) -> str:
         return "" if isinstance(value, float) and math.isnan(value) else number(value)
 
     points = _points(store)
     if not points:
         return
-    gauges = [name for name in points[0] if name.startswith("gauge_")][:_GAUGES]
+    gauges = [name for name in points[0] if name.startswith("gauge_")][:_MOST_GAUGES]
     head = [*(v.key for v in store.sweep.vary), *(name for name in (*MAIN, *gauges, "outcome") if name in points[0])]
-    print_columns(head, ([cell(row[name]) for name in head] for row in points[:_SHOWN]))
-    if len(points) > _SHOWN:
-        print(f"  the first {_SHOWN} of {len(points)} points; all are in results.csv")
+    print_columns(head, ([cell(row[name]) for name in head] for row in points[:_MOST_POINTS]))
+    if len(points) > _MOST_POINTS:
+        print(f"  the first {_MOST_POINTS} of {len(points)} points; all are in results.csv")
 
 
 def _rows(store: ResultStore, out: Path) -> list[tuple[str, str]]:
@@ -117,7 +123,7 @@ def _rows(store: ResultStore, out: Path) -> list[tuple[str, str]]:
     seconds = sum(number_in(row, "seconds") for row in solved)
     built = {row["body"]: number_in(row, "build_seconds") for row in solved}
     return [
-        ("points", f"{len(store.sweep.points)}, of them {len(store.rows)} kept"),
+        ("points", f"{len(store.sweep.points)}, {len(store.rows)} of them kept"),
         ("bodies", f"{len(store.sweep.bodies)}, each condensed once"),
         ("time of workers", f"{sum(built.values()):.1f} s meshing and condensing, {seconds:.1f} s contact"),
         ("results", str(out / "results.csv")),

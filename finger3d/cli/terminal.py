@@ -1,4 +1,4 @@
-"""What the commands do when the terminal goes away: a lost standard stream and SIGTERM."""
+"""Standard streams that never fail, and termination signals as interruptions."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, TextIO
 
@@ -15,16 +15,16 @@ from typing import Any, TextIO
 class SafeStream:
     """A text stream whose ``write`` and ``flush`` never fail.
 
-    Once the stream cannot be written (closed pipe, full disk), all later output is discarded. Characters that its
-    encoding lacks are written as backslash escapes.
+    After the first failure (closed pipe, full disk) all output is discarded. Characters that the encoding lacks are
+    written as backslash escapes.
 
     Parameters
     ----------
-    stream : the stream to write to, or None if the process has none
+    stream : stream to write to; None discards all output
 
     Attributes
     ----------
-    lost : the error that ended the output, or None
+    lost : error that ended the output, or None
     """
 
     def __init__(self, stream: TextIO | None) -> None:
@@ -35,7 +35,7 @@ class SafeStream:
         return getattr(self._stream, name)
 
     def write(self, text: str) -> int:
-        """Write text; return its length."""
+        """Write text and return its length."""
         if self.lost is None:
             try:
                 try:
@@ -47,13 +47,13 @@ class SafeStream:
                 self._give_up(error)
         return len(text)
 
-    def writelines(self, lines: Any) -> None:
-        """Write several texts."""
+    def writelines(self, lines: Iterable[str]) -> None:
+        """Write a sequence of texts."""
         for line in lines:
             self.write(line)
 
     def flush(self) -> None:
-        """Flush what was written."""
+        """Flush the stream."""
         if self.lost is None:
             try:
                 self._stream.flush()
@@ -62,7 +62,7 @@ class SafeStream:
 
     def _give_up(self, error: Exception) -> None:
         self.lost = error
-        # The interpreter flushes what is still buffered when it ends, and fails unless the descriptor accepts it.
+        # At exit the interpreter flushes the remaining buffer, which must not fail.
         with suppress(OSError, ValueError):
             target = os.open(os.devnull, os.O_WRONLY)
             os.dup2(target, self._stream.fileno())
@@ -73,8 +73,8 @@ class SafeStream:
 def safe_streams() -> Iterator[None]:
     """Replace ``sys.stdout`` and ``sys.stderr`` by streams that never fail, within the block.
 
-    A job writes its results whatever becomes of the terminal. A loss other than that of the reader of a pipe, for
-    instance a full disk, is reported on standard error at the end.
+    A job thus writes its results even if the terminal is closed. Any failure other than a closed pipe, for instance a
+    full disk, is reported on standard error at the end.
     """
     _fill_descriptors()
     before = sys.stdout, sys.stderr
@@ -93,7 +93,7 @@ def safe_streams() -> Iterator[None]:
 
 
 def _fill_descriptors() -> None:
-    """Open the null device as every standard descriptor that is closed; else the next file opened would become it."""
+    """Open the null device for closed standard descriptors, which the next opened file would otherwise take."""
     for number in range(3):
         try:
             os.fstat(number)
@@ -107,7 +107,7 @@ def _fill_descriptors() -> None:
 
 @contextmanager
 def termination_interrupts() -> Iterator[None]:
-    """Let SIGTERM and SIGHUP raise KeyboardInterrupt within the block, unless they are ignored (``nohup``)."""
+    """Raise KeyboardInterrupt on SIGTERM and SIGHUP within the block, unless they are ignored (``nohup``)."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -1,4 +1,4 @@
-"""validate: run the studies of validation/."""
+"""Command ``validate``: the studies of validation/."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ def validate(
     out: Annotated[Path | None, Parameter(help="Folder for the results instead of validation/.")] = None,
     json_: Json = False,
 ) -> None:
-    """Run the studies of validation/ against closed forms, other codes, and the paper.
+    """Run the studies of validation/, which compare with closed forms, other codes and measurements.
 
-    Without names, all studies run whose results are out of date; those that time the machine (cost_of_accuracy,
-    scaling, beside_calculix) run in full only by name.
+    Without names, all studies with outdated results run. Studies that measure time (cost_of_accuracy, scaling,
+    beside_calculix) run in full only if they are named.
 
     Example: finger3d validate press_line --quick
 
@@ -33,7 +33,7 @@ def validate(
     studies
         Names of studies.
     quick
-        Small meshes and few steps; the committed results do not change.
+        Use small meshes and few steps; the committed results do not change.
     """
     from finger3d.analyses import validate as study
     from finger3d.analyses.study_rows import table

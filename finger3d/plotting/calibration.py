@@ -54,7 +54,7 @@ def _shade_ranges(axes: Axes, c: Calibration) -> None:
 
 
 def curve_panel(axes: Axes, c: Calibration) -> None:
-    """Draw strain against mu: points, interpolation, quadratic fit, and the standard deviation of a reading."""
+    """Draw strain against mu: points, interpolation, second-order fit, and the standard deviation of a reading."""
     mu, sd = c.grid, c.strain_sd(c.grid)
     curve = c.at(mu)
     _shade_ranges(axes, c)
