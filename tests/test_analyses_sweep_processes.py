@@ -19,7 +19,8 @@ import pytest
 
 from finger3d.analyses.sweep.points import combinations
 
-COARSE = ["--set", "model.domain=plane-strain", "--set", "mesh.size_mm=4", "--set", "mesh.base_size_mm=16"]
+SETTINGS = ("model.domain=plane-strain", "mesh.size_mm=4", "mesh.base_size_mm=16", "press.steps=10")
+COARSE = [word for setting in SETTINGS for word in ("--set", setting)]
 
 
 @pytest.fixture
@@ -175,7 +176,7 @@ def test_a_scheduler_that_dies_ends_a_sweep_with_3_and_one_line(sent, root, scen
 
 def load_points(scene: Path) -> list:
     nu = ",".join(f"{0.3 + 0.19 * i / 4:.4f}" for i in range(4))
-    return list(combinations(scene, COARSE[1::2], ["friction.mu=0.02", f"material.nu={nu}"]).points)
+    return list(combinations(scene, SETTINGS, ["friction.mu=0.02", f"material.nu={nu}"]).points)
 
 
 AT_ONCE = "import finger3d.mechanics.parallel as s; s._ROWS_FOR_THREADS = 1; s.cores = lambda: 2; "
