@@ -16,6 +16,7 @@ from finger3d.effects.viscosity import (
     ConstantPoissonRatio,
     Effect,
     InternalVariables,
+    RelaxationWorkspace,
     Step,
     Viscoelastic,
 )
@@ -197,9 +198,10 @@ def test_the_compliance_of_a_step_is_the_difference_quotient_of_its_response(
     rng = np.random.default_rng(0)
     rows = len(problem.condensed.compliance)
     memory = InternalVariables(np.zeros(body.size), np.zeros((2, body.size)))
+    workspace = RelaxationWorkspace()
     for seconds in (0.3, 0.7):  # so that there is a past
         step = Step(TWO, seconds)
-        response = body.respond(step, memory)
+        response = body.respond(step, memory, workspace)
         force = rng.normal(size=rows)
         now = response.shape(force)
         assert body.read(now) == pytest.approx(response.moved + response.compliance @ force, rel=1e-9, abs=1e-12)
