@@ -1,4 +1,4 @@
-"""A self-contained HTML page from rows, tables, text and pictures; all text is escaped."""
+"""Self-contained HTML page with rows, tables, text, pictures, charts and a 3D view. All text is escaped."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from finger3d.report.chart import Chart
     from finger3d.report.view3d import View3D
 
-# The page may run its own script and show its own pictures, and may not ask any machine for anything.
+# Content security policy: only scripts, styles and pictures inside the page; no network access.
 _POLICY = "default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
 
-# What is folded away on a screen is printed all the same.
+# Collapsed sections are expanded for printing.
 _UNFOLD = (
     'addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((d) => { d.open = true; }));'
 )
@@ -34,14 +34,14 @@ PAPER = (
     "Takashi Maeno, Tomoyuki Kawamura, Sen-Chieh Cheng. Friction Estimation by Pressing an Elastic Finger-Shaped "
     "Sensor Against a Surface. IEEE Transactions on Robotics and Automation 20(2), 2004"
 )
-"""How to cite the program and the paper it grew from, as in CITATION.cff."""
+"""Citations of the program and of the paper that it follows, as in CITATION.cff."""
 
-_SHORT = 18  # letters of a cell that is not broken into lines
+_MOST_UNBROKEN = 18  # characters of a table cell that is not broken into lines
 
 
 @dataclass(frozen=True)
 class HeadlineRow:
-    """A number (or text) of the headline: what it is, its unit, and its error in the same unit, if one is known."""
+    """Main result of a page: its name, its value (a number or text), its unit, and its error in that unit or None."""
 
     name: str
     value: float | str
@@ -51,7 +51,7 @@ class HeadlineRow:
 
 @dataclass(frozen=True)
 class Table:
-    """A table; a cell that is a number is written with five digits and set flush right."""
+    """Table; numbers have five significant digits and are aligned to the right."""
 
     head: Sequence[str]
     rows: Sequence[Sequence[object]]
@@ -59,7 +59,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Figure:
-    """A PNG file in the page's folder unless its path says otherwise; a file that does not exist is left out."""
+    """PNG file, relative to the folder of the page; omitted if it does not exist."""
 
     path: str | Path
     caption: str = ""
@@ -67,7 +67,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Code:
-    """Text to be shown as it is; with a `summary` it is folded away behind that."""
+    """Preformatted text; with a `summary`, collapsed below it."""
 
     text: str
     summary: str = ""
@@ -78,7 +78,7 @@ Part = str | Table | Figure | Code
 
 @dataclass(frozen=True)
 class PageSection:
-    """A heading and what stands under it: paragraphs, tables, pictures, code; `folded` hides it behind the heading."""
+    """Heading followed by paragraphs, tables, pictures and code; collapsed if `folded`."""
 
     title: str
     parts: Sequence[Part]
@@ -101,28 +101,33 @@ def write_page(
     versions: Mapping[str, str] | None = None,
     file: str = "report.html",
 ) -> Path:
-    """Write a page into a folder, whole or not at all; versions and how to cite are added below the sections.
+    """Write a page atomically; versions and citations follow the sections.
 
     Parameters
     ----------
-    folder : where the page goes, and where figures without a folder are
-    headline : the numbers a reader came for
-    view : a body to turn, in 3D
-    charts : curves to read values off
-    command : what made the results, for instance ``press``
-    outcome, good : one line on how it went, and whether that is well
-    notes : warnings and advice, shown under the headline
-    versions : name -> version of what made the numbers; default: what is installed
+    folder : folder of the page and of the figures
+    title : title of the page
+    headline : main results
+    sections : sections of the page, in order
+    figures : pictures below the headline
+    view : interactive 3D view
+    charts : interactive charts
+    command : command that made the results, for instance ``press``
+    outcome : outcome of the command, in one line
+    good : whether the command succeeded
+    notes : warnings and advice, shown below the headline
+    versions : package -> version used for the results; default: the installed versions
+    file : name of the file
 
     Returns
     -------
     Path
-        Of the page.
+        Path of the page.
 
     Raises
     ------
     Finger3dError
-        If it cannot be written.
+        If the page cannot be written.
     """
     folder = Path(folder)
     body = [
@@ -158,14 +163,14 @@ def write_page(
 
 
 def number(value: object, error: float | None = None) -> str:
-    """Return a number with its error, or with five digits; text as it is."""
+    """Return a number with its error, or with five significant digits; other values as text."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return str(value)
     return with_error(value, error)
 
 
 def _plotly() -> bytes:
-    """Return the text of plotly.js, which comes with plotly; no "</script" in it, which would end the element."""
+    """Return plotly.js, as distributed with plotly, with "</script" escaped, which would end the script element."""
     from plotly.offline import get_plotlyjs
 
     return str(get_plotlyjs()).encode().replace(b"</script", b"<\\/script")
@@ -196,22 +201,22 @@ def _part(folder: Path, part: Part) -> str:
 
 
 def _table(table: Table) -> str:
-    # Names of columns are long and of one word: they may break where an underscore is.
+    # Column names may break after an underscore.
     head = "".join(f'<th scope="col">{escape(name).replace("_", "_<wbr>")}</th>' for name in table.head)
     rows = "".join(f"<tr>{''.join(map(_cell, row))}</tr>" for row in table.rows)
-    # A wide table scrolls in its own box, which the keyboard can reach too.
+    # A wide table scrolls in its own box, which has a tab index for keyboard users.
     return f'<div class="wide" tabindex="0"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
 
 
 def _cell(value: object) -> str:
     text = number(value)
     numeric = isinstance(value, int | float) and not isinstance(value, bool)
-    kind = "number" if numeric else "short" if len(text) <= _SHORT else ""
+    kind = "number" if numeric else "short" if len(text) <= _MOST_UNBROKEN else ""
     return f'<td class="{kind}">{escape(text)}</td>' if kind else f"<td>{escape(text)}</td>"
 
 
 def _figures(folder: Path, figures: Sequence[Figure]) -> str:
-    """Return the pictures in a grid."""
+    """Return existing pictures in a grid."""
     return _grid(_figure(folder / figure.path, figure.caption) for figure in figures)
 
 
@@ -221,7 +226,7 @@ def _grid(figures: Iterable[str]) -> str:
 
 
 def _figure(path: Path, caption: str) -> str:
-    """Return a picture with its data; a wide one scrolls in its own box on a narrow screen."""
+    """Return a figure element with the embedded picture, which scrolls in its own box on a narrow screen."""
     if not path.exists():
         return ""
     data, text = base64.b64encode(path.read_bytes()).decode("ascii"), escape(caption, quote=True)
@@ -232,7 +237,7 @@ def _figure(path: Path, caption: str) -> str:
 
 
 def _document(title: str, body: str) -> tuple[str, str]:
-    """What comes before the scripts that draw, and what comes after them."""
+    """Return the HTML before and after the scripts of view and charts."""
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'

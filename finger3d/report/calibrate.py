@@ -1,4 +1,4 @@
-"""The page of a calibration, from what is in its folder."""
+"""Page of a calibration."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from finger3d.results.summary import read_json, title_of
 
 
 def calibrate_page(folder: str | Path) -> Path:
-    """Write report.html of a calibration.
+    """Write report.html of a calibration from the files in its folder.
 
     Raises
     ------
     Finger3dError
-        If there is no calibration.json to read, or the page cannot be written.
+        If calibration.json cannot be read or the page cannot be written.
     """
     folder = Path(folder)
     data = read_json(folder / "calibration.json")
@@ -27,7 +27,7 @@ def calibrate_page(folder: str | Path) -> Path:
     known = [(i, s) for i, s in enumerate(sd) if s is not None]
     best = min(known, key=lambda pair: pair[1], default=None)
     headline = [
-        HeadlineRow(f"mu within {data['resolution_limit']:g}, all tolerances", ranges["trusted"]),
+        HeadlineRow(f"mu known within {data['resolution_limit']:g}, all tolerances", ranges["trusted"]),
         HeadlineRow("the same from strain noise alone", ranges["usable"]),
         HeadlineRow(f"strain at mu = {mu[0]:g}", strain[0]),
         HeadlineRow(f"strain at mu = {mu[-1]:g}", strain[-1]),
@@ -40,7 +40,7 @@ def calibrate_page(folder: str | Path) -> Path:
         ("mu", "strain", "resolution of mu", "sd of mu"), list(zip(mu, strain, data["resolution"], sd, strict=True))
     )
     causes = Table(
-        ("not known exactly", "standard deviation", "unit", "sd of mu at the best place"),
+        ("uncertain quantity", "standard deviation", "unit", "sd of mu where mu is known best"),
         [(name, t["sd"], t["unit"], t["mu_sd"][best[0]] if best else "") for name, t in data["tolerances"].items()],
     )
     use = f"finger3d estimate {folder}/calibration.json --strain {strain[len(strain) // 2]:.4g}"
@@ -55,11 +55,13 @@ def calibrate_page(folder: str | Path) -> Path:
             PageSection("Scene", how_modelled(data, folder)),
             PageSection("Use it", [Code(use)]),
         ],
-        [Figure("calibration.png", "Strain and fit, resolution, and what the uncertainty of mu is made of"),
-         Figure("map.png", "Where strains follow friction")],
+        [
+            Figure("calibration.png", "Strain and fit, resolution, and contributions to the variance of mu"),
+            Figure("map.png", "Sensitivity of strain to friction over the section"),
+        ],
         command="calibrate",
         outcome="converged" if not failed else f"{len(failed)} values of mu gave no numbers",
         good=not failed,
         notes=failed,
         versions=data["about"].get("versions"),
-    )  # fmt: skip
+    )

@@ -1,4 +1,4 @@
-"""Curves of a page, drawn by plotly in the reader's browser, so that values can be read off and lines hidden."""
+"""Interactive charts of a page, drawn in the browser by plotly."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from finger3d.report.html import asset, embedded
 
 @dataclass(frozen=True)
 class Line:
-    """A line through points x (n,), y (n,); NaN leaves a gap."""
+    """Line through points with coordinates x and y, shape (n,); NaN leaves a gap."""
 
     label: str
     x: Sequence[float]
@@ -21,15 +21,15 @@ class Line:
 
 @dataclass(frozen=True)
 class Chart:
-    """Lines over one pair of axes.
+    """Chart of lines in common axes.
 
     Attributes
     ----------
-    caption : what it shows
+    caption : caption of the chart
     x, y : titles of the axes, with units
-    lines : one at least; their labels are shown where there are several
-    legend : what the labels are values of
-    more : lines that were left out
+    lines : at least one line; labels are shown if there are several
+    legend : title of the legend: the quantity whose values the labels are
+    more : number of omitted lines
     """
 
     caption: str
@@ -40,7 +40,7 @@ class Chart:
     more: int = 0
 
     def html(self) -> str:
-        """The box it stands in."""
+        """Return the HTML element that holds the chart."""
         text = escape(self.caption, quote=True)
         left_out = f"; {self.more} more lines are left out" if self.more else ""
         return (
@@ -51,17 +51,21 @@ class Chart:
 
 
 def script(charts: Sequence[Chart]) -> str:
-    """The numbers of all charts of a page, and what draws them."""
+    """Return the scripts with the data of all charts of a page and the code that draws them."""
     data = [
         {
-            "caption": chart.caption, "x": chart.x, "y": chart.y, "legend": chart.legend,
+            "caption": chart.caption,
+            "x": chart.x,
+            "y": chart.y,
+            "legend": chart.legend,
             "lines": [{"label": line.label, "x": _known(line.x), "y": _known(line.y)} for line in chart.lines],
         }
         for chart in charts
-    ]  # fmt: skip
+    ]
     numbers = f'<script type="application/json" id="chart-data">{embedded(data)}</script>\n'
     return f"{numbers}<script>{asset('chart.js')}</script>\n"
 
 
 def _known(values: Sequence[float]) -> list[float | None]:
+    """Replace NaN and infinity, which JSON lacks, by None."""
     return [value if math.isfinite(value) else None for value in values]

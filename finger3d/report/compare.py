@@ -1,10 +1,8 @@
-"""The page of a comparison."""
+"""Page of a comparison of plane and solid models."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from finger3d.report.build import Figure, HeadlineRow, PageSection, Table, number, write_page
 from finger3d.report.scene import how_modelled
@@ -14,12 +12,12 @@ _FORCE = "force_N_per_mm"
 
 
 def compare_page(folder: str | Path) -> Path:
-    """Write report.html of a comparison from what is in its folder.
+    """Write report.html of a comparison from the files in its folder.
 
     Raises
     ------
     Finger3dError
-        If there is no compare.json to read, or the page cannot be written.
+        If compare.json cannot be read or the page cannot be written.
     """
     folder = Path(folder)
     data = read_json(folder / "compare.json")
@@ -32,13 +30,20 @@ def compare_page(folder: str | Path) -> Path:
     ]
     keys = list(dict.fromkeys(k for c in cases for k in c["numbers"]))
     rows = [
-        (c["model"], c["width_mm"], c["size_mm"], *(_with_error(c, k) for k in keys), c["seconds"], c["outcome"])
+        (
+            c["model"],
+            c["width_mm"],
+            c["size_mm"],
+            *(_with_error(c["numbers"].get(k), c["errors"].get(k)) for k in keys),
+            c["seconds"],
+            c["outcome"],
+        )
         for c in data["cases"]
     ]
     head = ("model", "width (mm)", "edges (mm)", *keys, "seconds", "outcome")
     proof = (
-        "Each case is a press of its own. It has numbers only if every step of it met Eqs. (1)-(4) of the paper and "
-        "friction opposing slip to 1e-8; press the scene for its steps."
+        "Each case is a separate press. It has numbers only if every step satisfies Eqs. (1)-(4) of Maeno 2004, and "
+        "friction opposes slip, to 1e-8. finger3d press reports the steps of a scene."
     )
     return write_page(
         folder,
@@ -49,7 +54,7 @@ def compare_page(folder: str | Path) -> Path:
             PageSection("Scene", how_modelled(data, folder)),
             PageSection("Every case", [proof, _BARS, Table(head, rows)]),
         ],
-        [Figure("compare.png", "Force against width, tractions along x, and every quantity beside the solid's")],
+        [Figure("compare.png", "Force against width, tractions along x, and all quantities relative to the solid")],
         command="compare",
         outcome=data["outcome"],
         good=data["outcome"] == "converged",
@@ -58,14 +63,12 @@ def compare_page(folder: str | Path) -> Path:
 
 
 _BARS = (
-    "After ±: the error by mesh and increments, estimated as finger3d press does: from a mesh with edges about twice "
-    "as long (half as long where none is coarser), and from more increments. Solids and sections of one width share "
-    "their edge lengths, so on swept meshes the deviation of their forces is known better than either force. The "
-    "verdict calls a deviation told from the limit where it is two bars away."
+    "The number after ± is the error of mesh and increments. It is estimated, as by finger3d press, from a mesh with "
+    "edges about twice as long (half as long if no coarser mesh is possible), and from more increments. Solids and "
+    "sections of one width have the same edge lengths; on swept meshes the difference of their forces is therefore "
+    "more accurate than either force. The verdict calls a deviation significant if it exceeds two error bars."
 )
 
 
-def _with_error(case: Mapping[str, Any], key: str) -> str:
-    if key not in case["numbers"] or case["numbers"][key] is None:
-        return ""
-    return number(case["numbers"][key], case["errors"].get(key))
+def _with_error(value: float | None, error: float | None) -> str:
+    return "" if value is None else number(value, error)

@@ -1,17 +1,16 @@
-"""Pieces of a page: the package's own files, and data that a script reads."""
+"""Style sheets and scripts of the pages, and data for the scripts."""
 
 from __future__ import annotations
 
 import json
 from importlib import resources
-from typing import Any
 
 
 def asset(name: str) -> str:
-    """Text of a file that travels with this package."""
+    """Return the text of a file of this package."""
     return resources.files("finger3d.report").joinpath(name).read_text(encoding="utf-8")
 
 
-def embedded(data: Any) -> str:
-    """JSON to stand in a script element: no "<" in it, which could end the element or begin a comment."""
+def embedded(data: object) -> str:
+    """Return JSON for a script element, with "<" escaped, which could end the element or begin a comment."""
     return json.dumps(data).replace("<", "\\u003c")

@@ -1,40 +1,36 @@
-"""The 3D view of a page: the deformed surface, drawn by plotly in the reader's browser from data in the page."""
+"""Interactive 3D view of a page: the deformed surface, drawn in the browser by plotly."""
 
 from __future__ import annotations
 
 import base64
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finger3d.fem.simplex import Mesh
 from finger3d.mechanics.gauges import Gauge
 from finger3d.plotting.gauges import marks_of
 from finger3d.report.html import asset, embedded
-from finger3d.results.states import States, chosen, label
+from finger3d.results.states import Array, States, chosen, label
 
-Array = NDArray[Any]
-
-_BUDGET = 1_500_000  # bytes of numbers in a page, beside plotly's 5 MB and the pictures
+_MOST_BYTES = 1_500_000  # of the data of a view; plotly.js has 5 MB
 
 
 @dataclass(frozen=True)
 class View3D:
-    """A surface at several increments, corners of its facets only.
+    """Surface of a solid at several increments, reduced to the corners of its facets.
 
     Attributes
     ----------
-    rest : (v, 3) mm
+    rest : (v, 3) undeformed vertices, mm
     body, contact : (t, 3) triangles off and on the contact surface
-    moved : (s, v, 3) mm, where the corners are at each increment
-    pressure : (s, v) MPa
+    moved : (s, v, 3) deformed vertices at each increment, mm
+    pressure : (s, v) contact pressure, MPa
     status : (s, v) 0 open, 1 stick, 2 slip
-    labels : (s,) what each increment is called
-    gauges : (s, g, 3, 3) mm, start, middle and end of every gauge at each increment, on the face in front (+z)
-    gauge_labels : (g,) what is written beside them
+    labels : (s,) label of each increment
+    gauges : (s, g, 3, 3) start, middle and end of each gauge at each increment, projected onto the front face (+z), mm
+    gauge_labels : (g,) label of each gauge
     """
 
     rest: Array
@@ -48,7 +44,7 @@ class View3D:
     gauge_labels: tuple[str, ...]
 
     def html(self) -> str:
-        """The box it stands in, with its controls."""
+        """Return the HTML element that holds the view and its controls."""
         last = len(self.labels) - 1
         hidden = " hidden" if last == 0 else ""
         none = "" if self.gauge_labels else " hidden"
@@ -63,13 +59,13 @@ class View3D:
             '<span class="zone"><i style="background:#f28e2b"></i>slip</span>'
             '<span class="open"><i style="background:#c4c4c4"></i>open, no contact</span></span>'
             '</div><div class="stage" id="view-stage"></div>'
-            "<p>True scale, deformed. Drag to turn, scroll or pinch to zoom; point at the contact surface to read it."
-            f"{' Gauges are inside; they are marked on the face in front.' if self.gauge_labels else ''}"
+            "<p>Deformed, to scale. Drag to rotate, scroll or pinch to zoom; hover over the contact surface for values."
+            f"{' Gauges are projected onto the front face.' if self.gauge_labels else ''}"
             "<noscript> The 3D view needs JavaScript; the pictures below show the last step.</noscript></p></div>"
         )
 
     def script(self) -> str:
-        """The numbers, and what lets plotly draw them."""
+        """Return the scripts with the data and the code that draws them."""
         data = {
             "labels": self.labels,
             "vertices": len(self.rest),
@@ -86,8 +82,8 @@ class View3D:
         return f"{numbers}<script>{asset('view3d.js')}</script>\n"
 
 
-def view_of(states: States, gauges: Sequence[Gauge] = (), budget: int = _BUDGET) -> View3D | None:
-    """A view of a solid; as many increments as the budget (bytes) holds, None for a section or if not one fits."""
+def view_of(states: States, gauges: Sequence[Gauge] = (), budget: int = _MOST_BYTES) -> View3D | None:
+    """Return a view of a solid with as many increments as `budget`, in bytes, allows; None if none fits, or for 2D."""
     if states.dim != 3:
         return None
     corners, index = np.unique(states.corners, return_inverse=True)
@@ -114,4 +110,5 @@ def view_of(states: States, gauges: Sequence[Gauge] = (), budget: int = _BUDGET)
 
 
 def _packed(values: Array, kind: str) -> str:
+    """Return numbers of a NumPy type `kind` in base64."""
     return base64.b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")
