@@ -15,16 +15,16 @@ _MARGIN = 1.04  # height of the window over that of its contents
 _WHITE = 250  # least grey level of the background, of 255
 
 
-def _viewer_axes() -> Float:
-    """Return the orthonormal axes of the viewer, shape (3, 3): right, up, and towards the viewer."""
-    towards = _VIEW / np.linalg.norm(_VIEW)
+def viewer_axes(direction: Float) -> Float:
+    """Return the axes of a viewer in a direction (3,) from the scene: rows (3, 3) right, up, and towards the viewer."""
+    towards = direction / np.linalg.norm(direction)
     right = np.cross([0.0, 1.0, 0.0], towards)
     right /= np.linalg.norm(right)
     return np.array([right, np.cross(towards, right), towards])
 
 
-AXES = _viewer_axes()
-"""Orthonormal axes of the viewer, shape (3, 3), one a row: right, up, and towards the viewer."""
+AXES = viewer_axes(_VIEW)
+"""Orthonormal axes of the viewer, rows (3, 3): right, up, and towards the viewer."""
 
 
 def flat(points: Float) -> Float:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 import sys
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,10 +15,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.errors import MissingError
 from finger3d.geometry.surface import Triangles
 from finger3d.io import atomic
-from finger3d.plotting.solid import run_child
+from finger3d.plotting.camera import viewer_axes
+from finger3d.plotting.layout import blank
+from finger3d.plotting.solid import rendered
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,7 +50,7 @@ class Scenery:
     ----------
     parts : triangles of each part, mm
     axes : (3, 3) array
-        Orthonormal axes of the viewer, one a row: right, up, and towards the viewer.
+        Orthonormal axes of the viewer, rows: right, up, and towards the viewer.
     middle : (3,) array, mm
         Centre of the picture.
     half : (2,) array, mm
@@ -77,10 +77,7 @@ def exploded(assembled: Mapping[str, Triangles]) -> Scenery:
         name: Triangles(part.points @ _POURING_AXES.T + np.array(shift.get(name, [0, 0, 0]), dtype=float), part.faces)
         for name, part in assembled.items()
     }
-    towards = _VIEW / np.linalg.norm(_VIEW)
-    right = np.cross([0.0, 1.0, 0.0], towards)
-    right /= np.linalg.norm(right)
-    axes = np.array([right, np.cross(towards, right), towards])
+    axes = viewer_axes(_VIEW)
     seen = np.vstack([part.points for part in parts.values()]) @ axes.T
     low, high = seen.min(axis=0), seen.max(axis=0)
     return Scenery(parts, axes, 0.5 * (low + high) @ axes, _MARGIN * 0.5 * (high - low)[:2])
@@ -106,15 +103,11 @@ def picture(path: Path, assembled: Mapping[str, Triangles], title: str, sizes: M
     MissingError
         If FINGER3D_RENDERER is ``pyvista`` and PyVista cannot render.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     scenery = exploded(assembled)
     image = _rendered(scenery)
     width, height = scenery.half
     high = _WIDTH * height / (_LABEL_FACTOR * width) + _TITLE_HEIGHT
-    figure = Figure(figsize=(_WIDTH, high), dpi=_DPI)
-    FigureCanvasAgg(figure)
+    figure = blank(_WIDTH, high)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0 - _TITLE_HEIGHT / high))
     if image is None:
         _draw(axes, scenery)
@@ -127,7 +120,7 @@ def picture(path: Path, assembled: Mapping[str, Triangles], title: str, sizes: M
     axes.set_axis_off()
     figure.text(0.5, 1.0 - 0.5 * _TITLE_HEIGHT / high, title, fontsize=11, ha="center", va="center")
     with atomic(path) as temporary:
-        figure.savefig(temporary)
+        figure.savefig(temporary, dpi=_DPI)
     return "matplotlib" if image is None else "pyvista"
 
 
@@ -179,18 +172,10 @@ def _rendered(scenery: Scenery) -> NDArray[np.uint8] | None:
     wanted = os.environ.get("FINGER3D_RENDERER", "")
     if wanted == "matplotlib":
         return None
-    with tempfile.TemporaryDirectory(prefix="finger3d-") as folder:
-        source, target = Path(folder) / "parts.npz", Path(folder) / "image.npy"
-        arrays: dict[str, NDArray[np.generic]] = {"axes": scenery.axes, "middle": scenery.middle, "half": scenery.half}
-        for name, part in scenery.parts.items():
-            arrays |= {f"points {name}": part.points, f"faces {name}": part.faces}
-        np.savez(source, allow_pickle=False, **arrays)
-        why = run_child([sys.executable, "-P", "-m", "finger3d.plotting.mold", str(source), str(target)])
-        if why is None and target.exists():
-            return np.asarray(np.load(target), dtype=np.uint8)
-    if wanted == "pyvista":
-        raise MissingError(f"PyVista cannot render here: {why}; unset FINGER3D_RENDERER to use matplotlib")
-    return None
+    arrays = {"axes": scenery.axes, "middle": scenery.middle, "half": scenery.half}
+    points = {f"points {name}": part.points for name, part in scenery.parts.items()}
+    faces = {f"faces {name}": part.faces for name, part in scenery.parts.items()}
+    return rendered("finger3d.plotting.mold", {**arrays, **points, **faces}, must=wanted == "pyvista")
 
 
 def _child(source: str, target: str) -> None:

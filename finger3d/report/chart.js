@@ -3,11 +3,12 @@
   const charts = JSON.parse(document.getElementById("chart-data").textContent);
   const boxes = [...document.querySelectorAll(".chart > div")];
   const dark = window.matchMedia("(prefers-color-scheme: dark)");
-  const plain = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;");  // plotly takes tags for its own
-  // Pixels of a line of the legend, above the axes (where plotly's tool bar is), below the axes, and of a letter.
+  const plain = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;");  // plotly interprets tags
+  // Height of a line of the legend, of the margins above (with plotly's tool bar) and below the axes, and width of a
+  // character, in pixels.
   const LINE = 18, ABOVE = 34, BELOW = 48, WIDE = 7.5;
 
-  // The names in a legend's title, in lines of so many letters.
+  // Break the names in the title of a legend into lines of at most `most` characters.
   function broken(text, most) {
     return text.split(", ").reduce((lines, name) => {
       const longer = lines.length ? `${lines[lines.length - 1]}, ${name}` : name;
@@ -23,7 +24,7 @@
     const style = getComputedStyle(document.body), grid = style.getPropertyValue("--line").trim();
     const axis = (title) => ({ title: { text: plain(title), standoff: 8 }, gridcolor: grid, zerolinecolor: grid,
       linecolor: grid, automargin: true, exponentformat: "power", nticks: 7 });
-    // The legend has as many lines as its entries take beside each other, and one for its title.
+    // The height of the legend: its title, and its entries in rows of equal width.
     const several = chart.lines.length > 1, longest = Math.max(...chart.lines.map((line) => line.label.length));
     const abreast = Math.max(1, Math.floor((box.clientWidth - 20) / (45 + WIDE * longest)));
     const title = broken(chart.legend, (box.clientWidth - 90) / WIDE);
@@ -38,7 +39,7 @@
   function draw() {
     return Promise.all(boxes.map((box, i) => Plotly.react(box, traces(charts[i]), layout(charts[i], box), {
       responsive: true, displaylogo: false,
-      // The last one would upload the chart.
+      // sendChartToCloud would upload the chart.
       modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d", "sendChartToCloud"],
       toImageButtonOptions: { filename: charts[i].caption, scale: 2 } })));
   }

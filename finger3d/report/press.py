@@ -156,7 +156,7 @@ def press_page(folder: str | Path) -> Path:
 
 
 def headline(step: Mapping[str, Any], errors: Mapping[str, float]) -> list[HeadlineRow]:
-    """Return the main numbers of a step with their errors; a tangential force of the size of round-off is omitted.
+    """Return the main numbers of a step with their errors, without a tangential force of the size of round-off.
 
     Parameters
     ----------

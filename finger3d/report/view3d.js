@@ -11,7 +11,8 @@
   const gauges = document.getElementById("view-gauges");
   const show = (kind, on) => document.querySelectorAll(`.key .${kind}`).forEach((e) => { e.hidden = !on; });
 
-  // Each contact triangle in six around its centre, two for each corner: a corner's status covers what is nearest to it.
+  // Split each contact triangle into six around its centre, two for each corner, so that the status of a corner is drawn
+  // on the area nearest to it.
   const edges = new Map(), parents = [], six = { i: [], j: [], k: [] }, owner = [];
   for (let v = 0; v < n; v++) parents.push([v]);
   const middle = (a, b) => {
@@ -38,14 +39,14 @@
   for (let s = 0; s < steps; s++) for (let v = 0; v < n; v++) {
     highest = Math.max(highest, pressure[s * n + v]); farthest = Math.max(farthest, shift(s, v));
   }
-  // How far towards the viewer gauges are drawn, and their names, or the face would hide them; in parts of the body.
+  // Distance of gauges and of their labels in front of the face, relative to the extent of the body, and its direction.
   const LINE = 0.012, NAME = 0.1, FROM = [-0.32, 0.55, 0.77];
   const extent = Math.max(...[0, 1, 2].map((a) => {
     const at = rest.filter((v, p) => p % 3 === a);
     return at.reduce((x, y) => Math.max(x, y)) - at.reduce((x, y) => Math.min(x, y));
   }));
 
-  // On a narrow screen the scale lies below the body, and the camera steps back.
+  // On a narrow screen the colour bar is below the body, and the camera is farther away.
   const narrow = () => stage.clientWidth < 600;
   const scale = (title, top) => ({ cmin: 0, cmax: top || 1, colorscale: "Viridis", showscale: true,
     colorbar: narrow() ? { title: { text: title, side: "top" }, thickness: 12, len: 0.9, orientation: "h", y: -0.02 }
@@ -60,8 +61,8 @@
     const base = { type: "mesh3d", flatshading: false, lighting: light, lightposition: { x: -2e4, y: 8e4, z: 5e4 } };
     const side = { ...base, ...place(corners), ...sides, hoverinfo: "skip", color: "#d9d6cf" };
     const press = parents.map((vs) => mean(vs, (v) => pressure[s * n + v]));
-    const said = parents.map((vs) => [...new Set(vs.map((v) => names[status[s * n + v]]))].join(" / "));
-    const text = parents.map((vs, p) => `${said[p]}<br>pressure ${press[p].toPrecision(3)} MPa`
+    const states = parents.map((vs) => [...new Set(vs.map((v) => names[status[s * n + v]]))].join(" / "));
+    const text = parents.map((vs, p) => `${states[p]}<br>pressure ${press[p].toPrecision(3)} MPa`
       + `<br>moved ${mean(vs, (v) => shift(s, v)).toPrecision(3)} mm`);
     const only = (keep) => {
       const on = owner.map((v, t) => t).filter((t) => keep(status[s * n + owner[t]]));
@@ -94,7 +95,7 @@
     return [...lines, side, face, ...(what === "pressure" ? [open] : [])];
   }
 
-  // The axes stay as they are from step to step, so that the finger is seen to move.
+  // The axes are the same for all steps, so that the motion of the finger is visible.
   const range = [0, 1, 2].map((a) => {
     let low = Infinity, high = -Infinity;
     for (const list of [rest, moved]) for (let p = a; p < list.length; p += 3) {
@@ -103,10 +104,10 @@
     const room = 0.02 * (high - low), name = data.gaugeLabels.length ? NAME * extent * FROM[a] : 0;
     return [low - Math.max(room, -name), high + Math.max(room, name)];
   });
-  // As far away as a body needs that has to fit into the stage, as wide and as high as it is seen from there.
+  // Distance of the camera at which the projected width and height of the body fit into the stage.
   const size = range.map(([low, high]) => high - low), cube = Math.cbrt(size[0] * size[1] * size[2]);
   const wide = 0.92 * size[0] + 0.38 * size[2], high = 0.84 * size[1] + 0.5 * size[2] + 0.17 * size[0];
-  const room = narrow() ? 2.1 : 1.8;  // titles of axes are as wide on a narrow screen
+  const room = narrow() ? 2.1 : 1.8;  // titles of axes take a larger share of a narrow screen
   const back = Math.max(1.5 * high, room * wide * stage.clientHeight / stage.clientWidth) / cube;
   const eye = { x: -0.35 * back, y: 0.6 * back, z: 0.85 * back };
   function layout() {
