@@ -80,5 +80,6 @@ def test_an_area_is_uncertain_by_half_a_spacing_all_round() -> None:
     frame = StepResult(ObjectPose(1.0), state, state, (15.0, 0.0), {}, 0.0, 0.0, Outcome.CONVERGED, 0.0, 1, "newton")
     bars = least_bars(points, frame, 1.0)
     assert bars["contact_area_mm2"] == bars["stick_area_mm2"] == pytest.approx(8.0 * np.pi, rel=0.15)
-    # all of the line but its two tips lies three points deep in the zone
-    assert bars["contact_half_length_mm"] <= 0.5
+    # the zone is three points wide along all of the line but its two tips
+    # both of its ends lie up to one spacing before the next point of the line
+    assert bars["contact_half_length_mm"] == pytest.approx(0.5, rel=1e-12)

@@ -80,9 +80,9 @@ def least_bars(points: ContactPoints, frame: StepResult, along_z_mm: float) -> d
     """Lower bounds of error bars that follow from the size of the zones in points, by name (mm, mm2, N, N/mm).
 
     An area is uncertain by half the area of the points along the border of its zone, the mean of those on either side
-    of it and of one point at least.  In a solid, a half-length is uncertain
-    by half of its part along which the zone is less than three points wide: a zone that thin may be absent, or longer
-    than it seems.  Friction along z is uncertain as the points are far apart along z.
+    of it and of one point at least.  In a solid, a half-length is uncertain by half of its part along which the zone is
+    less than three points wide, since a zone that thin may be absent or longer, and by half the mean distance from its
+    ends to the next points of the line z = 0.  Friction along z is uncertain by the spacing of the points along z.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def least_bars(points: ContactPoints, frame: StepResult, along_z_mm: float) -> d
         if points.dim == 3 and on.any():
             half = 0.5 * float(np.ptp(line[on]))
             thin = 1.0 - float(np.mean(points.resolved(zone)[nearest[on]]))
-            found[f"{name}_half_length_mm"] = 0.5 * thin * max(half, reach - half)
+            found[f"{name}_half_length_mm"] = max(0.5 * thin * max(half, reach - half), _at_the_ends(line, on))
             found[f"{name}_length_mm"] = 2.0 * found[f"{name}_half_length_mm"]
     if points.dim == 3 and touching.any():
         extent = max(0.5 * float(np.ptp(points.points[touching, 2])), along_z_mm)
@@ -110,3 +110,12 @@ def least_bars(points: ContactPoints, frame: StepResult, along_z_mm: float) -> d
         found["friction_sum_N"] = force
         found["friction_sum_N_per_mm"] = found["friction_along_z_N_per_mm"] = force / width
     return found
+
+
+def _at_the_ends(line: NDArray[np.float64], on: NDArray[np.bool_]) -> float:
+    """Return half the mean distance (mm) from the ends of a zone to the next points of its line, 0 at the line's end."""
+    left, right = line[on].min(), line[on].max()
+    below, above = line[line < left], line[line > right]
+    before = float(left - below.max()) if below.size else 0.0
+    after = float(above.min() - right) if above.size else 0.0
+    return 0.25 * (before + after)
