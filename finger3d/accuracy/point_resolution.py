@@ -113,7 +113,7 @@ def least_bars(points: ContactPoints, frame: StepResult, along_z_mm: float) -> d
 
 
 def _at_the_ends(line: NDArray[np.float64], on: NDArray[np.bool_]) -> float:
-    """Return half the mean distance (mm) from the ends of a zone to the next points of its line, 0 at the line's end."""
+    """Return half the mean distance (mm) from the ends of a zone to the next points of its line."""
     left, right = line[on].min(), line[on].max()
     below, above = line[line < left], line[line > right]
     before = float(left - below.max()) if below.size else 0.0
