@@ -27,6 +27,7 @@ EXAMPLES = (
     "finger3d",
     "finger3d.analyses.press",
     "finger3d.analyses.result",
+    "finger3d.mechanics.step_halving",
     "finger3d.mold.export",
     "finger3d.results.format",
     "finger3d.results.states",

@@ -28,7 +28,7 @@ from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.effects.viscosity import Viscoelastic
 from finger3d.fem.assembly import Stiffness, stiffness
 from finger3d.fem.condense import Condensation, condense
-from finger3d.fem.material import Elasticity
+from finger3d.fem.material import Elasticity, Isotropic
 from finger3d.fem.simplex import Mesh, quadratic
 from finger3d.fem.traces import BoundarySurface, local_rows, restrict, surface
 from finger3d.mechanics.formulation import Formulation, SmallStrain
@@ -65,6 +65,7 @@ class StandIn:
     condensed: Any
     active_dofs: NDArray[np.int64]
     parts: int
+    nu: float
     mesh: Mesh | None = None
     elastic: Elasticity | None = None
     stiffness: Stiffness | None = None
@@ -74,7 +75,10 @@ class StandIn:
 
     @property
     def model(self) -> Any:
-        return SimpleNamespace(rule="projection", friction=Coulomb(0.0), legs=(Leg(DEPTH),), domain="solid", gauges=())
+        material = Isotropic(1.0, self.nu)
+        return SimpleNamespace(
+            rule="projection", friction=Coulomb(0.0), legs=(Leg(DEPTH),), domain="solid", gauges=(), material=material
+        )
 
     @property
     def dim(self) -> int:
@@ -101,9 +105,9 @@ def on_rings(nu: float, count: int) -> StandIn:
     body = _rings.rings(nu, round(1.1 * count), round(1.1 * count) / count)
     rest = (body.edges[1:] ** 2 + body.edges[:-1] ** 2) / (4.0 * RADIUS)
     flat = body.compliance.reshape(2 * len(rest), -1)
-    return StandIn(
-        rest, np.pi * np.diff(body.edges**2), body.compliance, SimpleNamespace(compliance=flat), np.arange(len(flat)), 1
-    )
+    condensed = SimpleNamespace(compliance=flat)
+    area = np.pi * np.diff(body.edges**2)
+    return StandIn(rest, area, body.compliance, condensed, np.arange(len(flat)), parts=1, nu=nu)
 
 
 def on_tets(nu: float, points: int) -> StandIn:
@@ -119,8 +123,9 @@ def on_tets(nu: float, points: int) -> StandIn:
     matrix = stiffness(mesh, elastic)
     kept = np.flatnonzero(~held[face.nodes][:, [1, 0, 2]].ravel())
     small = condense(matrix, np.flatnonzero(held.ravel()), local_rows(face, vertical_frame(3))[kept])
+    delassus = _widened(small, kept, len(face.nodes))
     return StandIn(
-        _rest(face), face.area, _widened(small, kept, len(face.nodes)), small, kept, 4, mesh, elastic, matrix
+        _rest(face), face.area, delassus, small, kept, parts=4, nu=nu, mesh=mesh, elastic=elastic, stiffness=matrix
     )
 
 

@@ -126,8 +126,8 @@ def remaining(counts: Sequence[int], values: Sequence[float], at: int) -> float:
 
     Examples
     --------
-    >>> remaining([10, 20, 40], [1.10, 1.05, 1.025], 40)  # 1 + 1/N
-    0.025
+    >>> remaining([8, 16, 32], [1.125, 1.0625, 1.03125], 32)  # 1 + 1/N
+    0.03125
     """
     runs = list(zip(counts, values, strict=True))
     rates = [abs(b - a) / abs(1.0 / m - 1.0 / n) for (n, a), (m, b) in zip(runs, runs[1:], strict=False)]
