@@ -14,6 +14,7 @@ import pytest
 from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
 from finger3d.errors import MissingError
 from finger3d.fem.simplex import Mesh, boundary, quadratic
+from finger3d.plotting import renderer
 from finger3d.plotting import solid as render
 from finger3d.plotting.figures import contact_figure, finger_picture, force_figure, zones
 
@@ -100,7 +101,7 @@ def share(path: Path, colour: str, within: float = 0.12) -> float:
 def _fresh_renderer(monkeypatch: pytest.MonkeyPatch) -> None:
     """No renderer is forced, and no crash of another test is remembered."""
     monkeypatch.delenv("FINGER3D_RENDERER", raising=False)
-    monkeypatch.setattr(render, "_failure", [])
+    monkeypatch.setattr(renderer, "_failure", [])
 
 
 @pytest.fixture(scope="module")
@@ -136,7 +137,7 @@ def test_pyvista_draws_a_solid_or_tells_that_opengl_is_missing(
     monkeypatch.setenv("FINGER3D_RENDERER", "pyvista")
     mesh, result = solid
     tiny = "import pyvista as pv; p = pv.Plotter(off_screen=True); p.add_mesh(pv.Sphere()); p.screenshot()"
-    if render.run_child([sys.executable, "-c", tiny]) is None:
+    if renderer.run_child([sys.executable, "-c", tiny]) is None:
         assert finger_picture(tmp_path / "f.png", mesh, **result, title="Fig. 9", profile=PROFILE) == "pyvista"
         assert_shows_the_zones(tmp_path / "f.png")
     else:

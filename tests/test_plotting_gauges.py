@@ -72,12 +72,12 @@ def test_the_render_and_the_marks_have_one_scale(tmp_path: Path, monkeypatch: py
     )  # fmt: skip
     middle, size = skin.frame
     wide, high = solid.WINDOW
-    window = np.full((1, high, wide, 3), 255, dtype=np.uint8)
+    window = np.full((high, wide, 3), 255, dtype=np.uint8)
     pixel = 2.0 * solid.half_height(size) / high
     low = np.round(0.5 * np.array([wide, high]) - 0.5 * size / pixel).astype(int)
-    window[:, low[1] : high - low[1], low[0] : wide - low[0]] = 0
-    monkeypatch.setattr(solid, "rendered", lambda *_: window)
-    found = solid.render_solid(skin, [np.zeros((len(skin.contact), 3, 3))])
+    window[low[1] : high - low[1], low[0] : wide - low[0]] = 0
+    monkeypatch.setattr(solid, "render", lambda drawings: [window] * len(drawings))
+    found = solid.render_solids([(skin, np.zeros((len(skin.contact), 3, 3)), False)])
     assert found is not None
     images, extent = found
     assert images[0].shape[:2] == (high - 2 * low[1], wide - 2 * low[0])

@@ -16,7 +16,7 @@ import pytest
 
 from finger3d.cli import main
 from finger3d.errors import Finger3dError
-from finger3d.plotting import solid as render
+from finger3d.plotting import renderer as opengl
 from finger3d.plotting.window import values
 from finger3d.results.states import load_states
 from tests.test_report import SECTION, SOLID, pressed
@@ -79,7 +79,7 @@ def test_a_solid_with_and_without_opengl(
     renderer: str, solid: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("FINGER3D_RENDERER", renderer)
-    monkeypatch.setattr(render, "_failure", [])
+    monkeypatch.setattr(opengl, "_failure", [])
     assert main(["show", str(solid), "--png", str(tmp_path / "a.png"), "--step", "2"]) == 0
     image = pixels(tmp_path / "a.png")
     assert orange(image) > 1e-3
@@ -95,7 +95,7 @@ def test_the_window_off_screen_answers_its_controls(solid: Path, section: Path, 
     for folder in (solid, section):
         picture = tmp_path / f"{folder.parent.name}.png"
         command = [sys.executable, "-P", "-m", "finger3d.plotting.window", str(folder), str(picture)]
-        assert render.run_child(command) is None
+        assert opengl.run_child(command) is None
         assert pixels(picture).std() > 10.0
         assert marked(pixels(picture)) > 30
 

@@ -1,16 +1,12 @@
 """Pictures and animations of the steps of a press: contact pressure on the left, stick and slip on the right.
 
-All frames share one camera and one scale of pressure. ``python -m finger3d.plotting.animation IN.npz OUT.npy`` renders
-solids in a child process, like `finger3d.plotting.solid`.
+All frames share one camera and one scale of pressure.
 """
 
 from __future__ import annotations
 
 import io
-import os
-import sys
 from collections.abc import Sequence
-from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,10 +17,9 @@ from finger3d.fem.simplex import Mesh
 from finger3d.io import atomic
 from finger3d.mechanics.gauges import Gauge
 from finger3d.plotting import figures as view
-from finger3d.plotting import solid
-from finger3d.plotting.camera import AXES, flat, framed
+from finger3d.plotting.camera import flat
 from finger3d.plotting.gauges import draw_marks, marks_of
-from finger3d.plotting.solid import BODY, LINE, REST, Skin, skin_of
+from finger3d.plotting.solid import BODY, LINE, REST, Skin, draw_solid, render_solids, skin_of
 from finger3d.results.states import States
 
 if TYPE_CHECKING:
@@ -32,9 +27,6 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 Float = NDArray[np.float64]
-Images = NDArray[np.uint8]
-Frame = tuple[Float, Float]
-"""Centre (3,), and width and height (2,), of what the camera sees, mm."""
 
 _DPI = {"png": 120, "gif": 65}  # pixels per inch
 _FRAME_MS, _LAST_MS = 450, 1500  # duration of a frame and of the last frame of an animation
@@ -143,79 +135,23 @@ def _solids(
     marks: Sequence[view.Marks],
 ) -> list[Figure]:
     """Draw steps of a solid."""
-    images, extent = _rendered(skins, colours) or (None, None)
+    pictures = [(skin, shade, False) for skin, both in zip(skins, colours, strict=True) for shade in both]
+    window = _WINDOW["picture" if len(skins) == 1 else "animation"]
+    images, extent = render_solids(pictures, window) or (None, None)
     seen = np.concatenate([flat(skin.points) for skin in skins])
     low, span = seen.min(axis=0), np.ptp(seen, axis=0)
-    aspect = float(span[1] / span[0]) if images is None else images.shape[2] / images.shape[3]
+    aspect = float(span[1] / span[0]) if images is None else images[0].shape[0] / images[0].shape[1]
     figures = []
     for k, title in enumerate(titles):
         figure, panels = view.two_panels(aspect, title)
         for number, axes in enumerate(panels):
             if images is not None:
-                axes.imshow(images[k, number], interpolation="antialiased", extent=extent)
+                axes.imshow(images[2 * k + number], interpolation="antialiased", extent=extent)
             else:
-                solid.draw_solid(axes, skins[k], colours[k][number], arrows=False)
+                draw_solid(axes, skins[k], colours[k][number], arrows=False)
                 axes.set(xlim=(low[0], low[0] + span[0]), ylim=(low[1], low[1] + span[1]))
             axes.set_axis_off()
         draw_marks(panels[0], [(name, flat(line)) for name, line in marks[k]])
         view.keys(figure, highest, {"finger at rest": REST})
         figures.append(figure)
     return figures
-
-
-def _rendered(
-    skins: Sequence[Skin], colours: Sequence[tuple[Float, Float]]
-) -> tuple[Images, tuple[float, float, float, float]] | None:
-    """Render the skins by PyVista in a child process.
-
-    Returns
-    -------
-    tuple or None
-        Cropped images (s, 2, h, w, 3) and their left, right, lower and upper edge in mm; None if PyVista cannot render
-        or FINGER3D_RENDERER is ``matplotlib``.
-    """
-    wanted = os.environ.get("FINGER3D_RENDERER", "")
-    if wanted == "matplotlib":
-        return None
-    arrays = {f"{f.name}_{k}": getattr(skin, f.name) for k, skin in enumerate(skins) for f in fields(Skin)}
-    arrays |= {f"colours_{k}": np.array(both) for k, both in enumerate(colours)}
-    found = solid.rendered("finger3d.plotting.animation", arrays, must=wanted == "pyvista")
-    if found is None:
-        return None
-    images, extent = framed(found.reshape(-1, *found.shape[2:]), _frame(skins))
-    return images.reshape(-1, 2, *images.shape[1:]), extent
-
-
-def _frame(skins: Sequence[Skin]) -> Frame:
-    """Return one frame that holds all skins, so that the camera does not move between them."""
-    seen = np.concatenate([flat(skin.points) for skin in skins])
-    first = skins[0].frame[0]
-    low, high = seen.min(axis=0), seen.max(axis=0)
-    shift = 0.5 * (low + high) - flat(first)
-    return first + shift @ AXES[:2], high - low
-
-
-def _child(source: str, target: str) -> None:
-    """Render every skin in both of its colourings with one camera, and save the images (s, 2, h, w, 3)."""
-    import pyvista as pv
-
-    data = np.load(source)
-    count = sum(name.startswith("colours_") for name in data.files)
-    skins = [Skin(**{f.name: data[f"{f.name}_{k}"] for f in fields(Skin)}) for k in range(count)]
-    frame = _frame(skins)
-    images = []
-    for k, skin in enumerate(skins):
-        window = list(_WINDOW["picture" if count == 1 else "animation"])
-        plotter = pv.Plotter(off_screen=True, window_size=window, lighting="three lights")
-        contact = solid.stage(plotter, skin, frame)
-        for colours in data[f"colours_{k}"]:
-            contact["colour"] = np.round(255.0 * colours.reshape(-1, 3)).astype(np.uint8)
-            plotter.render()  # without it, the screenshot would show the previous colours
-            images.append(plotter.screenshot(return_img=True))
-        plotter.close()
-    stack = np.array(images)
-    np.save(target, stack.reshape(count, 2, *stack.shape[1:]))
-
-
-if __name__ == "__main__":
-    _child(*sys.argv[1:])

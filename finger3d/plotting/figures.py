@@ -6,7 +6,6 @@ case, and with ``FINGER3D_RENDERER=matplotlib``, matplotlib draws them.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,7 +19,7 @@ from finger3d.plotting.camera import flat
 from finger3d.plotting.gauges import Mark, draw_marks
 from finger3d.plotting.layout import WIDEST, blank, save, sheet, style
 from finger3d.plotting.outlines import edges_of, outline_of
-from finger3d.plotting.solid import BODY, COLOURS, LINE, OBJECT, REST, Skin, draw_solid, render_solid, skin_of
+from finger3d.plotting.solid import BODY, COLOURS, LINE, OBJECT, REST, Skin, draw_solid, render_solids, skin_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -375,9 +374,7 @@ def _solid(skin: Skin, title: str, marks: Marks) -> tuple[Figure, str]:
     highest = _highest(skin.pressure)
     by_pressure = pressure_colours(skin.pressure, highest)
     by_status = np.repeat(palette()[skin.status][:, None], 3, axis=1)
-    wanted = os.environ.get("FINGER3D_RENDERER", "")
-    found = None if wanted == "matplotlib" else render_solid(skin, [by_pressure, by_status], must=wanted == "pyvista")
-    images, extent = found or (None, None)
+    images, extent = render_solids([(skin, by_pressure, False), (skin, by_status, True)]) or (None, None)
     aspect = skin.aspect if images is None else images[0].shape[0] / images[0].shape[1]
     figure, panels = two_panels(aspect, title)
     for number, (axes, colours) in enumerate(zip(panels, (by_pressure, by_status), strict=True)):

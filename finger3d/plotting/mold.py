@@ -1,12 +1,7 @@
-"""Exploded view of a mold, rendered by PyVista in a child process, or drawn by matplotlib if PyVista cannot render.
-
-The child process runs ``python -m finger3d.plotting.mold IN.npz OUT.npy``.
-"""
+"""Exploded view of a mold, rendered by PyVista, or drawn by matplotlib if PyVista cannot render."""
 
 from __future__ import annotations
 
-import os
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +14,7 @@ from finger3d.geometry.surface import Triangles
 from finger3d.io import atomic
 from finger3d.plotting.camera import viewer_axes
 from finger3d.plotting.layout import blank
-from finger3d.plotting.solid import rendered
+from finger3d.plotting.renderer import Camera, Drawing, Image, Polygons, render
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -167,41 +162,13 @@ def _draw(axes: Axes, scenery: Scenery) -> None:
         axes.add_collection(faces)
 
 
-def _rendered(scenery: Scenery) -> NDArray[np.uint8] | None:
-    """Return the image (h, w, 3) by PyVista, or None if PyVista cannot render or matplotlib is asked for."""
-    wanted = os.environ.get("FINGER3D_RENDERER", "")
-    if wanted == "matplotlib":
-        return None
-    arrays = {"axes": scenery.axes, "middle": scenery.middle, "half": scenery.half}
-    points = {f"points {name}": part.points for name, part in scenery.parts.items()}
-    faces = {f"faces {name}": part.faces for name, part in scenery.parts.items()}
-    return rendered("finger3d.plotting.mold", {**arrays, **points, **faces}, must=wanted == "pyvista")
-
-
-def _child(source: str, target: str) -> None:
-    """Render the parts in this process and save the image (h, w, 3)."""
-    import pyvista as pv
-
-    with np.load(source, allow_pickle=False) as data:
-        half, middle, axes = data["half"], data["middle"], data["axes"]
-        parts = {n[7:]: (data[n], data[f"faces {n[7:]}"]) for n in data.files if n.startswith("points ")}
-    shape = [_PIXELS, max(int(_PIXELS * half[1] / half[0]), 1)]
-    plotter = pv.Plotter(off_screen=True, window_size=shape, lighting="three lights")
-    plotter.set_background("white")
-    shine = {"ambient": 0.25, "diffuse": 0.8, "specular": 0.1}
-    for name, (points, faces) in parts.items():
-        mesh = pv.PolyData(points, np.hstack([np.full((len(faces), 1), 3), faces]).ravel())
-        plotter.add_mesh(mesh, color=COLOURS[name], opacity=OPACITY.get(name, 1.0), **shine)
-        edges = mesh.extract_feature_edges(25.0, boundary_edges=False, non_manifold_edges=False, manifold_edges=False)
-        if edges.n_points:
-            plotter.add_mesh(edges, color="#333333", line_width=1.5)
-    plotter.enable_anti_aliasing("ssaa")
-    plotter.enable_parallel_projection()
-    plotter.camera_position = [tuple(middle + 10.0 * half.max() * axes[2]), tuple(middle), tuple(axes[1])]
-    plotter.camera.parallel_scale = float(half[1])
-    plotter.reset_camera_clipping_range()
-    np.save(target, plotter.screenshot(return_img=True)[..., :3])
-
-
-if __name__ == "__main__":
-    _child(*sys.argv[1:])
+def _rendered(scenery: Scenery) -> Image | None:
+    """Return the image (h, w, 3) by PyVista, or None if PyVista does not render."""
+    width, height = scenery.half
+    window = _PIXELS, max(int(_PIXELS * height / width), 1)
+    parts = tuple(
+        Polygons(part.points, part.faces, COLOURS[name], OPACITY.get(name, 1.0), feature_edges=True)
+        for name, part in scenery.parts.items()
+    )
+    images = render([Drawing(Camera(scenery.axes, scenery.middle, float(height), window), parts)])
+    return None if images is None else images[0]

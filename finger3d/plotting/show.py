@@ -88,14 +88,12 @@ def show_window(folder: str | Path) -> None:
     MissingError
         If there is no display or no window can be opened.
     """
-    from finger3d.plotting import solid
+    from finger3d.plotting.renderer import run_child
 
     found(folder)
     linux = sys.platform.startswith("linux")
     if linux and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         raise MissingError("show: there is no display here; add --png FILE for a picture, or --gif FILE for the steps")
-    why = solid.run_child(
-        [sys.executable, "-P", "-m", "finger3d.plotting.window", str(Path(folder).resolve())], window=True
-    )
+    why = run_child([sys.executable, "-P", "-m", "finger3d.plotting.window", str(Path(folder).resolve())], window=True)
     if why is not None:
         raise MissingError(f"show: no window could be opened: {why}; add --png FILE for a picture")

@@ -1,30 +1,21 @@
-"""Surface of a deformed solid, rendered by PyVista in a child process or drawn by matplotlib.
-
-The child process runs ``python -m finger3d.plotting.solid IN.npz OUT.npy``.
-"""
+"""Surface of a deformed solid, rendered by PyVista or drawn by matplotlib."""
 
 from __future__ import annotations
 
-import subprocess
-import sys
-import tempfile
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from pathlib import Path
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from finger3d._process import child_environment
 from finger3d.contact.friction import OPEN, SLIP, STICK
-from finger3d.errors import MissingError
 from finger3d.fem.elements import TRI3, TRI6
 from finger3d.fem.simplex import Mesh
 from finger3d.plotting.camera import AXES, WINDOW, flat, framed, half_height
+from finger3d.plotting.renderer import Arrows, Camera, Drawing, Image, Polygons, Polylines, render, unshared
 
 if TYPE_CHECKING:
-    import pyvista as pv
     from matplotlib.axes import Axes
 
 Float = NDArray[np.float64]
@@ -38,8 +29,6 @@ ARROWS = {STICK: "#ffffff", SLIP: "#000000"}
 _ARROW_LENGTH = 0.045  # of the longest arrow, relative to the largest extent of the finger
 _ARROW_SPACINGS = 1.6  # largest length of an arrow, in multiples of the distance between arrows
 _ARROW_COUNT = 100.0  # approximate number of arrows
-
-_TIME_LIMIT_S = 180.0  # of a child process that renders
 
 # A quadratic facet is split into six triangles around its centre (node 6), two for each corner, so that the status of
 # a corner is drawn on the area nearest to it.
@@ -284,163 +273,63 @@ def _shaded(faces: Float, colours: Float) -> tuple[Float, Float]:
     return faces[seen], np.clip(colours[seen] * brightness[:, None], 0.0, 1.0)
 
 
-# --- PyVista, in a child process ----------------------------------------------------------------------------------
+# --- PyVista ------------------------------------------------------------------------------------------------------
+
+Extent = tuple[float, float, float, float]
+"""Left, right, lower and upper edge of a picture in the picture plane of `flat`, mm."""
 
 
-# Reason of the first failure to render. Later calls do not try again, since a driver that crashed will crash again.
-_failure: list[str] = []
-
-
-def render_solid(
-    skin: Skin, colours: list[Float], must: bool = False
-) -> tuple[list[NDArray[np.uint8]], tuple[float, float, float, float]] | None:
-    """Render a solid in a child process.
+def render_solids(
+    pictures: Sequence[tuple[Skin, Float, bool]], window: tuple[int, int] = WINDOW
+) -> tuple[list[Image], Extent] | None:
+    """Render solids with one camera.
 
     Parameters
     ----------
-    skin : solid to render
-    colours : arrays (t, 3, 3)
-        RGB colours at the corners of the contact triangles, one array for each picture; the second shows arrows.
-    must : raise an error if PyVista cannot render
+    pictures : sequence of (skin, colours, arrows)
+        The solid, RGB colours (t, 3, 3) at the corners of the contact triangles, and whether to draw friction arrows.
+    window : width and height, in pixels
 
     Returns
     -------
     tuple or None
-        Pictures (h, w, 3), and their left, right, lower and upper edge in mm; None if PyVista cannot render.
-
-    Raises
-    ------
-    MissingError
-        If PyVista cannot render and `must` is set.
+        Pictures (h, w, 3), cropped alike, and their extent; None if PyVista does not render.
     """
-    arrays = {f.name: getattr(skin, f.name) for f in fields(skin)}
-    found = rendered("finger3d.plotting.solid", {"colours": np.array(colours), **arrays}, must)
-    if found is None:
+    middle, size = frame = _common_frame([skin for skin, _, _ in pictures])
+    camera = Camera(AXES, middle, half_height(size), window)
+    images = render([Drawing(camera, _parts(*picture)) for picture in pictures])
+    if images is None:
         return None
-    images, extent = framed(found, skin.frame)
-    return list(images), extent
+    cropped, extent = framed(np.array(images), frame)
+    return list(cropped), extent
 
 
-def rendered(module: str, arrays: Mapping[str, ArrayLike], must: bool = False) -> NDArray[np.uint8] | None:
-    """Return the array that ``python -m MODULE IN.npz OUT.npy`` makes of `arrays`, or None if PyVista cannot render.
-
-    Raises
-    ------
-    MissingError
-        If PyVista cannot render and `must` is set.
-    """
-    if not _failure:
-        with tempfile.TemporaryDirectory(prefix="finger3d-") as folder:
-            source, target = Path(folder) / "arrays.npz", Path(folder) / "image.npy"
-            np.savez(source, allow_pickle=False, **arrays)
-            why = run_child([sys.executable, "-P", "-m", module, str(source), str(target)])
-            if why is None and target.exists():
-                return np.asarray(np.load(target))
-            _failure.append(why or "it wrote no picture")
-    if must:
-        raise MissingError(f"PyVista cannot render here: {_failure[0]}; unset FINGER3D_RENDERER to use matplotlib")
-    return None
+def _common_frame(skins: Sequence[Skin]) -> tuple[Float, Float]:
+    """Return the centre (3,) of a picture that holds all skins, and its width and height (2,), mm."""
+    seen = np.concatenate([flat(skin.points) for skin in skins])
+    first = skins[0].frame[0]
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    shift = 0.5 * (low + high) - flat(first)
+    return first + shift @ AXES[:2], high - low
 
 
-def run_child(command: list[str], window: bool = False) -> str | None:
-    """Run a rendering command in a child process, which isolates crashes of the OpenGL driver.
-
-    Parameters
-    ----------
-    command : program and its arguments
-    window : whether the command opens a window; if not, there is a time limit
-
-    Returns
-    -------
-    str or None
-        Why it failed, in one line; None if it succeeded.
-    """
-    # EGL needs no display; choosing it avoids VTK's warning about a missing X server.
-    hidden = {} if window else {"VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow"}
-    env = {**hidden, **child_environment()}
-    limit = None if window else _TIME_LIMIT_S
-    try:
-        done = subprocess.run(command, env=env, capture_output=True, text=True, timeout=limit, check=False)
-    except (OSError, subprocess.TimeoutExpired) as error:
-        return str(error)
-    if done.returncode == 0:
-        return None
-    if done.returncode < 0:
-        return f"it crashed (signal {-done.returncode}); OpenGL may be missing (apt install libegl1 libgl1-mesa-dri)"
-    return " ".join(done.stderr.strip().splitlines()[-1:]) or f"it ended with code {done.returncode}"
-
-
-def _child(source: str, target: str) -> None:
-    """Render the skin in `source` once for each set of colours in this process, and save the images (s, h, w, 3)."""
-    import pyvista as pv
-
-    data = np.load(source)
-    skin = Skin(**{f.name: data[f.name] for f in fields(Skin)})
-    plotter = pv.Plotter(off_screen=True, window_size=list(WINDOW), lighting="three lights")
-    contact = stage(plotter, skin, skin.frame)
-    images = []
-    for number, colours in enumerate(data["colours"]):
-        contact["colour"] = np.round(255.0 * colours.reshape(-1, 3)).astype(np.uint8)
-        if number == 1:
-            _add_arrows(plotter, skin)
-        plotter.render()  # without it, the screenshot would show the previous colours
-        images.append(plotter.screenshot(return_img=True))
-    np.save(target, np.array(images))
-
-
-def stage(plotter: pv.Plotter, skin: Skin, frame: tuple[Float, Float]) -> pv.PolyData:
-    """Add the body to a plotter and aim its camera at a frame, as from `Skin.frame`; return the contact surface."""
-    plotter.set_background("white")
-    contact = _add_body(plotter, skin)
-    plotter.enable_parallel_projection()
-    middle, size = frame
-    plotter.camera_position = [tuple(middle + 3.0 * skin.size * AXES[2]), tuple(middle), (0.0, 1.0, 0.0)]
-    plotter.camera.parallel_scale = half_height(size)
-    plotter.reset_camera_clipping_range()
-    return contact
-
-
-def _poly(points: Float, lines: bool) -> pv.PolyData:
-    """Return a PyVista mesh of polygons, or of polylines, (m, corners, 3) that share no points."""
-    import pyvista as pv
-
-    count, corners = points.shape[:2]
-    index = np.hstack([np.full((count, 1), corners), np.arange(count * corners).reshape(count, corners)]).ravel()
-    vertices = np.ascontiguousarray(points.reshape(-1, 3))
-    return pv.PolyData(vertices, lines=index) if lines else pv.PolyData(vertices, index)
-
-
-def _add_body(plotter: pv.Plotter, skin: Skin) -> pv.PolyData:
-    """Add everything but the arrows; return the contact surface, whose array "colour" holds its colours."""
-    shine = {"ambient": 0.25, "diffuse": 0.8, "specular": 0.1}
-    if len(skin.body):
-        plotter.add_mesh(_poly(skin.body[:, _FOUR].reshape(-1, 3, 3), lines=False), color=BODY, **shine)
-    contact = _poly(skin.contact, lines=False)
-    contact["colour"] = np.zeros((contact.n_points, 3), dtype=np.uint8)
-    plotter.add_mesh(contact, scalars="colour", rgb=True, **shine)
-    for edges, colour, width, opacity in (
-        (skin.lines, LINE, 1.0, 0.5),
-        (skin.features, "#444444", 2.0, 1.0),
-        (skin.rest, REST, 1.5, 0.6),
-        (skin.outline[None], OBJECT, 3.0, 1.0),
-    ):
-        if edges.size:
-            plotter.add_mesh(_poly(edges, lines=True), color=colour, line_width=width, opacity=opacity)
-    return contact
-
-
-def _add_arrows(plotter: pv.Plotter, skin: Skin) -> None:
-    import pyvista as pv
-
-    shape = pv.Arrow(start=(-0.5, 0.0, 0.0), tip_length=0.4, tip_radius=0.13, shaft_radius=0.045)
-    for state, colour in ARROWS.items():
+def _parts(skin: Skin, colours: Float, arrows: bool) -> tuple[Polygons | Polylines | Arrows, ...]:
+    """Return what the renderer draws of a solid; for the parameters see `render_solids`."""
+    surfaces = (
+        (skin.body[:, _FOUR].reshape(-1, 3, 3), BODY),
+        (skin.contact, np.round(255.0 * colours.reshape(-1, 3)).astype(np.uint8)),
+    )
+    lines = (
+        Polylines(skin.lines, LINE, 1.0, 0.5),
+        Polylines(skin.features, "#444444", 2.0),
+        Polylines(skin.rest, REST, 1.5, 0.6),
+        Polylines(skin.outline[None], OBJECT, 3.0),
+    )
+    parts: list[Polygons | Polylines | Arrows] = [Polygons(*unshared(at), colour) for at, colour in surfaces if len(at)]
+    parts += [part for part in lines if part.points.size]
+    for state, colour in ARROWS.items() if arrows else ():
         on = skin.arrow_status == state
         if on.any():
-            points = pv.PolyData(skin.arrow_at[on] + [0.0, 0.004 * skin.size, 0.0])
-            points["arrow"] = skin.arrow[on]
-            glyphs = points.glyph(orient="arrow", scale="arrow", factor=skin.arrow_length, geom=shape)
-            plotter.add_mesh(glyphs, color=colour, lighting=False)
-
-
-if __name__ == "__main__":
-    _child(*sys.argv[1:])
+            above = skin.arrow_at[on] + [0.0, 0.004 * skin.size, 0.0]
+            parts.append(Arrows(above, skin.arrow_length * skin.arrow[on], colour))
+    return tuple(parts)

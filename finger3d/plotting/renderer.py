@@ -1,0 +1,245 @@
+"""PyVista renderer of surfaces, lines and arrows.
+
+VTK aborts its process if no OpenGL driver works. Therefore ``python -m finger3d.plotting.renderer IN OUT`` renders in
+a child process.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d._process import child_environment
+from finger3d.errors import MissingError
+
+if TYPE_CHECKING:
+    import pyvista as pv
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+Image = NDArray[np.uint8]
+"""Rendered window, shape (h, w, 3)."""
+
+_TIME_LIMIT_S = 180.0  # of a child process that renders
+_SHINE = {"ambient": 0.25, "diffuse": 0.8, "specular": 0.1}
+_FEATURE_ANGLE = 25.0  # between the normals of two triangles with a visible edge between them, in degrees
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Parallel projection.
+
+    Attributes
+    ----------
+    axes : (3, 3) array
+        Orthonormal axes of the viewer, rows: right, up, and towards the viewer.
+    middle : (3,) array, mm
+        Centre of the window.
+    half_height : float, mm
+        Half the height of the window.
+    window : width and height of the window, in pixels
+    """
+
+    axes: Float
+    middle: Float
+    half_height: float
+    window: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Polygons:
+    """Shaded polygons.
+
+    Attributes
+    ----------
+    points : (p, 3) array, mm
+    cells : (m, k) array
+        Indices of the corners.
+    colour : one colour, or (p, 3) RGB colours of the points
+    opacity : from 0 to 1
+    feature_edges : whether to draw the sharp edges
+    """
+
+    points: Float
+    cells: Int
+    colour: str | Image
+    opacity: float = 1.0
+    feature_edges: bool = False
+
+    def add(self, plotter: pv.Plotter) -> None:
+        """Add the polygons to a plotter."""
+        import pyvista as pv
+
+        mesh = pv.PolyData(self.points, _padded(self.cells))
+        if isinstance(self.colour, str):
+            plotter.add_mesh(mesh, color=self.colour, opacity=self.opacity, **_SHINE)
+        else:
+            mesh["colour"] = self.colour
+            plotter.add_mesh(mesh, scalars="colour", rgb=True, opacity=self.opacity, **_SHINE)
+        if self.feature_edges:
+            edges = mesh.extract_feature_edges(
+                _FEATURE_ANGLE, boundary_edges=False, non_manifold_edges=False, manifold_edges=False
+            )
+            if edges.n_points:
+                plotter.add_mesh(edges, color="#333333", line_width=1.5)
+
+
+@dataclass(frozen=True)
+class Polylines:
+    """Lines (m, k, 3), mm, of one colour; the width is in pixels."""
+
+    points: Float
+    colour: str
+    width: float
+    opacity: float = 1.0
+
+    def add(self, plotter: pv.Plotter) -> None:
+        """Add the lines to a plotter."""
+        import pyvista as pv
+
+        points, cells = unshared(self.points)
+        plotter.add_mesh(
+            pv.PolyData(points, lines=_padded(cells)), color=self.colour, line_width=self.width, opacity=self.opacity
+        )
+
+
+@dataclass(frozen=True)
+class Arrows:
+    """Flat arrows at the centres (a, 3), mm, along the vectors (a, 3), mm."""
+
+    centres: Float
+    vectors: Float
+    colour: str
+
+    def add(self, plotter: pv.Plotter) -> None:
+        """Add the arrows to a plotter."""
+        import pyvista as pv
+
+        shape = pv.Arrow(start=(-0.5, 0.0, 0.0), tip_length=0.4, tip_radius=0.13, shaft_radius=0.045)
+        points = pv.PolyData(self.centres)
+        points["vector"] = self.vectors
+        plotter.add_mesh(
+            points.glyph(orient="vector", scale="vector", factor=1.0, geom=shape), color=self.colour, lighting=False
+        )
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """What one window shows."""
+
+    camera: Camera
+    parts: tuple[Polygons | Polylines | Arrows, ...]
+
+
+def unshared(corners: Float) -> tuple[Float, Int]:
+    """Return points (m k, 3) and cells (m, k) of polygons or lines (m, k, 3) that share no points."""
+    count = corners.shape[0] * corners.shape[1]
+    return np.ascontiguousarray(corners.reshape(-1, 3)), np.arange(count).reshape(corners.shape[:2])
+
+
+# Reason of the first failure to render. Later calls do not try again, since a driver that crashed will crash again.
+_failure: list[str] = []
+
+
+def render(drawings: Sequence[Drawing]) -> list[Image] | None:
+    """Render drawings in a child process.
+
+    The environment variable FINGER3D_RENDERER may ask for ``pyvista`` or ``matplotlib``.
+
+    Returns
+    -------
+    list of (h, w, 3) arrays, or None
+        None if PyVista cannot render, or if matplotlib is asked for.
+
+    Raises
+    ------
+    MissingError
+        If PyVista is asked for and cannot render.
+    """
+    wanted = os.environ.get("FINGER3D_RENDERER", "")
+    if wanted == "matplotlib":
+        return None
+    if not _failure:
+        with tempfile.TemporaryDirectory(prefix="finger3d-") as folder:
+            source, target = Path(folder) / "drawings", Path(folder) / "images"
+            source.write_bytes(pickle.dumps(list(drawings)))
+            why = run_child([sys.executable, "-P", "-m", "finger3d.plotting.renderer", str(source), str(target)])
+            if why is None and target.exists():
+                images: list[Image] = pickle.loads(target.read_bytes())
+                return images
+            _failure.append(why or "it wrote no picture")
+    if wanted == "pyvista":
+        raise MissingError(f"PyVista cannot render here: {_failure[0]}; unset FINGER3D_RENDERER to use matplotlib")
+    return None
+
+
+def run_child(command: list[str], window: bool = False) -> str | None:
+    """Run a rendering command in a child process, which isolates crashes of the OpenGL driver.
+
+    Parameters
+    ----------
+    command : program and its arguments
+    window : whether the command opens a window; if not, there is a time limit
+
+    Returns
+    -------
+    str or None
+        Why it failed, in one line; None if it succeeded.
+    """
+    # EGL needs no display; choosing it avoids VTK's warning about a missing X server.
+    hidden = {} if window else {"VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow"}
+    env = {**hidden, **child_environment()}
+    limit = None if window else _TIME_LIMIT_S
+    try:
+        done = subprocess.run(command, env=env, capture_output=True, text=True, timeout=limit, check=False)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        return str(error)
+    if done.returncode == 0:
+        return None
+    if done.returncode < 0:
+        return f"it crashed (signal {-done.returncode}); OpenGL may be missing (apt install libegl1 libgl1-mesa-dri)"
+    return " ".join(done.stderr.strip().splitlines()[-1:]) or f"it ended with code {done.returncode}"
+
+
+def _image(drawing: Drawing) -> Image:
+    """Render one drawing in this process."""
+    import pyvista as pv
+
+    camera = drawing.camera
+    plotter = pv.Plotter(off_screen=True, window_size=list(camera.window), lighting="three lights")
+    plotter.set_background("white")
+    for part in drawing.parts:
+        part.add(plotter)
+    plotter.enable_anti_aliasing("ssaa")
+    plotter.enable_parallel_projection()
+    away = 10.0 * camera.half_height * camera.axes[2]
+    plotter.camera_position = [tuple(camera.middle + away), tuple(camera.middle), tuple(camera.axes[1])]
+    plotter.camera.parallel_scale = camera.half_height
+    plotter.reset_camera_clipping_range()
+    image: Image = np.asarray(plotter.screenshot(return_img=True))[..., :3].copy()
+    plotter.close()
+    return image
+
+
+def _padded(cells: Int) -> Int:
+    """Return cells (m, k) in VTK's format: each preceded by its number of corners."""
+    return np.hstack([np.full((len(cells), 1), cells.shape[1]), cells]).ravel()
+
+
+def _main(source: str, target: str) -> None:
+    drawings: list[Drawing] = pickle.loads(Path(source).read_bytes())
+    Path(target).write_bytes(pickle.dumps([_image(drawing) for drawing in drawings]))
+
+
+if __name__ == "__main__":
+    _main(*sys.argv[1:])
