@@ -1,4 +1,4 @@
-"""One model of a comparison, and what it says at the end of its path."""
+"""Result of one model of a comparison."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ FORCE = "force_N_per_mm"
 
 @dataclass(frozen=True)
 class Case:
-    """What one model of the scene says at the end of its path.
+    """Result of one model of the scene at the end of the path.
 
     Attributes
     ----------
     model : plane stress, plane strain, solid, or solid with held ends
     size_mm : edge length at the contact
-    numbers : quantity -> value, forces per width; see `measured`
-    errors : quantity -> error bar by mesh and increments, as `finger3d press` has it; empty without one
+    numbers : quantity -> value, forces per width; see `finger3d.analyses.compare.cases.quantities`
+    errors : quantity -> error bar of mesh and increments; empty if it was not estimated
     lines : line along x ("z = 0", "end") -> columns x_mm, pressure_MPa, shear_x_MPa, shear_z_MPa, status
-    outcome : of the path; anything but CONVERGED leaves `numbers` empty
-    companion : the numbers on the companion mesh
-    ratio : how many times longer its edges are
-    method : how the errors were estimated, or why not
+    outcome : `numbers` is empty unless it is CONVERGED
+    companion : quantities on the companion mesh
+    ratio : edge length of the companion mesh relative to this one's
+    method : method of the error estimate, or why there is none
     """
 
     model: str
@@ -44,16 +44,16 @@ class Case:
 
     @property
     def ok(self) -> bool:
-        """Whether there are numbers to compare."""
+        """Whether the path converged."""
         return self.outcome.ok
 
     @property
     def is_section(self) -> bool:
-        """Whether it is one of the two plane models."""
+        """Whether it is plane stress or plane strain."""
         return self.model.startswith("plane")
 
     def as_dict(self) -> dict[str, Any]:
-        """For compare.json."""
+        """Return the entry of compare.json."""
         return {
             "model": self.model,
             "width_mm": self.width_mm,

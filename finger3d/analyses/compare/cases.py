@@ -1,4 +1,4 @@
-"""One scene as different models: pressed, measured per width, and with the error bars of a press."""
+"""Presses of one scene by different models, and their results per unit width."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from finger3d.results.comparison import Case
 Float = NDArray[np.float64]
 
 _POINTS = 600
-"""Contact points of the meshed part up to which a solid of another width is quick (a few seconds)."""
+"""Largest number of contact points of the meshed part of a solid of another width; a press then takes a few seconds."""
 
 LINES = ("z = 0", "end")
 
 
 def resized(model: Model, size_mm: float) -> Model:
-    """The model on another mesh, all edge lengths scaled alike."""
+    """Return the model with all edge lengths scaled alike."""
     base = model.mesh.base_size_mm * size_mm / model.mesh.size_mm
     return replace(model, mesh=replace(model.mesh, size_mm=size_mm, base_size_mm=base))
 
 
 def widened(model: Model, width_mm: float) -> Model:
-    """A solid of another width: structured, no finer than the scene's, and coarse enough to be quick."""
+    """Return a solid of another width on a swept mesh, coarser than the scene's where needed for `_POINTS` points."""
     design = replace(model.design, width_mm=width_mm)
     free = 4 // 2 ** len(set(model.object.mirrors()) & {"x", "z"})
     size = min(model.mesh.size_mm, width_mm / FACTOR)
@@ -48,26 +48,26 @@ def widened(model: Model, width_mm: float) -> Model:
     return resized(replace(model, design=design, mesh=replace(model.mesh, mesher="swept")), size)
 
 
-def solved(name: str, model: Model) -> Case:
-    """Press the model, with error bars from `finger3d.accuracy.estimate.estimate`, the same that a press gets."""
+def press_with_errors(name: str, model: Model) -> Case:
+    """Press the model and estimate its errors; see `finger3d.accuracy.estimate.estimate`."""
     start = time.perf_counter()
     problem, frames, levels, case = _pressed(name, model)
     if case.ok:
-        found = estimate(problem, frames, numbers=lambda p, f: measured(p.points, f), levels=levels)
+        found = estimate(problem, frames, numbers=lambda p, f: quantities(p.points, f), levels=levels)
         case = replace(
             case, errors=found.totals(), companion=found.companion_numbers, ratio=found.ratio, method=found.method
         )
     return replace(case, seconds=time.perf_counter() - start)
 
 
-def measured_on(name: str, model: Model) -> Case:
-    """The model pressed on its own mesh only: numbers without error bars."""
+def press_without_errors(name: str, model: Model) -> Case:
+    """Press the model without estimating its errors."""
     return _pressed(name, model)[-1]
 
 
 def _pressed(name: str, model: Model) -> tuple[Problem, tuple[StepResult, ...], list[tuple[int, StepResult]], Case]:
     start = time.perf_counter()
-    # all of the contact face: how far contact reaches differs from model to model
+    # The whole contact face is a candidate, because the extent of contact differs from model to model.
     problem = build(model, margin=math.inf)
     frames, increments = marched(problem)
     levels = [(count, ends[-1]) for count, ends in increments.levels] if increments else []
@@ -75,12 +75,12 @@ def _pressed(name: str, model: Model) -> tuple[Problem, tuple[StepResult, ...], 
     mesher = "swept" if problem.dim == 2 else model.mesh.mesher
     case = Case(name, model.design.width_mm, model.mesh.size_mm, mesher, frame.outcome)
     if frame.outcome.ok:
-        case = replace(case, numbers=measured(problem.points, frame), lines=lines_along_x(problem.points, frame))
+        case = replace(case, numbers=quantities(problem.points, frame), lines=lines_along_x(problem.points, frame))
     return problem, frames, levels, replace(case, seconds=time.perf_counter() - start)
 
 
-def measured(points: ContactPoints, frame: StepResult) -> dict[str, float]:
-    """Numbers of a frame that a section and a solid share: N per mm of width, mm, MPa, strains."""
+def quantities(points: ContactPoints, frame: StepResult) -> dict[str, float]:
+    """Return the quantities of a step that sections and solids have in common: N per mm of width, mm, MPa, strains."""
     numbers = measure(points, frame)
     width = 2.0 * points.half_width_mm
     friction = np.abs(points.friction(frame.state.force)).sum(axis=0)
@@ -101,7 +101,7 @@ def measured(points: ContactPoints, frame: StepResult) -> dict[str, float]:
 
 
 def lines_along_x(points: ContactPoints, frame: StepResult) -> dict[str, dict[str, Any]]:
-    """Tractions along x at z = 0, and for a solid at its end; points in the band stand in where none is on the line."""
+    """Return tractions along x at z = 0, or near it on an unstructured mesh, and at the end of a solid."""
     table = contact_table(points, frame.state)
     z = table["z_mm"]
     exact = 1e-6 * points.half_width_mm

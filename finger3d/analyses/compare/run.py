@@ -1,17 +1,17 @@
-"""The 2D assumption held to the light: one scene as plane stress, plane strain and solid, and the verdict in words."""
+"""Comparison of a scene in plane stress, in plane strain and as a solid."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from finger3d._machine import versions
-from finger3d.analyses.compare.cases import solved, widened
-from finger3d.analyses.compare.verdict import WITHIN, passage, reached, sentences
+from finger3d.analyses.compare.cases import press_with_errors, widened
+from finger3d.analyses.compare.verdict import WITHIN, Deviation, crossing_width, deviations, verdict
 from finger3d.errors import Finger3dError, Outcome, UnresolvedError
 from finger3d.io import atomic, claimed, write_csv, write_json
 from finger3d.mechanics.model import Model
@@ -23,14 +23,14 @@ if TYPE_CHECKING:
 
 
 _WIDTHS = (1.0, 4.0, 12.0, 24.0)
-"""Widths, in heights of the finger, that are solved if none are asked for."""
+"""Default widths of further solids, in heights of the finger."""
 
-_INCOMPLETE = "incomplete: the comparison was still running, or was interrupted; the cases written are good"
+_INCOMPLETE = "incomplete: the comparison is running or was interrupted; the cases written are complete"
 
 
 @dataclass(frozen=True, repr=False)
 class Comparison:
-    """The cases solved, the verdict on them in sentences, and where everything was written."""
+    """Result of `compare`: the cases, the verdict on them in sentences, and the folder of the files."""
 
     cases: tuple[Case, ...]
     verdict: tuple[str, ...]
@@ -54,61 +54,63 @@ class Comparison:
 
     @property
     def outcome(self) -> Outcome:
-        """CONVERGED if every case is."""
+        """Outcome of the first case that did not converge, else CONVERGED."""
         return next((c.outcome for c in self.cases if not c.ok), Outcome.CONVERGED)
 
 
 def compare(
     scene: Scene | str | Path, out: str | Path, widths: Sequence[float] | None = None, report: Progress | None = None
 ) -> Comparison:
-    """Solve a scene as plane stress, plane strain and solid, and tell how far 2D is from 3D.
+    """Solve a scene in plane stress, in plane strain and as a solid, and compare the results.
 
     Parameters
     ----------
-    scene : a loaded scene, or the path of a TOML file; its own domain does not matter
+    scene : a loaded scene, or the path of a TOML file; its domain is ignored
     out : folder for compare.csv, compare.json, lines.csv, compare.png, report.html and scene.toml
-    widths : further widths (mm) of the solid; None chooses some from the finger's height, () leaves them out
-    report : told about every case
+    widths : further widths of the finger, mm; None takes multiples of its height
+    report : progress of the cases
 
     Returns
     -------
     Comparison
-        Also of a run in which some cases did not converge; the verdict names them.
+        Cases may have failed to converge; the verdict names them.
     """
     from finger3d.scene import load
 
     report = report or Progress()
     solid = _as_solid(load(scene) if isinstance(scene, str | Path) else scene)
     model = solid.model()
-    asked = _widths(model, widths)
-    _check(model, asked)
+    other_widths = _other_widths(model, widths)
+    _check(model, other_widths)
     with claimed(out, "compare") as folder:
-        return _compared(solid, model, asked, folder, report)
+        return _solve_and_write(solid, model, other_widths, folder, report)
 
 
-def _compared(solid: Scene, model: Model, asked: list[float], folder: Path, report: Progress) -> Comparison:
+def _solve_and_write(solid: Scene, model: Model, widths: list[float], folder: Path, report: Progress) -> Comparison:
+    """Solve every case and write all of them after each, so that an interruption loses none."""
     for name in ("compare.csv", "compare.json", "lines.csv", "compare.png", "report.html"):
         (folder / name).unlink(missing_ok=True)
     with atomic(folder / "scene.toml") as path:
         path.write_text(solid.to_toml(), encoding="utf-8")
-    plan = list(_plan(model, asked))
-    report.steps_total = len(plan)
+    variants = list(_variants(model, widths))
+    report.steps_total = len(variants)
     cases: list[Case] = []
-    for done, (name, variant) in enumerate(plan, start=1):
+    for done, (name, variant) in enumerate(variants, start=1):
         report.stage(f"{name}, {variant.design.width_mm:g} mm wide")
-        cases.append(_solved(name, variant, model))
-        report.step(done, len(plan), _remark(cases[-1]))
-        _write(folder, solid, model, cases, _INCOMPLETE if done < len(plan) else None)
+        cases.append(_press(name, variant, model))
+        report.step(done, len(variants), _remark(cases[-1]))
+        comparison = Comparison(tuple(cases), tuple(_verdict(model, cases)), folder)
+        _write(comparison, solid, model.design.height_mm, complete=done == len(variants))
     from finger3d.plotting.comparison import draw
     from finger3d.report.compare import compare_page
 
     draw(folder / "compare.png", cases, model.design.width_mm, solid.title)
     compare_page(folder)
-    return Comparison(tuple(cases), tuple(_verdict(model, cases)), folder)
+    return comparison
 
 
 def _as_solid(scene: Scene) -> Scene:
-    """The scene as a solid: mesh sizes left open are then those of a solid, for the sections too."""
+    """Return the scene as a solid, so that default mesh sizes are those of a solid in the sections, too."""
     from finger3d.scene import parse
 
     if scene.domain == "solid":
@@ -116,7 +118,7 @@ def _as_solid(scene: Scene) -> Scene:
     return parse({**scene.given, "model": {"domain": "solid"}}, path=scene.path)
 
 
-def _widths(model: Model, widths: Sequence[float] | None) -> list[float]:
+def _other_widths(model: Model, widths: Sequence[float] | None) -> list[float]:
     own = model.design.width_mm
     height = model.design.height_mm
     chosen = [float(f"{w * height:.2g}") for w in _WIDTHS] if widths is None else [float(w) for w in widths]
@@ -127,7 +129,7 @@ def _widths(model: Model, widths: Sequence[float] | None) -> list[float]:
 
 
 def _check(model: Model, widths: Sequence[float]) -> None:
-    """What a section cannot stand for is refused before any work."""
+    """Refuse a scene that has no plane model."""
     if model.design.section() is None:
         raise Finger3dError(
             f'compare: finger.geometry = "{model.design.name}" has no constant section, so there is no 2D model of it; '
@@ -139,12 +141,12 @@ def _check(model: Model, widths: Sequence[float]) -> None:
         if beyond := [w for w in widths if 2.0 * abs(gauge.z_mm) > w]:
             raise Finger3dError(
                 f'compare: gauge "{gauge.name}" at z_mm = {gauge.z_mm:g} is outside a finger {beyond[0]:g} mm wide; '
-                "ask for larger widths, or move it"
+                "give larger widths or another z_mm"
             )
 
 
-def _plan(model: Model, widths: Sequence[float]) -> Iterator[tuple[str, Model]]:
-    """Models by name, the quick and the telling ones first; every solid has sections on its own in-plane mesh."""
+def _variants(model: Model, widths: Sequence[float]) -> Iterator[tuple[str, Model]]:
+    """Yield the name and the model of every case; solid and sections of one width have the same in-plane mesh."""
     strain, stress = replace(model, domain="plane-strain"), replace(model, domain="plane-stress")
     yield "plane strain", strain
     yield "plane stress", stress
@@ -157,10 +159,10 @@ def _plan(model: Model, widths: Sequence[float]) -> Iterator[tuple[str, Model]]:
         yield "solid", wide
 
 
-def _solved(name: str, variant: Model, scene: Model) -> Case:
-    """A case; of another width than the scene's it may be too coarse for the object without failing the others."""
+def _press(name: str, variant: Model, scene: Model) -> Case:
+    """Press a variant; if its mesh is too coarse for the object, fail only where it has the width of the scene."""
     try:
-        return solved(name, variant)
+        return press_with_errors(name, variant)
     except UnresolvedError:
         if variant.design.width_mm == scene.design.width_mm:
             raise
@@ -176,9 +178,9 @@ def _remark(case: Case) -> str:
 
 
 def _verdict(model: Model, cases: Sequence[Case]) -> list[str]:
-    lines = sentences(cases, model.design.width_mm, model.design.height_mm)
+    lines = verdict(cases, model.design.width_mm, model.design.height_mm)
     if _varies_along_width(model):
-        lines.append("The object changes along the width; the plane models see only its section at z = 0.")
+        lines.append("The object changes along the width; the plane models take its section at z = 0.")
     return [*lines, *(f"Warning: {w}." for w in model.warnings)]
 
 
@@ -189,34 +191,32 @@ def _varies_along_width(model: Model) -> bool:
     return bool(np.ptp(height, axis=0).max() > 1e-9 * model.design.height_mm)
 
 
-def _write(folder: Path, scene: Scene, model: Model, cases: Sequence[Case], outcome: str | None) -> None:
-    """All files but the picture, after every case."""
-    rows = [_row(case, model.design.height_mm) for case in cases]
+def _write(comparison: Comparison, scene: Scene, height_mm: float, complete: bool) -> None:
+    """Write all files but the picture and the page."""
+    folder, cases = comparison.out, comparison.cases
+    rows = [_row(case, height_mm) for case in cases]
     names = list(dict.fromkeys(key for row in rows for key in row))
     write_csv(folder / "compare.csv", {key: [row.get(key, "") for row in rows] for key in names})
     _write_lines(folder, cases)
-    failed = next((str(c.outcome) for c in cases if not c.ok), str(Outcome.CONVERGED))
-    reach = {}
-    for name in ("plane strain", "plane stress"):
-        found = passage(name, cases)
-        at = reached(found, narrow=name == "plane stress") if len(found) > 1 else None
-        reach[name] = None if at is None else dict(zip(("width_mm", "low_mm", "high_mm"), at, strict=True))
+    by_width = {name: deviations(name, cases) for name in ("plane strain", "plane stress")}
     write_json(
         folder / "compare.json",
         {
             "scene": scene.as_dict(),
-            "outcome": outcome or failed,
-            "verdict": _verdict(model, cases),
+            "outcome": str(comparison.outcome) if complete else _INCOMPLETE,
+            "verdict": comparison.verdict,
             "within": WITHIN,
-            "width_within": reach,
-            "deviation_of_force": {
-                name: [{"width_mm": d.width_mm, "value": d.value, "error": d.error} for d in passage(name, cases)]
-                for name in reach
-            },
+            "width_within": {name: _width_within(found, name == "plane stress") for name, found in by_width.items()},
+            "deviation_of_force": {name: [asdict(d) for d in found] for name, found in by_width.items()},
             "cases": [case.as_dict() for case in cases],
             "versions": versions(),
         },
     )
+
+
+def _width_within(found: Sequence[Deviation], narrow: bool) -> dict[str, float] | None:
+    at = crossing_width(found, narrow) if len(found) > 1 else None
+    return None if at is None else dict(zip(("width_mm", "low_mm", "high_mm"), at, strict=True))
 
 
 def _row(case: Case, height: float) -> dict[str, Any]:

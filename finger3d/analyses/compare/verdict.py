@@ -1,4 +1,4 @@
-"""What the comparison comes to, in sentences: how far each plane model is from the solid, and from which width on."""
+"""Deviation of plane models from the solid, and the verdict on a comparison in sentences."""
 
 from __future__ import annotations
 
@@ -17,72 +17,76 @@ from finger3d.results.format import with_error
 Float = NDArray[np.float64]
 
 WITHIN = 0.05
-"""Deviation from the solid up to which a plane model counts as good enough."""
+"""Relative deviation from the solid below which a plane model is called sufficient."""
 
 _ASYMPTOTIC = 0.25
-"""Deviation from plane strain below which it falls as 1/width: two ends of one kind on an ever longer middle."""
+"""Deviation of plane strain below which it is extrapolated as 1/width; the ends are then independent of each other."""
 
 _COMMON = 0.25
-"""Share of its bar that a deviation keeps where the errors of plane model and solid are seen to cancel."""
+"""Smallest error bar of a deviation, relative to that of independent errors, if the errors cancel."""
 
 _SURE = 2.0
-"""Bars away from the limit from which a deviation counts as told apart from it (validation/error_bars.py)."""
+"""Distance from the limit, in error bars, beyond which a deviation differs significantly from it."""
 
 
 @dataclass(frozen=True)
 class Deviation:
-    """A plane model against the solid of the same width: (plane - solid)/solid of a quantity, and its error bar."""
+    """Relative deviation (plane - solid)/solid of a quantity at one width, and its error bar."""
 
     width_mm: float
     value: float
     error: float
 
     def text(self) -> str:
-        """For instance ``overstates ... by 74 +- 1 %``, without the quantity."""
+        """Return the magnitude in percent, for instance ``74 % (± 1 %)``."""
         return f"{rounded(100 * abs(self.value))} % (± {rounded(100 * self.error, 1)})"
 
 
 def rounded(value: float, digits: int = 2, signed: bool = False) -> str:
-    """A number to so many significant digits, without an exponent."""
+    """Return a number with the given number of significant digits, without an exponent."""
     return f"{float(f'{value:.{digits}g}'):{'+' if signed else ''}g}"
 
 
 def deviation(plane: Case, solid: Case, key: str = FORCE) -> Deviation:
-    """How far `plane` is from `solid` in one quantity."""
+    """Return the deviation of one quantity; the errors of both cases are taken as independent."""
     p, s = plane.numbers[key], solid.numbers[key]
     ratio = p / s
     relative = math.hypot(plane.errors.get(key, 0.0) / max(abs(p), 1e-300), solid.errors.get(key, 0.0) / abs(s))
     return Deviation(solid.width_mm, ratio - 1.0, abs(ratio) * relative)
 
 
-def matched(plane: Case, solid: Case) -> Deviation:
-    """Deviation of the forces; on swept meshes the in-plane error is common to both, so their ratio is known better.
+def force_deviation(plane: Case, solid: Case) -> Deviation:
+    """Return the deviation of the forces.
 
-    A share of the bar stays, for changes that agree by chance: of 32 deviations of the Fig. 9 finger (nu = 0.3 and
-    0.49, 10 to 200 mm wide, edges of 3.6 and 5 mm) 31 are within twice the bar with it, 24 without.
+    On swept meshes the in-plane error is common to both cases, and the error of their ratio follows from the ratio on
+    the companion meshes. The error bar is at least `_COMMON` times that of independent errors, because two changes may
+    agree by chance: of 32 deviations of the Fig. 9 finger (nu = 0.3 and 0.49, 10 to 200 mm wide, edges of 3.6 and 5 mm)
+    31 are within twice the error bar with this bound, 24 without.
     """
     found = deviation(plane, solid)
     both = plane.companion and solid.companion and (plane.ratio > 1.0) == (solid.ratio > 1.0)
-    # edges longer than the width are cut to it in the solid's companion, and not in the section's
+    # Edges of the solid's companion mesh are limited to the width, those of the section's are not.
     if solid.mesher != "swept" or not both or FACTOR * solid.size_mm > solid.width_mm:
         return found
     change = abs(found.value - (plane.companion[FORCE] / solid.companion[FORCE] - 1.0))
-    told = change / min(gain(plane.ratio), gain(solid.ratio))
-    return Deviation(found.width_mm, found.value, min(found.error, max(told, _COMMON * found.error)))
+    error = change / min(gain(plane.ratio), gain(solid.ratio))
+    return Deviation(found.width_mm, found.value, min(found.error, max(error, _COMMON * found.error)))
 
 
-def reached(found: Sequence[Deviation], narrow: bool, limit: float = WITHIN) -> tuple[float, float, float] | None:
-    """Width (mm) at which the deviation comes within `limit`, with the ends of its error bar; None if never.
+def crossing_width(
+    found: Sequence[Deviation], narrow: bool, limit: float = WITHIN
+) -> tuple[float, float, float] | None:
+    """Return the width at which the deviation reaches a limit, and the ends of its error bar, mm; None if it does not.
 
     Parameters
     ----------
     found : deviations at several widths
-    narrow : the model is good for narrow fingers (plane stress), not for wide ones (plane strain)
+    narrow : whether the model holds for narrow fingers (plane stress) instead of wide ones (plane strain)
     """
     ordered = sorted(found, key=lambda d: d.width_mm)
     width = np.array([d.width_mm for d in ordered])
     value, error = np.array([abs(d.value) for d in ordered]), np.array([d.error for d in ordered])
-    # the ends' share of a wide body falls as 1/width; a narrow one departs from plane stress in proportion to its width
+    # The deviation from plane strain falls as 1/width; that from plane stress grows in proportion to the width.
     scale = width if narrow else 1.0 / width
     at = [_crossing(scale, v, limit) for v in (value, np.maximum(value - error, 0.0), value + error)]
     if at[0] is None:
@@ -92,7 +96,7 @@ def reached(found: Sequence[Deviation], narrow: bool, limit: float = WITHIN) -> 
 
 
 def _crossing(scale: Float, value: Float, limit: float) -> float | None:
-    """Largest scale up to which `value` stays below `limit`, seen from scale 0, linear in between."""
+    """Return the largest scale up to which the interpolated `value` stays below `limit`; None if there is none."""
     order = np.argsort(scale)
     scale, value = scale[order], value[order]
     if value[0] > limit:
@@ -103,10 +107,10 @@ def _crossing(scale: Float, value: Float, limit: float) -> float | None:
     return float(scale[-1])
 
 
-def sentences(cases: Sequence[Case], own_width_mm: float, height_mm: float) -> list[str]:
-    """The verdict on the cases there are; what is missing or did not converge is said."""
+def verdict(cases: Sequence[Case], own_width_mm: float, height_mm: float) -> list[str]:
+    """Return the verdict on the solved cases; it names those that did not converge."""
     failed = [c for c in cases if not c.ok]
-    out = [f"{c.model}, {c.width_mm:g} mm wide, gave no numbers: {c.outcome}." for c in failed]
+    out = [f"{c.model}, {c.width_mm:g} mm wide, has no result: {c.outcome}." for c in failed]
     own = {c.model: c for c in cases if c.ok and c.width_mm == own_width_mm and c.model != "solid"}
     solid = next((c for c in cases if c.ok and c.model == "solid" and c.width_mm == own_width_mm), None)
     planes = [own[name] for name in ("plane strain", "plane stress") if name in own]
@@ -114,9 +118,9 @@ def sentences(cases: Sequence[Case], own_width_mm: float, height_mm: float) -> l
         return [*out, "No verdict: the solid and a plane model are needed."]
     out.append(_force(planes, solid, height_mm))
     out += _ends(own)
-    out += [_passage(name, cases) for name in ("plane strain", "plane stress")]
+    out += [_width_within(name, cases) for name in ("plane strain", "plane stress")]
     out += _others(planes, solid)
-    out.append(_would_have_done(planes, solid))
+    out.append(_sufficient(planes, solid))
     return out
 
 
@@ -145,17 +149,17 @@ def _ends(own: dict[str, Case]) -> list[str]:
     away = 100 * (held.numbers[FORCE] / strain.numbers[FORCE] - 1.0)
     return [
         f"With its end faces held along z the solid gives {held.numbers[FORCE]:.4g} N per mm, {abs(away):.1g} % from "
-        "plane strain: the difference is the free ends', not the mesh's."
+        "plane strain: the difference comes from the free ends, not from the mesh."
     ]
 
 
-def passage(model: str, cases: Sequence[Case]) -> list[Deviation]:
-    """Deviations of a plane model from the solids of all widths, each on the same in-plane mesh."""
+def deviations(model: str, cases: Sequence[Case]) -> list[Deviation]:
+    """Return the deviations of a plane model from the solids of all widths, each on the same in-plane mesh."""
     found = []
     for solid in cases:
         plane = next((c for c in cases if c.ok and c.model == model and _matches(c, solid)), None)
         if solid.ok and solid.model == "solid" and plane is not None:
-            found.append(matched(plane, solid))
+            found.append(force_deviation(plane, solid))
     return sorted(found, key=lambda d: d.width_mm)
 
 
@@ -163,56 +167,56 @@ def _matches(plane: Case, solid: Case) -> bool:
     return plane.width_mm == solid.width_mm and plane.size_mm == solid.size_mm
 
 
-def _passage(name: str, cases: Sequence[Case]) -> str:
-    found = passage(name, cases)
+def _width_within(name: str, cases: Sequence[Case]) -> str:
+    found = deviations(name, cases)
     narrow = name == "plane stress"
     goal, side = f"within {100 * WITHIN:g} % of the solid's force", "up to" if narrow else "from"
     if len(found) < 2:
-        return f"From which width on it comes {goal} was not asked: give --widths."
+        return f"{name.capitalize()} was solved at one width only; --widths finds the width at which it is {goal}."
     nearest = found[0] if narrow else found[-1]
-    reach = reached(found, narrow)
+    reach = crossing_width(found, narrow)
     widest = f"{rounded(100 * nearest.value, signed=True)} % at {nearest.width_mm:g} mm"
     if reach is None:
-        far = "the narrowest" if narrow else "the widest"
+        far = "narrowest" if narrow else "widest"
         more = ""
         if not narrow and abs(nearest.value) < _ASYMPTOTIC:
             guess = nearest.width_mm * abs(nearest.value) / WITHIN
-            more = f"; falling on as 1/width it would be at about {rounded(guess)} mm"
-        return f"{name.capitalize()} does not come {goal} within the widths asked ({widest}, {far} asked){more}."
+            more = f"; extrapolated as 1/width, it does at about {rounded(guess)} mm"
+        return f"{name.capitalize()} is not {goal} at any of these widths ({widest}, the {far}){more}."
     at, low, high = reach
     widths = [d.width_mm for d in found]
     if at == (max(widths) if narrow else min(widths)):
-        return f"{name.capitalize()} is {goal} at every width asked, {min(widths):g} to {max(widths):g} mm."
+        return f"{name.capitalize()} is {goal} at all of these widths, {min(widths):g} to {max(widths):g} mm."
     bar = [f"{v:.3g}" for v in sorted((low, high)) if math.isfinite(v)]
     between = f" (error bar {' to '.join(bar)})" if len(bar) == 2 else ""
     if len(bar) == 1:
-        ends = f"below the narrowest asked to {bar[0]}" if narrow else f"{bar[0]} to beyond the widest asked"
+        ends = f"less than {min(widths):g} to {bar[0]}" if narrow else f"{bar[0]} to more than {max(widths):g}"
         between = f" (error bar {ends})"
-    return f"{name.capitalize()} comes {goal} {side} a width of {at:.3g} mm{between}."
+    return f"{name.capitalize()} is {goal} {side} a width of {at:.3g} mm{between}."
 
 
 def _others(planes: Sequence[Case], solid: Case) -> list[str]:
     out = []
     for key, what in (("contact_length_mm", "Contact length at z = 0"), ("stick_length_mm", "Stick length at z = 0")):
-        told = ", ".join(f"{c.model} {_with_error(c, key, ' mm')}" for c in (solid, *planes))
-        out.append(f"{what}: {told}.")
+        values = ", ".join(f"{c.model} {_with_error(c, key, ' mm')}" for c in (solid, *planes))
+        out.append(f"{what}: {values}.")
     total, across = (solid.numbers[k] for k in ("friction_sum_N_per_mm", "friction_along_z_N_per_mm"))
     if total > 0.0:
         along = ", ".join(f"{c.model} {_with_error(c, 'friction_along_x_N_per_mm')}" for c in (solid, *planes))
         out.append(f"Sum of |friction along x|: {along} N per mm.")
         out.append(
-            f"Friction along the width, which no section has, sums up to {across:.3g} N per mm in the solid, "
-            f"{100 * across / total:.0f} % of its sum of |friction|."
+            f"Sum of |friction along z|, which is zero in a section: solid {across:.3g} N per mm, "
+            f"{100 * across / total:.0f} % of the sum of |friction|."
         )
     for key in solid.numbers:
         if key.startswith("gauge_"):
-            told = ", ".join(f"{c.model} {_with_error(c, key)}" for c in (solid, *planes))
-            out.append(f"Gauge {key.removeprefix('gauge_')}: {told}.")
+            values = ", ".join(f"{c.model} {_with_error(c, key)}" for c in (solid, *planes))
+            out.append(f"Gauge {key.removeprefix('gauge_')}: {values}.")
     return out
 
 
-def _would_have_done(planes: Sequence[Case], solid: Case) -> str:
-    """Which quantities each plane model has within the limit, or within the error bars where those are wider."""
+def _sufficient(planes: Sequence[Case], solid: Case) -> str:
+    """Name the quantities of each plane model that deviate by more and by less than the limit."""
     names = {
         FORCE: "force",
         "contact_length_mm": "contact length",
@@ -223,15 +227,15 @@ def _would_have_done(planes: Sequence[Case], solid: Case) -> str:
     names |= {k: f"gauge {k.removeprefix('gauge_')}" for k in solid.numbers if k.startswith("gauge_")}
     parts = []
     for plane in planes:
-        sides: dict[str, list[str]] = {"off by more than": [], "within": [], "by this mesh not told from": []}
+        sides: dict[str, list[str]] = {"more than": [], "less than": [], "not significantly more or less than": []}
         for key, name in names.items():
             if solid.numbers[key] == 0.0:
                 continue
             d = deviation(plane, solid, key)
             clear = abs(abs(d.value) - WITHIN) >= _SURE * d.error
-            side = "within" if abs(d.value) < WITHIN else "off by more than"
-            side = side if clear else "by this mesh not told from"
+            side = "less than" if abs(d.value) < WITHIN else "more than"
+            side = side if clear else "not significantly more or less than"
             sides[side].append(f"{name} ({rounded(100 * d.value, signed=True)} %)")
-        told = [f"{side} {100 * WITHIN:g} % in {', '.join(found)}" for side, found in sides.items() if found]
-        parts.append(f"{plane.model.capitalize()} in place of the solid is {'; '.join(told)}.")
+        lists = [f"{side} {100 * WITHIN:g} % in {', '.join(found)}" for side, found in sides.items() if found]
+        parts.append(f"{plane.model.capitalize()} deviates from the solid by {'; by '.join(lists)}.")
     return " ".join(parts)
