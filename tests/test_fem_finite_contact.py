@@ -21,8 +21,14 @@ def contact(mesh: Mesh, face: BoundarySurface, u: np.ndarray) -> DeformedContact
     normal = np.array([0.2, -1.0, 0.1])[: mesh.dim]
     normal = normal / np.linalg.norm(normal)
     at = face.samples + face.interpolate @ u
-    seen = at @ normal + 1.2
-    return deformed_contact(face, (mesh.points, u), (seen, np.broadcast_to(normal, at.shape)), ())
+    return deformed_contact(
+        face,
+        points=mesh.points,
+        displacement=u,
+        gap=at @ normal + 1.2,
+        normal=np.broadcast_to(normal, at.shape),
+        axes=(),
+    )
 
 
 @pytest.mark.parametrize("d", [2, 3])

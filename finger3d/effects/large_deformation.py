@@ -1,8 +1,11 @@
-"""Finite strain: neo-Hookean body, gap and directions that follow the moved points.
+"""Finite strain: a neo-Hookean body, and contact conditions on its deformed surface.
 
-Newton around the same contact solution: linearise elasticity and gap at the current state, condense,
-let the contact rule solve contact exactly, repeat.  The multipliers are total: with internal forces R and tangent K,
-``u + K^-1 (B^T f - R)`` is the next state, and the contact rule sees its part without f as the free motion.
+Newton's method around the contact solution.  At displacements u with internal forces R(u), tangent K and normals and
+tangents B of the contact points, the contact forces f and the next displacements solve ::
+
+    u' = u + K^-1 (B^T f - R),    contact conditions of f and B u'
+
+The forces are total, not increments, so f = 0 in an open point.  `u - K^-1 R` is the free motion of the increment.
 """
 
 from __future__ import annotations
@@ -10,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -33,19 +37,63 @@ from finger3d.mechanics.problem import Problem, scatter_to_points
 
 Float = NDArray[np.float64]
 
-_ITERATIONS = 20
-_SETTLED = 1e-9  # largest violation; round-off may leave as much as TOLERANCE
-_SHARES = (1.0, 0.5, 0.25, 0.125)  # of a step that would turn a cell inside out
+_ITERATIONS = 19
+"""Newton iterations of an increment, at most."""
 
-_SLOPE_STEP = 1e-5  # of the depth: central differences of the object's height, exact for planes
-_BESIDE = 2.0  # gap beside an object, in heights of the finger
+_TARGET_RESIDUAL = 1e-9
+"""Residual at which the iteration ends; where round-off prevents it, one up to `TOLERANCE` that no longer falls."""
+
+_LARGEST_STEP = 10.0
+"""Displacement of one Newton step, in depths of the press, beyond which the iteration diverges."""
+
+_STEP_LENGTHS = (1.0, 0.5, 0.25, 0.125)
+"""Fractions of a Newton step tried in the line search, until no cell is inverted."""
+
+_SLOPE_STEP = 1e-5
+"""Step of the central differences of the object's height, in depths of the press; any step is exact for a plane."""
+
+_OUTSIDE_GAP = 2.0
+"""Gap of points that no part of the object covers, in heights of the finger."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DeformedState(ContactState):
+    """A contact state with the unknowns (N,) of the meshed part that belong to it."""
+
+    unknowns: Float
 
 
 @dataclass(frozen=True)
-class DeformedState(ContactState):
-    """A contact state with the unknowns (N,) of the meshed part that go with it."""
+class _Configuration:
+    """Unknowns x (N,), and internal forces (N,) and tangent there; None for a tangent that was factored before."""
 
-    unknowns: Float | None = None
+    x: Float
+    internal: Float
+    tangent: Stiffness | None
+
+
+@dataclass
+class NewtonWorkspace(Workspace):
+    """Sparsity patterns of the tangent, and the configuration where the last increment ended with its condensation.
+
+    The condensation serves the next increment if it begins there; otherwise its factor is overwritten.
+    """
+
+    end: _Configuration | None = None
+    condensation: Condensation | None = None
+    _patterns: tuple[Pattern, sp.csr_matrix] | None = None
+
+    def patterns(self, problem: Problem) -> tuple[Pattern, sp.csr_matrix]:
+        """Sparsity patterns of the tangent and of the contact rows (r, n d), the same in all iterations."""
+        if self._patterns is None:
+            face, d = problem.surface, problem.dim
+            coupled = sp.csr_matrix((face.average != 0).astype(float) @ (face.interpolate != 0).astype(float))
+            pairs = (coupled.T @ coupled).tocoo()
+            rows = sp.kron(coupled, np.ones((d, d)), format="csr")[problem.active_dofs]
+            rows.sort_indices()
+            linked = pairs.row.astype(np.int64), pairs.col.astype(np.int64)
+            self._patterns = Pattern.of(problem.mesh, problem.elastic.mixed, linked), rows
+        return self._patterns
 
 
 @dataclass(frozen=True)
@@ -58,20 +106,16 @@ class FiniteStrain:
     supported_slots: ClassVar[frozenset[str]] = frozenset()
 
     def workspace(self) -> NewtonWorkspace:
-        """Nothing assembled, nothing factored."""
+        """Return a workspace without patterns and factors."""
         return NewtonWorkspace()
 
-    def _law(self, problem: Problem) -> NeoHooke:
-        material = problem.model.material.isotropic("effects.large_deformation")
-        return NeoHooke.of(material.E_MPa, material.nu, problem.model.domain == "plane-stress")
-
     def start(self, problem: Problem) -> DeformedState:
-        """At rest."""
-        law, mesh = self._law(problem), problem.mesh
-        unknowns = np.zeros(mesh.points.size + (len(mesh.vertices) if law.mixed else 0))
-        frames = np.broadcast_to(problem.points.basis, (len(problem.surface.nodes), problem.dim, problem.dim))
+        """State at rest."""
+        mesh = problem.mesh
+        unknowns = np.zeros(mesh.points.size + (len(mesh.vertices) if _law(problem).mixed else 0))
+        bases = np.broadcast_to(problem.points.basis, (len(problem.surface.nodes), problem.dim, problem.dim))
         rest = ContactState.at_rest(problem.gap(problem.origin), problem.dim)
-        return DeformedState(**(vars(rest) | {"bases": frames}), unknowns=unknowns)
+        return DeformedState(**(vars(rest) | {"bases": bases}), unknowns=unknowns)
 
     def increment(
         self,
@@ -82,67 +126,45 @@ class FiniteStrain:
         guess: Float | None,
         workspace: Workspace,
     ) -> ContactSolution:
-        """Newton until all conditions hold where it has come to.
-
-        It begins with the factor that the increment before ended with, which is that of the same place.
-        """
+        """Newton iterations until equilibrium and contact conditions hold in the deformed configuration."""
         assert isinstance(state, DeformedState)
         assert isinstance(workspace, NewtonWorkspace)
-        assert state.unknowns is not None
-        law, scale = self._law(problem), length_scale(problem, a, b)
-        c, d = problem.delassus.shape[:2]
-        weights = augmentation_parameters(problem.delassus.reshape(c * d, c * d), d)
-        place, body = self._begin(problem, law, state.unknowns, workspace)
-        force, spent, found = state.force if guess is None else guess, 0, None
-        error = size = np.inf
+        newton = _NewtonIncrement(problem, state, a, b, workspace)
+        configuration, condensation = newton.begin()
+        contact = newton.contact(configuration)
+        force = state.force if guess is None else guess
+        outcome, iterations = Outcome.NEWTON, 0
+        error = size = math.inf
         for _ in range(_ITERATIONS):
-            contact = _contact(problem, problem.surface, displacement(problem.mesh, place.x), b)
-            if found is not None:
-                moved = _moved_by(problem, state, contact, (state.unknowns, place.x, None), (a, b))
-                last, error = error, _violation(problem, place, contact, found.state, moved, (scale, law.shear))
-                if error <= _SETTLED or 0.3 * last < error <= TOLERANCE:
-                    workspace.last = replace(place, tangent=None), body
-                    after = vars(next_state(state, found.state.force, moved, found.state.status))
-                    settled = DeformedState(**(after | {"bases": contact.bases}), unknowns=place.x)
-                    return ContactSolution(settled, Outcome.CONVERGED, max(found.residual, error), spent, found.method)
-            if place.tangent is not None:
-                body = _factored(problem, place.tangent, contact, force[:, 0], body, workspace)
-            assert body is not None
-            relaxed = body.solve(-place.inner)
-            free = _moved_by(problem, state, contact, (state.unknowns, place.x, relaxed), (a, b))
-            free[:, 1:] += state.tangential_displacement
-            compliance = scatter_to_points(body.compliance, problem.active_dofs, c, d)
-            found = solve_contact(problem, state, free, compliance, scale, force, weights)
-            spent += found.iterations
-            if not found.outcome.ok:
-                return replace(found, state=state, iterations=spent)
-            force = found.state.force
-            step = relaxed + body.unknowns(force.ravel()[problem.active_dofs])
-            last, size = size, float(np.abs(step[: problem.mesh.points.size]).max()) / scale
-            if not np.isfinite(size) or size > max(10.0, 1e3 * last):
+            condensation = newton.linearise(configuration, contact, force, condensation)
+            solution, step = newton.solve_contact(configuration, contact, force, condensation)
+            iterations += solution.iterations
+            if not solution.outcome.ok:
+                return replace(solution, state=state, iterations=iterations)
+            force = solution.state.force
+            last_size, size = size, newton.step_size(step)
+            if not size < max(_LARGEST_STEP, 1e3 * last_size):  # NaN too
                 break
-            onward = _onward(problem, law, place, step, workspace)
-            if onward is None:
-                return ContactSolution(state, Outcome.INVERTED, error, spent, "none")
-            place = onward
-        return ContactSolution(state, Outcome.NEWTON, error, spent, "none")
-
-    def _begin(
-        self, problem: Problem, law: NeoHooke, x: Float, workspace: NewtonWorkspace
-    ) -> tuple[_Place, Condensation | None]:
-        """The place of unknowns x without a tangent if its body is at hand; otherwise a body to overwrite."""
-        kept, workspace.last = workspace.last, None
-        place, body = kept or (None, None)
-        return (place if place is not None and place.x is x else _Place.at(problem, law, x, workspace)), body
+            try:
+                configuration = newton.line_search(configuration, step)
+            except InvertedError:
+                outcome = Outcome.INVERTED
+                break
+            contact = newton.contact(configuration)
+            last_error, error = error, newton.residual(configuration, contact, solution.state)
+            if error <= _TARGET_RESIDUAL or 0.3 * last_error < error <= TOLERANCE:
+                newton.keep(configuration, condensation)
+                converged = newton.state(configuration, contact, solution.state)
+                return replace(solution, state=converged, residual=max(solution.residual, error), iterations=iterations)
+        return ContactSolution(state, outcome, error, iterations, "none")
 
     def unknowns(self, problem: Problem, state: ContactState) -> Float:
-        """Kept with the state."""
+        """All unknowns (N,), which the state holds."""
         assert isinstance(state, DeformedState)
-        assert state.unknowns is not None
         return state.unknowns
 
     def all_unknowns(self, problem: Problem, states: Sequence[ContactState]) -> Iterator[Float]:
-        """Those of each state."""
+        """All unknowns (N,) of each state."""
         return (self.unknowns(problem, state) for state in states)
 
     def gauges(self, problem: Problem, state: ContactState) -> dict[str, float]:
@@ -154,140 +176,188 @@ class FiniteStrain:
     def gaps(
         self, problem: Problem, states: Sequence[ContactState], targets: Sequence[ObjectPose], face: BoundarySurface
     ) -> list[Float]:
-        """Gap of the moved points."""
-        moved = (displacement(problem.mesh, unknowns) for unknowns in self.all_unknowns(problem, states))
-        return [_contact(problem, face, u, target).gap for u, target in zip(moved, targets, strict=True)]
+        """Gap (c,) mm of the points of a face in each deformed configuration."""
+        fields = (displacement(problem.mesh, unknowns) for unknowns in self.all_unknowns(problem, states))
+        return [_contact(problem, face, u, target).gap for u, target in zip(fields, targets, strict=True)]
 
     def fields(self, problem: Problem, state: ContactState) -> tuple[Float, Float, Float]:
         """Displacement, Green-Lagrange strain and Cauchy stress."""
-        unknowns, law = self.unknowns(problem, state), self._law(problem)
-        strain, cauchy = nodal_fields(problem.mesh, law, unknowns)
+        unknowns = self.unknowns(problem, state)
+        strain, cauchy = nodal_fields(problem.mesh, _law(problem), unknowns)
         return displacement(problem.mesh, unknowns), strain, cauchy
 
 
+def _law(problem: Problem) -> NeoHooke:
+    material = problem.model.material.isotropic("effects.large_deformation")
+    return NeoHooke.of(material.E_MPa, material.nu, problem.model.domain == "plane-stress")
+
+
 @dataclass(frozen=True)
-class _Place:
-    """Unknowns x (N,), the internal forces (N,) and the tangent there; no tangent if it was factored before."""
+class _NewtonIncrement:
+    """Stages of the Newton iteration from a state, as the object moves from pose a to pose b."""
 
-    x: Float
-    inner: Float
-    tangent: Stiffness | None
+    problem: Problem
+    start: DeformedState
+    a: ObjectPose
+    b: ObjectPose
+    workspace: NewtonWorkspace
 
-    @classmethod
-    def at(cls, problem: Problem, law: NeoHooke, x: Float, workspace: NewtonWorkspace) -> _Place:
-        """Assemble; raises InvertedError."""
-        pattern, _ = workspace.places(problem)
-        tangent, inner = assemble(problem.mesh, law, x, pattern, problem.thickness)
-        return cls(x, inner, tangent)
+    @cached_property
+    def _law(self) -> NeoHooke:
+        return _law(self.problem)
 
+    @cached_property
+    def _length_scale(self) -> float:
+        return length_scale(self.problem, self.a, self.b)
 
-@dataclass
-class NewtonWorkspace(Workspace):
-    """Sparsity patterns of the tangent, and the place and factor that the last increment ended with."""
+    @cached_property
+    def _augmentation(self) -> Float:
+        delassus = self.problem.delassus
+        c, d = delassus.shape[:2]
+        return augmentation_parameters(delassus.reshape(c * d, c * d), d)
 
-    last: tuple[_Place, Condensation | None] | None = None
-    _patterns: tuple[Pattern, sp.csr_matrix] | None = None
+    def begin(self) -> tuple[_Configuration, Condensation | None]:
+        """Return the configuration of the first state, and the condensation that the last increment left."""
+        end, condensation = self.workspace.end, self.workspace.condensation
+        self.workspace.end = self.workspace.condensation = None
+        if end is not None and end.x is self.start.unknowns:
+            return end, condensation
+        return self._configuration(self.start.unknowns), condensation
 
-    def places(self, problem: Problem) -> tuple[Pattern, sp.csr_matrix]:
-        """Where entries of the tangent and of the contact rows (r, n d) may stand: the same in all iterations."""
-        if self._patterns is None:
-            face, d = problem.surface, problem.dim
-            beside = sp.csr_matrix((face.average != 0).astype(float) @ (face.interpolate != 0).astype(float))
-            pairs = (beside.T @ beside).tocoo()
-            rows = sp.kron(beside, np.ones((d, d)), format="csr")[problem.active_dofs]
-            rows.sort_indices()
-            linked = pairs.row.astype(np.int64), pairs.col.astype(np.int64)
-            self._patterns = Pattern.of(problem.mesh, problem.elastic.mixed, linked), rows
-        return self._patterns
+    def keep(self, configuration: _Configuration, condensation: Condensation) -> None:
+        """Leave the last configuration and condensation to the next increment."""
+        self.workspace.end, self.workspace.condensation = replace(configuration, tangent=None), condensation
 
+    def _configuration(self, x: Float) -> _Configuration:
+        pattern, _ = self.workspace.patterns(self.problem)
+        tangent, internal = assemble(self.problem.mesh, self._law, x, pattern, self.problem.thickness)
+        return _Configuration(x, internal, tangent)
 
-def _factored(
-    problem: Problem,
-    tangent: Stiffness,
-    contact: DeformedContact,
-    force: Float,
-    spent: Condensation | None,
-    workspace: NewtonWorkspace,
-) -> Condensation:
-    """The body condensed at a place, under normal forces (c,) N."""
-    _, places = workspace.places(problem)
-    rows = sp.csr_matrix(
-        (on_places(contact.rows[problem.active_dofs], places), places.indices, places.indptr), places.shape
-    )
-    softened = tangent.less(contact.geometric_stiffness(problem.surface, force))
-    body = condense(softened, problem.fixed_dofs, rows, spent=spent)
-    workspace.factorizations += body.factorizations
-    return body
+    def contact(self, configuration: _Configuration) -> DeformedContact:
+        """Gaps, directions and contact rows of the deformed surface under the object at b."""
+        problem = self.problem
+        return _contact(problem, problem.surface, displacement(problem.mesh, configuration.x), self.b)
 
+    def linearise(
+        self,
+        configuration: _Configuration,
+        contact: DeformedContact,
+        force: Float,
+        condensation: Condensation | None,
+    ) -> Condensation:
+        """Condense the tangent under contact forces (c, d); a tangent that is None was condensed before."""
+        if configuration.tangent is None:
+            assert condensation is not None
+            return condensation
+        problem = self.problem
+        _, pattern = self.workspace.patterns(problem)
+        entries = on_places(contact.rows[problem.active_dofs], pattern)
+        rows = sp.csr_matrix((entries, pattern.indices, pattern.indptr), pattern.shape)
+        tangent = configuration.tangent.less(contact.geometric_stiffness(problem.surface, force[:, 0]))
+        condensed = condense(tangent, problem.fixed_dofs, rows, spent=condensation)
+        self.workspace.factorizations += condensed.factorizations
+        return condensed
 
-def _onward(problem: Problem, law: NeoHooke, place: _Place, step: Float, workspace: NewtonWorkspace) -> _Place | None:
-    """The place a step further on, or as much of it as turns no cell inside out."""
-    for share in _SHARES:
-        try:
-            return _Place.at(problem, law, place.x + share * step, workspace)
-        except InvertedError:
-            continue
-    return None
+    def solve_contact(
+        self, configuration: _Configuration, contact: DeformedContact, guess: Float, condensation: Condensation
+    ) -> tuple[ContactSolution, Float]:
+        """Solve contact of the linearised body; returns the solution and the Newton step (N,) of the unknowns."""
+        problem, start = self.problem, self.start
+        c, d = start.force.shape
+        relaxation = condensation.solve(-configuration.internal)
+        free = self._relative_displacement(contact, configuration.x + relaxation)
+        free[:, 0] += (contact.rows @ relaxation[: problem.mesh.points.size])[::d]
+        free[:, 1:] += start.tangential_displacement
+        delassus = scatter_to_points(condensation.compliance, problem.active_dofs, c, d)
+        solution = solve_contact(problem, start, free, delassus, self._length_scale, guess, self._augmentation)
+        forces = solution.state.force.ravel()[problem.active_dofs]
+        return solution, relaxation + condensation.unknowns(forces)
 
+    def _relative_displacement(self, contact: DeformedContact, x: Float) -> Float:
+        """Gap and increment of tangential displacement (c, d) at unknowns x (N,), in the directions of `contact`."""
+        problem = self.problem
+        n, d = problem.mesh.points.size, problem.dim
+        travel = (self.b.displacement - self.a.displacement)[:d]
+        increment = problem.surface.trace @ (x - self.start.unknowns)[:n].reshape(-1, d) - travel
+        out = np.empty((len(contact.gap), d))
+        out[:, 0] = contact.gap
+        out[:, 1:] = np.einsum("ctk,ck->ct", contact.bases[:, 1:], increment)
+        # Across a symmetry plane nothing moves; the weighted mean over half of a point's hat need not be zero.
+        out.ravel()[np.setdiff1d(np.arange(out.size), problem.active_dofs)] = 0.0
+        return out
 
-def _moved_by(
-    problem: Problem, state: ContactState, contact: DeformedContact,
-    motion: tuple[Float, Float, Float | None], path: tuple[ObjectPose, ObjectPose],
-) -> Float:  # fmt: skip
-    """Gap and change of tangential position (c, d) of a body that moved from `before` to x, and on by `relaxed`."""
-    (before, x, relaxed), (a, b) = motion, path
-    n, d = problem.mesh.points.size, problem.dim
-    travel = (b.displacement - a.displacement)[:d]
-    there = x if relaxed is None else x + relaxed
-    out = np.empty((len(contact.gap), d))
-    out[:, 0] = contact.gap + (0.0 if relaxed is None else (contact.rows @ relaxed[:n])[::d])
-    since = problem.surface.trace @ (there - before)[:n].reshape(-1, d) - travel
-    out[:, 1:] = np.einsum("ctk,ck->ct", contact.bases[:, 1:], since)
-    # the tangent across a symmetry plane does not move, whatever the half hat's mean says
-    out.ravel()[np.setdiff1d(np.arange(out.size), problem.active_dofs)] = 0.0
-    return out
+    def step_size(self, step: Float) -> float:
+        """Largest displacement of a step, in depths of the press; NaN if the step is not finite."""
+        return float(np.abs(step[: self.problem.mesh.points.size]).max()) / self._length_scale
 
+    def line_search(self, configuration: _Configuration, step: Float) -> _Configuration:
+        """Return the configuration after the longest fraction of a step that inverts no cell.
 
-def _violation(
-    problem: Problem, place: _Place, contact: DeformedContact, found: ContactState, moved: Float,
-    scales: tuple[float, float],
-) -> float:  # fmt: skip
-    """Largest violation at a place: of contact (lengths by a scale), equilibrium (by the largest nodal force), and
-    p = K (J - 1) (in J; p by the shear modulus).  The forces' own friction law holds as the rule left it."""
-    n, force = problem.mesh.points.size, found.force
-    normal, length = force[:, 0], np.linalg.norm(force[:, 1:], axis=1)
-    mu = length / np.where(normal > 0.0, normal, 1.0)
-    astray = place.inner.copy()
-    astray[:n] -= contact.rows[problem.active_dofs].T @ force.ravel()[problem.active_dofs]
-    astray[problem.fixed_dofs] = 0.0
-    largest = float(np.linalg.norm(force, axis=1).max()) or float(np.abs(place.inner[:n]).max()) or 1.0
-    unbalanced = float(np.abs(astray[:n]).max()) / largest
-    mesh = problem.mesh
-    volume = np.abs(np.linalg.det(np.diff(mesh.points[mesh.cells[:, : mesh.dim + 1]], axis=1))).mean()
-    volume *= problem.thickness / math.factorial(mesh.dim) * pressure_scale(mesh, scales[1])
-    swollen = float(np.abs(astray[n:]).max(initial=0.0)) / volume
-    return max(residual(force, moved, found.status, mu, scales[0]), unbalanced, swollen)
+        Raises
+        ------
+        InvertedError
+            If even the shortest fraction inverts a cell.
+        """
+        for length in _STEP_LENGTHS:
+            try:
+                return self._configuration(configuration.x + length * step)
+            except InvertedError:
+                continue
+        raise InvertedError
+
+    def residual(self, configuration: _Configuration, contact: DeformedContact, solution: ContactState) -> float:
+        """Largest violation of contact conditions, equilibrium and p = K (J - 1), dimensionless.
+
+        Lengths are divided by the depth, forces by the largest nodal force, p by the shear modulus.  The friction
+        coefficients are those that the contact solution has used.
+        """
+        problem, force = self.problem, solution.force
+        mesh, n = problem.mesh, problem.mesh.points.size
+        normal, tangential = force[:, 0], np.linalg.norm(force[:, 1:], axis=1)
+        mu = tangential / np.where(normal > 0.0, normal, 1.0)
+        out_of_balance = configuration.internal.copy()
+        out_of_balance[:n] -= contact.rows[problem.active_dofs].T @ force.ravel()[problem.active_dofs]
+        out_of_balance[problem.fixed_dofs] = 0.0
+        largest = np.linalg.norm(force, axis=1).max() or np.abs(configuration.internal[:n]).max() or 1.0
+        equilibrium = float(np.abs(out_of_balance[:n]).max() / largest)
+        volume = float(np.abs(np.linalg.det(np.diff(mesh.points[mesh.cells[:, : mesh.dim + 1]], axis=1))).mean())
+        volume *= problem.thickness / math.factorial(mesh.dim) * pressure_scale(mesh, self._law.shear)
+        dilatation = float(np.abs(out_of_balance[n:]).max(initial=0.0)) / volume
+        moved = self._relative_displacement(contact, configuration.x)
+        return max(residual(force, moved, solution.status, mu, self._length_scale), equilibrium, dilatation)
+
+    def state(self, configuration: _Configuration, contact: DeformedContact, solution: ContactState) -> DeformedState:
+        """Return the state at the end of the increment."""
+        moved = self._relative_displacement(contact, configuration.x)
+        after = next_state(self.start, solution.force, moved, solution.status)
+        return DeformedState(**(vars(after) | {"bases": contact.bases}), unknowns=configuration.x)
 
 
 def _contact(problem: Problem, face: BoundarySurface, u: Float, target: ObjectPose) -> DeformedContact:
-    """Contact of a face displaced by u (n, d): gaps are means over the deformed area."""
+    """Contact of a face displaced by u (n, d) with the object at a pose; gaps are means over the deformed area."""
     model, d = problem.model, problem.dim
-    at = face.samples + face.interpolate @ u
-    z = at[:, 2] - target.slide_z_mm if d == 3 else np.zeros(len(at))
-    x, step = at[:, 0] - target.slide_x_mm, _SLOPE_STEP * max(target.depth_mm, 1e-3)
-    level = model.object.height(x, z)
-    there = np.isfinite(level)
-    slope_x = (model.object.height(x + step, z) - model.object.height(x - step, z)) / (2.0 * step)
-    slope_z = (model.object.height(x, z + step) - model.object.height(x, z - step)) / (2.0 * step)
+    height = model.object.height
+    position = face.samples + face.interpolate @ u
+    x, step = position[:, 0] - target.slide_x_mm, _SLOPE_STEP * max(target.depth_mm, 1e-3)
+    z = position[:, 2] - target.slide_z_mm if d == 3 else np.zeros(len(x))
+    level = height(x, z)
+    covered = np.isfinite(level)
+    slope_x = (height(x + step, z) - height(x - step, z)) / (2.0 * step)
+    slope_z = (height(x, z + step) - height(x, z - step)) / (2.0 * step)
     normal = np.stack([slope_x, np.full(len(x), -1.0), slope_z], axis=1)[:, :d]
-    usable = there & np.isfinite(normal).all(axis=1)
-    normal = np.where(usable[:, None], normal, problem.points.basis[0])
+    has_slope = covered & np.isfinite(normal).all(axis=1)
+    normal = np.where(has_slope[:, None], normal, problem.points.basis[0])
     length = np.linalg.norm(normal, axis=1)
-    normal = normal / length[:, None]
-    vertical = level + problem.first_contact_mm - target.depth_mm - at[:, 1]
-    sampled = np.where(there, vertical / length, _BESIDE * model.design.height_mm)
-    axes = problem.axes
-    return deformed_contact(face, (problem.mesh.points, u), (sampled, normal), axes)
+    vertical = level + problem.first_contact_mm - target.depth_mm - position[:, 1]
+    gap = np.where(covered, vertical / length, _OUTSIDE_GAP * model.design.height_mm)
+    return deformed_contact(
+        face,
+        points=problem.mesh.points,
+        displacement=u,
+        gap=gap,
+        normal=normal / length[:, None],
+        axes=problem.axes,
+    )
 
 
 @dataclass(frozen=True)
@@ -297,6 +367,6 @@ class Effect:
     slot: ClassVar[str] = "formulation"
 
     def apply(self, model: Model) -> Model:
-        """Fill the kinematics slot."""
+        """Set the formulation of the model."""
         model.material.isotropic("effects.large_deformation")
         return fill(model, "formulation", FiniteStrain(), "large_deformation")

@@ -1,10 +1,9 @@
-"""Contact of a surface in its deformed place: gaps as means over the deformed area, and their derivatives."""
+"""Contact of a deformed surface: gaps as means over the deformed area, and their derivatives."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,7 +17,7 @@ Float = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class DeformedContact:
-    """Contact of a face in a deformed place.
+    """Contact of a deformed face.
 
     Attributes
     ----------
@@ -55,42 +54,61 @@ class DeformedContact:
 
 
 def deformed_contact(
-    face: BoundarySurface, moved: tuple[Float, Float], seen: tuple[Float, Float], axes: tuple[str, ...]
+    face: BoundarySurface,
+    *,
+    points: Float,
+    displacement: Float,
+    gap: Float,
+    normal: Float,
+    axes: tuple[str, ...],
 ) -> DeformedContact:
-    """Contact of a face with something seen from its samples.
+    """Contact of a deformed face.
 
     Parameters
     ----------
-    moved : nodes at rest and their displacement, (n, d) mm
-    seen : gap (q,) mm at the samples, and unit normals (q, d) into the body along which it is measured
-    axes : symmetry planes, on which directions do not lean out
+    points, displacement : (n, d) arrays, mm
+        Nodes of the mesh at rest, and their displacement.
+    gap : (q,) array, mm
+        Gap at the samples.
+    normal : (q, d) array
+        Unit normals into the body at the samples, along which the gap is measured.
+    axes : tuple of str
+        Normals of the symmetry planes, in which the normals of points on them lie.
     """
-    (points, u), (sampled, normal) = moved, seen
-    d = u.shape[1]
-    growth, spread, bend = _growth(face, points, u)
-    size = face.average @ growth
-    mean = (face.average @ (normal * growth[:, None])) / size[:, None]
-    gap = (face.average @ (sampled * growth)) / size
+    d = displacement.shape[1]
+    area_ratio, d_area_ratio, d2_area_ratio = _area_ratio(face, points, displacement)
+    area = face.average @ area_ratio
+    mean_normal = (face.average @ (normal * area_ratio[:, None])) / area[:, None]
+    mean_gap = (face.average @ (gap * area_ratio)) / area
     for k in axis_numbers(axes):
-        mean[face.points[:, k] == 0.0, k] = 0.0
-    frames = _frames(mean)
-    approach = _rows([sp.diags_array(normal[:, k]) @ face.interpolate for k in range(d)])
+        mean_normal[face.points[:, k] == 0.0, k] = 0.0
+    bases = _bases(mean_normal)
+    d_gap = _rows([sp.diags_array(normal[:, k]) @ face.interpolate for k in range(d)])
     # d(mean gap) = mean of d(gap) and of (gap - mean gap) d(area)
-    weight = sp.diags_array(1.0 / size) @ face.average
-    uneven = weight @ sp.diags_array(sampled) - sp.diags_array(gap) @ weight
-    blocks = [weight @ sp.diags_array(growth) @ approach + uneven @ spread]
-    blocks += [_rows([sp.diags_array(frames[:, t, k]) @ face.trace for k in range(d)]) for t in range(1, d)]
-    rows = sp.vstack(blocks, format="csr")[np.arange(len(gap) * d).reshape(d, -1).T.ravel()]
-    return DeformedContact(gap, sp.csr_matrix(rows), frames, growth, approach, spread, sampled, bend)
+    weight = sp.diags_array(1.0 / area) @ face.average
+    deviation = weight @ sp.diags_array(gap) - sp.diags_array(mean_gap) @ weight
+    blocks = [weight @ sp.diags_array(area_ratio) @ d_gap + deviation @ d_area_ratio]
+    blocks += [_rows([sp.diags_array(bases[:, t, k]) @ face.trace for k in range(d)]) for t in range(1, d)]
+    rows = sp.vstack(blocks, format="csr")[np.arange(len(mean_gap) * d).reshape(d, -1).T.ravel()]
+    return DeformedContact(
+        gap=mean_gap,
+        rows=sp.csr_matrix(rows),
+        bases=bases,
+        area_ratio=area_ratio,
+        d_gap=d_gap,
+        d_area_ratio=d_area_ratio,
+        gap_at_samples=gap,
+        d2_area_ratio=d2_area_ratio,
+    )
 
 
-def _rows(parts: list[Any]) -> sp.csr_matrix:
+def _rows(parts: Sequence[sp.csr_matrix]) -> sp.csr_matrix:
     """Rows (m, n d) on displacements from rows (m, n) on each of their components."""
     d, n = len(parts), parts[0].shape[1]
     return sp.csr_matrix(sp.hstack(parts, format="csr")[:, np.arange(n * d).reshape(d, n).T.ravel()])
 
 
-def _growth(
+def _area_ratio(
     face: BoundarySurface, points: Float, u: Float
 ) -> tuple[Float, sp.csr_matrix, Callable[[Float], sp.csr_matrix]]:
     """Deformed over initial area (q,) at the samples, its derivative (q, n d), and weighted sums of its second one."""
@@ -106,7 +124,7 @@ def _growth(
     scaled = [sp.diags_array(1.0 / initial) @ slope for slope in face.along]
     spread = _rows([sum(sp.diags_array(t[:, k]) @ x for t, x in zip(turned, scaled, strict=True)) for k in range(d)])
 
-    def bend(weights: Float) -> sp.csr_matrix:
+    def weighted_second(weights: Float) -> sp.csr_matrix:
         parts = [_change(face, moved, i) for i in range(d)]
         stretched = sp.diags_array(weights / (length * initial))
         total = sum(part.T @ stretched @ part for part in parts)
@@ -120,7 +138,7 @@ def _growth(
                 total = total + half + half.T
         return sp.csr_matrix(total)
 
-    return length / initial, spread, bend
+    return length / initial, spread, weighted_second
 
 
 def _component(rows: sp.csr_matrix, axis: int) -> sp.csr_matrix:
@@ -143,8 +161,8 @@ def _change(face: BoundarySurface, moved: list[Float], i: int) -> sp.csr_matrix:
     )
 
 
-def _frames(normal: Float) -> Float:
-    """Directions (c, d, d) with the given normals (c, d): the first tangent is +x laid into the plane."""
+def _bases(normal: Float) -> Float:
+    """Orthonormal bases (c, d, d) with the given normals (c, d); the first tangent is +x projected on the plane."""
     d = normal.shape[1]
     n = normal / np.linalg.norm(normal, axis=1)[:, None]
     along = np.eye(d)[0] - n[:, :1] * n
