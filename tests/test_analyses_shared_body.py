@@ -99,7 +99,7 @@ def test_candidates_are_widened_when_contact_reaches_beyond_them(monkeypatch):
     wide = SharedBody(model, [Variant.of(model)]).press(Variant.of(model))
     said = []
     first = [lambda m, say, margin=-0.8: build(m, say, margin)]
-    monkeypatch.setattr("finger3d.mechanics.solve.build", lambda m, say, *margin: first[0](m, say, *margin))
+    monkeypatch.setattr("finger3d.mechanics.build.build", lambda m, say, *margin: first[0](m, say, *margin))
     narrow = SharedBody(model, [Variant.of(model)], said.append)
     again = narrow.press(Variant.of(model))
     assert any("beyond" in text for text in said)
@@ -235,7 +235,7 @@ NARROW = -0.8
 
 
 def narrowed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("finger3d.mechanics.solve.build", lambda m, say, margin=NARROW: build(m, say, margin))
+    monkeypatch.setattr("finger3d.mechanics.build.build", lambda m, say, margin=NARROW: build(m, say, margin))
 
 
 @pytest.mark.parametrize("threads", [False, True], ids=["in turn", "at once"])
@@ -294,11 +294,11 @@ def test_presses_that_cannot_be_proved_fail_and_what_failed_before_keeps_its_rea
             raise ArithmeticError("its own")
         return march(problem, **arguments)
 
-    def unproved(problem, frames):
+    def unproved(problem, step):
         raise MemoryError("no proof")
 
     monkeypatch.setattr("finger3d.mechanics.step_halving.march", failing)
-    monkeypatch.setattr("finger3d.mechanics.solve.contact_within_candidates", unproved)
+    monkeypatch.setattr("finger3d.mechanics.coverage.step_within_candidates", unproved)
     assert [str(p) for p in body.presses(variants)] == ["no proof", "its own"]
 
 
@@ -311,7 +311,7 @@ def test_a_body_that_cannot_be_widened_fails_those_that_need_it_only(monkeypatch
             raise MemoryError
         return build(model, say, margin)
 
-    monkeypatch.setattr("finger3d.mechanics.solve.build", once)
+    monkeypatch.setattr("finger3d.mechanics.build.build", once)
     found = list(SharedBody(models[0], variants).presses(variants))
     assert [isinstance(p, MemoryError) for p in found] == [True, False, True]
     assert found[1].outcome == "converged"

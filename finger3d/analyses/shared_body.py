@@ -1,8 +1,7 @@
-"""Which scenes share a body, and one condensation for all of them.
+"""Families of scenes that share a condensed body.
 
-Friction, path, contact rule and gauges do not change a body's compliance: scenes that differ in nothing else are a
-family.  Its body is meshed for the union of all paths, so scenes of other depths or slides are pressed on a mesh graded
-for the widest contact among them, and not each on its own.
+Scenes that differ only in friction, path, contact rule and gauges have the same compliance and form a family.  The body
+of a family is meshed for the union of all paths, so that its mesh is graded for the widest contact among them.
 """
 
 from __future__ import annotations
@@ -15,12 +14,13 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
-from itertools import dropwhile, takewhile
+from itertools import dropwhile
 from pathlib import Path
 from threading import Event
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from finger3d.contact.friction import FrictionLaw
+from finger3d.contact.rules import RuleName
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
@@ -28,42 +28,47 @@ from finger3d.scene import Scene
 
 if TYPE_CHECKING:
     from finger3d.mechanics.formulation import Workspace
-    from finger3d.mechanics.solve import Problem
+    from finger3d.mechanics.problem import Problem
 
 _FREE = ("title", "friction", "press", "contact", "gauge")
+"""Tables of the scene that do not change the compliance."""
+
 _SIZES = ("size_mm", "base_size_mm")
-_WAIT_S = 1.0  # that finished presses may wait to be proved together
 
 TROUBLE = (Finger3dError, ArithmeticError, ValueError, RuntimeError, MemoryError)
-"""What one press, or the build of its body, may fail of without taking others along."""
+"""Errors that end one press, or one body, and leave the others of a sweep running."""
 
 
 @dataclass(frozen=True)
 class Variant:
-    """What may differ between presses of one body."""
+    """Settings in which presses of one body may differ."""
 
     friction: FrictionLaw
     legs: tuple[Leg, ...]
-    rule: Any
+    rule: RuleName
     gauges: tuple[Gauge, ...]
 
     @classmethod
     def of(cls, model: Model) -> Variant:
-        """The variant that a model is of its body."""
+        """Return the variant of a model."""
         return cls(model.friction, model.legs, model.rule, model.gauges)
+
+    def without_gauges(self) -> Variant:
+        """Return the variant without gauges; variants with an equal one share a press."""
+        return replace(self, gauges=())
 
 
 @dataclass(frozen=True)
 class VariantResult:
-    """The end of a press.
+    """Result of the last step of a press.
 
     Attributes
     ----------
-    outcome : the text of summary.json; where a step failed, which one
+    outcome : as in summary.json, with the number of the step that failed
     residual : the largest of all steps
-    numbers : the contract's numbers of the last step, without gauges; empty unless converged
-    gauges : name -> strain; likewise
-    seconds : of this press; 0 if another variant, different in its gauges only, has paid for it
+    numbers : quantities of the last step by their names in summary.json, without gauges; empty unless converged
+    gauges : name -> strain; empty unless converged
+    seconds : time of this press; 0 if it is that of another variant, with other gauges
     """
 
     outcome: str
@@ -74,14 +79,14 @@ class VariantResult:
 
 
 def body_key(scene: Scene) -> str:
-    """Hash of all that shapes the condensation: equal for scenes that share a body."""
+    """Return a hash of everything that changes the condensed body; scenes of one family have the same."""
     tree = scene.as_dict()
     effects = {k: v for k, v in tree["effects"].items() if getattr(scene.effects[k], "slot", "") != "friction"}
     kept = {k: v for k, v in tree.items() if k not in _FREE} | {"effects": effects}
     if "embedded_gauge" in effects:
         kept["gauge"] = tree["gauge"]
     given = scene.given.get("mesh", {})
-    # sizes that were chosen, not given, may follow the depth: the finest of a family is taken
+    # Default sizes depend on the depth; a family takes the smallest.
     kept["mesh"] = {k: v for k, v in tree["mesh"].items() if k not in _SIZES or k in given}
     files = [tree["finger"]["geometry"], tree["object"].get("path")]
     kept["files"] = [_digest(Path(name)) for name in files if name and Path(name).is_file()]
@@ -93,7 +98,7 @@ def _digest(path: Path) -> str:
 
 
 def families(scenes: Sequence[Scene]) -> dict[str, list[int]]:
-    """Numbers of the scenes that share a body, by the key of the body, in the order in which they come."""
+    """Return the indices of the scenes of each family, by `body_key`."""
     found: dict[str, list[int]] = {}
     for number, scene in enumerate(scenes):
         found.setdefault(body_key(scene), []).append(number)
@@ -101,111 +106,125 @@ def families(scenes: Sequence[Scene]) -> dict[str, list[int]]:
 
 
 def finest(models: Sequence[Model]) -> MeshOptions:
-    """The mesh options with the smallest sizes of the models."""
+    """Return the mesh options with the smallest sizes of the models."""
     sizes, bases = [m.mesh.size_mm for m in models], [m.mesh.base_size_mm for m in models]
     return replace(models[0].mesh, size_mm=min(sizes), base_size_mm=min(bases))
 
 
 class SharedBody:
-    """A body built once for some variants, and pressed as each of them.
+    """A condensed body that is pressed as several variants.
 
     Parameters
     ----------
-    model : any of the family, with the mesh that all share
-    variants : all that it will be pressed as
-    say : told about meshing and condensation
+    model : any model of the family, with the mesh that all share
+    variants : all variants that will be pressed
+    say : receives messages about meshing and condensation
+
+    Attributes
+    ----------
+    problem : the condensed body, with the gauges of all variants
+    seconds : time of meshing and condensation
     """
 
     def __init__(
         self, model: Model, variants: Sequence[Variant], say: Callable[[str], None] = lambda text: None
     ) -> None:
-        # the solver and SciPy are for those who press; who only sorts scenes by body does without
-        from finger3d.mechanics.solve import build
+        # Scenes are sorted by body without loading SciPy and the solver.
+        from finger3d.mechanics.build import build
 
         start = time.perf_counter()
         self._say = say
         gauges = model.gauges
         if model.inclusions is None:
-            # every place once, under names that cannot clash
+            # Each place has one gauge, whose name is a number; variants may use one name for different places.
             places = dict.fromkeys(replace(g, name="") for v in variants for g in v.gauges)
             gauges = tuple(replace(place, name=str(i)) for i, place in enumerate(places))
         self._names = {replace(g, name=""): g.name for g in gauges}
-        self._free = model.inclusions is not None
+        self._gauges_are_inclusions = model.inclusions is not None
         self.problem = build(replace(model, legs=shared_legs(variants), gauges=gauges), say)
         self.seconds = time.perf_counter() - start
-        self._done: dict[Any, VariantResult | Exception] = {}
+        self._results: dict[Variant, VariantResult | Exception] = {}
 
     def problem_of(self, variant: Variant) -> Problem:
-        """The condensed body under the friction, path and rule of a variant, with all gauges of all variants."""
-        own = replace(self.problem.model, friction=variant.friction, legs=variant.legs, rule=variant.rule)
-        return replace(self.problem, model=own)
+        """Return the body under the friction, path and rule of a variant, with the gauges of all variants."""
+        model = replace(self.problem.model, friction=variant.friction, legs=variant.legs, rule=variant.rule)
+        return replace(self.problem, model=model)
 
     def frames(self, variants: Sequence[Variant]) -> list[tuple[StepResult, ...]]:
-        """Frames of each variant, all of `problem` as it then is.
+        """Return the steps of each variant, all on the same candidate points.
 
-        If contact reached beyond the candidate points, that is the body condensed to all of its contact face.
+        Raises
+        ------
+        Exception
+            The reason why a press failed, one of `TROUBLE`.
         """
         found: list[_Run | None] = [None] * len(variants)
+        # Presses are repeated if a later one has added candidate points.
         while left := [i for i, run in enumerate(found) if run is None or run.problem is not self.problem]:
             for i, run in zip(left, self._runs([variants[i] for i in left], None), strict=True):
                 found[i] = run
-        return [run.known() for run in found if run]
+        return [run.steps_or_raise() for run in found if run]
 
     def press(self, variant: Variant) -> VariantResult:
-        """The last step's numbers of a variant."""
+        """Return the result of a variant.
+
+        Raises
+        ------
+        Exception
+            The reason why the press failed, one of `TROUBLE`.
+        """
         found = next(self.presses([variant]))
         if isinstance(found, Exception):
             raise found
         return found
 
     def presses(self, variants: Sequence[Variant], most: int | None = None) -> Iterator[VariantResult | Exception]:
-        """The last step's numbers of each variant, or what it failed of, in that order; each at most some way behind.
+        """Yield the result of each variant in order, or the reason why its press failed.
 
-        Variants that differ in their gauges only share a press.  As many run at once as pays, and no more than `most`.
+        Variants that differ only in their gauges share a press.
+
+        Parameters
+        ----------
+        variants : sequence
+        most : int, optional
+            Largest number of presses at once.
         """
-        new = {_press_of(v): v for v in variants if _press_of(v) not in self._done}
-        runs, keys, unpaid = self._runs(list(new.values()), most), iter(new), set(new)
+        new = [v for v in dict.fromkeys(v.without_gauges() for v in variants) if v not in self._results]
+        runs, unpaid = zip(new, self._runs(new, most), strict=True), set(new)
         for variant in variants:
-            key = _press_of(variant)
-            while key not in self._done:
-                self._done[next(keys)] = next(runs).pressed()
-            pressed = self._done[key]
-            if isinstance(pressed, VariantResult):
-                gauges = self.strains(variant, pressed.gauges) if pressed.gauges else {}
-                pressed = replace(pressed, gauges=gauges, seconds=pressed.seconds if key in unpaid else 0.0)
-            unpaid.discard(key)
-            yield pressed
+            press = variant.without_gauges()
+            while press not in self._results:
+                done, run = next(runs)
+                self._results[done] = run.result()
+            result = self._results[press]
+            if isinstance(result, VariantResult):
+                gauges = self.strains(variant, result.gauges) if result.gauges else {}
+                result = replace(result, gauges=gauges, seconds=result.seconds if press in unpaid else 0.0)
+            unpaid.discard(press)
+            yield result
+
+    def strains(self, variant: Variant, gauges: dict[str, float]) -> dict[str, float]:
+        """Return the strains of a variant's gauges by name, from those of the gauges of all variants."""
+        if self._gauges_are_inclusions:
+            return gauges
+        return {g.name: gauges[self._names[replace(g, name="")]] for g in variant.gauges}
 
     def _runs(self, variants: Sequence[Variant], most: int | None) -> Iterator[_Run]:
-        """Each variant pressed, and proved to touch no point beyond the candidates; several are proved at once.
-
-        What is finished waits for that a second, or for as long as the press beside it takes.
-        """
-        from finger3d.mechanics.solve import candidates_cover_face, map_parallel
+        """Press each variant; condense the whole contact face once contact goes beyond the candidate points."""
+        from finger3d.mechanics.parallel import map_parallel
 
         left = deque(variants)
         while left:
-            waiting: list[_Run] = []
-            since, reached = time.perf_counter(), False
-            wait = 0.0 if candidates_cover_face(self.problem) else _WAIT_S
             with closing(map_parallel(self.problem, self._run, tuple(left), most)) as runs:
                 for run in runs:
-                    waiting.append(run)
-                    if len(waiting) < len(left) and time.perf_counter() - since < wait:
-                        continue
-                    proved = _proved(self.problem, waiting)
-                    for done in proved:
-                        left.popleft()
-                        yield done
-                    if reached := len(proved) < len(waiting):
-                        break
-                    waiting, since = [], time.perf_counter()
-            if reached:
-                try:
-                    self._widen()
-                except TROUBLE as error:
+                    checked, covered = run.with_coverage()
+                    if not covered:
+                        reason = self._widen()
+                        if reason is None:
+                            break  # and press the variants that are left on the new body
+                        checked = replace(run, frames=reason)
                     left.popleft()
-                    yield replace(waiting[len(proved)], frames=error.with_traceback(None))
+                    yield checked
 
     def _run(self, variant: Variant, before: Sequence[_Run], workspace: Workspace, cancel: Event) -> _Run:
         from finger3d.mechanics.resolution import check
@@ -215,49 +234,56 @@ class SharedBody:
         frames: tuple[StepResult, ...] | Exception
         try:
             problem = self.problem_of(variant)
-            if variant.legs != self.problem.model.legs:  # the body was built, and its mesh checked, for another path
+            if variant.legs != self.problem.model.legs:  # the mesh was checked for the path of all variants
                 check(problem.model, problem.surface, problem.first_contact_mm, problem.place_mm, problem.axes)
             frames = marched(problem, workspace, cancel)[0]
         except TROUBLE as error:
-            frames = error.with_traceback(None)  # which would keep all arrays on the way
+            frames = error.with_traceback(None)  # a traceback would keep all arrays of its frames
         return _Run(self.problem, frames, time.perf_counter() - start)
 
-    def _widen(self) -> None:
-        from finger3d.mechanics.solve import build
+    def _widen(self) -> Exception | None:
+        """Condense the body to all points of the contact face; return the reason if that fails."""
+        from finger3d.mechanics.build import build
 
         start = time.perf_counter()
         self._say("contact reached beyond the candidate points; condensing all of the contact face")
-        self.problem = build(self.problem.model, self._say, math.inf)
+        try:
+            self.problem = build(self.problem.model, self._say, math.inf)
+        except TROUBLE as error:
+            return error.with_traceback(None)
         self.seconds += time.perf_counter() - start
-
-    def strains(self, variant: Variant, gauges: dict[str, float]) -> dict[str, float]:
-        """Strain of a variant's gauges by their names in it, from that of all gauges of all variants."""
-        if self._free:
-            return gauges
-        return {g.name: gauges[self._names[replace(g, name="")]] for g in variant.gauges}
+        return None
 
 
 @dataclass(frozen=True)
 class _Run:
-    """Frames of a press of a problem, or what it failed of."""
+    """Steps of a press of `problem`, or the reason why it failed."""
 
     problem: Problem
     frames: tuple[StepResult, ...] | Exception
     seconds: float
 
-    @property
-    def end(self) -> StepResult | None:
-        """The last frame, if all converged."""
-        return None if isinstance(self.frames, Exception) or not self.frames[-1].outcome.ok else self.frames[-1]
+    def with_coverage(self) -> tuple[_Run, bool]:
+        """Return the run, and whether contact stayed within the candidate points; the check counts as part of it."""
+        from finger3d.mechanics.coverage import step_within_candidates
 
-    def known(self) -> tuple[StepResult, ...]:
-        """The frames; raises what it failed of."""
+        if isinstance(self.frames, Exception) or not self.frames[-1].outcome.ok:
+            return self, True
+        start = time.perf_counter()
+        try:
+            covered = step_within_candidates(self.problem, self.frames[-1])
+        except TROUBLE as error:
+            return replace(self, frames=error.with_traceback(None)), True
+        return replace(self, seconds=self.seconds + time.perf_counter() - start), covered
+
+    def steps_or_raise(self) -> tuple[StepResult, ...]:
+        """Return the steps, or raise the reason why there are none."""
         if isinstance(self.frames, Exception):
             raise self.frames
         return self.frames
 
-    def pressed(self) -> VariantResult | Exception:
-        """What is told of it."""
+    def result(self) -> VariantResult | Exception:
+        """Return the quantities of the last step."""
         if isinstance(self.frames, Exception):
             return self.frames
         residual = max(f.residual for f in self.frames)
@@ -272,42 +298,23 @@ class _Run:
         return VariantResult(str(Outcome.CONVERGED), residual, numbers, gauges, self.seconds)
 
 
-def _proved(problem: Problem, runs: Sequence[_Run]) -> list[_Run]:
-    """The runs before the first that went beyond the candidate points; each pays its part of the proof."""
-    from finger3d.mechanics.solve import contact_within_candidates
-
-    start = time.perf_counter()
-    try:
-        good = iter(contact_within_candidates(problem, [run.end for run in runs if run.end]))
-    except TROUBLE as error:
-        return [replace(run, frames=error.with_traceback(None)) if run.end else run for run in runs]
-    proved = list(takewhile(lambda run: run.end is None or next(good), runs))
-    share = (time.perf_counter() - start) / len(runs)
-    return [replace(run, seconds=run.seconds + share) for run in proved]
-
-
-def _press_of(variant: Variant) -> tuple[Any, ...]:
-    """What of a variant makes a press: all but its gauges."""
-    return variant.friction, variant.legs, variant.rule
-
-
 def shared_legs(variants: Sequence[Variant]) -> tuple[Leg, ...]:
-    """A path that goes wherever one of the variants goes, and nowhere else.
+    """Return a path that is the union of the paths of the variants.
 
-    One path is left as it is; among paths without slides it is the deepest; else all in turn, each traced back to
-    first touch before the next.
+    Among paths without slides it is the deepest. Otherwise all paths follow one another, each traced back to first
+    contact before the next.
     """
     paths = list(dict.fromkeys(v.legs for v in variants))
     if not any(leg.slide_x_mm or leg.slide_z_mm for legs in paths for leg in legs):
         return max(paths, key=lambda legs: max(leg.depth_mm for leg in legs))
-    whole: list[Leg] = []
+    union: list[Leg] = []
     for number, legs in enumerate(paths):
-        whole += legs
+        union += legs
         if number + 1 < len(paths):
             back = [*reversed(legs[:-1]), Leg(0.0)]
             here = legs[-1]
-            whole += dropwhile(lambda leg, here=here: _end(leg) == _end(here), back)  # type: ignore[misc]
-    return tuple(whole)
+            union += dropwhile(lambda leg, here=here: _end(leg) == _end(here), back)  # type: ignore[misc]
+    return tuple(union)
 
 
 def _end(leg: Leg) -> tuple[float, float, float]:
