@@ -26,9 +26,11 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.material import Isotropic
 from finger3d.fem.simplex import Mesh
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.build import build
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.solve import Problem, build, march
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.solve import march
 from finger3d.mechanics.step_halving import step_error
 from finger3d.meshing import tetwild
 from finger3d.meshing.swept import mesh_swept
@@ -278,7 +280,7 @@ def test_a_cached_mesh_without_its_companion_gets_one_and_pays_once(made: list[s
     monkeypatch.setattr(companions, "_LEAST_UNSTRUCTURED_UNKNOWNS", 0)
     pressed(unstructured())
     problem, frames = pressed(unstructured())
-    assert problem.report.from_cache
+    assert problem.part.report.from_cache
     assert made == ["lump"]
     found = estimate(problem, frames)
     assert "(ftetwild, 0.8 and 2 mm) beside, order" in found.method

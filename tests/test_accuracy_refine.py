@@ -13,8 +13,9 @@ from finger3d.cli import main
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.build import build
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.solve import build, march
+from finger3d.mechanics.solve import march
 from finger3d.scene import load
 
 SCENE = """
@@ -57,7 +58,7 @@ def test_it_refines_until_the_estimate_is_met_and_says_every_round() -> None:
     assert found.rounds[-1].dofs > found.rounds[0].dofs
     assert found.mesh.size_mm == found.rounds[-1].size_mm
     assert found.problem is not None
-    assert found.problem.stiffness.upper.shape[0] == found.rounds[-1].dofs
+    assert found.problem.part.stiffness.upper.shape[0] == found.rounds[-1].dofs
     # and it is true: against five times the edge lengths' fineness, twice the tolerance at most
     truth = build(replace(section(0.4), mesh=MeshOptions(0.02, 0.1, "swept")))
     force = [-f.state.force[:, 0].sum() for p in (found.problem, truth) for f in [list(march(p))[-1]]]

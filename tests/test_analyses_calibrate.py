@@ -13,7 +13,7 @@ from finger3d.analyses.calibrate import presses as pressing
 from finger3d.analyses.calibrate.run import calibrated
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.solve import build
+from finger3d.mechanics.build import build
 from finger3d.sensor import Calibration, Tolerance, estimate
 from finger3d.sensor.maps import Reader, StrainMap
 from tests.sensor_cases import NONE, SCENE, curve, kinked, saturating, scene, straight, turning

@@ -16,7 +16,7 @@ from finger3d.analyses.calibrate.tolerances import read
 from finger3d.analyses.optimise.run import optimise
 from finger3d.analyses.optimise.task import FreeKey
 from finger3d.analyses.optimise.task import OptimisationProblem as Search
-from finger3d.mechanics.solve import build
+from finger3d.mechanics.build import build
 from finger3d.sensor import estimate, load
 from tests.sensor_cases import NONE, SCENE, scene
 

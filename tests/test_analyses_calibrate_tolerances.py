@@ -20,8 +20,9 @@ from finger3d.analyses.reduced import ReducedModel
 from finger3d.contact import acceleration
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
+from finger3d.mechanics.build import build
 from finger3d.mechanics.model import Leg
-from finger3d.mechanics.solve import build, march
+from finger3d.mechanics.solve import march
 from finger3d.progress import Progress
 from finger3d.sensor import Calibration, estimate
 from tests.sensor_cases import FEW, NONE, SCENE, scene

@@ -20,7 +20,8 @@ from finger3d.analyses.compare.run import compare
 from finger3d.analyses.compare.verdict import Deviation, crossing_width, deviation, force_deviation, rounded, verdict
 from finger3d.cli import main
 from finger3d.errors import Finger3dError, Outcome
-from finger3d.mechanics.solve import build, march
+from finger3d.mechanics.build import build
+from finger3d.mechanics.solve import march
 from finger3d.results.comparison import FORCE, Case
 from finger3d.scene import load
 

@@ -14,7 +14,8 @@ from finger3d.analyses.optimise.run import optimise
 from finger3d.analyses.optimise.task import FreeKey, ObjectiveTable, OptimisationProblem, sensitivity
 from finger3d.cli import main
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.solve import build, march
+from finger3d.mechanics.build import build
+from finger3d.mechanics.solve import march
 from finger3d.scene import load, tree
 from tests.test_report import words
 

@@ -239,15 +239,15 @@ def test_a_new_run_leaves_no_number_of_an_old_one(tmp_path: Path) -> None:
 
 def test_contact_beyond_the_candidate_points_is_solved_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from finger3d.analyses import press
-    from finger3d.mechanics import solve
+    from finger3d.mechanics import build as module
 
     scene = written(tmp_path, SECTION)
-    build = solve.build
+    build = module.build
 
     def narrow(model, say, margin=-0.8):  # candidates only where the rigid overlap is deep
         return build(model, say, margin)
 
-    monkeypatch.setattr(solve, "build", narrow)
+    monkeypatch.setattr(module, "build", narrow)
     result = press.press(scene, tmp_path / "narrow", figures=False)
     monkeypatch.undo()
     plain = press.press(scene, tmp_path / "plain", figures=False)

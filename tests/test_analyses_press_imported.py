@@ -37,7 +37,8 @@ def strange(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def pressed(file: Path, scene: Path, obj: str, depth: float, sizes: tuple[float, float]) -> tuple[Any, list[Any]]:
     """The problem and the frames of a finger from a file."""
-    from finger3d.mechanics.solve import build, march
+    from finger3d.mechanics.build import build
+    from finger3d.mechanics.solve import march
 
     scene.write_text(
         f'[finger]\ngeometry = "{file}"\n[material]\nE_MPa = 0.5\nnu = 0.45\n[object]\n{obj}\n[friction]\nmu = 0.4\n'
@@ -59,7 +60,7 @@ def test_a_finger_drawn_outside_can_be_pressed(strange: Path, tmp_path: Path) ->
     force = [float(f.state.force[:, 0].sum()) for f in frames]
     assert (np.diff(force, prepend=0.0) > 0.0).all()
     body = imported(strange / "tip.step")
-    assert problem.report.volume_mm3 == pytest.approx(body.volume_mm3, rel=2e-3)
+    assert problem.part.report.volume_mm3 == pytest.approx(body.volume_mm3, rel=2e-3)
     assert (problem.mesh.points[np.unique(problem.mesh.facets["base"]), 1] == 0.0).all()
     surface = problem.mesh.points[np.unique(np.vstack(list(problem.mesh.facets.values())))]
     inside = np.zeros(len(surface), dtype=bool)

@@ -24,9 +24,10 @@ from finger3d.effects.viscosity import Effect as Viscous
 from finger3d.errors import Finger3dError
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.build import build
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.solve import build, march
+from finger3d.mechanics.solve import march
 from finger3d.objects import Cylinder, MeshObject, Plane, Sphere, Wave, Wedge
 from tests.bodies import ball
 
@@ -109,7 +110,7 @@ def test_loading_and_pressing_need_no_mesher_cad_or_factorisation(tmp_path: Path
 def test_fields_are_refused() -> None:
     reduced = ReducedModel.of(build(model()))
     with pytest.raises(Finger3dError, match="no mesh"):
-        reduced.problem.condensed.solve(np.zeros(0))
+        reduced.problem.part.condensed.solve(np.zeros(0))
 
 
 @pytest.mark.parametrize(

@@ -12,15 +12,11 @@ from finger3d.analyses.shared_body import SharedBody, Variant, body_key, familie
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.recover import displacement
 from finger3d.fem.traces import restrict, surface
+from finger3d.mechanics.build import build
+from finger3d.mechanics.coverage import candidates_cover_face, contact_within_candidates, step_within_candidates
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg
-from finger3d.mechanics.solve import (
-    build,
-    candidates_cover_face,
-    contact_within_candidates,
-    march,
-    step_within_candidates,
-)
+from finger3d.mechanics.solve import march
 from finger3d.scene import Scene, parse, tree
 
 BLOCK = {

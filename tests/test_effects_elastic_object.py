@@ -19,10 +19,11 @@ from finger3d.fem.traces import surface
 from finger3d.fem.transfer import facing_trace, values_over
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
+from finger3d.mechanics.build import build
 from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.solve import build, march
+from finger3d.mechanics.solve import march
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.swept import mesh_section
 from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave, Wedge

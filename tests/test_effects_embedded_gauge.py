@@ -20,9 +20,12 @@ from finger3d.fem.condense import condense, spring_forces, stiffened
 from finger3d.fem.kelvin import FoilPatches, InfiniteBody
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.build import build
 from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.solve import Problem, build, march, symmetry
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.solve import march
+from finger3d.mechanics.symmetry import symmetry
 from finger3d.objects import Plane, Sphere
 from finger3d.scene import parse
 
@@ -71,14 +74,14 @@ def test_condensed_foils_are_foils_in_the_stiffness(domain: str, nu: float) -> N
     assert problem.factorizations == 1
     inlay = model.inclusions.discretise(model, problem.mesh, problem.axes)
     added = sp.csr_matrix(inlay.rows.T @ sp.diags_array(inlay.bar_stiffness) @ inlay.rows)
-    added.resize(problem.stiffness.upper.shape)
+    added.resize(problem.part.stiffness.upper.shape)
     stiffer = Stiffness(
-        sp.csr_matrix(problem.stiffness.upper + sp.triu(added)), problem.stiffness.pressure_vertices,
-        problem.stiffness.pressure_scale,
+        sp.csr_matrix(problem.part.stiffness.upper + sp.triu(added)), problem.part.stiffness.pressure_vertices,
+        problem.part.stiffness.pressure_scale,
     )  # fmt: skip
-    rows = problem.condensed._rows[: len(problem.active_dofs) + 2, : problem.mesh.points.size]
-    direct = condense(stiffer, problem.fixed_dofs, rows).compliance
-    r, mesh_alone = len(problem.active_dofs), problem.condensed.compliance.copy()
+    rows = problem.part.condensed._rows[: len(problem.system.active_dofs) + 2, : problem.mesh.points.size]
+    direct = condense(stiffer, problem.part.fixed_dofs, rows).compliance
+    r, mesh_alone = len(problem.system.active_dofs), problem.part.condensed.compliance.copy()
     mesh_alone[r:, r:] -= problem.inclusions.subgrid_compliance
     found = stiffened(mesh_alone, problem.inclusions.bar_stiffness)[: r + 2, : r + 2]
     assert found == pytest.approx(direct, abs=1e-8 * direct.max())
@@ -88,7 +91,7 @@ def test_the_rows_of_gauges_are_means_of_their_bars() -> None:
     model = FOIL.apply(block(domain="plane-strain", gauges=(MIDDLE, ASIDE)))
     problem = build(model)
     inlay = model.inclusions.discretise(model, problem.mesh, problem.axes)
-    whole, r = problem.condensed.compliance, len(problem.active_dofs)
+    whole, r = problem.part.condensed.compliance, len(problem.system.active_dofs)
     assert inlay.gauge_weights.sum(axis=1) == pytest.approx(1.0)
     assert whole[r : r + 2] == pytest.approx(inlay.gauge_weights @ whole[r + 2 :], abs=1e-12 * whole.max())
     assert (

@@ -24,9 +24,11 @@ from finger3d.errors import Finger3dError, Outcome
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics import formulation
+from finger3d.mechanics.build import build
 from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.solve import Problem, build, march
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.solve import march
 from finger3d.objects import Cylinder, Plane, Sphere
 from finger3d.scene import parse
 
@@ -119,9 +121,9 @@ def test_quick_presses_are_instantaneous_and_slow_ones_relaxed(nu: float, bulk: 
     for legs, material in ((quick, model.material), (slow, soft)):
         wanted = build(replace(model, legs=legs, material=material))
         # one form for all: mixed and displacement elements differ by their mesh error
-        assert wanted.elastic.mixed == problem.elastic.mixed or not bulk
+        assert wanted.part.elastic.mixed == problem.part.elastic.mixed or not bulk
         got, elastic = run(viscous(problem, TWO, bulk, legs=legs))[-1], run(wanted)[-1]
-        close = 1e-7 if wanted.elastic.mixed == problem.elastic.mixed else 0.01
+        close = 1e-7 if wanted.part.elastic.mixed == problem.part.elastic.mixed else 0.01
         assert got.part.force == pytest.approx(elastic.part.force, abs=close * elastic.part.force.max())
         assert got.gauges["g"] == pytest.approx(elastic.gauges["g"], rel=close)
 
@@ -167,7 +169,7 @@ def test_stress_carries_the_force(domain: str, nu: float, bulk: bool) -> None:
     sigma = held.model.formulation.fields(held, frame.part)[2]
     assert sigma.shape[1:] == (3, 3)
     parts = 2 ** len(problem.axes)
-    volume = _nodal_volume(problem) * problem.thickness * parts
+    volume = _nodal_volume(problem) * problem.part.thickness * parts
     force = measure(problem.points, frame)["normal_force_N"]
     assert -float(volume @ sigma[:, 1, 1]) == pytest.approx(3.0 * force, rel=0.01)
     if domain == "plane-strain" and not bulk:
@@ -196,7 +198,7 @@ def test_the_compliance_of_a_step_is_the_difference_quotient_of_its_response(
     problem = build(block(domain=domain, material=Isotropic(1.0, nu), legs=RAMP))
     body = kind(problem)
     rng = np.random.default_rng(0)
-    rows = len(problem.condensed.compliance)
+    rows = len(problem.part.condensed.compliance)
     memory = InternalVariables(np.zeros(body.size), np.zeros((2, body.size)))
     workspace = RelaxationWorkspace()
     for seconds in (0.3, 0.7):  # so that there is a past

@@ -11,9 +11,10 @@ from finger3d.contact.state import ContactState
 from finger3d.errors import Outcome
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.build import build
 from finger3d.mechanics.history import ContactPoints, ObjectPose, StepResult, measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.solve import build, march
+from finger3d.mechanics.solve import march
 from finger3d.objects import Sphere
 
 

@@ -20,11 +20,13 @@ from finger3d.errors import UnresolvedError
 from finger3d.fem.material import Isotropic
 from finger3d.fem.recover import displacement
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.build import build
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.resolution import Hidden, foreseen, hidden, inside, penetration, tips_of
-from finger3d.mechanics.solve import build, march, symmetry
+from finger3d.mechanics.solve import march
+from finger3d.mechanics.symmetry import symmetry
 from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
 
 FIG9 = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
@@ -62,8 +64,8 @@ def fig9(obj: RigidObject, depth: float, size: float, **changes: object) -> Mode
 
 
 def unseen(problem: Problem) -> Hidden:
-    tips = tips_of(problem.model, problem.place_mm)
-    return hidden(problem.model, problem.surface, problem.first_contact_mm, tips, problem.axes)
+    tips = tips_of(problem.model, problem.system.place_mm)
+    return hidden(problem.model, problem.surface, problem.system.first_contact_mm, tips, problem.axes)
 
 
 @pytest.mark.parametrize(

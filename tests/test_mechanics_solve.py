@@ -21,10 +21,13 @@ from finger3d.fem.recover import displacement
 from finger3d.fem.traces import displacement_row
 from finger3d.geometry.registry import designs
 from finger3d.mechanics import formulation
+from finger3d.mechanics.build import build
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.solve import Problem, build, march, targets
+from finger3d.mechanics.path import targets
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.solve import march
 from finger3d.mechanics.step_halving import automatic, limits, marched, refine, remaining, step_error
 from finger3d.objects import Plane, Sphere
 
@@ -127,7 +130,7 @@ def test_contact_forces_and_base_reaction_balance() -> None:
         block(symmetry=(), legs=(Leg(0.3, steps=2), Leg(0.3, slide_x_mm=0.1, slide_z_mm=0.05, steps=2)))
     )
     unknowns = problem.unknowns(frames[-1].part.force)
-    full = problem.stiffness.upper + sp.triu(problem.stiffness.upper, 1).T
+    full = problem.part.stiffness.upper + sp.triu(problem.part.stiffness.upper, 1).T
     residual = (full @ unknowns)[: problem.mesh.points.size].reshape(problem.mesh.points.shape)
     base = np.unique(problem.mesh.facets["base"])
     contact = problem.points.to_global(frames[-1].state.force).sum(axis=0)

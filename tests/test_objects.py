@@ -13,9 +13,10 @@ from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.errors import Finger3dError
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.build import build
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.solve import build, march
+from finger3d.mechanics.solve import march
 from finger3d.objects import (
     ContactPath,
     Cylinder,

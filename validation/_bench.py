@@ -31,9 +31,11 @@ from finger3d.analyses.study_rows import Row
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.build import build, contact_box
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.solve import build, contact_box, march, symmetry
+from finger3d.mechanics.solve import march
+from finger3d.mechanics.symmetry import symmetry
 from finger3d.meshing.generate import mesh_solid
 
 LARGE, MIDDLE, QUICK = 1.1, 1.25, 3.0  # mm: 150 000, 47 000 and 8 000 unknowns
@@ -89,8 +91,8 @@ def measured(size: float) -> dict[str, float]:
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
     del problem  # frees the memory of its factor
     problem, again = _pressed(size)
-    free = np.setdiff1d(np.arange(problem.stiffness.upper.shape[0]), problem.fixed_dofs)
-    upper = problem.stiffness.upper[free][:, free]
+    free = np.setdiff1d(np.arange(problem.part.stiffness.upper.shape[0]), problem.part.fixed_dofs)
+    upper = problem.part.stiffness.upper[free][:, free]
     del problem
     return _least([found, again]) | {"peak_MB": peak, "factorisation": _plain(upper)}
 
@@ -99,7 +101,7 @@ def _pressed(size: float) -> tuple[Problem, dict[str, float]]:
     """The finger condensed, and pressed in ten increments, under one mu and all; seconds by stage, unknowns, rows."""
     problem = build(fig9(size))
     found = {k: problem.seconds[k] for k in ("assembly", "condensation")}
-    found |= {"dofs": problem.stiffness.upper.shape[0], "rows": len(problem.active_dofs)}
+    found |= {"dofs": problem.part.stiffness.upper.shape[0], "rows": len(problem.system.active_dofs)}
     begin = time.perf_counter()
     *_, frame = march(replace(problem, model=replace(problem.model, friction=Coulomb(MU))))
     if not frame.outcome.ok:

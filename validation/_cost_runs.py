@@ -49,8 +49,8 @@ def measured(given: dict[str, Any]) -> dict[str, Any]:
         seconds |= {"condensation": 0.0, f"contact {case.counts[0]}": time.perf_counter() - begin}
         return {**answer, "seconds": seconds, "numbers": {str(case.counts[0]): values}, "factorizations": press.solves}
     problem = condensed(parts, case.solver)
-    seconds["condensation"] = problem.condensed.seconds
-    answer |= {"rows": len(problem.condensed.compliance), "perturbed_pivots": problem.condensed.perturbed_pivots}
+    seconds["condensation"] = problem.part.condensed.seconds
+    answer |= {"rows": len(problem.part.condensed.compliance), "perturbed_pivots": problem.condensed.perturbed_pivots}
     found, iterations = {}, {}
     for count in case.counts:
         begin = time.perf_counter()

@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb, FrictionLaw
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.build import build
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.solve import Problem, build, march
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.solve import march
 from finger3d.objects import Cylinder
 
 Float = NDArray[np.float64]

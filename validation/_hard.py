@@ -21,9 +21,12 @@ from finger3d.effects.kinetic_friction import TwoCoefficients
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.build import build
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.solve import Problem, build, march, targets
+from finger3d.mechanics.path import targets
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.solve import march
 from finger3d.objects import Plane
 from finger3d.scene import load
 

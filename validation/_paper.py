@@ -20,9 +20,11 @@ from finger3d.contact.friction import OPEN, STICK, Coulomb, FrictionLaw
 from finger3d.fem.material import Isotropic
 from finger3d.fem.recover import displacement
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.build import build
 from finger3d.mechanics.history import StepResult, contact_table
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.solve import Problem, build, march
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.solve import march
 
 Float = NDArray[np.float64]
 

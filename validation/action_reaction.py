@@ -23,9 +23,11 @@ from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.build import build
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.solve import Problem, build, march
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.solve import march
 
 from ._common import convergence, rate
 
@@ -59,7 +61,7 @@ class Balance:
 
 def balance(problem: Problem, frame: StepResult) -> Balance:
     """Compare contact forces with K u, and work with what is stored and lost."""
-    upper, n, d = problem.stiffness.upper, problem.mesh.points.size, problem.dim
+    upper, n, d = problem.part.stiffness.upper, problem.mesh.points.size, problem.dim
     unknowns = problem.unknowns(frame.part.force)
     inner = (upper + sparse.triu(upper, 1).T) @ unknowns
     nodal = inner[:n].reshape(-1, d)

@@ -24,7 +24,8 @@ from typing import Any
 from finger3d._machine import versions
 from finger3d.analyses.study_rows import Result, Row
 from finger3d.errors import MissingError
-from finger3d.mechanics.solve import contact_box, symmetry
+from finger3d.mechanics.build import contact_box
+from finger3d.mechanics.symmetry import symmetry
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.swept import mesh_section
 

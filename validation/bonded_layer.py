@@ -22,8 +22,9 @@ from numpy.typing import NDArray
 from finger3d.analyses.study_rows import Result, Row
 from finger3d.fem.material import Elasticity, Isotropic
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.build import build
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.solve import build, march
+from finger3d.mechanics.solve import march
 from finger3d.objects import Cylinder, Sphere
 
 from ._common import body, contact_axis, convergence, graded, halved, quarter_block, rate

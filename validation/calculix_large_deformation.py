@@ -21,9 +21,11 @@ from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.build import build
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.solve import Problem, build, march
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.solve import march
 
 from ._calculix import deck, program, solve
 

@@ -23,8 +23,8 @@ from finger3d.analyses.calibrate.tolerances import TOLERANCES, read
 from finger3d.analyses.study_rows import Result, Row
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.build import build
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.solve import build
 from finger3d.sensor import Calibration, estimate
 
 from ._paper import columns

@@ -18,7 +18,7 @@ import numpy as np
 from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import STICK
 from finger3d.mechanics.model import Leg
-from finger3d.mechanics.solve import Problem
+from finger3d.mechanics.problem import Problem
 
 from . import _halfplane, _halfspace
 

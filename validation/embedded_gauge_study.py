@@ -24,8 +24,10 @@ from finger3d.contact.friction import Coulomb
 from finger3d.effects.embedded_gauge import Effect, Strips
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.build import build
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.solve import Problem, build, march
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.solve import march
 
 from ._foil import alone, by_mesh, wing
 

@@ -28,9 +28,11 @@ from finger3d.fem.material import Isotropic
 from finger3d.geometry.design import Design
 from finger3d.geometry.registry import designs
 from finger3d.io import AREAS, MAIN
+from finger3d.mechanics.build import build
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.solve import Problem, build, march
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.solve import march
 from finger3d.mechanics.step_halving import DISSIPATION_TOLERANCE, TOLERANCE, error_by_count, marched, step_error
 from finger3d.objects import Cylinder, Plane, Sphere
 
@@ -191,7 +193,7 @@ def _by_mesh(case: Case) -> list[Judged]:
         beside = companion(problem)
         runs = zip(_runs(problem, case.mus), _runs(beside, case.mus), truth, strict=True)
         for (mu, depth, p), (_, _, coarse), exact in runs:
-            frame, dofs = _end(p), problem.stiffness.upper.shape[0]
+            frame, dofs = _end(p), problem.part.stiffness.upper.shape[0]
             told, bars = main_numbers(p, frame), compared(p, frame, coarse, _end(coarse))
             right = {**exact, **_hertz(case, exact)}
             found += [
@@ -241,7 +243,7 @@ def _by_steps(name: str, model: Model) -> Iterator[Judged]:
                 continue
             # a length is printed with half the distance of points beside, below which no increment can be judged
             bar = bars[k] + (0.5 * spacing if k.endswith("_length_mm") else 0.0)
-            dofs = problem.stiffness.upper.shape[0]
+            dofs = problem.part.stiffness.upper.shape[0]
             depth = model.legs[0].depth_mm
             yield Judged(
                 name, part, dofs, model.friction.mu, depth, k, value, bar, abs(value - exact[k])

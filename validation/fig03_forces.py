@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from finger3d.analyses.study_rows import Result, Row
+from finger3d.mechanics.build import build
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.solve import build
 
 from ._paper import STRAIN, STRESS, Profile, columns, half_cylinder, said, under
 

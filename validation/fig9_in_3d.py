@@ -14,8 +14,8 @@ import numpy as np
 
 from finger3d.analyses.study_rows import Result, Row
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.build import build
 from finger3d.mechanics.history import measure
-from finger3d.mechanics.solve import build
 
 from ._paper import (
     BELOW_FIG9,

@@ -24,8 +24,10 @@ from numpy.typing import NDArray
 
 from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
+from finger3d.mechanics.build import build
 from finger3d.mechanics.history import measure
-from finger3d.mechanics.solve import Problem, build, march
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.solve import march
 from finger3d.scene import load
 
 from . import _layer

@@ -23,9 +23,11 @@ from numpy.typing import NDArray
 from finger3d.analyses.study_rows import Result, Row
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.build import build
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.solve import Problem, build, march
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.solve import march
 from finger3d.objects import Cylinder
 
 from ._common import convergence, rate

@@ -15,7 +15,7 @@ import numpy as np
 
 from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
-from finger3d.mechanics.solve import Problem
+from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.step_halving import DISSIPATION_TOLERANCE, TOLERANCE, marched
 
 from ._paper import STRAIN, STRESS, Profile, columns, half_cylinder, line_r5, said, strains, under

@@ -24,9 +24,11 @@ from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.build import build
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.solve import Problem, build, march
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.solve import march
 from finger3d.objects import Cylinder, Plane, RigidObject
 
 FORCE = 200.0  # N over 20 mm: some 5 mm deep on the plane

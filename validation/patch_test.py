@@ -20,8 +20,9 @@ from finger3d.contact.friction import Coulomb
 from finger3d.fem.material import Elasticity, Isotropic
 from finger3d.fem.simplex import Mesh, quadratic
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.build import build
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.solve import build, march
+from finger3d.mechanics.solve import march
 
 from ._common import body, body_load, cube, held_at, shuffled, solve
 

@@ -26,8 +26,9 @@ from finger3d.analyses.study_rows import Result, Row
 from finger3d.effects.embedded_gauge import Effect
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.build import build
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.solve import Problem, build
+from finger3d.mechanics.problem import Problem
 from finger3d.plotting.strain_map import resolution_panel, slope_panel
 from finger3d.sensor import Calibration, estimate
 from finger3d.sensor.maps import StrainMap

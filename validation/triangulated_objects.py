@@ -24,9 +24,10 @@ from finger3d.contact.friction import Coulomb
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
+from finger3d.mechanics.build import build
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.solve import build, march
+from finger3d.mechanics.solve import march
 from finger3d.objects import Cylinder, MeshObject, RigidObject, Sphere, first_contact_height
 
 from ._common import convergence, rate

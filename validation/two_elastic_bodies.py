@@ -28,9 +28,11 @@ from finger3d.fem.material import Elasticity, Isotropic
 from finger3d.fem.traces import local_rows
 from finger3d.fem.transfer import facing_trace
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.build import build, contact_box
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.solve import Problem, build, contact_box, march
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.solve import march
 from finger3d.objects import Cylinder, Plane
 
 from ._common import held_at, solve
@@ -196,7 +198,7 @@ def _third_law_rows() -> list[Row]:
         load = (rows.T @ force).reshape(-1, 2)
         found = solve(mesh, Elasticity.of(modulus, nu), held_at(mesh, {"base": (0, 1)}), load=load)
         ends.append(found.reaction.sum(axis=0))
-        moved += rows @ found.u.ravel() / problem.thickness
+        moved += rows @ found.u.ravel() / problem.part.thickness
     total = np.abs(ends[0]).max()
     c = len(problem.surface.nodes)
     condensed = np.einsum("idje,je->id", problem.delassus, frame.state.force).ravel()

@@ -81,6 +81,14 @@ class StandIn:
         )
 
     @property
+    def part(self) -> StandIn:
+        return self
+
+    @property
+    def system(self) -> StandIn:
+        return self
+
+    @property
     def dim(self) -> int:
         return int(self.delassus.shape[1])
 

@@ -15,8 +15,10 @@ import numpy as np
 
 from finger3d.errors import Finger3dError, UnresolvedError
 from finger3d.fem.traces import surface
+from finger3d.mechanics.build import build, contact_box
 from finger3d.mechanics.model import MeshOptions, Model
-from finger3d.mechanics.solve import Problem, build, contact_box, symmetry
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.symmetry import symmetry
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.swept import mesh_section
 from finger3d.objects import Sphere
@@ -113,7 +115,7 @@ def _built_if(problem: Problem, model: Model, enough: Callable[[float], bool], s
 
 def built_like(problem: Problem, model: Model, say: Say = lambda text: None) -> Problem:
     """Return another model condensed, onto its whole contact face if the problem keeps its whole contact face."""
-    everything = len(surface(problem.mesh, "contact", problem.thickness).nodes) == len(problem.surface.nodes)
+    everything = len(surface(problem.mesh, "contact", problem.part.thickness).nodes) == len(problem.surface.nodes)
     return build(model, say, margin=math.inf) if everything else build(model, say)
 
 
@@ -124,7 +126,9 @@ def edge_ratio(problem: Problem, beside: Problem) -> float:
     finger; between unstructured meshes from the distance of contact points, since both grow alike away from the
     contact; between an unstructured and a swept mesh it is the geometric mean of the two.
     """
-    by_unknowns = float((problem.stiffness.upper.shape[0] / beside.stiffness.upper.shape[0]) ** (1.0 / problem.dim))
+    by_unknowns = float(
+        (problem.part.stiffness.upper.shape[0] / beside.part.stiffness.upper.shape[0]) ** (1.0 / problem.dim)
+    )
     wild = sum(p.dim == 3 and p.model.mesh.mesher != "swept" for p in (problem, beside))
     if not wild:
         return by_unknowns

@@ -10,9 +10,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from finger3d.accuracy.estimate import FACTORISATIONS
+from finger3d.mechanics.build import contact_box
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.solve import AUTO_START, contact_box, symmetry
+from finger3d.mechanics.path import AUTO_START
 from finger3d.mechanics.step_halving import automatic, condensation_s, contact_s, limits
+from finger3d.mechanics.symmetry import symmetry
 from finger3d.meshing.limits import check_memory, rows_gb
 
 _BASE_MB = 170.0

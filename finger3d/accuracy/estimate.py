@@ -21,7 +21,8 @@ from finger3d.accuracy.richardson import ORDER, mesh_error
 from finger3d.errors import Finger3dError
 from finger3d.io import AREAS, MAIN
 from finger3d.mechanics.history import StepResult, measure
-from finger3d.mechanics.solve import AUTO_START, Problem
+from finger3d.mechanics.path import AUTO_START
+from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.step_halving import (
     TIMES,
     as_solved,
@@ -183,7 +184,7 @@ def _budget(problem: Problem) -> float:
 
 
 def _unknowns(problem: Problem) -> int:
-    return int(problem.stiffness.upper.shape[0])
+    return int(problem.part.stiffness.upper.shape[0])
 
 
 def _on_mesh(beside: Problem, kind: str) -> str:

@@ -17,8 +17,9 @@ from finger3d.accuracy.companions import FACTOR, companion
 from finger3d.accuracy.estimate import compared, main_numbers
 from finger3d.accuracy.richardson import ORDER, Kind, Quantity, largest_strain
 from finger3d.errors import Finger3dError, UnresolvedError
+from finger3d.mechanics.build import build
 from finger3d.mechanics.model import MeshOptions, Model
-from finger3d.mechanics.solve import Problem, build
+from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.step_halving import last_frame
 
 MOST_ROUNDS = 8
@@ -200,7 +201,7 @@ def _round(model: Model, tolerance: float) -> tuple[Problem, Round, MeshOptions]
     sizes = _next(problem, number, error, tolerance, numbers, coarse)
     seconds = time.perf_counter() - start
     options = model.mesh
-    dofs = int(problem.stiffness.upper.shape[0])
+    dofs = int(problem.part.stiffness.upper.shape[0])
     return problem, Round(options.size_mm, options.base_size_mm, dofs, error, number, seconds), sizes
 
 

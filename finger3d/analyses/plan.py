@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from finger3d.accuracy.cost import forecast
 from finger3d.mechanics.resolution import foreseen
-from finger3d.mechanics.solve import symmetry
+from finger3d.mechanics.symmetry import symmetry
 
 if TYPE_CHECKING:
     from finger3d.scene import Scene

@@ -100,7 +100,8 @@ def _solve(scene: Scene, writer: ResultWriter, report: Progress, started: float)
     """Build the problem and march through its increments, again with the whole contact face if contact reaches beyond
     the candidate points.
     """
-    from finger3d.mechanics.solve import build, step_within_candidates
+    from finger3d.mechanics.build import build
+    from finger3d.mechanics.coverage import step_within_candidates
 
     refinement = _refined(scene, report)
     if refinement:
@@ -149,7 +150,8 @@ def _march(record: PressRecord, writer: ResultWriter, report: Progress) -> None:
 
 def _march_through(record: PressRecord, writer: ResultWriter, report: Progress) -> None:
     """Solve the increments that the scene names."""
-    from finger3d.mechanics.solve import march, targets
+    from finger3d.mechanics.path import targets
+    from finger3d.mechanics.solve import march
 
     total = len(targets(record.problem.model.legs))
     report.stage("pressing")

@@ -117,11 +117,11 @@ class PressRecord:
 
 
 def _mesh(problem: Problem) -> dict[str, Any]:
-    report = problem.report
+    report = problem.part.report
     return {
         "points": report.points,
         "cells": report.cells,
-        "dofs": int(problem.stiffness.upper.shape[0]),
+        "dofs": int(problem.part.stiffness.upper.shape[0]),
         "contact_points": len(problem.surface.nodes),
         "min_dihedral_deg": report.min_dihedral_deg,
         "volume_mm3": report.volume_mm3,
@@ -130,7 +130,7 @@ def _mesh(problem: Problem) -> dict[str, Any]:
         "from_cache": report.from_cache,
         "cache_path": report.cache_path,
         "symmetry": list(problem.axes),
-        "formulation": "mixed quadratic/linear" if problem.elastic.mixed else "quadratic displacement",
+        "formulation": "mixed quadratic/linear" if problem.part.elastic.mixed else "quadratic displacement",
     }
 
 
@@ -139,8 +139,8 @@ def _cost(record: PressRecord) -> dict[str, Any]:
         "seconds": {**record.seconds, "total": time.perf_counter() - record.started},
         "factorizations": record.all_factorizations,
         "peak_memory_MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0,
-        "solver": record.problem.condensed.solver,
-        "perturbed_pivots": record.problem.condensed.perturbed_pivots,
+        "solver": record.problem.part.condensed.solver,
+        "perturbed_pivots": record.problem.part.condensed.perturbed_pivots,
     }
 
 

@@ -22,11 +22,13 @@ from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.errors import Finger3dError
 from finger3d.fem.traces import BoundarySurface, restrict, surface
 from finger3d.geometry.design import DesignSummary
+from finger3d.mechanics.build import MARGIN
 from finger3d.mechanics.history import History
 from finger3d.mechanics.model import Leg
+from finger3d.mechanics.path import targets
 from finger3d.mechanics.problem import Problem, rigid_gap
 from finger3d.mechanics.resolution import check
-from finger3d.mechanics.solve import MARGIN, march, targets
+from finger3d.mechanics.solve import march
 
 Float = NDArray[np.float64]
 
@@ -73,17 +75,19 @@ class ReducedModel:
                 f"effects.{name}: a body with it has no reduced model, its compliance is not constant; "
                 "take the effect out, or press the scene itself"
             )
-        face = surface(problem.mesh, "contact", problem.thickness)
+        face = surface(problem.mesh, "contact", problem.part.thickness)
         others = restrict(face, ~np.isin(face.nodes, problem.surface.nodes))
         about = {
             "versions": versions(),
-            "mesh_hash": problem.report.hash,
-            "dofs": int(problem.stiffness.upper.shape[0]),
+            "mesh_hash": problem.part.report.hash,
+            "dofs": int(problem.part.stiffness.upper.shape[0]),
             "effects": sorted({effect for _, effect in model.filled}),
         }
         size = DesignSummary(float(model.design.height_mm), float(model.design.width_mm))
         light = replace(model, design=size, inclusions=None, object_compliance=None, symmetry=problem.axes)
-        return cls(assembled(light, arrays_of(problem), problem.first_contact_mm, problem.axes), bare(others), about)
+        return cls(
+            assembled(light, arrays_of(problem), problem.system.first_contact_mm, problem.axes), bare(others), about
+        )
 
     @property
     def gauges(self) -> tuple[str, ...]:
@@ -128,11 +132,13 @@ class ReducedModel:
         problem = replace(self.problem, model=replace(model, friction=law, legs=tuple(legs or model.legs)))
         if legs is not None:
             self._check(problem)
-            check(problem.model, problem.surface, problem.first_contact_mm, problem.place_mm, problem.axes)
+            check(
+                problem.model, problem.surface, problem.system.first_contact_mm, problem.system.place_mm, problem.axes
+            )
         return History(problem.points, tuple(march(problem)))
 
     def _check(self, problem: Problem) -> None:
-        """Raise Finger3dError if contact could leave the candidate points of `finger3d.mechanics.solve.build`."""
+        """Raise Finger3dError if contact could leave the candidate points of `finger3d.mechanics.build.build`."""
         legs = problem.model.legs
         for leg in legs:
             if not all(math.isfinite(getattr(leg, k)) for k in _PATH) or leg.depth_mm < 0.0:
@@ -152,7 +158,9 @@ class ReducedModel:
             return
         path = targets(legs)
         deepest = max(t.depth_mm for t in path)
-        nearest = min(float(rigid_gap(problem.model, self.others, problem.first_contact_mm, t).min()) for t in path)
+        nearest = min(
+            float(rigid_gap(problem.model, self.others, problem.system.first_contact_mm, t).min()) for t in path
+        )
         if nearest < _GAP_LEFT * deepest:
             raise Finger3dError(
                 f"press: at depth {deepest:g} mm contact may leave the {self.contact_points} points that were "

@@ -128,7 +128,7 @@ def arrays_of(problem: Problem) -> dict[str, NDArray[Any]]:
     c, d = problem.delassus.shape[:2]
     arrays = {
         "compliance": problem.delassus.reshape(c * d, c * d),
-        "gauge_rows": problem.gauge_rows,
+        "gauge_rows": problem.system.gauge_rows,
         "parent": problem.symmetry.image_of,
         "sign": problem.symmetry.mirror_sign,
         "share": problem.symmetry.multiplicity,
@@ -142,7 +142,7 @@ def arrays_of(problem: Problem) -> dict[str, NDArray[Any]]:
     if problem.without_inclusions:
         arrays |= {
             "bare_compliance": problem.without_inclusions.delassus.reshape(c * d, c * d),
-            "bare_gauge_rows": problem.without_inclusions.gauge_rows,
+            "bare_gauge_rows": problem.without_inclusions.system.gauge_rows,
         }
     return arrays
 
@@ -197,7 +197,7 @@ def _header(problem: Problem) -> dict[str, Any]:
         "warnings": list(model.warnings),
         "filled": [list(f) for f in model.filled],
         "axes": list(problem.axes),
-        "touch_mm": problem.first_contact_mm,
+        "touch_mm": problem.system.first_contact_mm,
     }
 
 

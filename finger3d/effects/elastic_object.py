@@ -65,12 +65,12 @@ class SoftObject:
             rows, images = _all_images(problem, mesh, frame), 2 ** len(axes)
         elastic = Isotropic(self.E_MPa, self.nu).elasticity(model.domain == "plane-stress")
         say(f"condensing the object's {mesh.points.size} unknowns")
-        matrix = stiffness(mesh, elastic, problem.thickness)
+        matrix = stiffness(mesh, elastic, problem.part.thickness)
         held = held_dofs(mesh, () if whole else axes, model.held_ends)
-        condensed = condense(matrix, held, rows[problem.active_dofs])
+        condensed = condense(matrix, held, rows[problem.system.active_dofs])
         c = len(problem.surface.nodes)
         out = np.zeros((c * d, c * d))
-        out[np.ix_(problem.active_dofs, problem.active_dofs)] = condensed.compliance / images
+        out[np.ix_(problem.system.active_dofs, problem.system.active_dofs)] = condensed.compliance / images
         seconds = {"object_mesh": meshing, "object_condensation": condensed.seconds}
         return ObjectResponse(out.reshape(c, d, c, d), condensed.factorizations, seconds)
 

@@ -89,10 +89,10 @@ class NewtonWorkspace(Workspace):
             face, d = problem.surface, problem.dim
             coupled = sp.csr_matrix((face.average != 0).astype(float) @ (face.interpolate != 0).astype(float))
             pairs = (coupled.T @ coupled).tocoo()
-            rows = sp.kron(coupled, np.ones((d, d)), format="csr")[problem.active_dofs]
+            rows = sp.kron(coupled, np.ones((d, d)), format="csr")[problem.system.active_dofs]
             rows.sort_indices()
             linked = pairs.row.astype(np.int64), pairs.col.astype(np.int64)
-            self._patterns = Pattern.of(problem.mesh, problem.elastic.mixed, linked), rows
+            self._patterns = Pattern.of(problem.mesh, problem.part.elastic.mixed, linked), rows
         return self._patterns
 
 
@@ -230,7 +230,7 @@ class _NewtonIncrement:
 
     def _configuration(self, x: Float) -> _Configuration:
         pattern, _ = self.workspace.patterns(self.problem)
-        tangent, internal = assemble(self.problem.mesh, self._law, x, pattern, self.problem.thickness)
+        tangent, internal = assemble(self.problem.mesh, self._law, x, pattern, self.problem.part.thickness)
         return _Configuration(x, internal, tangent)
 
     def contact(self, configuration: _Configuration) -> DeformedContact:
@@ -251,10 +251,10 @@ class _NewtonIncrement:
             return condensation
         problem = self.problem
         _, pattern = self.workspace.patterns(problem)
-        entries = on_places(contact.rows[problem.active_dofs], pattern)
+        entries = on_places(contact.rows[problem.system.active_dofs], pattern)
         rows = sp.csr_matrix((entries, pattern.indices, pattern.indptr), pattern.shape)
         tangent = configuration.tangent.less(contact.geometric_stiffness(problem.surface, force[:, 0]))
-        condensed = condense(tangent, problem.fixed_dofs, rows, spent=condensation)
+        condensed = condense(tangent, problem.part.fixed_dofs, rows, spent=condensation)
         self.workspace.factorizations += condensed.factorizations
         return condensed
 
@@ -268,9 +268,9 @@ class _NewtonIncrement:
         free = self._relative_displacement(contact, configuration.x + relaxation)
         free[:, 0] += (contact.rows @ relaxation[: problem.mesh.points.size])[::d]
         free[:, 1:] += start.tangential_displacement
-        delassus = scatter_to_points(condensation.compliance, problem.active_dofs, c, d)
+        delassus = scatter_to_points(condensation.compliance, problem.system.active_dofs, c, d)
         solution = solve_contact(problem, start, free, delassus, self._length_scale, guess, self._augmentation)
-        forces = solution.state.force.ravel()[problem.active_dofs]
+        forces = solution.state.force.ravel()[problem.system.active_dofs]
         return solution, relaxation + condensation.unknowns(forces)
 
     def _relative_displacement(self, contact: DeformedContact, x: Float) -> Float:
@@ -283,7 +283,7 @@ class _NewtonIncrement:
         out[:, 0] = contact.gap
         out[:, 1:] = np.einsum("ctk,ck->ct", contact.bases[:, 1:], increment)
         # Across a symmetry plane nothing moves; the weighted mean over half of a point's hat need not be zero.
-        out.ravel()[np.setdiff1d(np.arange(out.size), problem.active_dofs)] = 0.0
+        out.ravel()[np.setdiff1d(np.arange(out.size), problem.system.active_dofs)] = 0.0
         return out
 
     def step_size(self, step: Float) -> float:
@@ -316,12 +316,12 @@ class _NewtonIncrement:
         normal, tangential = force[:, 0], np.linalg.norm(force[:, 1:], axis=1)
         mu = tangential / np.where(normal > 0.0, normal, 1.0)
         out_of_balance = configuration.internal.copy()
-        out_of_balance[:n] -= contact.rows[problem.active_dofs].T @ force.ravel()[problem.active_dofs]
-        out_of_balance[problem.fixed_dofs] = 0.0
+        out_of_balance[:n] -= contact.rows[problem.system.active_dofs].T @ force.ravel()[problem.system.active_dofs]
+        out_of_balance[problem.part.fixed_dofs] = 0.0
         largest = np.linalg.norm(force, axis=1).max() or np.abs(configuration.internal[:n]).max() or 1.0
         equilibrium = float(np.abs(out_of_balance[:n]).max() / largest)
         volume = float(np.abs(np.linalg.det(np.diff(mesh.points[mesh.cells[:, : mesh.dim + 1]], axis=1))).mean())
-        volume *= problem.thickness / math.factorial(mesh.dim) * pressure_scale(mesh, self._law.shear)
+        volume *= problem.part.thickness / math.factorial(mesh.dim) * pressure_scale(mesh, self._law.shear)
         dilatation = float(np.abs(out_of_balance[n:]).max(initial=0.0)) / volume
         moved = self._relative_displacement(contact, configuration.x)
         return max(residual(force, moved, solution.status, mu, self._length_scale), equilibrium, dilatation)
@@ -348,7 +348,7 @@ def _contact(problem: Problem, face: BoundarySurface, u: Float, target: ObjectPo
     has_slope = covered & np.isfinite(normal).all(axis=1)
     normal = np.where(has_slope[:, None], normal, problem.points.basis[0])
     length = np.linalg.norm(normal, axis=1)
-    vertical = level + problem.first_contact_mm - target.depth_mm - position[:, 1]
+    vertical = level + problem.system.first_contact_mm - target.depth_mm - position[:, 1]
     gap = np.where(covered, vertical / length, _OUTSIDE_GAP * model.design.height_mm)
     return deformed_contact(
         face,

@@ -113,29 +113,29 @@ class ConstantPoissonRatio:
     @property
     def size(self) -> int:
         """Number of condensed rows."""
-        return len(self.problem.condensed.compliance)
+        return len(self.problem.part.condensed.compliance)
 
     def respond(self, step: Step, memory: InternalVariables, workspace: RelaxationWorkspace) -> Response:
         """The instantaneous compliance over alpha."""
         past, alpha = step.history_load(memory), step.alpha
-        compliance = self.problem.condensed.compliance / alpha
+        compliance = self.problem.part.condensed.compliance / alpha
         return Response(compliance, compliance @ past, lambda rows: (rows + past) / alpha)
 
     def unknowns(self, now: Float) -> Float:
         """With the factor at hand."""
-        return self.problem.condensed.unknowns(now)
+        return self.problem.part.condensed.unknowns(now)
 
     def read(self, now: Float) -> Float:
         """Through the compliance."""
-        return self.problem.condensed.compliance @ now
+        return self.problem.part.condensed.compliance @ now
 
     def stress(self, prony: Prony, memory: InternalVariables) -> Float:
         """That of the elastic body under the forces that are left."""
         problem = self.problem
         unknowns = self.unknowns(relaxed(prony, memory))
         strain = nodal_strain(problem.mesh, displacement(problem.mesh, unknowns))
-        p = pressure(problem.mesh, problem.stiffness, unknowns) if problem.elastic.mixed else None
-        return stress(strain, problem.elastic, p)
+        p = pressure(problem.mesh, problem.part.stiffness, unknowns) if problem.part.elastic.mixed else None
+        return stress(strain, problem.part.elastic, p)
 
 
 @dataclass(frozen=True)
@@ -149,7 +149,7 @@ class ConstantBulkModulus:
 
     @property
     def _own(self) -> int:
-        return int(self.problem.stiffness.upper.shape[0])
+        return int(self.problem.part.stiffness.upper.shape[0])
 
     @property
     def size(self) -> int:
@@ -172,7 +172,7 @@ class ConstantBulkModulus:
         # steps of one length differ by round-off of their ends
         alpha = Step(step.prony, float(f"{step.seconds:.12g}")).alpha
         problem = self.problem
-        body = workspace.condensation(alpha, lambda: problem.condensed.again(self._stiffness(alpha, workspace)))
+        body = workspace.condensation(alpha, lambda: problem.part.condensed.again(self._stiffness(alpha, workspace)))
         past, first = step.history_load(memory), len(body.compliance) - len(problem.inclusions.subgrid_compliance)
         settled = body.solve(self._shear_force(past[: self._own], workspace))
         compliance, moved = body.compliance.copy(), body.read(settled)
@@ -181,7 +181,7 @@ class ConstantBulkModulus:
 
         def shape(rows: Float) -> Float:
             found = settled + body.unknowns(rows)
-            found[problem.mesh.points.size :] *= problem.stiffness.pressure_scale / self._lame(alpha)
+            found[problem.mesh.points.size :] *= problem.part.stiffness.pressure_scale / self._lame(alpha)
             return np.concatenate([found, (rows[first:] + past[self._own :]) / alpha])
 
         return Response(compliance, moved, shape)
@@ -191,14 +191,14 @@ class ConstantBulkModulus:
         if workspace.shear_part is None:
             problem, shear = self.problem, self._elastic.shear
             part = Elasticity(shear, -2.0 / 3.0 * shear, False)
-            workspace.shear_part = stiffness(problem.mesh, part, problem.thickness).upper
+            workspace.shear_part = stiffness(problem.mesh, part, problem.part.thickness).upper
         return workspace.shear_part
 
     def _stiffness(self, alpha: float, workspace: RelaxationWorkspace) -> Stiffness:
         """K_b + alpha K_s; in the mixed form every block has its own factor."""
         problem = self.problem
-        whole: Stiffness = problem.stiffness
-        if not problem.elastic.mixed:
+        whole: Stiffness = problem.part.stiffness
+        if not problem.part.elastic.mixed:
             return Stiffness(whole.upper - (1.0 - alpha) * self._shear_part(workspace), whole.pressure_vertices, 1.0)
         upper, n = whole.upper.copy(), problem.mesh.points.size
         row = np.repeat(np.arange(upper.shape[0]), np.diff(upper.indptr))
@@ -209,11 +209,11 @@ class ConstantBulkModulus:
     def _shear_force(self, shape: Float, workspace: RelaxationWorkspace) -> Float:
         """K_s times a shape (N,), as loads (N,)."""
         problem, n = self.problem, self.problem.mesh.points.size
-        if not problem.elastic.mixed:
+        if not problem.part.elastic.mixed:
             return _times(self._shear_part(workspace), shape)
         deviator = shape.copy()
-        deviator[n:] *= -2.0 / 3.0 * self._elastic.shear / problem.stiffness.pressure_scale
-        load = _times(problem.stiffness.upper, deviator)
+        deviator[n:] *= -2.0 / 3.0 * self._elastic.shear / problem.part.stiffness.pressure_scale
+        load = _times(problem.part.stiffness.upper, deviator)
         load[n:] = 0.0
         return load
 
@@ -221,12 +221,12 @@ class ConstantBulkModulus:
         """The displacements as they are."""
         n = self.problem.mesh.points.size
         out = now[: self._own].copy()
-        out[n:] *= self._elastic.lame / self.problem.stiffness.pressure_scale
+        out[n:] *= self._elastic.lame / self.problem.part.stiffness.pressure_scale
         return out
 
     def read(self, now: Float) -> Float:
         """From the displacements, and what the mesh does not see."""
-        rows, beyond = self.problem.condensed.read(now[: self._own]), self.problem.inclusions.subgrid_compliance
+        rows, beyond = self.problem.part.condensed.read(now[: self._own]), self.problem.inclusions.subgrid_compliance
         rows[len(rows) - len(beyond) :] += beyond @ now[self._own :]
         return rows
 
@@ -243,9 +243,9 @@ class ConstantBulkModulus:
     def _strain(self, shape: Float) -> tuple[Float, Float]:
         problem = self.problem
         strain = nodal_strain(problem.mesh, displacement(problem.mesh, shape))
-        if not problem.elastic.mixed:
+        if not problem.part.elastic.mixed:
             return strain, np.trace(strain, axis1=1, axis2=2)
-        return strain, pressure(problem.mesh, problem.stiffness, shape) / problem.stiffness.pressure_scale
+        return strain, pressure(problem.mesh, problem.part.stiffness, shape) / problem.part.stiffness.pressure_scale
 
 
 def _times(upper: sp.csr_matrix, vector: Float) -> Float:
@@ -312,12 +312,12 @@ class Viscoelastic(SmallStrain):
             moved = moved + own[:, first:] @ spring_forces(own, springs, moved)
         c, d = len(problem.surface.nodes), problem.dim
         free = problem.free_motion(b)
-        free.reshape(-1)[problem.active_dofs] += moved[: len(problem.active_dofs)]
+        free.reshape(-1)[problem.system.active_dofs] += moved[: len(problem.system.active_dofs)]
         # what is elastic beside the body (an object that yields) stays so
         rest = problem.delassus - scatter_to_points(
-            stiffened(problem.condensed.compliance, springs), problem.active_dofs, c, d
+            stiffened(problem.part.condensed.compliance, springs), problem.system.active_dofs, c, d
         )
-        compliance = scatter_to_points(stiffened(own, springs), problem.active_dofs, c, d) + rest
+        compliance = scatter_to_points(stiffened(own, springs), problem.system.active_dofs, c, d) + rest
         found = solve_contact(problem, state, free, compliance, length_scale(problem, a, b), guess)
         if found.state is state:
             return found
@@ -333,7 +333,7 @@ class Viscoelastic(SmallStrain):
 
     def gauges(self, problem: Problem, state: ContactState) -> dict[str, float]:
         """From the memory, through the gauges' rows."""
-        first = len(problem.active_dofs)
+        first = len(problem.system.active_dofs)
         rows = self._body(problem).read(self._memory(state).elastic)[first:]
         return {g.name: float(strain) for g, strain in zip(problem.model.gauges, rows, strict=False)}
 

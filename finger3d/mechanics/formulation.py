@@ -197,8 +197,8 @@ class SmallStrain:
         unknowns = self.unknowns(problem, state)
         u = displacement(problem.mesh, unknowns)
         strain = nodal_strain(problem.mesh, u)
-        p = pressure(problem.mesh, problem.stiffness, unknowns) if problem.elastic.mixed else None
-        sigma = stress(strain, problem.elastic, p)
+        p = pressure(problem.mesh, problem.part.stiffness, unknowns) if problem.part.elastic.mixed else None
+        sigma = stress(strain, problem.part.elastic, p)
         if problem.dim == 3:
             return u, strain, sigma
         material, plane_strain = problem.model.material, problem.model.domain == "plane-strain"

@@ -46,7 +46,7 @@ def map_parallel(
     known: tuple[Result, ...] = ()
     at_once = min(len(variants), cores() if most is None else most)
     cancel = Event()
-    if len(problem.active_dofs) < _ROWS_FOR_THREADS or at_once < 2 or formulation.refactorises:
+    if len(problem.system.active_dofs) < _ROWS_FOR_THREADS or at_once < 2 or formulation.refactorises:
         workspace = formulation.workspace()
         for variant in variants:
             known = (*known, press(variant, known, workspace, cancel))[-2:]

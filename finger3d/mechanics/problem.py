@@ -129,36 +129,6 @@ class Problem:
         return self.part.mesh
 
     @property
-    def report(self) -> MeshReport:
-        """Statistics of the mesh."""
-        return self.part.report
-
-    @property
-    def elastic(self) -> LinearElasticity:
-        """Elastic constants."""
-        return self.part.elastic
-
-    @property
-    def stiffness(self) -> Stiffness:
-        """Assembled stiffness."""
-        return self.part.stiffness
-
-    @property
-    def condensed(self) -> Condensation:
-        """The condensed part."""
-        return self.part.condensed
-
-    @property
-    def thickness(self) -> float:
-        """Width (mm) of a section, 1 for a solid."""
-        return self.part.thickness
-
-    @property
-    def fixed_dofs(self) -> NDArray[np.int64]:
-        """Numbers of the unknowns that are zero."""
-        return self.part.fixed_dofs
-
-    @property
     def surface(self) -> BoundarySurface:
         """Candidate contact points of the part."""
         return self.system.surface
@@ -172,26 +142,6 @@ class Problem:
     def delassus(self) -> Float:
         """Compliance (c, d, c, d) mm/N of the contact points."""
         return self.system.delassus
-
-    @property
-    def gauge_rows(self) -> Float:
-        """Strain (g, c d) of the gauges per contact force, 1/N."""
-        return self.system.gauge_rows
-
-    @property
-    def active_dofs(self) -> NDArray[np.int64]:
-        """Directions (r,) among c d that the condensed rows stand for."""
-        return self.system.active_dofs
-
-    @property
-    def first_contact_mm(self) -> float:
-        """Height of the object's lowest point at first touch, mm."""
-        return self.system.first_contact_mm
-
-    @property
-    def place_mm(self) -> tuple[float, float] | None:
-        """Place (x, z) of first touch, mm."""
-        return self.system.place_mm
 
     @property
     def axes(self) -> tuple[str, ...]:

@@ -131,8 +131,8 @@ def check(
 
 def warnings(problem: Problem) -> list[str]:
     """What to tell of a press whose contact points see less than all of the object."""
-    model, touch = problem.model, problem.first_contact_mm
-    tips = tips_of(model, problem.place_mm)
+    model, touch = problem.model, problem.system.first_contact_mm
+    tips = tips_of(model, problem.system.place_mm)
     return _told(model, touch, tips, hidden(model, problem.surface, touch, tips, problem.axes))
 
 
@@ -160,7 +160,7 @@ def _told(model: Model, touch_mm: float, tips: Float | None, found: Hidden) -> l
 
 def unseen(problem: Problem, frames: Sequence[StepResult]) -> list[str]:
     """What to tell of increments at which the object reaches into the finger at rest, and no contact point sees it."""
-    model, face, touch, missed = problem.model, problem.surface, problem.first_contact_mm, list[float]()
+    model, face, touch, missed = problem.model, problem.surface, problem.system.first_contact_mm, list[float]()
     for frame in frames:
         end = frame.target
         if end.depth_mm <= 0.0 or not frame.outcome.ok or (frame.state.status != OPEN).any():
@@ -193,14 +193,14 @@ def penetration(problem: Problem, frame: StepResult, u: Float) -> tuple[float, F
         normal = model.object.frame(d)[0]
         moved = np.outer(moved @ normal, normal)
     at = face.samples + moved
-    over = _overlap(model, at, problem.first_contact_mm, target)
+    over = _overlap(model, at, problem.system.first_contact_mm, target)
     at, over = at[over > 0.0], over[over > 0.0]
     if not len(at):
         return 0.0, np.zeros(d)
     if isinstance(model.object, MeshObject):  # beside a wall the vertical overlap says little
         there = np.zeros((len(at), 3))
         there[:, :d] = at
-        there -= [target.slide_x_mm, problem.first_contact_mm - target.depth_mm, target.slide_z_mm]
+        there -= [target.slide_x_mm, problem.system.first_contact_mm - target.depth_mm, target.slide_z_mm]
         over = np.minimum(over, -model.object.signed_distance(there)[0])
     else:
         over = over * _upright(model, at, target)

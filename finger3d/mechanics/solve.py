@@ -12,32 +12,13 @@ from numpy.typing import NDArray
 
 from finger3d.contact.rules import STEP_DEPENDENT_RULES
 from finger3d.contact.state import ContactSolution, ContactState
-from finger3d.mechanics.build import MARGIN, build, contact_box
-from finger3d.mechanics.coverage import candidates_cover_face, contact_within_candidates, step_within_candidates
 from finger3d.mechanics.energy import external_work, frictional_dissipation
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.history import ObjectPose, StepResult
-from finger3d.mechanics.parallel import map_parallel
-from finger3d.mechanics.path import AUTO_START, between, straight_on, targets
+from finger3d.mechanics.path import between, straight_on, targets
 from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.symmetry import symmetry
 
 Float = NDArray[np.float64]
-
-__all__ = [
-    "AUTO_START",
-    "MARGIN",
-    "Problem",
-    "build",
-    "candidates_cover_face",
-    "contact_box",
-    "contact_within_candidates",
-    "map_parallel",
-    "march",
-    "step_within_candidates",
-    "symmetry",
-    "targets",
-]
 
 _CUTS = 6
 """Times that an increment which does not converge is halved, at most."""

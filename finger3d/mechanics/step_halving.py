@@ -22,7 +22,9 @@ from finger3d.errors import Finger3dError
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.model import Leg, Model
-from finger3d.mechanics.solve import AUTO_START, Problem, march
+from finger3d.mechanics.path import AUTO_START
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.solve import march
 
 Told = Callable[[Problem, StepResult], dict[str, float]]
 
@@ -143,7 +145,7 @@ def refine(
     succeeded or one with twice as many does.  Workspace and event are those of `march`.
     """
     workspace = workspace or problem.model.formulation.workspace()
-    steps, last = limits(problem.model, problem.stiffness.upper.shape[0], len(problem.surface.nodes))
+    steps, last = limits(problem.model, problem.part.stiffness.upper.shape[0], len(problem.surface.nodes))
     levels: list[tuple[int, tuple[StepResult, ...]]] = []
     failed: tuple[StepResult, ...] = ()
     while steps <= last:

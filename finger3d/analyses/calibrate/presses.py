@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.history import StepResult
+from finger3d.mechanics.parallel import map_parallel
 from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.solve import map_parallel, march
+from finger3d.mechanics.solve import march
 
 Float = NDArray[np.float64]
 

@@ -22,10 +22,11 @@ from finger3d.analyses.calibrate.tolerances import ReferenceReadings, chosen, mo
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.errors import Finger3dError
 from finger3d.io import atomic, claimed, write_csv
+from finger3d.mechanics.build import MARGIN, build
+from finger3d.mechanics.coverage import contact_within_candidates
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Gauge, Model
 from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.solve import MARGIN, build, contact_within_candidates
 from finger3d.progress import Progress
 from finger3d.report.calibrate import calibrate_page
 from finger3d.sensor.curve import FEWEST, NOISE, RESOLUTION, Calibration, Tolerance
@@ -138,8 +139,8 @@ def _whole(
         raise
     sweep.seconds["total"] = time.perf_counter() - start
     about = {
-        "domain": model.domain, "effects": list(scene.effects), "dofs": int(problem.stiffness.upper.shape[0]),
-        "contact_points": len(problem.surface.nodes), "mesh_hash": problem.report.hash, "seconds": sweep.seconds,
+        "domain": model.domain, "effects": list(scene.effects), "dofs": int(problem.part.stiffness.upper.shape[0]),
+        "contact_points": len(problem.surface.nodes), "mesh_hash": problem.part.report.hash, "seconds": sweep.seconds,
         "factorizations": problem.factorizations, "versions": versions(),
         "increments": sweep.increments.as_dict() if sweep.increments else {},
     }  # fmt: skip
@@ -287,7 +288,7 @@ def _write(
     own = replace(
         problem,
         model=replace(problem.model, gauges=model.gauges),
-        system=replace(problem.system, gauge_rows=problem.gauge_rows[: len(model.gauges)]),
+        system=replace(problem.system, gauge_rows=problem.system.gauge_rows[: len(model.gauges)]),
     )
     if model.formulation.is_linear_elastic:
         ReducedModel.of(own).save(folder / "reduced.npz")

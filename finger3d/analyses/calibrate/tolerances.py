@@ -27,11 +27,11 @@ from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.errors import Finger3dError
 from finger3d.fem.condense import stiffened
 from finger3d.fem.material import MIXED_FROM
+from finger3d.mechanics.build import build
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.path import targets
 from finger3d.mechanics.problem import Problem, scatter_to_points
-from finger3d.mechanics.solve import build
 from finger3d.objects import Plane
 from finger3d.sensor.curve import Tolerance
 
@@ -262,14 +262,13 @@ def with_modulus(problem: Problem, times: float) -> Problem:
     c, d = problem.delassus.shape[:2]
 
     def soft(one: Problem) -> Problem:
-        own = stiffened(one.condensed.compliance, one.inclusions.bar_stiffness)
-        rest = one.delassus - scatter_to_points(own, one.active_dofs, c, d)  # of the object
-        changed = stiffened(one.condensed.compliance / times, one.inclusions.bar_stiffness)
-        rows = np.zeros_like(one.gauge_rows)
-        rows[:, one.active_dofs] = changed[
-            len(one.active_dofs) : len(one.active_dofs) + len(rows), : len(one.active_dofs)
-        ]
-        delassus = scatter_to_points(changed, one.active_dofs, c, d) + rest
+        own = stiffened(one.part.condensed.compliance, one.inclusions.bar_stiffness)
+        active, gauges = one.system.active_dofs, len(one.system.gauge_rows)
+        rest = one.delassus - scatter_to_points(own, active, c, d)  # of the object
+        changed = stiffened(one.part.condensed.compliance / times, one.inclusions.bar_stiffness)
+        rows = np.zeros_like(one.system.gauge_rows)
+        rows[:, active] = changed[len(active) : len(active) + gauges, : len(active)]
+        delassus = scatter_to_points(changed, active, c, d) + rest
         return replace(one, system=replace(one.system, delassus=delassus, gauge_rows=rows))
 
     changed = soft(problem)

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from finger3d.accuracy.companions import FACTOR
 from finger3d.accuracy.estimate import estimate
+from finger3d.mechanics.build import build
 from finger3d.mechanics.history import ContactPoints, StepResult, contact_table, measure
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.solve import Problem, build
+from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.step_halving import marched
 from finger3d.results.comparison import Case
 
