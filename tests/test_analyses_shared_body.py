@@ -190,7 +190,7 @@ def test_several_presses_are_proved_as_each_on_its_own(effect, at_once, monkeypa
         )[-1]
         for mu, depth in ((0.1, 0.3), (0.5, 0.2), (1.0, 0.1))
     ]
-    face = surface(problem.mesh, "contact", problem.thickness)
+    face = surface(problem.mesh, "contact", problem.part.thickness)
     others = ~np.isin(face.nodes, problem.surface.nodes)
     kinematics = model.formulation
     together = kinematics.gaps(problem, [f.part for f in ends], [f.target for f in ends], restrict(face, others))

@@ -235,7 +235,8 @@ class SharedBody:
         try:
             problem = self.problem_of(variant)
             if variant.legs != self.problem.model.legs:  # the mesh was checked for the path of all variants
-                check(problem.model, problem.surface, problem.system.first_contact_mm, problem.system.place_mm, problem.axes)
+                system = problem.system
+                check(problem.model, system.surface, system.first_contact_mm, system.place_mm, problem.axes)
             frames = marched(problem, workspace, cancel)[0]
         except TROUBLE as error:
             frames = error.with_traceback(None)  # a traceback would keep all arrays of its frames
