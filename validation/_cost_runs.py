@@ -50,7 +50,10 @@ def measured(given: dict[str, Any]) -> dict[str, Any]:
         return {**answer, "seconds": seconds, "numbers": {str(case.counts[0]): values}, "factorizations": press.solves}
     problem = condensed(parts, case.solver)
     seconds["condensation"] = problem.part.condensed.seconds
-    answer |= {"rows": len(problem.part.condensed.compliance), "perturbed_pivots": problem.condensed.perturbed_pivots}
+    answer |= {
+        "rows": len(problem.part.condensed.compliance),
+        "perturbed_pivots": problem.part.condensed.perturbed_pivots,
+    }
     found, iterations = {}, {}
     for count in case.counts:
         begin = time.perf_counter()
