@@ -44,7 +44,7 @@ bench: install
 lint: install
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy finger3d
+	$(BIN)/mypy
 	$(BIN)/lint-imports
 
 clean:

@@ -37,7 +37,8 @@ if TYPE_CHECKING:
     from finger3d.fem.material import Isotropic
     from finger3d.fem.simplex import Mesh
     from finger3d.geometry.registry import designs
-    from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
+    from finger3d.mechanics.gauges import Gauge
+    from finger3d.mechanics.model import Leg, MeshOptions, Model
     from finger3d.mold.options import MoldOptions
     from finger3d.objects import Cylinder, Plane, Sphere, Wave, Wedge
     from finger3d.scene import Scene, load, parse

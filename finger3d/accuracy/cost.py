@@ -190,7 +190,7 @@ def _kept_mb(model: Model, size: _Size, axes: tuple[str, ...]) -> float:
     if "viscosity" in effects:
         branches = 1 + len(getattr(model.formulation, "prony", ()))
         each += 8.0 * branches * (d * size.contact_points if getattr(model.formulation, "bulk", True) else size.dofs)
-    return steps * each / 1e6
+    return float(steps * each / 1e6)
 
 
 def _memory(size: _Size, d: int, gauges: int = 0) -> float:

@@ -22,8 +22,9 @@ from finger3d.fem.material import Isotropic
 from finger3d.fem.traces import BoundarySurface
 from finger3d.geometry.design import DesignSummary
 from finger3d.io import atomic, read_arrays
+from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.history import ContactPoints
-from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.problem import ContactSystem, Problem
 from finger3d.mechanics.symmetry import Symmetry
 from finger3d.objects import OBJECTS, MeshObject, RigidObject

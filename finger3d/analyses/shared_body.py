@@ -22,8 +22,9 @@ from typing import TYPE_CHECKING
 from finger3d.contact.friction import FrictionLaw
 from finger3d.contact.rules import RuleName
 from finger3d.errors import Finger3dError, Outcome
+from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.history import StepResult, measure
-from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.scene import Scene
 
 if TYPE_CHECKING:

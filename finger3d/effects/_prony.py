@@ -43,7 +43,7 @@ class Step:
     @property
     def gain(self) -> Float:
         """g_i gamma_i: what a branch takes of a change of shape."""
-        return np.array([share for share, _ in self.prony]) * exprel(-self._rates)
+        return np.asarray(np.array([share for share, _ in self.prony]) * exprel(-self._rates))
 
     @property
     def alpha(self) -> float:
@@ -52,7 +52,7 @@ class Step:
 
     def history_load(self, memory: InternalVariables) -> Float:
         """Vector (k,) with ``alpha now' - past`` the stress at the end of the step."""
-        return self.gain.sum() * memory.elastic - self.decay @ memory.branches
+        return np.asarray(self.gain.sum() * memory.elastic - self.decay @ memory.branches)
 
     def after(self, memory: InternalVariables, now: Float) -> InternalVariables:
         """The memory once the shape is `now`."""
@@ -67,4 +67,4 @@ def long_time_share(prony: Prony) -> float:
 
 def relaxed(prony: Prony, memory: InternalVariables) -> Float:
     """Vector (k,) of which the present stress is the instantaneous elastic one."""
-    return long_time_share(prony) * memory.elastic + memory.branches.sum(axis=0)
+    return np.asarray(long_time_share(prony) * memory.elastic + memory.branches.sum(axis=0))

@@ -27,7 +27,8 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.kelvin import FoilPatches, InfiniteBody
 from finger3d.fem.simplex import Mesh, reflect_into_part
 from finger3d.fem.traces import displacement_row
-from finger3d.mechanics.model import EmbeddedBars, Gauge, Model
+from finger3d.mechanics.gauges import Gauge
+from finger3d.mechanics.model import EmbeddedBars, Model
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -83,7 +84,7 @@ def _alone(model: Model, foils: list[FoilPatches]) -> Float:
     material = model.material.isotropic("effects.embedded_gauge")
     body = InfiniteBody(material.E_MPa, material.nu, model.domain == "plane-stress", section)
     whole = np.block([[a.strained_by(b, body) for b in foils] for a in foils])
-    return 0.5 * (whole + whole.T)
+    return np.asarray(0.5 * (whole + whole.T))
 
 
 def _enter(rows: dict[tuple[float, ...], sp.csr_matrix], foil: FoilPatches, mesh: Mesh, axes: tuple[str, ...]) -> Int:

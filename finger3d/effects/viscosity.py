@@ -250,7 +250,7 @@ class ConstantBulkModulus:
 
 def _times(upper: sp.csr_matrix, vector: Float) -> Float:
     """A symmetric matrix, given by its upper triangle, times a vector."""
-    return upper @ vector + upper.T @ vector - upper.diagonal() * vector
+    return np.asarray(upper @ vector + upper.T @ vector - upper.diagonal() * vector)
 
 
 @dataclass(frozen=True, kw_only=True)

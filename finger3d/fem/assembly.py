@@ -207,7 +207,7 @@ def _outer_products(gradients: Float, weights: Float) -> Float:
     """Integrals (e, k, d, k, d) of G_am G_bn, from gradients G (e, q, k, d) and weights (e, q)."""
     e, q, k, d = gradients.shape
     flat = gradients.reshape(e, q, k * d)
-    return np.matmul(np.swapaxes(flat * weights[:, :, None], 1, 2), flat).reshape(e, k, d, k, d)
+    return np.asarray(np.matmul(np.swapaxes(flat * weights[:, :, None], 1, 2), flat).reshape(e, k, d, k, d))
 
 
 def stiffness(mesh: Mesh, elastic: LinearElasticity, thickness: float = 1.0) -> Stiffness:

@@ -141,7 +141,7 @@ def spring_forces(compliance: Float, springs: Float, moved: Float) -> Float:
     root = np.sqrt(springs)
     inner = np.eye(len(springs)) + root[:, None] * compliance[first:, first:] * root
     scaled = (root * moved[first:].T).T
-    return -(root * np.linalg.solve(inner, scaled).T).T
+    return np.asarray(-(root * np.linalg.solve(inner, scaled).T).T)
 
 
 def stiffened(compliance: Float, springs: Float) -> Float:

@@ -96,7 +96,7 @@ class Element:
 
     def jacobians(self, nodes: Float, bary: Float) -> Float:
         """Return the Jacobians (e, q, D, d) at barycentric points of cells with node coordinates (e, k, D)."""
-        return np.einsum("ekD,qkd->eqDd", nodes, self.gradient(bary), optimize=True)
+        return np.asarray(np.einsum("ekD,qkd->eqDd", nodes, self.gradient(bary), optimize=True))
 
     def physical_gradients(self, nodes: Float, bary: Float) -> tuple[Float, Float]:
         """Return gradients (e, q, k, d) in space, 1/mm, and Jacobian determinants (e, q), of cells (e, k, d)."""
@@ -106,7 +106,7 @@ class Element:
     def surface_measure(self, nodes: Float, bary: Float) -> Float:
         """Return the length or area factor (m, q) of facets with nodes (m, k, D): sqrt(det J^T J)."""
         jacobian = self.jacobians(nodes, bary)
-        return np.sqrt(np.linalg.det(np.swapaxes(jacobian, -1, -2) @ jacobian))
+        return np.asarray(np.sqrt(np.linalg.det(np.swapaxes(jacobian, -1, -2) @ jacobian)))
 
 
 LINE2, LINE3 = Element("line2", 1, 1, 3), Element("line3", 1, 2, 21)

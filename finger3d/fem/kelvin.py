@@ -41,10 +41,10 @@ class InfiniteBody:
         ahead = (reach @ t) * (reach @ force) / square
         if self.thickness is None:
             scale = (1.0 + self.nu) / (8.0 * math.pi * self.E_MPa * (1.0 - self.nu))
-            return scale * ((3.0 - 4.0 * self.nu) * float(t @ force) + ahead) / np.sqrt(square)
+            return np.asarray(scale * ((3.0 - 4.0 * self.nu) * float(t @ force) + ahead) / np.sqrt(square))
         E, nu = self._plane
         scale = (1.0 + nu) / (4.0 * math.pi * E * self.thickness)
-        return scale * ((1.0 + nu) * ahead - 0.5 * (3.0 - nu) * float(t @ force) * np.log(square))
+        return np.asarray(scale * ((1.0 + nu) * ahead - 0.5 * (3.0 - nu) * float(t @ force) * np.log(square)))
 
     def pushed_by_own(self, begin: Float, end: Float, low: Float, high: Float, s: Float, z: Float) -> Float:
         """Displacement along a foil at s (along, from its middle) and z (across) from 1 N on its patches."""
@@ -87,7 +87,7 @@ class FoilPatches:
     def places(self) -> Float:
         """Middles (n, m, 3) mm of the patches: the ends of the bars."""
         aside = _middles(self.across)[None, :, None] * np.array([0.0, 0.0, 1.0])
-        return self.middle + _middles(self.along)[:, None, None] * self.direction + aside
+        return np.asarray(self.middle + _middles(self.along)[:, None, None] * self.direction + aside)
 
     def strained_by(self, other: FoilPatches, body: InfiniteBody) -> Float:
         """Strain of this foil's bars (n m - m, n' m' - m') by the pull of the other's, 1 N mm each: 1/(N mm)."""
@@ -101,7 +101,7 @@ class FoilPatches:
             moved = body.pushed(reach, self.direction, other.direction, _BLUNT * size)
         steps = [np.diff(np.eye(len(f.along) - 1), axis=0) / np.diff(_middles(f.along))[:, None] for f in (self, other)]
         found = np.einsum("ia,akbl,jb->ikjl", steps[0], moved, steps[1], optimize=True)
-        return found.reshape(len(self.area), len(other.area))
+        return np.asarray(found.reshape(len(self.area), len(other.area)))
 
     def _sizes(self, body: InfiniteBody) -> Float:
         """Extent (n, m) mm of the patches."""

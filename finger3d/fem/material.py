@@ -129,7 +129,9 @@ class Elasticity:
         deviator = 2.0 * self.shear * strain
         if self.mixed:
             return deviator
-        return deviator + (self.lame * np.trace(strain, axis1=1, axis2=2))[:, None, None] * np.eye(strain.shape[-1])
+        return np.asarray(
+            deviator + (self.lame * np.trace(strain, axis1=1, axis2=2))[:, None, None] * np.eye(strain.shape[-1])
+        )
 
 
 @dataclass(frozen=True)

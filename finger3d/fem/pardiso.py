@@ -31,15 +31,17 @@ def _library() -> Any:
     from pypardiso.pardiso_wrapper import PyPardisoSolver
 
     library = PyPardisoSolver().libmkl
-    library.mkl_set_exit_handler(_EXIT)
+    library.mkl_set_exit_handler(_EXIT_HANDLER)
     return library.pardiso
 
 
-@ctypes.CFUNCTYPE(None, ctypes.c_int)
-def _EXIT(code: int) -> None:
-    """End the process as a lack of memory does: MKL would exit with 2, which stands for a mistake of the user."""
+def _exit(code: int) -> None:
+    """End the process with the exit code for lack of memory; MKL would exit with 2, the code for bad input."""
     os.write(2, f"finger3d: {OUT_OF_MEMORY}\n".encode())
     os._exit(MissingError.exit_code)
+
+
+_EXIT_HANDLER = ctypes.CFUNCTYPE(None, ctypes.c_int)(_exit)  # must live as long as MKL may call it
 
 
 def available() -> bool:

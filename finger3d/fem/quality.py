@@ -37,7 +37,9 @@ def curved_volume(mesh: Mesh) -> float:
 def curved_jacobians(mesh: Mesh) -> Float:
     """Smallest Jacobian determinant (e,) over the nodes and the centre of each quadratic cell, mm^d."""
     d = mesh.dim
-    return _determinants(mesh, np.vstack([mesh.element.nodes, np.full((1, d + 1), 1.0 / (d + 1))])).min(axis=0)
+    return np.asarray(
+        _determinants(mesh, np.vstack([mesh.element.nodes, np.full((1, d + 1), 1.0 / (d + 1))])).min(axis=0)
+    )
 
 
 def cell_angles_deg(points: Float, cells: Int) -> Float:
@@ -49,7 +51,7 @@ def cell_angles_deg(points: Float, cells: Int) -> Float:
         back = -edge[:, [2, 0, 1]]
         sine = edge[..., 0] * back[..., 1] - edge[..., 1] * back[..., 0]
         angle = np.degrees(np.arctan2(sine, np.einsum("eix,eix->ei", edge, back)))
-        return np.maximum(angle.min(axis=1), 0.0)
+        return np.asarray(np.maximum(angle.min(axis=1), 0.0))
     faces = p[:, FACETS[3]]
     normal = np.cross(faces[:, :, 1] - faces[:, :, 0], faces[:, :, 2] - faces[:, :, 0])
     length = np.linalg.norm(normal, axis=2, keepdims=True)

@@ -49,7 +49,7 @@ class Mesh:
     @property
     def dim(self) -> int:
         """Number of space dimensions."""
-        return self.points.shape[1]
+        return int(self.points.shape[1])
 
     @property
     def element(self) -> Element:
@@ -71,14 +71,14 @@ def boundary(cells: Int, dim: int) -> Int:
     """Facets (m, dim) of linear cells that belong to one cell only, oriented outward."""
     faces = cells[:, FACETS[dim]].reshape(-1, dim)
     _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
-    return faces[np.sort(first[count == 1])]
+    return np.asarray(faces[np.sort(first[count == 1])])
 
 
 def signed_volumes(mesh: Mesh) -> Float:
     """Signed volume (area in 2D) (e,) of the straight cells, mm^d."""
     corners = mesh.points[mesh.cells[:, : mesh.dim + 1]]
     edges = corners[:, 1:] - corners[:, :1]
-    return np.linalg.det(edges) / (2.0 if mesh.dim == 2 else 6.0)
+    return np.asarray(np.linalg.det(edges) / (2.0 if mesh.dim == 2 else 6.0))
 
 
 def quadratic(mesh: Mesh) -> Mesh:

@@ -96,4 +96,4 @@ def _moved(mesh: Mesh, u: Float, place: Float, axes: tuple[str, ...]) -> Float:
     d = mesh.dim
     inside, sign = reflect_into_part(place, np.ones(3), axes, d)
     cell, barycentric = cells_at(mesh, inside)[0]
-    return place[:d] + sign * (mesh.element.shape(barycentric[None])[0] @ u[mesh.cells[cell]])
+    return np.asarray(place[:d] + sign * (mesh.element.shape(barycentric[None])[0] @ u[mesh.cells[cell]]))

@@ -65,7 +65,7 @@ class ContactPoints:
     @property
     def dim(self) -> int:
         """2 for a section, 3 for a solid."""
-        return self.basis.shape[-1]
+        return int(self.basis.shape[-1])
 
     def with_basis_of(self, state: ContactState) -> ContactPoints:
         """The points with the directions of a state, where they turn with the motion."""

@@ -226,7 +226,7 @@ def rigid_gap(model: Model, where: BoundarySurface, touch: float, target: Object
     upright = -model.object.frame(where.samples.shape[1])[0, 1]
     there = np.isfinite(vertical)
     if there.all():
-        return np.asarray(where.average @ vertical) * upright
+        return np.asarray(np.asarray(where.average @ vertical) * upright)
     # Beside the object there is no gap: a point's mean is over what the object covers, if that is half of its hat.
     share = np.asarray(where.average @ there)
     mean = np.asarray(where.average @ np.where(there, vertical, 0.0)) / np.maximum(share, _COVERED)

@@ -199,7 +199,7 @@ WORTH_S = {2: 4.0, 3: 4.0}
 
 def contact_s(points: float, dim: int) -> float:
     """Seconds of one increment on so many contact points of the meshed part, measured on 2 cores."""
-    return 0.0025 + (0.065 * (points / 680.0) ** 2.4 if dim == 3 else 0.038 * (points / 700.0) ** 2.75)
+    return float(0.0025 + (0.065 * (points / 680.0) ** 2.4 if dim == 3 else 0.038 * (points / 700.0) ** 2.75))
 
 
 def condensation_s(dofs: float, dim: int) -> float:

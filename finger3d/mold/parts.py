@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from finger3d.errors import Finger3dError
 from finger3d.geometry.surface import Triangles
 from finger3d.geometry.tessellate import triangulated
-from finger3d.mechanics.model import Gauge
+from finger3d.mechanics.gauges import Gauge
 from finger3d.mold.demould import box, is_base, undercuts
 from finger3d.mold.options import RIM_MM, MoldOptions
 from finger3d.mold.shell import volume

@@ -78,4 +78,4 @@ def _gradient(
     here = height(x, z)
     sides = [s * (height(x + s * step * along[0], z + s * step * along[1]) - here) / step for s in (-1.0, 1.0)]
     known = np.nan_to_num(np.stack(sides))
-    return known[np.abs(known).argmax(axis=0), np.arange(len(x))]
+    return np.asarray(known[np.abs(known).argmax(axis=0), np.arange(len(x))])

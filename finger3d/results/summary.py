@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.model import Gauge
+from finger3d.mechanics.gauges import Gauge
 
 
 def read_json(path: Path) -> dict[str, Any]:

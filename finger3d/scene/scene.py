@@ -18,7 +18,8 @@ from finger3d.fem.material import Isotropic
 from finger3d.geometry.design import Design
 from finger3d.geometry.files import SUFFIXES
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model, contact_path
+from finger3d.mechanics.gauges import Gauge
+from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model, contact_path
 from finger3d.objects import OBJECTS, RigidObject, initial_contact
 from finger3d.scene import checks, files, tree
 from finger3d.scene.messages import Place, choose, described, dotted, listed, messages_from, nearest, shown, unknown

@@ -41,18 +41,26 @@ def _located(message: str, text: str) -> str:
     return message.replace("(at end of document)", end)
 
 
-def frozen(value: Any) -> Any:
-    """Copy of a tree with tuples for lists, which the strict tables ask for."""
-    if isinstance(value, Mapping):
-        return {k: frozen(v) for k, v in value.items()}
-    return tuple(frozen(v) for v in value) if isinstance(value, list | tuple) else value
+def frozen(tree: Mapping[str, object]) -> Tree:
+    """Return a copy with tuples in place of lists, which the strict tables require."""
+    return {key: _with_tuples(value) for key, value in tree.items()}
 
 
-def plain(value: Any) -> Any:
-    """Copy of a tree with lists for tuples and without None, as TOML and JSON want it."""
+def _with_tuples(value: object) -> object:
     if isinstance(value, Mapping):
-        return {k: plain(v) for k, v in value.items() if v is not None}
-    return [plain(v) for v in value] if isinstance(value, list | tuple) else value
+        return frozen(value)
+    return tuple(_with_tuples(v) for v in value) if isinstance(value, list | tuple) else value
+
+
+def plain(tree: Mapping[str, object]) -> Tree:
+    """Return a copy with lists in place of tuples and without None, which TOML and JSON require."""
+    return {key: _with_lists(value) for key, value in tree.items() if value is not None}
+
+
+def _with_lists(value: object) -> object:
+    if isinstance(value, Mapping):
+        return plain(value)
+    return [_with_lists(v) for v in value] if isinstance(value, list | tuple) else value
 
 
 def override(tree: Tree, overrides: Iterable[str], option: str = "--set") -> Tree:

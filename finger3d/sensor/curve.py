@@ -159,7 +159,7 @@ class Calibration:
             found[out] = np.abs(left) / _SHARPER
         found[[0, -1]] = found[[1, -2]]
         # a kink between two of the points is seen from either of them, or from the next
-        return np.max([found, np.append(found[1:], 0.0), np.append(0.0, found[:-1])], axis=0)
+        return np.asarray(np.max([found, np.append(found[1:], 0.0), np.append(0.0, found[:-1])], axis=0))
 
     def curve_error(self, mu: ArrayLike, shape: Shape = "interpolation") -> Float:
         """Strain error (m,) of the curve used at mu (m,).

@@ -24,8 +24,9 @@ from finger3d.errors import Finger3dError
 from finger3d.io import atomic, claimed, write_csv
 from finger3d.mechanics.build import MARGIN, build
 from finger3d.mechanics.coverage import contact_within_candidates
+from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.history import StepResult
-from finger3d.mechanics.model import Gauge, Model
+from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
 from finger3d.progress import Progress
 from finger3d.report.calibrate import calibrate_page

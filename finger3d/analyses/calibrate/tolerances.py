@@ -28,8 +28,9 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.condense import stiffened
 from finger3d.fem.material import MIXED_FROM
 from finger3d.mechanics.build import build
+from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.history import StepResult
-from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.path import targets
 from finger3d.mechanics.problem import Problem, scatter_to_points
 from finger3d.objects import Plane
@@ -124,7 +125,7 @@ class ReferenceBody:
 
     def change(self, problem: Problem, like: Like | None = None) -> Float:
         """What the strain (m,) changes by once the body, or its path, is another; started from presses `like` it."""
-        return read(problem, (self.gauge.name,), self.mu, like or self.pressed)[0] - self.strain
+        return np.asarray(read(problem, (self.gauge.name,), self.mu, like or self.pressed)[0] - self.strain)
 
     def rebuilt(self, **changes: Any) -> Problem:
         """The body with another model, without the gauges that nobody reads; all of them where they stiffen it."""

@@ -42,7 +42,7 @@ def widened(model: Model, width_mm: float) -> Model:
 
     def points(size_mm: float) -> float:
         layers = max(2, math.ceil(width_mm / (2.0 * size_mm)))
-        return free * (design.half_length_mm / size_mm + 1) * (layers + 1)
+        return float(free * (design.half_length_mm / size_mm + 1) * (layers + 1))
 
     while points(size) > _POINTS and 1.2 * size <= largest:
         size *= 1.2

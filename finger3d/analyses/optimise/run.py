@@ -26,8 +26,9 @@ from finger3d.analyses.optimise.task import (
 from finger3d.analyses.shared_body import SharedBody, Variant, body_key
 from finger3d.errors import Finger3dError
 from finger3d.io import atomic, claimed, write_csv, write_json
+from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.history import StepResult, measure
-from finger3d.mechanics.model import Gauge, Leg, Model
+from finger3d.mechanics.model import Leg, Model
 from finger3d.plotting.optimise import draw
 from finger3d.progress import Progress
 from finger3d.report.optimise import optimise_page
