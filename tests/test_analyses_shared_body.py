@@ -213,7 +213,7 @@ def test_one_solver_proves_as_the_other(monkeypatch):
     ends = [list(march(problem))[-1]] * 3
     monkeypatch.setenv("FINGER3D_SOLVER", "superlu")
     other = build(scene().model())
-    assert other.condensed.solver == "superlu"
+    assert other.part.condensed.solver == "superlu"
     forces = [f.part.force for f in ends]
     for a, b in zip(problem.unknowns_of(forces), other.unknowns_of(forces), strict=True):
         assert np.abs(a - b).max() <= 1e-12 * np.abs(b).max()

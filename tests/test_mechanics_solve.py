@@ -28,7 +28,7 @@ from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.path import targets
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
-from finger3d.mechanics.step_halving import automatic, limits, marched, refine, remaining, step_error
+from finger3d.mechanics.step_halving import automatic, increment_error, limits, march_automatic, refine, step_error
 from finger3d.objects import Plane, Sphere
 
 
@@ -297,7 +297,7 @@ def test_two_counts_that_agree_by_chance_do_not_pass() -> None:
 
 
 def test_dissipation_below_its_floor_is_said_not_to_be_resolved() -> None:
-    frames, estimate = marched(build(stuck(legs=(Leg(10.0, steps="auto"),))))
+    frames, estimate = march_automatic(build(stuck(legs=(Leg(10.0, steps="auto"),))))
     assert estimate is not None
     assert frames[-1].dissipation_mJ < estimate.dissipation_floor_mJ
     assert not estimate.dissipation_resolved
@@ -309,7 +309,7 @@ def test_rules_that_have_no_limit_in_increments_take_ten(name: str) -> None:
     model = block(legs=(Leg(0.3, steps="auto"),), object=Plane(), friction=Coulomb(0.05))
     literal = {"rule": {"rule": "paper"}, "branch": {"friction": TwoCoefficients(0.1, 0.7, "paper")}}[name]
     assert automatic(model)
-    frames, estimate = marched(build(replace(model, **literal)))
+    frames, estimate = march_automatic(build(replace(model, **literal)))
     assert estimate is None
     assert len(frames) == 10
 
@@ -336,7 +336,7 @@ def test_a_run_in_few_increments_that_fails_does_not_fail_the_press(monkeypatch:
         return true_march(problem, **arguments)
 
     monkeypatch.setattr("finger3d.mechanics.step_halving.march", anew)
-    frames, estimate = marched(problem)
+    frames, estimate = march_automatic(problem)
     assert frames[-1].outcome.ok
     assert estimate is not None
     assert estimate.levels[0][0] == 10
@@ -344,10 +344,10 @@ def test_a_run_in_few_increments_that_fails_does_not_fail_the_press(monkeypatch:
 
 def test_the_remaining_error_is_exact_at_the_first_order_and_keeps_the_largest() -> None:
     counts = (10, 20, 40)
-    assert remaining(counts, [1.0 + 1.0 / n for n in counts], 40) == pytest.approx(1.0 / 40.0)
-    assert remaining(counts, [1.0 + 1.0 / n for n in counts], 10) == pytest.approx(1.0 / 10.0)
+    assert increment_error(counts, [1.0 + 1.0 / n for n in counts], 40) == pytest.approx(1.0 / 40.0)
+    assert increment_error(counts, [1.0 + 1.0 / n for n in counts], 10) == pytest.approx(1.0 / 10.0)
     # 20 and 40 agree by chance: the change from 10 to 20, 20 / N, is not forgotten
-    assert remaining(counts, [2.0, 1.0, 1.0], 40) == pytest.approx(20.0 / 40.0)
+    assert increment_error(counts, [2.0, 1.0, 1.0], 40) == pytest.approx(20.0 / 40.0)
 
 
 @pytest.mark.parametrize("domain", ["solid", "plane-strain"])

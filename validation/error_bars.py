@@ -33,7 +33,13 @@ from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
-from finger3d.mechanics.step_halving import DISSIPATION_TOLERANCE, TOLERANCE, error_by_count, marched, step_error
+from finger3d.mechanics.step_halving import (
+    DISSIPATION_TOLERANCE,
+    TOLERANCE,
+    errors_from_counts,
+    march_automatic,
+    step_error,
+)
 from finger3d.objects import Cylinder, Plane, Sphere
 
 from ._drawn import drawn
@@ -231,11 +237,11 @@ def _by_steps(name: str, model: Model) -> Iterator[Judged]:
         for n, end in ends.items()
     ]
     free = replace(problem, model=replace(model, legs=tuple(replace(leg, steps="auto") for leg in model.legs)))
-    frames, chosen = marched(free)
+    frames, chosen = march_automatic(free)
     if chosen:
         told = {count: press_numbers(problem, last[-1]) for count, last in chosen.levels[-4:]}
         kind = "automatic, met" if chosen.met else "automatic, not met"
-        runs.append((kind, press_numbers(problem, frames[-1]), error_by_count(told, chosen.steps)))
+        runs.append((kind, press_numbers(problem, frames[-1]), errors_from_counts(told, chosen.steps)))
         exact["floor"] = chosen.dissipation_floor_mJ
     for part, numbers, bars in runs:
         for k, value in numbers.items():

@@ -16,7 +16,7 @@ import numpy as np
 from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.step_halving import DISSIPATION_TOLERANCE, TOLERANCE, marched
+from finger3d.mechanics.step_halving import DISSIPATION_TOLERANCE, TOLERANCE, march_automatic
 
 from ._paper import STRAIN, STRESS, Profile, columns, half_cylinder, line_r5, said, strains, under
 
@@ -69,7 +69,7 @@ def _statements(plane: str, nu: float, found: dict[Any, np.ndarray], counts: lis
 def _automatic(here: str, problem: Problem) -> list[Row]:
     """Errors left by automatic increments that met their tolerances, against four times as many."""
     legs = tuple(replace(leg, steps="auto") for leg in problem.model.legs)
-    frames, chosen = marched(replace(problem, model=replace(problem.model, friction=Coulomb(0.25), legs=legs)))
+    frames, chosen = march_automatic(replace(problem, model=replace(problem.model, friction=Coulomb(0.25), legs=legs)))
     if chosen is None or not chosen.met:
         return []
     ends = frames[-1], under(problem, 0.25, 4 * len(frames))[-1]

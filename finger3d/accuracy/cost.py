@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from finger3d.accuracy.estimate import FACTORISATIONS
 from finger3d.mechanics.build import contact_box
+from finger3d.mechanics.cost import AddedCost, PressCost
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.path import AUTO_START
 from finger3d.mechanics.step_halving import automatic, condensation_s, contact_s, limits
@@ -22,11 +22,6 @@ _TETWILD_MB = 500.0  # while it meshes, however little
 _IMPORT_S = 0.4
 _FIGURES_S = {2: 1.0, 3: 4.5}
 _GAUGE_S, _GAUGE_CELL_S = 3e-3, 7e-7  # a gauge, and for every cell that is searched for it
-_NUMERIC = 0.8  # of a condensation, once the ordering is known; with two solutions
-_TANGENT = 0.8  # assemblies of the linear stiffness
-_NEWTON_S = {2: 0.008, 3: 0.12}  # besides, in each step
-_FOIL_ROWS = {2: 16, 3: 96}  # of a foil, mirror images together
-_FOIL_S = {2: 0.02, 3: 0.2}
 
 
 @dataclass(frozen=True)
@@ -57,8 +52,17 @@ def forecast(model: Model) -> dict[str, Any]:
     seconds = _seconds(size, d, marched, tetwild)
     seconds["assembly"] += len(model.gauges) * (_GAUGE_S + _GAUGE_CELL_S * size.cells)
     memory = max(_memory(size, d, len(model.gauges)), _TETWILD_MB if tetwild else 0.0)
-    memory += _kept_mb(model, size, axes)
-    costs = {name: _costs(name, model, size, seconds, marched, len(runs)) for _, name in model.filled}
+    press = PressCost(
+        dim=d,
+        dofs=size.dofs,
+        contact_points=size.contact_points,
+        increments=marched,
+        runs=len(runs),
+        seconds=seconds,
+        factor_mb=_memory(size, d) - _BASE_MB,
+    )
+    memory += _states_mb(model, press, axes)
+    costs = {name: _added_cost(slot, model, press) for slot, name in model.filled}
     check_memory((memory + sum(cost.memory_mb for cost in costs.values())) / 1e3, "this press")
     return {
         "domain": model.domain,
@@ -72,7 +76,7 @@ def forecast(model: Model) -> dict[str, Any]:
         "steps": fixed + runs[-1] * free,
         **({"steps_of_all_runs": marched} if len(runs) > 1 else {}),
         **{f"{stage}_s": round(s, 2) for stage, s in seconds.items()},
-        **{name: f"costs {cost.why}" for name, cost in costs.items()},
+        **{name: f"costs {cost}" for name, cost in costs.items()},
         "total_s": round(sum(seconds.values()) + sum(cost.seconds for cost in costs.values()), 1),
         "memory_MB": round(memory + sum(cost.memory_mb for cost in costs.values())),
     }
@@ -92,49 +96,16 @@ def _runs(model: Model, size: _Size, d: int) -> list[int]:
     return runs
 
 
-@dataclass(frozen=True)
-class _Cost:
-    """What an effect adds, and by what."""
-
-    seconds: float
-    memory_mb: float
-    reason: str
-
-    @property
-    def why(self) -> str:
-        """For a reader."""
-        return f"about {self.seconds:.2g} s and {self.memory_mb:.2g} MB: {self.reason}"
-
-
-def _costs(name: str, model: Model, size: _Size, seconds: dict[str, float], steps: int, runs: int) -> _Cost:
-    d = 3 if model.domain == "solid" else 2
-    condensation, assembly = seconds["condensation"], seconds["assembly"]
-    factor_mb = _memory(size, d) - _BASE_MB
-    if name == "large_deformation":
-        each = FACTORISATIONS * _NUMERIC * condensation + (FACTORISATIONS + 1) * _TANGENT * assembly + _NEWTON_S[d]
-        pressed = (FACTORISATIONS - 1) * seconds["contact"]
-        return _Cost(
-            steps * each + pressed, factor_mb, f"about {FACTORISATIONS} factorisations in each of {steps} steps"
-        )
-    if name == "viscosity" and not getattr(model.formulation, "bulk", True):
-        lengths = {leg.duration_s / leg.steps for leg in model.legs if leg.duration_s and leg.steps != "auto"}
-        lengths_in_all = len(lengths) + runs * len({leg.duration_s for leg in model.legs if leg.steps == "auto"})
-        more = max(lengths_in_all, 1)
-        text = f"{more} more factorisation{'s' * (more > 1)}, one for each length of step"
-        return _Cost(more * condensation + assembly, more * factor_mb, text)
-    if name == "elastic_object":
-        return _Cost(
-            condensation + assembly + seconds["mesh"], 0.5 * factor_mb,
-            "the object is meshed and condensed like the finger; taken to be of its size",
-        )  # fmt: skip
-    if name == "embedded_gauge":
-        rows = _FOIL_ROWS[d] * len(model.gauges)
-        share = rows / max(d * size.contact_points, 1.0)
-        return _Cost(
-            min(share, 1.0) * condensation + seconds["contact"] + _FOIL_S[d] * len(model.gauges), 40e-6 * rows**2,
-            f"{rows} more rows, and every step once more without the foils",
-        )  # fmt: skip
-    return _Cost(0.0, 0.0, "no factorisation and no further step")
+def _added_cost(slot: str, model: Model, press: PressCost) -> AddedCost:
+    """Cost of the effect in a slot; a friction law adds none."""
+    match slot:
+        case "formulation":
+            return model.formulation.added_cost(model, press)
+        case "inclusions" if model.inclusions:
+            return model.inclusions.added_cost(model, press)
+        case "object_compliance" if model.object_compliance:
+            return model.object_compliance.added_cost(model, press)
+    return AddedCost()
 
 
 def _size(model: Model, zone: tuple[float, float, float, float], axes: tuple[str, ...], mixed: bool) -> _Size:
@@ -179,18 +150,11 @@ def _triangles(model: Model) -> dict[str, int]:
     return {name: len(body.surface.faces) for name, body in bodies.items() if hasattr(body, "surface")}
 
 
-def _kept_mb(model: Model, size: _Size, axes: tuple[str, ...]) -> float:
-    """Memory of the states of all increments, MB: the part's, the whole finger's, and what an effect keeps."""
-    d = 3 if model.domain == "solid" else 2
+def _states_mb(model: Model, press: PressCost, axes: tuple[str, ...]) -> float:
+    """Memory of the states of all increments, MB: those of the part, of the whole finger and of the formulation."""
     steps = sum(leg.steps if isinstance(leg.steps, int) else 8 * AUTO_START for leg in model.legs)
-    each = 8.0 * (3 * d) * size.contact_points * (1 + 2 ** len(axes))
-    effects = {name for _, name in model.filled}
-    if "large_deformation" in effects:
-        each += 8.0 * size.dofs
-    if "viscosity" in effects:
-        branches = 1 + len(getattr(model.formulation, "prony", ()))
-        each += 8.0 * branches * (d * size.contact_points if getattr(model.formulation, "bulk", True) else size.dofs)
-    return float(steps * each / 1e6)
+    numbers = 3 * press.dim * press.contact_points * (1 + 2 ** len(axes)) + model.formulation.state_size(press)
+    return float(8e-6 * steps * numbers)
 
 
 def _memory(size: _Size, d: int, gauges: int = 0) -> float:

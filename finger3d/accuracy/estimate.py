@@ -20,18 +20,19 @@ from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.accuracy.richardson import ORDER, mesh_error
 from finger3d.errors import Finger3dError
 from finger3d.io import AREAS, MAIN
+from finger3d.mechanics.cost import FACTORISATIONS
 from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.path import AUTO_START
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.step_halving import (
-    TIMES,
-    as_solved,
+    COUNT_RATIOS,
+    choose_counts,
     condensation_s,
     contact_s,
-    error_by_count,
-    last_frame,
-    other_counts,
+    errors_from_counts,
+    last_step,
     step_error,
+    with_increments_of,
 )
 
 Float = NDArray[np.float64]
@@ -42,9 +43,6 @@ _STEPS_SHARE = 0.15
 
 _STEPS_S = 0.2
 """Modelled seconds that further increments may take in any case."""
-
-FACTORISATIONS = 3
-"""Factorisations of the tangent in an increment at finite strain, typical of the studies of large deformation."""
 
 _MESHED_S = 1.0
 """Seconds above which a mesh was made by pytetwild and not read from the cache."""
@@ -139,21 +137,21 @@ def _estimated(
         raise Finger3dError("the last step did not converge")
     automatic = len(levels) > 1 and all(leg.steps == "auto" for leg in problem.model.legs)
     # from here on, automatic increments are numbers
-    own = replace(problem, model=replace(problem.model, legs=as_solved(problem.model.legs, len(frames))))
+    own = replace(problem, model=replace(problem.model, legs=with_increments_of(problem.model.legs, len(frames))))
     beside = companion(own, say)
-    last = last_frame(beside)
+    last = last_step(beside)
     mesh = compared(own, frames[-1], beside, last, numbers)
     ratio = edge_ratio(own, beside)
     kind = "coarse" if ratio > 1.0 else "finer"
     if automatic:
         used = levels[-4:]
-        steps = error_by_count({count: numbers(own, frame) for count, frame in used}, used[-1][0])
+        steps = errors_from_counts({count: numbers(own, frame) for count, frame in used}, used[-1][0])
         by = ", ".join(str(count) for count, _ in used)
     else:
-        on_own_mesh, way = other_counts(_marching_cost(own), _marching_cost(beside), _budget(own))
+        on_own_mesh, way = choose_counts(_marching_cost(own), _marching_cost(beside), _budget(own))
         where = (own, frames[-1]) if on_own_mesh else (beside, last)
         steps = step_error(where[0], numbers(*where), numbers, way)
-        by = " and ".join({0.25: "a quarter", 0.5: "half", 2: "twice", 4: "four times"}[t] for t in TIMES[way])
+        by = " and ".join({0.25: "a quarter", 0.5: "half", 2: "twice", 4: "four times"}[t] for t in COUNT_RATIOS[way])
         by += " as many" + ("" if on_own_mesh else f" on the {kind} mesh")
     return ErrorEstimate(
         discretisation=mesh,

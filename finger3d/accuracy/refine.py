@@ -20,7 +20,7 @@ from finger3d.errors import Finger3dError, UnresolvedError
 from finger3d.mechanics.build import build
 from finger3d.mechanics.model import MeshOptions, Model
 from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.step_halving import last_frame
+from finger3d.mechanics.step_halving import last_step
 
 MOST_ROUNDS = 8
 _PART = 0.3  # of the change: a length that makes less of it is left alone
@@ -190,10 +190,10 @@ def _round(model: Model, tolerance: float) -> tuple[Problem, Round, MeshOptions]
     """Press on one mesh; the edge lengths to try next."""
     start = time.perf_counter()
     problem = build(model)
-    frame = last_frame(problem)
+    frame = last_step(problem)
     numbers = main_numbers(problem, frame)
     beside = companion(problem)
-    last = last_frame(beside)
+    last = last_step(beside)
     errors = compared(problem, frame, beside, last)
     number, error = worst(numbers, {name: errors[name] for name in judged(problem, errors)})
     # a finer companion, beside the coarsest of meshes, does not tell the two lengths apart
@@ -235,7 +235,7 @@ def _shares(
     if coarse is None or size < 1.1 * options.size_mm:
         return 1.0, 1.0
     third = build(replace(problem.model, mesh=replace(_swept(problem, options), size_mm=size)))
-    middle = main_numbers(third, last_frame(third))[number]
+    middle = main_numbers(third, last_step(third))[number]
     contact, base = abs(fine[number] - middle), abs(middle - coarse[number])
     total = contact + base
     return (contact / total, base / total) if total > 0.0 else (1.0, 0.0)

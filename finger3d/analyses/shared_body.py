@@ -229,7 +229,7 @@ class SharedBody:
 
     def _run(self, variant: Variant, before: Sequence[_Run], workspace: Workspace, cancel: Event) -> _Run:
         from finger3d.mechanics.resolution import check
-        from finger3d.mechanics.step_halving import marched
+        from finger3d.mechanics.step_halving import march_automatic
 
         start = time.perf_counter()
         frames: tuple[StepResult, ...] | Exception
@@ -238,7 +238,7 @@ class SharedBody:
             if variant.legs != self.problem.model.legs:  # the mesh was checked for the path of all variants
                 system = problem.system
                 check(problem.model, system.surface, system.first_contact_mm, system.place_mm, problem.axes)
-            frames = marched(problem, workspace, cancel)[0]
+            frames = march_automatic(problem, workspace, cancel)[0]
         except TROUBLE as error:
             frames = error.with_traceback(None)  # a traceback would keep all arrays of its frames
         return _Run(self.problem, frames, time.perf_counter() - start)

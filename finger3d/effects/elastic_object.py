@@ -27,6 +27,7 @@ from finger3d.fem.simplex import Mesh, axis_numbers, reflected
 from finger3d.fem.transfer import facing_trace
 from finger3d.geometry.design import Design
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.cost import AddedCost, PressCost
 from finger3d.mechanics.model import MeshOptions, Model, ObjectResponse
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.symmetry import held_dofs
@@ -49,6 +50,14 @@ class SoftObject:
     E_MPa: float
     nu: float
     height_mm: float | None = None
+
+    def added_cost(self, model: Model, press: PressCost) -> AddedCost:
+        """Return the cost of the object's mesh and condensation."""
+        return AddedCost(
+            seconds=press.seconds["condensation"] + press.seconds["assembly"] + press.seconds["mesh"],
+            memory_mb=0.5 * press.factor_mb,
+            reason="the object is meshed and condensed like the finger; taken to be of its size",
+        )
 
     def respond(self, problem: Problem, zone: Zone, say: Say) -> ObjectResponse:
         """Mesh and condense the object, and read its compliance at the contact points of the finger."""

@@ -27,6 +27,7 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.kelvin import FoilPatches, InfiniteBody
 from finger3d.fem.simplex import Mesh, reflect_into_part
 from finger3d.fem.traces import displacement_row
+from finger3d.mechanics.cost import AddedCost, PressCost
 from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.model import EmbeddedBars, Model
 
@@ -34,6 +35,13 @@ Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
 _PATCHES = {2: (16, 1), 3: (12, 8)}  # along and across, by dimension: within half a percent of any number
+
+_ROWS = {2: 16, 3: 96}
+"""Condensed rows of a foil with its mirror images, by dimension; for the estimated cost."""
+
+_FOIL_S = {2: 0.02, 3: 0.2}
+"""Seconds to discretise a foil, by dimension."""
+
 _SAME = 1e-9  # mm, and radians
 
 
@@ -44,6 +52,17 @@ class Strips:
     E_MPa: float
     thickness_mm: float
     width_mm: float
+
+    def added_cost(self, model: Model, press: PressCost) -> AddedCost:
+        """Return the cost of the foils' rows and of the press without foils."""
+        foils, d = len(model.gauges), press.dim
+        rows = _ROWS[d] * foils
+        share = min(rows / max(d * press.contact_points, 1.0), 1.0)
+        return AddedCost(
+            seconds=share * press.seconds["condensation"] + press.seconds["contact"] + _FOIL_S[d] * foils,
+            memory_mb=40e-6 * rows**2,
+            reason=f"{rows} more rows, and every step once more without the foils",
+        )
 
     def mirrors(self, model: Model) -> frozenset[str]:
         """Planes about which the foils, all together, are mirror images."""

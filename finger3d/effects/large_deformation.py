@@ -30,6 +30,7 @@ from finger3d.fem.finite_contact import DeformedContact, deformed_contact
 from finger3d.fem.neo_hooke import InvertedError, NeoHooke, assemble, nodal_fields
 from finger3d.fem.recover import displacement
 from finger3d.fem.traces import BoundarySurface
+from finger3d.mechanics.cost import FACTORISATIONS, AddedCost, PressCost
 from finger3d.mechanics.formulation import Workspace, length_scale, solve_contact
 from finger3d.mechanics.history import ObjectPose
 from finger3d.mechanics.model import Model
@@ -51,6 +52,15 @@ _STEP_LENGTHS = (1.0, 0.5, 0.25, 0.125)
 
 _SLOPE_STEP = 1e-5
 """Step of the central differences of the object's height, in depths of the press; any step is exact for a plane."""
+
+_NUMERIC_FACTORISATION = 0.8
+"""Time of a factorisation whose ordering is known, over that of a condensation."""
+
+_TANGENT_ASSEMBLY = 0.8
+"""Time to assemble the tangent over that of the linear stiffness."""
+
+_OTHER_S = {2: 0.008, 3: 0.12}
+"""Further seconds of an increment, by dimension."""
 
 _OUTSIDE_GAP = 2.0
 """Gap of points that no part of the object covers, in heights of the finger."""
@@ -104,6 +114,20 @@ class FiniteStrain:
     is_linear_elastic: ClassVar[bool] = False
     refactorises: ClassVar[bool] = True
     supported_slots: ClassVar[frozenset[str]] = frozenset()
+
+    def added_cost(self, model: Model, press: PressCost) -> AddedCost:
+        """Return the cost of the factorisations in every increment."""
+        increment = FACTORISATIONS * _NUMERIC_FACTORISATION * press.seconds["condensation"]
+        increment += (FACTORISATIONS + 1) * _TANGENT_ASSEMBLY * press.seconds["assembly"] + _OTHER_S[press.dim]
+        return AddedCost(
+            seconds=press.increments * increment + (FACTORISATIONS - 1) * press.seconds["contact"],
+            memory_mb=press.factor_mb,
+            reason=f"about {FACTORISATIONS} factorisations in each of {press.increments} steps",
+        )
+
+    def state_size(self, press: PressCost) -> float:
+        """Return the number of unknowns."""
+        return press.dofs
 
     def workspace(self) -> NewtonWorkspace:
         """Return a workspace without patterns and factors."""

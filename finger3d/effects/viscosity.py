@@ -32,6 +32,7 @@ from finger3d.fem.assembly import Stiffness, stiffness
 from finger3d.fem.condense import Condensation, spring_forces, stiffened
 from finger3d.fem.material import Elasticity
 from finger3d.fem.recover import across, displacement, nodal_strain, pressure, stress
+from finger3d.mechanics.cost import AddedCost, PressCost
 from finger3d.mechanics.formulation import SmallStrain, Workspace, length_scale, solve_contact
 from finger3d.mechanics.history import ObjectPose
 from finger3d.mechanics.model import Model
@@ -273,6 +274,23 @@ class Viscoelastic(SmallStrain):
     def refactorises(self) -> bool:
         """Without `bulk` every length of step has a factor of its own."""
         return not self.bulk
+
+    def added_cost(self, model: Model, press: PressCost) -> AddedCost:
+        """Return the cost of a factorisation for each length of step; none if the bulk modulus relaxes too."""
+        if self.bulk:
+            return AddedCost()
+        fixed = {leg.duration_s / leg.steps for leg in model.legs if leg.duration_s and leg.steps != "auto"}
+        automatic = {leg.duration_s for leg in model.legs if leg.steps == "auto"}
+        lengths = max(len(fixed) + press.runs * len(automatic), 1)
+        return AddedCost(
+            seconds=lengths * press.seconds["condensation"] + press.seconds["assembly"],
+            memory_mb=lengths * press.factor_mb,
+            reason=f"{lengths} more factorisation{'s' * (lengths > 1)}, one for each length of step",
+        )
+
+    def state_size(self, press: PressCost) -> float:
+        """Return the number of internal variables, and of the elastic response with them."""
+        return (1 + len(self.prony)) * (press.dim * press.contact_points if self.bulk else press.dofs)
 
     def workspace(self) -> RelaxationWorkspace:
         """No factor yet."""

@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from finger3d.contact.rules import RULES
 from finger3d.contact.state import ContactSolution, ContactState
+from finger3d.mechanics.cost import AddedCost, PressCost
 
 if TYPE_CHECKING:
     from finger3d.fem.traces import BoundarySurface
     from finger3d.mechanics.history import ObjectPose
+    from finger3d.mechanics.model import Model
     from finger3d.mechanics.problem import Problem
 
 Float = NDArray[np.float64]
@@ -60,6 +62,14 @@ class Formulation(Protocol):
 
     @property
     def supported_slots(self) -> frozenset[str]: ...
+
+    def added_cost(self, model: Model, press: PressCost) -> AddedCost:
+        """Return the cost that the formulation adds to that of small-strain elasticity."""
+        ...
+
+    def state_size(self, press: PressCost) -> float:
+        """Return how many numbers a state holds besides those of its contact points."""
+        ...
 
     def workspace(self) -> Workspace:
         """Return an empty workspace for `increment`."""
@@ -143,6 +153,14 @@ class SmallStrain:
     def refactorises(self) -> bool:
         """False: the factor of the build serves every increment."""
         return False
+
+    def added_cost(self, model: Model, press: PressCost) -> AddedCost:
+        """Return zero cost."""
+        return AddedCost()
+
+    def state_size(self, press: PressCost) -> float:
+        """Return 0: the contact forces determine the displacements."""
+        return 0.0
 
     def workspace(self) -> Workspace:
         """Nothing is kept: the compliance is that of the build."""

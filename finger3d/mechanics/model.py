@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.contact.rules import RuleName
 from finger3d.fem.material import Material
+from finger3d.fem.simplex import Mesh
 from finger3d.geometry.design import Design
+from finger3d.mechanics.cost import AddedCost, PressCost
 from finger3d.mechanics.formulation import Formulation, SmallStrain
 from finger3d.mechanics.gauges import Gauge
 from finger3d.objects import ContactPath, Plane, RigidObject
@@ -52,7 +55,7 @@ class MeshOptions:
     mesher: Literal["ftetwild", "swept"] = "ftetwild"
     layers: int = 2
 
-    def as_table(self) -> dict[str, Any]:
+    def as_table(self) -> dict[str, float | str]:
         """The keys of ``[mesh]`` in a scene."""
         return {"size_mm": self.size_mm, "base_size_mm": self.base_size_mm, "mesher": self.mesher}
 
@@ -71,7 +74,7 @@ class EmbeddedBars:
         How the bars unload themselves and each other, in a body without end; in place of what the mesh says.
     """
 
-    rows: Any
+    rows: sp.csr_matrix
     bar_stiffness: Float
     gauge_weights: Float
     self_compliance: Float
@@ -85,11 +88,15 @@ class EmbeddedBars:
 class Inclusions(Protocol):
     """Stiff things in the body that need no mesh of their own."""
 
-    def mirrors(self, model: Any) -> frozenset[str]:
+    def added_cost(self, model: Model, press: PressCost) -> AddedCost:
+        """Return the cost that the inclusions add."""
+        ...
+
+    def mirrors(self, model: Model) -> frozenset[str]:
         """Planes, "x" and "z", about which they are mirror images."""
         ...
 
-    def discretise(self, model: Any, mesh: Any, axes: tuple[str, ...]) -> EmbeddedBars:
+    def discretise(self, model: Model, mesh: Mesh, axes: tuple[str, ...]) -> EmbeddedBars:
         """Cut them into bars."""
         ...
 
@@ -113,6 +120,10 @@ class ObjectResponse:
 
 class ObjectCompliance(Protocol):
     """An elastic object."""
+
+    def added_cost(self, model: Model, press: PressCost) -> AddedCost:
+        """Return the cost that the object's elasticity adds."""
+        ...
 
     def respond(
         self, problem: Problem, zone: tuple[float, float, float, float], say: Callable[[str], None]

@@ -1,21 +1,21 @@
-"""Number of increments, chosen by the error that they leave, and that error.
+"""Number of increments, chosen by the estimated error of the result.
 
-A press is marched in N, 2 N, 4 N, ... increments.  The error of a number x(N) is taken to fall as 1/N, so that each
-pair of successive counts tells it,
+The path is solved in N, 2 N, 4 N, ... increments.  The error of a quantity x(N) is assumed to be proportional to 1/N;
+then each pair of successive counts gives an estimate,
 
     error of x(n) = |x(N) - x(2 N)| / (1/N - 1/(2 N)) / n,
 
-and the largest of several pairs is kept: two counts may agree by chance, three in a row hardly do.  How often the true
-error lies within twice this estimate is measured by ``validation/error_bars.py``.
+of which the largest is taken, since two counts may agree by chance.  ``validation/error_bars.py`` measures how often
+the true error is within twice this estimate.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from threading import Event
-from typing import Any
 
 from finger3d.contact.rules import STEP_DEPENDENT_RULES
 from finger3d.errors import Finger3dError
@@ -26,30 +26,34 @@ from finger3d.mechanics.path import AUTO_START
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
 
-Told = Callable[[Problem, StepResult], dict[str, float]]
+Measurement = Callable[[Problem, StepResult], dict[str, float]]
+"""Quantities by name, measured at the end of a press."""
 
 TOLERANCE = 0.01
-"""Of normal force and friction sum, relative; of a gauge's strain, relative to the largest of all gauges."""
+"""Relative error allowed in normal force, friction sum and strain; a strain's is relative to the largest strain."""
 
 DISSIPATION_TOLERANCE = 0.05
+"""Relative error allowed in the dissipation."""
+
 FLOOR = 1e-4
-"""Share of the external work below which dissipation is not resolved: it is that of a few points that slip early."""
+"""Share of the external work below which the dissipation is not resolved: only a few points slip, in the first
+increments."""
 
 _PAIRS = {2: 4, 3: 3}
-"""Pairs of successive counts that make the estimate, at most, by dimension. With three, one section of eight drawn at
-random was called good to 1 % with an error of 1.8 %; a solid would take twice as long with four."""
+"""Largest number of pairs of successive counts in an estimate, by dimension.  With three pairs, one of eight random
+sections had an estimate below 1 % and an error of 1.8 %; in a solid four pairs would double the time."""
 
 _LEAST_RUNS = {2: 4, 3: 3}
-"""Runs before a tolerance may be met; three still agree by chance now and then, and in a section one more is cheap."""
+"""Least number of runs before the tolerances may be met; three sometimes agree by chance."""
 
 _FIRST, _LARGEST = 5, 640
 _FIRST_IF_FACTORED, _LARGEST_IF_FACTORED = 3, 12
-"""Where every increment factors the stiffness anew: 3, 6 and 12 take twice as long as 10 alone."""
+"""Counts if every increment factors the stiffness again: 3, 6 and 12 increments cost twice as much as 10."""
 
 
 @dataclass(frozen=True)
 class StepEstimate:
-    """Estimated error that the increments leave, relative; the largest over the ends of the legs.
+    """Estimated relative error due to the size of the increments, the largest over the ends of the legs.
 
     Attributes
     ----------
@@ -59,8 +63,8 @@ class StepEstimate:
     dissipation : relative, where dissipation is above the floor
     dissipation_floor_mJ : `FLOOR` times the largest external work
     dissipation_resolved : False if the dissipation at the end is below the floor, so that its own error is not limited
-    met : whether every error is below its tolerance, for dissipation if it is above the floor
-    levels : number of increments of a leg, and the frames at the ends of the legs, of every run
+    met : whether every error is below its tolerance; that of the dissipation counts only above the floor
+    levels : of every run, the number of increments in a leg and the results at the ends of the legs
     """
 
     steps: int
@@ -75,13 +79,13 @@ class StepEstimate:
     dissipation_tolerance: float = DISSIPATION_TOLERANCE
     levels: tuple[tuple[int, tuple[StepResult, ...]], ...] = field(default=(), repr=False, compare=False)
 
-    def as_dict(self) -> dict[str, Any]:
-        """For summary.json."""
+    def as_dict(self) -> dict[str, float | bool]:
+        """The estimate as an entry of summary.json."""
         return {key: value for key, value in asdict(replace(self, levels=())).items() if key != "levels"}
 
     @property
     def warning(self) -> str:
-        """One line with the errors that are left, empty if the tolerances are met."""
+        """One line with the estimated errors; empty if the tolerances are met."""
         if self.met:
             return ""
         return (
@@ -103,10 +107,10 @@ class StepEstimate:
 
 
 def automatic(model: Model) -> bool:
-    """Whether any leg asks for increments chosen by their error.
+    """Whether the number of increments of any leg is chosen by the error.
 
-    Under the paper's rules of contact or of kinetic friction the result depends on the increments and has no limit
-    that more of them approach; there "auto" is a fixed number, `finger3d.mechanics.problem.AUTO_START`.
+    Under the paper's rules of contact or of kinetic friction the solution does not converge with the number of
+    increments; there "auto" is a fixed number, `finger3d.mechanics.path.AUTO_START`.
     """
     depends_on_steps = model.rule in STEP_DEPENDENT_RULES or model.friction.depends_on_steps
     return not depends_on_steps and any(leg.steps == "auto" for leg in model.legs)
@@ -118,31 +122,34 @@ def with_steps(problem: Problem, steps: int) -> Problem:
     return replace(problem, model=replace(problem.model, legs=legs))
 
 
-def remaining(counts: Sequence[int], values: Sequence[float], at: int) -> float:
-    """Estimated error of a number in `at` increments, from its values in successive counts of increments.
+def increment_error(counts: Sequence[int], values: Sequence[float], count: int) -> float:
+    """Estimated error of a quantity computed in `count` increments.
 
     Parameters
     ----------
-    counts, values : at least two, ordered by count
-    at : a count, among those given or not
+    counts, values : sequences
+        At least two numbers of increments in ascending order, and the values of the quantity.
+    count : int
+        A number of increments, whether among `counts` or not.
 
     Examples
     --------
-    >>> remaining([8, 16, 32], [1.125, 1.0625, 1.03125], 32)  # 1 + 1/N
+    >>> increment_error([8, 16, 32], [1.125, 1.0625, 1.03125], 32)  # 1 + 1/N
     0.03125
     """
     runs = list(zip(counts, values, strict=True))
     rates = [abs(b - a) / abs(1.0 / m - 1.0 / n) for (n, a), (m, b) in zip(runs, runs[1:], strict=False)]
-    return max(rates) / at
+    return max(rates) / count
 
 
 def refine(
     problem: Problem, workspace: Workspace | None = None, cancel: Event | None = None
 ) -> Iterator[tuple[tuple[StepResult, ...], StepEstimate | None]]:
-    """Frames and estimate of ever more increments; none after the first run, and none is met too early.
+    """Yield the results of runs with more and more increments, each with its estimate; the first run has none.
 
-    Ends when the estimate is met or the limit is reached.  A run that fails is left out if one with fewer increments
-    succeeded or one with twice as many does.  Workspace and event are those of `march`.
+    The iteration ends when the tolerances are met or the largest number of increments is reached.  A run that fails is
+    omitted if one with fewer increments converged or one with twice as many does.  `workspace` and `cancel` are
+    arguments of `march`.
     """
     workspace = workspace or problem.model.formulation.workspace()
     steps, last = limits(problem.model, problem.part.stiffness.upper.shape[0], len(problem.surface.nodes))
@@ -150,17 +157,17 @@ def refine(
     failed: tuple[StepResult, ...] = ()
     while steps <= last:
         trial = with_steps(problem, steps)
-        frames = tuple(march(trial, workspace=workspace, cancel=cancel))
-        if not frames[-1].outcome.ok:
+        results = tuple(march(trial, workspace=workspace, cancel=cancel))
+        if not results[-1].outcome.ok:
             if levels:
                 return
             if failed:
                 break
-            failed = frames
+            failed = results
         else:
-            levels.append((steps, _ends(trial, frames)))
+            levels.append((steps, _leg_ends(trial, results)))
             estimate = _estimate(problem, levels) if len(levels) > 1 else None
-            yield frames, estimate
+            yield results, estimate
             if estimate and estimate.met:
                 return
         steps *= 2
@@ -168,10 +175,13 @@ def refine(
         yield failed, None
 
 
-def marched(
+def march_automatic(
     problem: Problem, workspace: Workspace | None = None, cancel: Event | None = None
 ) -> tuple[tuple[StepResult, ...], StepEstimate | None]:
-    """Frames of a press, its automatic increments chosen; the estimate is None where none are or no run told it."""
+    """Return the results of a press whose automatic increments are chosen by their error, and the estimated error.
+
+    The estimate is None if no leg has automatic increments or only one run converged.
+    """
     if not automatic(problem.model):
         return tuple(march(problem, workspace=workspace, cancel=cancel)), None
     *_, last = refine(problem, workspace, cancel)
@@ -179,12 +189,12 @@ def marched(
 
 
 def limits(model: Model, dofs: float, contact_points: float) -> tuple[int, int]:
-    """Fewest and most automatic increments of a leg; by the size of the problem, so that every run has the same."""
+    """Smallest and largest number of automatic increments in a leg; they depend on the size of the problem only."""
     if model.formulation.finite_strain:
         return _FIRST_IF_FACTORED, _LARGEST_IF_FACTORED
     dim = 3 if model.domain == "solid" else 2
     if dim == 3 and model.formulation.refactorises:
-        return _FIRST, 4 * _FIRST  # every length of increments takes a condensation of its own
+        return _FIRST, 4 * _FIRST  # a condensation for each length of the increments
     budget = WORTH_S[dim] + condensation_s(dofs, dim)
     most = budget / contact_s(contact_points, dim) / len(model.legs)
     steps = 4 * _FIRST
@@ -194,126 +204,150 @@ def limits(model: Model, dofs: float, contact_points: float) -> tuple[int, int]:
 
 
 WORTH_S = {2: 4.0, 3: 4.0}
-"""Seconds that automatic increments may take besides those of the condensation: less than the rest of a press."""
+"""Modelled seconds that automatic increments may take in addition to those of the condensation, by dimension."""
 
 
 def contact_s(points: float, dim: int) -> float:
-    """Seconds of one increment on so many contact points of the meshed part, measured on 2 cores."""
+    """Seconds of an increment with this number of contact points of the meshed part, calibrated on 2 cores."""
     return float(0.0025 + (0.065 * (points / 680.0) ** 2.4 if dim == 3 else 0.038 * (points / 700.0) ** 2.75))
 
 
 def condensation_s(dofs: float, dim: int) -> float:
-    """Seconds of the condensation, likewise."""
+    """Seconds of the condensation, calibrated on 2 cores."""
     return 6.0 * (dofs / 85_000.0) ** 1.75 if dim == 3 else 0.004 + 8e-6 * dofs
 
 
-def _ends(problem: Problem, frames: tuple[StepResult, ...]) -> tuple[StepResult, ...]:
-    """The frame at the end of every leg."""
-    out, at = [], 0
-    for leg in problem.model.legs:
-        at += int(leg.steps)
-        out.append(frames[at - 1])
-    return tuple(out)
+def _leg_ends(problem: Problem, results: tuple[StepResult, ...]) -> tuple[StepResult, ...]:
+    """Result at the end of every leg."""
+    counts = itertools.accumulate(int(leg.steps) for leg in problem.model.legs)
+    return tuple(results[count - 1] for count in counts)
 
 
 def _estimate(problem: Problem, levels: Sequence[tuple[int, tuple[StepResult, ...]]]) -> StepEstimate:
     used = levels[-(_PAIRS[problem.dim] + 1) :]
     counts = [count for count, _ in used]
-    told = [[_numbers(problem, frame) for frame in ends] for _, ends in used]
-    finest = told[-1]
+    runs = [[_quantities(problem, end) for end in ends] for _, ends in used]
+    finest = runs[-1]
     errors = [
-        {name: remaining(counts, [run[leg][name] for run in told], counts[-1]) for name in numbers}
-        for leg, numbers in enumerate(finest)
+        {name: increment_error(counts, [run[leg][name] for run in runs], counts[-1]) for name in quantities}
+        for leg, quantities in enumerate(finest)
     ]
     strains = [name for name in finest[0] if name.startswith("gauge_") and not math.isnan(finest[-1][name])]
-    floor = FLOOR * max(abs(numbers["external_work_mJ"]) for numbers in finest)
+    floor = FLOOR * max(abs(quantities["external_work_mJ"]) for quantities in finest)
 
-    def worst(*names: str) -> float:
-        largest = max((abs(numbers[name]) for numbers in finest for name in names), default=0.0)
+    def largest_error(*names: str) -> float:
+        largest = max((abs(quantities[name]) for quantities in finest for name in names), default=0.0)
         error = max((leg[name] for leg in errors for name in names), default=0.0)
         return error / largest if largest else 0.0
 
-    lost = [(numbers["dissipation_mJ"], leg["dissipation_mJ"]) for numbers, leg in zip(finest, errors, strict=True)]
-    above = [error / max(value, floor) for value, error in lost if value + error > floor]
-    left = (worst("normal_force_N"), worst("friction_sum_N"), worst(*strains), max(above, default=0.0))
-    enough = len(levels) >= _LEAST_RUNS[problem.dim]
+    dissipation = [(end["dissipation_mJ"], error["dissipation_mJ"]) for end, error in zip(finest, errors, strict=True)]
+    resolved = [error / max(value, floor) for value, error in dissipation if value + error > floor]
+    normal_force, friction_sum = largest_error("normal_force_N"), largest_error("friction_sum_N")
+    gauges, dissipation_error = largest_error(*strains), max(resolved, default=0.0)
     return StepEstimate(
-        counts[-1], *left,
-        dissipation_floor_mJ=floor, dissipation_resolved=sum(lost[-1]) > floor or not any(lost[-1]),
-        met=enough and max(left[:3]) <= TOLERANCE and left[3] <= DISSIPATION_TOLERANCE, levels=tuple(levels),
-    )  # fmt: skip
+        steps=counts[-1],
+        normal_force=normal_force,
+        friction_sum=friction_sum,
+        gauges=gauges,
+        dissipation=dissipation_error,
+        dissipation_floor_mJ=floor,
+        dissipation_resolved=sum(dissipation[-1]) > floor or not any(dissipation[-1]),
+        met=len(levels) >= _LEAST_RUNS[problem.dim]
+        and max(normal_force, friction_sum, gauges) <= TOLERANCE
+        and dissipation_error <= DISSIPATION_TOLERANCE,
+        levels=tuple(levels),
+    )
 
 
-def _numbers(problem: Problem, frame: StepResult) -> dict[str, float]:
-    """Numbers that the increments are chosen by."""
-    numbers = measure(problem.points, frame)
+def _quantities(problem: Problem, result: StepResult) -> dict[str, float]:
+    """Quantities by name whose errors determine the number of increments."""
+    measured = measure(problem.points, result)
     names = ("normal_force_N", "friction_sum_N", "dissipation_mJ", "external_work_mJ")
-    return {name: numbers[name] for name in names} | {f"gauge_{k}": v for k, v in numbers["gauges"].items()}
+    return {name: measured[name] for name in names} | {f"gauge_{k}": v for k, v in measured["gauges"].items()}
 
 
-TIMES: dict[str, tuple[float, float]] = {"up": (2.0, 4.0), "both": (0.5, 2.0), "down": (0.25, 0.5)}
-"""Other counts of increments that the error of a count is told by, as multiples of it; the best first."""
+COUNT_RATIOS: dict[str, tuple[float, float]] = {"up": (2.0, 4.0), "both": (0.5, 2.0), "down": (0.25, 0.5)}
+"""Ratios of the counts of increments that an error is estimated from to the count of the result, the best first."""
 
 
-def step_error(problem: Problem, numbers: Mapping[str, float], told: Told, way: str = "up") -> dict[str, float]:
-    """Error by increments, by name, from two other counts of increments on the same condensation.
-
-    Three counts, since two often agree by chance; see `remaining`.
+def step_error(
+    problem: Problem, quantities: Mapping[str, float], measurement: Measurement, ratios: str = "up"
+) -> dict[str, float]:
+    """Error by name due to the increments, from two further runs on the same condensation.
 
     Parameters
     ----------
-    numbers : in the increments at hand
-    way : "up" for two and four times as many, "both" for half and twice, "down" for a quarter and half
+    problem : Problem
+    quantities : mapping
+        Quantities by name in the increments of the problem.
+    measurement : callable
+        Returns these quantities at the end of a run.
+    ratios : str
+        Key of `COUNT_RATIOS`.
     """
     legs = problem.model.legs
     own = [leg.steps if isinstance(leg.steps, int) else AUTO_START for leg in legs]
-    runs = {sum(own): dict(numbers)}
-    for times in TIMES[way]:
-        other = [max(1, round(times * n)) for n in own]
-        if sum(other) not in runs:
-            parts = tuple(replace(leg, steps=n) for leg, n in zip(legs, other, strict=True))
-            trial = replace(problem, model=replace(problem.model, legs=parts))
-            runs[sum(other)] = told(trial, last_frame(trial))
+    runs = {sum(own): dict(quantities)}
+    for ratio in COUNT_RATIOS[ratios]:
+        counts = [max(1, round(ratio * count)) for count in own]
+        if sum(counts) not in runs:
+            changed = tuple(replace(leg, steps=count) for leg, count in zip(legs, counts, strict=True))
+            trial = replace(problem, model=replace(problem.model, legs=changed))
+            runs[sum(counts)] = measurement(trial, last_step(trial))
     if len(runs) < 2:
         raise Finger3dError("a single increment cannot be halved")
-    return error_by_count(runs, sum(own))
+    return errors_from_counts(runs, sum(own))
 
 
-def error_by_count(runs: Mapping[int, Mapping[str, float]], at: int) -> dict[str, float]:
-    """Error by name of the numbers in `at` increments, from those in several counts."""
+def errors_from_counts(runs: Mapping[int, Mapping[str, float]], count: int) -> dict[str, float]:
+    """Error by name of the quantities in `count` increments, from the quantities in several counts of increments."""
     counts = sorted(runs)
-    found = {name: remaining(counts, [runs[n][name] for n in counts], at) for name in runs[at]}
-    return {k: float(v) for k, v in found.items() if math.isfinite(v)}
+    errors = {name: increment_error(counts, [runs[n][name] for n in counts], count) for name in runs[count]}
+    return {name: float(error) for name, error in errors.items() if math.isfinite(error)}
 
 
-def other_counts(here_s: float, beside_s: float, budget: float) -> tuple[bool, str]:
-    """Whether the increments are judged on the mesh at hand or beside it, and by which other counts; see `TIMES`."""
-    cost = {True: here_s, False: beside_s}
-    choices = [(here, way) for way in ("up", "both") for here in (True, False)]
-    affordable = ((here, way) for here, way in choices if sum(TIMES[way]) * cost[here] <= budget)
+def choose_counts(own_s: float, companion_s: float, budget_s: float) -> tuple[bool, str]:
+    """Choose the mesh and the counts of increments that the error due to the increments is estimated on.
+
+    Parameters
+    ----------
+    own_s, companion_s : float
+        Seconds of all increments on the mesh of the problem and on its companion.
+    budget_s : float
+        Seconds that the estimate may take.
+
+    Returns
+    -------
+    on_own_mesh : bool
+    ratios : str
+        Key of `COUNT_RATIOS`.
+    """
+    seconds = {True: own_s, False: companion_s}
+    choices = [(own, ratios) for ratios in ("up", "both") for own in (True, False)]
+    affordable = ((own, ratios) for own, ratios in choices if sum(COUNT_RATIOS[ratios]) * seconds[own] <= budget_s)
     return next(affordable, (False, "down"))
 
 
-def last_frame(problem: Problem) -> StepResult:
-    """March to the end.
+def last_step(problem: Problem) -> StepResult:
+    """Solve all increments and return the result of the last.
 
     Raises
     ------
     Finger3dError
-        Where an increment does not converge.
+        If an increment does not converge.
     """
-    frame = None
-    for frame in march(problem):
-        if not frame.outcome.ok:
-            raise Finger3dError(f"a run with {problem.model.mesh.size_mm:.4g} mm did not converge ({frame.outcome})")
-    if frame is None:
+    result = None
+    for result in march(problem):
+        if not result.outcome.ok:
+            raise Finger3dError(f"a run with {problem.model.mesh.size_mm:.4g} mm did not converge ({result.outcome})")
+    if result is None:
         raise Finger3dError("there are no increments to march")
-    return frame
+    return result
 
 
-def as_solved(legs: tuple[Leg, ...], count: int) -> tuple[Leg, ...]:
-    """The legs with their automatic increments as many as `count` frames in all tell."""
-    free = [leg for leg in legs if leg.steps == "auto"]
+def with_increments_of(legs: tuple[Leg, ...], count: int) -> tuple[Leg, ...]:
+    """Return the legs with the automatic increments of a press that had `count` increments in all."""
+    automatic_legs = sum(leg.steps == "auto" for leg in legs)
     fixed = sum(leg.steps for leg in legs if isinstance(leg.steps, int))
-    each = (count - fixed) // max(1, len(free))
+    each = (count - fixed) // max(1, automatic_legs)
     return tuple(replace(leg, steps=each) if leg.steps == "auto" else leg for leg in legs)

@@ -16,7 +16,7 @@ from finger3d.mechanics.build import build
 from finger3d.mechanics.history import ContactPoints, StepResult, contact_table, measure
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.step_halving import marched
+from finger3d.mechanics.step_halving import march_automatic
 from finger3d.results.comparison import Case
 
 Float = NDArray[np.float64]
@@ -70,7 +70,7 @@ def _pressed(name: str, model: Model) -> tuple[Problem, tuple[StepResult, ...], 
     start = time.perf_counter()
     # The whole contact face is a candidate, because the extent of contact differs from model to model.
     problem = build(model, margin=math.inf)
-    frames, increments = marched(problem)
+    frames, increments = march_automatic(problem)
     levels = [(count, ends[-1]) for count, ends in increments.levels] if increments else []
     frame = frames[-1]
     mesher = "swept" if problem.dim == 2 else model.mesh.mesher
