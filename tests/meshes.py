@@ -22,9 +22,10 @@ def grid(counts: tuple[int, ...], shuffle: float = 0.0, seed: int = 0) -> Mesh:
     for order in itertools.permutations(range(d)):
         path = np.concatenate([[0], np.cumsum(strides[list(order)])])
         cells.append(low[:, None] + path)
-    mesh = Mesh(points, np.vstack(cells), {})
-    turned = signed_volumes(mesh) < 0
-    mesh.cells[turned] = mesh.cells[turned][:, [1, 0, *range(2, d + 1)]]
+    corners = np.vstack(cells)
+    turned = signed_volumes(Mesh(points, corners, {})) < 0
+    corners[turned] = corners[turned][:, [1, 0, *range(2, d + 1)]]
+    mesh = Mesh(points, corners, {})
     inside = np.all((points > 0) & (points < 1), axis=1)
     step = np.random.default_rng(seed).uniform(-shuffle, shuffle, points.shape) / np.array(counts)
     moved = points + step * inside[:, None]

@@ -188,8 +188,7 @@ def test_sizes_that_hang_the_mesher(size: float, text: str, tmp_path: Path, caps
 def test_a_finger_without_base_or_through_itself(tmp_path: Path, capsys: Any) -> None:
     write_stl(tmp_path / "ball.stl", ball(5.0, 8, 12))
     assert "no base" in refused(capsys, tmp_path, '"ball.stl"', 'shape = "plane"')
-    crossed = moved(lambda p: p.copy())
-    crossed.points[6] = [-12.0, 8.0, 1.0]
+    crossed = moved(lambda p: np.vstack([p[:6], [[-12.0, 8.0, 1.0]], p[7:]]))
     write_stl(tmp_path / "crossed.stl", crossed)
     assert "runs through itself" in refused(capsys, tmp_path, '"crossed.stl"', 'shape = "plane"')
     write_stl(tmp_path / "leaf.stl", box(8.0, 1e-3, 4.0))  # its size can be asked for, its tetrahedra cannot

@@ -261,8 +261,9 @@ def test_bodies_that_are_no_finger(tmp_path: Path, surface: Triangles, text: str
 
 
 def test_a_body_that_runs_through_itself_is_refused(tmp_path: Path) -> None:
-    bad = box(4.0, 4.0, 4.0)
-    bad.points[6] = [-6.0, 5.0, 1.0]  # a top corner pulled out through the far side
+    good = box(4.0, 4.0, 4.0)
+    corner = [[-6.0, 5.0, 1.0]]  # a top corner pulled out through the far side
+    bad = replace(good, points=np.vstack([good.points[:6], corner, good.points[7:]]))
     with pytest.raises(Finger3dError, match="runs through itself at"):
         imported(write_stl(tmp_path / "body.stl", bad))
 

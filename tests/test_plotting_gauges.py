@@ -11,6 +11,7 @@ from finger3d.mechanics.model import Gauge
 from finger3d.plotting import solid
 from finger3d.plotting.figures import finger_picture
 from finger3d.plotting.gauges import COLOUR, marks_of
+from tests.meshes import mapped
 from tests.test_plotting_figures import finger, pixels, pressed, share
 
 POINT = Gauge("g36", 36.0, 38.0, 2.5, np.radians(30.0))
@@ -38,7 +39,7 @@ def test_in_a_solid_the_mark_is_on_the_face_in_front() -> None:
     assert [mark.label for mark in marks_of(mesh, [POINT], near=True)] == ["g36, 30°, z = 2.5"]
     assert np.allclose(marks_of(mesh, [POINT], near=True)[0].of(mesh.points)[1], [36.0, 38.0, 10.0], atol=1e-9)
     # narrower towards the top, as a dome is
-    mesh.points[:, 2] *= 1.0 - 0.4 * (mesh.points[:, 1] / 50.0)
+    mesh = mapped(mesh, lambda p: p * np.column_stack([np.ones((len(p), 2)), 1.0 - 0.4 * p[:, 1] / 50.0]))
     face = 10.0 * (1.0 - 0.4 * 38.0 / 50.0)
     found = marks_of(mesh, [POINT], near=True)[0].of(mesh.points)[1]
     assert np.allclose(found[:2], [36.0, 38.0], atol=1e-9)

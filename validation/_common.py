@@ -51,14 +51,14 @@ def box(axes: Sequence[Float]) -> Mesh:
     strides = np.array([np.prod([n + 1 for n in counts[i + 1 :]]) for i in range(d)], dtype=np.int64)
     low = np.stack(np.meshgrid(*[np.arange(n) for n in counts], indexing="ij"), axis=-1).reshape(-1, d) @ strides
     paths = [np.concatenate([[0], np.cumsum(strides[list(p)])]) for p in itertools.permutations(range(d))]
-    mesh = Mesh(points, np.vstack([low[:, None] + p for p in paths]), {})
-    turned = signed_volumes(mesh) < 0
-    mesh.cells[turned] = mesh.cells[turned][:, [1, 0, *range(2, d + 1)]]
-    outer = boundary(mesh.cells, d)
+    cells = np.vstack([low[:, None] + p for p in paths])
+    turned = signed_volumes(Mesh(points, cells, {})) < 0
+    cells[turned] = cells[turned][:, [1, 0, *range(2, d + 1)]]
+    outer = boundary(cells, d)
     facets = {}
     for axis, (sign, at) in itertools.product(range(d), (("-", 0), ("+", -1))):
         facets["xyz"[axis] + sign] = outer[np.all(points[outer][:, :, axis] == axes[axis][at], axis=1)]
-    return Mesh(points, mesh.cells, facets)
+    return Mesh(points, cells, facets)
 
 
 def cube(dim: int, count: int) -> Mesh:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._arrays import freeze_arrays
 from finger3d.contact.friction import OPEN
 from finger3d.errors import Outcome
 
@@ -36,6 +37,9 @@ class ContactState:
     tangential_displacement: Float
     accumulated_slip: Float
     bases: Float | None = None
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
 
     @classmethod
     def at_rest(cls, gap: Float, dim: int) -> ContactState:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._arrays import freeze_arrays
 from finger3d.fem.elements import EDGES, Element, element_of
 
 Float = NDArray[np.float64]
@@ -39,6 +40,9 @@ class Mesh:
     points: Float
     cells: Int
     facets: Mapping[str, Int]
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
 
     def __repr__(self) -> str:
         """One line: the arrays would fill pages."""

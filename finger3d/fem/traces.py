@@ -12,6 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from finger3d._arrays import freeze_arrays
 from finger3d.errors import Finger3dError
 from finger3d.fem.elements import quadrature
 from finger3d.fem.locate import cells_at
@@ -52,6 +53,9 @@ class BoundarySurface:
     average: sp.csr_matrix
     interpolate: sp.csr_matrix
     along: tuple[sp.csr_matrix, ...] = ()
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
 
 
 def surface(mesh: Mesh, label: str, thickness: float = 1.0) -> BoundarySurface:

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._arrays import freeze_arrays
 from finger3d.geometry.bvh import Tree, puck_distance
 
 Float = NDArray[np.float64]
@@ -30,6 +31,9 @@ class Triangles:
 
     points: Float
     faces: Int
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Triangles) and self.digest == other.digest

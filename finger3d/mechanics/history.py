@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._arrays import freeze_arrays
 from finger3d.contact.friction import OPEN, STATUS_NAMES, STICK
 from finger3d.contact.state import ContactState
 from finger3d.errors import Outcome
@@ -61,6 +62,9 @@ class ContactPoints:
     half_width_mm: float
     band_mm: float
     edges: NDArray[np.int64]
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
 
     @property
     def dim(self) -> int:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._arrays import freeze_arrays
 from finger3d.contact.newton import uniqueness
 from finger3d.contact.state import ContactState
 from finger3d.errors import Finger3dError
@@ -47,6 +48,9 @@ class Part:
     fixed_dofs: NDArray[np.int64]
     condensed: Condensation
 
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
+
 
 @dataclass(frozen=True, kw_only=True)
 class ContactSystem:
@@ -73,6 +77,9 @@ class ContactSystem:
     place_mm: tuple[float, float] | None = None
     object_factorizations: int = 0
 
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
+
 
 @dataclass(frozen=True, kw_only=True)
 class AddedStiffness:
@@ -88,6 +95,9 @@ class AddedStiffness:
 
     bar_stiffness: Float = field(default_factory=lambda: np.zeros(0))
     subgrid_compliance: Float = field(default_factory=lambda: np.zeros((0, 0)))
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._arrays import freeze_arrays
 from finger3d.contact.state import ContactState
 from finger3d.fem.simplex import Mesh, axis_numbers, reflect_into_part, unfold
 from finger3d.fem.traces import BoundarySurface
@@ -53,6 +54,9 @@ class Symmetry:
     image_of: NDArray[np.int64]
     mirror_sign: Float
     multiplicity: Float
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
 
     def unfold(self, state: ContactState) -> ContactState:
         """Return the contact state of the whole finger (m points) from that of the part."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._arrays import freeze_arrays
 from finger3d.contact.friction import OPEN, SLIP, STICK
 from finger3d.fem.elements import TRI3, TRI6
 from finger3d.fem.simplex import Mesh
@@ -71,6 +72,9 @@ class Skin:
     arrow: Float
     arrow_status: Int
     largest_shear: float
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
 
     @property
     def size(self) -> float:

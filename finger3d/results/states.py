@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._arrays import freeze_arrays
 from finger3d.errors import Finger3dError
 from finger3d.fem.simplex import Mesh, middles
 from finger3d.io import atomic, read_arrays
@@ -56,6 +57,9 @@ class States:
     shear_z: Array
     gap: Array
     status: Array
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
 
     @property
     def dim(self) -> int:
