@@ -1,4 +1,4 @@
-"""What effects share: each fills one slot of the model, and two that want the same slot are a mistake."""
+"""Interface of the effects: each sets one slot of the model, which no other effect may set."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ def fill(model: Model, slot: str, value: Any, effect: str) -> Model:
         raise Finger3dError(f"effects: {taken} and {effect} both set the {slot}; keep one of them")
     filled = tuple(sorted((*model.filled, (slot, effect))))
     made = replace(model, **{slot: value}, filled=filled)
-    for wish in ("inclusions", "object_compliance"):
-        if getattr(made, wish) is not None and wish not in made.formulation.supported_slots:
-            others = {wish, "formulation"} - {slot}
+    for needed in ("inclusions", "object_compliance"):
+        if getattr(made, needed) is not None and needed not in made.formulation.supported_slots:
+            others = {needed, "formulation"} - {slot}
             other = next((name for s, name in model.filled if s in others), "the model's own slots")
             raise Finger3dError(f"effects: {other} and {effect} do not go together; keep one of them")
     return made

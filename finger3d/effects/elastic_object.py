@@ -1,4 +1,4 @@
-"""An object that yields: its compliance is added to the finger's at the contact points.
+"""Elastic object: its compliance is added to that of the finger at the contact points.
 
 The object is meshed and condensed like the finger, in small strain, and held where it is gripped: the lower half of a
 cylinder or ball on its cut; behind a plane, wedge or wave a block as long and wide as the finger, on its far face; a
@@ -11,7 +11,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -85,17 +85,19 @@ class SoftObject:
 
 
 def _all_images(problem: Problem, mesh: Mesh, frame: Float) -> sp.csr_matrix:
-    """Rows that sum a displacement over all mirror images of every point, each seen in its own mirror."""
+    """Rows that sum the displacement of every contact point and of its mirror images, each in its own frame."""
     d = problem.dim
-    total: Any = 0.0
     signs = [np.ones(d)]
     for axis in axis_numbers(problem.axes):
         flip = np.where(np.arange(d) == axis, -1.0, 1.0)
         signs += [s * flip for s in signs]
-    for sign in signs:
-        image = replace(problem.surface, samples=problem.surface.samples * sign)
-        total = total + sp.kron(facing_trace(image, mesh, "contact"), frame * sign, format="csr")
-    return sp.csr_matrix(total)
+    faces = [replace(problem.surface, samples=problem.surface.samples * sign) for sign in signs]
+    return sp.csr_matrix(
+        sum(
+            sp.kron(facing_trace(face, mesh, "contact"), frame * sign, format="csr")
+            for face, sign in zip(faces, signs, strict=True)
+        )
+    )
 
 
 @dataclass(frozen=True)
@@ -211,9 +213,11 @@ class ObjectBody:
         # Turned about z by half a turn, measured from the middle of the plane it is held on.
         lowest = np.array([-obj.origin[0], -obj.origin[1], obj.origin[2]]) - body.middle
         zone = (
-            lowest[0] - (self.zone[1] - obj.x_mm), lowest[0] - (self.zone[0] - obj.x_mm),
-            lowest[2] + self.zone[2] - obj.z_mm, lowest[2] + self.zone[3] - obj.z_mm,
-        )  # fmt: skip
+            lowest[0] - (self.zone[1] - obj.x_mm),
+            lowest[0] - (self.zone[0] - obj.x_mm),
+            lowest[2] + self.zone[2] - obj.z_mm,
+            lowest[2] + self.zone[3] - obj.z_mm,
+        )
         mesh = self._made(body, zone, "ftetwild", ())
         points = (mesh.points - lowest) * [-1.0, -1.0, 1.0] + [obj.x_mm, 0.0, obj.z_mm]
         return Mesh(points, mesh.cells, mesh.facets)

@@ -81,11 +81,11 @@ class RelaxationWorkspace(Workspace):
 
 
 class ViscoelasticBody(Protocol):
-    """What remembers, and how it answers."""
+    """A viscoelastic body with internal variables."""
 
     @property
     def size(self) -> int:
-        """Length of the memory's vectors."""
+        """Number of internal variables of a branch."""
         ...
 
     def respond(self, step: Step, memory: InternalVariables, workspace: RelaxationWorkspace) -> Response:
@@ -107,7 +107,7 @@ class ViscoelasticBody(Protocol):
 
 @dataclass(frozen=True)
 class ConstantPoissonRatio:
-    """Poisson's ratio is constant: a shape is told by the row forces that would hold it elastically."""
+    """Constant Poisson's ratio; internal variables are the row forces that hold a shape of the elastic body."""
 
     problem: Problem
 
@@ -141,9 +141,9 @@ class ConstantPoissonRatio:
 
 @dataclass(frozen=True)
 class ConstantBulkModulus:
-    """The bulk modulus is constant: a shape is told by displacements and, in the mixed form, vertex dilatations.
+    """Constant bulk modulus; internal variables are displacements and, in the mixed form, vertex dilatations.
 
-    What inclusions yield beyond the mesh is told by their row forces; it relaxes as if nu were constant.
+    The subgrid compliance of inclusions acts on their row forces, and relaxes as if nu were constant.
     """
 
     problem: Problem
@@ -304,7 +304,7 @@ class Viscoelastic(SmallStrain):
         return state.memory
 
     def start(self, problem: Problem) -> ViscousState:
-        """Nothing to remember."""
+        """State at rest, with internal variables zero."""
         _check_domain(problem.model, self.bulk)
         size = self._body(problem).size
         empty = InternalVariables(np.zeros(size), np.zeros((len(self.prony), size)))
@@ -391,7 +391,7 @@ class Effect:
     bulk: bool = True
 
     def __post_init__(self) -> None:
-        """Refuse a body that would relax to nothing."""
+        """Refuse a series whose long-time modulus is not positive."""
         total = math.fsum(share for share, _ in self.prony)
         if total >= 1.0 - 1e-12:
             raise Finger3dError(
@@ -399,7 +399,7 @@ class Effect:
             )
 
     def apply(self, model: Model) -> Model:
-        """Fill the kinematics slot; every leg must say how long it takes."""
+        """Set the formulation of the model; every leg needs a duration."""
         prony = tuple((share, time) for share, time in self.prony)
         model = fill(model, "formulation", Viscoelastic(prony, self.bulk), "viscosity")
         timeless = [i for i, leg in enumerate(model.legs) if leg.duration_s is None]

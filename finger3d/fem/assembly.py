@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -180,7 +179,7 @@ def _places(row: Int, col: Int, n: int, pressures: int, d: int) -> tuple[AnyInt,
     length = np.diff(first)
     rows = np.concatenate([np.maximum(length[:n, None] - np.arange(d), 0).ravel(), length[n:]])
     indptr = np.concatenate([[0], np.cumsum(rows)])
-    kind: type[Any] = np.int32 if indptr[-1] < np.iinfo(np.int32).max else np.int64
+    kind: type[np.signedinteger] = np.int32 if indptr[-1] < np.iinfo(np.int32).max else np.int64
     unknown = np.concatenate([np.arange(n) * d, np.arange(n * d, n * d + pressures)])
     start, length = (indptr[unknown] - first[:-1])[row], length[row]
     start += before[:-1]

@@ -31,7 +31,7 @@ _SOLVE_CHUNK = 64
 
 @dataclass(frozen=True)
 class Condensation:
-    """A body seen through its rows.
+    """A body condensed to its rows.
 
     Attributes
     ----------
@@ -52,14 +52,14 @@ class Condensation:
     _series: _Series | None = field(default=None, repr=False)
 
     def unknowns(self, force: Float) -> Float:
-        """All unknowns (N, ...) under row forces (r, ...) N, with the factor at hand: displacements mm, then pressures.
+        """All unknowns (N, ...) under row forces (r, ...) N: displacements in mm, then pressures.
 
-        Several forces at once, as columns (r, k), cost less than one after another: the factor is read once.
+        Several forces as columns (r, k) cost less than one after another.
         """
         return self.solve(self._rows.T @ force)
 
     def solve(self, load: Float) -> Float:
-        """All unknowns (N, ...) under loads (N, ...) on any of them; held ones stay zero."""
+        """All unknowns (N, ...) under loads (N, ...); fixed unknowns are zero."""
         whole = np.zeros(load.shape, order="F")  # one field after another
         whole[self._free] = self._solve(load[self._free])
         return whole
@@ -69,7 +69,7 @@ class Condensation:
         return np.asarray(self._rows @ unknowns)
 
     def again(self, stiffness: Stiffness) -> Condensation:
-        """Another stiffness on the same numbering, held and condensed alike: one more factorisation."""
+        """Condense another stiffness with the same fixed unknowns and rows; this takes one more factorisation."""
         fixed = np.setdiff1d(np.arange(self._rows.shape[1]), self._free)
         return condense(stiffness, fixed, self._rows, self.solver)
 
@@ -103,8 +103,8 @@ def condense(
     # entries of order 1, by powers of two, so that neither the modulus nor the unit of a row changes a digit.
     unit, units = _power_of_two(upper.data), _row_scales(padded)
     scaled = sp.csr_matrix((upper.data / unit, upper.indices, upper.indptr), shape=upper.shape)
-    read = sp.csr_matrix((padded.data / np.repeat(units, np.diff(padded.indptr)), padded.indices, padded.indptr),
-                         shape=padded.shape)  # fmt: skip
+    entries = padded.data / np.repeat(units, np.diff(padded.indptr))
+    read = sp.csr_matrix((entries, padded.indices, padded.indptr), shape=padded.shape)
     series: _Series | None = None
     factor_solve: Callable[[Float], Float]
     if solver == "pardiso":

@@ -135,7 +135,7 @@ def with_bars(problem: Problem, bars: EmbeddedBars) -> Problem:
 
 def with_object_compliance(problem: Problem, response: ObjectResponse) -> Problem:
     """Return the problem with the compliance of an elastic object added to that of the contact points."""
-    bare = problem.without_inclusions
+    body = problem.without_inclusions
     return replace(
         problem,
         system=replace(
@@ -144,7 +144,7 @@ def with_object_compliance(problem: Problem, response: ObjectResponse) -> Proble
             object_factorizations=response.factorizations,
         ),
         seconds=problem.seconds | response.seconds,
-        without_inclusions=with_object_compliance(bare, response) if bare else None,
+        without_inclusions=with_object_compliance(body, response) if body else None,
     )
 
 

@@ -1,4 +1,4 @@
-"""What a press leaves behind: frames, and the numbers of the contract measured on them."""
+"""Results of the increments of a press, and the quantities measured on them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _ON_LINE = 1e-9
 
 @dataclass(frozen=True)
 class ObjectPose:
-    """Where the object is: pressed down by a depth, slid along x and z, at a time (s)."""
+    """Pose of the object: depth and slides along x and z, at a time (s)."""
 
     depth_mm: float
     slide_x_mm: float = 0.0
@@ -121,7 +121,7 @@ class ContactPoints:
 
 @dataclass(frozen=True)
 class StepResult:
-    """One increment as reported: whole contact state (m points), gauge strains, work, and how it was settled.
+    """Result of an increment: contact state of the whole finger (m points), gauge strains, work and convergence.
 
     `part` is the state of the meshed part (c points), from which fields are recovered.
     """
@@ -141,18 +141,18 @@ class StepResult:
 
 @dataclass(frozen=True, repr=False)
 class History:
-    """Frames of one press, with the points they speak of."""
+    """Results of the increments of a press, and the contact points of the whole finger."""
 
     points: ContactPoints
     steps: tuple[StepResult, ...]
 
     def __repr__(self) -> str:
-        """One line: the arrays would fill pages."""
+        """One line without arrays."""
         return f"<History of {len(self.steps)} steps, {len(self.points.nodes)} contact points: {self.outcome}>"
 
     @property
     def outcome(self) -> Outcome:
-        """CONVERGED if every increment is."""
+        """CONVERGED if every increment has converged, else the first other outcome."""
         return next((f.outcome for f in self.steps if not f.outcome.ok), Outcome.CONVERGED)
 
 
@@ -160,22 +160,22 @@ def _half_extent(x: Float) -> float:
     return float(np.ptp(x) / 2.0) if len(x) else 0.0
 
 
-def measure(points: ContactPoints, frame: StepResult) -> dict[str, Any]:
-    """The entry of `steps` in summary.json for one frame.
+def measure(points: ContactPoints, step: StepResult) -> dict[str, Any]:
+    """Entry of `steps` in summary.json for one increment.
 
     ``contact_half_length_mm`` and ``stick_half_length_mm`` are half the distance along x between the first and the last
     point of the line z = 0 that touch or stick.  The line has the vertices of the surface mesh on it and the
     intersections of its edges with it, each with the state of the nearer end of the edge.
     """
-    state, target = frame.state, frame.target
+    state, target = step.state, step.target
     points = points.with_basis_of(state)
     world = points.to_global(state.force)
     friction = points.friction(state.force)
     touching, sticking = state.status != OPEN, state.status == STICK
     x, z = points.points[:, 0], points.points[:, 2]
     line, nearest = points.middle_line()
-    outward_x = friction[:, 0] * np.sign(x - frame.lowest[0])
-    outward_z = friction[:, 2] * np.sign(z - frame.lowest[1])
+    outward_x = friction[:, 0] * np.sign(x - step.lowest[0])
+    outward_z = friction[:, 2] * np.sign(z - step.lowest[1])
     numbers: dict[str, Any] = {
         "depth_mm": target.depth_mm,
         "slide_x_mm": target.slide_x_mm,
@@ -196,13 +196,13 @@ def measure(points: ContactPoints, frame: StepResult) -> dict[str, Any]:
         end = np.abs(z - points.half_width_mm) <= 1e-6 * points.half_width_mm
         numbers["contact_half_length_end_mm"] = _half_extent(x[touching & end])
     return numbers | {
-        "external_work_mJ": frame.external_work_mJ,
-        "dissipation_mJ": frame.dissipation_mJ,
-        "gauges": dict(frame.gauges),
-        "iterations": frame.iterations,
-        "residual": frame.residual,
-        "method": frame.method,
-        "outcome": str(frame.outcome),
+        "external_work_mJ": step.external_work_mJ,
+        "dissipation_mJ": step.dissipation_mJ,
+        "gauges": dict(step.gauges),
+        "iterations": step.iterations,
+        "residual": step.residual,
+        "method": step.method,
+        "outcome": str(step.outcome),
     }
 
 

@@ -25,8 +25,8 @@ from finger3d.meshing.report import MeshReport
 Float = NDArray[np.float64]
 
 _COVERED = 0.5  # least share of a point's hat that must be under the object
-_BESIDE = 2.0  # gap beside an object, in heights of the finger: finite, and never closed
-_AT_ONCE = 8_000_000  # unknowns of fields that are solved for together: 64 MB, and as much again a few times on the way
+_OUTSIDE_GAP = 2.0  # gap of points that the object does not cover, in heights of the finger; never closed
+_AT_ONCE = 8_000_000  # unknowns solved for at once: 64 MB, and a few times as much in between
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,7 +90,7 @@ class AddedStiffness:
     bar_stiffness : (s,) N mm
         Stiffness that the inclusions add to each of the last s rows.
     subgrid_compliance : (g + s, g + s)
-        What the last rows, gauges and inclusions, yield more than the mesh says.
+        Compliance of the last rows, gauges and inclusions, that the mesh does not resolve.
     """
 
     bar_stiffness: Float = field(default_factory=lambda: np.zeros(0))
@@ -165,7 +165,7 @@ class Problem:
 
     @property
     def origin(self) -> ObjectPose:
-        """Where every path begins: first touch."""
+        """Pose at first touch, where every path begins."""
         return ObjectPose(0.0)
 
     @property
@@ -213,7 +213,7 @@ class Problem:
         return self._unknowns(self.row_forces(force))
 
     def unknowns_of(self, forces: Sequence[Float]) -> Iterator[Float]:
-        """The same for each of several forces (c, d): as many at once as fit into some memory."""
+        """All unknowns (N,) for each of several forces (c, d), in blocks of limited memory."""
         at_once = max(1, _AT_ONCE // self.part.stiffness.upper.shape[0])
         for first in range(0, len(forces), at_once):
             rows = np.stack([self.row_forces(force) for force in forces[first : first + at_once]], axis=1)
@@ -237,10 +237,10 @@ def rigid_gap(model: Model, where: BoundarySurface, touch: float, target: Object
     there = np.isfinite(vertical)
     if there.all():
         return np.asarray(np.asarray(where.average @ vertical) * upright)
-    # Beside the object there is no gap: a point's mean is over what the object covers, if that is half of its hat.
+    # The mean is over the part of a point's hat that the object covers, if that is at least half of it.
     share = np.asarray(where.average @ there)
     mean = np.asarray(where.average @ np.where(there, vertical, 0.0)) / np.maximum(share, _COVERED)
-    return np.where(share < _COVERED, _BESIDE * model.design.height_mm, mean * upright)
+    return np.where(share < _COVERED, _OUTSIDE_GAP * model.design.height_mm, mean * upright)
 
 
 def scatter_to_points(rows: Float, kept: NDArray[np.int64], count: int, dim: int) -> Float:

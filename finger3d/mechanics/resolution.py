@@ -1,4 +1,4 @@
-"""Whether contact points are close enough together for the object that is pressed on them.
+"""Whether the contact points resolve the shape of the object.
 
 A contact point knows the object through one number, the gap averaged over its hat function.  What reaches into the
 finger between the points, or is lost in an average, is compared with the exact object at rest: at the surface's
@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -47,7 +46,7 @@ _FORESEEN = 50  # the same before there is a mesh, at most
 
 @dataclass(frozen=True)
 class Hidden:
-    """What contact points do not see of the object.
+    """Part of the object that the contact points do not resolve.
 
     Attributes
     ----------
@@ -130,10 +129,10 @@ def check(
 
 
 def warnings(problem: Problem) -> list[str]:
-    """What to tell of a press whose contact points see less than all of the object."""
+    """Warnings about an object that the contact points do not resolve."""
     model, touch = problem.model, problem.system.first_contact_mm
     tips = tips_of(model, problem.system.place_mm)
-    return _told(model, touch, tips, hidden(model, problem.surface, touch, tips, problem.axes))
+    return _messages(model, touch, tips, hidden(model, problem.surface, touch, tips, problem.axes))
 
 
 def foreseen(model: Model, axes: tuple[str, ...]) -> list[str]:
@@ -146,20 +145,20 @@ def foreseen(model: Model, axes: tuple[str, ...]) -> list[str]:
     at = np.array([0.5 * size if axis in axes else place for axis, place in zip("xz", way.place, strict=True)])
     tips = tips_of(model, way.place)
     tips = None if tips is None else _within(tips, box)
-    return _told(
+    return _messages(
         model, way.first_contact_mm, tips, hidden(model, regular(model, box, size, at), way.first_contact_mm, tips)
     )
 
 
-def _told(model: Model, touch_mm: float, tips: Float | None, found: Hidden) -> list[str]:
-    told = _details(model)
+def _messages(model: Model, touch_mm: float, tips: Float | None, found: Hidden) -> list[str]:
+    messages = _details(model)
     if found.share > _WARNED or not found.seen:
-        told.append(_sentence(model, found, needed_mm(model, touch_mm, found, tips)))
-    return told
+        messages.append(_sentence(model, found, needed_mm(model, touch_mm, found, tips)))
+    return messages
 
 
 def unseen(problem: Problem, frames: Sequence[StepResult]) -> list[str]:
-    """What to tell of increments at which the object reaches into the finger at rest, and no contact point sees it."""
+    """Warnings about increments in which the object overlaps the finger at rest but reaches no contact point."""
     model, face, touch, missed = problem.model, problem.surface, problem.system.first_contact_mm, list[float]()
     for frame in frames:
         end = frame.target
@@ -179,7 +178,7 @@ def unseen(problem: Problem, frames: Sequence[StepResult]) -> list[str]:
 
 
 def penetration(problem: Problem, frame: StepResult, u: Float) -> tuple[float, Float]:
-    """How deep (mm) the displaced contact face is inside a rigid object anywhere between its contact points, and where.
+    """Largest penetration (mm) of the deformed contact face into a rigid object, and the point where it occurs.
 
     In small strain displacements count along the normal only, as in the gap.
 
@@ -209,7 +208,7 @@ def penetration(problem: Problem, frame: StepResult, u: Float) -> tuple[float, F
 
 
 def inside(problem: Problem, frame: StepResult, u: Float) -> list[str]:
-    """What to tell of a press at whose end the object is inside the finger between the contact points."""
+    """Warnings about penetration between the contact points at the end of a press."""
     if problem.model.object_compliance is not None:  # its surface has moved as well
         return []
     depth, at = penetration(problem, frame, u)
@@ -278,7 +277,7 @@ def regular(model: Model, box: Box, size_mm: float, at: Float | None = None) -> 
     return BoundarySurface(np.arange(len(points)), points, np.ones(len(points)), none[0], samples, mean, none[1])
 
 
-def _lines(box: Any, half: float, size: float, at: float) -> Float:
+def _lines(box: Sequence[float], half: float, size: float, at: float) -> Float:
     """Places of contact points along one axis, the finger's ends among them."""
     low, high = max(box[0] - size, -half), min(box[1] + size, half)
     first, last = math.ceil((low - at) / size - 0.5), math.floor((high - at) / size - 0.5)
@@ -308,7 +307,7 @@ def _flat(points: Float) -> Float:
 
 
 def _overlap(model: Model, at: Float, touch: float, target: ObjectPose) -> Float:
-    """How deep (n,) mm the object would be below places (n, d) of the finger at rest; -inf beside it."""
+    """Vertical overlap (n,) mm of the object with points (n, d) of the finger at rest; -inf outside the object."""
     z = at[:, 2] if at.shape[1] == 3 else np.zeros(len(at))
     height = model.object.height(at[:, 0] - target.slide_x_mm, z - target.slide_z_mm)
     return np.nan_to_num(at[:, 1] - (height + touch - target.depth_mm), nan=-np.inf)
@@ -337,7 +336,7 @@ def _sentence(model: Model, found: Hidden, size: float | None) -> str:
 
 
 def _details(model: Model) -> list[str]:
-    """Lengths of the object that are short beside the edges."""
+    """Messages about lengths of the object that are short compared with the edges of the mesh."""
     detail, size, largest = model.object.detail, model.mesh.size_mm, _resolving(model.object)
     if detail is None or size <= largest * (1.0 + 1e-9):
         return []
@@ -348,7 +347,7 @@ def _details(model: Model) -> list[str]:
 
 
 def _rounded(size: float) -> float:
-    """Down to two significant digits."""
+    """Round down to two significant digits."""
     unit = 10.0 ** (math.floor(math.log10(size)) - 1)
     return float(f"{math.floor(size / unit * (1.0 + 1e-12)) * unit:.2g}")
 

@@ -94,9 +94,9 @@ def march(
 
 
 def _march_without_inclusions(problem: Problem, workspace: Workspace) -> Iterator[StepResult] | None:
-    """The same press of the body without inclusions, which tells the free strain of the gauges."""
-    bare = problem.without_inclusions
-    return march(replace(bare, model=problem.model), workspace=workspace) if bare else None
+    """The same press of the body without inclusions, for the free strain of the gauges."""
+    body = problem.without_inclusions
+    return march(replace(body, model=problem.model), workspace=workspace) if body else None
 
 
 def _free_strain(problem: Problem, without_inclusions: Iterator[StepResult] | None) -> dict[str, float]:
@@ -128,7 +128,7 @@ def _increment(
     cuts: int,
     guess: Float | None = None,
 ) -> tuple[ContactSolution, list[_Substep]]:
-    """Advance from a to b; an increment that does not settle is cut in two, from the state restored."""
+    """Advance from a to b; an increment that does not converge is halved and repeated from the same state."""
     found = problem.model.formulation.increment(problem, state, a, b, guess, workspace)
     if found.outcome.ok or cuts == 0:
         return found, [_Substep(state, found.state, a, b)]
