@@ -27,11 +27,20 @@ _NEAR = 0.1  # of mu: from one farther off a press takes longer than from its ow
 
 @dataclass(frozen=True)
 class Press:
-    """A press with one mu: its last increment, and the forces (c, d) N on the meshed part at the end of every one."""
+    """A press with one mu.
+
+    Attributes
+    ----------
+    mu : coefficient of friction
+    frame : the last increment
+    forces : contact forces (c, d), N, on the meshed part at the end of every increment
+    factorizations : factorisations of the body in the increments
+    """
 
     mu: float
     frame: StepResult
     forces: tuple[Float, ...]
+    factorizations: int = 0
 
 
 Like = Mapping[float, Press]
@@ -48,10 +57,12 @@ def press(
     """Press the condensed body with this mu, started from the last two presses of `near`."""
     law, forces, frame = problem.model.friction.with_mu(mu), [], None
     start = _start(problem, mu, near)
+    workspace = workspace or problem.model.formulation.workspace()
+    before = workspace.factorizations
     for frame in march(replace(problem, model=replace(problem.model, friction=law)), start, workspace, cancel):
         forces.append(frame.part.force)
     assert frame is not None  # a path has an increment
-    return Press(mu, frame, tuple(forces))
+    return Press(mu, frame, tuple(forces), workspace.factorizations - before)
 
 
 def presses(problem: Problem, mus: Sequence[float], like: Like | None = None) -> Iterator[Press]:

@@ -1,12 +1,12 @@
-"""Calibration of one gauge of a scene: one condensation, a press for every mu, and what the tolerances do."""
+"""Calibration of one gauge of a scene: one condensation, a press for every mu, and the effect of the tolerances."""
 
 from __future__ import annotations
 
 import hashlib
 import math
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -48,24 +48,86 @@ _FILES = ("calibration.json", "calibration.csv", "calibration.png", "reduced.npz
 _SLOPES = {True: 7, False: 3}  # values of mu at which tolerances are tried: in small strain, and beyond
 
 
-@dataclass
-class CurvePoints:
-    """The presses of one calibration as they come: last frame by mu, or why there is none; a few with their paths.
+@dataclass(frozen=True)
+class CalibrationSettings:
+    """Gauge, values of mu, and uncertainties of a calibration.
 
-    `increments` is known once there is a press.
+    Attributes
+    ----------
+    mus : coefficients of friction, ascending
+    noise : standard deviation of a strain reading
+    limit : largest standard deviation of mu at which the gauge is usable
+    tolerances : standard deviation of every uncertain quantity, all above zero
+    maps : whether the sensitivity of strain to mu is mapped over the section
     """
 
+    gauge: Gauge
     mus: tuple[float, ...]
-    frames: dict[float, StepResult] = field(default_factory=dict)
-    failed: dict[float, str] = field(default_factory=dict)
-    few: dict[float, Press] = field(default_factory=dict)
-    seconds: dict[str, float] = field(default_factory=dict)
-    increments: Increments | None = None
+    noise: float
+    limit: float
+    tolerances: Mapping[str, float]
+    maps: bool = False
 
-    def strains(self, name: str) -> tuple[Float, Float]:
-        """mu (n,) that converged and strain (n,) of a gauge."""
-        good = [mu for mu in self.mus if mu in self.frames]
-        return np.array(good), np.array([self.frames[mu].gauges[name] for mu in good])
+    def __post_init__(self) -> None:
+        """Check the numbers; mu is sorted, and equal values count once."""
+        for mu in self.mus:
+            if not 0.0 <= mu <= _LARGEST_MU:
+                raise Finger3dError(f"--mu: {mu:g}: must be finite numbers from 0 up to 1e6, for instance 0.02:1.2:25")
+        object.__setattr__(self, "mus", tuple(sorted({float(mu) for mu in self.mus})))
+        count = len(self.mus)
+        if count < FEWEST:
+            raise Finger3dError(
+                f"--mu: {count} different value{'s' if count != 1 else ''}; a calibration needs at least "
+                f"{FEWEST}, for instance 0.02:1.2:25"
+            )
+        for name, value, high in (("--noise", self.noise, LARGEST_STRAIN), ("--resolution", self.limit, 1e6)):
+            if not 1e-12 <= value <= high:
+                raise Finger3dError(f"{name} {value:g}: must be a finite number from 1e-12 to {number(high)}")
+
+
+@dataclass(frozen=True)
+class CurvePoints:
+    """Presses of one condensed body, one for every mu that is finished.
+
+    Attributes
+    ----------
+    problem : the condensed body; its gauges include the displaced ones, which give the tolerances of position
+    mus : all values of mu of the calibration, ascending
+    increments : of every press
+    presses : in the order of `mus`
+    seconds : wall time of the build and of the presses
+    factorizations_before : factorisations of an earlier attempt with too few candidate points
+    """
+
+    problem: Problem
+    mus: tuple[float, ...]
+    increments: Increments
+    presses: tuple[Press, ...]
+    seconds: Mapping[str, float]
+    factorizations_before: int = 0
+
+    @property
+    def frames(self) -> dict[float, StepResult]:
+        """Last increment of every press that converged, by mu."""
+        return {p.mu: p.frame for p in self.presses if p.frame.outcome.ok}
+
+    @property
+    def failed(self) -> dict[float, str]:
+        """Outcome of every press that did not converge, by mu."""
+        return {
+            p.mu: f"at depth {p.frame.target.depth_mm:.4g} mm: {p.frame.outcome}"
+            for p in self.presses
+            if not p.frame.outcome.ok
+        }
+
+    @property
+    def factorizations(self) -> int:
+        """Factorisations of the body, in its build and in the presses."""
+        return self.factorizations_before + self.problem.factorizations + sum(p.factorizations for p in self.presses)
+
+    def strain(self, gauge: str) -> Float:
+        """Return the strain (n,) of a gauge in the presses that converged."""
+        return np.array([frame.gauges[gauge] for frame in self.frames.values()])
 
 
 def calibrate(
@@ -105,50 +167,36 @@ def calibrate(
     report = report or Progress()
     scene = load(scene) if isinstance(scene, str | Path) else scene
     model = scene.model()
-    known = found_gauge(model, gauge)
-    asked = _checked(mus, noise, limit)
-    wanted = chosen(tolerances)
+    settings = CalibrationSettings(found_gauge(model, gauge), tuple(mus), noise, limit, chosen(tolerances), maps)
     if maps:
         from finger3d.sensor.maps import check
 
         check(model)
-    settings = (known, asked, wanted, noise, limit, report, maps)
     if out is None:
-        return _whole(scene, model, None, *settings)
+        return _calibrate_scene(scene, model, settings, None, report)
     with claimed(out, "calibrate") as folder:
-        return _whole(scene, model, folder, *settings)
+        return _calibrate_scene(scene, model, settings, folder, report)
 
 
-def _whole(
-    scene: Scene, model: Model, folder: Path | None, gauge: Gauge, mus: tuple[float, ...],
-    wanted: Mapping[str, float], noise: float, limit: float, report: Progress, maps: bool,
-) -> Calibration:  # fmt: skip
-    """Calibrate and write what is found; an interruption leaves the curve so far in calibration.csv."""
-    text = scene.to_toml()
+def _calibrate_scene(
+    scene: Scene, model: Model, settings: CalibrationSettings, folder: Path | None, report: Progress
+) -> Calibration:
+    """Press every mu, apply the tolerances, and write the results."""
+    start = time.perf_counter()
     if folder:
-        for name in _FILES:
-            (folder / name).unlink(missing_ok=True)
-        with atomic(folder / "scene.toml") as path:
-            path.write_text(text, encoding="utf-8")
-    sweep, start = CurvePoints(mus), time.perf_counter()
-    try:
-        problem = _condensed(model, gauge, wanted, sweep, noise, report)
-        calibration = _calibrated(problem, gauge, wanted, sweep, noise, limit, report)
-    except (KeyboardInterrupt, Finger3dError):
-        if folder and (sweep.frames or sweep.failed):
-            _keep(folder, sweep, gauge.name)
-        raise
-    sweep.seconds["total"] = time.perf_counter() - start
-    about = {
-        "domain": model.domain, "effects": list(scene.effects), "dofs": int(problem.part.stiffness.upper.shape[0]),
-        "contact_points": len(problem.surface.nodes), "mesh_hash": problem.part.report.hash, "seconds": sweep.seconds,
-        "factorizations": problem.factorizations, "versions": versions(),
-        "increments": sweep.increments.as_dict() if sweep.increments else {},
-    }  # fmt: skip
-    digest = hashlib.sha256(text.encode()).hexdigest()[:16]
+        _prepare(folder, scene)
+    curve = _press_all(model, settings, report, folder)
+    calibration = _with_tolerances(curve, settings, report)
+    seconds = {**calibration.about["seconds"], "total": time.perf_counter() - start}
+    about = {**_about(scene, curve), "seconds": seconds}
+    digest = hashlib.sha256(scene.to_toml().encode()).hexdigest()[:16]
     calibration = replace(calibration, scene=scene.as_dict(), hash=digest, about=about)
     if folder:
-        _write(folder, calibration, problem, model, gauge, sweep, report, maps)
+        report.stage("writing")
+        _write_body(folder, model, curve.problem, report)
+        if settings.maps:
+            _write_map(folder, calibration, curve, settings.gauge)
+        _write_curve(folder, calibration)
     return calibration
 
 
@@ -161,11 +209,16 @@ def calibrated(
     tolerances: Mapping[str, float] | None = None,
     report: Progress | None = None,
 ) -> tuple[Calibration, Problem, CurvePoints]:
-    """The same for a model made in Python; writes nothing. Returns also the condensed body and the last frames."""
-    report, known, sweep = report or Progress(), found_gauge(model, gauge), CurvePoints(_checked(mus, noise, limit))
-    wanted = chosen(tolerances)
-    problem = _condensed(model, known, wanted, sweep, noise, report)
-    return _calibrated(problem, known, wanted, sweep, noise, limit, report), problem, sweep
+    """Calibrate a gauge of a model made in Python; write nothing.
+
+    Returns
+    -------
+    Calibration, the condensed body, and the presses
+    """
+    report = report or Progress()
+    settings = CalibrationSettings(found_gauge(model, gauge), tuple(mus), noise, limit, chosen(tolerances))
+    curve = _press_all(model, settings, report)
+    return _with_tolerances(curve, settings, report), curve.problem, curve
 
 
 def found_gauge(model: Model, name: str) -> Gauge:
@@ -179,129 +232,148 @@ def found_gauge(model: Model, name: str) -> Gauge:
     return model.gauges[names.index(name)]
 
 
-def _checked(mus: Sequence[float], noise: float, limit: float) -> tuple[float, ...]:
-    for mu in mus:
-        if not 0.0 <= mu <= _LARGEST_MU:
-            raise Finger3dError(f"--mu: {mu:g}: must be finite numbers from 0 up to 1e6, for instance 0.02:1.2:25")
-    found = tuple(sorted({float(mu) for mu in mus}))
-    if len(found) < FEWEST:
-        raise Finger3dError(
-            f"--mu: {len(found)} different value{'s' if len(found) != 1 else ''}; a calibration needs at least "
-            f"{FEWEST}, for instance 0.02:1.2:25"
-        )
-    for name, value, low, high in (("--noise", noise, 1e-12, LARGEST_STRAIN), ("--resolution", limit, 1e-12, 1e6)):
-        if not low <= value <= high:
-            raise Finger3dError(f"{name} {value:g}: must be a finite number from {number(low)} to {number(high)}")
-    return found
+def _prepare(folder: Path, scene: Scene) -> None:
+    """Remove the results of an earlier calibration, and write scene.toml."""
+    for name in _FILES:
+        (folder / name).unlink(missing_ok=True)
+    with atomic(folder / "scene.toml") as path:
+        path.write_text(scene.to_toml(), encoding="utf-8")
 
 
-def _condensed(
-    model: Model, gauge: Gauge, wanted: Mapping[str, float], sweep: CurvePoints, noise: float, report: Progress
-) -> Problem:
-    """Build, press every mu, and once more with the whole contact face where contact went beyond the candidates."""
-    extra = () if model.inclusions else tuple(m.gauge for m in moved_gauges(model, gauge, wanted))
-    model = replace(model, gauges=(*model.gauges, *extra))
-    three = np.array(sweep.mus)[[0, len(sweep.mus) // 2, -1]]
+def _press_all(
+    model: Model, settings: CalibrationSettings, report: Progress, folder: Path | None = None
+) -> CurvePoints:
+    """Press every mu; again with all of the contact face if contact leaves the candidate points.
+
+    Every mu that is finished is written to calibration.csv, so that a failure or an interruption keeps it.
+    """
+    extra = () if model.inclusions else moved_gauges(model, settings.gauge, settings.tolerances)
+    model = replace(model, gauges=(*model.gauges, *(m.gauge for m in extra)))
+    spent = 0
     for margin in (MARGIN, math.inf):
         start = time.perf_counter()
         report.stage("condensing")
         problem = build(model, report.say, margin)
-        sweep.seconds["build"] = time.perf_counter() - start
-        start = time.perf_counter()
-        report.stage("increments")
-        sweep.increments = found_increments(problem, lambda p: read(p, (gauge.name,), three)[0], noise)
-        if sweep.increments.chosen:
-            report.say(str(sweep.increments))
-        problem = replace(problem, model=replace(problem.model, legs=sweep.increments.legs))
-        _press(problem, sweep, report)
-        sweep.seconds["presses"] = time.perf_counter() - start
-        if all(contact_within_candidates(problem, list(sweep.frames.values()))):
+        seconds = {"build": time.perf_counter() - start}
+        for curve in _curve_points(problem, settings, report):
+            curve = replace(curve, seconds={**seconds, **curve.seconds}, factorizations_before=spent)
+            if folder:
+                _write_points(folder, curve, settings.gauge.name)
+        if all(contact_within_candidates(curve.problem, list(curve.frames.values()))):
             break
+        spent = curve.factorizations
         report.say("contact reached beyond the candidate points; once more with all of the contact face")
-    return problem
+    return curve
 
 
-def _press(problem: Problem, sweep: CurvePoints, report: Progress) -> None:
+def _curve_points(problem: Problem, settings: CalibrationSettings, report: Progress) -> Iterator[CurvePoints]:
+    """Choose the increments, press the body with every mu, and yield the points after each."""
+    start = time.perf_counter()
+    mus, name = settings.mus, settings.gauge.name
+    three = np.array(mus)[[0, len(mus) // 2, -1]]
+    report.stage("increments")
+    increments = found_increments(problem, lambda p: read(p, (name,), three)[0], settings.noise)
+    if increments.chosen:
+        report.say(str(increments))
+    problem = replace(problem, model=replace(problem.model, legs=increments.legs))
     if problem.model.formulation.finite_strain:
-        name = dict(problem.model.filled).get("formulation", "this body")
-        report.say(f"{name}: its compliance changes on the way, so that every one of {len(sweep.mus)} mu is a full "
-                   "march, and so is every tolerance")  # fmt: skip
+        formulation = dict(problem.model.filled).get("formulation", "this body")
+        report.say(
+            f"{formulation}: its compliance changes during the press, so that every one of {len(mus)} mu is a full "
+            "press, and so is every tolerance"
+        )
     report.stage("pressing")
-    for kept in (sweep.frames, sweep.failed, sweep.few):
-        kept.clear()
-    few = {sweep.mus[i] for i in _few(problem, len(sweep.mus))}
-    for done, found in enumerate(presses(problem, sweep.mus), start=1):
-        mu, frame = found.mu, found.frame
-        if frame.outcome.ok:
-            sweep.frames[mu] = frame
-            if mu in few:
-                sweep.few[mu] = found
-        else:
-            sweep.failed[mu] = f"at depth {frame.target.depth_mm:.4g} mm: {frame.outcome}"
-        report.step(done, len(sweep.mus), f"mu = {mu:.4g}: {sweep.failed.get(mu, 'converged')}")
+    curve = CurvePoints(problem, mus, increments, (), {})
+    for found in presses(problem, mus):
+        seconds = {"presses": time.perf_counter() - start}
+        curve = replace(curve, presses=(*curve.presses, found), seconds=seconds)
+        report.step(len(curve.presses), len(mus), f"mu = {found.mu:.4g}: {curve.failed.get(found.mu, 'converged')}")
+        yield curve
+
+
+def _with_tolerances(curve: CurvePoints, settings: CalibrationSettings, report: Progress) -> Calibration:
+    """Return the calibration with the effect of every tolerance; too few points are an error."""
+    start = time.perf_counter()
+    mu, gauge = np.array(list(curve.frames)), settings.gauge
+    calibration = Calibration(
+        gauge=gauge.name,
+        mu=mu,
+        strain=curve.strain(gauge.name),
+        noise=settings.noise,
+        limit=settings.limit,
+        failed=tuple(sorted(curve.failed.items())),
+    )
+    found: tuple[Tolerance, ...] = ()
+    if settings.tolerances:
+        base = ReferenceReadings(
+            mu=mu,
+            strain={g.name: curve.strain(g.name) for g in curve.problem.model.gauges},
+            few=_few(curve.problem, len(mu)),
+            frame=curve.frames[float(mu[-1])],
+            pressed={p.mu: p for p in curve.presses if p.frame.outcome.ok},
+        )
+        found = tuple(slopes(curve.problem, gauge, settings.tolerances, base, curve.increments, report.stage))
+    seconds = {**curve.seconds, "tolerances": time.perf_counter() - start}
+    return replace(calibration, tolerances=found, about={"seconds": seconds})
 
 
 def _few(problem: Problem, count: int) -> NDArray[np.int64]:
-    """Numbers, among `count` values of mu, of those at which tolerances are tried."""
+    """Return the indices, among `count` values of mu, of those at which tolerances are applied."""
     wanted = _SLOPES[not problem.model.formulation.finite_strain]
     return np.unique(np.linspace(0, count - 1, wanted).round().astype(int))
 
 
-def _calibrated(
-    problem: Problem, gauge: Gauge, wanted: Mapping[str, float], sweep: CurvePoints, noise: float, limit: float,
-    report: Progress,
-) -> Calibration:  # fmt: skip
-    start = time.perf_counter()
-    mu, strain = sweep.strains(gauge.name)
-    failed = tuple(sorted(sweep.failed.items()))
-    bare = Calibration(gauge.name, mu, strain, noise, limit, (), failed)  # refuses too few points
-    found: tuple[Tolerance, ...] = ()
-    if wanted and sweep.increments:
-        strains = {g.name: sweep.strains(g.name)[1] for g in problem.model.gauges}
-        base = ReferenceReadings(mu, strains, _few(problem, len(mu)), sweep.frames[float(mu[-1])], sweep.few)
-        found = tuple(slopes(problem, gauge, wanted, base, sweep.increments, report.stage))
-    sweep.seconds["tolerances"] = time.perf_counter() - start
-    return replace(bare, tolerances=found)
+def _about(scene: Scene, curve: CurvePoints) -> dict[str, object]:
+    problem = curve.problem
+    return {
+        "domain": problem.model.domain,
+        "effects": list(scene.effects),
+        "dofs": int(problem.part.stiffness.upper.shape[0]),
+        "contact_points": len(problem.surface.nodes),
+        "mesh_hash": problem.part.report.hash,
+        "factorizations": curve.factorizations,
+        "versions": versions(),
+        "increments": curve.increments.as_dict(),
+    }
 
 
-def _keep(folder: Path, sweep: CurvePoints, gauge: str) -> None:
-    """What there is of a curve that was not finished."""
-    done = sorted([*sweep.frames, *sweep.failed])
-    strain = [sweep.frames[mu].gauges[gauge] if mu in sweep.frames else math.nan for mu in done]
-    outcome = [sweep.failed.get(mu, "converged") for mu in done]
-    write_csv(folder / "calibration.csv", {"mu": done, "strain": strain, "outcome": outcome})
+def _write_points(folder: Path, curve: CurvePoints, gauge: str) -> None:
+    """Write the values of mu that are finished to calibration.csv."""
+    frames, failed = curve.frames, curve.failed
+    mus = [p.mu for p in curve.presses]
+    strain = [frames[mu].gauges[gauge] if mu in frames else math.nan for mu in mus]
+    outcome = [failed.get(mu, "converged") for mu in mus]
+    write_csv(folder / "calibration.csv", {"mu": mus, "strain": strain, "outcome": outcome})
 
 
-def _write(
-    folder: Path,
-    calibration: Calibration,
-    problem: Problem,
-    model: Model,
-    gauge: Gauge,
-    sweep: CurvePoints,
-    report: Progress,
-    maps: bool,
-) -> None:
-    from finger3d.plotting.calibration import draw
-
-    report.stage("writing")
-    write_table(calibration, folder / "calibration.csv")
+def _write_body(folder: Path, model: Model, problem: Problem, report: Progress) -> None:
+    """Write the condensed body with the gauges of the scene, without the displaced ones, to reduced.npz."""
+    if not model.formulation.is_linear_elastic:
+        report.say("no reduced.npz: the compliance of the body changes during the press")
+        return
+    rows = problem.system.gauge_rows[: len(model.gauges)]
     own = replace(
         problem,
         model=replace(problem.model, gauges=model.gauges),
-        system=replace(problem.system, gauge_rows=problem.system.gauge_rows[: len(model.gauges)]),
+        system=replace(problem.system, gauge_rows=rows),
     )
-    if model.formulation.is_linear_elastic:
-        ReducedModel.of(own).save(folder / "reduced.npz")
-    else:
-        report.say("no reduced.npz: the body's answer changes on the way")
-    if maps:
-        from finger3d.plotting.strain_map import draw_map
-        from finger3d.sensor.maps import StrainMap
+    ReducedModel.of(own).save(folder / "reduced.npz")
 
-        found = StrainMap.of(problem, sweep.frames, z_mm=gauge.z_mm)
-        found.write(folder / "map.csv", gauge.angle, calibration.noise)
-        draw_map(folder / "map.png", found, gauge, calibration)
+
+def _write_map(folder: Path, calibration: Calibration, curve: CurvePoints, gauge: Gauge) -> None:
+    from finger3d.plotting.strain_map import draw_map
+    from finger3d.sensor.maps import StrainMap
+
+    found = StrainMap.of(curve.problem, curve.frames, z_mm=gauge.z_mm)
+    found.write(folder / "map.csv", gauge.angle, calibration.noise)
+    draw_map(folder / "map.png", found, gauge, calibration)
+
+
+def _write_curve(folder: Path, calibration: Calibration) -> None:
+    """Write the curve, its figure and its page."""
+    from finger3d.plotting.calibration import draw
+
+    write_table(calibration, folder / "calibration.csv")
     save(calibration, folder / "calibration.json")
     draw(folder / "calibration.png", calibration)
     calibrate_page(folder)
