@@ -258,9 +258,8 @@ def _affordable(now: MeshOptions, wanted: MeshOptions, seconds: float, left: flo
     # as far as the time allows, each length in proportion
     part = math.log(least) / math.log(factor)
     size, base = (
-        b * (w / b) ** part
-        for b, w in ((now.size_mm, wanted.size_mm), (now.base_size_mm, wanted.base_size_mm))
-    )  # fmt: skip
+        b * (w / b) ** part for b, w in ((now.size_mm, wanted.size_mm), (now.base_size_mm, wanted.base_size_mm))
+    )
     return replace(now, size_mm=_rounded(size), base_size_mm=_rounded(max(size, base)))
 
 

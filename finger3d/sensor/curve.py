@@ -197,9 +197,7 @@ class Calibration:
     def shares(self, mu: float) -> dict[str, float]:
         """Share of every cause in the variance of mu at one mu: noise, curve, and each tolerance; they sum to 1."""
         squares = {"noise": self.noise**2, "curve": float(self.curve_error(mu)) ** 2}
-        squares |= {
-            t.name: float(s) ** 2 for t, s in zip(self.tolerances, self.tolerance_sd(mu)[:, 0], strict=True)
-        }  # fmt: skip
+        squares |= {t.name: float(s) ** 2 for t, s in zip(self.tolerances, self.tolerance_sd(mu)[:, 0], strict=True)}
         total = sum(squares.values())
         return {name: value / total if total else 0.0 for name, value in squares.items()}
 

@@ -102,9 +102,12 @@ def write_table(calibration: Calibration, path: Path) -> None:
     """Write calibration.csv: every mu with its strain, slope, resolution and what each tolerance adds."""
     c = calibration
     columns: dict[str, Any] = {
-        "mu": c.mu, "strain": c.strain, "strain_fit": c.at(c.mu, "fit"), "strain_per_mu": c.slope(c.mu),
+        "mu": c.mu,
+        "strain": c.strain,
+        "strain_fit": c.at(c.mu, "fit"),
+        "strain_per_mu": c.slope(c.mu),
         "resolution": c.resolution(c.mu),
-    }  # fmt: skip
+    }
     columns |= {f"mu_sd_{t.name}": _mu_sd(c, i) for i, t in enumerate(c.tolerances)}
     columns["outcome"] = np.array(["converged"] * len(c.mu), dtype=object)
     blank = [np.nan] * len(c.failed)
@@ -150,10 +153,17 @@ def load(path: str | Path) -> Calibration:
     if len(lengths) > 1 or (np.diff(mu) <= 0.0).any() or mu[0] < 0.0:
         raise Finger3dError(f"{path}: curve: mu must ascend from 0 up, with a strain and tolerances for each; {again}")
     return Calibration(
-        found.gauge, mu, strain, found.noise, found.resolution_limit,
-        tuple(
-            Tolerance(k, t.unit, t.sd, np.array(t.strain_per_unit), np.array(t.strain_sd))
+        gauge=found.gauge,
+        mu=mu,
+        strain=strain,
+        noise=found.noise,
+        limit=found.resolution_limit,
+        tolerances=tuple(
+            Tolerance(name=k, unit=t.unit, sd=t.sd, slope=np.array(t.strain_per_unit), spread=np.array(t.strain_sd))
             for k, t in found.tolerances.items()
         ),
-        tuple((f.mu, f.why) for f in found.failed), found.scene, found.hash, found.about,
-    )  # fmt: skip
+        failed=tuple((f.mu, f.why) for f in found.failed),
+        scene=found.scene,
+        hash=found.hash,
+        about=found.about,
+    )

@@ -103,20 +103,24 @@ def estimate(
         raise Finger3dError(
             f"std: {given.size} of them for {readings.size} strains; give one for all, or each"
         ) from None
-    far = LARGEST_STRAIN
-    for name, values, bad in (("strain", readings, ~(np.abs(readings) <= far)),
-                              ("std", noise, ~((noise >= 0.0) & (noise <= far)))):  # fmt: skip
-        if bad.any():
-            i = int(np.argmax(bad))
-            wanted = f"a finite number from {-far if name == 'strain' else 0:g} to {far:g}"
-            where = f" (reading {i + 1} of {len(readings)})" if len(readings) > 1 else ""
-            raise Finger3dError(f"{name} = {values[i]}{where}: must be {wanted}")
+    _check("strain", readings, -LARGEST_STRAIN)
+    _check("std", noise, 0.0)
     calibration = calibration if tolerances else replace(calibration, tolerances=())
     found: list[Estimate] = []
     for start in range(0, len(readings), _CHUNK):
         part = slice(start, start + _CHUNK)
         found += _estimates(calibration, readings[part], noise[part], shape)
     return found
+
+
+def _check(name: str, values: Float, least: float) -> None:
+    """Refuse values (m,) outside of `least` to `LARGEST_STRAIN`, and nan."""
+    bad = ~((values >= least) & (values <= LARGEST_STRAIN))
+    if bad.any():
+        i = int(np.argmax(bad))
+        where = f" (reading {i + 1} of {len(values)})" if len(values) > 1 else ""
+        wanted = f"a finite number from {least:g} to {LARGEST_STRAIN:g}"
+        raise Finger3dError(f"{name} = {values[i]}{where}: must be {wanted}")
 
 
 def _estimates(calibration: Calibration, strain: Float, noise: Float, shape: Shape) -> list[Estimate]:
@@ -126,7 +130,7 @@ def _estimates(calibration: Calibration, strain: Float, noise: Float, shape: Sha
     away = strain[:, None] - curve
     low, high = _inside(away, sd)
     return [
-        _worded(calibration, strain[i], noise[i], _joined(grid, low[i], high[i]), away[i], sd[i], shape)
+        _estimate(calibration, strain[i], noise[i], _joined(grid, low[i], high[i]), away[i], sd[i], shape)
         for i in range(len(strain))
     ]
 
@@ -205,50 +209,95 @@ def _root(a: float, b: float, at_a: float, at_b: float) -> float:
     return a if at_a == at_b else a + (b - a) * at_a / (at_a - at_b)
 
 
-def _worded(
-    calibration: Calibration, strain: float, noise: float, found: list[tuple[float, float]], away: Float, sd: Float,
+def _estimate(
+    calibration: Calibration,
+    strain: float,
+    noise: float,
+    intervals: list[tuple[float, float]],
+    away: Float,
+    sd: Float,
     shape: Shape,
-) -> Estimate:  # fmt: skip
-    """Name the case and say it."""
+) -> Estimate:
+    """Return the estimate of one reading from its intervals of mu.
+
+    Parameters
+    ----------
+    away, sd : (m,) reading minus curve on the grid of the calibration, and its standard deviation
+    """
     first, last = float(calibration.mu[0]), float(calibration.mu[-1])
-    answers = tuple(_candidates(calibration.grid, found, away, sd)) if found else ()
+    candidates = tuple(_candidates(calibration.grid, intervals, away, sd)) if intervals else ()
+    low = high = math.nan
+    if intervals:
+        low = 0.0 if intervals[0][0] <= first else intervals[0][0]
+        high = math.inf if intervals[-1][1] >= last else intervals[-1][1]
+    status = _status(candidates, low, high, calibration.limit)
+    if status == "outside":
+        verdict = _nearest(calibration, away, sd)
+    elif status == "ambiguous":
+        verdict = _alternatives(calibration, candidates, shape)
+    else:
+        verdict = _verdict(calibration, status, candidates[0])
+    known = status in ("ok", "coarse")
+    return Estimate(
+        strain=float(strain),
+        reading_std=float(noise),
+        mu=candidates[0].mu if known else math.nan,
+        std=candidates[0].std if known else math.nan,
+        low=low,
+        high=high,
+        status=status,
+        verdict=verdict,
+        candidates=candidates,
+    )
 
-    def told(status: Status, verdict: str, low: float, high: float, best: Candidate | None = None) -> Estimate:
-        mu, std = (best.mu, best.std) if best else (math.nan, math.nan)
-        return Estimate(float(strain), float(noise), mu, std, low, high, status, verdict, answers)
 
-    if not answers:
-        times_all = np.abs(away) / np.maximum(sd, _TINY)
-        i = int(np.argmin(times_all))
-        times = float(times_all[i])
-        side = "above" if away[i] > 0.0 else "below"
-        return told(
-            "outside", f"out of range: no mu from {first:g} to {last:g} has this strain; it lies {times:.2g} standard "
-            f"deviations {side} the nearest, at mu = {calibration.grid[i]:.3g}", math.nan, math.nan,
-        )  # fmt: skip
-    low = 0.0 if found[0][0] <= first else found[0][0]
-    high = math.inf if found[-1][1] >= last else found[-1][1]
-    if len(answers) > 1:
-        names = " or ".join(_named(a, first, last) for a in answers)
-        steps = np.sign(np.diff(calibration.at(calibration.grid, shape)))
-        turns = bool((steps > 0.0).any() and (steps < 0.0).any())
-        why = "the curve is not monotone" if turns else "what is not known exactly reaches that far"
-        return told("ambiguous", f"ambiguous: {names}; {why}", low, high)
-    best = answers[0]
+def _status(candidates: tuple[Candidate, ...], low: float, high: float, limit: float) -> Status:
+    if not candidates:
+        return "outside"
+    if len(candidates) > 1:
+        return "ambiguous"
     if low == 0.0 and high == math.inf:
+        return "blind"
+    if high == math.inf:
+        return "above"
+    if low == 0.0:
+        return "below"
+    return "coarse" if candidates[0].std > limit else "ok"
+
+
+def _nearest(calibration: Calibration, away: Float, sd: Float) -> str:
+    """Return the verdict on a strain that no mu has."""
+    times = np.abs(away) / np.maximum(sd, _TINY)
+    i = int(np.argmin(times))
+    return (
+        f"out of range: no mu from {calibration.mu[0]:g} to {calibration.mu[-1]:g} has this strain; it lies "
+        f"{times[i]:.2g} standard deviations {'above' if away[i] > 0.0 else 'below'} the nearest, "
+        f"at mu = {calibration.grid[i]:.3g}"
+    )
+
+
+def _alternatives(calibration: Calibration, candidates: tuple[Candidate, ...], shape: Shape) -> str:
+    """Return the verdict on a strain that several mu have."""
+    names = " or ".join(_named(c, float(calibration.mu[0]), float(calibration.mu[-1])) for c in candidates)
+    steps = np.sign(np.diff(calibration.at(calibration.grid, shape)))
+    turns = bool((steps > 0.0).any() and (steps < 0.0).any())
+    why = "the curve is not monotone" if turns else "what is not known exactly reaches that far"
+    return f"ambiguous: {names}; {why}"
+
+
+def _verdict(calibration: Calibration, status: Status, best: Candidate) -> str:
+    """Return the verdict on a strain with one interval of mu."""
+    first, last, limit = calibration.mu[0], calibration.mu[-1], calibration.limit
+    if status == "blind":
         text = f"out of range: no mu from {first:g} to {last:g} can be told apart by this strain"
-        return told("blind", text + _blame(calibration, best.mu), low, high)
-    half = 0.5 * (best.high - best.low)
-    if low == 0.0 or high == math.inf:
-        side, edge, end = (">", best.low, last) if high == math.inf else ("<", best.high, first)
-        why = f"the strain at mu {side} {edge:.3g} cannot be told apart"
-        if half <= calibration.limit:
-            why = f"mu {side} {edge:.3g}, and the calibration ends at {end:g}"
-        return told("above" if side == ">" else "below", f"out of range: {why}", low, high)
+        return text + _blame(calibration, best.mu)
+    if status in ("above", "below"):
+        side, edge, end = (">", best.low, last) if status == "above" else ("<", best.high, first)
+        if 0.5 * (best.high - best.low) <= limit:
+            return f"out of range: mu {side} {edge:.3g}, and the calibration ends at {end:g}"
+        return f"out of range: the strain at mu {side} {edge:.3g} cannot be told apart"
     text = f"mu = {best.mu:.3g} +- {best.std:.2g} (68 % interval {best.low:.3g} to {best.high:.3g})"
-    if best.std > calibration.limit:
-        return told("coarse", f"{text}: coarser than the limit of {calibration.limit:g}", low, high, best)
-    return told("ok", text, low, high, best)
+    return text if status == "ok" else f"{text}: coarser than the limit of {limit:g}"
 
 
 def _blame(calibration: Calibration, mu: float) -> str:

@@ -77,9 +77,7 @@ class Reader:
         slope = np.einsum("ekj,eki->eji", u[self.mesh.cells[self.cells]], self.gradients)
         slope = slope * self.turn[:, :, None] * self.turn[:, None, :]
         out = np.full((len(self.inside), 3), np.nan)
-        out[self.inside] = np.stack(
-            [slope[:, 0, 0], slope[:, 1, 1], 0.5 * (slope[:, 0, 1] + slope[:, 1, 0])], axis=1
-        )  # fmt: skip
+        out[self.inside] = np.stack([slope[:, 0, 0], slope[:, 1, 1], 0.5 * (slope[:, 0, 1] + slope[:, 1, 0])], axis=1)
         return out
 
 
@@ -157,9 +155,13 @@ class StrainMap:
         x, y = np.meshgrid(self.x, self.y)
         best, direction = self.best()
         columns = {
-            "x_mm": x, "y_mm": y, "strain_per_mu": self.slope_at(angle, mu), "worst_strain_per_mu":
-            self.worst_slope(angle), "best_worst_strain_per_mu": best, "best_angle_deg": np.degrees(direction),
-        }  # fmt: skip
+            "x_mm": x,
+            "y_mm": y,
+            "strain_per_mu": self.slope_at(angle, mu),
+            "worst_strain_per_mu": self.worst_slope(angle),
+            "best_worst_strain_per_mu": best,
+            "best_angle_deg": np.degrees(direction),
+        }
         table = {name: values[inside] for name, values in columns.items()}
         with np.errstate(divide="ignore"):
             table["best_worst_resolution"] = noise / table["best_worst_strain_per_mu"]

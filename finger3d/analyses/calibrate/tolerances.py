@@ -145,9 +145,13 @@ def _strain(frame: StepResult, name: str) -> float:
 
 
 def slopes(
-    problem: Problem, gauge: Gauge, tolerances: Mapping[str, float], base: ReferenceReadings, increments: Increments,
+    problem: Problem,
+    gauge: Gauge,
+    tolerances: Mapping[str, float],
+    base: ReferenceReadings,
+    increments: Increments,
     say: Callable[[str], None],
-) -> Iterator[Tolerance]:  # fmt: skip
+) -> Iterator[Tolerance]:
     """Every tolerance with its slope at all mu of `base`; those between the few are interpolated.
 
     Parameters
@@ -177,7 +181,7 @@ def slopes(
         elif name == "increments":
             left = increment_error(
                 problem, own, increments.chosen, lambda other: read(other, (gauge.name,), base.mu[at])[0]
-            )  # fmt: skip
+            )
             steps = [(sd, sd * left)]
         else:
             steps = beside or list(_steps(coarse if coarse and enough else body, name, sd))
@@ -189,7 +193,13 @@ def slopes(
         # a step may be cut short, for instance at the body's edge: its effect is scaled to one sd
         effects = np.array([effect * sd / step for step, effect in steps])
         (a, at_a), (b, at_b) = [*steps, (0.0, np.zeros(len(base.mu)))][:2]
-        yield Tolerance(name, TOLERANCES[name][1], sd, (at_a - at_b) / (a - b), np.sqrt(np.mean(effects**2, axis=0)))
+        yield Tolerance(
+            name=name,
+            unit=TOLERANCES[name][1],
+            sd=sd,
+            slope=(at_a - at_b) / (a - b),
+            spread=np.sqrt(np.mean(effects**2, axis=0)),
+        )
 
 
 def _between(mu: Float, at: Float, values: Float) -> Float:
