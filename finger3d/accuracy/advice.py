@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -68,7 +66,7 @@ def _slopes(problem: Problem, frame: StepResult) -> list[str]:
     return [f"{text}; {_finite_strain(problem.model)}"] if text else []
 
 
-def _width(model: Any) -> list[str]:
+def _width(model: Model) -> list[str]:
     if model.domain == "solid":
         return []
     ratio = model.design.width_mm / model.design.height_mm

@@ -120,7 +120,7 @@ class Calibration:
         return Fit((float(c0), float(c1), float(c2)), float(np.sqrt(np.mean(left**2))), float(np.abs(left).max()))
 
     @cached_property
-    def _pchip(self) -> Any:
+    def _pchip(self) -> PchipInterpolator:
         return PchipInterpolator(self.mu, self.strain)
 
     def at(self, mu: ArrayLike, shape: Shape = "interpolation") -> Float:
@@ -269,7 +269,7 @@ def _ranges(stretches: Sequence[Range]) -> str:
     return ", ".join(f"mu = {r.low:.3g} to {r.high:.3g}" for r in stretches) or "nowhere"
 
 
-def summary(calibration: Calibration) -> list[tuple[str, Any]]:
+def summary(calibration: Calibration) -> list[tuple[str, str]]:
     """The closing table of a calibration."""
     c = calibration
     at = float(c.mu[np.argmin(np.abs(c.mu - 0.5))]) if c.mu[0] <= 0.5 <= c.mu[-1] else float(c.mu[len(c.mu) // 2])

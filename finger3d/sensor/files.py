@@ -94,7 +94,7 @@ def as_dict(calibration: Calibration) -> dict[str, Any]:
     }
 
 
-def _mu_sd(c: Calibration, number: int) -> np.ndarray[Any, Any]:
+def _mu_sd(c: Calibration, number: int) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
     return c.mu_sd(c.mu, c.tolerance_sd(c.mu)[number])
 
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,12 +50,12 @@ class Increments:
     error: float
     wanted: float
 
-    def as_dict(self) -> dict[str, Any]:
-        """For calibration.json."""
+    def as_dict(self) -> dict[str, object]:
+        """Return the entry of calibration.json."""
         return {"steps": [leg.steps for leg in self.legs], "chosen": self.chosen}
 
     def __str__(self) -> str:
-        """How many, and what they leave."""
+        """Number of increments, and the error of the strain."""
         steps = ", ".join(str(leg.steps) for leg in self.legs)
         met = "as asked" if self.error <= self.wanted else f"{self.wanted:.1e} was asked; more are not affordable"
         return f"{steps} increments leave an error of about {self.error:.1e} in the strain; {met}"

@@ -96,7 +96,7 @@ def _inside(model: Model, gauge: Gauge) -> bool:
 
 @dataclass(frozen=True)
 class ReferenceReadings:
-    """What was found of the body as it should be.
+    """Presses of the nominal body.
 
     Attributes
     ----------
@@ -124,7 +124,7 @@ class ReferenceBody:
     pressed: Like
 
     def change(self, problem: Problem, like: Like | None = None) -> Float:
-        """What the strain (m,) changes by once the body, or its path, is another; started from presses `like` it."""
+        """Return the change of the strain (m,) in another body or path; `like` gives initial guesses."""
         return np.asarray(read(problem, (self.gauge.name,), self.mu, like or self.pressed)[0] - self.strain)
 
     def rebuilt(self, **changes: Any) -> Problem:
@@ -327,7 +327,7 @@ def _coarser(problem: Problem) -> MeshOptions:
 def _tilted(body: ReferenceBody, sd: float) -> Iterator[tuple[float, Float]]:
     """A plane that is not level; of a scene that is its own mirror image one tilt gives both, by the mirrored gauge."""
     problem, gauge, model = body.problem, body.gauge, body.problem.model
-    thing: Any = model.object
+    thing = model.object
     if not isinstance(thing, Plane):
         return
     step, mesh = math.radians(sd), _coarser(problem)
