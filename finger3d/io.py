@@ -14,11 +14,11 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from enum import Enum
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from finger3d._types import Array
 from finger3d.errors import Finger3dError
 
 MAIN = ("normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm")
@@ -129,7 +129,7 @@ _DAMAGED = (
 """What NumPy raises for an .npz file that is cut short, changed, or of another kind."""
 
 
-def read_arrays(path: str | Path) -> dict[str, NDArray[Any]]:
+def read_arrays(path: str | Path) -> dict[str, Array]:
     """Read all arrays of an .npz file.
 
     Raises
@@ -163,19 +163,19 @@ def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> None:
         writer.writerows(zip(*(a.tolist() for a in arrays), strict=True))
 
 
-def write_json(path: str | Path, data: Any) -> None:
+def write_json(path: str | Path, data: object) -> None:
     """Write nested dicts, lists, arrays and numbers; NaN and infinity, which JSON lacks, become null."""
     text = json_text(data)
     with atomic(path) as temporary:
         temporary.write_text(text + "\n", encoding="utf-8")
 
 
-def json_text(data: Any) -> str:
+def json_text(data: object) -> str:
     """JSON of nested dicts, lists, arrays and numbers; NaN and infinity become null."""
     return json.dumps(_plain(data), indent=2, ensure_ascii=False, allow_nan=False)
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> object:
     if isinstance(value, Mapping):
         return {str(k): _plain(v) for k, v in value.items()}
     if isinstance(value, np.ndarray | np.generic):

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.contact.friction import OPEN
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
 from finger3d.objects.slope import slope_of
-
-Float = NDArray[np.float64]
 
 _STRAIN = 0.1
 _QUANTILE = 0.99  # the clamped corners are singular, their strain says nothing

@@ -7,8 +7,8 @@ unknowns in 2D and 509 000 in 3D; good to a factor 2.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
+from finger3d._types import Tree
 from finger3d.mechanics.build import contact_box
 from finger3d.mechanics.cost import AddedCost, PressCost
 from finger3d.mechanics.model import Model
@@ -32,7 +32,7 @@ class _Size:
     contact_points: float
 
 
-def forecast(model: Model) -> dict[str, Any]:
+def forecast(model: Model) -> Tree:
     """Size, seconds and memory of a press.
 
     Returns

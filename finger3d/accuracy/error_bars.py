@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Self
+from typing import Self
+
+from finger3d._types import Tree, TreeView
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,7 +27,7 @@ class ErrorBars:
     seconds: float = 0.0
 
     @classmethod
-    def of_summary(cls, summary: Mapping[str, Any]) -> Self:
+    def of_summary(cls, summary: TreeView) -> Self:
         """Read the error bars of a summary.json; without names if the press made no estimate."""
         known = summary.get("error_estimate") or {}
         mesh, steps = (
@@ -45,7 +47,7 @@ class ErrorBars:
         """Return the sums of both errors by name."""
         return {name: error + self.steps.get(name, 0.0) for name, error in self.discretisation.items()}
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> Tree:
         """Return the entries of summary.json."""
         return {
             "discretisation": dict(self.discretisation),

@@ -12,8 +12,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.accuracy.companions import Say, companion, edge_ratio, is_unstructured
 from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.accuracy.point_resolution import PointResolution
@@ -35,7 +35,6 @@ from finger3d.mechanics.step_halving import (
     with_increments_of,
 )
 
-Float = NDArray[np.float64]
 Measure = Callable[[Problem, StepResult], dict[str, float]]
 
 _STEPS_SHARE = 0.15

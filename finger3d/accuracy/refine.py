@@ -11,8 +11,8 @@ import math
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any
 
+from finger3d._types import Tree
 from finger3d.accuracy.companions import FACTOR, companion
 from finger3d.accuracy.estimate import compared, main_numbers
 from finger3d.accuracy.richardson import ORDER, Kind, Quantity, largest_strain
@@ -92,7 +92,7 @@ class Refinement:
             f"error of {self.best.error:.2g} in {self.best.number}"
         )
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> Tree:
         """For summary.json."""
         return {
             "tolerance": self.tolerance,

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from finger3d._types import Tree, TreeView
 from finger3d.accuracy.cost import forecast
 from finger3d.mechanics.resolution import foreseen
 from finger3d.mechanics.symmetry import symmetry
@@ -27,8 +28,8 @@ class Plan:
     """
 
     title: str
-    effects: Mapping[str, Mapping[str, Any]]
-    forecast: Mapping[str, Any]
+    effects: Mapping[str, TreeView]
+    forecast: TreeView
     warnings: tuple[str, ...]
 
     @property
@@ -51,7 +52,7 @@ class Plan:
         """Peak memory, MB."""
         return float(self.forecast["memory_MB"])
 
-    def summary(self) -> dict[str, Any]:
+    def summary(self) -> Tree:
         """Return what `finger3d plan --json` prints."""
         return {
             "title": self.title,

@@ -6,8 +6,9 @@ import math
 import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from finger3d._types import Tree
 from finger3d.analyses.press_files import Fields, ResultWriter
 from finger3d.analyses.press_record import PressRecord, point_count_warning
 from finger3d.analyses.result import PressResult
@@ -65,7 +66,7 @@ def press(
 
 def run_press(
     scene: Scene, writer: ResultWriter, report: Progress, started: float, error: bool, figures: bool
-) -> tuple[PressRecord, dict[str, Any]]:
+) -> tuple[PressRecord, Tree]:
     """Solve a scene, recover its fields, estimate its errors; write and draw each as it is known.
 
     Parameters

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from finger3d._types import Array, Float, Tree, TreeView
 from finger3d.contact.friction import STICK
 from finger3d.fem.simplex import Mesh, axis_numbers, middles, unfold
 from finger3d.io import atomic, write_csv, write_json
@@ -22,7 +23,6 @@ from finger3d.results.vtu import write_vtu
 if TYPE_CHECKING:
     from finger3d.analyses.press_record import PressRecord
 
-Float = NDArray[np.float64]
 
 _WRITE_EVERY_S = 0.5
 """Shortest time between two writes of the tables, s."""
@@ -104,7 +104,7 @@ class ResultWriter:
         if time.perf_counter() - self._written > max(_WRITE_EVERY_S, _WRITE_SHARE * self._seconds):
             self.progress(record)
 
-    def summary(self, record: PressRecord, outcome: str) -> dict[str, Any]:
+    def summary(self, record: PressRecord, outcome: str) -> Tree:
         """Write summary.json and return its content."""
         begin = time.perf_counter()
         content = record.summary(outcome)
@@ -154,15 +154,13 @@ class ResultWriter:
         )
 
 
-def history_table(steps: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
+def history_table(steps: Sequence[TreeView]) -> dict[str, ArrayLike]:
     """Return the columns of history.csv from the entries of `steps` in summary.json."""
     rows = [{**step, **{f"gauge_{name}": strain for name, strain in step["gauges"].items()}} for step in steps]
     return {name: [row[name] for row in rows] for name in rows[0] if name != "gauges"}
 
 
-def _on_surface(
-    mesh: Mesh, nodes: NDArray[np.int64], table: Mapping[str, Any], step: StepResult
-) -> dict[str, NDArray[Any]]:
+def _on_surface(mesh: Mesh, nodes: NDArray[np.int64], table: TreeView, step: StepResult) -> dict[str, Array]:
     """Contact quantities on all nodes (n,): as computed at vertices, interpolated between them."""
     ends, between = middles(mesh.facets["contact"], mesh.dim)
     out = {}

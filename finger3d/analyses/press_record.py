@@ -5,11 +5,12 @@ from __future__ import annotations
 import resource
 import time
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from finger3d._machine import versions
+from finger3d._types import Tree
 from finger3d.contact.friction import OPEN
 from finger3d.mechanics.history import History, StepResult, measure
 
@@ -97,7 +98,7 @@ class PressRecord:
             return str(self.history.outcome)
         return f"at a depth of {failed.target.depth_mm:.4g} mm: {failed.outcome}"
 
-    def summary(self, outcome: str) -> dict[str, Any]:
+    def summary(self, outcome: str) -> Tree:
         """Return the content of summary.json."""
         return {
             "scene": self.scene.as_dict(),
@@ -116,7 +117,7 @@ class PressRecord:
         }
 
 
-def _mesh(problem: Problem) -> dict[str, Any]:
+def _mesh(problem: Problem) -> Tree:
     report = problem.part.report
     return {
         "points": report.points,
@@ -134,7 +135,7 @@ def _mesh(problem: Problem) -> dict[str, Any]:
     }
 
 
-def _cost(record: PressRecord) -> dict[str, Any]:
+def _cost(record: PressRecord) -> Tree:
     return {
         "seconds": {**record.seconds, "total": time.perf_counter() - record.started},
         "factorizations": record.all_factorizations,

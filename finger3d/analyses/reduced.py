@@ -8,15 +8,15 @@ whose contact could reach beyond them is refused.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finger3d._machine import versions
+from finger3d._types import TreeView
 from finger3d.analyses.reduced_file import arrays_of, assembled, bare, read, write
 from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.errors import Finger3dError
@@ -29,8 +29,6 @@ from finger3d.mechanics.path import targets
 from finger3d.mechanics.problem import Problem, rigid_gap
 from finger3d.mechanics.resolution import check
 from finger3d.mechanics.solve import march
-
-Float = NDArray[np.float64]
 
 _PATH = ("depth_mm", "slide_x_mm", "slide_z_mm")
 
@@ -51,7 +49,7 @@ class ReducedModel:
 
     problem: Problem
     others: BoundarySurface
-    about: Mapping[str, Any]
+    about: TreeView
 
     def __repr__(self) -> str:
         """One line: the compliance would fill pages."""

@@ -6,15 +6,14 @@ import json
 import math
 import zipfile
 import zlib
-from collections.abc import Mapping
 from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any, get_type_hints
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from finger3d._types import Array, Tree, TreeView
 from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.contact.rules import RULES
 from finger3d.errors import Finger3dError
@@ -29,17 +28,15 @@ from finger3d.mechanics.problem import ContactSystem, Problem
 from finger3d.mechanics.symmetry import Symmetry
 from finger3d.objects import OBJECTS, MeshObject, RigidObject
 
-Float = NDArray[np.float64]
-
 FORMAT, VERSION = "finger3d condensed body", 2
 _SHAPES: dict[str, type[RigidObject]] = {r.__name__: r for r in OBJECTS.values()} | {"MeshObject": MeshObject}
 _MAX_STEPS = 1_000_000
 """Largest number of increments of a leg in a file."""
 
 
-def write(path: str | Path, problem: Problem, other: BoundarySurface, about: Mapping[str, Any]) -> Path:
+def write(path: str | Path, problem: Problem, other: BoundarySurface, about: TreeView) -> Path:
     """Write a reduced model, whole or not at all; return its path."""
-    arrays: dict[str, Any] = {**arrays_of(problem), **_face_arrays("other", other)}
+    arrays: Tree = {**arrays_of(problem), **_face_arrays("other", other)}
     if isinstance(problem.model.object, MeshObject):
         shape = problem.model.object.surface
         arrays |= {"object_points": shape.points, "object_faces": shape.faces}
@@ -50,7 +47,7 @@ def write(path: str | Path, problem: Problem, other: BoundarySurface, about: Map
     return Path(path)
 
 
-def read(path: str | Path) -> tuple[Problem, BoundarySurface, Mapping[str, Any]]:
+def read(path: str | Path) -> tuple[Problem, BoundarySurface, TreeView]:
     """Read a reduced model: problem, points that are no candidates, and versions.
 
     Raises
@@ -93,7 +90,7 @@ def read(path: str | Path) -> tuple[Problem, BoundarySurface, Mapping[str, Any]]
         ) from None
 
 
-def _face_arrays(name: str, face: BoundarySurface) -> dict[str, NDArray[Any]]:
+def _face_arrays(name: str, face: BoundarySurface) -> dict[str, Array]:
     mean = face.average.tocsr()
     return {
         f"{name}_nodes": face.nodes,
@@ -106,7 +103,7 @@ def _face_arrays(name: str, face: BoundarySurface) -> dict[str, NDArray[Any]]:
     }
 
 
-def _face(name: str, arrays: Mapping[str, Any], dim: int) -> BoundarySurface:
+def _face(name: str, arrays: TreeView, dim: int) -> BoundarySurface:
     """Return a surface with the quadrature points of the gap, and without traces of a mesh."""
     samples, nodes = arrays[f"{name}_samples"].reshape(-1, dim), arrays[f"{name}_nodes"]
     parts = (arrays[f"{name}_mean"], arrays[f"{name}_mean_at"], arrays[f"{name}_mean_rows"])
@@ -124,7 +121,7 @@ def bare(face: BoundarySurface) -> BoundarySurface:
     return _face("it", _face_arrays("it", light), face.points.shape[1])
 
 
-def arrays_of(problem: Problem) -> dict[str, NDArray[Any]]:
+def arrays_of(problem: Problem) -> dict[str, Array]:
     """Return the arrays of a problem that a press needs, by their name in the file."""
     c, d = problem.delassus.shape[:2]
     arrays = {
@@ -148,7 +145,7 @@ def arrays_of(problem: Problem) -> dict[str, NDArray[Any]]:
     return arrays
 
 
-def assembled(model: Model, arrays: Mapping[str, Any], touch_mm: float, axes: tuple[str, ...]) -> Problem:
+def assembled(model: Model, arrays: TreeView, touch_mm: float, axes: tuple[str, ...]) -> Problem:
     """Return a problem without a meshed part, made from arrays."""
     d = arrays["sign"].shape[1]
     c = len(arrays["face_nodes"])
@@ -181,7 +178,7 @@ def assembled(model: Model, arrays: Mapping[str, Any], touch_mm: float, axes: tu
     return replace(problem, without_inclusions=replace(problem, system=without))
 
 
-def _header(problem: Problem) -> dict[str, Any]:
+def _header(problem: Problem) -> Tree:
     model = problem.model
     thing = model.object
     placed = {f.name: getattr(thing, f.name) for f in fields(thing) if f.name != "surface"}
@@ -202,7 +199,7 @@ def _header(problem: Problem) -> dict[str, Any]:
     }
 
 
-def _model(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> Model:
+def _model(header: TreeView, arrays: TreeView) -> Model:
     placed = dict(header["object"])
     kind = placed.pop("kind")
     if kind == "MeshObject":
@@ -246,7 +243,7 @@ def _friction_laws() -> dict[str, type[FrictionLaw]]:
     return {law.__name__: law for law in (Coulomb, TwoCoefficients)}
 
 
-def _number(value: Any) -> float:
+def _number(value: object) -> float:
     """Return the value as a float.
 
     Raises
@@ -259,7 +256,7 @@ def _number(value: Any) -> float:
     return float(value)
 
 
-def _dataclass(kind: Any, values: Mapping[str, Any]) -> Any:
+def _dataclass(kind: Any, values: TreeView) -> Any:
     """Return a dataclass made from the header, with fields of the declared types.
 
     Raises
@@ -284,7 +281,7 @@ def _dataclass(kind: Any, values: Mapping[str, Any]) -> Any:
     return result
 
 
-def _check_arrays(arrays: Mapping[str, Any], d: int, gauges: int) -> None:
+def _check_arrays(arrays: TreeView, d: int, gauges: int) -> None:
     """Raise ValueError or KeyError unless types and shapes of all arrays fit together, and numbers are finite."""
     c, p = len(arrays["face_nodes"]), len(arrays["nodes"])
     wanted: dict[str, tuple[int, ...]] = {

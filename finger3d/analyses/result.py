@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
+from finger3d._types import Tree
 from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.analyses.press_files import history_table
 from finger3d.errors import Finger3dError, Outcome
@@ -114,7 +115,7 @@ class PressResult:
 
     history: History
     out: Path
-    _numbers: dict[str, Any]
+    _numbers: Tree
     _folder: TemporaryDirectory[str] | None = field(default=None, compare=False)
 
     @property
@@ -141,7 +142,7 @@ class PressResult:
             raise Finger3dError(f"{self.out}: no increment converged: {self._numbers['outcome']}")
         return good[-1]
 
-    def summary(self) -> dict[str, Any]:
+    def summary(self) -> Tree:
         """Return what summary.json holds: scene, effects, steps, mesh, cost, versions, errors, warnings."""
         return self._numbers
 
@@ -183,7 +184,7 @@ class PressResult:
         """
         return grid(self.out, step)
 
-    def _contact(self) -> dict[str, Any]:
+    def _contact(self) -> Tree:
         frames = self.history.steps
         if not frames:
             raise Finger3dError(f"{self.out}: no step was finished, so there is no contact to show")

@@ -9,6 +9,8 @@ from typing import Any, Literal
 
 from numpy.typing import ArrayLike
 
+from finger3d._types import Tree
+
 Kind = Literal["verification", "validation", "sensitivity", "statement"]
 Measure = Literal["relative", "absolute", "at most", "at least"]
 
@@ -65,7 +67,7 @@ class Row:
             return "holds" if self.within else "does not hold"
         return "pass" if self.passed else "FAIL"
 
-    def columns(self) -> dict[str, Any]:
+    def columns(self) -> Tree:
         """Return the columns of the results file."""
         return {k: getattr(self, k) for k in COLUMNS}
 

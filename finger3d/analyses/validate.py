@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from finger3d._machine import versions
+from finger3d._types import Tree, TreeView
 from finger3d.analyses.study_rows import COLUMNS, Result, Row, score, table
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.geometry.registry import import_from
@@ -233,7 +234,7 @@ def _place(out: Path, study: Study) -> Path:
     return out / "results" / f"{study.name}.json"
 
 
-def _about(out: Path, study: Study) -> dict[str, Any]:
+def _about(out: Path, study: Study) -> Tree:
     try:
         return dict(json.loads(_place(out, study).read_text(encoding="utf-8")))
     except (OSError, ValueError):
@@ -249,7 +250,7 @@ def kept_rows(out: Path, study: Study) -> tuple[Row, ...]:
         return tuple(map(_row, csv.DictReader(stream)))
 
 
-def _row(kept: Mapping[str, Any]) -> Row:
+def _row(kept: TreeView) -> Row:
     wanted, got, tolerance = (float(kept[k]) for k in ("wanted", "got", "tolerance"))
     return Row(
         kept["what"], kept["reference"], wanted, got, tolerance, kept["reason"], kept["kind"], kept["measure"]

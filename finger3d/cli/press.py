@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from cyclopts import Parameter
 
+from finger3d._types import TreeView
 from finger3d.cli.common import Json, Set, app, job, load, print_json, print_rows
 from finger3d.errors import Finger3dError, MissingError
 
@@ -75,7 +76,7 @@ _NUMBERS = {
 """Name of a row -> key of a step, factor, significant digits, unit."""
 
 
-def _rows(summary: Mapping[str, Any], out: Path) -> Iterator[tuple[str, str]]:
+def _rows(summary: TreeView, out: Path) -> Iterator[tuple[str, str]]:
     """Yield the rows of the closing table: numbers of the last step with their errors, cost, and files."""
     from finger3d.accuracy.error_bars import ErrorBars
     from finger3d.results.format import with_error

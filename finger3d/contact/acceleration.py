@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
+from finger3d._types import Float
 from finger3d.contact.conditions import ContactProblem, lengths, project_on_friction_cone
 from finger3d.contact.newton import ActiveSetSystem, Iterate, NewtonResult, Precision, lu_solver, newton
 
-Float = NDArray[np.float64]
 Array = NDArray[np.floating[Any]]
 Solve = Callable[[Array], Array]
 
@@ -81,13 +81,13 @@ def _blas() -> ThreadpoolController:
     return ThreadpoolController().select(user_api="blas")
 
 
-def one_thread() -> AbstractContextManager[Any]:
+def one_thread() -> AbstractContextManager[object]:
     """Return a context in which dense algebra runs on one thread."""
-    context: AbstractContextManager[Any] = _blas().limit(limits=1)
+    context: AbstractContextManager[object] = _blas().limit(limits=1)
     return context
 
 
-def threads_for(rows: int) -> AbstractContextManager[Any]:
+def threads_for(rows: int) -> AbstractContextManager[object]:
     """Return a context in which dense algebra with so many rows runs on as many threads as help it."""
     return one_thread() if rows < _ONE_THREAD_BELOW else nullcontext()
 

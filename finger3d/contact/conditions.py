@@ -18,10 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.contact.friction import OPEN, SLIP, STICK, FrictionLaw
 from finger3d.contact.state import ContactState, pressure
-
-Float = NDArray[np.float64]
 
 TOLERANCE = 1e-8
 """Largest residual of an increment that is called converged."""

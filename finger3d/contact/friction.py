@@ -10,9 +10,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.errors import Finger3dError
 
-Float = NDArray[np.float64]
 Status = NDArray[np.int8]
 
 OPEN, STICK, SLIP = 0, 1, 2

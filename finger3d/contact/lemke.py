@@ -11,10 +11,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import OPEN, SLIP, STICK
-
-Float = NDArray[np.float64]
 
 _PIVOT = 1e-11
 LARGEST = 2000

@@ -7,15 +7,13 @@ on fine meshes or at high nu the active sets repeat; such an increment is report
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.contact.conditions import TOLERANCE, ContactProblem, residual
 from finger3d.contact.friction import OPEN, SLIP, STICK, FrictionLaw
 from finger3d.contact.newton import force_of_sets
 from finger3d.contact.state import ContactSolution, ContactState, invalid_input, next_state
 from finger3d.errors import Outcome
-
-Float = NDArray[np.float64]
 
 _MAX_ITERATIONS = 500
 

@@ -16,12 +16,12 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.linalg.lapack import get_lapack_funcs
 
+from finger3d._types import Array, Float
 from finger3d.contact.conditions import ContactProblem, lengths, project_on_friction_cone, residual
 from finger3d.contact.friction import SLIP, STICK
 
-Float = NDArray[np.float64]
 Precision: TypeAlias = type[np.float64] | type[np.float32]
-Solver: TypeAlias = Callable[[NDArray[Any]], NDArray[Any]]
+Solver: TypeAlias = Callable[[Array], Array]
 
 _CONDITIONS_TOLERANCE = 1e-11
 """Residual of the contact conditions at which an iterate is a solution.  The residual of the projection would not do:
@@ -166,9 +166,9 @@ class ActiveSetSystem:
         size = m + s if d > 2 else m
         all_active, normal, across = np.arange(m), np.arange(m - s, m), np.arange(m, m + s)  # places among the unknowns
         mu_e = mu[:, None] * e
-        rho: NDArray[Any] = problem.augmentation.ravel().astype(precision, copy=False)
-        a: NDArray[Any] = ratio.astype(precision, copy=False)
-        t_: NDArray[Any] = t.astype(precision, copy=False)
+        rho: Array = problem.augmentation.ravel().astype(precision, copy=False)
+        a: Array = ratio.astype(precision, copy=False)
+        t_: Array = t.astype(precision, copy=False)
 
         columns = [(active_dofs, all_active, np.ones(m))]
         rows = [(all_active, active_dofs, rho[active_dofs])]
@@ -181,10 +181,10 @@ class ActiveSetSystem:
         weights = _sparse(rows, (size, c * d))  # D
 
         touched = np.concatenate([active_dofs, *tangent_dofs])
-        w: NDArray[Any] = problem.delassus[np.ix_(touched, touched)].astype(precision, copy=False)
+        w: Array = problem.delassus[np.ix_(touched, touched)].astype(precision, copy=False)
         p, d_t = forces[touched].astype(precision), weights[m:, touched]
         p_a, p_t, d_a = p[:, :m], p[:, m:], rho[active_dofs, None]  # columns of x (but x_t) and of x_t; rho of the rows
-        matrix: NDArray[Any] = np.block(
+        matrix: Array = np.block(
             [
                 [d_a * (w[:m] @ p_a), (d_a * w[:m]) @ p_t],
                 [d_t @ (w @ p_a), d_t @ (w @ p_t) + np.diag(1.0 - a[: size - m])],
@@ -212,7 +212,7 @@ class ActiveSetSystem:
         return self.force(self.solve(self.rhs) if len(self.rhs) else self.rhs)
 
 
-Entries: TypeAlias = list[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[Any]]]
+Entries: TypeAlias = list[tuple[NDArray[np.int64], NDArray[np.int64], Array]]
 
 
 def _sparse(entries: Entries, shape: tuple[int, int]) -> Any:
@@ -229,7 +229,7 @@ def force_of_sets(problem: ContactProblem, status: NDArray[np.int8], augmented_f
     return ActiveSetSystem.of(problem, status, augmented_force).solution()
 
 
-def lu_solver(matrix: NDArray[Any], reuse: bool) -> Solver:
+def lu_solver(matrix: Array, reuse: bool) -> Solver:
     """Return the solution operator of a matrix, factored at once if it is to be reused."""
     if not (reuse and len(matrix)):  # LAPACK accepts no empty matrix
         return partial(np.linalg.solve, matrix)

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from typing import Final, Literal, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
+from finger3d._types import Float
 from finger3d.contact.friction import FrictionLaw
 from finger3d.contact.maeno import maeno_active_set
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactSolution, ContactState
-
-Float = NDArray[np.float64]
 
 
 class StickRule(Protocol):

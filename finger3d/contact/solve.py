@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.contact.acceleration import accelerated_newton, threads_for
 from finger3d.contact.conditions import TOLERANCE, ContactProblem, residual
 from finger3d.contact.friction import FrictionLaw
@@ -15,8 +15,6 @@ from finger3d.contact.lemke import friction_start
 from finger3d.contact.newton import NewtonResult, block_gauss_seidel, force_of_sets, newton
 from finger3d.contact.state import ContactSolution, ContactState, invalid_input, next_state, pressure
 from finger3d.errors import Outcome
-
-Float = NDArray[np.float64]
 
 _FRICTION_UPDATES = 50
 """Updates of the friction coefficients allowed in an increment, and one more for every contact point."""

@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._arrays import freeze_arrays
+from finger3d._types import Float
 from finger3d.contact.friction import OPEN
 from finger3d.errors import Outcome
-
-Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

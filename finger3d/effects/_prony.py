@@ -9,10 +9,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import exprel
 
-Float = NDArray[np.float64]
+from finger3d._types import Float
+
 Prony = tuple[tuple[float, float], ...]
 
 

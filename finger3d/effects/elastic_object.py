@@ -15,9 +15,9 @@ from typing import ClassVar
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
 from finger3d._ranges import Length, Modulus, Poisson
+from finger3d._types import Float
 from finger3d.effects.base import fill, warn
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import stiffness
@@ -35,7 +35,6 @@ from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.swept import mesh_section
 from finger3d.objects import Cylinder, MeshObject, Plane, Sphere
 
-Float = NDArray[np.float64]
 Zone = tuple[float, float, float, float]
 Say = Callable[[str], None]
 

@@ -19,9 +19,9 @@ from typing import ClassVar
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
 from finger3d._ranges import Length, Modulus, at_most
+from finger3d._types import Float, Int
 from finger3d.effects.base import fill
 from finger3d.errors import Finger3dError
 from finger3d.fem.kelvin import FoilPatches, InfiniteBody
@@ -30,9 +30,6 @@ from finger3d.fem.traces import displacement_row
 from finger3d.mechanics.cost import AddedCost, PressCost
 from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.model import EmbeddedBars, Model
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 
 _PATCHES = {2: (16, 1), 3: (12, 8)}  # along and across, by dimension: within half a percent of any number
 

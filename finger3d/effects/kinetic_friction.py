@@ -13,14 +13,13 @@ from typing import Annotated, ClassVar, Literal, get_args
 
 import numpy as np
 from annotated_types import Ge, Le
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.contact.friction import SLIP, FrictionLaw, Status
 from finger3d.effects.base import fill, warn
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Model
 
-Float = NDArray[np.float64]
 Branch = Literal["keep", "paper"]
 
 

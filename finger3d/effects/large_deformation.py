@@ -18,8 +18,8 @@ from typing import ClassVar
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.contact.conditions import TOLERANCE, augmentation_parameters, residual
 from finger3d.contact.state import ContactSolution, ContactState, next_state
 from finger3d.effects.base import fill
@@ -35,8 +35,6 @@ from finger3d.mechanics.formulation import Workspace, length_scale, solve_contac
 from finger3d.mechanics.history import ObjectPose
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem, scatter_to_points
-
-Float = NDArray[np.float64]
 
 _ITERATIONS = 19
 """Newton iterations of an increment, at most."""

@@ -21,9 +21,9 @@ from typing import Annotated, ClassVar, Protocol
 import numpy as np
 import scipy.sparse as sp
 from annotated_types import MinLen
-from numpy.typing import NDArray
 
 from finger3d._ranges import Fraction, Seconds
+from finger3d._types import Float
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.effects._prony import InternalVariables, Prony, Step, relaxed
 from finger3d.effects.base import fill
@@ -37,8 +37,6 @@ from finger3d.mechanics.formulation import SmallStrain, Workspace, length_scale,
 from finger3d.mechanics.history import ObjectPose
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem, scatter_to_points
-
-Float = NDArray[np.float64]
 
 _FACTORS_KEPT = 5
 """Condensations kept at once: each holds a factor, and a path rarely has more than four lengths of step."""

@@ -13,12 +13,11 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from finger3d._types import Float, Int
 from finger3d.fem.elements import quadrature
 from finger3d.fem.material import LinearElasticity
 from finger3d.fem.simplex import Mesh
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 AnyInt = NDArray[np.int32] | NDArray[np.int64]
 
 # Cells at a time: so few that their matrices stay in a core's cache, and that the next ones find the memory at hand.

@@ -18,13 +18,12 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from finger3d._types import Float, Int
 from finger3d.fem.assembly import Stiffness
 
 if TYPE_CHECKING:
     from finger3d.fem.pardiso import SchurFactor
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 
 _SOLVE_CHUNK = 64
 

@@ -10,10 +10,8 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
+from finger3d._types import Float, Int
 
 _CYCLES = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
 

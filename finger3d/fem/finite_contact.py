@@ -7,12 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.fem.simplex import axis_numbers
 from finger3d.fem.traces import BoundarySurface
-
-Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

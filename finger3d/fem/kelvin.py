@@ -12,9 +12,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
+from finger3d._types import Float
 
 _BLUNT = 0.3  # of a patch's size: what a point force of another foil is spread over, where they cross
 

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float, Int
 from finger3d.fem.elements import Element
 from finger3d.fem.simplex import Mesh
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 
 _ITERATIONS = 8
 """Newton iterations on a quadratic element; the map of a linear one is inverted exactly by the first."""

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
+from finger3d._types import Float
 
 MIXED_FROM = 0.48
 """Poisson's ratio from which the mixed form is used: near 1/2 linear elements lock (validation/cook.py), and the

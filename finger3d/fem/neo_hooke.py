@@ -11,16 +11,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.fem.assembly import Pattern, Stiffness, cell_parts, pressure_scale
 from finger3d.fem.elements import quadrature
 from finger3d.fem.locate import cells_at
 from finger3d.fem.material import LEAST_COMPRESSIBILITY, MIXED_FROM
 from finger3d.fem.recover import displacement, nodal_gradient, nodal_pressure
 from finger3d.fem.simplex import Mesh
-
-Float = NDArray[np.float64]
 
 _THICKNESS_ITERATIONS = 30
 

@@ -6,23 +6,25 @@ import ctypes
 import os
 import sys
 import weakref
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from finger3d._types import Array, Float
 from finger3d.errors import OUT_OF_MEMORY, MissingError
 
-Float = NDArray[np.float64]
+Call: TypeAlias = Callable[..., object]
+"""PARDISO's only function."""
 
 _MTYPE = ctypes.c_int32(-2)  # real, symmetric, indefinite
 _INT32_MAX = 2**31 - 1
 _NO_MEMORY = -2
 
 
-def _library() -> Any:
+def _library() -> Call:
     if "PYPARDISO_MKL_RT" not in os.environ:
         # pypardiso's own search walks the whole environment, which costs more than a small solve.
         found = sorted(Path(sys.prefix, "lib").glob("libmkl_rt.so*"))
@@ -32,7 +34,8 @@ def _library() -> Any:
 
     library = PyPardisoSolver().libmkl
     library.mkl_set_exit_handler(_EXIT_HANDLER)
-    return library.pardiso
+    call: Call = library.pardiso
+    return call
 
 
 def _exit(code: int) -> None:
@@ -132,12 +135,23 @@ class SchurFactor:
 
 
 def _run(
-    call: Any, pt: Any, phase: int, n: int, a: Any, ia: Any, ja: Any, perm: Any, nrhs: int, iparm: Any, b: Any, x: Any
+    call: Call,
+    pt: Array,
+    phase: int,
+    n: int,
+    a: Array,
+    ia: Array,
+    ja: Array,
+    perm: Array,
+    nrhs: int,
+    iparm: Array,
+    b: Array,
+    x: Array,
 ) -> None:
-    def i32(value: int) -> Any:
+    def i32(value: int) -> object:
         return ctypes.byref(ctypes.c_int32(value))
 
-    def pointer(array: Any, kind: Any = ctypes.c_int32) -> Any:
+    def pointer(array: Array, kind: type[ctypes.c_int32 | ctypes.c_int64] = ctypes.c_int32) -> object:
         return array.ctypes.data_as(ctypes.POINTER(kind))
 
     error = ctypes.c_int32(0)
@@ -153,7 +167,7 @@ def _run(
         raise PardisoError(f"PARDISO phase {phase}: error {error.value} ({reason.get(error.value, 'see MKL manual')})")
 
 
-def _release(call: Any, pt: Any, n: int, iparm: Any) -> None:
+def _release(call: Call, pt: Array, n: int, iparm: Array) -> None:
     one = np.zeros(1)
     index = np.ones(1, dtype=np.int32)
     _run(call, pt, -1, n, one, index, index, index, 1, iparm, one, one)

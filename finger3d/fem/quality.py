@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float, Int
 from finger3d.fem.elements import EDGES, quadrature
 from finger3d.fem.simplex import FACETS, Mesh
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 
 _DEGREE = {2: 2, 3: 3}
 """Degree of the Jacobian determinant of a quadratic element, by dimension."""

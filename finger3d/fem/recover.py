@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.fem.assembly import Stiffness
 from finger3d.fem.material import LinearElasticity, Material
 from finger3d.fem.simplex import Mesh
-
-Float = NDArray[np.float64]
 
 _CELLS_AT_ONCE = 4096  # bounds the memory of their gradients
 

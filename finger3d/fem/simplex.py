@@ -10,13 +10,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finger3d._arrays import freeze_arrays
+from finger3d._types import Float, Int
 from finger3d.fem.elements import EDGES, Element, element_of
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 
 FACETS = {
     2: np.array([[0, 1], [1, 2], [2, 0]]),

@@ -13,13 +13,11 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from finger3d._arrays import freeze_arrays
+from finger3d._types import Float, Int
 from finger3d.errors import Finger3dError
 from finger3d.fem.elements import quadrature
 from finger3d.fem.locate import cells_at
 from finger3d.fem.simplex import Mesh
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 
 _SURFACE_DEGREE = 5  # hats times quadratic traces are cubic, curvature adds a little
 

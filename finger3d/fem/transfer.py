@@ -6,14 +6,12 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from finger3d._types import Float, Int
 from finger3d.fem.elements import Element
 from finger3d.fem.locate import inverse_map
 from finger3d.fem.simplex import Mesh
 from finger3d.fem.traces import BoundarySurface
 from finger3d.geometry.surface import Triangles
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 
 _BEYOND = 0.25  # a curved facet's border bulges at most this far, in barycentric coordinates
 _COVERED = 0.5  # least share of a point's hat that must be under the other surface

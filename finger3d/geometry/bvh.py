@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
+from finger3d._types import Float, Int
+
 Bool = NDArray[np.bool_]
 Test = Callable[[Int, int, Int], Bool]
 

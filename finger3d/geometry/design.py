@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.geometry.rules import check_dimensions
 from finger3d.geometry.section import Section
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from build123d import Solid
 
     from finger3d.geometry.tessellate import Tessellation
-
-Float = NDArray[np.float64]
 
 
 class Design(Protocol):

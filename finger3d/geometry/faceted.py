@@ -9,12 +9,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._types import Float, Int
 from finger3d.geometry.surface import Triangles
 from finger3d.geometry.surface_checks import mistake
 from finger3d.geometry.tessellate import CadFace, Tessellation
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 
 _CREASE_COSINE = math.cos(math.radians(35.0))  # between normals; smaller ones separate patches
 _MAX_PATCHES = 150  # with more, patches of one label are merged

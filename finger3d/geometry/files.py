@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._ranges import number
+from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.geometry.surface import Triangles
 from finger3d.geometry.surface_checks import mistake
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from build123d import Face, Solid
     from OCP.STEPControl import STEPControl_Reader
 
-Float = NDArray[np.float64]
 
 STL, STEP = (".stl",), (".step", ".stp")
 SUFFIXES = (*STL, *STEP)

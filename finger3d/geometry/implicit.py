@@ -7,7 +7,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+
+from finger3d._types import Float
 
 if TYPE_CHECKING:
     from build123d import Face
@@ -15,7 +16,6 @@ if TYPE_CHECKING:
     from OCP.gp import gp_Dir, gp_Pnt
     from OCP.ShapeAnalysis import ShapeAnalysis_Surface
 
-Float = NDArray[np.float64]
 
 _PROJECTION_TOLERANCE_MM = 1e-9
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.geometry.files import STEP, content, read_named, read_surface, tessellated
 from finger3d.geometry.surface import Triangles
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 
     from finger3d.geometry.tessellate import Tessellation
 
-Float = NDArray[np.float64]
 
 SMALLEST_MM, LARGEST_MM = 0.2, 5000.0
 

@@ -10,10 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._arrays import freeze_arrays
+from finger3d._types import Float, Int
 from finger3d.geometry.bvh import Tree, puck_distance
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 
 _SLACK = 1e-12  # over the surface's size: tolerance that makes vertical lines through shared edges hit a triangle
 _EDGES = ((0, 1), (1, 2), (2, 0))

@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._types import Float, Int
 from finger3d.geometry.surface import Triangles
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 
 _FLAT = 1e-9  # thickness over length
 

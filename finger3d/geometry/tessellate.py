@@ -6,16 +6,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float, Int
 from finger3d.geometry.cad import labelled_faces
 from finger3d.geometry.implicit import ImplicitSurface, surface_of
 
 if TYPE_CHECKING:
     from build123d import Face, Solid
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 
 _WELD = 1e-7  # mm
 

@@ -10,6 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.fem.assembly import stiffness
 from finger3d.fem.condense import condense, stiffened
 from finger3d.fem.simplex import Mesh
@@ -32,7 +33,6 @@ from finger3d.meshing.report import MeshReport
 from finger3d.meshing.swept import mesh_section
 from finger3d.objects import initial_contact
 
-Float = NDArray[np.float64]
 Say = Callable[[str], None]
 
 MARGIN = 0.3

@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finger3d.fem.traces import restrict, surface
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.problem import Problem
-
-Float = NDArray[np.float64]
 
 _TOUCHES = 1e-9
 """Overlap outside the candidate points that counts as contact there, in depths of the press: round-off of a gap."""

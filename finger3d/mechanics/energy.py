@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finger3d.contact.friction import SLIP
 from finger3d.contact.state import ContactState
 from finger3d.mechanics.history import ObjectPose
 from finger3d.mechanics.problem import Problem
-
-Float = NDArray[np.float64]
 
 
 def external_work(problem: Problem, before: ContactState, after: ContactState, a: ObjectPose, b: ObjectPose) -> float:

@@ -6,9 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
+from finger3d._types import Float
 from finger3d.contact.rules import RULES
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.mechanics.cost import AddedCost, PressCost
@@ -18,8 +16,6 @@ if TYPE_CHECKING:
     from finger3d.mechanics.history import ObjectPose
     from finger3d.mechanics.model import Model
     from finger3d.mechanics.problem import Problem
-
-Float = NDArray[np.float64]
 
 
 @dataclass

@@ -7,13 +7,11 @@ from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.fem.locate import cells_at
 from finger3d.fem.simplex import Mesh, reflect_into_part
 from finger3d.fem.traces import displacement_row, strain_row
-
-Float = NDArray[np.float64]
 
 
 class Reading(Protocol):

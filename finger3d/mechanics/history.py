@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._arrays import freeze_arrays
+from finger3d._types import Float, Tree
 from finger3d.contact.friction import OPEN, STATUS_NAMES, STICK
 from finger3d.contact.state import ContactState
 from finger3d.errors import Outcome
-
-Float = NDArray[np.float64]
 
 _ON_LINE = 1e-9
 """Distance from the line z = 0, in half widths, below which a vertex lies on it: round-off of its coordinates."""
@@ -160,7 +158,7 @@ def _half_extent(x: Float) -> float:
     return float(np.ptp(x) / 2.0) if len(x) else 0.0
 
 
-def measure(points: ContactPoints, step: StepResult) -> dict[str, Any]:
+def measure(points: ContactPoints, step: StepResult) -> Tree:
     """Entry of `steps` in summary.json for one increment.
 
     ``contact_half_length_mm`` and ``stick_half_length_mm`` are half the distance along x between the first and the last
@@ -176,7 +174,7 @@ def measure(points: ContactPoints, step: StepResult) -> dict[str, Any]:
     line, nearest = points.middle_line()
     outward_x = friction[:, 0] * np.sign(x - step.lowest[0])
     outward_z = friction[:, 2] * np.sign(z - step.lowest[1])
-    numbers: dict[str, Any] = {
+    numbers: Tree = {
         "depth_mm": target.depth_mm,
         "slide_x_mm": target.slide_x_mm,
         "slide_z_mm": target.slide_z_mm,
@@ -206,7 +204,7 @@ def measure(points: ContactPoints, step: StepResult) -> dict[str, Any]:
     }
 
 
-def contact_table(points: ContactPoints, state: ContactState) -> dict[str, Any]:
+def contact_table(points: ContactPoints, state: ContactState) -> Tree:
     """Columns of contact.csv; pressure and shear are the traction on the finger, slip is in x and z."""
     points = points.with_basis_of(state)
     friction = points.friction(state.force)

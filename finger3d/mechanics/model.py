@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.contact.rules import RuleName
 from finger3d.fem.material import Material
@@ -23,7 +23,6 @@ from finger3d.objects import ContactPath, Plane, RigidObject
 if TYPE_CHECKING:
     from finger3d.mechanics.problem import Problem
 
-Float = NDArray[np.float64]
 Domain = Literal["solid", "plane-strain", "plane-stress"]
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._arrays import freeze_arrays
+from finger3d._types import Float
 from finger3d.contact.newton import uniqueness
 from finger3d.contact.state import ContactState
 from finger3d.errors import Finger3dError
@@ -21,8 +22,6 @@ from finger3d.mechanics.history import ContactPoints, ObjectPose
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.symmetry import Symmetry
 from finger3d.meshing.report import MeshReport
-
-Float = NDArray[np.float64]
 
 _COVERED = 0.5  # least share of a point's hat that must be under the object
 _OUTSIDE_GAP = 2.0  # gap of points that the object does not cover, in heights of the finger; never closed

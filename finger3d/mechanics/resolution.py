@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
+from finger3d._types import Float
 from finger3d.contact.friction import OPEN
 from finger3d.errors import UnresolvedError
 from finger3d.fem.traces import BoundarySurface
@@ -27,7 +27,6 @@ from finger3d.mechanics.path import targets
 from finger3d.mechanics.problem import Problem, rigid_gap
 from finger3d.objects import MeshObject, RigidObject, initial_contact
 
-Float = NDArray[np.float64]
 Box = tuple[float, float, float, float]
 
 REFUSED = 0.5

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from threading import Event
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.contact.rules import STEP_DEPENDENT_RULES
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.mechanics.energy import external_work, frictional_dissipation
@@ -17,8 +17,6 @@ from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.history import ObjectPose, StepResult
 from finger3d.mechanics.path import between, straight_on, targets
 from finger3d.mechanics.problem import Problem
-
-Float = NDArray[np.float64]
 
 _CUTS = 6
 """Times that an increment which does not converge is halved, at most."""

@@ -8,13 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._arrays import freeze_arrays
+from finger3d._types import Float
 from finger3d.contact.state import ContactState
 from finger3d.fem.simplex import Mesh, axis_numbers, reflect_into_part, unfold
 from finger3d.fem.traces import BoundarySurface
 from finger3d.mechanics.history import ContactPoints
 from finger3d.mechanics.model import Model
-
-Float = NDArray[np.float64]
 
 LOCAL_DIRECTIONS = (1, 0, 2)
 """World axis of the normal and of each tangent of a contact point under an upright object."""

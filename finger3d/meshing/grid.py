@@ -10,12 +10,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float, Int
 from finger3d.geometry.section import Section
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 
 RATE = 0.25
 """Growth of the edge length per length away from the contact zone."""

@@ -12,13 +12,12 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._types import Float, Int
 from finger3d.geometry.faceted import Faceted
 from finger3d.geometry.implicit import ImplicitPlane
 from finger3d.geometry.surface import Triangles
 from finger3d.geometry.tessellate import Tessellation
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 Bool = NDArray[np.bool_]
 
 SMOOTH = np.cos(np.radians(6.0))

@@ -6,14 +6,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float, Int
 from finger3d.errors import Finger3dError
 from finger3d.geometry.design import Design
 from finger3d.meshing.options import MeshSizes, Zone
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 
 RATE = 0.3
 """Growth of the edge length per distance from the zone."""

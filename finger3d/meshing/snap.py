@@ -12,6 +12,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._types import Float, Int
 from finger3d.fem.elements import TET4, TRI3
 from finger3d.fem.quality import cell_angles_deg, curved_jacobians
 from finger3d.fem.simplex import Mesh, boundary, quadratic
@@ -20,8 +21,6 @@ from finger3d.geometry.implicit import ImplicitPlane
 from finger3d.geometry.tessellate import CadFace, Tessellation
 from finger3d.meshing.seams import Seams
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 Bool = NDArray[np.bool_]
 
 MIN_DIHEDRAL_DEG = 3.0

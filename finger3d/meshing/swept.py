@@ -8,6 +8,7 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._types import Float, Int
 from finger3d.errors import Finger3dError
 from finger3d.fem.simplex import Mesh, boundary, quadratic, unfold
 from finger3d.geometry.design import Design
@@ -16,9 +17,6 @@ from finger3d.meshing.grid import Grid, Sizes, folded_zone, rows, triangulate
 from finger3d.meshing.limits import check_count, check_sizes
 from finger3d.meshing.options import MeshSizes, Zone
 from finger3d.meshing.report import MeshReport, report
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 
 _AXIS = {"x": 0, "z": 2}
 _LEAST_ANGLE_DEG = 0.5  # of a cell; smaller angles occur where a wall or an edge is far thinner than the mesh

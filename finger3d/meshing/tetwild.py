@@ -17,9 +17,9 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finger3d._process import child_environment
+from finger3d._types import Float, Int
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.fem.simplex import Mesh, signed_volumes
 from finger3d.geometry.design import Design
@@ -32,8 +32,6 @@ from finger3d.meshing.sizing import Sizing, forecast, rounded_zone, sizing
 if TYPE_CHECKING:
     from finger3d.geometry.tessellate import Tessellation
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 
 STOP_ENERGY = 10.0
 ATTEMPTS = 3

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from finger3d._types import Float
 
 if TYPE_CHECKING:
     from build123d import Face, Shape, Solid
 
-Float = NDArray[np.float64]
 
 _ON_PLANE_MM = 1e-6  # distance at which a face lies on a plane
 _NORMAL_TOLERANCE = 1e-6  # component of a unit normal against the opening direction

@@ -6,16 +6,14 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.io import atomic
 from finger3d.mold.parts import Mold, strips
 from finger3d.mold.sheet import oversize, sheet
 from finger3d.mold.shell import Shell, shell, write_3mf, write_step, write_stl
 from finger3d.plotting.mold import picture
 from finger3d.progress import Progress
-
-Float = NDArray[np.float64]
 
 GAP_MM = 8.0
 """Distance between parts on the plate."""

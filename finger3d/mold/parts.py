@@ -20,8 +20,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.geometry.surface import Triangles
 from finger3d.geometry.tessellate import triangulated
@@ -33,7 +33,6 @@ from finger3d.mold.shell import volume
 if TYPE_CHECKING:
     from build123d import Shape, Solid
 
-Float = NDArray[np.float64]
 
 COVER_MM = 0.5
 """Least cover of silicone between a foil and the surface of the cavity."""

@@ -8,9 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
+from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.geometry.surface import Triangles
 from finger3d.geometry.surface_checks import mistake
@@ -19,7 +17,6 @@ from finger3d.io import atomic
 if TYPE_CHECKING:
     from build123d import Shape, Solid
 
-Float = NDArray[np.float64]
 
 ANGLE = 0.2
 """First tessellation's largest angle between facets, radians; it keeps pegs and holes round."""

@@ -7,12 +7,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.objects.shapes import RigidObject
 
-Float = NDArray[np.float64]
 Top = Callable[[Float, Float], Float]
 
 _GRID = (401, 41)

@@ -16,11 +16,10 @@ from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from annotated_types import Gt, Lt
-from numpy.typing import NDArray
 
 from finger3d._ranges import Length, Place, Radians, Zero
+from finger3d._types import Float
 
-Float = NDArray[np.float64]
 Axis = Literal["x", "z"]
 
 

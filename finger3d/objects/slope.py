@@ -7,11 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.objects.shapes import RigidObject
-
-Float = NDArray[np.float64]
 
 _STEP = 1e-6  # of the finger's size: small beside curvature, large beside round-off
 _MUCH_DEG = 10.0  # 1.5 % of the distance, 18 % of the force sideways

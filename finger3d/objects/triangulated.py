@@ -6,13 +6,11 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finger3d._ranges import PathName, Scale
+from finger3d._types import Float
 from finger3d.geometry.surface import Triangles
 from finger3d.objects.shapes import RigidObject
-
-Float = NDArray[np.float64]
 
 _LEVEL = 1e-6  # of the size: points this little above the lowest one count as lowest too (STL has single precision)
 _MIRROR = 1e-6

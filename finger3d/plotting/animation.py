@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.fem.simplex import Mesh
 from finger3d.io import atomic
 from finger3d.mechanics.gauges import Gauge
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from PIL.Image import Image
 
-Float = NDArray[np.float64]
 
 _DPI = {"png": 120, "gif": 65}  # pixels per inch
 _FRAME_MS, _LAST_MS = 450, 1500  # duration of a frame and of the last frame of an animation

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
+from finger3d._types import Float
 
 WINDOW = (1600, 1200)
 """Width and height of the window that PyVista renders, in pixels."""

@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from finger3d._types import Float, Int
 from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
 from finger3d.fem.simplex import Mesh
 from finger3d.plotting.camera import flat
@@ -26,8 +27,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 Marks = Sequence[tuple[str, Float]]
 """Labels of gauges, and their start, middle and end, shape (3, d), mm."""
 

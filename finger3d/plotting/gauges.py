@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float, Int
 from finger3d.fem.simplex import Mesh
 
 if TYPE_CHECKING:
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from finger3d.mechanics.gauges import Gauge
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 
 COLOUR = "#b0006a"
 """Colour of gauges in all pictures."""

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.geometry.surface import Triangles
 from finger3d.io import atomic
 from finger3d.plotting.camera import viewer_axes
@@ -19,7 +19,6 @@ from finger3d.plotting.renderer import Camera, Drawing, Image, Polygons, render
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Float = NDArray[np.float64]
 
 COLOURS = {"half_a": "#9db4c8", "half_b": "#c9d9ee", "lid": "#8d8a84", "sensor": "#f28e2b", "strips": "#222222"}
 OPACITY = {"half_b": 0.35}

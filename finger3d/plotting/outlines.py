@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.fem.simplex import Mesh
 
 if TYPE_CHECKING:
     from matplotlib.path import Path
 
-Float = NDArray[np.float64]
 
 _MOST_CELLS = 4000  # of a mesh whose edges are drawn; those of a finer mesh would merge into a grey area
 

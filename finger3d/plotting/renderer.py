@@ -20,13 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._process import child_environment
+from finger3d._types import Float, Int
 from finger3d.errors import MissingError
 
 if TYPE_CHECKING:
     import pyvista as pv
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 Image = NDArray[np.uint8]
 """Rendered window, shape (h, w, 3)."""
 

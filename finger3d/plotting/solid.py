@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finger3d._arrays import freeze_arrays
+from finger3d._types import Float, Int
 from finger3d.contact.friction import OPEN, SLIP, STICK
 from finger3d.fem.elements import TRI3, TRI6
 from finger3d.fem.simplex import Mesh
@@ -19,8 +19,6 @@ from finger3d.plotting.renderer import Arrows, Camera, Drawing, Image, Polygons,
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 
 BODY, LINE, REST, OBJECT = "#d9d6cf", "#8d8a84", "#777777", "#222222"
 COLOURS = {OPEN: "#c4c4c4", STICK: "#1f3f77", SLIP: "#f28e2b"}

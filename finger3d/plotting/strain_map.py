@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.mechanics.gauges import Gauge
 from finger3d.plotting.layout import sheet
 from finger3d.sensor.curve import Calibration
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.cm import ScalarMappable
     from matplotlib.figure import Figure
 
-Float = NDArray[np.float64]
 
 _WORST_RESOLUTION = 10.0  # upper end of the colour scale, in multiples of the limit; grey beyond
 _BEST_RESOLUTION = 0.05  # lower end of the colour scale, in multiples of the limit

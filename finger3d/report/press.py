@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal, NotRequired, TypedDict
+from typing import Literal, NotRequired, TypedDict
 
 import numpy as np
 
+from finger3d._types import TreeView
 from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.contact.conditions import TOLERANCE
 from finger3d.contact.friction import OPEN, STATUS_NAMES
@@ -155,7 +156,7 @@ def press_page(folder: str | Path) -> Path:
     )
 
 
-def headline(step: Mapping[str, Any], errors: Mapping[str, float]) -> list[HeadlineRow]:
+def headline(step: TreeView, errors: Mapping[str, float]) -> list[HeadlineRow]:
     """Return the main numbers of a step with their errors, without a tangential force of the size of round-off.
 
     Parameters

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from finger3d._types import Array
 from finger3d.fem.simplex import Mesh
 from finger3d.mechanics.gauges import Gauge
 from finger3d.plotting.gauges import marks_of
 from finger3d.report.html import asset, embedded
-from finger3d.results.states import Array, States, chosen, label
+from finger3d.results.states import States, chosen, label
 
 _MOST_BYTES = 1_500_000  # of the data of a view; plotly.js has 5 MB
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
+from finger3d._types import Tree, TreeView
 from finger3d.accuracy.companions import FACTOR
 from finger3d.errors import Outcome
 
@@ -36,7 +36,7 @@ class Case:
     outcome: Outcome
     numbers: Mapping[str, float] = field(default_factory=dict)
     errors: Mapping[str, float] = field(default_factory=dict)
-    lines: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    lines: Mapping[str, TreeView] = field(default_factory=dict)
     seconds: float = 0.0
     companion: Mapping[str, float] = field(default_factory=dict)
     ratio: float = FACTOR
@@ -52,7 +52,7 @@ class Case:
         """Whether it is plane stress or plane strain."""
         return self.model.startswith("plane")
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> Tree:
         """Return the entry of compare.json."""
         return {
             "model": self.model,

@@ -5,19 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finger3d._arrays import freeze_arrays
+from finger3d._types import Array
 from finger3d.errors import Finger3dError
 from finger3d.fem.simplex import Mesh, middles
 from finger3d.io import atomic, read_arrays
 from finger3d.mechanics.history import StepResult, contact_table
 from finger3d.mechanics.problem import Problem
-
-Array = NDArray[Any]
 
 _LARGEST = 1e9
 """Bound of every number in steps.npz, in mm or MPa: far above any result, and far below an overflow in a drawing."""

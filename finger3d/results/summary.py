@@ -5,15 +5,14 @@ from __future__ import annotations
 import csv
 import json
 import math
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
+from finger3d._types import Tree, TreeView
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.gauges import Gauge
 
 
-def read_json(path: Path) -> dict[str, Any]:
+def read_json(path: Path) -> Tree:
     """Read a result.
 
     Raises
@@ -22,7 +21,7 @@ def read_json(path: Path) -> dict[str, Any]:
         If it is not there, or is no JSON object.
     """
     try:
-        found: Any = json.loads(path.read_text(encoding="utf-8"))
+        found: object = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise Finger3dError(f"{path.parent}: holds no {path.name}; give a folder of results") from None
     except (OSError, ValueError, RecursionError) as error:
@@ -49,13 +48,13 @@ def read_rows(path: Path) -> list[dict[str, str]]:
         raise Finger3dError(f"{path}: cannot be read ({error}); make the results again") from None
 
 
-def title_of(scene: Mapping[str, Any]) -> str:
+def title_of(scene: TreeView) -> str:
     """The scene's title, or what is pressed onto what."""
     object_ = (scene.get("object") or {}).get("shape", "plane")
     return scene.get("title") or f"{scene['finger']['geometry']} on a {object_}"
 
 
-def gauges_of(scene: Mapping[str, Any]) -> list[Gauge]:
+def gauges_of(scene: TreeView) -> list[Gauge]:
     """The gauges of a scene as summary.json holds it.
 
     Raises
@@ -64,8 +63,8 @@ def gauges_of(scene: Mapping[str, Any]) -> list[Gauge]:
         If they are not as a press writes them.
     """
 
-    def number(value: Any) -> float:
-        if isinstance(value, str) or not math.isfinite(value):
+    def number(value: object) -> float:
+        if not isinstance(value, int | float) or not math.isfinite(value):
             raise ValueError(value)
         return float(value)
 

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from finger3d._types import Array
 from finger3d.errors import Finger3dError
 from finger3d.fem.simplex import Mesh
 from finger3d.io import atomic
@@ -57,7 +58,7 @@ def write_vtu(
         temporary.write_bytes(file.document())
 
 
-def _vtk_values(name: str, values: NDArray[Any], count: int, dim: int) -> NDArray[Any]:
+def _vtk_values(name: str, values: Array, count: int, dim: int) -> Array:
     """Values as (count,) or (count, k) of a type VTK knows, padded to three dimensions."""
     if values.ndim not in (1, 2, 3) or len(values) != count:
         raise ValueError(f"field {name!r} has shape {values.shape}; its first length must be {count}")
@@ -84,7 +85,7 @@ class _Appended:
     def close(self, tag: str) -> None:
         self._text.append(f"</{tag}>")
 
-    def array(self, name: str, values: NDArray[Any]) -> None:
+    def array(self, name: str, values: Array) -> None:
         data = np.ascontiguousarray(values.astype(values.dtype.newbyteorder("<"), copy=False))
         components = 1 if data.ndim == 1 else data.shape[1]
         self._text.append(

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from typing import Any
 
 import numpy as np
 
 from finger3d._ranges import LONGEST_SLIDE, at_least, at_most
+from finger3d._types import Tree
 from finger3d.geometry.design import Design
 from finger3d.mechanics.model import Domain, MeshOptions
 from finger3d.objects import RigidObject
@@ -44,7 +44,7 @@ def check(tables: SceneTable, legs: tuple[LegTable, ...], design: Design) -> lis
     return lines
 
 
-def _legs(press: dict[str, Any], legs: tuple[LegTable, ...], design: Design, solid: bool) -> list[str]:
+def _legs(press: Tree, legs: tuple[LegTable, ...], design: Design, solid: bool) -> list[str]:
     lines = []
     height, half_length = design.height_mm, design.half_length_mm
     for i, leg in enumerate(legs):

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from finger3d._types import Tree, TreeView
 from finger3d.geometry.design import Design
 from finger3d.geometry.files import SUFFIXES
 from finger3d.objects import MeshObject, RigidObject
@@ -16,12 +17,12 @@ if TYPE_CHECKING:
 _APART = 200.0  # sizes of object and finger that differ more than this are in different units, or cannot be meshed
 
 
-def is_file(geometry: Any) -> bool:
+def is_file(geometry: object) -> bool:
     """Whether finger.geometry names a file and not a design."""
     return isinstance(geometry, str) and geometry.lower().endswith(SUFFIXES)
 
 
-def absolute(given: Mapping[str, Any], scene: Path | None) -> dict[str, Any]:
+def absolute(given: TreeView, scene: Path | None) -> Tree:
     """The tree with the paths of its bodies, which are relative to the scene's file, made absolute."""
     folder = scene.parent if scene else Path()
     tree = dict(given)

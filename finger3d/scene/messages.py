@@ -24,7 +24,7 @@ def dotted(place: Place) -> str:
     return ".".join(str(p) if isinstance(p, int) or p.isidentifier() else json.dumps(p) for p in place)
 
 
-def shown(value: Any) -> str:
+def shown(value: object) -> str:
     """Write a value as in TOML, short."""
     if isinstance(value, Mapping):
         return "a table"
@@ -57,14 +57,14 @@ def nearest(name: str, names: Iterable[str]) -> str | None:
     return None
 
 
-def choose(place: Place, value: Any, names: Sequence[str]) -> str:
+def choose(place: Place, value: object, names: Sequence[str]) -> str:
     """Word a name that is not one of `names`."""
     near = nearest(value, names) if isinstance(value, str) else None
     hint = f'did you mean "{near}"? ' if near else ""
     return f"{dotted(place)} = {shown(value)}: {hint}must be {listed(names)}"
 
 
-def unknown(place: Place, value: Any, names: Sequence[str], kind: str = "key") -> str:
+def unknown(place: Place, value: object, names: Sequence[str], kind: str = "key") -> str:
     """Word a key (or an effect) that is not one of `names`."""
     near = nearest(str(place[-1]), names)
     hint = f'; did you mean "{near}"?' if near else ""
@@ -74,7 +74,7 @@ def unknown(place: Place, value: Any, names: Sequence[str], kind: str = "key") -
     return f"{key}: no such {kind}{hint} ({where} takes {', '.join(names) if names else 'none'})"
 
 
-def _bounds(metadata: Iterable[Any]) -> str:
+def _bounds(metadata: Iterable[object]) -> str:
     low = high = ""
     for m in metadata:
         if isinstance(m, at.Gt):
@@ -95,11 +95,11 @@ def _bounds(metadata: Iterable[Any]) -> str:
     return "".join(f" {b}" for b in (" and ".join(t for t in (low, high) if t),) if b)
 
 
-def _number(value: Any) -> str:
+def _number(value: object) -> str:
     return number(value) if isinstance(value, int | float) else str(value)
 
 
-def _text(metadata: Sequence[Any]) -> str:
+def _text(metadata: Sequence[object]) -> str:
     """Say what a text with bounds on its length, and perhaps of one line, may be."""
     lines = "one line of printable text" if any(isinstance(m, at.Predicate) for m in metadata) else "a text"
     longest = next((f", of at most {m.max_length} characters" for m in metadata if isinstance(m, at.MaxLen)), "")
@@ -158,14 +158,14 @@ def _target(table: type[TomlTable], place: Place) -> tuple[Place, type[TomlTable
     return tuple(typed), holder, hint
 
 
-def _value(tree: Any, place: Place) -> Any:
+def _value(tree: Any, place: Place) -> object:
     for part in place:
         tree = tree[part]
     return tree
 
 
 def messages_from(
-    error: ValidationError, table: type[TomlTable], tree: Any, under: Place, also: Sequence[str] = ()
+    error: ValidationError, table: type[TomlTable], tree: object, under: Place, also: Sequence[str] = ()
 ) -> dict[Place, str]:
     """Return a message for every finding of a check of `tree` (which stands at `under` in the file) against `table`.
 

@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from finger3d._ranges import PathName, one_line, printable
+from finger3d._types import Tree, TreeView
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
 from finger3d.fem.material import Isotropic
@@ -58,8 +59,8 @@ class Scene:
     design: Design = field(compare=False)
     object: RigidObject = field(compare=False)
     mesh: MeshOptions = field(compare=False)
-    effects: Mapping[str, Any] = field(compare=False)
-    given: Mapping[str, Any] = field(compare=False)
+    effects: TreeView = field(compare=False)
+    given: TreeView = field(compare=False)
     path: Path | None = field(compare=False, default=None)
 
     @property
@@ -121,7 +122,7 @@ class Scene:
             model = self.effects[name].apply(model)
         return model
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> Tree:
         """Return the tables with every default filled in, as plain dicts and lists."""
         return tree.plain(self.tables.model_dump())
 
@@ -149,9 +150,7 @@ def load(path: str | Path, overrides: Iterable[str] = ()) -> Scene:
     return parse(given, path=path, set_keys=[o.partition("=")[0].strip() for o in overrides])
 
 
-def parse(
-    given: Mapping[str, Any], path: Path | None = None, set_keys: Iterable[str] | Mapping[str, str] = ()
-) -> Scene:
+def parse(given: TreeView, path: Path | None = None, set_keys: Iterable[str] | Mapping[str, str] = ()) -> Scene:
     """Check a tree of tables (lists or tuples for arrays) and return it as a Scene.
 
     Parameters
@@ -190,7 +189,7 @@ class _Parts:
     object: RigidObject
     press: PressTable | LegsTable
     settings: Mapping[str, TomlTable]
-    effects: Mapping[str, Any]
+    effects: TreeView
 
     @property
     def legs(self) -> tuple[LegTable, ...]:
@@ -229,7 +228,7 @@ class _Parts:
         )
 
 
-def _read(given: Mapping[str, Any], found: dict[Place, str]) -> _Parts | None:
+def _read(given: TreeView, found: dict[Place, str]) -> _Parts | None:
     """Check every table by itself; None if there are mistakes, which are put into `found`."""
     tables = _checked(SceneTable, given, (), found)
     geometry, dimensions = _named(given, "finger", "geometry", designs(), found)
@@ -266,7 +265,7 @@ def _refusal(lines: list[str], path: Path | None, set_keys: Iterable[str] | Mapp
 
 
 def _checked(
-    table: type[AnyTable], given: Mapping[str, Any], under: Place, found: dict[Place, str], also: tuple[str, ...] = ()
+    table: type[AnyTable], given: TreeView, under: Place, found: dict[Place, str], also: tuple[str, ...] = ()
 ) -> AnyTable | None:
     try:
         return table.model_validate(given)
@@ -318,7 +317,7 @@ def _shaped(table: Any) -> Any:
 
 
 def _named(
-    given: Mapping[str, Any], name: str, key: str, known: Mapping[str, type], found: dict[Place, str]
+    given: TreeView, name: str, key: str, known: Mapping[str, type], found: dict[Place, str]
 ) -> tuple[str, TomlTable | None]:
     """Check a table whose `key` says which other keys it takes."""
     given_table = given.get(name)
@@ -361,7 +360,7 @@ def _named(
     return "", None
 
 
-def _press(given: Mapping[str, Any], found: dict[Place, str]) -> PressTable | LegsTable | None:
+def _press(given: TreeView, found: dict[Place, str]) -> PressTable | LegsTable | None:
     press = given.get("press")
     if not isinstance(press, Mapping):
         return None  # found by the check of the whole file
@@ -376,10 +375,10 @@ def _press(given: Mapping[str, Any], found: dict[Place, str]) -> PressTable | Le
     return _checked(LegsTable, press, ("press",), found)
 
 
-def _effects(given: Mapping[str, Any], found: dict[Place, str]) -> tuple[dict[str, TomlTable], dict[str, Any]]:
+def _effects(given: TreeView, found: dict[Place, str]) -> tuple[dict[str, TomlTable], Tree]:
     """Check the effects that are present, the only ones that are imported; return their tables and their settings."""
     tables: dict[str, TomlTable] = {}
-    effects: dict[str, Any] = {}
+    effects: Tree = {}
     present = given.get("effects")
     for name, settings in present.items() if isinstance(present, Mapping) else ():
         place = ("effects", name)

@@ -27,6 +27,7 @@ from finger3d._ranges import (
     Title,
     Zero,
 )
+from finger3d._types import Tree
 from finger3d.contact.rules import RuleName
 from finger3d.mechanics.model import Domain
 
@@ -160,16 +161,16 @@ class SceneTable(TomlTable):
     """The whole file. Tables whose keys depend on a name are checked afterwards, against that name's own table."""
 
     title: Title | None = None
-    finger: dict[str, Any]
+    finger: Tree
     material: MaterialTable
-    object: dict[str, Any] | None = None
+    object: Tree | None = None
     friction: FrictionTable = FrictionTable(mu=0.0)
-    press: dict[str, Any]
+    press: Tree
     contact: ContactTable = ContactTable()
     model: DomainTable = DomainTable()
     mesh: MeshTable = MeshTable()
     gauge: tuple[GaugeTable, ...] = ()
-    effects: dict[str, Any] = {}
+    effects: Tree = {}
 
 
 class FileTable(TomlTable):
@@ -180,7 +181,7 @@ class FileTable(TomlTable):
 def table_of(record: type) -> type[TomlTable]:
     """Return the strict table of a dataclass: a design's dimensions, an object's, or an effect's settings."""
     hints = typing.get_type_hints(record, include_extras=True)
-    fields: dict[str, Any] = {}
+    fields: Tree = {}
     for f in dataclasses.fields(record):
         default = f.default if f.default_factory is dataclasses.MISSING else f.default_factory()
         name, hint = f.name, hints[f.name]

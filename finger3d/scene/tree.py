@@ -8,10 +8,9 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from finger3d._types import Tree, TreeView
 from finger3d.errors import Finger3dError
 from finger3d.scene.messages import shown
-
-Tree = dict[str, Any]
 
 
 def read(path: Path) -> Tree:
@@ -107,7 +106,7 @@ def _set(node: Any, parts: list[str], value: Any, key: str) -> None:
             node = node[index]
 
 
-def written(tree: Mapping[str, Any]) -> str:
+def written(tree: TreeView) -> str:
     """Write a tree as TOML text."""
     import tomli_w
 

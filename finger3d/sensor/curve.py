@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
+from finger3d._types import Float, TreeView
 from finger3d.errors import MissingError
-
-Float = NDArray[np.float64]
 
 Shape = Literal["interpolation", "fit"]
 
@@ -89,9 +88,9 @@ class Calibration:
     limit: float
     tolerances: tuple[Tolerance, ...] = ()
     failed: tuple[tuple[float, str], ...] = ()
-    scene: Mapping[str, Any] = field(default_factory=dict)
+    scene: TreeView = field(default_factory=dict)
     hash: str = ""
-    about: Mapping[str, Any] = field(default_factory=dict)
+    about: TreeView = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Refuse too few points."""

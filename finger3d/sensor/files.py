@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from annotated_types import Ge, Gt, Le, MinLen
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from finger3d._ranges import LARGEST_SD, Friction, Noise, Strain, StrainSd
+from finger3d._types import Tree
 from finger3d.errors import Finger3dError
 from finger3d.io import write_csv, write_json
 from finger3d.sensor.curve import FEWEST, Calibration, Tolerance
@@ -48,9 +49,9 @@ class _File(_Part):
     resolution_limit: Annotated[float, Gt(0.0), Le(1e6)]
     tolerances: dict[str, _Tolerance]
     failed: list[_Failed]
-    scene: dict[str, Any]
+    scene: Tree
     hash: str
-    about: dict[str, Any]
+    about: Tree
 
 
 def save(calibration: Calibration, path: str | Path) -> Path:
@@ -59,7 +60,7 @@ def save(calibration: Calibration, path: str | Path) -> Path:
     return Path(path)
 
 
-def as_dict(calibration: Calibration) -> dict[str, Any]:
+def as_dict(calibration: Calibration) -> Tree:
     """What calibration.json holds; what can be worked out from the curve stands in it too, for other readers."""
     c = calibration
     fit = c.fit
@@ -101,7 +102,7 @@ def _mu_sd(c: Calibration, number: int) -> np.ndarray[tuple[int, ...], np.dtype[
 def write_table(calibration: Calibration, path: Path) -> None:
     """Write calibration.csv: every mu with its strain, slope, resolution and what each tolerance adds."""
     c = calibration
-    columns: dict[str, Any] = {
+    columns: Tree = {
         "mu": c.mu,
         "strain": c.strain,
         "strain_fit": c.at(c.mu, "fit"),

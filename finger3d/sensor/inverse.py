@@ -18,13 +18,13 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from finger3d._ranges import LARGEST_STRAIN
+from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.sensor.curve import Calibration, Shape
 
-Float = NDArray[np.float64]
 Status = Literal["ok", "coarse", "ambiguous", "above", "below", "outside", "blind"]
 
 _CHUNK = 256  # readings at a time: each asks the whole grid

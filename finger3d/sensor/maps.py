@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._types import Float, Int
 from finger3d.errors import Finger3dError
 from finger3d.fem.locate import locate
 from finger3d.fem.recover import displacement
@@ -22,10 +23,6 @@ from finger3d.io import write_csv
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
-
-Float = NDArray[np.float64]
-
-Int = NDArray[np.int64]
 
 PIXEL_MM = 1.0
 

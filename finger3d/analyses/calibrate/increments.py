@@ -12,14 +12,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.path import AUTO_START
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.step_halving import with_steps
-
-Float = NDArray[np.float64]
 
 SHARE = 0.1
 """Of the strain noise: an error of the increments below that asks for no more of them."""

@@ -10,16 +10,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from threading import Event
 
-import numpy as np
-from numpy.typing import NDArray
-
+from finger3d._types import Float
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.parallel import map_parallel
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
-
-Float = NDArray[np.float64]
 
 _FARTHEST = 2.0  # times the distance of the last two mu: forces are not continued beyond
 _NEAR = 0.1  # of mu: from one farther off a press takes longer than from its own path

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from finger3d._machine import versions
 from finger3d._ranges import LARGEST_STRAIN, number
+from finger3d._types import Float
 from finger3d.analyses.calibrate.increments import Increments, found_increments
 from finger3d.analyses.calibrate.presses import Press, presses
 from finger3d.analyses.calibrate.tolerances import ReferenceReadings, chosen, moved_gauges, read, slopes
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
 
 _LARGEST_MU = 1e6
 
-Float = NDArray[np.float64]
 
 MUS = tuple(float(mu) for mu in np.linspace(0.02, 1.2, 25).round(10))
 """Values of mu that are pressed unless others are given."""

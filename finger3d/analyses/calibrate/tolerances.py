@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from finger3d._ranges import LARGEST_SD
+from finger3d._types import Float, Int
 from finger3d.accuracy.companions import built_like, companion
 from finger3d.accuracy.estimate import strain_error
 from finger3d.analyses.calibrate.increments import Increments, increment_error
@@ -35,9 +35,6 @@ from finger3d.mechanics.path import targets
 from finger3d.mechanics.problem import Problem, scatter_to_points
 from finger3d.objects import Plane
 from finger3d.sensor.curve import Tolerance
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 
 _ENOUGH = {2: 150, 3: 500}  # contact points that make a coarser body's differences good to a fifth of the largest
 _LEFT = {2: 100, 3: 500}  # contact points that a tilted body is left with

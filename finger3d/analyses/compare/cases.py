@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Tree
 from finger3d.accuracy.companions import FACTOR
 from finger3d.accuracy.estimate import estimate
 from finger3d.mechanics.build import build
@@ -18,8 +17,6 @@ from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.step_halving import march_automatic
 from finger3d.results.comparison import Case
-
-Float = NDArray[np.float64]
 
 _POINTS = 600
 """Largest number of contact points of the meshed part of a solid of another width; a press then takes a few seconds."""
@@ -101,7 +98,7 @@ def quantities(points: ContactPoints, frame: StepResult) -> dict[str, float]:
     return out | {f"gauge_{name}": float(strain) for name, strain in numbers["gauges"].items()}
 
 
-def lines_along_x(points: ContactPoints, frame: StepResult) -> dict[str, dict[str, Any]]:
+def lines_along_x(points: ContactPoints, frame: StepResult) -> dict[str, Tree]:
     """Return tractions along x at z = 0, or near it on an unstructured mesh, and at the end of a solid."""
     table = contact_table(points, frame.state)
     z = table["z_mm"]

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from finger3d._machine import versions
+from finger3d._types import Tree
 from finger3d.analyses.compare.cases import press_with_errors, widened
 from finger3d.analyses.compare.verdict import WITHIN, Deviation, crossing_width, deviations, verdict
 from finger3d.errors import Finger3dError, Outcome, UnresolvedError
@@ -219,8 +220,8 @@ def _width_within(found: Sequence[Deviation], narrow: bool) -> dict[str, float] 
     return None if at is None else dict(zip(("width_mm", "low_mm", "high_mm"), at, strict=True))
 
 
-def _row(case: Case, height: float) -> dict[str, Any]:
-    row: dict[str, Any] = {
+def _row(case: Case, height: float) -> Tree:
+    row: Tree = {
         "model": case.model,
         "width_mm": case.width_mm,
         "width_over_height": case.width_mm / height,
@@ -235,11 +236,16 @@ def _row(case: Case, height: float) -> dict[str, Any]:
 
 
 def _write_lines(folder: Path, cases: Sequence[Case]) -> None:
-    columns: dict[str, list[Any]] = {}
+    columns: dict[str, list[float | str]] = {}
     for case in cases:
         for line, values in case.lines.items():
             count = len(values["x_mm"])
-            same = {"model": case.model, "width_mm": case.width_mm, "size_mm": case.size_mm, "line": line}
+            same: dict[str, float | str] = {
+                "model": case.model,
+                "width_mm": case.width_mm,
+                "size_mm": case.size_mm,
+                "line": line,
+            }
             for key, value in same.items():
                 columns.setdefault(key, []).extend([value] * count)
             for key, column in values.items():

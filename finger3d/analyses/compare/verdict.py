@@ -7,14 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.accuracy.companions import FACTOR
 from finger3d.accuracy.richardson import gain
 from finger3d.results.comparison import FORCE, Case
 from finger3d.results.format import with_error
-
-Float = NDArray[np.float64]
 
 WITHIN = 0.05
 """Relative deviation from the solid below which a plane model is called sufficient."""

@@ -11,11 +11,11 @@ from typing import Any, Literal
 
 import numpy as np
 
+from finger3d._types import Float, Tree
 from finger3d.analyses.calibrate.increments import found_increments, increment_error
 from finger3d.analyses.optimise.evaluation import Evaluation, evaluation_of, mistake
 from finger3d.analyses.optimise.task import (
     METHODS,
-    Float,
     FreeKey,
     Objective,
     ObjectiveTable,
@@ -192,7 +192,7 @@ class _Search:
         except Finger3dError:
             pass  # as at first: the first design that can be built chooses
 
-    def increments(self, values: Sequence[float]) -> dict[str, Any]:
+    def increments(self, values: Sequence[float]) -> Tree:
         """The increments of a design, and the error that they leave in its strain, by presses of more or fewer."""
         model = self.problem.scene(values).model()
         gauge, mus = self._gauge(model), _three(self.problem.mus)

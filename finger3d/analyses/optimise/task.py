@@ -11,14 +11,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float, Tree, TreeView
 from finger3d.analyses.sweep.points import numbered
 from finger3d.errors import Finger3dError
 from finger3d.scene import Scene, parse, tree
 from finger3d.scene.messages import shown
 
-Float = NDArray[np.float64]
 Objective = Callable[["ObjectiveTable"], float]
 
 MUS = tuple(float(v) for v in np.round(np.linspace(0.05, 1.0, 9), 5))
@@ -124,7 +123,7 @@ class OptimisationProblem:
     budget : designs, or bodies where keys of both body and gauges are free
     """
 
-    given: Mapping[str, Any]
+    given: TreeView
     free: tuple[FreeKey, ...]
     objective: str = "sensitivity"
     path: Path | None = None
@@ -146,7 +145,7 @@ class OptimisationProblem:
         changed = tree.override(dict(self.given), changes, "--free")
         return parse(changed, path=self.path, set_keys=dict.fromkeys(keys, "--free"))
 
-    def identity(self) -> dict[str, Any]:
+    def identity(self) -> Tree:
         """What two runs must share for one to go on with the other's evaluations; more budget is no other search."""
         path = Path(self.objective)
         judged = hashlib.sha256(path.read_bytes()).hexdigest()[:16] if path.is_file() else self.objective

@@ -7,8 +7,8 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
+from finger3d._types import Tree, TreeView
 from finger3d.analyses.shared_body import Variant, body_key, finest
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import MeshOptions
@@ -78,7 +78,7 @@ def varied(texts: Iterable[str]) -> tuple[Vary, ...]:
     return found
 
 
-def numbered(key: str, given: Mapping[str, Any], option: str) -> str:
+def numbered(key: str, given: TreeView, option: str) -> str:
     """The key with a gauge's name replaced by its number: ``gauge.g36.x_mm`` is ``gauge.0.x_mm``."""
     parts = key.split(".")
     gauges = given.get("gauge", ())
@@ -126,7 +126,7 @@ class BodySpec:
     key: str
     variants: tuple[Variant, ...]
     mesh: MeshOptions
-    given: Mapping[str, Any] = field(compare=False, repr=False)
+    given: TreeView = field(compare=False, repr=False)
 
 
 @dataclass(frozen=True)
@@ -138,13 +138,13 @@ class Sweep:
     given : the scene that is varied, as written, overrides included, paths absolute
     """
 
-    given: Mapping[str, Any]
+    given: TreeView
     vary: tuple[Vary, ...]
     points: tuple[Point, ...]
     bodies: dict[str, BodySpec]
     title: str
 
-    def identity(self) -> dict[str, Any]:
+    def identity(self) -> Tree:
         """What makes two sweeps the same; bodies stand for the contents of files too."""
         return {
             "scene": tree.plain(self.given),
