@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Annotated, ClassVar, Protocol
 
 import numpy as np
@@ -26,10 +26,11 @@ from finger3d._ranges import Fraction, Seconds
 from finger3d._types import Float
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.effects._prony import InternalVariables, Prony, Step, relaxed
+from finger3d.effects._relaxation import RelaxationWorkspace
 from finger3d.effects.base import fill
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import Stiffness, stiffness
-from finger3d.fem.condense import Condensation, spring_forces, stiffened
+from finger3d.fem.condense import spring_forces, stiffened
 from finger3d.fem.material import Elasticity
 from finger3d.fem.recover import across, displacement, nodal_strain, pressure, stress
 from finger3d.mechanics.cost import AddedCost, PressCost
@@ -37,9 +38,6 @@ from finger3d.mechanics.formulation import SmallStrain, Workspace, length_scale,
 from finger3d.mechanics.history import ObjectPose
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem, scatter_to_points
-
-_FACTORS_KEPT = 5
-"""Condensations kept at once: each holds a factor, and a path rarely has more than four lengths of step."""
 
 
 @dataclass(frozen=True)
@@ -57,25 +55,6 @@ class Response:
     compliance: Float
     moved: Float
     shape: Callable[[Float], Float]
-
-
-@dataclass
-class RelaxationWorkspace(Workspace):
-    """The body condensed for the lengths of step used last, by alpha, and the shear part of its stiffness."""
-
-    shear_part: sp.csr_matrix | None = None
-    _condensations: dict[float, Condensation] = field(default_factory=dict)
-
-    def condensation(self, alpha: float, make: Callable[[], Condensation]) -> Condensation:
-        """Return the condensation for alpha, made unless it is one of the last few."""
-        found = self._condensations.pop(alpha, None)
-        if found is None:
-            found = make()
-            self.factorizations += found.factorizations
-        self._condensations[alpha] = found
-        if len(self._condensations) > _FACTORS_KEPT:
-            self._condensations.pop(next(iter(self._condensations)))
-        return found
 
 
 class ViscoelasticBody(Protocol):
