@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+import re
+from html import unescape
+from pathlib import Path
+
+from finger3d.cli import main
+
 FIG9 = """
 [finger]
 geometry = "clipped_cylinder"
@@ -52,3 +58,22 @@ def changed(text: str, **values: object) -> str:
 def solid(text: str, size_mm: float) -> str:
     """The scene in 3D, on a swept mesh."""
     return changed(text, domain="solid", size_mm=size_mm).replace("[mesh]\n", '[mesh]\nmesher = "swept"\n')
+
+
+SECTION = changed(HALF_CYLINDER, title="a <script>alert(1)</script> & ü", name="<g>", angle_deg=0.0)
+"""The half cylinder with a title and a name that hold markup."""
+
+SOLID = solid(SECTION, 0.5)
+
+
+def pressed(folder: Path, text: str, *arguments: str) -> Path:
+    """Press a scene by the command line, and return the folder of the results."""
+    (folder / "scene.toml").write_text(text, encoding="utf-8")
+    assert main(["press", str(folder / "scene.toml"), "--out", str(folder / "out"), "--no-error", *arguments]) == 0
+    return folder / "out"
+
+
+def words(page: Path) -> str:
+    """What a reader reads: the page without scripts, styles, pictures and tags."""
+    text = re.sub(r"<(script|style)\b.*?</\1>", " ", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    return " ".join(unescape(re.sub(r"<[^>]*>", " ", text)).split())

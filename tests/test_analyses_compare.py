@@ -80,18 +80,18 @@ def force(compared, model: str, width: float) -> float:
     return found.numbers[FORCE]
 
 
-def test_a_solid_passes_from_plane_stress_to_plane_strain_as_it_widens(compared):
+def test_a_solid_passes_from_plane_stress_to_plane_strain_as_it_widens(compared) -> None:
     forces = [force(compared, "solid", w) for w in (5.0, 20.0, 200.0, 1200.0)]
     assert forces == sorted(forces)
     assert force(compared, "plane stress", 5.0) < forces[0]
     assert forces[-1] < force(compared, "plane strain", 1200.0) < 1.06 * forces[-1]
 
 
-def test_held_ends_make_plane_strain_of_a_narrow_solid(compared):
+def test_held_ends_make_plane_strain_of_a_narrow_solid(compared) -> None:
     assert force(compared, "solid, ends held", 20.0) == pytest.approx(force(compared, "plane strain", 20.0), rel=5e-3)
 
 
-def test_the_verdict_of_the_papers_finger(compared):
+def test_the_verdict_of_the_papers_finger(compared) -> None:
     text = " ".join(compared.verdict)
     (percent,) = re.findall(r"At width/height 0.4 .* plane strain overstates the force by (\d+) %", text)
     assert 70 <= int(percent) <= 78
@@ -102,7 +102,7 @@ def test_the_verdict_of_the_papers_finger(compared):
     assert compared.outcome.ok
 
 
-def test_what_is_written_agrees_with_what_is_returned(compared):
+def test_what_is_written_agrees_with_what_is_returned(compared) -> None:
     told = json.loads((compared.out / "compare.json").read_text())
     assert told["outcome"] == "converged"
     assert tuple(told["verdict"]) == compared.verdict
@@ -119,14 +119,14 @@ def test_what_is_written_agrees_with_what_is_returned(compared):
     assert load(compared.out / "scene.toml").domain == "solid"
 
 
-def test_models_of_one_width_share_their_in_plane_mesh(compared):
+def test_models_of_one_width_share_their_in_plane_mesh(compared) -> None:
     for width in (5.0, 20.0, 200.0, 1200.0):
         assert len({c.size_mm for c in compared.cases if c.width_mm == width and "held" not in c.model}) == 1
 
 
 @pytest.mark.parametrize("domain", ["plane-strain", "plane-stress"])
 @pytest.mark.parametrize("nu", [0.3, 0.49])
-def test_error_bars_hold_the_answer_of_a_fine_mesh(scene, domain, nu):
+def test_error_bars_hold_the_answer_of_a_fine_mesh(scene, domain, nu) -> None:
     model = load(scene, [f"model.domain={domain}", f"material.nu={nu}"]).model()
     fine = cases.press_without_errors("fine", resized(model, 0.4))
     for size in (5.0, 3.0, 2.0):
@@ -138,7 +138,7 @@ def test_error_bars_hold_the_answer_of_a_fine_mesh(scene, domain, nu):
 
 
 @pytest.mark.parametrize("domain", ["plane-strain", "solid"])
-def test_a_case_has_the_very_bars_of_a_press(scene, domain):
+def test_a_case_has_the_very_bars_of_a_press(scene, domain) -> None:
     model = load(scene, [f"model.domain={domain}"]).model()
     case = press_with_errors(domain, model)
     problem = build(model)
@@ -158,14 +158,14 @@ def test_a_case_has_the_very_bars_of_a_press(scene, domain):
 
 
 @pytest.mark.parametrize("width", [1.0, 20.0, 2000.0])
-def test_other_widths_are_structured_and_have_room_for_the_companion(scene, width):
+def test_other_widths_are_structured_and_have_room_for_the_companion(scene, width) -> None:
     wide = widened(load(scene, ["mesh.mesher=ftetwild"]).model(), width)
     assert (wide.design.width_mm, wide.mesh.mesher) == (width, "swept")
     assert wide.mesh.size_mm * FACTOR <= min(width, 50.0)
     assert wide.mesh.base_size_mm / wide.mesh.size_mm == pytest.approx(12.0 / 5.0)
 
 
-def test_the_width_is_interpolated_in_one_over_width():
+def test_the_width_is_interpolated_in_one_over_width() -> None:
     # deviation = 40/width exactly: 5 % at 800
     found = [Deviation(w, 40.0 / w, 0.1 * 40.0 / w) for w in (200.0, 20.0, 1000.0)]
     at, low, high = crossing_width(found, narrow=False)
@@ -173,12 +173,12 @@ def test_the_width_is_interpolated_in_one_over_width():
     assert (low, high) == (pytest.approx(720.0), pytest.approx(880.0))
 
 
-def test_narrow_enough_for_plane_stress_is_an_upper_width():
+def test_narrow_enough_for_plane_stress_is_an_upper_width() -> None:
     found = [Deviation(w, -0.002 * w, 0.0) for w in (5.0, 20.0, 50.0)]
     assert crossing_width(found, narrow=True)[0] == pytest.approx(25.0)
 
 
-def test_a_width_that_was_not_asked_for_is_not_made_up():
+def test_a_width_that_was_not_asked_for_is_not_made_up() -> None:
     assert crossing_width([Deviation(20.0, 0.7, 0.01), Deviation(200.0, 0.2, 0.01)], narrow=False) is None
     solids = [case("solid", w, f) for w, f in ((20.0, 10.0), (200.0, 15.0))]
     planes = [case("plane strain", w, 18.0) for w in (20.0, 200.0)]
@@ -186,13 +186,13 @@ def test_a_width_that_was_not_asked_for_is_not_made_up():
     assert re.search(r"Plane strain is not within 5 % .* \(\+20 % at 200 mm, .*at about 800 mm", text)
 
 
-def test_no_width_is_guessed_from_a_narrow_finger():
+def test_no_width_is_guessed_from_a_narrow_finger() -> None:
     cases = [case("solid", w, f) for w, f in ((20.0, 10.0), (50.0, 11.0))]
     cases += [case("plane strain", w, 18.0) for w in (20.0, 50.0)]
     assert "1/width" not in " ".join(verdict(cases, 20.0, 50.0))
 
 
-def test_an_error_bar_that_leaves_the_widths_asked_says_on_which_side():
+def test_an_error_bar_that_leaves_the_widths_asked_says_on_which_side() -> None:
     forces = {"solid": (10.0, 10.4), "plane strain": (11.0, 10.8), "plane stress": (9.7, 9.0)}
     cases = [case(m, w, f, 0.15) for m, both in forces.items() for w, f in zip((20.0, 200.0), both, strict=True)]
     cases = [replace(c, mesher="ftetwild") for c in cases]
@@ -201,17 +201,17 @@ def test_an_error_bar_that_leaves_the_widths_asked_says_on_which_side():
     assert re.search(r"up to a width of [\d.]+ mm \(error bar less than 20 to [\d.]+\)", text)
 
 
-def test_within_everywhere_is_said_so():
+def test_within_everywhere_is_said_so() -> None:
     found = [case(m, w, 10.0 + 0.1 * (m == "plane strain")) for m in ("plane strain", "solid") for w in (20.0, 200.0)]
     assert re.search(r"Plane strain is within 5 % .*, 20 to 200 mm\.", " ".join(verdict(found, 20.0, 50.0)))
 
 
-def test_a_deviation_carries_both_error_bars():
+def test_a_deviation_carries_both_error_bars() -> None:
     d = deviation(case("plane strain", 20.0, 15.0, 0.15), case("solid", 20.0, 10.0, 0.2))
     assert (d.value, d.error) == (pytest.approx(0.5), pytest.approx(1.5 * (0.01**2 + 0.02**2) ** 0.5))
 
 
-def test_on_swept_meshes_a_common_error_cancels():
+def test_on_swept_meshes_a_common_error_cancels() -> None:
     plane, solid = case("plane strain", 20.0, 15.0, 0.15), case("solid", 20.0, 10.0, 0.1)
     plane, solid = replace(plane, companion={FORCE: 15.3}), replace(solid, companion={FORCE: 10.2})
     # both change by 2 %, so the deviation does not: of the bar of two unrelated errors a quarter is kept
@@ -220,12 +220,12 @@ def test_on_swept_meshes_a_common_error_cancels():
     assert apart > 0.01
 
 
-def test_a_deviation_within_its_error_bar_of_the_limit_is_not_significant():
+def test_a_deviation_within_its_error_bar_of_the_limit_is_not_significant() -> None:
     told = verdict([case("plane strain", 20.0, 10.52, 0.1), case("solid", 20.0, 10.0, 0.1)], 20.0, 50.0)[-1]
     assert "not significantly more or less than 5 % in force (+5.2 %)" in told
 
 
-def test_without_a_solid_there_is_no_verdict():
+def test_without_a_solid_there_is_no_verdict() -> None:
     failed = Case("solid", 20.0, 2.0, "swept", Outcome.NO_CONVERGENCE)
     text = verdict([case("plane strain", 20.0, 10.0), failed], 20.0, 50.0)
     assert text[0].startswith("solid, 20 mm wide, has no result: contact did not settle")
@@ -233,7 +233,7 @@ def test_without_a_solid_there_is_no_verdict():
 
 
 @pytest.mark.parametrize(("value", "text"), [(123.4, "120"), (8.16e2, "820"), (0.0567, "0.057")])
-def test_rounded_numbers_have_no_exponent(value, text):
+def test_rounded_numbers_have_no_exponent(value, text) -> None:
     assert rounded(value) == text
 
 
@@ -246,13 +246,13 @@ def test_rounded_numbers_have_no_exponent(value, text):
         ([], [float("nan")], "--widths nan: must be positive"),
     ],
 )
-def test_what_a_section_cannot_stand_for_is_refused(scene, tmp_path, overrides, widths, words):
+def test_what_a_section_cannot_stand_for_is_refused(scene, tmp_path, overrides, widths, words) -> None:
     with pytest.raises(Finger3dError, match=re.escape(words)):
         compare(load(scene, overrides), tmp_path / "out", widths)
     assert not (tmp_path / "out").exists()
 
 
-def test_a_ball_has_no_section(scene, tmp_path):
+def test_a_ball_has_no_section(scene, tmp_path) -> None:
     ball = '[finger]\ngeometry = "hemisphere"\nradius_mm = 50.0\n[material]'
     text = re.sub(r"\[finger\].*?\[material\]", ball, SCENE, flags=re.S)
     scene.write_text(text.replace('mesher = "swept"\n', "").replace("y_mm = 38.0", "y_mm = 20.0"))
@@ -260,18 +260,18 @@ def test_a_ball_has_no_section(scene, tmp_path):
         compare(scene, tmp_path / "out")
 
 
-def test_an_object_that_varies_along_the_width_is_pointed_out(scene, tmp_path):
+def test_an_object_that_varies_along_the_width_is_pointed_out(scene, tmp_path) -> None:
     told = compare(load(scene, ["object.shape=sphere", "object.radius_mm=200.0"]), tmp_path / "out", ()).verdict
     assert any("changes along the width" in line for line in told)
 
 
-def test_the_scenes_own_domain_does_not_matter(scene, tmp_path):
+def test_the_scenes_own_domain_does_not_matter(scene, tmp_path) -> None:
     as_strain = compare(load(scene, ["model.domain=plane-strain"]), tmp_path / "a", ())
     as_solid = compare(load(scene), tmp_path / "b", ())
     assert [c.numbers for c in as_strain.cases] == [c.numbers for c in as_solid.cases]
 
 
-def test_the_command_prints_the_verdict(scene, tmp_path, capsys):
+def test_the_command_prints_the_verdict(scene, tmp_path, capsys) -> None:
     assert main(["compare", str(scene), "--out", str(tmp_path / "out"), "--widths", "50"]) == 0
     out = capsys.readouterr().out
     assert "step 7 of 7" in out
@@ -279,14 +279,14 @@ def test_the_command_prints_the_verdict(scene, tmp_path, capsys):
 
 
 @pytest.mark.parametrize("widths", ["5,abc", "5,,20", "-5", "inf"])
-def test_widths_that_are_none_are_refused_in_one_line(scene, tmp_path, capsys, widths):
+def test_widths_that_are_none_are_refused_in_one_line(scene, tmp_path, capsys, widths) -> None:
     assert main(["compare", str(scene), "--out", str(tmp_path / "out"), f"--widths={widths}"]) == 2
     err = capsys.readouterr().err
     assert err.startswith("finger3d: --widths")
     assert err.count("\n") == 1
 
 
-def test_a_case_that_fails_is_named_and_the_others_are_kept(scene, tmp_path, monkeypatch, capsys):
+def test_a_case_that_fails_is_named_and_the_others_are_kept(scene, tmp_path, monkeypatch, capsys) -> None:
     def failing(name, model):
         if name == "solid":
             return Case(name, model.design.width_mm, model.mesh.size_mm, "swept", Outcome.NO_CONVERGENCE)
@@ -302,7 +302,7 @@ def test_a_case_that_fails_is_named_and_the_others_are_kept(scene, tmp_path, mon
     assert sum(bool(c["numbers"]) for c in told["cases"]) == 5
 
 
-def test_an_interrupted_comparison_keeps_its_cases(scene, tmp_path, monkeypatch, capsys):
+def test_an_interrupted_comparison_keeps_its_cases(scene, tmp_path, monkeypatch, capsys) -> None:
     def interrupted(name, model):
         if name == "solid":
             raise KeyboardInterrupt

@@ -17,7 +17,7 @@ from finger3d.errors import Finger3dError
 from finger3d.mechanics.build import build
 from finger3d.mechanics.solve import march
 from finger3d.scene import load, tree
-from tests.test_report import words
+from tests.scenes import words
 
 SETS = ["model.domain=plane-strain", "mesh.size_mm=4", "mesh.base_size_mm=16", "press.steps=10"]
 COARSE = [option for text in SETS for option in ("--set", text)]
@@ -35,7 +35,7 @@ def table_of(strain: list[float], mu: tuple[float, ...] = MUS) -> ObjectiveTable
     return ObjectiveTable(np.array(mu), {"g": np.array(strain)}, (), 1e-3, "g", None)  # type: ignore[arg-type]
 
 
-def test_sensitivity_is_the_least_slope_in_units_of_noise():
+def test_sensitivity_is_the_least_slope_in_units_of_noise() -> None:
     # slopes 0.1/0.4 and 0.05/0.5 per mu, noise 1e-3
     assert sensitivity(table_of([0.0, 0.1, 0.15])) == pytest.approx(100.0)
     assert sensitivity(table_of([0.0, -0.1, -0.15])) == pytest.approx(100.0)
@@ -43,7 +43,7 @@ def test_sensitivity_is_the_least_slope_in_units_of_noise():
     assert sensitivity(table_of([0.0, 0.1, 0.05])) == pytest.approx(-100.0)
 
 
-def test_gauges_are_searched_in_one_body_and_read_as_a_press_reads_them(problem, tmp_path):
+def test_gauges_are_searched_in_one_body_and_read_as_a_press_reads_them(problem, tmp_path) -> None:
     found = optimise(problem, tmp_path)
     assert found.bodies == 1
     assert len(found.evaluations) == 13
@@ -58,7 +58,7 @@ def test_gauges_are_searched_in_one_body_and_read_as_a_press_reads_them(problem,
 
 
 @pytest.mark.parametrize("bulk", [True, False])
-def test_gauges_of_a_body_that_relaxes_are_read_as_a_press_reads_them(problem, bulk, tmp_path):
+def test_gauges_of_a_body_that_relaxes_are_read_as_a_press_reads_them(problem, bulk, tmp_path) -> None:
     """Ten time constants long, so that the instantaneous field is far from the one the press ends with."""
     visco = f"effects.viscosity={{prony = [[0.5, 0.1]], bulk = {str(bulk).lower()}}}"
     given = tree.override(problem.given, [*SETS, visco, "press.duration_s=1.0", "press.steps=4", "material.nu=0.45"])
@@ -72,7 +72,7 @@ def test_gauges_of_a_body_that_relaxes_are_read_as_a_press_reads_them(problem, b
     assert found.best.value == pytest.approx(sensitivity(replace(table_of(strain), noise=problem.noise)), rel=1e-9)
 
 
-def test_a_search_goes_on_with_what_is_kept_and_is_the_same_every_time(problem, tmp_path):
+def test_a_search_goes_on_with_what_is_kept_and_is_the_same_every_time(problem, tmp_path) -> None:
     whole = optimise(replace(problem, budget=10), tmp_path / "whole")
     first = optimise(replace(problem, budget=4), tmp_path / "parts")
     kept = tmp_path / "parts" / "evaluations.jsonl"
@@ -86,14 +86,14 @@ def test_a_search_goes_on_with_what_is_kept_and_is_the_same_every_time(problem, 
         optimise(replace(problem, noise=1.0), tmp_path / "parts")
 
 
-def test_keys_of_the_body_search_the_gauges_anew_in_every_body(problem, tmp_path):
+def test_keys_of_the_body_search_the_gauges_anew_in_every_body(problem, tmp_path) -> None:
     free = (FreeKey("finger.edge_height_mm", 30.0, 40.0), ANGLE)
     found = optimise(replace(problem, free=free, budget=2), tmp_path)
     assert 2 <= found.bodies <= 3
     assert len(found.evaluations) > 50
 
 
-def test_a_design_that_cannot_be_built_is_a_line_with_its_reason(problem, tmp_path):
+def test_a_design_that_cannot_be_built_is_a_line_with_its_reason(problem, tmp_path) -> None:
     found = optimise(replace(problem, free=(FreeKey("gauge.0.y_mm", 40.0, 60.0),), budget=8), tmp_path)
     with (tmp_path / "evaluations.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
@@ -108,13 +108,13 @@ def test_a_design_that_cannot_be_built_is_a_line_with_its_reason(problem, tmp_pa
 
 
 @pytest.mark.parametrize("method", ["dual-annealing", "nelder-mead"])
-def test_other_optimisers_stay_within_bounds_and_budget(method, problem, tmp_path):
+def test_other_optimisers_stay_within_bounds_and_budget(method, problem, tmp_path) -> None:
     found = optimise(replace(problem, method=method), tmp_path)
     assert len(found.evaluations) <= problem.budget + 1
     assert all(ANGLE.low <= e.values[0] <= ANGLE.high for e in found.evaluations)
 
 
-def test_an_objective_from_a_file_on_the_command_line(root, tmp_path, capsys):
+def test_an_objective_from_a_file_on_the_command_line(root, tmp_path, capsys) -> None:
     judge = tmp_path / "judge.py"
     judge.write_text("def objective(table):\n    return -abs(table.scene.tables.gauge[0].angle_deg - 40.0)\n")
     scene, out = root / "geometries" / "fig9.toml", tmp_path / "out"
@@ -149,7 +149,7 @@ def test_an_objective_from_a_file_on_the_command_line(root, tmp_path, capsys):
         (["--free", "gauge.g36.x_mm=1:2", "--noise", "0"], "must be above 0"),
     ],
 )
-def test_bad_input_is_one_line(options, expected, root, tmp_path, capsys):
+def test_bad_input_is_one_line(options, expected, root, tmp_path, capsys) -> None:
     scene = root / "geometries" / "fig9.toml"
     assert main(["optimise", str(scene), *COARSE, *options, "--out", str(tmp_path / "out")]) == 2
     err = capsys.readouterr().err

@@ -44,7 +44,7 @@ SHARING = [
 ]
 
 
-def test_a_body_pressed_as_its_variants_is_each_pressed_on_its_own():
+def test_a_body_pressed_as_its_variants_is_each_pressed_on_its_own() -> None:
     scenes = [scene(), *(scene(*c) for c in SHARING)]
     assert list(families(scenes).values()) == [list(range(len(scenes)))]
     models = [s.model() for s in scenes]
@@ -60,7 +60,7 @@ def test_a_body_pressed_as_its_variants_is_each_pressed_on_its_own():
         assert shared.gauges == pytest.approx(alone["gauges"], rel=1e-9)
 
 
-def test_a_slide_among_the_variants_costs_the_mirror_plane_only():
+def test_a_slide_among_the_variants_costs_the_mirror_plane_only() -> None:
     """A plane touches the same places however it slides, so the mesh is the same."""
     level = ["object={shape='plane'}", "finger={geometry='half_cylinder', radius_mm=3.0, width_mm=1.0}"]
     level += ["gauge.0.x_mm=0.5"]
@@ -75,7 +75,7 @@ def test_a_slide_among_the_variants_costs_the_mirror_plane_only():
         )
 
 
-def test_a_shallower_press_on_the_mesh_of_the_deepest():
+def test_a_shallower_press_on_the_mesh_of_the_deepest() -> None:
     models = [scene().model(), scene("press.depth_mm=0.15").model()]
     body = SharedBody(models[0], [Variant.of(m) for m in models])
     shared = body.press(Variant.of(models[1]))
@@ -90,7 +90,7 @@ def test_a_shallower_press_on_the_mesh_of_the_deepest():
     assert shared.numbers["normal_force_N"] == pytest.approx(alone["normal_force_N"], rel=0.02)
 
 
-def test_candidates_are_widened_when_contact_reaches_beyond_them(monkeypatch):
+def test_candidates_are_widened_when_contact_reaches_beyond_them(monkeypatch) -> None:
     model = scene("friction.mu=0.0").model()
     wide = SharedBody(model, [Variant.of(model)]).press(Variant.of(model))
     said = []
@@ -102,7 +102,7 @@ def test_candidates_are_widened_when_contact_reaches_beyond_them(monkeypatch):
     assert again.numbers["normal_force_N"] == pytest.approx(wide.numbers["normal_force_N"], rel=1e-9)
 
 
-def test_gauges_alone_cost_no_press():
+def test_gauges_alone_cost_no_press() -> None:
     models = [scene().model(), scene("gauge.0.x_mm=0.5").model()]
     body = SharedBody(models[0], [Variant.of(m) for m in models])
     first, second = (body.press(Variant.of(m)) for m in models)
@@ -119,11 +119,11 @@ def test_gauges_alone_cost_no_press():
         "model.domain=plane-stress", "effects.large_deformation={}",
     ],
 )  # fmt: skip
-def test_what_shapes_the_condensation_makes_another_body(change):
+def test_what_shapes_the_condensation_makes_another_body(change) -> None:
     assert body_key(scene(change)) != body_key(scene())
 
 
-def test_a_gauge_that_is_stiff_shapes_the_body():
+def test_a_gauge_that_is_stiff_shapes_the_body() -> None:
     foil = ["effects.embedded_gauge={E_MPa=3000.0, thickness_mm=0.02, width_mm=1.0}", "gauge.0.length_mm=1.0"]
     assert body_key(scene(*foil)) != body_key(scene(*foil, "gauge.0.x_mm=0.5"))
     models = [scene(*foil).model(), scene(*foil, "friction.mu=1.0").model()]
@@ -133,7 +133,7 @@ def test_a_gauge_that_is_stiff_shapes_the_body():
     assert body.press(Variant.of(models[1])).gauges == pytest.approx(alone["gauges"], rel=1e-9)
 
 
-def test_chosen_sizes_follow_the_depth_and_are_shared():
+def test_chosen_sizes_follow_the_depth_and_are_shared() -> None:
     free = {k: v for k, v in BLOCK.items() if k != "mesh"}
     scenes = [parse(tree.override(tree.frozen(free), [f"press.depth_mm={d}"])) for d in (0.004, 0.3)]
     assert scenes[0].mesh.size_mm < scenes[1].mesh.size_mm
@@ -141,7 +141,7 @@ def test_chosen_sizes_follow_the_depth_and_are_shared():
     assert finest([s.model() for s in scenes]).size_mm == scenes[0].mesh.size_mm
 
 
-def test_a_step_that_fails_is_named():
+def test_a_step_that_fails_is_named() -> None:
     """The paper's rule, which does not exclude friction that helps slip."""
     model = scene("contact.rule=paper", "material.nu=0.45", "mesh.size_mm=0.1", "press.depth_mm=0.6").model()
     pressed = SharedBody(model, [Variant.of(model)]).press(Variant.of(model))
@@ -154,7 +154,7 @@ def variant(*legs: Leg) -> Variant:
     return replace(Variant.of(scene().model()), legs=legs)
 
 
-def test_the_shared_path_goes_everywhere_and_nowhere_else():
+def test_the_shared_path_goes_everywhere_and_nowhere_else() -> None:
     a, b = (Leg(1.0), Leg(1.0, 2.0)), (Leg(2.0),)
     assert shared_legs([variant(*a)]) == a
     assert shared_legs([variant(*b), variant(Leg(1.0))]) == b
@@ -174,7 +174,7 @@ def test_the_shared_path_goes_everywhere_and_nowhere_else():
     ids=["paper", "embedded gauge", "elastic object", "viscosity", "shear relaxes", "large deformation"],
 )
 @pytest.mark.parametrize("at_once", [8_000_000, 1], ids=["together", "in chunks"])
-def test_several_presses_are_proved_as_each_on_its_own(effect, at_once, monkeypatch):
+def test_several_presses_are_proved_as_each_on_its_own(effect, at_once, monkeypatch) -> None:
     """The gaps beyond the candidates are those of a back-substitution for each press, over the whole face."""
     monkeypatch.setattr("finger3d.mechanics.problem._AT_ONCE", at_once)
     model = scene(*effect).model()
@@ -208,7 +208,7 @@ def test_several_presses_are_proved_as_each_on_its_own(effect, at_once, monkeypa
     )
 
 
-def test_one_solver_proves_as_the_other(monkeypatch):
+def test_one_solver_proves_as_the_other(monkeypatch) -> None:
     problem = build(scene().model())
     ends = [list(march(problem))[-1]] * 3
     monkeypatch.setenv("FINGER3D_SOLVER", "superlu")
@@ -219,7 +219,7 @@ def test_one_solver_proves_as_the_other(monkeypatch):
         assert np.abs(a - b).max() <= 1e-12 * np.abs(b).max()
 
 
-def test_a_face_that_is_touched_nearly_everywhere_is_all_candidates():
+def test_a_face_that_is_touched_nearly_everywhere_is_all_candidates() -> None:
     """Then nothing is beyond them, and no press pays a proof."""
     level = ["object={shape='plane'}", "finger={geometry='block', half_length_mm=4.0, height_mm=3.0, width_mm=4.0}"]
     assert candidates_cover_face(build(scene(*level).model()))
@@ -235,7 +235,7 @@ def narrowed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("threads", [False, True], ids=["in turn", "at once"])
-def test_presses_together_are_the_presses_alone(threads, monkeypatch):
+def test_presses_together_are_the_presses_alone(threads, monkeypatch) -> None:
     """Two reach beyond the candidates, one does not, two differ in their gauges only; in the order asked."""
     monkeypatch.setattr("finger3d.mechanics.parallel._ROWS_FOR_THREADS", 1 if threads else 10**6)
     monkeypatch.setattr("finger3d.mechanics.parallel.cores", lambda: 2)
@@ -261,7 +261,7 @@ def test_presses_together_are_the_presses_alone(threads, monkeypatch):
 
 
 @pytest.mark.parametrize("threads", [False, True], ids=["in turn", "at once"])
-def test_a_press_that_fails_takes_no_other_along(threads, monkeypatch):
+def test_a_press_that_fails_takes_no_other_along(threads, monkeypatch) -> None:
     monkeypatch.setattr("finger3d.mechanics.parallel._ROWS_FOR_THREADS", 1 if threads else 10**6)
     monkeypatch.setattr("finger3d.mechanics.parallel.cores", lambda: 2)
     models = [scene(f"friction.mu={mu}").model() for mu in (0.1, 0.5, 1.0)]
@@ -280,7 +280,7 @@ def test_a_press_that_fails_takes_no_other_along(threads, monkeypatch):
         body.press(Variant.of(models[1]))
 
 
-def test_presses_that_cannot_be_proved_fail_and_what_failed_before_keeps_its_reason(monkeypatch):
+def test_presses_that_cannot_be_proved_fail_and_what_failed_before_keeps_its_reason(monkeypatch) -> None:
     models = [scene(f"friction.mu={mu}").model() for mu in (0.1, 0.5)]
     variants = [Variant.of(m) for m in models]
     body = SharedBody(models[0], variants)
@@ -298,7 +298,7 @@ def test_presses_that_cannot_be_proved_fail_and_what_failed_before_keeps_its_rea
     assert [str(p) for p in body.presses(variants)] == ["no proof", "its own"]
 
 
-def test_a_body_that_cannot_be_widened_fails_those_that_need_it_only(monkeypatch):
+def test_a_body_that_cannot_be_widened_fails_those_that_need_it_only(monkeypatch) -> None:
     models = [scene(change).model() for change in ("friction.mu=0.1", "press.depth_mm=0.03", "friction.mu=1.0")]
     variants = [Variant.of(m) for m in models]
 

@@ -56,7 +56,7 @@ def table(out: Path) -> list[dict]:
         return list(csv.DictReader(file))
 
 
-def test_every_combination_is_a_point_and_only_the_material_makes_bodies(scene):
+def test_every_combination_is_a_point_and_only_the_material_makes_bodies(scene) -> None:
     sweep = points_of(scene, "friction.mu=0.06,0.25", "material.nu=0.45,0.49", "gauge.g36.angle_deg=10,20")
     assert [p.number for p in sweep.points] == list(range(8))
     assert sweep.points[1].values == {"friction.mu": 0.06, "material.nu": 0.45, "gauge.g36.angle_deg": 20}
@@ -72,7 +72,7 @@ def test_every_combination_is_a_point_and_only_the_material_makes_bodies(scene):
         ('title="a,b",c', ("a,b", "c")),
     ],
 )
-def test_values_are_told_apart_by_commas_outside_brackets_and_quotes(text, values):
+def test_values_are_told_apart_by_commas_outside_brackets_and_quotes(text, values) -> None:
     assert Vary.of(text).values == values
 
 
@@ -98,7 +98,7 @@ def test_values_are_told_apart_by_commas_outside_brackets_and_quotes(text, value
         ([f"friction.mu={','.join(map(str, range(400)))}", f"material.nu={','.join(map(str, range(400)))}"], "160000"),
     ],
 )
-def test_bad_values_are_refused_before_the_first_run(vary, expected, scene, tmp_path, capsys):
+def test_bad_values_are_refused_before_the_first_run(vary, expected, scene, tmp_path, capsys) -> None:
     options = [option for text in vary for option in ("--vary", text)]
     assert main(["sweep", str(scene), *COARSE, *options, "--out", str(tmp_path / "out")]) == 2
     err = capsys.readouterr().err
@@ -118,7 +118,7 @@ def test_bad_values_are_refused_before_the_first_run(vary, expected, scene, tmp_
 )
 def test_a_cluster_that_cannot_be_used_is_told_in_one_line(
     options, code, expected, scene, tmp_path, capsys, monkeypatch
-):
+) -> None:
     monkeypatch.setattr("finger3d.analyses.sweep.cluster.CONNECT_S", 1.0)
     arguments = ["sweep", str(scene), *COARSE, "--vary", "friction.mu=0.1", "--out", str(tmp_path / "out"), *options]
     assert main(arguments) == code
@@ -127,7 +127,7 @@ def test_a_cluster_that_cannot_be_used_is_told_in_one_line(
     assert expected in err
 
 
-def test_a_scheduler_that_does_not_answer_is_left_after_the_time_limit(scene, tmp_path, monkeypatch):
+def test_a_scheduler_that_does_not_answer_is_left_after_the_time_limit(scene, tmp_path, monkeypatch) -> None:
     monkeypatch.setattr("finger3d.analyses.sweep.cluster.CONNECT_S", 1.0)
     with socket.socket() as deaf:
         deaf.bind(("127.0.0.1", 0))
@@ -139,7 +139,7 @@ def test_a_scheduler_that_does_not_answer_is_left_after_the_time_limit(scene, tm
         assert time.monotonic() - start < 10.0
 
 
-def test_rows_become_a_table_in_the_scenes_own_names(scene, tmp_path):
+def test_rows_become_a_table_in_the_scenes_own_names(scene, tmp_path) -> None:
     sweep = points_of(scene, "friction.mu=0.06,1", "contact.rule=projection,paper")
     rows = pressed_here(sweep)
     with ResultStore(sweep, tmp_path).open() as kept:
@@ -160,7 +160,7 @@ def test_rows_become_a_table_in_the_scenes_own_names(scene, tmp_path):
     assert float(table(tmp_path)[0]["normal_force_N"]) == rows[0]["normal_force_N"]
 
 
-def test_a_torn_line_is_dropped_and_its_point_done_again(scene, tmp_path):
+def test_a_torn_line_is_dropped_and_its_point_done_again(scene, tmp_path) -> None:
     sweep = points_of(scene, "friction.mu=0.06,1")
     rows = pressed_here(sweep)
     with ResultStore(sweep, tmp_path).open() as kept:
@@ -185,7 +185,7 @@ EDITS = [
 ] + [{"gauge_g36": "5"}, {"a b": []}]  # fmt: skip
 
 
-def test_a_journal_edited_by_hand_is_one_line(scene, tmp_path, capsys):
+def test_a_journal_edited_by_hand_is_one_line(scene, tmp_path, capsys) -> None:
     sweep = points_of(scene, "friction.mu=0.06,1")
     rows = pressed_here(sweep)
     with ResultStore(sweep, tmp_path).open() as kept:
@@ -207,7 +207,7 @@ def test_a_journal_edited_by_hand_is_one_line(scene, tmp_path, capsys):
     assert str(journal) in capsys.readouterr().err
 
 
-def test_a_damaged_sweep_json_is_one_line(scene, tmp_path, capsys):
+def test_a_damaged_sweep_json_is_one_line(scene, tmp_path, capsys) -> None:
     with ResultStore(points_of(scene, "friction.mu=0.06,1"), tmp_path).open():
         pass
     path = tmp_path / "sweep.json"
@@ -228,7 +228,7 @@ def test_a_damaged_sweep_json_is_one_line(scene, tmp_path, capsys):
 
 
 @pytest.mark.parametrize("data", [b"point\n\xe9", b'point\n"' + b"a" * 200_000])
-def test_a_damaged_table_is_one_line(data, tmp_path, capsys):
+def test_a_damaged_table_is_one_line(data, tmp_path, capsys) -> None:
     (tmp_path / "sweep.json").write_text('{"vary": {"friction.mu": ["0.1", "0.2"]}}')
     (tmp_path / "results.csv").write_bytes(data)
     assert main(["show", str(tmp_path), "--png", str(tmp_path / "a.png")]) == 2
@@ -237,7 +237,7 @@ def test_a_damaged_table_is_one_line(data, tmp_path, capsys):
     assert str(tmp_path / "results.csv") in err
 
 
-def test_a_folder_of_another_sweep_is_refused(scene, tmp_path, capsys):
+def test_a_folder_of_another_sweep_is_refused(scene, tmp_path, capsys) -> None:
     with ResultStore(points_of(scene, "friction.mu=0.06,1"), tmp_path).open():
         pass
     arguments = ["sweep", str(scene), *COARSE, "--vary", "friction.mu=0.06,2", "--out", str(tmp_path)]
@@ -254,7 +254,7 @@ def test_a_folder_of_another_sweep_is_refused(scene, tmp_path, capsys):
         (["material.nu=0.4"], "its friction.mu is"),
     ],
 )
-def test_what_makes_it_another_sweep_is_named(vary, expected, scene, tmp_path):
+def test_what_makes_it_another_sweep_is_named(vary, expected, scene, tmp_path) -> None:
     with ResultStore(points_of(scene, "friction.mu=0.06,1"), tmp_path).open():
         pass
     with pytest.raises(Finger3dError, match=expected), ResultStore(points_of(scene, *vary), tmp_path).open():
@@ -264,7 +264,7 @@ def test_what_makes_it_another_sweep_is_named(vary, expected, scene, tmp_path):
         pass
 
 
-def test_one_body_is_swept_without_workers_and_its_points_are_shown(scene, tmp_path, capsys, monkeypatch):
+def test_one_body_is_swept_without_workers_and_its_points_are_shown(scene, tmp_path, capsys, monkeypatch) -> None:
     monkeypatch.setattr("finger3d.analyses.sweep.cluster.local", lambda *a: pytest.fail("workers were started"))
     vary = ["--vary", "friction.mu=0.1,0.2,0.3,0.4,0.5,0.6", "--vary", "gauge.g36.angle_deg=15,30"]
     assert main(["sweep", str(scene), *COARSE, *vary, "--out", str(tmp_path)]) == 0
@@ -289,14 +289,14 @@ def test_one_body_is_swept_without_workers_and_its_points_are_shown(scene, tmp_p
     assert [row["gauge_g36"] for row in data["rows"]] == [float(row["gauge_g36"]) for row in found]
 
 
-def test_a_folder_in_use_is_refused(scene, tmp_path):
+def test_a_folder_in_use_is_refused(scene, tmp_path) -> None:
     sweep = points_of(scene, "friction.mu=0.06")
     with ResultStore(sweep, tmp_path).open(), pytest.raises(Finger3dError, match="another finger3d is writing there"):
         with ResultStore(sweep, tmp_path).open():
             pass
 
 
-def test_a_sweep_of_one_body_needs_neither_dask_nor_matplotlib(scene, tmp_path):
+def test_a_sweep_of_one_body_needs_neither_dask_nor_matplotlib(scene, tmp_path) -> None:
     code = "import sys; from finger3d.cli import main; main(sys.argv[1:]); "
     code += "sys.exit(repr({'matplotlib', 'distributed'} & set(sys.modules)))"
     words = ["sweep", str(scene), *COARSE, "--vary", "friction.mu=0.1,0.2", "--out", str(tmp_path)]
@@ -306,7 +306,7 @@ def test_a_sweep_of_one_body_needs_neither_dask_nor_matplotlib(scene, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["points.jsonl", "results.parquet"])
-def test_a_full_disk_is_one_line_that_says_what_is_kept(name, scene, tmp_path, monkeypatch):
+def test_a_full_disk_is_one_line_that_says_what_is_kept(name, scene, tmp_path, monkeypatch) -> None:
     sweep = points_of(scene, "friction.mu=0.06,1")
     rows = pressed_here(sweep)
     kept = ResultStore(sweep, tmp_path)
@@ -341,7 +341,7 @@ def test_a_full_disk_is_one_line_that_says_what_is_kept(name, scene, tmp_path, m
         assert again.left() == [sweep.points[1]]
 
 
-def test_a_body_that_cannot_be_built_and_a_point_that_fails_are_rows(scene, monkeypatch):
+def test_a_body_that_cannot_be_built_and_a_point_that_fails_are_rows(scene, monkeypatch) -> None:
     sweep = points_of(scene, "friction.mu=0.06,1")
     monkeypatch.setattr(
         "finger3d.analyses.sweep.worker._build", lambda *a: (_ for _ in ()).throw(Finger3dError("no mesh"))
@@ -359,7 +359,7 @@ def test_a_body_that_cannot_be_built_and_a_point_that_fails_are_rows(scene, monk
 
 
 @pytest.mark.parametrize("threads", [1, None], ids=["a worker", "here"])
-def test_workers_gain_no_threads(threads, scene, monkeypatch):
+def test_workers_gain_no_threads(threads, scene, monkeypatch) -> None:
     """Two workers on two cores are as many as there is room for; a body pressed by this process takes them all."""
     pools = []
 
@@ -379,5 +379,5 @@ def test_workers_gain_no_threads(threads, scene, monkeypatch):
     assert pools == ([] if threads else [2])
 
 
-def test_the_scene_of_these_tests_is_small(scene):
+def test_the_scene_of_these_tests_is_small(scene) -> None:
     assert load(scene, SETS).mesh.size_mm == 4.0

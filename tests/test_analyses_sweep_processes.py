@@ -118,7 +118,7 @@ def killed_and_resumed(command: list[str], out: Path, total: int, env: dict[str,
     assert lines(out)[: len(before)] == before
 
 
-def test_a_sweep_survives_kill_9_of_a_worker_and_of_the_parent(root, scene, tmp_path):
+def test_a_sweep_survives_kill_9_of_a_worker_and_of_the_parent(root, scene, tmp_path) -> None:
     out = tmp_path / "out"
     env = environment(root, str(tmp_path))
     killed_and_resumed(sweeping(scene, out, 60, 4, "--workers", "2"), out, 240, env, tmp_path)
@@ -126,7 +126,7 @@ def test_a_sweep_survives_kill_9_of_a_worker_and_of_the_parent(root, scene, tmp_
 
 
 @pytest.mark.slow
-def test_a_thousand_points_survive_kill_9(root, scene, tmp_path):
+def test_a_thousand_points_survive_kill_9(root, scene, tmp_path) -> None:
     out = tmp_path / "out"
     env = environment(root, str(tmp_path))
     killed_and_resumed(sweeping(scene, out, 50, 20, "--workers", "2"), out, 1000, env, tmp_path)
@@ -148,7 +148,7 @@ def dask(workers: int, env: dict[str, str], where: Path) -> Iterator[tuple[str, 
         yield address, process
 
 
-def test_a_scheduler_and_two_workers_of_their_own(root, scene, tmp_path):
+def test_a_scheduler_and_two_workers_of_their_own(root, scene, tmp_path) -> None:
     env, out = environment(root, str(tmp_path)), tmp_path / "out"
     with dask(2, env, tmp_path) as (address, _):
         command = sweeping(scene, out, 3, 4, "--scheduler", address)
@@ -161,7 +161,7 @@ def test_a_scheduler_and_two_workers_of_their_own(root, scene, tmp_path):
 
 
 @pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGTERM])
-def test_a_scheduler_that_dies_ends_a_sweep_with_3_and_one_line(sent, root, scene, tmp_path):
+def test_a_scheduler_that_dies_ends_a_sweep_with_3_and_one_line(sent, root, scene, tmp_path) -> None:
     env, out = environment(root, str(tmp_path)), tmp_path / "out"
     with dask(1, env, tmp_path) as (address, scheduler):
         command = sweeping(scene, out, 60, 2, "--scheduler", address, *SLOW)
@@ -187,7 +187,7 @@ AT_ONCE += "from finger3d.cli import main; import sys; sys.exit(main())"
 
 
 @pytest.mark.parametrize("bodies", [1, 2, 0], ids=["here", "workers", "threads"])
-def test_ctrl_c_ends_with_130_and_one_line(bodies, root, scene, tmp_path):
+def test_ctrl_c_ends_with_130_and_one_line(bodies, root, scene, tmp_path) -> None:
     out, threads, bodies = tmp_path / "out", bodies == 0, bodies or 1
     command = sweeping(scene, out, 120 // bodies, bodies, "--workers", "1", *SLOW)
     if threads:

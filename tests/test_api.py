@@ -21,7 +21,7 @@ import finger3d
 from finger3d.analyses.result import PressResult
 from finger3d.errors import Finger3dError
 from finger3d.results.vtu import grid
-from tests.test_report import SECTION, SOLID
+from tests.scenes import SECTION, SOLID
 
 EXAMPLES = (
     "finger3d",

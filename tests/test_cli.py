@@ -71,20 +71,20 @@ def fake_press(monkeypatch):
     return calls
 
 
-def test_new_says_what_to_do_next(tmp_path, capsys):
+def test_new_says_what_to_do_next(tmp_path, capsys) -> None:
     path = tmp_path / "mine.toml"
     assert run("new", path) == 0
     assert f"finger3d press {path} --out out" in capsys.readouterr().out
 
 
-def test_new_writes_a_scene_that_loads_and_is_the_papers_finger(scene):
+def test_new_writes_a_scene_that_loads_and_is_the_papers_finger(scene) -> None:
     loaded = load(scene)
     assert loaded.design.width_mm == 20.0
     assert loaded.model().mesh == MeshOptions(2.0, 8.0, "ftetwild")
     assert [leg.depth_mm for leg in loaded.legs] == [10.0]
 
 
-def test_new_explains_every_key(scene):
+def test_new_explains_every_key(scene) -> None:
     text = scene.read_text(encoding="utf-8")
     keys = set(re.findall(r"^\| `(\w+)` \|", reference(), re.MULTILINE))
     assert {"depth_mm", "prony", "tolerance"} <= keys
@@ -93,7 +93,7 @@ def test_new_explains_every_key(scene):
 
 
 @pytest.mark.parametrize("name", effect_names())
-def test_an_effect_of_the_new_scene_is_switched_on_by_uncommenting_it(scene, name):
+def test_an_effect_of_the_new_scene_is_switched_on_by_uncommenting_it(scene, name) -> None:
     before, block = scene.read_text(encoding="utf-8").split(f"# [effects.{name}]\n")
     keys = re.match(r"(?:# \w+ = .*\n)*", block)[0].replace("# ", "", 1).replace("\n# ", "\n")
     text = before.replace("length_mm = 0.0", "length_mm = 2.0").replace("[press]", "[press]\nduration_s = 1.0", 1)
@@ -101,25 +101,25 @@ def test_an_effect_of_the_new_scene_is_switched_on_by_uncommenting_it(scene, nam
     assert set(load(scene).effects) == {name}
 
 
-def test_new_leaves_a_file_alone_that_is_there(scene, capsys):
+def test_new_leaves_a_file_alone_that_is_there(scene, capsys) -> None:
     scene.write_text("mine", encoding="utf-8")
     assert run("new", scene) == 2
     assert f"{scene}: there already" in capsys.readouterr().err
     assert scene.read_text(encoding="utf-8") == "mine"
 
 
-def test_new_without_a_name_writes_scene_toml(tmp_path, monkeypatch):
+def test_new_without_a_name_writes_scene_toml(tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert run("new") == 0
     assert load("scene.toml").title == "Fig. 9 finger, 20 mm wide"
 
 
-def test_new_in_a_folder_that_is_not_there(tmp_path, capsys):
+def test_new_in_a_folder_that_is_not_there(tmp_path, capsys) -> None:
     assert run("new", tmp_path / "no" / "scene.toml") == 2
     assert "cannot be written" in capsys.readouterr().err
 
 
-def test_press_prints_the_closing_table(scene, tmp_path, fake_press, capsys):
+def test_press_prints_the_closing_table(scene, tmp_path, fake_press, capsys) -> None:
     assert run("press", scene, "--out", tmp_path / "out", "--set", "friction.mu=0.5", "--set=press.steps=2") == 0
     out, err = capsys.readouterr()
     assert err == ""
@@ -132,12 +132,12 @@ def test_press_prints_the_closing_table(scene, tmp_path, fake_press, capsys):
         assert text in out
 
 
-def test_press_without_figures(scene, tmp_path, fake_press):
+def test_press_without_figures(scene, tmp_path, fake_press) -> None:
     assert run("press", scene, "--out", tmp_path / "out", "--no-figures") == 0
     assert fake_press.figures is False
 
 
-def test_press_that_does_not_converge_ends_with_3(scene, tmp_path, fake_press, capsys):
+def test_press_that_does_not_converge_ends_with_3(scene, tmp_path, fake_press, capsys) -> None:
     fake_press.end = Outcome.NO_CONVERGENCE
     assert run("press", scene, "--out", tmp_path / "out") == 3
     err = capsys.readouterr().err
@@ -146,19 +146,19 @@ def test_press_that_does_not_converge_ends_with_3(scene, tmp_path, fake_press, c
     assert "1 of 2 steps are kept" in err
 
 
-def test_press_that_misses_something_ends_with_3(scene, tmp_path, fake_press, capsys):
+def test_press_that_misses_something_ends_with_3(scene, tmp_path, fake_press, capsys) -> None:
     fake_press.end = MissingError("no mesher; install pytetwild")
     assert run("press", scene, "--out", tmp_path / "out") == 3
     assert capsys.readouterr().err == "finger3d: no mesher; install pytetwild\n"
 
 
-def test_an_interrupted_press_ends_with_130_and_says_what_is_kept(scene, tmp_path, fake_press, capsys):
+def test_an_interrupted_press_ends_with_130_and_says_what_is_kept(scene, tmp_path, fake_press, capsys) -> None:
     fake_press.end = KeyboardInterrupt()
     assert run("press", scene, "--out", tmp_path / "out") == 130
     assert capsys.readouterr().err == f"finger3d: interrupted; 2 of 2 steps are kept in {tmp_path / 'out'}\n"
 
 
-def test_an_interruption_before_the_first_step(scene, tmp_path, monkeypatch, capsys):
+def test_an_interruption_before_the_first_step(scene, tmp_path, monkeypatch, capsys) -> None:
     def press(scene, out, report, figures=True, error=True):
         raise KeyboardInterrupt
 
@@ -171,7 +171,9 @@ def test_an_interruption_before_the_first_step(scene, tmp_path, monkeypatch, cap
     ("out", "expected"),
     [("scene.toml", "is a file"), ("scene.toml/deeper", "cannot be written"), (".", "holds scene.toml")],
 )
-def test_press_refuses_a_folder_it_cannot_use_before_any_work(out, expected, scene, tmp_path, fake_press, capsys):
+def test_press_refuses_a_folder_it_cannot_use_before_any_work(
+    out, expected, scene, tmp_path, fake_press, capsys
+) -> None:
     before = scene.read_bytes()
     assert run("press", scene, "--out", tmp_path / out) == 2
     printed, err = capsys.readouterr()
@@ -183,7 +185,7 @@ def test_press_refuses_a_folder_it_cannot_use_before_any_work(out, expected, sce
     assert scene.read_bytes() == before
 
 
-def test_plan_tells_effects_and_forecast_and_solves_nothing(scene, fake_press, capsys):
+def test_plan_tells_effects_and_forecast_and_solves_nothing(scene, fake_press, capsys) -> None:
     assert run("plan", scene, "--set", "title=planned [b]") == 0
     out, err = capsys.readouterr()
     assert err == ""
@@ -192,7 +194,7 @@ def test_plan_tells_effects_and_forecast_and_solves_nothing(scene, fake_press, c
     assert fake_press.scene is None
 
 
-def test_info_names_versions_and_machine(capsys):
+def test_info_names_versions_and_machine(capsys) -> None:
     assert run("info") == 0
     out = capsys.readouterr().out
     for text in ("finger3d", "numpy", "build123d", "pytetwild", "vtk", "python", "cores", "memory", "cache", "PARDISO"):
@@ -214,7 +216,7 @@ def test_info_names_versions_and_machine(capsys):
         (["info", "--loud"], "--loud"),
     ],
 )
-def test_wrong_arguments_end_with_2_and_one_line(arguments, expected, tmp_path, monkeypatch, capsys):
+def test_wrong_arguments_end_with_2_and_one_line(arguments, expected, tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
     assert run(*arguments) == 2
     out, err = capsys.readouterr()
@@ -225,17 +227,17 @@ def test_wrong_arguments_end_with_2_and_one_line(arguments, expected, tmp_path, 
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["press", "--help"], []])
-def test_help_shows_examples(arguments, capsys):
+def test_help_shows_examples(arguments, capsys) -> None:
     assert run(*arguments) == 0
     assert "finger3d press scene.toml --out out" in capsys.readouterr().out
 
 
-def test_version(capsys):
+def test_version(capsys) -> None:
     assert run("--version") == 0
     assert capsys.readouterr().out.strip() == finger3d.__version__
 
 
-def test_python_m_runs_the_command_line(tmp_path):
+def test_python_m_runs_the_command_line(tmp_path) -> None:
     command = [sys.executable, "-m", "finger3d", "plan", "nothing.toml"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 2
@@ -244,13 +246,13 @@ def test_python_m_runs_the_command_line(tmp_path):
 
 
 @pytest.mark.parametrize("code", ["import finger3d", "from finger3d.cli import main; main(['--help'])"])
-def test_import_and_help_load_nothing_heavy(code):
+def test_import_and_help_load_nothing_heavy(code) -> None:
     check = f"import sys; print(*sorted(set({HEAVY!r}) & set(sys.modules)), file=sys.stderr)"
     done = subprocess.run([sys.executable, "-c", f"{code}\n{check}"], capture_output=True, text=True, check=True)
     assert done.stderr == "\n"
 
 
-def test_the_table_prints_where_only_ascii_can_be_written():
+def test_the_table_prints_where_only_ascii_can_be_written() -> None:
     command = [sys.executable, "-m", "finger3d", "info"]
     environment = {"PYTHONIOENCODING": "ascii", "PATH": ""}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
@@ -258,13 +260,13 @@ def test_the_table_prints_where_only_ascii_can_be_written():
     assert "PARDISO" in done.stdout
 
 
-def test_every_public_name_is_there():
+def test_every_public_name_is_there() -> None:
     for name in finger3d.__all__:
         assert getattr(finger3d, name) is not None
     assert set(finger3d.__all__) <= set(dir(finger3d))
 
 
-def test_an_unknown_public_name_is_an_attribute_error():
+def test_an_unknown_public_name_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match="has no attribute 'pres'"):
         _ = finger3d.pres
 
@@ -272,14 +274,14 @@ def test_an_unknown_public_name_is_an_attribute_error():
 # --- for scripts ------------------------------------------------------------------------------------------------------
 
 
-def test_press_as_json_prints_the_summary_alone(scene, tmp_path, fake_press, capsys):
+def test_press_as_json_prints_the_summary_alone(scene, tmp_path, fake_press, capsys) -> None:
     assert run("press", scene, "--out", tmp_path / "out", "--json") == 0
     out, err = capsys.readouterr()
     assert json.loads(out) == json.loads((tmp_path / "out" / "summary.json").read_text())
     assert "step 2 of 2: remark 1" in err
 
 
-def test_press_as_json_that_does_not_converge(scene, tmp_path, fake_press, capsys):
+def test_press_as_json_that_does_not_converge(scene, tmp_path, fake_press, capsys) -> None:
     fake_press.end = Outcome.NO_CONVERGENCE
     assert run("press", scene, "--out", tmp_path / "out", "--json") == 3
     out, err = capsys.readouterr()
@@ -287,7 +289,7 @@ def test_press_as_json_that_does_not_converge(scene, tmp_path, fake_press, capsy
     assert "1 of 2 steps are kept" in err
 
 
-def test_what_a_job_prints_does_not_spoil_the_json(scene, tmp_path, monkeypatch, capsys):
+def test_what_a_job_prints_does_not_spoil_the_json(scene, tmp_path, monkeypatch, capsys) -> None:
     def press(scene, out, report, **options):
         print("a stray remark")
         summary = {"outcome": "converged", "warnings": ["Wärme"]}
@@ -301,7 +303,7 @@ def test_what_a_job_prints_does_not_spoil_the_json(scene, tmp_path, monkeypatch,
     assert "warning: Wärme" in err
 
 
-def test_plan_info_and_validate_as_json(scene, tmp_path, capsys):
+def test_plan_info_and_validate_as_json(scene, tmp_path, capsys) -> None:
     override = "effects.kinetic_friction={ratio = 0.7}"
     assert run("plan", scene, "--json", "--set", override, "--set", "friction.mu=0.3") == 0
     planned = json.loads(capsys.readouterr().out)
@@ -319,7 +321,7 @@ def test_plan_info_and_validate_as_json(scene, tmp_path, capsys):
     assert "patch_test" in err
 
 
-def test_compare_as_json_prints_its_file(scene, tmp_path, monkeypatch, capsys):
+def test_compare_as_json_prints_its_file(scene, tmp_path, monkeypatch, capsys) -> None:
     import finger3d.analyses.compare.run
 
     def compare(scene, out, widths, report):
@@ -336,7 +338,7 @@ def test_compare_as_json_prints_its_file(scene, tmp_path, monkeypatch, capsys):
 
 
 @pytest.mark.parametrize("command", ["press", "compare", "plan"])
-def test_a_mistake_with_json_leaves_standard_output_empty(command, tmp_path, capsys):
+def test_a_mistake_with_json_leaves_standard_output_empty(command, tmp_path, capsys) -> None:
     out = [] if command == "plan" else ["--out", tmp_path / "out"]
     assert run(command, tmp_path / "nothing.toml", *out, "--json") == 2
     printed, err = capsys.readouterr()
@@ -350,7 +352,7 @@ COMMANDS = [name for name in app if not name.startswith("-")]
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_has_an_example_and_a_text_for_every_option(command, capsys):
+def test_every_command_has_an_example_and_a_text_for_every_option(command, capsys) -> None:
     assert run(command, "--help") == 0
     shown = " ".join(capsys.readouterr().out.replace("│", " ").split())
     assert re.search(rf"Example: .*finger3d {command}\b", shown)
@@ -363,7 +365,7 @@ def test_every_command_has_an_example_and_a_text_for_every_option(command, capsy
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_completion_prints_a_script(shell, capsys):
+def test_completion_prints_a_script(shell, capsys) -> None:
     assert run("completion", shell) == 0
     script = capsys.readouterr().out
     for command in COMMANDS:
@@ -374,7 +376,7 @@ def test_completion_prints_a_script(shell, capsys):
     ("typed", "offered"),
     [(["pre"], "press"), (["press", "scene.toml", "--no"], "--no-figures"), (["completion", "b"], "bash")],
 )
-def test_bash_completes_commands_options_and_choices(typed, offered, tmp_path, capsys):
+def test_bash_completes_commands_options_and_choices(typed, offered, tmp_path, capsys) -> None:
     """bash reads the script, and is asked what it offers after what was typed."""
     run("completion", "bash")
     script = tmp_path / "completion.bash"
@@ -415,7 +417,7 @@ def on_a_terminal(arguments: list[str], **environment: str) -> str:
 COLOUR = re.compile(r"\x1b\[(?:[\d;]*;)?(?:3[0-8]|4[0-8]|9\d|10[0-7])(?:;[\d;]*)?m")
 
 
-def test_colours_only_on_a_terminal_that_wants_them():
+def test_colours_only_on_a_terminal_that_wants_them() -> None:
     """A pipe gets text alone; a terminal gets colours, none with NO_COLOR; a dumb one nothing it cannot show."""
     command = ["press", "--help"]
     done = subprocess.run([sys.executable, "-m", "finger3d", *command], capture_output=True, text=True, check=True)

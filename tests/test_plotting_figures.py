@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import subprocess
 import sys
 from pathlib import Path
@@ -13,88 +12,11 @@ import pytest
 
 from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
 from finger3d.errors import MissingError
-from finger3d.fem.simplex import Mesh, boundary, quadratic
+from finger3d.fem.simplex import Mesh
 from finger3d.plotting import renderer
 from finger3d.plotting import solid as render
 from finger3d.plotting.figures import contact_figure, finger_picture, force_figure, zones
-
-MU = 0.25
-
-
-def top(x: np.ndarray) -> np.ndarray:
-    """Height of the Fig. 9 finger, R = 100, mm."""
-    return 36.6 + np.sqrt(100.0**2 - x**2) - np.sqrt(100.0**2 - 50.0**2)
-
-
-def finger(shape: tuple[int, ...]) -> Mesh:
-    """A coarse Fig. 9 finger, (nx, ny) or (nx, ny, nz) boxes, quadratic, with labelled facets."""
-    d = len(shape)
-    grid = np.stack(np.meshgrid(*(np.linspace(0, 1, n + 1) for n in shape), indexing="ij"), axis=-1).reshape(-1, d)
-    number = np.arange(len(grid)).reshape([n + 1 for n in shape])
-    cells = []
-    for order in itertools.permutations(range(d)):
-        corner, path = [0] * d, []
-        for axis in (None, *order):
-            if axis is not None:
-                corner[axis] = 1
-            path.append(number[tuple(slice(c, c + n) for c, n in zip(corner, shape, strict=True))].ravel())
-        cells.append(np.stack(path, axis=1))
-    tets = np.concatenate(cells)
-    x = 100.0 * grid[:, 0] - 50.0
-    points = np.column_stack([x, grid[:, 1] * top(x), *(20.0 * grid[:, k] - 10.0 for k in range(2, d))])
-    negative = np.linalg.det(points[tets[:, 1:]] - points[tets[:, :1]]) < 0.0
-    tets[negative] = tets[negative][:, [1, 0, *range(2, d + 1)]]
-    faces, at = boundary(tets, d), {}
-    sides_of = {"contact": (1, (1.0,)), "base": (1, (0.0,)), "walls": (0, (0.0, 1.0)), "ends": (2, (0.0, 1.0))}
-    for label, (axis, sides) in sides_of.items():
-        if axis < d:
-            on = [np.all(grid[faces][..., axis] == side, axis=1) for side in sides]
-            at[label] = faces[np.any(on, axis=0)]
-    return quadratic(Mesh(points, tets, at))
-
-
-def pressed(mesh: Mesh) -> dict[str, Any]:
-    """Made-up but likely fields: pressed 10 mm, Hertz's pressure, friction limited by mu p and pointing outward."""
-    x, y = mesh.points[:, 0], mesh.points[:, 1]
-    push = np.maximum(top(x) - 40.0, 0.0)
-    u = np.zeros_like(mesh.points)
-    u[:, 1] = -push * (y / top(x)) ** 1.5
-    u[:, 0] = 0.05 * x * (y / 50.0) * (1.0 - y / 55.0)
-    if mesh.dim == 3:
-        u[:, 2] = 0.25 * mesh.points[:, 2] * np.sin(np.pi * np.minimum(y / 48.0, 1.0)) * np.exp(-((x / 45.0) ** 2))
-    nodes = np.unique(mesh.facets["contact"][:, : mesh.dim])
-    a = 38.0
-    inside = np.abs(x[nodes]) < a
-    pressure = 0.3 * np.sqrt(np.maximum(1.0 - (x[nodes] / a) ** 2, 0.0))
-    along = mesh.points[nodes][:, [0, *range(2, mesh.dim)]] / np.array([a, 10.0][: mesh.dim - 1])
-    wanted = 0.09 * along
-    size = np.linalg.norm(wanted, axis=1)
-    limit = MU * pressure
-    shear = wanted * np.minimum(1.0, limit / np.maximum(size, 1e-12))[:, None]
-    status = np.where(~inside, OPEN, np.where(size < limit, STICK, SLIP))
-    table = {
-        "x_mm": x[nodes],
-        "z_mm": mesh.points[nodes, 2] if mesh.dim == 3 else np.zeros(len(nodes)),
-        "pressure_MPa": pressure,
-        "shear_x_MPa": shear[:, 0],
-        "shear_z_MPa": shear[:, 1] if mesh.dim == 3 else np.zeros(len(nodes)),
-        "status": [STATUS_NAMES[s] for s in status],
-    }
-    return {"displacement": u, "table": table, "contact_nodes": nodes}
-
-
-def pixels(path: Path) -> np.ndarray:
-    """The picture as (h, w, 3) in 0 .. 1."""
-    from matplotlib.image import imread
-
-    return imread(path)[..., :3]
-
-
-def share(path: Path, colour: str, within: float = 0.12) -> float:
-    """Share of the pixels that have about that colour."""
-    from matplotlib.colors import to_rgb
-
-    return float(np.mean(np.all(np.abs(pixels(path) - to_rgb(colour)) < within, axis=-1)))
+from tests.pictures import MU, STEPS, finger, pixels, pressed, share, top
 
 
 @pytest.fixture(autouse=True)
@@ -267,15 +189,3 @@ def test_force_against_depth_is_drawn(tmp_path: Path) -> None:
     force_figure(tmp_path / "f.png", STEPS, "Fig. 9")
     assert share(tmp_path / "f.png", "#c0392b", within=0.05) > 1e-4
     assert share(tmp_path / "f.png", render.COLOURS[STICK], within=0.05) > 1e-4
-
-
-STEPS = [
-    {
-        "depth_mm": d,
-        "normal_force_N": 15.0 * d**1.3,
-        "friction_sum_N": 3.0 * d**1.3,
-        "contact_half_length_mm": 7.0 * d**0.7,
-        "stick_half_length_mm": 5.0 * d**0.7,
-    }
-    for d in range(1, 11)
-]

@@ -24,7 +24,7 @@ from finger3d.report.sweep_figure import draw as draw_sweep
 from finger3d.results.comparison import Case
 from finger3d.sensor.curve import Calibration, Tolerance
 from finger3d.sensor.maps import StrainMap
-from tests.test_plotting_figures import MU, STEPS, finger, pressed
+from tests.pictures import MU, STEPS, finger, pressed
 
 SHOWN = 960  # CSS pixels of the narrowest picture in a page: 60 rem
 LEGIBLE = 7  # CSS pixels of an em: below, lower-case letters have less than four pixels

@@ -19,7 +19,7 @@ from finger3d.errors import Finger3dError
 from finger3d.plotting import renderer as opengl
 from finger3d.plotting.window import values
 from finger3d.results.states import load_states
-from tests.test_report import SECTION, SOLID, pressed
+from tests.scenes import SECTION, SOLID, pressed
 
 
 @pytest.fixture(scope="module")

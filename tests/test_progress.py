@@ -20,7 +20,7 @@ def work(report: Progress) -> Progress:
     return report
 
 
-def test_plain_report_writes_a_line_per_event():
+def test_plain_report_writes_a_line_per_event() -> None:
     stream = io.StringIO()
     report = work(PlainProgress(stream))
     lines = [re.sub(r"^\[ *[\d.]+ s\] ", "", line) for line in stream.getvalue().splitlines()]
@@ -34,13 +34,13 @@ def test_plain_report_writes_a_line_per_event():
     assert (report.steps_done, report.steps_total) == (2, 2)
 
 
-def test_the_silent_report_still_counts(capsys):
+def test_the_silent_report_still_counts(capsys) -> None:
     report = work(Progress())
     assert (report.steps_done, report.steps_total) == (2, 2)
     assert capsys.readouterr() == ("", "")
 
 
-def test_bar_report_keeps_what_is_said(capsys):
+def test_bar_report_keeps_what_is_said(capsys) -> None:
     report = work(BarProgress())
     assert report.steps_done == 2
     assert "mesh taken from the cache [quickly]" in capsys.readouterr().out
@@ -55,7 +55,7 @@ def test_bar_report_keeps_what_is_said(capsys):
         (False, {"TERM": "xterm"}, PlainProgress),
     ],
 )
-def test_reporter_fits_the_place(terminal, environment, kind, monkeypatch):
+def test_reporter_fits_the_place(terminal, environment, kind, monkeypatch) -> None:
     for name in ("TERM", "CI"):
         monkeypatch.delenv(name, raising=False)
     for name, value in environment.items():

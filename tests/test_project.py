@@ -162,7 +162,7 @@ def test_code_stays_short(root: Path) -> None:
     assert long == []
 
 
-def test_the_layers_of_imports_are_modules_that_exist(root):
+def test_the_layers_of_imports_are_modules_that_exist(root) -> None:
     layers = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]["contracts"][
         0
     ]

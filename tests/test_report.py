@@ -8,13 +8,11 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
-from html import unescape
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from finger3d.cli import main
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Gauge
 from finger3d.plotting.layout import sheet
@@ -23,17 +21,7 @@ from finger3d.report.compare import compare_page
 from finger3d.report.press import press_page
 from finger3d.report.view3d import view_of
 from finger3d.results.states import chosen, load_states
-from tests import scenes
-from tests.scenes import HALF_CYLINDER, changed
-
-SECTION = changed(HALF_CYLINDER, title="a <script>alert(1)</script> & ü", name="<g>", angle_deg=0.0)
-SOLID = scenes.solid(SECTION, 0.5)
-
-
-def pressed(folder: Path, text: str, *arguments: str) -> Path:
-    (folder / "scene.toml").write_text(text, encoding="utf-8")
-    assert main(["press", str(folder / "scene.toml"), "--out", str(folder / "out"), "--no-error", *arguments]) == 0
-    return folder / "out"
+from tests.scenes import SECTION, SOLID, pressed, words
 
 
 @pytest.fixture(scope="module")
@@ -44,12 +32,6 @@ def section(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def solid(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return pressed(tmp_path_factory.mktemp("solid"), SOLID)
-
-
-def words(page: Path) -> str:
-    """What a reader reads: the page without scripts, styles, pictures and tags."""
-    text = re.sub(r"<(script|style)\b.*?</\1>", " ", page.read_text(encoding="utf-8"), flags=re.DOTALL)
-    return " ".join(unescape(re.sub(r"<[^>]*>", " ", text)).split())
 
 
 def copied(source: Path, target: Path, **changes: object) -> Path:

@@ -16,7 +16,7 @@ from finger3d.plotting.layout import DPI
 from finger3d.report.build import write_page
 from finger3d.report.chart import Chart, Line
 from finger3d.results.states import load_states
-from tests.test_report import SECTION, SOLID
+from tests.scenes import SECTION, SOLID
 
 pytestmark = pytest.mark.browser
 

@@ -26,13 +26,13 @@ def rows_of(folder: Path, *more: Row, task: dict = TASK) -> list[Row]:
         return journal.rows
 
 
-def test_the_same_task_continues_after_its_rows(tmp_path):
+def test_the_same_task_continues_after_its_rows(tmp_path) -> None:
     assert rows_of(tmp_path, {"n": 0}, {"n": 1 / 3}) == [{"n": 0}, {"n": 1 / 3}]
     assert rows_of(tmp_path, {"n": 2}) == [{"n": 0}, {"n": 1 / 3}, {"n": 2}]
     assert math.isnan(number_in(rows_of(tmp_path, {"n": math.nan})[-1], "n"))
 
 
-def test_a_line_that_was_cut_short_is_removed(tmp_path):
+def test_a_line_that_was_cut_short_is_removed(tmp_path) -> None:
     rows_of(tmp_path, {"n": 0})
     path = tmp_path / "rows.jsonl"
     path.write_text(path.read_text() + '{"n": 1, "na')
@@ -40,7 +40,7 @@ def test_a_line_that_was_cut_short_is_removed(tmp_path):
     assert [json.loads(line) for line in path.read_text().splitlines()] == [{"n": 0}, {"n": 2}]
 
 
-def test_another_task_is_refused_and_its_rows_stay(tmp_path):
+def test_another_task_is_refused_and_its_rows_stay(tmp_path) -> None:
     rows_of(tmp_path, {"n": 0})
     with pytest.raises(Finger3dError, match="holds the results of another task"):
         rows_of(tmp_path, task={**TASK, "points": 4})
@@ -50,7 +50,7 @@ def test_another_task_is_refused_and_its_rows_stay(tmp_path):
     assert (tmp_path / "rows.jsonl").read_text() == '{"n": 0}\n'
 
 
-def test_a_row_of_another_kind_is_named_by_its_line(tmp_path):
+def test_a_row_of_another_kind_is_named_by_its_line(tmp_path) -> None:
     rows_of(tmp_path, {"n": 0})
     path = tmp_path / "rows.jsonl"
     path.write_text(path.read_text() + "[1]\n")
@@ -58,7 +58,7 @@ def test_a_row_of_another_kind_is_named_by_its_line(tmp_path):
         rows_of(tmp_path)
 
 
-def test_a_full_disk_is_an_error_of_the_row_that_does_not_fit():
+def test_a_full_disk_is_an_error_of_the_row_that_does_not_fit() -> None:
     journal = Journal(Path("/dev/full"), [])
     with pytest.raises(OSError, match="No space left"):
         journal.append({"n": 0})

@@ -39,7 +39,7 @@ def write(folder: Path, text: str) -> Path:
     return path
 
 
-def test_the_least_scene_is_frictionless_on_a_plane_as_a_solid():
+def test_the_least_scene_is_frictionless_on_a_plane_as_a_solid() -> None:
     model = parse(SMALL).model()
     assert model.friction == Coulomb(0.0)
     assert model.object == Plane()
@@ -51,7 +51,7 @@ def test_the_least_scene_is_frictionless_on_a_plane_as_a_solid():
     assert model.design.height_mm == pytest.approx(HEIGHT)
 
 
-def test_the_contract_example_loads_without_its_effects(tmp_path):
+def test_the_contract_example_loads_without_its_effects(tmp_path) -> None:
     contract = """
         title = "Fig. 9 finger, 20 mm wide"
         [finger]
@@ -95,20 +95,20 @@ def test_the_contract_example_loads_without_its_effects(tmp_path):
 
 
 @pytest.mark.parametrize(("domain", "share"), [("solid", 1.0), ("plane-strain", 0.25), ("plane-stress", 0.25)])
-def test_absent_mesh_sizes_are_chosen_from_the_height(domain, share):
+def test_absent_mesh_sizes_are_chosen_from_the_height(domain, share) -> None:
     mesh = parse({**SMALL, "model": {"domain": domain}}).model().mesh
     assert mesh.size_mm == pytest.approx(share * HEIGHT / 25, rel=1e-3)
     assert mesh.base_size_mm == pytest.approx(share * HEIGHT / 6.25, rel=1e-3)
 
 
 @pytest.mark.parametrize("given_size", [{"size_mm": 10.0}, {"base_size_mm": 1.0}])
-def test_a_chosen_size_never_contradicts_a_given_one(given_size):
+def test_a_chosen_size_never_contradicts_a_given_one(given_size) -> None:
     mesh = parse({**SMALL, "mesh": given_size}).model().mesh
     assert mesh.size_mm <= mesh.base_size_mm
     assert {k: getattr(mesh, k) for k in given_size} == given_size
 
 
-def test_a_thin_finger_gets_two_elements_across():
+def test_a_thin_finger_gets_two_elements_across() -> None:
     thin = parse({**SMALL, "finger": {**FINGER, "width_mm": 1.0}})
     assert thin.model().mesh.size_mm == pytest.approx(0.5)
 
@@ -129,7 +129,7 @@ def test_a_thin_finger_gets_two_elements_across():
         ),
     ],
 )
-def test_objects_arrive_with_angles_in_radians(table, expected):
+def test_objects_arrive_with_angles_in_radians(table, expected) -> None:
     assert parse({**SMALL, "object": table}).model().object == expected
 
 
@@ -140,23 +140,23 @@ def test_objects_arrive_with_angles_in_radians(table, expected):
         {"geometry": "block", "half_length_mm": 10.0, "height_mm": 5.0, "width_mm": 10.0},
     ],
 )
-def test_every_design_loads(finger):
+def test_every_design_loads(finger) -> None:
     scene = parse({**SMALL, "finger": finger, "press": {"depth_mm": 0.5}})
     assert scene.design.height_mm == 5.0
     assert scene.as_dict()["finger"] == finger
 
 
-def test_legs_press_slide_and_release():
+def test_legs_press_slide_and_release() -> None:
     legs = [{"depth_mm": 10.0}, {"depth_mm": 10.0, "slide_x_mm": 2.0, "steps": "auto"}, {"depth_mm": 0.0, "steps": 5}]
     model = parse({**SMALL, "press": {"leg": legs}}).model()
     assert model.legs == (Leg(10.0, steps="auto"), Leg(10.0, slide_x_mm=2.0, steps="auto"), Leg(0.0, steps=5))
 
 
-def test_whole_numbers_serve_as_numbers():
+def test_whole_numbers_serve_as_numbers() -> None:
     assert parse({**SMALL, "friction": {"mu": 1}}) == parse({**SMALL, "friction": {"mu": 1.0}})
 
 
-def test_overrides_are_applied_before_checking(tmp_path):
+def test_overrides_are_applied_before_checking(tmp_path) -> None:
     # nu is missing in the file: only the override makes it a scene.
     path = write(tmp_path, parse(SMALL).to_toml(defaults=False).replace("nu = 0.49\n", ""))
     overrides = [
@@ -177,13 +177,13 @@ def test_overrides_are_applied_before_checking(tmp_path):
     assert scene.design.name == "block"
 
 
-def test_an_override_reaches_into_a_list(tmp_path):
+def test_an_override_reaches_into_a_list(tmp_path) -> None:
     legs = {"leg": [{"depth_mm": 5.0}, {"depth_mm": 0.0}]}
     path = write(tmp_path, parse({**SMALL, "press": legs}).to_toml())
     assert load(path, ["press.leg.1.depth_mm=2.5"]).legs == (Leg(5.0, steps="auto"), Leg(2.5, steps="auto"))
 
 
-def test_the_file_is_not_changed_by_an_override(tmp_path):
+def test_the_file_is_not_changed_by_an_override(tmp_path) -> None:
     path = write(tmp_path, parse(SMALL).to_toml())
     before = path.read_bytes()
     load(path, ["friction.mu=0.5"])
@@ -202,7 +202,7 @@ def test_the_file_is_not_changed_by_an_override(tmp_path):
         {"model": {"domain": "plane-stress"}, "mesh": {"mesher": "swept", "size_mm": 1.0}},
     ],
 )
-def test_round_trip(extra, defaults):
+def test_round_trip(extra, defaults) -> None:
     scene = parse({**SMALL, **extra})
     again = parse(tomllib.loads(scene.to_toml(defaults)))
     assert again == scene
@@ -217,7 +217,7 @@ def test_round_trip(extra, defaults):
     tilt=st.floats(-20.0, 20.0),  # steeper ones touch an edge first, and are refused
     x=st.floats(-50.0, 50.0),
 )
-def test_numbers_survive_the_round_trip_to_the_last_bit(nu, mu, depth, tilt, x):
+def test_numbers_survive_the_round_trip_to_the_last_bit(nu, mu, depth, tilt, x) -> None:
     scene = parse(
         {
             **SMALL,
@@ -231,7 +231,7 @@ def test_numbers_survive_the_round_trip_to_the_last_bit(nu, mu, depth, tilt, x):
     assert parse(tomllib.loads(scene.to_toml())).model() == scene.model()
 
 
-def test_as_dict_is_json_with_every_default():
+def test_as_dict_is_json_with_every_default() -> None:
     scene = parse(SMALL)
     tree = scene.as_dict()
     assert json.loads(json.dumps(tree)) == tree
@@ -242,11 +242,11 @@ def test_as_dict_is_json_with_every_default():
     assert tree["effects"] == {}
 
 
-def test_scenes_that_differ_are_not_equal():
+def test_scenes_that_differ_are_not_equal() -> None:
     assert parse(SMALL) != parse({**SMALL, "friction": {"mu": 0.1}})
 
 
-def test_byte_order_mark_and_windows_lines_are_taken(tmp_path):
+def test_byte_order_mark_and_windows_lines_are_taken(tmp_path) -> None:
     path = tmp_path / "scene.toml"
     path.write_bytes(b"\xef\xbb\xbf" + parse(SMALL).to_toml().replace("\n", "\r\n").encode())
     assert load(path) == parse(SMALL)
@@ -281,7 +281,7 @@ def stiffer(tmp_path, monkeypatch):
     sys.modules.pop("finger3d.effects.stiffer", None)
 
 
-def test_a_present_effect_fills_its_slot_and_an_absent_one_is_not_imported(stiffer):
+def test_a_present_effect_fills_its_slot_and_an_absent_one_is_not_imported(stiffer) -> None:
     assert parse(SMALL).model().material.E_MPa == 1.0
     assert stiffer not in sys.modules
     scene = parse({**SMALL, "effects": {"stiffer": {"factor": 3.0, "prony": [[0.3, 0.5]]}}})
@@ -309,12 +309,12 @@ def test_a_present_effect_fills_its_slot_and_an_absent_one_is_not_imported(stiff
         ({"base": {}}, r"effects\.base: no such effect"),
     ],
 )
-def test_mistakes_in_an_effect(stiffer, effects, message):
+def test_mistakes_in_an_effect(stiffer, effects, message) -> None:
     with pytest.raises(Finger3dError, match=message):
         parse({**SMALL, "effects": effects})
 
 
-def test_loading_a_scene_needs_no_cad_and_no_drawing(tmp_path):
+def test_loading_a_scene_needs_no_cad_and_no_drawing(tmp_path) -> None:
     path = write(tmp_path, parse(SMALL).to_toml())
     heavy = "{'OCP', 'build123d', 'vtk', 'vtkmodules', 'pyvista', 'pytetwild', 'matplotlib'}"
     code = f"import sys, finger3d; finger3d.load({str(path)!r}).model(); print({heavy} & set(sys.modules))"
@@ -343,13 +343,13 @@ def test_the_reference_names_every_key_with_its_meaning() -> None:
     } <= keys
 
 
-def test_an_object_without_a_shape_is_a_plane():
+def test_an_object_without_a_shape_is_a_plane() -> None:
     placed = parse({**SMALL, "object": {"x_mm": 1.0, "tilt_deg": 2.0}})
     assert placed == parse({**SMALL, "object": {"shape": "plane", "x_mm": 1.0, "tilt_deg": 2.0}})
     assert parse({**SMALL, "object": {}}) == parse(SMALL)
 
 
-def test_the_template_names_every_design_shape_and_key_of_an_object():
+def test_the_template_names_every_design_shape_and_key_of_an_object() -> None:
     from importlib import resources
 
     from finger3d.geometry.registry import designs
@@ -363,7 +363,7 @@ def test_the_template_names_every_design_shape_and_key_of_an_object():
     assert {key for design in designs().values() for key in table_of(design).model_fields} <= words
 
 
-def test_the_title_of_a_file_with_escapes_in_its_name_is_printable(tmp_path, capsys):
+def test_the_title_of_a_file_with_escapes_in_its_name_is_printable(tmp_path, capsys) -> None:
     from finger3d.cli import main
 
     path = tmp_path / "a\x1b[31mred\nline.toml"

@@ -215,7 +215,7 @@ def scene(tmp_path):
 
 @pytest.mark.parametrize("command", ["press", "plan"])
 @pytest.mark.parametrize("name", MISTAKES)
-def test_one_line_for_a_mistake(name, command, scene, capsys):
+def test_one_line_for_a_mistake(name, command, scene, capsys) -> None:
     old, new, expected = MISTAKES[name]
     assert old in SCENE
     scene.write_text(SCENE.replace(old, new, 1), encoding="utf-8")
@@ -236,7 +236,7 @@ def test_one_line_for_a_mistake(name, command, scene, capsys):
         ("gauge=[{name='a', x_mm=7.0, y_mm=9.0}]", ["gauge.0.y_mm = 9.0", "from 0 to 7.14142"]),
     ],
 )
-def test_a_hemisphere_is_a_solid_without_a_section(override, expected, tmp_path, capsys):
+def test_a_hemisphere_is_a_solid_without_a_section(override, expected, tmp_path, capsys) -> None:
     path = tmp_path / "ball.toml"
     path.write_text(
         '[finger]\ngeometry = "hemisphere"\nradius_mm = 10.0\n'
@@ -247,7 +247,7 @@ def test_a_hemisphere_is_a_solid_without_a_section(override, expected, tmp_path,
         assert text in err
 
 
-def test_the_first_of_several_mistakes_is_told_and_the_others_counted(scene, capsys):
+def test_the_first_of_several_mistakes_is_told_and_the_others_counted(scene, capsys) -> None:
     bad = SCENE.replace("nu = 0.49", "nu = 0.6").replace("mu = 0.25", "mu = -1").replace("steps = 10", "steps = 0")
     scene.write_text(bad, encoding="utf-8")
     err = refused(capsys, "plan", scene)
@@ -255,7 +255,7 @@ def test_the_first_of_several_mistakes_is_told_and_the_others_counted(scene, cap
     assert "(and 2 more mistakes)" in err
 
 
-def test_a_misspelt_required_key_is_one_mistake(scene, capsys):
+def test_a_misspelt_required_key_is_one_mistake(scene, capsys) -> None:
     scene.write_text(SCENE.replace("nu = 0.49", "nuu = 0.49"), encoding="utf-8")
     assert "more mistake" not in refused(capsys, "plan", scene)
 
@@ -275,28 +275,28 @@ def test_a_misspelt_required_key_is_one_mistake(scene, capsys):
         ("title.first=3", ["--set title.first", 'title = "test" is not a table']),
     ],
 )
-def test_a_mistake_in_an_override(override, expected, scene, capsys):
+def test_a_mistake_in_an_override(override, expected, scene, capsys) -> None:
     err = refused(capsys, "plan", scene, "--set", override)
     for text in expected:
         assert text in err
 
 
-def test_a_scene_that_is_not_there(tmp_path, capsys):
+def test_a_scene_that_is_not_there(tmp_path, capsys) -> None:
     path = tmp_path / "nothing.toml"
     assert f"{path}: there is no such file" in refused(capsys, "plan", path)
 
 
-def test_a_folder_for_a_scene(tmp_path, capsys):
+def test_a_folder_for_a_scene(tmp_path, capsys) -> None:
     assert f"{tmp_path}: this is a folder" in refused(capsys, "plan", tmp_path)
 
 
-def test_a_file_that_is_not_text(tmp_path, capsys):
+def test_a_file_that_is_not_text(tmp_path, capsys) -> None:
     path = tmp_path / "scene.toml"
     path.write_bytes(b"mu = \xff\xfe")
     assert f"{path}: not TOML: byte 5 is not UTF-8" in refused(capsys, "plan", path)
 
 
-def test_an_empty_file(tmp_path, capsys):
+def test_an_empty_file(tmp_path, capsys) -> None:
     path = tmp_path / "scene.toml"
     path.write_text("")
     assert "finger is missing" in refused(capsys, "plan", path)
@@ -309,7 +309,7 @@ def test_an_empty_file(tmp_path, capsys):
         ([{"depth_mm": 1.0}, {"depth_mm": 1.0}], "goes nowhere"),
     ],
 )
-def test_a_leg_that_does_nothing_is_refused(legs, text):
+def test_a_leg_that_does_nothing_is_refused(legs, text) -> None:
     from finger3d.scene import parse
 
     tables = {

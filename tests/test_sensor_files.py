@@ -216,7 +216,9 @@ def test_mistakes_in_readings(text: str, options: list[str], told: str, tmp_path
      (("curve", "mu", 24), 1e300), (("tolerances", "nu", "sd"), 1e300),
      (("tolerances", "nu", "strain_per_unit", 2), 1e300), (("tolerances", "nu", "strain_sd", 2), 1e300)],
 )  # fmt: skip
-def test_a_number_that_would_overflow_is_refused(place: tuple[Any, ...], value: float, tmp_path: Path, capsys: Any):
+def test_a_number_that_would_overflow_is_refused(
+    place: tuple[Any, ...], value: float, tmp_path: Path, capsys: Any
+) -> None:
     one = Tolerance("nu", "1", 0.003, np.ones(25), np.ones(25))
     data = json.loads(save(curve(straight, tolerances=(one,)), tmp_path / "calibration.json").read_text())
     node = data

@@ -1,0 +1,87 @@
+"""A finger with made-up fields, and what a picture shows, for the tests of plotting."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
+from finger3d.fem.simplex import Mesh, quadratic
+from tests.meshes import grid
+
+MU = 0.25
+
+
+def top(x: np.ndarray) -> np.ndarray:
+    """Height of the Fig. 9 finger, R = 100, mm."""
+    return 36.6 + np.sqrt(100.0**2 - x**2) - np.sqrt(100.0**2 - 50.0**2)
+
+
+def finger(shape: tuple[int, ...]) -> Mesh:
+    """Return a coarse Fig. 9 finger of (nx, ny) or (nx, ny, nz) boxes, quadratic, with labelled facets."""
+    unit = grid(shape)
+    x, y = 100.0 * unit.points[:, 0] - 50.0, unit.points[:, 1]
+    points = np.column_stack([x, y * top(x), *(20.0 * z - 10.0 for z in unit.points.T[2:])])
+    sides = {"contact": ("y+",), "base": ("y-",), "walls": ("x-", "x+"), "ends": ("z-", "z+")}
+    facets = {
+        label: np.vstack([unit.facets[side] for side in of]) for label, of in sides.items() if of[0] in unit.facets
+    }
+    return quadratic(Mesh(points, unit.cells, facets))
+
+
+def pressed(mesh: Mesh) -> dict[str, Any]:
+    """Made-up but likely fields: pressed 10 mm, Hertz's pressure, friction limited by mu p and pointing outward."""
+    x, y = mesh.points[:, 0], mesh.points[:, 1]
+    push = np.maximum(top(x) - 40.0, 0.0)
+    u = np.zeros_like(mesh.points)
+    u[:, 1] = -push * (y / top(x)) ** 1.5
+    u[:, 0] = 0.05 * x * (y / 50.0) * (1.0 - y / 55.0)
+    if mesh.dim == 3:
+        u[:, 2] = 0.25 * mesh.points[:, 2] * np.sin(np.pi * np.minimum(y / 48.0, 1.0)) * np.exp(-((x / 45.0) ** 2))
+    nodes = np.unique(mesh.facets["contact"][:, : mesh.dim])
+    a = 38.0
+    inside = np.abs(x[nodes]) < a
+    pressure = 0.3 * np.sqrt(np.maximum(1.0 - (x[nodes] / a) ** 2, 0.0))
+    along = mesh.points[nodes][:, [0, *range(2, mesh.dim)]] / np.array([a, 10.0][: mesh.dim - 1])
+    wanted = 0.09 * along
+    size = np.linalg.norm(wanted, axis=1)
+    limit = MU * pressure
+    shear = wanted * np.minimum(1.0, limit / np.maximum(size, 1e-12))[:, None]
+    status = np.where(~inside, OPEN, np.where(size < limit, STICK, SLIP))
+    table = {
+        "x_mm": x[nodes],
+        "z_mm": mesh.points[nodes, 2] if mesh.dim == 3 else np.zeros(len(nodes)),
+        "pressure_MPa": pressure,
+        "shear_x_MPa": shear[:, 0],
+        "shear_z_MPa": shear[:, 1] if mesh.dim == 3 else np.zeros(len(nodes)),
+        "status": [STATUS_NAMES[s] for s in status],
+    }
+    return {"displacement": u, "table": table, "contact_nodes": nodes}
+
+
+def pixels(path: Path) -> np.ndarray:
+    """The picture as (h, w, 3) in 0 .. 1."""
+    from matplotlib.image import imread
+
+    return imread(path)[..., :3]
+
+
+def share(path: Path, colour: str, within: float = 0.12) -> float:
+    """Share of the pixels that have about that colour."""
+    from matplotlib.colors import to_rgb
+
+    return float(np.mean(np.all(np.abs(pixels(path) - to_rgb(colour)) < within, axis=-1)))
+
+
+STEPS = [
+    {
+        "depth_mm": d,
+        "normal_force_N": 15.0 * d**1.3,
+        "friction_sum_N": 3.0 * d**1.3,
+        "contact_half_length_mm": 7.0 * d**0.7,
+        "stick_half_length_mm": 5.0 * d**0.7,
+    }
+    for d in range(1, 11)
+]
