@@ -5,13 +5,15 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from finger3d._types import TreeView
 from finger3d.cli.common import Json, Set, app, job, load, print_json, print_rows
 from finger3d.errors import Finger3dError, MissingError
+
+if TYPE_CHECKING:
+    from finger3d._types import TreeView
 
 
 @app.command
