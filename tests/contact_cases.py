@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from finger3d.contact.conditions import ContactProblem, augmentation_parameters
 from finger3d.contact.friction import OPEN, SLIP, STICK
 from finger3d.contact.state import ContactState
 
@@ -80,3 +81,12 @@ def half_space(x: np.ndarray, z: np.ndarray, spacing: float, nu: float, modulus:
         out[:, 0, :, i] = -out[:, i, :, 0]
     out[:, 1, :, 2] = out[:, 2, :, 1] = np.where(own, 0.0, k * nu * dx * dz / r**3)
     return out
+
+
+def random_problem(dim: int, seed: int = 0, points: int = 7) -> tuple[ContactProblem, np.ndarray]:
+    """Contact problem of a random symmetric positive definite operator, and random forces (c, d)."""
+    rng = np.random.default_rng(seed)
+    delassus = random_compliance(rng, points, dim, 1.0).reshape(points * dim, points * dim)
+    free, force = rng.normal(size=(points, dim)), rng.normal(size=(points, dim))
+    problem = ContactProblem(free, delassus, np.full(points, 0.5), augmentation_parameters(delassus, dim), 1.0)
+    return problem, force

@@ -7,13 +7,13 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from finger3d.contact.acceleration import accelerated_newton, chord_step, threads_for, warm_start
+from finger3d.contact.acceleration import accelerated_newton, assemble_in_place, chord_step, threads_for, warm_start
 from finger3d.contact.conditions import ContactProblem, augmentation_parameters
-from finger3d.contact.friction import SLIP, Coulomb
-from finger3d.contact.newton import ActiveSetSystem, Iterate, NewtonResult, newton
+from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
+from finger3d.contact.newton import ActiveSet, ActiveSetSystem, Iterate, NewtonResult, Precision, assemble, newton
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState, next_state
-from tests.contact_cases import half_plane, half_space, random_compliance
+from tests.contact_cases import half_plane, half_space, random_compliance, random_problem
 
 Method = Callable[[ContactProblem, np.ndarray, int, bool], NewtonResult]
 
@@ -114,6 +114,21 @@ def test_a_singular_operator_leaves_the_expected_forces() -> None:
     assert np.array_equal(warm_start(problem, force), force)
 
 
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("precision", [np.float64, np.float32])
+@pytest.mark.parametrize("seed", range(4))
+def test_the_matrix_assembled_in_place_is_that_of_the_plain_assembly(dim: int, precision: Precision, seed: int) -> None:
+    problem, force = random_problem(dim, seed, points=12)
+    status = np.random.default_rng(seed).permutation(np.repeat([OPEN, STICK, SLIP], 4)).astype(np.int8)
+    status[:seed] = OPEN
+    active = ActiveSet.of(problem, status, Iterate.of(problem, force).augmented_force)
+    wanted = assemble(problem, active, np.float64)
+    found = assemble_in_place(problem, active, precision)
+    assert found.dtype == precision
+    # an entry is a sum of at most nine products of numbers of order 1
+    assert np.abs(found - wanted).max() <= 50.0 * np.finfo(precision).eps * np.abs(wanted).max()
+
+
 def test_chord_steps_reduce_the_mismatch_of_slip_directions() -> None:
     compliance, gap = sphere()
     pressing = pressed(newton, compliance, gap, 0.25)[1]
@@ -131,7 +146,7 @@ def test_chord_steps_reduce_the_mismatch_of_slip_directions() -> None:
     turned[slips, 2] += (angle * found.force[:, 1])[slips]
     before = Iterate.of(problem, turned)
     assert (before.status == found.status).all()
-    system = ActiveSetSystem.of(problem, before.status, before.augmented_force)
+    system = ActiveSetSystem.of(problem, ActiveSet.of(problem, before.status, before.augmented_force))
     force = chord_step(system, system.solution(), np.zeros_like(free))
     mismatches = []
     for _ in range(3):

@@ -5,18 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from finger3d.contact.conditions import ContactProblem, augmentation_parameters, project_on_friction_cone, residual
+from finger3d.contact.conditions import project_on_friction_cone, residual
 from finger3d.contact.friction import OPEN, SLIP, STICK
-from finger3d.contact.newton import ActiveSetSystem, Iterate, block_gauss_seidel, newton
-from tests.contact_cases import random_compliance
-
-
-def random_problem(dim: int, seed: int = 0, points: int = 7) -> tuple[ContactProblem, np.ndarray]:
-    rng = np.random.default_rng(seed)
-    delassus = random_compliance(rng, points, dim, 1.0).reshape(points * dim, points * dim)
-    free, force = rng.normal(size=(points, dim)), rng.normal(size=(points, dim))
-    problem = ContactProblem(free, delassus, np.full(points, 0.5), augmentation_parameters(delassus, dim), 1.0)
-    return problem, force
+from finger3d.contact.newton import ActiveSet, ActiveSetSystem, Iterate, assemble, block_gauss_seidel, newton
+from tests.contact_cases import random_problem
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -26,7 +18,7 @@ def test_a_newton_step_solves_the_linearised_projection_equation(dim: int, seed:
     # one iteration of the method makes the friction at slipping points admissible, where the system is the derivative
     for _ in range(2):
         iterate = Iterate.of(problem, force)
-        system = ActiveSetSystem.of(problem, iterate.status, iterate.augmented_force)
+        system = ActiveSetSystem.of(problem, ActiveSet.of(problem, iterate.status, iterate.augmented_force))
         force = system.solution()
     open_, stick, slip = (iterate.status == s for s in (OPEN, STICK, SLIP))
     displacement = problem.relative_displacement(force)
@@ -45,19 +37,35 @@ def test_the_matrix_is_that_of_the_blocks_written_out(dim: int) -> None:
     problem, force = random_problem(dim, 4)
     iterate = Iterate.of(problem, force)
     status = np.array([OPEN, STICK, SLIP, SLIP, STICK, OPEN, SLIP], dtype=np.int8)
-    system = ActiveSetSystem.of(problem, status, iterate.augmented_force)
-    p = system.force_of_unknowns.toarray()
-    x = np.linspace(1.0, 2.0, p.shape[1])
-    w = problem.delassus @ p @ x  # displacements of these unknowns
-    rho, m = problem.augmentation.ravel(), len(system.active_dofs)
+    active = ActiveSet.of(problem, status, iterate.augmented_force)
+    x = np.linspace(1.0, 2.0, active.size)
+    w = problem.delassus @ active.force(x).ravel()  # displacements of these unknowns
+    rho, m = problem.augmentation.ravel(), len(active.active_dofs)
     image = np.empty(len(x))
-    image[:m] = rho[system.active_dofs] * w[system.active_dofs]
+    image[:m] = rho[active.active_dofs] * w[active.active_dofs]
     if dim == 3:
-        trial = iterate.augmented_force[system.slip_points]
+        trial = iterate.augmented_force[active.slip_points]
         a = np.minimum(0.5 * trial[:, 0] / np.linalg.norm(trial[:, 1:], axis=1), 1.0)
-        across = np.sum(system.tangent * (rho * w).reshape(-1, 3)[system.slip_points, 1:], axis=1)
+        across = np.sum(active.tangent * (rho * w).reshape(-1, 3)[active.slip_points, 1:], axis=1)
         image[m:] = (1.0 - a) * x[m:] + a * across
-    assert system.solve(image) == pytest.approx(x, rel=1e-9)
+    assert ActiveSetSystem.of(problem, active).solve(image) == pytest.approx(x, rel=1e-9)
+    assert assemble(problem, active, np.float64) @ x == pytest.approx(image, rel=1e-9)
+
+
+def test_the_forces_of_an_active_set_are_admissible() -> None:
+    problem, force = random_problem(3, 4)
+    status = np.array([OPEN, STICK, SLIP, SLIP, STICK, OPEN, SLIP], dtype=np.int8)
+    active = ActiveSet.of(problem, status, Iterate.of(problem, force).augmented_force)
+    x = np.linspace(1.0, 2.0, active.size)
+    found = active.force(x)
+    assert not found[status == OPEN].any()
+    assert found[status == STICK].ravel() == pytest.approx(x[:6])
+    slipping = found[status == SLIP]
+    assert slipping[:, 0] == pytest.approx(x[6:9])
+    direction = Iterate.of(problem, force).augmented_force[status == SLIP, 1:]
+    direction /= np.linalg.norm(direction, axis=1)[:, None]
+    assert np.sum(slipping[:, 1:] * direction, axis=1) == pytest.approx(0.5 * x[6:9])
+    assert direction[:, 0] * slipping[:, 2] - direction[:, 1] * slipping[:, 1] == pytest.approx(x[9:])
 
 
 def test_gauss_seidel_converges_to_the_solution_of_newton() -> None:

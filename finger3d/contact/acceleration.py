@@ -2,6 +2,7 @@
 
 - Warm start: the initial guess alternates a normal contact problem (friction fixed) and a friction problem (normal
   forces fixed), each solved approximately (Panagiotopoulos 1975).
+- Assembly in place: the matrix of an active set is made from the Delassus operator by scaling and adding rows.
 - Mixed precision: in 3D and under moderate friction the matrices are factored in single precision.
 - Chord iterations: the factors are reused while they reduce the residual.
 - Products with the Delassus operator end at the last point that bears a force; the deepest points come first.
@@ -15,7 +16,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,7 @@ from threadpoolctl import ThreadpoolController
 
 from finger3d._types import Float
 from finger3d.contact.conditions import ContactProblem, lengths, project_on_friction_cone
-from finger3d.contact.newton import ActiveSetSystem, Iterate, NewtonResult, Precision, lu_solver, newton
+from finger3d.contact.newton import ActiveSet, ActiveSetSystem, Iterate, NewtonResult, Precision, lu_solver, newton
 
 Array = NDArray[np.floating[Any]]
 Solve = Callable[[Array], Array]
@@ -68,11 +69,11 @@ def accelerated_newton(problem: ContactProblem, expected: Float, limit: int, dam
     start = warm_start(problem, expected)
     precision, spent = _PRECISION[start.shape[1]], 0
     if precision is np.float32 and problem.friction.max(initial=0.0) <= _FLOAT32_MAX_MU:
-        single = newton(problem, start, _FLOAT32_ITERATIONS, damped, precision, chord_iterations)
+        single = newton(problem, start, _FLOAT32_ITERATIONS, damped, precision, chord_iterations, assemble_in_place)
         if single.solved:
             return single
         spent = single.iterations
-    double = newton(problem, start, limit, damped, correct=chord_iterations)
+    double = newton(problem, start, limit, damped, correct=chord_iterations, assembly=assemble_in_place)
     return replace(double, iterations=spent + double.iterations)
 
 
@@ -108,6 +109,35 @@ class _ShortProducts(ContactProblem):
         return rows[:, :count] @ forces[:count]
 
 
+def assemble_in_place(problem: ContactProblem, active: ActiveSet, precision: Precision) -> Array:
+    """Return the matrix (k, k) of an active set, as `finger3d.contact.newton.assemble` does.
+
+    The Delassus operator between the points that touch is overwritten: rows are combined to W P first (the operator is
+    symmetric, so these are the columns transposed), then columns are weighted, and the transpose is returned.
+    """
+    slip_dofs = active.slip_dofs
+    touched = np.concatenate([active.active_dofs, *slip_dofs])
+    matrix: Array = problem.delassus[np.ix_(touched, touched)].astype(precision, copy=False)
+    rho, mu_e, t, a = (  # an operand in double precision would make all of it double
+        cast(Array, x.astype(precision, copy=False))
+        for x in (problem.augmentation.ravel(), active.slip_force_direction, active.tangent, active.turning)
+    )
+    m, s = len(active.active_dofs), len(active.slip_points)
+    normal, *tangents = (slice(m + i * s, m + (i + 1) * s) for i in range(-1, len(slip_dofs)))
+    for i, rows in enumerate(tangents):
+        matrix[normal] += mu_e[:, i, None] * matrix[rows]
+    matrix[:, :m] *= rho[active.active_dofs]
+    if active.is_3d:
+        first, second = tangents
+        matrix[first] *= t[:, 0, None]
+        matrix[first] += t[:, 1, None] * matrix[second]
+        matrix[: m + s, first] *= a * t[:, 0] * rho[slip_dofs[0]]
+        matrix[: m + s, first] += matrix[: m + s, second] * (a * t[:, 1] * rho[slip_dofs[1]])
+        across = np.arange(m, m + s)
+        matrix[across, across] += 1.0 - a
+    return matrix[: active.size, : active.size].T
+
+
 def chord_iterations(problem: ContactProblem, system: ActiveSetSystem, found: Iterate) -> Iterate:
     """Return the better of an iterate and what chord iterations with its factors make of it.
 
@@ -115,7 +145,7 @@ def chord_iterations(problem: ContactProblem, system: ActiveSetSystem, found: It
     """
     if found.at_roundoff(problem) or system.is_exact:
         return found
-    best = Iterate.of(problem, _scale_to_slip_limit(system, found.force))
+    best = Iterate.of(problem, _scale_to_slip_limit(system.active, found.force))
     for _ in range(_CHORD_ITERATIONS):
         if best.at_roundoff(problem) or (best.status != found.status).any():
             break
@@ -132,16 +162,17 @@ def chord_step(system: ActiveSetSystem, force: Float, mismatch: Float) -> Float:
     The equations hold only for friction of length mu r_n at the slipping points of `force`; `mismatch` (c, d) is the
     difference between `force` and its projection.
     """
-    across = np.sum(mismatch[system.slip_points, 1:] * system.tangent, axis=1)
-    change = system.solve(-np.concatenate([mismatch.ravel()[system.active_dofs], across]))
-    return _scale_to_slip_limit(system, force + system.force(change))
+    active = system.active
+    across = np.sum(mismatch[active.slip_points, 1:] * active.tangent, axis=1)
+    change = system.solve(-np.concatenate([mismatch.ravel()[active.active_dofs], across]))
+    return _scale_to_slip_limit(active, force + active.force(change))
 
 
-def _scale_to_slip_limit(system: ActiveSetSystem, force: Float) -> Float:
+def _scale_to_slip_limit(active: ActiveSet, force: Float) -> Float:
     """Return the forces (c, d) with friction of length mu r_n at slipping points, its direction unchanged."""
-    scaled, slip = force.copy(), system.slip_points
+    scaled, slip = force.copy(), active.slip_points
     length = lengths(scaled[slip, 1:])
-    limit = lengths(system.slip_force_direction) * scaled[slip, 0]
+    limit = lengths(active.slip_force_direction) * scaled[slip, 0]
     scaled[slip, 1:] *= (limit / np.where(length > 0.0, length, 1.0))[:, None]
     return scaled
 

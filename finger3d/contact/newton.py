@@ -98,127 +98,160 @@ class Iterate(NamedTuple):
 
 
 @dataclass(frozen=True)
-class ActiveSetSystem:
-    """Linear equations A x = b of an active set, factored.
+class ActiveSet:
+    """Which points stick and slip, with the forces that this allows as linear functions r = P x of unknowns x.
 
-    The unknowns x are the forces of sticking points, the normal forces x_n of slipping points and, in 3D, their forces
-    x_t along the tangent t across the slip direction e.  Forces are r = P x, and the equations ask that displacements
-    vanish, weighted to forces::
+    The unknowns are the forces of sticking points, the normal forces x_n of slipping points and, in 3D, their forces
+    x_t along the tangent t across the slip direction e.  The equations ask that displacements vanish, weighted to
+    forces::
 
         stick   r = x                     rho w = 0
         slip    r_n = x_n                 rho_n w_n = 0
                 r_t = mu e x_n + t x_t    (1 - a) x_t + a rho_t t . w_t = 0,   a = min(mu r_n / |r_t|, 1)
 
     with r_n, r_t of a taken from the augmented force.  The last row is the derivative of the radial return, as e turns
-    with the force.  With w = W P x + q and the weights D of these rows, ``A = D W P + diag(0, 0, 1 - a)`` and
-    ``b = -D q``.
+    with the force.
 
     Attributes
     ----------
     shape : (c, d)
-    solve : callable
-        Unknowns (k,) for a right side (k,).
-    rhs : (k,) array
-    force_of_unknowns : (c d, k) sparse matrix
-        P.
     active_dofs : (m,) array
         Directions, among c d, of the sticking points and of the slipping points' normals.
     slip_points : (s,) array
     slip_force_direction : (s, d - 1) array
         Friction per normal force, mu e.
     tangent : (s, d - 1) array
-        Direction t across the slip; only in 3D.
-    is_exact : bool
-        Whether the solution is that of the active set up to round-off: no slip direction turns, no single precision.
+        Direction t across the slip; (s, 0) in 2D.
+    turning : (s,) array
+        Weight a.
     """
 
-    shape: tuple[int, ...]
-    solve: Solver
-    rhs: Float
-    force_of_unknowns: Any
+    shape: tuple[int, int]
     active_dofs: NDArray[np.int64]
     slip_points: NDArray[np.int64]
     slip_force_direction: Float
     tangent: Float
-    is_exact: bool
+    turning: Float
 
     @classmethod
-    def of(
-        cls,
-        problem: ContactProblem,
-        status: NDArray[np.int8],
-        augmented_force: Float,
-        precision: Precision = np.float64,
-    ) -> ActiveSetSystem:
-        """Assemble and factor the equations of an active set in the given precision."""
+    def of(cls, problem: ContactProblem, status: NDArray[np.int8], augmented_force: Float) -> ActiveSet:
+        """Return the active set of a status (c,) whose slip directions are those of the augmented force (c, d)."""
         c, d = augmented_force.shape
         stick, slip = np.flatnonzero(status == STICK), np.flatnonzero(status == SLIP)
         friction_force = augmented_force[slip, 1:]
         length = lengths(friction_force)
         length = np.where(length > 0.0, length, 1.0)
         e, mu = friction_force / length[:, None], problem.friction[slip]
-        t = np.stack([-e[:, 1], e[:, 0]], axis=1) if d > 2 else np.zeros((len(slip), 0))
-        ratio = np.minimum(mu * augmented_force[slip, 0] / length, 1.0)
-
-        active_dofs = np.concatenate([(stick[:, None] * d + np.arange(d)).ravel(), slip * d])
-        tangent_dofs = [slip * d + i for i in range(1, d)]
-        m, s = len(active_dofs), len(slip)
-        size = m + s if d > 2 else m
-        all_active, normal, across = np.arange(m), np.arange(m - s, m), np.arange(m, m + s)  # places among the unknowns
-        mu_e = mu[:, None] * e
-        rho: Array = problem.augmentation.ravel().astype(precision, copy=False)
-        a: Array = ratio.astype(precision, copy=False)
-        t_: Array = t.astype(precision, copy=False)
-
-        columns = [(active_dofs, all_active, np.ones(m))]
-        rows = [(all_active, active_dofs, rho[active_dofs])]
-        for i, dofs in enumerate(tangent_dofs):
-            columns.append((dofs, normal, mu_e[:, i]))
-            if d > 2:
-                columns.append((dofs, across, t[:, i]))
-                rows.append((across, dofs, a * t_[:, i] * rho[dofs]))
-        forces = _sparse(columns, (c * d, size))  # P
-        weights = _sparse(rows, (size, c * d))  # D
-
-        touched = np.concatenate([active_dofs, *tangent_dofs])
-        w: Array = problem.delassus[np.ix_(touched, touched)].astype(precision, copy=False)
-        p, d_t = forces[touched].astype(precision), weights[m:, touched]
-        p_a, p_t, d_a = p[:, :m], p[:, m:], rho[active_dofs, None]  # columns of x (but x_t) and of x_t; rho of the rows
-        matrix: Array = np.block(
-            [
-                [d_a * (w[:m] @ p_a), (d_a * w[:m]) @ p_t],
-                [d_t @ (w @ p_a), d_t @ (w @ p_t) + np.diag(1.0 - a[: size - m])],
-            ]
-        )
-        is_exact = d == 2 and precision is np.float64
         return cls(
             shape=(c, d),
-            solve=lu_solver(matrix, reuse=not is_exact),
-            rhs=-(weights @ problem.free_motion.ravel()),
-            force_of_unknowns=forces,
-            active_dofs=active_dofs,
+            active_dofs=np.concatenate([(stick[:, None] * d + np.arange(d)).ravel(), slip * d]),
             slip_points=slip,
-            slip_force_direction=mu_e,
-            tangent=t,
-            is_exact=is_exact,
+            slip_force_direction=mu[:, None] * e,
+            tangent=np.stack([-e[:, 1], e[:, 0]], axis=1) if d > 2 else np.zeros((len(slip), 0)),
+            turning=np.minimum(mu * augmented_force[slip, 0] / length, 1.0),
         )
 
+    @property
+    def is_3d(self) -> bool:
+        """Whether slip directions can turn."""
+        return self.shape[1] > 2
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return len(self.active_dofs) + (len(self.slip_points) if self.is_3d else 0)
+
+    @property
+    def slip_dofs(self) -> list[NDArray[np.int64]]:
+        """Directions, among c d, of the slipping points' tangents: one (s,) array for each tangent."""
+        return [self.slip_points * self.shape[1] + i for i in range(1, self.shape[1])]
+
     def force(self, unknowns: Float) -> Float:
-        """Return the forces (c, d) of unknowns (k,)."""
-        return np.asarray(self.force_of_unknowns @ unknowns).reshape(self.shape)
+        """Return the forces (c, d), P x, of unknowns (k,)."""
+        force = np.zeros(self.shape)
+        m, s = len(self.active_dofs), len(self.slip_points)
+        force.ravel()[self.active_dofs] = unknowns[:m]
+        force[self.slip_points, 1:] = self.slip_force_direction * unknowns[m - s : m, None]
+        if self.is_3d:
+            force[self.slip_points, 1:] += self.tangent * unknowns[m:, None]
+        return force
 
-    def solution(self) -> Float:
-        """Return the forces (c, d) that solve the equations."""
-        return self.force(self.solve(self.rhs) if len(self.rhs) else self.rhs)
+    def weighted(self, problem: ContactProblem, displacement: Float) -> Float:
+        """Return the rows D w (k,), N, of the equations, for displacements (c, d)."""
+        w = problem.augmentation * displacement
+        rows = w.ravel()[self.active_dofs]
+        if not self.is_3d:
+            return rows
+        return np.concatenate([rows, self.turning * np.sum(self.tangent * w[self.slip_points, 1:], axis=1)])
 
 
-Entries: TypeAlias = list[tuple[NDArray[np.int64], NDArray[np.int64], Array]]
+Assembly: TypeAlias = Callable[[ContactProblem, ActiveSet, Precision], Array]
+
+
+def assemble(problem: ContactProblem, active: ActiveSet, precision: Precision) -> Array:
+    """Return the matrix A = D W P + diag(0, 0, 1 - a) (k, k) of the equations of an active set."""
+    m, s, cd = len(active.active_dofs), len(active.slip_points), problem.free_motion.size
+    all_active, normal, across = np.arange(m), np.arange(m - s, m), np.arange(m, m + s)  # places among the unknowns
+    rho = problem.augmentation.ravel()
+    columns = [(active.active_dofs, all_active, np.ones(m))]
+    rows = [(all_active, active.active_dofs, rho[active.active_dofs])]
+    for i, dofs in enumerate(active.slip_dofs):
+        columns.append((dofs, normal, active.slip_force_direction[:, i]))
+        if active.is_3d:
+            columns.append((dofs, across, active.tangent[:, i]))
+            rows.append((across, dofs, active.turning * active.tangent[:, i] * rho[dofs]))
+    forces = _sparse(columns, (cd, active.size))  # P
+    weights = _sparse(rows, (active.size, cd))  # D
+    matrix: Array = weights @ (problem.delassus @ forces)
+    if active.is_3d:
+        matrix[across, across] += 1.0 - active.turning
+    return matrix.astype(precision, copy=False)
+
+
+Entries: TypeAlias = list[tuple[NDArray[np.int64], NDArray[np.int64], Float]]
 
 
 def _sparse(entries: Entries, shape: tuple[int, int]) -> Any:
     """Return the sparse matrix of entries (row, column, value)."""
     rows, columns, values = (np.concatenate(parts) for parts in zip(*entries, strict=True))
-    return sp.csr_matrix((values, (rows, columns)), shape=shape)
+    return sp.csr_array((values, (rows, columns)), shape=shape)
+
+
+@dataclass(frozen=True)
+class ActiveSetSystem:
+    """Linear equations A x = -D q of an active set, factored; q is the free motion.
+
+    Attributes
+    ----------
+    active : ActiveSet
+    solve : callable
+        Unknowns (k,) for a right side (k,).
+    rhs : (k,) array, N
+    is_exact : bool
+        Whether the solution is that of the active set up to round-off: no slip direction turns, no single precision.
+    """
+
+    active: ActiveSet
+    solve: Solver
+    rhs: Float
+    is_exact: bool
+
+    @classmethod
+    def of(
+        cls,
+        problem: ContactProblem,
+        active: ActiveSet,
+        precision: Precision = np.float64,
+        assembly: Assembly = assemble,
+    ) -> ActiveSetSystem:
+        """Assemble and factor the equations of an active set in the given precision."""
+        is_exact = not active.is_3d and precision is np.float64
+        solve = lu_solver(assembly(problem, active, precision), reuse=not is_exact)
+        return cls(active, solve, -active.weighted(problem, problem.free_motion), is_exact)
+
+    def solution(self) -> Float:
+        """Return the forces (c, d) that solve the equations."""
+        return self.active.force(self.solve(self.rhs) if len(self.rhs) else self.rhs)
 
 
 def force_of_sets(problem: ContactProblem, status: NDArray[np.int8], augmented_force: Float) -> Float:
@@ -226,7 +259,7 @@ def force_of_sets(problem: ContactProblem, status: NDArray[np.int8], augmented_f
 
     `augmented_force` (c, d) gives the slipping points their direction (see `project_on_friction_cone`).
     """
-    return ActiveSetSystem.of(problem, status, augmented_force).solution()
+    return ActiveSetSystem.of(problem, ActiveSet.of(problem, status, augmented_force)).solution()
 
 
 def lu_solver(matrix: Array, reuse: bool) -> Solver:
@@ -250,6 +283,7 @@ def newton(
     damped: bool,
     precision: Precision = np.float64,
     correct: Correction | None = None,
+    assembly: Assembly = assemble,
 ) -> NewtonResult:
     """Solve the projection equation by the semismooth Newton method.
 
@@ -266,6 +300,8 @@ def newton(
         Precision of the factored matrices.
     correct : callable, optional
         What improves an iterate with the factors that led to it; see `finger3d.contact.acceleration`.
+    assembly : callable, optional
+        What assembles the matrix of an active set.
     """
     current = Iterate.of(problem, start)
     seen: dict[bytes, float] = {}
@@ -277,7 +313,8 @@ def newton(
             break
         seen[status.tobytes()] = current.mismatch
         try:
-            system = ActiveSetSystem.of(problem, status, current.augmented_force, precision)
+            active = ActiveSet.of(problem, status, current.augmented_force)
+            system = ActiveSetSystem.of(problem, active, precision, assembly)
             target = system.solution()
         except np.linalg.LinAlgError:
             break
