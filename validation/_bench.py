@@ -1,11 +1,11 @@
 """Time of a press relative to one factorisation of the same matrix, and the overhead of the commands.
 
-All ratios are measured in one run on the Fig. 9 finger, 20 mm wide, nu = 0.49, in ten increments except where the rows
-say that their number is chosen by the estimated error.  Solids use swept meshes, which are reproducible.  Each is solved
-twice in a process of its own and the shorter time of each stage counts; for whole sweeps the median over pairs is taken.
-The factorisation it is compared with is PARDISO's, called through pypardiso with the same settings (parallel METIS,
-Bunch-Kaufman).  Every row states the load of the machine, since other work distorts the times.  The results describe one
-machine at one time and are not stored.
+All ratios are measured in one run on the Fig. 9 finger, 20 mm wide, nu = 0.49, in ten increments except where the
+rows say that their number is chosen by the estimated error. Solids use swept meshes, which are reproducible. Each is
+solved twice in a process of its own and the shorter time of each stage counts; for whole sweeps the median over pairs
+is taken. The factorisation it is compared with is PARDISO's, called through pypardiso with the same settings
+(parallel METIS, Bunch-Kaufman). Every row states the load of the machine, since other work distorts the times. The
+results describe one machine at one time and are not stored.
 
 Run it by ``make bench``.  ``python -m validation._bench --quick`` only shows that the benchmark runs.
 """
