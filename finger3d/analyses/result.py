@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Literal
@@ -14,59 +13,12 @@ from finger3d.analyses.press_files import history_table
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.io import atomic
 from finger3d.mechanics.history import History, contact_table
+from finger3d.results.summary import PressStep, steps_of
 from finger3d.results.vtu import grid
 
 if TYPE_CHECKING:
     import pandas
     import pyvista
-
-
-@dataclass(frozen=True)
-class PressStep:
-    """Numbers of one increment, as in the entries of ``steps`` in summary.json.
-
-    Attributes
-    ----------
-    depth_mm : press depth, the way of the object along -y from first touch
-    slide_x_mm, slide_z_mm : way of the object along x and z from where it touched first
-    time_s : time at the end of the increment
-    normal_force_N : sum of the contact forces along -y on the finger
-    tangential_force_x_N, tangential_force_z_N : net friction on the finger
-    friction_sum_N : sum of |friction| over the contact points
-    outward_friction_x_N, outward_friction_z_N : sum of the friction away from the object's lowest point
-    contact_area_mm2, stick_area_mm2 : area of the points in contact, and of those that stick
-    contact_half_length_mm, stick_half_length_mm : half the extent along x of contact and stick zone at z = 0
-    contact_half_length_end_mm : half the extent of the contact zone at z = width/2; None for a section
-    external_work_mJ, dissipation_mJ : work done on the finger, and work lost to friction, since the start
-    gauges : strain by the name of the gauge, dimensionless
-    iterations : of the contact solver
-    residual : largest violation of the contact conditions, dimensionless
-    method : the algorithm that solved the increment
-    outcome : "converged", or what failed
-    """
-
-    depth_mm: float
-    slide_x_mm: float
-    slide_z_mm: float
-    time_s: float
-    normal_force_N: float
-    tangential_force_x_N: float
-    tangential_force_z_N: float
-    friction_sum_N: float
-    outward_friction_x_N: float
-    outward_friction_z_N: float
-    contact_area_mm2: float
-    stick_area_mm2: float
-    contact_half_length_mm: float
-    stick_half_length_mm: float
-    external_work_mJ: float
-    dissipation_mJ: float
-    gauges: Mapping[str, float]
-    iterations: int
-    residual: float
-    method: str
-    outcome: str
-    contact_half_length_end_mm: float | None = None
 
 
 @dataclass(frozen=True)
@@ -126,7 +78,7 @@ class PressResult:
     @property
     def steps(self) -> tuple[PressStep, ...]:
         """The numbers of every increment."""
-        return tuple(PressStep(**step) for step in self._numbers["steps"])
+        return steps_of(self._numbers)
 
     @property
     def last(self) -> PressStep:
@@ -217,6 +169,6 @@ class PressResult:
         good = self._good()
         rows = [
             (row.name, f"{number(row.value, row.error)} {row.unit}".strip())
-            for row in (headline(asdict(good[-1]), ErrorBars.of_summary(self._numbers).totals()) if good else ())
+            for row in (headline(good[-1], ErrorBars.of_summary(self._numbers).totals()) if good else ())
         ]
         return card(self._title, self._status(), rows, self._numbers["warnings"], self._numbers["advice"])

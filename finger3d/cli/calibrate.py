@@ -9,7 +9,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
-from finger3d.cli.common import Json, Set, app, job, load, print_json, print_rows
+from finger3d.cli.common import Json, Noise, Set, app, job, load, print_json, print_rows
 from finger3d.errors import Finger3dError, MissingError
 
 Tolerances = Annotated[
@@ -33,9 +33,7 @@ def calibrate(
     mu: Annotated[
         str, Parameter(help="Values of mu: first:last:count, or numbers separated by commas.")
     ] = "0.02:1.2:25",
-    noise: Annotated[
-        float, Parameter(help="Standard deviation of a strain reading; the default is that of Maeno 2004.")
-    ] = 1.5e-4,
+    noise: Noise = 1.5e-4,
     resolution: Annotated[
         float, Parameter(help="Largest standard deviation of mu at which the gauge is usable.")
     ] = 0.1,

@@ -58,6 +58,8 @@ Json = Annotated[
     ),
 ]
 
+Noise = Annotated[float, Parameter(help="Standard deviation of a strain reading; the default is that of Maeno 2004.")]
+
 
 class Interrupted(Exception):
     """Interruption of a job; the message says which results are kept. Exit code 130."""

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from finger3d.cli.common import Json, Set, app, check_writable, job, print_json, print_rows
+from finger3d.cli.common import Json, Noise, Set, app, check_writable, job, print_json, print_rows
 from finger3d.errors import Finger3dError
 
 
@@ -30,9 +30,7 @@ def optimise(
     mu: Annotated[
         str | None, Parameter(help="Ascending values of mu, with commas; default: nine from 0.05 to 1.")
     ] = None,
-    noise: Annotated[
-        float, Parameter(help="Standard deviation of a strain reading; the default is that of Maeno 2004.")
-    ] = 1.5e-4,
+    noise: Noise = 1.5e-4,
     budget: Annotated[
         int, Parameter(help="Number of designs; of bodies, if keys of gauges are optimised for each body.")
     ] = 60,

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Literal, NotRequired, TypedDict
+from typing import NotRequired, TypedDict
 
 import numpy as np
 
-from finger3d._types import TreeView
 from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.contact.conditions import TOLERANCE
 from finger3d.contact.friction import OPEN, STATUS_NAMES
@@ -16,7 +15,7 @@ from finger3d.report.build import Figure, HeadlineRow, PageSection, Part, Table,
 from finger3d.report.scene import how_modelled
 from finger3d.report.view3d import view_of
 from finger3d.results.states import States, load_states
-from finger3d.results.summary import gauges_of, read_json, title_of
+from finger3d.results.summary import PressStep, gauges_of, read_json, steps_of, title_of
 
 _HEADLINE = {
     "normal_force_N": ("normal force", 1.0, "N"),
@@ -37,21 +36,7 @@ _PICTURES = {
     "force.png": "Forces, and half lengths of contact and stick zone, against depth",
 }
 
-StepNumber = Literal[
-    "depth_mm",
-    "slide_x_mm",
-    "slide_z_mm",
-    "time_s",
-    "normal_force_N",
-    "tangential_force_x_N",
-    "tangential_force_z_N",
-    "friction_sum_N",
-    "contact_area_mm2",
-    "stick_area_mm2",
-    "dissipation_mJ",
-]
-
-_STEP_COLUMNS: dict[StepNumber, str] = {
+_STEP_COLUMNS = {
     "depth_mm": "depth (mm)",
     "slide_x_mm": "slide x (mm)",
     "slide_z_mm": "slide z (mm)",
@@ -68,27 +53,6 @@ _STEP_COLUMNS: dict[StepNumber, str] = {
 
 _ERROR_REMARK = "The number after ± is the error of mesh and increments; it does not include the error of the model."
 _ROUND_OFF = 1e-9  # magnitude of round-off, relative to the force that a number is compared with
-
-
-class StepSummary(TypedDict):
-    """One of the ``steps`` of summary.json; quantities that are unknown are None."""
-
-    depth_mm: float
-    slide_x_mm: float
-    slide_z_mm: float
-    time_s: float
-    normal_force_N: float
-    tangential_force_x_N: float
-    tangential_force_z_N: float
-    friction_sum_N: float
-    contact_area_mm2: float
-    stick_area_mm2: float
-    dissipation_mJ: float
-    gauges: Mapping[str, float | None]
-    residual: float | None
-    iterations: int
-    method: NotRequired[str]
-    outcome: str
 
 
 class MeshSummary(TypedDict):
@@ -128,12 +92,12 @@ def press_page(folder: str | Path) -> Path:
     """
     folder = Path(folder)
     summary = read_json(folder / "summary.json")
-    steps: Sequence[StepSummary] = summary["steps"]
+    steps = steps_of(summary)
     bars = ErrorBars.of_summary(summary)
-    good = [step for step in steps if step["outcome"] == "converged"]
+    good = [step for step in steps if step.outcome == "converged"]
     source = folder / "steps.npz"
     states = load_states(source) if source.exists() else None
-    last = f" after step {steps.index(good[-1]) + 1}, {good[-1]['depth_mm']:.4g} mm deep" if good else ""
+    last = f" after step {steps.index(good[-1]) + 1}, {good[-1].depth_mm:.4g} mm deep" if good else ""
     sections = [
         PageSection("Scene", how_modelled(summary, folder)),
         *([_proof(steps, states, good)] if steps else []),
@@ -156,23 +120,24 @@ def press_page(folder: str | Path) -> Path:
     )
 
 
-def headline(step: TreeView, errors: Mapping[str, float]) -> list[HeadlineRow]:
+def headline(step: PressStep, errors: Mapping[str, float]) -> list[HeadlineRow]:
     """Return the main numbers of a step with their errors, without a tangential force of the size of round-off.
 
     Parameters
     ----------
-    step : one of the ``steps`` of summary.json
+    step : the step
     errors : key of a number -> its error, in the unit of the number
     """
     rows = []
     for key, (name, factor, unit) in _HEADLINE.items():
-        if key.startswith("tangential") and abs(step[key]) <= _ROUND_OFF * max(step["friction_sum_N"], 1e-300):
+        value = getattr(step, key)
+        if key.startswith("tangential") and abs(value) <= _ROUND_OFF * max(step.friction_sum_N, 1e-300):
             continue
         error = errors.get(key)
-        rows.append(HeadlineRow(name, factor * step[key], unit, None if error is None else factor * error))
+        rows.append(HeadlineRow(name, factor * value, unit, None if error is None else factor * error))
     return rows + [
         HeadlineRow(f"strain of gauge {name}", "unknown" if strain is None else strain, "", errors.get(f"gauge_{name}"))
-        for name, strain in step["gauges"].items()
+        for name, strain in step.gauges.items()
     ]
 
 
@@ -183,9 +148,9 @@ def _error_bars(bars: ErrorBars) -> PageSection:
     return PageSection("Error bars", [f"The number after ± is the sum of both errors. Method: {bars.method}", *table])
 
 
-def _proof(steps: Sequence[StepSummary], states: States | None, good: Sequence[StepSummary]) -> PageSection:
+def _proof(steps: Sequence[PressStep], states: States | None, good: Sequence[PressStep]) -> PageSection:
     """Return the residuals of the contact conditions of every step, and the extreme values of the last state."""
-    worst = max((s["residual"] for s in good if s["residual"] is not None), default=None)
+    worst = max((s.residual for s in good if s.residual is not None), default=None)
     parts: list[Part] = [
         "Every contact point is open (gap > 0, no force) or closed (gap = 0, pressure > 0). A closed point sticks (no "
         "slip, |friction| at most mu times pressure) or slips (|friction| = mu times pressure, opposite to the slip): "
@@ -200,12 +165,12 @@ def _proof(steps: Sequence[StepSummary], states: States | None, good: Sequence[S
     rows = [
         (
             k,
-            step["depth_mm"],
-            f"{step['residual']:.1e}" if step["residual"] is not None else "none",
-            "yes" if step["residual"] is not None and step["residual"] <= TOLERANCE else "NO",
-            step["iterations"],
-            step.get("method", ""),
-            step["outcome"],
+            step.depth_mm,
+            f"{step.residual:.1e}" if step.residual is not None else "none",
+            "yes" if step.residual is not None and step.residual <= TOLERANCE else "NO",
+            step.iterations,
+            step.method,
+            step.outcome,
         )
         for k, step in enumerate(steps, start=1)
     ]
@@ -229,13 +194,13 @@ def _last_state(states: States) -> Table:
     return Table(("in the last step", "", ""), rows)
 
 
-def _steps(good: Sequence[StepSummary]) -> PageSection:
+def _steps(good: Sequence[PressStep]) -> PageSection:
     """Return a table of the converged steps; columns of the size of round-off are omitted."""
-    scale = max(abs(step["normal_force_N"]) for step in good)
+    scale = max(abs(step.normal_force_N) for step in good)
     # For instance the tangential force of a symmetric press, and slides of a path without them.
-    shown = [k for k in _STEP_COLUMNS if k == "depth_mm" or max(abs(s[k]) for s in good) > _ROUND_OFF * scale]
-    gauges = list(good[-1]["gauges"])
-    rows = [[*(float(s[k]) for k in shown), *(s["gauges"].get(g) for g in gauges)] for s in good]
+    shown = [k for k in _STEP_COLUMNS if k == "depth_mm" or max(abs(getattr(s, k)) for s in good) > _ROUND_OFF * scale]
+    gauges = list(good[-1].gauges)
+    rows = [[*(getattr(s, k) for k in shown), *(s.gauges.get(g) for g in gauges)] for s in good]
     table = Table([*(_STEP_COLUMNS[k] for k in shown), *(f"strain {g}" for g in gauges)], rows)
     return PageSection(
         "Every step", ["The file history.csv has these numbers, and more, with all digits.", table], folded=True

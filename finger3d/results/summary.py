@@ -5,11 +5,72 @@ from __future__ import annotations
 import csv
 import json
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from finger3d._types import Tree, TreeView
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.gauges import Gauge
+
+
+@dataclass(frozen=True)
+class PressStep:
+    """Numbers of one increment, as in the entries of ``steps`` in summary.json.
+
+    Attributes
+    ----------
+    depth_mm : press depth, the way of the object along -y from first touch
+    slide_x_mm, slide_z_mm : way of the object along x and z from where it touched first
+    time_s : time at the end of the increment
+    normal_force_N : sum of the contact forces along -y on the finger
+    tangential_force_x_N, tangential_force_z_N : net friction on the finger
+    friction_sum_N : sum of |friction| over the contact points
+    outward_friction_x_N, outward_friction_z_N : sum of the friction away from the object's lowest point
+    contact_area_mm2, stick_area_mm2 : area of the points in contact, and of those that stick
+    contact_half_length_mm, stick_half_length_mm : half the extent along x of contact and stick zone at z = 0
+    contact_half_length_end_mm : half the extent of the contact zone at z = width/2; None for a section
+    external_work_mJ, dissipation_mJ : work done on the finger, and work lost to friction, since the start
+    gauges : strain by the name of the gauge, dimensionless; None if it is unknown
+    iterations : of the contact solver
+    residual : largest violation of the contact conditions, dimensionless; None if it is not finite
+    method : the algorithm that solved the increment
+    outcome : "converged", or what failed
+    """
+
+    depth_mm: float
+    slide_x_mm: float
+    slide_z_mm: float
+    time_s: float
+    normal_force_N: float
+    tangential_force_x_N: float
+    tangential_force_z_N: float
+    friction_sum_N: float
+    outward_friction_x_N: float
+    outward_friction_z_N: float
+    contact_area_mm2: float
+    stick_area_mm2: float
+    contact_half_length_mm: float
+    stick_half_length_mm: float
+    external_work_mJ: float
+    dissipation_mJ: float
+    gauges: Mapping[str, float | None]
+    iterations: int
+    residual: float | None
+    method: str
+    outcome: str
+    contact_half_length_end_mm: float | None = None
+
+
+def steps_of(summary: TreeView) -> tuple[PressStep, ...]:
+    """Return the steps of a summary.
+
+    Raises
+    ------
+    TypeError
+        If they are not as a press writes them.
+    """
+    return tuple(PressStep(**step) for step in summary["steps"])
 
 
 def read_json(path: Path) -> Tree:
