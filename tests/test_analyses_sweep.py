@@ -22,6 +22,7 @@ from finger3d.analyses.sweep.points import Sweep, Vary, combinations
 from finger3d.analyses.sweep.store import ResultStore
 from finger3d.cli import main
 from finger3d.errors import Finger3dError, MissingError
+from finger3d.results.journal import Journal, Row
 from finger3d.scene import load
 
 COARSE = ["--set", "model.domain=plane-strain", "--set", "mesh.size_mm=4", "--set", "mesh.base_size_mm=16"]
@@ -339,6 +340,21 @@ def test_a_full_disk_is_one_line_that_says_what_is_kept(name, scene, tmp_path, m
     assert name in str(told.value)
     with ResultStore(sweep, tmp_path).open() as again:
         assert again.left() == [sweep.points[1]]
+
+
+def test_a_point_whose_row_is_written_at_an_interruption_is_counted(scene, tmp_path, monkeypatch, capsys) -> None:
+    append = Journal.append
+
+    def interrupted(journal: Journal, row: Row) -> None:
+        append(journal, row)
+        if len(journal.rows) == 2:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(Journal, "append", interrupted)
+    words = ["sweep", str(scene), *COARSE, "--vary", "friction.mu=0.1,0.2,0.3", "--out", str(tmp_path)]
+    assert main(words) == 130
+    assert "2 of 3 points are kept" in capsys.readouterr().err
+    assert len(lines(tmp_path)) == len(table(tmp_path)) == 2
 
 
 def test_a_body_that_cannot_be_built_and_a_point_that_fails_are_rows(scene, monkeypatch) -> None:

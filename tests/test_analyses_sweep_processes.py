@@ -121,8 +121,8 @@ def killed_and_resumed(command: list[str], out: Path, total: int, env: dict[str,
 def test_a_sweep_survives_kill_9_of_a_worker_and_of_the_parent(root, scene, tmp_path) -> None:
     out = tmp_path / "out"
     env = environment(root, str(tmp_path))
-    killed_and_resumed(sweeping(scene, out, 60, 4, "--workers", "2"), out, 240, env, tmp_path)
-    assert_nothing_repeated_or_lost(out, 240)
+    killed_and_resumed(sweeping(scene, out, 30, 4, "--workers", "2"), out, 120, env, tmp_path)
+    assert_nothing_repeated_or_lost(out, 120)
 
 
 @pytest.mark.slow

@@ -89,7 +89,7 @@ def opened(
             raise Finger3dError(
                 f"--out {folder}: holds the results of another task{how and f' ({how})'}; name another folder"
             )
-        rows = list(_rows(path, mistake))
+        rows = list(journal_rows(path, mistake))
     elif path.exists():
         raise Finger3dError(f"--out {folder}: holds {path.name} without {task_path.name}; name another folder")
     with atomic(path) as temporary:
@@ -102,8 +102,14 @@ def opened(
         journal.close()
 
 
-def _rows(path: Path, mistake: Callable[[object], str]) -> Iterator[Row]:
-    """Yield the rows of a file, without lines that were cut short."""
+def journal_rows(path: Path, mistake: Callable[[object], str]) -> Iterator[Row]:
+    """Yield the rows of a file, without lines that were cut short.
+
+    Raises
+    ------
+    Finger3dError
+        If the file cannot be read or a row is not fit for the task, see `opened`.
+    """
     try:
         lines = path.read_text(encoding="utf-8", errors="replace").split("\n") if path.exists() else []
     except OSError as error:

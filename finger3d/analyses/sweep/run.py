@@ -74,6 +74,8 @@ def sweep(
         try:
             _press(store, scheduler, workers, progress)
         finally:
+            store.reload()
+            progress.report.steps_done = len(store.rows)
             store.write()
         with store.room("report.html"):
             sweep_page(folder)

@@ -11,7 +11,7 @@ from pathlib import Path
 from finger3d.analyses.sweep.points import Point, Sweep
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.io import atomic, claimed, write_csv
-from finger3d.results.journal import Journal, Row, number_in, opened
+from finger3d.results.journal import Journal, Row, journal_rows, number_in, opened
 from finger3d.scene.messages import shown
 
 JOURNAL, TASK = "points.jsonl", "sweep.json"
@@ -85,6 +85,10 @@ class ResultStore:
             self._journal.append(row)
         self.rows[_number_of(row)] = row
         self.lost.pop(_number_of(row), None)
+
+    def reload(self) -> None:
+        """Read the rows from the journal: an interruption may fall between writing a row and its entry in `rows`."""
+        self.rows = {_number_of(row): row for row in journal_rows(self._journal.path, self._mistake)}
 
     def lose(self, point: Point, reason: str) -> None:
         """Note why a point has no numbers."""
