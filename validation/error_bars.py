@@ -265,7 +265,9 @@ def run(quick: bool) -> Result:
     rows = [row for kind in KINDS for row in _rows(kind, found, "by mesh")]
     rows += _by_kind_of_mesh(found, {case.name: case.meshes for case in chosen})
     explicit = [j for j in steps if j.part.endswith("steps")]
-    rows += [row for kind in STEP_KINDS for row in _rows(kind, explicit, f"by {counts[0]} to {counts[-1]} steps", ROUND)]
+    rows += [
+        row for kind in STEP_KINDS for row in _rows(kind, explicit, f"by {counts[0]} to {counts[-1]} steps", ROUND)
+    ]
     automatic = [j for j in steps if j.part.startswith("automatic")]
     rows += [row for kind in STEP_KINDS for row in _rows(kind, automatic, "by automatic steps", ROUND)]
     rows += [_met(kind, [j for j in automatic if j.part.endswith(" met") and "not" not in j.part]) for kind in MET]

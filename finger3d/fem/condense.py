@@ -18,6 +18,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from finger3d._arrays import freeze_arrays
 from finger3d._types import Float, Int
 from finger3d.fem.assembly import Stiffness
 
@@ -49,6 +50,9 @@ class Condensation:
     _free: Int = field(repr=False)
     _solve: Callable[[Float], Float] = field(repr=False)
     _series: _Series | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
 
     def unknowns(self, force: Float) -> Float:
         """All unknowns (N, ...) under row forces (r, ...) N: displacements in mm, then pressures.

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from finger3d._arrays import freeze_arrays
 from finger3d._types import Float, Int
 from finger3d.geometry.cad import labelled_faces
 from finger3d.geometry.implicit import ImplicitSurface, surface_of
@@ -47,6 +48,9 @@ class Tessellation:
     faces: tuple[CadFace, ...]
     corners: Float
     corner_faces: tuple[tuple[int, ...], ...]
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
 
     @property
     def labels(self) -> list[str]:

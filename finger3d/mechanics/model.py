@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal, Protocol
 import numpy as np
 import scipy.sparse as sp
 
+from finger3d._arrays import freeze_arrays
 from finger3d._types import Float
 from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.contact.rules import RuleName
@@ -78,6 +79,9 @@ class EmbeddedBars:
     gauge_weights: Float
     self_compliance: Float
 
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
+
     def subgrid_compliance(self, compliance: Float) -> Float:
         """What rows of gauges and bars yield (g + s, g + s) beyond the mesh, from its compliance (s, s) of bars."""
         both = np.vstack([self.gauge_weights, np.eye(len(self.bar_stiffness))])
@@ -115,6 +119,9 @@ class ObjectResponse:
     compliance: Float
     factorizations: int
     seconds: dict[str, float]
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
 
 
 class ObjectCompliance(Protocol):

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from finger3d._arrays import freeze_arrays
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.objects.shapes import RigidObject
@@ -43,6 +44,9 @@ class ContactPath:
     half_width_mm: float
     targets: Float
     landmarks: Float | None = None
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
 
 
 @dataclass(frozen=True)
