@@ -61,12 +61,12 @@ def test_a_body_never_solves_with_the_factor_of_a_later_one(solver: str) -> None
     first = condense(matrix, fixed, rows, solver)
     before = first.solve(load)
     twice = replace(matrix, upper=2.0 * matrix.upper)
-    second = condense(twice, fixed, rows, solver, spent=first)
+    second = condense(twice, fixed, rows, solver, replaced=first)
     assert np.abs(second.solve(load) - 0.5 * before).max() < 1e-12 * np.abs(before).max()
     assert np.array_equal(first.compliance, 2.0 * second.compliance)
     with pytest.raises(RuntimeError) if solver == "pardiso" else nullcontext():
         assert np.array_equal(first.solve(load), before)
-    third = condense(matrix, fixed, rows, solver, spent=first)  # its factor is the second's by now
+    third = condense(matrix, fixed, rows, solver, replaced=first)  # its factor is the second's by now
     assert np.abs(third.solve(load) - before).max() < 1e-12 * np.abs(before).max()
     assert np.abs(second.solve(load) - 0.5 * before).max() < 1e-12 * np.abs(before).max()
 

@@ -276,7 +276,7 @@ class _NewtonIncrement:
         entries = on_places(contact.rows[problem.system.active_dofs], pattern)
         rows = sp.csr_matrix((entries, pattern.indices, pattern.indptr), pattern.shape)
         tangent = configuration.tangent.less(contact.geometric_stiffness(problem.surface, force[:, 0]))
-        condensed = condense(tangent, problem.part.fixed_dofs, rows, spent=condensation)
+        condensed = condense(tangent, problem.part.fixed_dofs, rows, replaced=condensation)
         self.workspace.factorizations += condensed.factorizations
         return condensed
 

@@ -1,7 +1,7 @@
-"""Condensation of a body to a few rows of interest: one factorisation, one small dense compliance.
+"""Condensation of a body to some rows of its displacements: one factorisation, and a dense compliance.
 
-PARDISO returns ``R K^-1 R^T`` as a Schur complement for about the price of factoring K; where there is
-no MKL, SuperLU factors K and solves for every row, behind the same interface.
+PARDISO returns ``R K^-1 R^T`` as a Schur complement at about the cost of factoring K.  Without MKL, SuperLU factors K
+and solves for every row.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class Condensation:
     compliance : (r, r) mm/N
         Row displacements per unit row force, symmetric: ``R K^-1 R^T``.
     perturbed_pivots : int
-        0 for a trustworthy factor.
+        Number of pivots that PARDISO replaced; 0 if the factor is accurate.
     """
 
     compliance: Float
@@ -49,26 +49,26 @@ class Condensation:
     _rows: sp.csr_matrix = field(repr=False)
     _free: Int = field(repr=False)
     _solve: Callable[[Float], Float] = field(repr=False)
-    _series: _Series | None = field(default=None, repr=False)
+    _factorization: _Factorization | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
 
     def unknowns(self, force: Float) -> Float:
-        """All unknowns (N, ...) under row forces (r, ...) N: displacements in mm, then pressures.
+        """Return all unknowns (N, ...) under row forces (r, ...), N: displacements in mm, then pressures.
 
-        Several forces as columns (r, k) cost less than one after another.
+        Several forces in the columns of an array (r, k) cost less than one after another.
         """
         return self.solve(self._rows.T @ force)
 
     def solve(self, load: Float) -> Float:
-        """All unknowns (N, ...) under loads (N, ...); fixed unknowns are zero."""
+        """Return all unknowns (N, ...) under loads (N, ...); fixed unknowns are zero."""
         whole = np.zeros(load.shape, order="F")  # one field after another
         whole[self._free] = self._solve(load[self._free])
         return whole
 
     def read(self, unknowns: Float) -> Float:
-        """Row displacements (r,) mm of all unknowns (N,)."""
+        """Return the row displacements (r,), mm, of all unknowns (N,)."""
         return np.asarray(self._rows @ unknowns)
 
     def again(self, stiffness: Stiffness) -> Condensation:
@@ -78,7 +78,11 @@ class Condensation:
 
 
 def condense(
-    stiffness: Stiffness, fixed: Int, rows: sp.csr_matrix, solver: str | None = None, spent: Condensation | None = None
+    stiffness: Stiffness,
+    fixed: Int,
+    rows: sp.csr_matrix,
+    solver: str | None = None,
+    replaced: Condensation | None = None,
 ) -> Condensation:
     """Condense a stiffness to rows.
 
@@ -89,9 +93,9 @@ def condense(
     rows : (r, n d) sparse
         What is read: row displacement = rows @ u; row forces act through the transpose.
     solver : "pardiso" or "superlu"; default FINGER3D_SOLVER, else PARDISO where it is installed
-    spent : a body that is not needed any more
-        PARDISO overwrites its factor, and keeps its ordering if the entries stand in the same places; that body keeps
-        its compliance but can no longer solve.
+    replaced : a condensed body that is no longer needed
+        If it has the same sparsity pattern, PARDISO keeps its ordering and overwrites its factor; that body keeps its
+        compliance, but can no longer solve.
     """
     start = time.perf_counter()
     upper, size = stiffness.upper, stiffness.upper.shape[0]
@@ -108,11 +112,12 @@ def condense(
     scaled = sp.csr_matrix((upper.data / unit, upper.indices, upper.indptr), shape=upper.shape)
     entries = padded.data / np.repeat(units, np.diff(padded.indptr))
     read = sp.csr_matrix((entries, padded.indices, padded.indptr), shape=padded.shape)
-    series: _Series | None = None
+    factorization: _Factorization | None = None
     factor_solve: Callable[[Float], Float]
     if solver == "pardiso":
-        series = _Series.of(scaled, free, read, spent._series if spent else None)
-        compliance, perturbed, factor_solve = -series.factor.schur, series.factor.perturbed, series.solve
+        factorization = _Factorization.of(scaled, free, read, replaced._factorization if replaced else None)
+        compliance, perturbed = -factorization.factor.schur, factorization.factor.perturbed
+        factor_solve = factorization.solve
     else:
         compliance, perturbed, factor_solve = _superlu(scaled[free][:, free], read[:, free].tocsr())
     compliance = units[:, None] * (0.5 / unit * (compliance + compliance.T)) * units
@@ -121,34 +126,40 @@ def condense(
         return factor_solve(load) / unit
 
     seconds = time.perf_counter() - start
-    return Condensation(compliance, perturbed, 1, seconds, solver, padded, free, solve, series)
+    return Condensation(compliance, perturbed, 1, seconds, solver, padded, free, solve, factorization)
 
 
 def _power_of_two(values: Float) -> float:
-    """Power of two next to the largest magnitude of `values`; 1 if there is none."""
+    """Return the power of two nearest to the largest magnitude of `values`, or 1 if there is none."""
     largest = float(np.abs(values).max(initial=0.0))
     return 2.0 ** round(math.log2(largest)) if 0.0 < largest < math.inf else 1.0
 
 
 def _row_scales(rows: sp.csr_matrix) -> Float:
-    """Power of two (r,) next to the largest magnitude in every row of a sparse matrix."""
+    """Return the power of two (r,) nearest to the largest magnitude in each row of a sparse matrix."""
     return np.array([_power_of_two(rows.data[a:b]) for a, b in itertools.pairwise(rows.indptr)])
 
 
-def spring_forces(compliance: Float, springs: Float, moved: Float) -> Float:
-    """Forces (s, ...) N of springs (s,) N/mm on the last s rows of a body, which without them would move by `moved`.
+def spring_forces(compliance: Float, springs: Float, displacement: Float) -> Float:
+    """Return the forces (s, ...), N, of springs on the last s rows of a body, by Woodbury's formula.
 
-    Woodbury's formula: with any number of springs on its rows a body keeps its factorisation.
+    Parameters
+    ----------
+    compliance : (r, r) array, mm/N
+        Of the body without springs.
+    springs : (s,) array, N/mm
+    displacement : (r, ...) array, mm
+        Row displacements without springs.
     """
     first = len(compliance) - len(springs)
     root = np.sqrt(springs)
     inner = np.eye(len(springs)) + root[:, None] * compliance[first:, first:] * root
-    scaled = (root * moved[first:].T).T
+    scaled = (root * displacement[first:].T).T
     return np.asarray(-(root * np.linalg.solve(inner, scaled).T).T)
 
 
 def stiffened(compliance: Float, springs: Float) -> Float:
-    """Compliance (r, r) of a body once springs (s,) N/mm hold its last s rows."""
+    """Return the compliance (r, r) of a body with springs (s,), N/mm, on its last s rows."""
     if not len(springs):
         return compliance
     first = len(compliance) - len(springs)
@@ -163,68 +174,76 @@ def _default_solver() -> str:
 
 
 @dataclass(frozen=True)
-class _Places:
-    """Where the entries of stiffness and rows stand in PARDISO's matrix ``[[K, R^T], [R, 0]]`` of the free unknowns.
+class _Pattern:
+    """Sparsity pattern of PARDISO's matrix ``[[K, R^T], [R, 0]]`` of the free unknowns.
 
     Attributes
     ----------
-    given : what must be the same for another stiffness and other rows to stand there too
-    kept : (nnz of the stiffness,) whether an entry is of free unknowns
-    body : (nnz of PARDISO's matrix,) whether an entry is one of these; the others are of the rows, or zeros
-    beside, take : numbers of the places of entries of the rows, and of these entries
+    key : index arrays of stiffness and rows; the same arrays give the same pattern
+    is_kept : (nnz of the stiffness,) whether both unknowns of an entry are free
+    is_stiffness : (nnz of PARDISO's matrix,) whether an entry is one of the stiffness
+    row_places, row_entries : places of the entries of the rows, and which entries these are
     """
 
-    given: tuple[Int, ...]
-    kept: NDArray[np.bool_]
-    body: NDArray[np.bool_]
-    beside: Int
-    take: Int
+    key: tuple[Int, ...]
+    is_kept: NDArray[np.bool_]
+    is_stiffness: NDArray[np.bool_]
+    row_places: Int
+    row_entries: Int
 
     def values(self, upper: sp.csr_matrix, rows: sp.csr_matrix) -> Float:
-        """Entries (nnz,) of PARDISO's matrix."""
-        found = np.zeros(len(self.body))
-        found[self.body] = upper.data[self.kept]
-        found[self.beside] = rows.data[self.take]
+        """Return the entries (nnz,) of PARDISO's matrix."""
+        found = np.zeros(len(self.is_stiffness))
+        found[self.is_stiffness] = upper.data[self.is_kept]
+        found[self.row_places] = rows.data[self.row_entries]
         return found
 
 
 @dataclass(frozen=True)
-class _Series:
-    """PARDISO's factor, and the places in its matrix: for the next such matrix.
+class _Factorization:
+    """PARDISO's factor of one matrix; a later matrix of the same pattern may overwrite it.
 
-    `number` is that of the factorisation: the next one in the same places overwrites the factor.
+    `number` counts the matrices that this factor has been computed for.
     """
 
-    places: _Places
+    pattern: _Pattern
     factor: SchurFactor
     number: int = 1
 
     @property
-    def current(self) -> bool:
-        """Whether the factor is still the one of this matrix."""
+    def is_current(self) -> bool:
+        """Whether the factor is still that of this matrix."""
         return self.number == self.factor.factorizations
 
     def solve(self, load: Float) -> Float:
-        """Displacements ``K^-1 load``; raises RuntimeError once another matrix has been factored in its place."""
-        if not self.current:
+        """Return the displacements ``K^-1 load``.
+
+        Raises
+        ------
+        RuntimeError
+            If the factor has been overwritten.
+        """
+        if not self.is_current:
             raise RuntimeError("the factor of this condensed body was overwritten by a later one; condense it again")
         return self.factor.solve(load)
 
     @classmethod
-    def of(cls, upper: sp.csr_matrix, free: Int, rows: sp.csr_matrix, spent: _Series | None) -> _Series:
-        """Factor the free unknowns with the rows beside them, in the places of an earlier one where it fits."""
+    def of(
+        cls, upper: sp.csr_matrix, free: Int, rows: sp.csr_matrix, replaced: _Factorization | None
+    ) -> _Factorization:
+        """Factor the matrix of the free unknowns and the rows, reusing an earlier factor of the same pattern."""
         from finger3d.fem.pardiso import SchurFactor
 
-        given = (upper.indptr, upper.indices, free, rows.indptr, rows.indices)
-        if spent and spent.current and all(map(np.array_equal, given, spent.places.given)):
-            spent.factor.renew(spent.places.values(upper, rows))
-            return cls(spent.places, spent.factor, spent.factor.factorizations)
-        places, matrix = _augmented(upper, free, rows)
-        return cls(places, SchurFactor(matrix, rows.shape[0]))
+        key = (upper.indptr, upper.indices, free, rows.indptr, rows.indices)
+        if replaced and replaced.is_current and all(map(np.array_equal, key, replaced.pattern.key)):
+            replaced.factor.renew(replaced.pattern.values(upper, rows))
+            return cls(replaced.pattern, replaced.factor, replaced.factor.factorizations)
+        pattern, matrix = _augmented(upper, free, rows)
+        return cls(pattern, SchurFactor(matrix, rows.shape[0]))
 
 
-def _augmented(upper: sp.csr_matrix, free: Int, rows: sp.csr_matrix) -> tuple[_Places, sp.csr_matrix]:
-    """Upper triangle of ``[[K, R^T], [R, 0]]``; the entries of R^T follow those of K in every row."""
+def _augmented(upper: sp.csr_matrix, free: Int, rows: sp.csr_matrix) -> tuple[_Pattern, sp.csr_matrix]:
+    """Return the upper triangle of ``[[K, R^T], [R, 0]]``; in each row the entries of R^T follow those of K."""
     n, r = len(free), rows.shape[0]
     is_free = np.zeros(upper.shape[0], dtype=np.bool_)
     is_free[free] = True
@@ -232,20 +251,21 @@ def _augmented(upper: sp.csr_matrix, free: Int, rows: sp.csr_matrix) -> tuple[_P
     kept &= np.repeat(is_free, np.diff(upper.indptr))
     own = np.add.reduceat(kept, upper.indptr[:-1], dtype=np.int64)[free]  # no row is empty: it has its diagonal
     numbered = sp.csr_matrix((np.arange(rows.nnz), rows.indices, rows.indptr), rows.shape)
-    turned = numbered[:, free].T.tocsr()
-    more = np.diff(turned.indptr)
+    transposed = numbered[:, free].T.tocsr()
+    more = np.diff(transposed.indptr)
     indptr = np.concatenate([[0], np.cumsum(np.concatenate([own + more, np.ones(r, dtype=np.int64)]))])
-    beside = np.arange(turned.nnz) + np.repeat(np.cumsum(own), more)
-    body = np.ones(indptr[-1], dtype=np.bool_)
-    body[beside] = False
-    body[len(body) - r :] = False
+    row_places = np.arange(transposed.nnz) + np.repeat(np.cumsum(own), more)
+    stiffness = np.ones(indptr[-1], dtype=np.bool_)
+    stiffness[row_places] = False
+    stiffness[len(stiffness) - r :] = False
     number = np.cumsum(is_free, dtype=upper.indices.dtype) - 1
-    indices = np.empty(len(body), dtype=upper.indices.dtype)
-    indices[body] = number[upper.indices[kept]]
-    indices[beside] = n + turned.indices
-    indices[len(body) - r :] = np.arange(n, n + r)
-    places = _Places((upper.indptr, upper.indices, free, rows.indptr, rows.indices), kept, body, beside, turned.data)
-    return places, sp.csr_matrix((places.values(upper, rows), indices, indptr), shape=(n + r, n + r))
+    indices = np.empty(len(stiffness), dtype=upper.indices.dtype)
+    indices[stiffness] = number[upper.indices[kept]]
+    indices[row_places] = n + transposed.indices
+    indices[len(stiffness) - r :] = np.arange(n, n + r)
+    key = (upper.indptr, upper.indices, free, rows.indptr, rows.indices)
+    pattern = _Pattern(key, kept, stiffness, row_places, transposed.data)
+    return pattern, sp.csr_matrix((pattern.values(upper, rows), indices, indptr), shape=(n + r, n + r))
 
 
 def _superlu(upper: sp.csr_matrix, rows: sp.csr_matrix) -> tuple[Float, int, Callable[[Float], Float]]:
