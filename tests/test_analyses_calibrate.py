@@ -202,8 +202,8 @@ def test_the_standard_deviation_is_that_of_the_errors(function: Any) -> None:
 def test_coverage_with_a_depth_that_is_off_by_presses_of_the_real_body() -> None:
     """Depth errors are pressed, not linearised; noise is drawn; the interval comes from the calibration's slopes."""
     model = scene().model()
-    found, problem, _ = calibrated(model, "g36", np.linspace(0.1, 1.0, 13), tolerances={**NONE, "depth_mm": 0.1})
-    body = ReducedModel.of(problem)
+    found, curve = calibrated(model, "g36", np.linspace(0.1, 1.0, 13), tolerances={**NONE, "depth_mm": 0.1})
+    body = ReducedModel.of(curve.problem)
     random = np.random.default_rng(7)
     count = 250
     hits = 0

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finger3d.analyses.calibrate.increments import error_left, found_increments, increment_error
+from finger3d.analyses.calibrate.increments import choose_increments, pairwise_error, strain_error_of_increments
 from finger3d.analyses.calibrate.run import calibrate, calibrated
 from finger3d.analyses.calibrate.tolerances import read
 from finger3d.analyses.optimise.run import optimise
@@ -31,7 +31,7 @@ def test_an_error_that_falls_as_one_over_n_is_told_exactly() -> None:
     true, slope = np.array([0.02, 0.05]), np.array([3e-3, -1e-3])
     strains = {n: true + slope / n for n in (10, 20, 40, 80)}
     for n in strains:
-        assert error_left(strains, n) == pytest.approx(np.abs(slope) / n, rel=1e-9)
+        assert pairwise_error(strains, n) == pytest.approx(np.abs(slope) / n, rel=1e-9)
 
 
 def test_levels_that_agree_by_chance_do_not_hide_the_error() -> None:
@@ -39,13 +39,13 @@ def test_levels_that_agree_by_chance_do_not_hide_the_error() -> None:
     strains = {n: np.array([v]) for n, v in ((5, 0.0272), (10, 0.0249), (20, 0.0274), (40, 0.0221))}
     assert abs(0.0272 - 0.0274) < 3e-4  # four times as many
     # |0.0272 - 0.0221| / (1 - 5 / 40)
-    assert error_left(strains, 5) == pytest.approx(0.0051 / 0.875, rel=1e-9)
-    assert error_left(strains, 5) >= 0.0272 - 0.0212 - 2e-4
+    assert pairwise_error(strains, 5) == pytest.approx(0.0051 / 0.875, rel=1e-9)
+    assert pairwise_error(strains, 5) >= 0.0272 - 0.0212 - 2e-4
 
 
 def test_a_press_that_failed_tells_nothing() -> None:
     strains = {10: np.array([1.0, np.nan]), 20: np.array([2.0, np.nan]), 40: np.array([np.nan, 1.0])}
-    assert error_left(strains, 20) == pytest.approx([1.0, np.nan], nan_ok=True)
+    assert pairwise_error(strains, 20) == pytest.approx([1.0, np.nan], nan_ok=True)
 
 
 @pytest.mark.parametrize(
@@ -58,18 +58,18 @@ def test_a_press_that_failed_tells_nothing() -> None:
 )
 def test_increments_are_doubled_until_the_error_is_a_tenth_of_the_noise(slope: float, expected: int) -> None:
     problem = build(steps("auto").model())
-    found = found_increments(problem, lambda p: np.array([slope / p.model.legs[0].steps]), NOISE)
+    found = choose_increments(problem, lambda p: np.array([slope / p.model.legs[0].steps]), NOISE)
     assert found.chosen
     assert [leg.steps for leg in found.legs] == [expected]
     assert found.error == pytest.approx(slope / expected)
-    assert found.light[0].steps == 40
+    assert found.comparison_legs[0].steps == 40
 
 
 def test_a_number_that_is_given_is_kept() -> None:
     model = steps(7).model()
-    found = found_increments(build(model), lambda p: pytest.fail("nothing is to be pressed"), NOISE)
+    found = choose_increments(build(model), lambda p: pytest.fail("nothing is to be pressed"), NOISE)
     assert not found.chosen
-    assert found.legs == found.light == model.legs
+    assert found.legs == found.comparison_legs == model.legs
 
 
 def test_the_error_of_given_increments_is_that_of_presses_of_many() -> None:
@@ -81,7 +81,7 @@ def test_the_error_of_given_increments_is_that_of_presses_of_many() -> None:
         return read(other, ("g36",), mu)[0]
 
     own = strain(problem)
-    told = increment_error(problem, own, False, strain)
+    told = strain_error_of_increments(problem, own, False, strain)
     true = np.abs(own - strain(build(steps(160).model())))
     assert true.max() > 10.0 * NOISE
     ratio = told[true > NOISE] / true[true > NOISE]
@@ -110,10 +110,9 @@ def test_chosen_increments_press_the_curve_and_fewer_the_differences() -> None:
     """Where the strain hardly depends on them, 40 do, and depth is a difference of two presses of as many."""
     calm = replace(steps("auto").model(), friction=scene().model().friction)
     mus = (0.02, 0.03, 0.04, 0.05)
-    found, problem, sweep = calibrated(calm, "g36", mus, tolerances={**NONE, "depth_mm": 0.1, "increments": 1.0})
-    assert sweep.increments is not None
-    assert sweep.increments.chosen
-    assert problem.model.legs[0].steps == 40
+    found, curve = calibrated(calm, "g36", mus, tolerances={**NONE, "depth_mm": 0.1, "increments": 1.0})
+    assert curve.increments.chosen
+    assert curve.problem.model.legs[0].steps == 40
     same = calibrate(steps(40), "g36", mus=mus, tolerances={**NONE, "depth_mm": 0.1})
     assert found.strain == pytest.approx(same.strain, rel=1e-9)
     assert found.tolerances[0].slope == pytest.approx(same.tolerances[0].slope, rel=1e-6)

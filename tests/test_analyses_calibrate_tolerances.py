@@ -115,8 +115,8 @@ def test_a_fine_body_leaves_its_differences_to_the_coarser_one_beside_it(monkeyp
     told = {**NONE, "depth_mm": 0.1, "nu": 0.003}
     fine = scene(mesh={"size_mm": 0.3, "base_size_mm": 4.0}, press={"depth_mm": 10.0, "steps": 10})
     found = calibrate(fine, "g36", mus=FEW, tolerances=told)
-    beside, _, _ = calibrated(companion(build(fine.model())).model, "g36", mus=FEW, tolerances=told)
-    monkeypatch.setattr(slopes, "_ENOUGH", {2: math.inf})
+    beside, _ = calibrated(companion(build(fine.model())).model, "g36", mus=FEW, tolerances=told)
+    monkeypatch.setattr(slopes, "_LEAST_POINTS", {2: math.inf})
     own = calibrate(fine, "g36", mus=FEW, tolerances=told)
     assert found.strain == pytest.approx(own.strain, abs=0.0)
     for a, b, c in zip(found.tolerances, own.tolerances, beside.tolerances, strict=True):

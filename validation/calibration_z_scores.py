@@ -17,7 +17,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.analyses.calibrate.increments import error_left
+from finger3d.analyses.calibrate.increments import pairwise_error
 from finger3d.analyses.calibrate.run import calibrated
 from finger3d.analyses.calibrate.tolerances import TOLERANCES, read
 from finger3d.analyses.study_rows import Result, Row
@@ -98,9 +98,8 @@ def _readings(
     some = gauges()[1::3] if quick else gauges()
     found = {}
     for gauge in some:
-        c, problem, sweep = calibrated(model(nu, size, steps), gauge.name, curve, NOISE, 0.1, ON)
-        assert sweep.increments is not None
-        own = int(sweep.increments.legs[0].steps)
+        c, points = calibrated(model(nu, size, steps), gauge.name, curve, NOISE, 0.1, ON)
+        own = int(points.increments.legs[0].steps)
         found[gauge.name] = c, own
     for mesh, edge in ((SAME, size), (FINER, 0.5 * size)):
         for name, (c, own) in found.items():
@@ -182,7 +181,7 @@ def _extrapolated(bare: dict[tuple[float, float, int], Float], nu: float, size: 
                 better / plain, 0.0, "below 1 it helps", "statement", "at most",
             )
         )  # fmt: skip
-    stated = np.array([error_left({n: strains[n].ravel() for n in (b // 4, b // 2, b)}, b) for b in (40, 80, 160)])
+    stated = np.array([pairwise_error({n: strains[n].ravel() for n in (b // 4, b // 2, b)}, b) for b in (40, 80, 160)])
     off = np.array([np.abs(strains[b] - true).ravel() for b in (40, 80, 160)])
     big = off > 0.1 * NOISE
     rows.append(

@@ -28,7 +28,6 @@ from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.problem import Problem
 from finger3d.plotting.strain_map import resolution_panel, slope_panel
 from finger3d.sensor import Calibration, estimate
 from finger3d.sensor.maps import StrainMap
@@ -65,12 +64,12 @@ def run(quick: bool) -> Result:
     maps: dict[Domain, StrainMap] = {}
     rows: list[Row] = []
     for domain, sizes in (QUICK if quick else SIZES).items():
-        free, problem, sweep = calibrated(model(domain, sizes, 0.0, quick), "g", mus, NOISE, LIMIT, wanted)
+        free, points = calibrated(model(domain, sizes, 0.0, quick), "g", mus, NOISE, LIMIT, wanted)
         found[domain, FREE] = free
         foil = FOIL.apply(model(domain, sizes, 4.0, quick))
         found[domain, READ] = calibrated(foil, "g", mus, NOISE, LIMIT, OFF if quick else STEPS_ALONE)[0]
-        maps[domain] = StrainMap.of(problem, sweep.frames)
-        rows += _checks(domain, free, problem, sweep)
+        maps[domain] = StrainMap.of(points.problem, points.frames)
+        rows += _checks(domain, free, points)
     for (domain, kind), calibration in found.items():
         rows += _statements(f"{kind}, {NAMES[domain]}", calibration)
     rows += _widths(found)
@@ -82,15 +81,15 @@ def run(quick: bool) -> Result:
     return Result(tuple(rows), columns(LINES, lines), lambda figure: _draw(figure, found, maps))
 
 
-def _checks(domain: Domain, c: Calibration, problem: Problem, sweep: CurvePoints) -> list[Row]:
+def _checks(domain: Domain, c: Calibration, points: CurvePoints) -> list[Row]:
     """What must hold whatever the answer: maps, the reduced model, and the coverage of the intervals."""
     here = NAMES[domain]
-    first, last = sweep.mus[0], sweep.mus[-1]
-    near = StrainMap.of(problem, {mu: sweep.frames[mu] for mu in (first, last)})
+    problem, (first, *_, last) = points.problem, points.mus
+    near = StrainMap.of(problem, {mu: points.frames[mu] for mu in (first, last)})
     i, j = int(np.argmin(np.abs(near.y - 40.5))), int(np.argmin(np.abs(near.x - 36.5)))
     at = replace(problem.model.gauges[0], x_mm=36.5, y_mm=40.5)
     other = build(replace(problem.model, gauges=(at,)))
-    row = np.array([other.gauge_strains(sweep.frames[mu].part.force)["g"] for mu in (first, last)])
+    row = np.array([other.gauge_strains(points.frames[mu].part.force)["g"] for mu in (first, last)])
     reduced = ReducedModel.of(problem).press(last).steps[-1].gauges["g"]
     random = np.random.default_rng(20261121)
     count = 4000

@@ -1,7 +1,7 @@
-"""Presses of one condensed body under one coefficient of friction after another, each started from those before.
+"""Presses of a condensed body with several coefficients of friction, each started from the presses before it.
 
-Where mu changes by 0.1 at most, forces at the mu before take up to half off the time of a press, whose increments
-then need no other start.  They decide nothing: what is found is proved as always.
+Where mu changes by at most 0.1, the forces at the previous mu save up to half of the time of a press.  They are an
+initial guess only: the solution satisfies the contact conditions in any case.
 """
 
 from __future__ import annotations
@@ -17,8 +17,11 @@ from finger3d.mechanics.parallel import map_parallel
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
 
-_FARTHEST = 2.0  # times the distance of the last two mu: forces are not continued beyond
-_NEAR = 0.1  # of mu: from one farther off a press takes longer than from its own path
+_FARTHEST = 2.0
+"""Largest extrapolation of forces in mu, over the difference of the last two values."""
+
+_NEAR = 0.1
+"""Largest difference in mu from which a press is started; from farther off its own path is the better start."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +42,8 @@ class Press:
     factorizations: int = 0
 
 
-Like = Mapping[float, Press]
-"""Presses of a body much like another, by mu."""
+PressesByMu = Mapping[float, Press]
+"""Presses by mu, as initial guesses for those of a similar body or path."""
 
 
 def press(
@@ -50,7 +53,7 @@ def press(
     workspace: Workspace | None = None,
     cancel: Event | None = None,
 ) -> Press:
-    """Press the condensed body with this mu, started from the last two presses of `near`."""
+    """Press the condensed body with this mu; the last two presses of `near` give the initial guess."""
     law, forces, frame = problem.model.friction.with_mu(mu), [], None
     start = _start(problem, mu, near)
     workspace = workspace or problem.model.formulation.workspace()
@@ -61,9 +64,9 @@ def press(
     return Press(mu, frame, tuple(forces), workspace.factorizations - before)
 
 
-def presses(problem: Problem, mus: Sequence[float], like: Like | None = None) -> Iterator[Press]:
-    """Presses with ascending mu; where `like` has a press with the same mu, that is what it starts from."""
-    known = like or {}
+def presses(problem: Problem, mus: Sequence[float], initial: PressesByMu | None = None) -> Iterator[Press]:
+    """Yield a press for each of ascending values of mu, started from the press of `initial` with the same mu if any."""
+    known = initial or {}
 
     def pressed(mu: float, before: Sequence[Press], workspace: Workspace, cancel: Event) -> Press:
         return press(problem, mu, [known[mu]] if mu in known else before, workspace, cancel)
@@ -72,7 +75,7 @@ def presses(problem: Problem, mus: Sequence[float], like: Like | None = None) ->
 
 
 def _start(problem: Problem, mu: float, near: Sequence[Press]) -> list[Float]:
-    """Forces of the last press near, continued at the pace of the two; none of a body with other points."""
+    """Return the forces extrapolated in mu from the last two presses; none if these have other contact points."""
     shape = problem.delassus.shape[:2]
     good = [p for p in near if p.forces[0].shape == shape]
     if not good or abs(good[-1].mu - mu) > _NEAR:

@@ -17,9 +17,15 @@ from numpy.typing import NDArray
 from finger3d._machine import versions
 from finger3d._ranges import LARGEST_STRAIN, number
 from finger3d._types import Float
-from finger3d.analyses.calibrate.increments import Increments, found_increments
+from finger3d.analyses.calibrate.increments import Increments, choose_increments
 from finger3d.analyses.calibrate.presses import Press, presses
-from finger3d.analyses.calibrate.tolerances import ReferenceReadings, chosen, moved_gauges, read, slopes
+from finger3d.analyses.calibrate.tolerances import (
+    ReferenceReadings,
+    displaced_gauges,
+    evaluate_tolerances,
+    read,
+    with_defaults,
+)
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.errors import Finger3dError
 from finger3d.io import atomic, claimed, write_csv
@@ -167,7 +173,7 @@ def calibrate(
     report = report or Progress()
     scene = load(scene) if isinstance(scene, str | Path) else scene
     model = scene.model()
-    settings = CalibrationSettings(found_gauge(model, gauge), tuple(mus), noise, limit, chosen(tolerances), maps)
+    settings = CalibrationSettings(found_gauge(model, gauge), tuple(mus), noise, limit, with_defaults(tolerances), maps)
     if maps:
         from finger3d.sensor.maps import check
 
@@ -208,17 +214,12 @@ def calibrated(
     limit: float = RESOLUTION,
     tolerances: Mapping[str, float] | None = None,
     report: Progress | None = None,
-) -> tuple[Calibration, Problem, CurvePoints]:
-    """Calibrate a gauge of a model made in Python; write nothing.
-
-    Returns
-    -------
-    Calibration, the condensed body, and the presses
-    """
+) -> tuple[Calibration, CurvePoints]:
+    """Return the calibration of a gauge of a model made in Python, and its presses; write nothing."""
     report = report or Progress()
-    settings = CalibrationSettings(found_gauge(model, gauge), tuple(mus), noise, limit, chosen(tolerances))
+    settings = CalibrationSettings(found_gauge(model, gauge), tuple(mus), noise, limit, with_defaults(tolerances))
     curve = _press_all(model, settings, report)
-    return _with_tolerances(curve, settings, report), curve.problem, curve
+    return _with_tolerances(curve, settings, report), curve
 
 
 def found_gauge(model: Model, name: str) -> Gauge:
@@ -247,7 +248,7 @@ def _press_all(
 
     Every mu that is finished is written to calibration.csv, so that a failure or an interruption keeps it.
     """
-    extra = () if model.inclusions else moved_gauges(model, settings.gauge, settings.tolerances)
+    extra = () if model.inclusions else displaced_gauges(model, settings.gauge, settings.tolerances)
     model = replace(model, gauges=(*model.gauges, *(m.gauge for m in extra)))
     spent = 0
     for margin in (MARGIN, math.inf):
@@ -272,7 +273,7 @@ def _curve_points(problem: Problem, settings: CalibrationSettings, report: Progr
     mus, name = settings.mus, settings.gauge.name
     three = np.array(mus)[[0, len(mus) // 2, -1]]
     report.stage("increments")
-    increments = found_increments(problem, lambda p: read(p, (name,), three)[0], settings.noise)
+    increments = choose_increments(problem, lambda p: read(p, (name,), three)[0], settings.noise)
     if increments.chosen:
         report.say(str(increments))
     problem = replace(problem, model=replace(problem.model, legs=increments.legs))
@@ -308,16 +309,18 @@ def _with_tolerances(curve: CurvePoints, settings: CalibrationSettings, report: 
         base = ReferenceReadings(
             mu=mu,
             strain={g.name: curve.strain(g.name) for g in curve.problem.model.gauges},
-            few=_few(curve.problem, len(mu)),
+            sample=_sample(curve.problem, len(mu)),
             frame=curve.frames[float(mu[-1])],
             pressed={p.mu: p for p in curve.presses if p.frame.outcome.ok},
         )
-        found = tuple(slopes(curve.problem, gauge, settings.tolerances, base, curve.increments, report.stage))
+        found = tuple(
+            evaluate_tolerances(curve.problem, gauge, settings.tolerances, base, curve.increments, report.stage)
+        )
     seconds = {**curve.seconds, "tolerances": time.perf_counter() - start}
     return replace(calibration, tolerances=found, about={"seconds": seconds})
 
 
-def _few(problem: Problem, count: int) -> NDArray[np.int64]:
+def _sample(problem: Problem, count: int) -> NDArray[np.int64]:
     """Return the indices, among `count` values of mu, of those at which tolerances are applied."""
     wanted = _SLOPES[not problem.model.formulation.finite_strain]
     return np.unique(np.linspace(0, count - 1, wanted).round().astype(int))

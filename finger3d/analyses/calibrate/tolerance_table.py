@@ -1,4 +1,4 @@
-"""What a calibration takes to be not known exactly: a table apart, which the help of the command line reads."""
+"""Tolerances of a calibration; the help of the command line reads this table without loading NumPy."""
 
 from __future__ import annotations
 
@@ -13,5 +13,5 @@ TOLERANCES: dict[str, tuple[float, str]] = {
     "mesh": (1.0, "error bar"),
     "increments": (1.0, "error bar"),
 }
-"""Standard deviations assumed unless others are given: a careful laboratory set-up and a hand-laid gauge; of the mesh
-its error bar, from a coarser companion, and of the increments theirs, from presses of more or fewer."""
+"""Default standard deviation and unit of each quantity: a careful laboratory set-up and a gauge laid by hand.  For mesh
+and increments the unit is the error bar of the strain due to them."""

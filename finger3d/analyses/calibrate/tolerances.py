@@ -1,10 +1,10 @@
-"""What else moves the strain: depth, material, tilt, and where the gauge really lies, by finite differences.
+"""Effect of tolerances on the strain of a gauge: depth, material, tilt, place of the gauge, mesh and increments.
 
-Gauges that are a little off are read beside the true one from the same presses.  All else is a difference between two
-presses, of a fine mesh those of the coarser one that its error bar comes from: depth is another path of it, E another
-scale of its compliance; nu, tilt and a foil that lies elsewhere are bodies of their own.  Differences are over one
-tolerance, at a few mu; slopes in between are interpolated.  What the increments leave out is a difference to presses of
-more or fewer of them.
+Each effect is a finite difference over one standard deviation.  A displaced gauge is read in the same presses as the
+nominal one.  Other quantities are varied in a further series of presses at some values of mu, on the coarser mesh
+that the error bar comes from if that has enough contact points: the depth on another path, Young's modulus with a
+scaled compliance, and Poisson's ratio, the tilt and the place of a stiff gauge on a body of their own.  Between these
+values of mu the effect is interpolated.  The error of the increments follows from presses with more or fewer of them.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import partial
+from typing import Any, TypeAlias
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -21,8 +22,8 @@ from finger3d._ranges import LARGEST_SD
 from finger3d._types import Float, Int
 from finger3d.accuracy.companions import built_like, companion
 from finger3d.accuracy.estimate import strain_error
-from finger3d.analyses.calibrate.increments import Increments, increment_error
-from finger3d.analyses.calibrate.presses import Like, presses
+from finger3d.analyses.calibrate.increments import Increments, strain_error_of_increments
+from finger3d.analyses.calibrate.presses import PressesByMu, presses
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.errors import Finger3dError
 from finger3d.fem.condense import stiffened
@@ -36,13 +37,26 @@ from finger3d.mechanics.problem import Problem, scatter_to_points
 from finger3d.objects import Plane
 from finger3d.sensor.curve import Tolerance
 
-_ENOUGH = {2: 150, 3: 500}  # contact points that make a coarser body's differences good to a fifth of the largest
-_LEFT = {2: 100, 3: 500}  # contact points that a tilted body is left with
-_PLACES = ("gauge_x_mm", "gauge_y_mm", "gauge_angle_deg")
+_LEAST_POINTS = {2: 150, 3: 500}
+"""Contact points, by dimension, from which differences on the coarser mesh are good to a fifth of the largest."""
+
+_TILTED_POINTS = {2: 100, 3: 500}
+"""Contact points, by dimension, that the mesh of a tilted body has about."""
+
+_GAUGE_PLACES = ("gauge_x_mm", "gauge_y_mm", "gauge_angle_deg")
+
+Effect: TypeAlias = tuple[float, Float]
+"""Step of a quantity in its unit, and the change (m,) of the strain that it causes."""
 
 
-def chosen(given: Mapping[str, float] | None) -> dict[str, float]:
-    """The tolerances (standard deviations) by name: the defaults, changed by what is given; 0 leaves one out."""
+def with_defaults(given: Mapping[str, float] | None) -> dict[str, float]:
+    """Return the standard deviations by name: the defaults, updated with the given ones, without those that are zero.
+
+    Raises
+    ------
+    Finger3dError
+        If a name is unknown or a number out of range.
+    """
     from difflib import get_close_matches
 
     found = {name: sd for name, (sd, _) in TOLERANCES.items()}
@@ -58,26 +72,26 @@ def chosen(given: Mapping[str, float] | None) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class DisplacedGauge:
-    """The same gauge laid a little off, by `step` of one tolerance's unit, under another name."""
+    """A gauge that is displaced by `step`, in the unit of a tolerance; it has a name of its own."""
 
     tolerance: str
     step: float
     gauge: Gauge
 
 
-def moved_gauges(model: Model, gauge: Gauge, tolerances: Mapping[str, float]) -> list[DisplacedGauge]:
-    """The gauge off by plus and minus each tolerance of place; sides that leave the body are left out."""
+def displaced_gauges(model: Model, gauge: Gauge, tolerances: Mapping[str, float]) -> list[DisplacedGauge]:
+    """Return the gauge displaced by plus and minus each tolerance of its place, as far as it stays in the body."""
     found = []
-    for name in (n for n in _PLACES if n in tolerances):
+    for name in (n for n in _GAUGE_PLACES if n in tolerances):
         for sign in (1.0, -1.0):
             step = sign * tolerances[name]
-            off = replace(_off(gauge, name, step), name=f"{gauge.name} {name} {sign:+g}")
-            if _inside(model, off):
-                found.append(DisplacedGauge(name, step, off))
+            displaced = replace(_displaced(gauge, name, step), name=f"{gauge.name} {name} {sign:+g}")
+            if _is_inside(model, displaced):
+                found.append(DisplacedGauge(name, step, displaced))
     return found
 
 
-def _off(gauge: Gauge, name: str, step: float) -> Gauge:
+def _displaced(gauge: Gauge, name: str, step: float) -> Gauge:
     if name == "gauge_x_mm":
         return replace(gauge, x_mm=gauge.x_mm + step)
     if name == "gauge_y_mm":
@@ -85,7 +99,7 @@ def _off(gauge: Gauge, name: str, step: float) -> Gauge:
     return replace(gauge, angle=gauge.angle + math.radians(step))
 
 
-def _inside(model: Model, gauge: Gauge) -> bool:
+def _is_inside(model: Model, gauge: Gauge) -> bool:
     at = np.array([gauge.middle, *gauge.ends])
     top = model.design.top(at[:, 0], at[:, 2])
     return bool(np.isfinite(top).all() and (at[:, 1] > 0.0).all() and (at[:, 1] < top - 1e-6).all())
@@ -93,47 +107,56 @@ def _inside(model: Model, gauge: Gauge) -> bool:
 
 @dataclass(frozen=True)
 class ReferenceReadings:
-    """Presses of the nominal body.
+    """Readings of the nominal body.
 
     Attributes
     ----------
-    mu, strain : (n,), and (n,) of every gauge by name
-    few : numbers of the mu at which other bodies and paths are pressed
-    frame : the last one of any press
-    pressed : presses that others may start from
+    mu : (n,) array
+    strain : strain (n,) by gauge
+    sample : (m,) array
+        Indices of the values of mu at which other bodies and paths are pressed.
+    frame : the last increment of any press
+    pressed : presses by mu
     """
 
     mu: Float
     strain: Mapping[str, Float]
-    few: Int
+    sample: Int
     frame: StepResult
-    pressed: Like
+    pressed: PressesByMu
 
 
 @dataclass(frozen=True)
 class ReferenceBody:
-    """The body that others are compared with: strain (m,) of the gauge at mu (m,), and presses they may start from."""
+    """Body that others are compared with: strain (m,) of the gauge at mu (m,), and its presses by mu."""
 
     problem: Problem
     gauge: Gauge
     mu: Float
     strain: Float
-    pressed: Like
+    pressed: PressesByMu
 
-    def change(self, problem: Problem, like: Like | None = None) -> Float:
-        """Return the change of the strain (m,) in another body or path; `like` gives initial guesses."""
-        return np.asarray(read(problem, (self.gauge.name,), self.mu, like or self.pressed)[0] - self.strain)
+    @classmethod
+    def of(cls, problem: Problem, gauge: Gauge, mu: Float) -> ReferenceBody:
+        """Press a problem at mu (m,)."""
+        pressed = {p.mu: p for p in presses(problem, mu.tolist())}
+        strain = np.array([_strain(p.frame, gauge.name) for p in pressed.values()])
+        return cls(problem, gauge, mu, strain, pressed)
+
+    def change(self, problem: Problem, initial: PressesByMu | None = None) -> Float:
+        """Return the change (m,) of the strain in another body or path; `initial` has the initial guesses."""
+        return np.asarray(read(problem, (self.gauge.name,), self.mu, initial or self.pressed)[0] - self.strain)
 
     def rebuilt(self, **changes: Any) -> Problem:
-        """The body with another model, without the gauges that nobody reads; all of them where they stiffen it."""
+        """Return the body with a changed model, and without the other gauges unless they stiffen it."""
         model = self.problem.model
         alone = model if model.inclusions else replace(model, gauges=(self.gauge,))
         return built_like(self.problem, replace(alone, **changes))
 
 
-def read(problem: Problem, names: tuple[str, ...], mu: Float, like: Like | None = None) -> Float:
-    """Strain (g, m) of some gauges at mu (m,), nan where a press failed."""
-    frames = [p.frame for p in presses(problem, mu.tolist(), like)]
+def read(problem: Problem, names: tuple[str, ...], mu: Float, initial: PressesByMu | None = None) -> Float:
+    """Return the strain (g, m) of gauges at mu (m,), NaN where a press failed."""
+    frames = [p.frame for p in presses(problem, mu.tolist(), initial)]
     return np.array([[_strain(f, n) for f in frames] for n in names])
 
 
@@ -141,7 +164,7 @@ def _strain(frame: StepResult, name: str) -> float:
     return frame.gauges[name] if frame.outcome.ok else math.nan
 
 
-def slopes(
+def evaluate_tolerances(
     problem: Problem,
     gauge: Gauge,
     tolerances: Mapping[str, float],
@@ -149,162 +172,203 @@ def slopes(
     increments: Increments,
     say: Callable[[str], None],
 ) -> Iterator[Tolerance]:
-    """Every tolerance with its slope at all mu of `base`; those between the few are interpolated.
+    """Yield every tolerance with its effect at all values of mu of `base`.
 
     Parameters
     ----------
     problem : the condensed body
-    increments : of its path; presses that are only compared with each other may have fewer
-    base : strains of its gauges, those a little off among them unless it has inclusions
-    say : told which tolerance is being tried; a press that fails is passed over
+    gauge : Gauge
+    tolerances : standard deviations by name
+    base : readings of its gauges; without inclusions the displaced gauges are among them
+    increments : of its path
+    say : receives a line about each tolerance
+
+    Notes
+    -----
+    A tolerance is left out if a press that it needs fails.
     """
-    at = base.few
-    own = base.strain[gauge.name][at]
-    body = ReferenceBody(problem, gauge, base.mu[at], own, base.pressed)
-    others = set(tolerances) - {*_PLACES, "increments"}
-    if others and increments.light != problem.model.legs:
-        body = _body(replace(problem, model=replace(problem.model, legs=increments.light)), gauge, base.mu[at])
-    enough = len(problem.points.nodes) >= 2 ** (problem.dim - 1) * _ENOUGH[problem.dim]
+    mu = base.mu[base.sample]
+    own = base.strain[gauge.name][base.sample]
+    body = ReferenceBody(problem, gauge, mu, own, base.pressed)
+    others = set(tolerances) - {*_GAUGE_PLACES, "increments"}
+    if others and increments.comparison_legs != problem.model.legs:
+        legs = increments.comparison_legs
+        body = ReferenceBody.of(replace(problem, model=replace(problem.model, legs=legs)), gauge, mu)
+    coarse_suffices = len(problem.points.nodes) >= 2 ** (problem.dim - 1) * _LEAST_POINTS[problem.dim]
     coarse = None
-    if "mesh" in tolerances or (enough and others):
+    if "mesh" in tolerances or (coarse_suffices and others):
         say("a coarser body")
-        coarse = _beside_mesh(body, say)
+        coarse = _on_coarser_mesh(body, say)
+    varied = coarse if coarse and coarse_suffices else body
     for name, sd in tolerances.items():
         say(f"tolerance {name}")
-        beside = _beside(problem.model, gauge, name, sd, base)
-        where = np.arange(len(base.mu)) if beside else at
+        effects = _effects_of_displaced_gauge(problem.model, gauge, name, sd, base)
+        known = base.mu if effects else mu
         if name == "mesh":
-            steps = [(sd, sd * _mesh_error(body, coarse, base.frame))] if coarse else []
+            effects = [(sd, sd * _mesh_error(body, coarse, base.frame))] if coarse else []
         elif name == "increments":
-            left = increment_error(
-                problem, own, increments.chosen, lambda other: read(other, (gauge.name,), base.mu[at])[0]
+            error = strain_error_of_increments(
+                problem, own, increments.chosen, lambda other: read(other, (gauge.name,), mu)[0]
             )
-            steps = [(sd, sd * left)]
-        else:
-            steps = beside or list(_steps(coarse if coarse and enough else body, name, sd))
-        if not steps:
-            continue
-        steps = [(step, _between(base.mu, base.mu[where], effect)) for step, effect in steps]
-        if not all(np.isfinite(effect).all() for _, effect in steps):
-            continue
-        # a step may be cut short, for instance at the body's edge: its effect is scaled to one sd
-        effects = np.array([effect * sd / step for step, effect in steps])
-        (a, at_a), (b, at_b) = [*steps, (0.0, np.zeros(len(base.mu)))][:2]
-        yield Tolerance(
-            name=name,
-            unit=TOLERANCES[name][1],
-            sd=sd,
-            slope=(at_a - at_b) / (a - b),
-            spread=np.sqrt(np.mean(effects**2, axis=0)),
-        )
+            effects = [(sd, sd * error)]
+        elif not effects:
+            effects = list(_VARIATIONS[name](varied, sd))
+        effects = [(step, _interpolated(base.mu, known, change)) for step, change in effects]
+        if effects and all(np.isfinite(change).all() for _, change in effects):
+            yield _tolerance(name, sd, effects)
 
 
-def _between(mu: Float, at: Float, values: Float) -> Float:
-    """Values (n,) at mu (n,) by PCHIP of those (m,) at some that are known, constant beyond; nan where none is."""
+def _tolerance(name: str, sd: float, effects: list[Effect]) -> Tolerance:
+    """Return a tolerance from its effects, each scaled to one standard deviation."""
+    scaled = np.array([change * sd / step for step, change in effects])
+    (a, change_a), (b, change_b) = [*effects, (0.0, np.zeros(scaled.shape[1]))][:2]
+    return Tolerance(
+        name=name,
+        unit=TOLERANCES[name][1],
+        sd=sd,
+        slope=(change_a - change_b) / (a - b),
+        spread=np.sqrt(np.mean(scaled**2, axis=0)),
+    )
+
+
+def _interpolated(mu: Float, known: Float, values: Float) -> Float:
+    """Return values (n,) at mu (n,) by monotone cubic interpolation, constant outside; NaN if none is known."""
     good = np.isfinite(values)
     if good.sum() < 2:
         return np.full(len(mu), values[good][0] if good.any() else math.nan)
-    at, values = at[good], values[good]
-    return np.asarray(PchipInterpolator(at, values)(np.clip(mu, at[0], at[-1])))
+    known, values = known[good], values[good]
+    return np.asarray(PchipInterpolator(known, values)(np.clip(mu, known[0], known[-1])))
 
 
-def _beside(model: Model, gauge: Gauge, name: str, sd: float, base: ReferenceReadings) -> list[tuple[float, Float]]:
-    """Steps of a gauge's place, and what they change, read from the same presses."""
+def _effects_of_displaced_gauge(
+    model: Model, gauge: Gauge, name: str, sd: float, base: ReferenceReadings
+) -> list[Effect]:
+    """Return the effects of a displaced gauge, read in the presses of the nominal one; none if it stiffens the body."""
     if model.inclusions:
         return []
-    off = [m for m in moved_gauges(model, gauge, {name: sd}) if m.gauge.name in base.strain]
-    return [(m.step, base.strain[m.gauge.name] - base.strain[gauge.name]) for m in off]
+    displaced = [d for d in displaced_gauges(model, gauge, {name: sd}) if d.gauge.name in base.strain]
+    return [(d.step, base.strain[d.gauge.name] - base.strain[gauge.name]) for d in displaced]
 
 
-def _steps(body: ReferenceBody, name: str, sd: float) -> Iterator[tuple[float, Float]]:
-    """One or two steps of a tolerance, and what they change the strain (m,) by."""
-    problem, gauge = body.problem, body.gauge
-    model = problem.model
-    if name == "depth_mm":
-        shallowest = min(leg.depth_mm for leg in model.legs if leg.depth_mm > 0.0)
-        for step in (sd, -min(sd, 0.5 * shallowest)):
-            legs = tuple(replace(leg, depth_mm=leg.depth_mm + step * (leg.depth_mm > 0.0)) for leg in model.legs)
-            yield step, body.change(replace(problem, model=replace(model, legs=legs)), _along(body, legs))
-    elif name == "E_percent":
-        alone = model.inclusions is None and model.object_compliance is None
-        # strains do not know the modulus unless something else in the scene has a stiffness too
-        yield sd, np.zeros(len(body.mu)) if alone else body.change(with_modulus(problem, 1.0 + 0.01 * sd))
-    elif name == "nu":
-        material = model.material.isotropic("the tolerance of nu")
-        step = _step_of_nu(material.nu, sd)
-        yield step, body.change(body.rebuilt(material=replace(material, nu=material.nu + step)))
-    elif name == "tilt_deg":
-        yield from _tilted(body, sd)
-    elif name in _PLACES and model.inclusions:  # a foil stiffens the body where it lies
-        off = _off(gauge, name, sd)
-        if _inside(model, off):
-            gauges = tuple(off if g.name == gauge.name else g for g in model.gauges)
-            yield sd, body.change(body.rebuilt(gauges=gauges))
+def _vary_depth(body: ReferenceBody, sd: float) -> Iterator[Effect]:
+    """Press deeper, and less deep by at most half the depth of the shallowest leg."""
+    problem, model = body.problem, body.problem.model
+    shallowest = min(leg.depth_mm for leg in model.legs if leg.depth_mm > 0.0)
+    for step in (sd, -min(sd, 0.5 * shallowest)):
+        legs = tuple(replace(leg, depth_mm=leg.depth_mm + step * (leg.depth_mm > 0.0)) for leg in model.legs)
+        yield step, body.change(replace(problem, model=replace(model, legs=legs)), _scaled_to_path(body, legs))
 
 
-def _along(body: ReferenceBody, legs: tuple[Leg, ...]) -> Like:
-    """The body's presses as they may be on other legs: forces go on with the depth at the pace of each increment."""
+def _vary_modulus(body: ReferenceBody, sd: float) -> Iterator[Effect]:
+    """Raise Young's modulus; strains depend on it only if something else in the scene has a stiffness."""
+    model = body.problem.model
+    alone = model.inclusions is None and model.object_compliance is None
+    yield sd, np.zeros(len(body.mu)) if alone else body.change(with_modulus(body.problem, 1.0 + 0.01 * sd))
+
+
+def _vary_poisson(body: ReferenceBody, sd: float) -> Iterator[Effect]:
+    """Lower Poisson's ratio, or raise it if lowering leaves its range or changes the element."""
+    material = body.problem.model.material.isotropic("the tolerance of nu")
+    nu = material.nu
+    changes_element = nu - sd < MIXED_FROM <= nu
+    step = sd if nu - sd < 0.0 or (changes_element and nu + sd <= 0.5) else -sd
+    yield step, body.change(body.rebuilt(material=replace(material, nu=nu + step)))
+
+
+def _vary_tilt(body: ReferenceBody, sd: float) -> Iterator[Effect]:
+    """Tilt a plane by plus and minus `sd`; of a symmetric scene the mirrored gauge gives the second reading.
+
+    The mesh is another one, without symmetry, so that the two tilted bodies are compared with each other.
+    """
+    problem, gauge, model = body.problem, body.gauge, body.problem.model
+    if not isinstance(model.object, Plane):
+        return
+    plane, step, mesh = model.object, math.radians(sd), _coarser(problem)
+    if "x" in problem.axes and not model.inclusions:
+        image = replace(gauge, name=f"{gauge.name} mirrored", x_mm=-gauge.x_mm, angle=math.pi - gauge.angle)
+        tilted = body.rebuilt(mesh=mesh, object=replace(plane, tilt=step), gauges=(gauge, image), symmetry=None)
+        plus, minus = read(tilted, (gauge.name, image.name), body.mu)
+    else:
+        plus, minus = (
+            read(
+                body.rebuilt(mesh=mesh, object=replace(plane, tilt=plane.tilt + sign * step), symmetry=None),
+                (gauge.name,),
+                body.mu,
+            )[0]
+            for sign in (1.0, -1.0)
+        )
+    half = 0.5 * (plus - minus)
+    yield sd, half
+    yield -sd, -half
+
+
+def _vary_stiff_gauge(name: str, body: ReferenceBody, sd: float) -> Iterator[Effect]:
+    """Displace a gauge that stiffens the body, as far as it stays inside."""
+    model = body.problem.model
+    displaced = _displaced(body.gauge, name, sd)
+    if model.inclusions and _is_inside(model, displaced):
+        gauges = tuple(displaced if g.name == body.gauge.name else g for g in model.gauges)
+        yield sd, body.change(body.rebuilt(gauges=gauges))
+
+
+_VARIATIONS: dict[str, Callable[[ReferenceBody, float], Iterator[Effect]]] = {
+    "depth_mm": _vary_depth,
+    "E_percent": _vary_modulus,
+    "nu": _vary_poisson,
+    "tilt_deg": _vary_tilt,
+    **{name: partial(_vary_stiff_gauge, name) for name in _GAUGE_PLACES},
+}
+"""By tolerance, the function that yields its effects on a reference body for one standard deviation."""
+
+
+def _scaled_to_path(body: ReferenceBody, legs: tuple[Leg, ...]) -> PressesByMu:
+    """Return the presses of a body with forces extrapolated to the depths of another path, as initial guesses."""
     own = [t.depth_mm for t in targets(body.problem.model.legs)]
     strides = np.diff([0.0, *own])
     change = np.subtract([t.depth_mm for t in targets(legs)], own)
     share = np.divide(change, strides, out=np.zeros(len(own)), where=strides != 0.0)
 
-    def moved(forces: tuple[Float, ...]) -> tuple[Float, ...]:
+    def extrapolated(forces: tuple[Float, ...]) -> tuple[Float, ...]:
         before = (np.zeros_like(forces[0]), *forces)
         return tuple(f + s * (f - last) for f, last, s in zip(forces, before, share, strict=False))
 
-    return {mu: replace(one, forces=moved(one.forces)) for mu, one in body.pressed.items()}
+    return {mu: replace(press, forces=extrapolated(press.forces)) for mu, press in body.pressed.items()}
 
 
-def _step_of_nu(nu: float, sd: float) -> float:
-    """Down, unless that leaves the range or the element that the body is made of."""
-    other_side = nu - sd < MIXED_FROM <= nu
-    return sd if nu - sd < 0.0 or (other_side and nu + sd <= 0.5) else -sd
-
-
-def with_modulus(problem: Problem, times: float) -> Problem:
-    """The problem with its Young's modulus multiplied, in small strain from the same condensation."""
+def with_modulus(problem: Problem, factor: float) -> Problem:
+    """Return the problem with Young's modulus multiplied; in small strain the condensation is reused."""
     if not problem.model.formulation.is_linear_elastic:
         material = problem.model.material.isotropic("the tolerance of E_MPa")
-        return build(replace(problem.model, material=replace(material, E_MPa=material.E_MPa * times)))
+        return build(replace(problem.model, material=replace(material, E_MPa=material.E_MPa * factor)))
     c, d = problem.delassus.shape[:2]
 
-    def soft(one: Problem) -> Problem:
+    def scaled(one: Problem) -> Problem:
         own = stiffened(one.part.condensed.compliance, one.inclusions.bar_stiffness)
         active, gauges = one.system.active_dofs, len(one.system.gauge_rows)
-        rest = one.delassus - scatter_to_points(own, active, c, d)  # of the object
-        changed = stiffened(one.part.condensed.compliance / times, one.inclusions.bar_stiffness)
+        of_object = one.delassus - scatter_to_points(own, active, c, d)
+        changed = stiffened(one.part.condensed.compliance / factor, one.inclusions.bar_stiffness)
         rows = np.zeros_like(one.system.gauge_rows)
         rows[:, active] = changed[len(active) : len(active) + gauges, : len(active)]
-        delassus = scatter_to_points(changed, active, c, d) + rest
+        delassus = scatter_to_points(changed, active, c, d) + of_object
         return replace(one, system=replace(one.system, delassus=delassus, gauge_rows=rows))
 
-    changed = soft(problem)
-    return (
-        replace(changed, without_inclusions=soft(problem.without_inclusions)) if problem.without_inclusions else changed
-    )
+    changed, bare = scaled(problem), problem.without_inclusions
+    return replace(changed, without_inclusions=scaled(bare)) if bare else changed
 
 
-def _beside_mesh(body: ReferenceBody, say: Callable[[str], None]) -> ReferenceBody | None:
-    """The same on the coarser mesh that the error bar comes from; none of a mesh that has no coarser one."""
+def _on_coarser_mesh(body: ReferenceBody, say: Callable[[str], None]) -> ReferenceBody | None:
+    """Return the body on the coarser mesh that the error bar comes from; None if there is no coarser mesh."""
     try:
-        return _body(companion(body.problem, say), body.gauge, body.mu)
+        return ReferenceBody.of(companion(body.problem, say), body.gauge, body.mu)
     except Finger3dError:
         return None
 
 
-def _body(problem: Problem, gauge: Gauge, mu: Float) -> ReferenceBody:
-    """A body pressed at mu (m,), to compare others with."""
-    pressed = {p.mu: p for p in presses(problem, mu.tolist())}
-    strain = np.array([_strain(p.frame, gauge.name) for p in pressed.values()])
-    return ReferenceBody(problem, gauge, mu, strain, pressed)
-
-
 def _mesh_error(body: ReferenceBody, coarse: ReferenceBody, frame: StepResult) -> Float:
-    """Error bar (m,) of the strain, by its grain in a last frame at any mu.
+    """Return the error bar (m,) of the strain due to the mesh, nowhere below its root mean square.
 
-    Nowhere below its root mean square: errors of a mesh are much alike at all mu, and where the two curves cross they
-    agree by chance.
+    The error depends little on mu, and where the strains of the two meshes cross they agree by chance.  `frame` is the
+    last increment at any mu.
     """
     found = strain_error(body.problem, frame, coarse.problem, body.strain, coarse.strain)
     known = found[np.isfinite(found)]
@@ -312,33 +376,8 @@ def _mesh_error(body: ReferenceBody, coarse: ReferenceBody, frame: StepResult) -
 
 
 def _coarser(problem: Problem) -> MeshOptions:
-    """Edge lengths of a tilted body, which is compared with its own mirror image: longer, with some points left to
-    touch; structured where the design allows, so that nothing is meshed for long.
-    """
-    options, left = problem.model.mesh, len(problem.points.nodes) / _LEFT[problem.dim]
-    times = min(2.0, max(1.0, left)) if problem.dim == 2 else min(1.5, max(1.25, math.sqrt(left)))
+    """Return the mesh options of a tilted body: longer edges, and a structured mesh where the design allows one."""
+    options, left = problem.model.mesh, len(problem.points.nodes) / _TILTED_POINTS[problem.dim]
+    factor = min(2.0, max(1.0, left)) if problem.dim == 2 else min(1.5, max(1.25, math.sqrt(left)))
     mesher: Any = "swept" if problem.model.design.section() is not None else options.mesher
-    return replace(options, size_mm=times * options.size_mm, base_size_mm=times * options.base_size_mm, mesher=mesher)
-
-
-def _tilted(body: ReferenceBody, sd: float) -> Iterator[tuple[float, Float]]:
-    """A plane that is not level; of a scene that is its own mirror image one tilt gives both, by the mirrored gauge."""
-    problem, gauge, model = body.problem, body.gauge, body.problem.model
-    thing = model.object
-    if not isinstance(thing, Plane):
-        return
-    step, mesh = math.radians(sd), _coarser(problem)
-    if "x" in problem.axes and not model.inclusions:
-        image = replace(gauge, name=f"{gauge.name} mirrored", x_mm=-gauge.x_mm, angle=math.pi - gauge.angle)
-        other = body.rebuilt(mesh=mesh, object=replace(thing, tilt=step), gauges=(gauge, image), symmetry=None)
-        there, back = read(other, (gauge.name, image.name), body.mu)
-    else:
-        tilted = [
-            body.rebuilt(mesh=mesh, object=replace(thing, tilt=thing.tilt + sign * step), symmetry=None)
-            for sign in (1.0, -1.0)
-        ]
-        there, back = (read(one, (gauge.name,), body.mu)[0] for one in tilted)
-    # the body's mesh is another one, whole: it is compared with itself
-    half = 0.5 * (there - back)
-    yield sd, half
-    yield -sd, -half
+    return replace(options, size_mm=factor * options.size_mm, base_size_mm=factor * options.base_size_mm, mesher=mesher)
