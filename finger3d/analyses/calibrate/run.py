@@ -98,8 +98,7 @@ class CurvePoints:
     Attributes
     ----------
     problem : the condensed body; its gauges include the displaced ones, which give the tolerances of position
-    mus : all values of mu of the calibration, ascending
-    increments : of every press
+    mus, increments : all values of mu of the calibration, ascending; the increments of every press
     presses : in the order of `mus`
     seconds : wall time of the build and of the presses
     factorizations_before : factorisations of an earlier attempt with too few candidate points
@@ -155,11 +154,10 @@ def calibrate(
     gauge : name of a [[gauge]]
     out : folder for calibration.json, .csv, .png, reduced.npz (and map.png, map.csv); None writes nothing
     mus : coefficients of friction, from 0 up
-    noise, limit : standard deviation of a strain reading; resolution of mu beyond which the gauge is called blind
-    tolerances : standard deviations by name, over the defaults of `finger3d.analyses.calibrate.tolerances.TOLERANCES`;
-        0 leaves one out
-    report : told about every mu
-    maps : also map over the section how far strains follow mu
+    noise, limit : standard deviation of a strain reading, and largest one of mu at which the gauge is usable
+    tolerances : standard deviations by name, in place of the defaults of `TOLERANCES`; 0 omits one
+    report : receives the progress
+    maps : also map the sensitivity of strain to mu over the section
 
     Raises
     ------
@@ -223,7 +221,7 @@ def calibrated(
 
 
 def found_gauge(model: Model, name: str) -> Gauge:
-    """The gauge of this name, or a refusal that names the nearest."""
+    """Return the gauge of this name; an unknown name is refused with the nearest one."""
     names = [g.name for g in model.gauges]
     if not names:
         raise Finger3dError(f'--gauge {name}: the scene has no [[gauge]]; add one with name = "{name}", x_mm and y_mm')
