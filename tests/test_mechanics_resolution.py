@@ -24,7 +24,14 @@ from finger3d.mechanics.build import build
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.resolution import Hidden, foreseen, hidden, inside, penetration, tips_of
+from finger3d.mechanics.resolution import (
+    UnresolvedOverlap,
+    landmarks_of,
+    penetration,
+    penetration_warnings,
+    unresolved_overlap,
+    warnings_before_meshing,
+)
 from finger3d.mechanics.solve import march
 from finger3d.mechanics.symmetry import symmetry
 from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
@@ -63,9 +70,9 @@ def fig9(obj: RigidObject, depth: float, size: float, **changes: object) -> Mode
     return replace(model, **changes)
 
 
-def unseen(problem: Problem) -> Hidden:
-    tips = tips_of(problem.model, problem.system.place_mm)
-    return hidden(problem.model, problem.surface, problem.system.first_contact_mm, tips, problem.axes)
+def overlap_of(problem: Problem) -> UnresolvedOverlap:
+    landmarks = landmarks_of(problem.model, problem.system.place_mm)
+    return unresolved_overlap(problem.model, problem.surface, problem.system.first_contact_mm, landmarks, problem.axes)
 
 
 @pytest.mark.parametrize(
@@ -90,7 +97,7 @@ def test_what_touches_no_point_is_refused_with_the_size_that_resolves_it(
     assert f"mesh.size_mm = {finer:g}" in str(refused.value)
     resolved = fig9(obj, depth, finer)
     problem = build(resolved)
-    assert unseen(problem).share <= 0.1
+    assert overlap_of(problem).share <= 0.1
     *_, end = march(problem)
     assert end.outcome.ok
     assert measure(problem.points, end)["normal_force_N"] > 0.0
@@ -137,8 +144,8 @@ def test_what_points_see_well_is_neither_refused_nor_warned_of(
     obj: RigidObject, depth: float, size: float, domain: str
 ) -> None:
     model = fig9(obj, depth, size, domain=domain, legs=(Leg(depth, steps=2), Leg(0.5 * depth, steps=1)))
-    assert unseen(build(model)).share < 0.1
-    assert not foreseen(model, symmetry(model))
+    assert overlap_of(build(model)).share < 0.1
+    assert not warnings_before_meshing(model, symmetry(model))
 
 
 def test_what_is_hidden_is_the_sagitta_of_the_hats() -> None:
@@ -147,7 +154,7 @@ def test_what_is_hidden_is_the_sagitta_of_the_hats() -> None:
     for size in (4.0, 2.0, 1.0):
         problem = build(fig9(Plane(), 0.5, size))
         spacing = np.diff(np.sort(problem.surface.points[:, 0]))[0]
-        found = unseen(problem)
+        found = overlap_of(problem)
         assert found.depth_mm == pytest.approx(spacing**2 / (12.0 * 100.0), rel=0.02)
         assert found.share == found.depth_mm / 0.5
 
@@ -162,10 +169,10 @@ def test_what_is_hidden_is_the_sagitta_of_the_hats() -> None:
     ],
 )
 def test_details_that_points_cannot_see_are_warned_of(obj: RigidObject, lengths: tuple[str, str]) -> None:
-    told = foreseen(fig9(obj, 5.0, 0.5), ())
+    told = warnings_before_meshing(fig9(obj, 5.0, 0.5), ())
     assert len(told) == 1
     assert all(re.search(rf"\b{re.escape(length)}\b", told[0]) for length in lengths)
-    assert not foreseen(replace(fig9(obj, 5.0, 0.5), mesh=MeshOptions(float(lengths[1]), 8.0)), ("x",))
+    assert not warnings_before_meshing(replace(fig9(obj, 5.0, 0.5), mesh=MeshOptions(float(lengths[1]), 8.0)), ("x",))
 
 
 def written(tmp_path: Path, text: str = SCENE) -> str:
@@ -242,8 +249,8 @@ def test_the_end_of_a_press_tells_how_deep_the_object_is_between_the_points(fini
         u = displacement(problem.mesh, problem.model.formulation.unknowns(problem, end.part))
         shares.append(penetration(problem, end, u)[0] / depth)
         # what is hidden at rest, vertically, foretells it: within 0.06 on 26 presses
-        assert shares[-1] == pytest.approx(unseen(problem).share, abs=0.06)
-        assert len(inside(problem, end, u)) == (shares[-1] > 0.1)
+        assert shares[-1] == pytest.approx(overlap_of(problem).share, abs=0.06)
+        assert len(penetration_warnings(problem, end, u)) == (shares[-1] > 0.1)
     assert shares[0] > 0.1 > shares[1]
 
 
@@ -254,8 +261,8 @@ def test_an_edge_that_cuts_between_points_which_moved_is_told() -> None:
     problem = build(Effect().apply(model))
     *_, end = march(problem)
     u = displacement(problem.mesh, problem.model.formulation.unknowns(problem, end.part))
-    assert unseen(problem).share < 0.01
-    assert len(inside(problem, end, u)) == 1
+    assert overlap_of(problem).share < 0.01
+    assert len(penetration_warnings(problem, end, u)) == 1
 
 
 def test_an_object_that_slides_off_is_no_mistake() -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from finger3d._types import Tree, TreeView
 from finger3d.accuracy.cost import forecast
-from finger3d.mechanics.resolution import foreseen
+from finger3d.mechanics.resolution import warnings_before_meshing
 from finger3d.mechanics.symmetry import symmetry
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ class Plan:
 def plan(scene: Scene) -> Plan:
     """Forecast size, time and memory of a press without solving anything."""
     model = scene.model()
-    expected, warnings = forecast(model), foreseen(model, symmetry(model))
+    expected, warnings = forecast(model), warnings_before_meshing(model, symmetry(model))
     tolerance = scene.tables.mesh.tolerance
     if tolerance is not None:
         expected = {"mesh": f"the first of those refined to tolerance = {tolerance:g}"} | expected

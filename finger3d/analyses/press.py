@@ -199,13 +199,13 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fie
     fields, good, problem = None, record.converged_steps, record.problem
     if good:
         u, strain, stress = problem.model.formulation.fields(problem, good[-1].part)
-        record.warnings += resolution.inside(problem, good[-1], u)
+        record.warnings += resolution.penetration_warnings(problem, good[-1], u)
         record.advice = advise(problem, good[-1], strain)
         if record.step_estimate and record.step_estimate.advice:
             record.advice.append(record.step_estimate.advice)
         fields = Fields.of(record, u, strain, stress)
         writer.fields(record, fields)
-    record.warnings += point_count_warning(record) + resolution.unseen(problem, record.steps)
+    record.warnings += point_count_warning(record) + resolution.increments_without_contact(problem, record.steps)
     record.seconds["output"] += time.perf_counter() - begin
     return fields
 

@@ -1,9 +1,9 @@
 """Whether the contact points resolve the shape of the object.
 
-A contact point knows the object through one number, the gap averaged over its hat function.  What reaches into the
-finger between the points, or is lost in an average, is compared with the exact object at rest: at the surface's
-quadrature points and at the object's corners and tips the *hidden* depth is the overlap of object and finger less the
-largest overlap that a contact point beside the place sees.
+The gap of a contact point is an average over its hat function, so that a part of the object between the points, or
+one that is lost in the average, is not represented.  The *unresolved overlap* at a place is the overlap of object and
+finger at rest there, less the largest overlap at the nearest contact points.  It is evaluated at the quadrature
+points of the contact face and at the landmarks of the object, its corners and tips.
 """
 
 from __future__ import annotations
@@ -29,80 +29,98 @@ from finger3d.objects import MeshObject, RigidObject, initial_contact
 
 Box = tuple[float, float, float, float]
 
-REFUSED = 0.5
-"""Hidden depth over the depth of the press above which it is refused: most of the object is not seen."""
+REFUSE_ABOVE, _WARN_ABOVE = 0.5, 0.1
+"""Unresolved overlap, over the depth of the press, above which a press is refused, and above which it is warned of."""
 
-_WARNED = 0.1
-_AIM = 0.05  # of the edge length that is named, as meshes are not regular
-_STATIONS = 4  # along each leg, as for the approach
-_BESIDE = {2: 4, 3: 16}  # contact points beside a place: with two rings, some lie all under the foot of a step
-_PER_WAVE, _PER_RADIUS = 4.0, 2.0  # edges that a wavelength, and a radius, must have at least
-_FINER, _TRIES = 0.8, 80  # down to 2e-8 of the edge length
-_PATCH = 3  # edges on either side of a place
-_SLOPE_STEP = 1e-6  # of the finger's height
-_FORESEEN = 50  # the same before there is a mesh, at most
+_RESOLVED = 0.05
+"""The same for the edge length that a message recommends; a mesh is less regular than the points it is found with."""
+
+_STATIONS = 4
+"""Poses along each leg at which the overlap is evaluated."""
+
+_NEAREST_POINTS = {2: 4, 3: 16}
+"""Contact points compared with a place: with two rings of neighbours, all may lie under the foot of a step."""
+
+_PER_WAVE, _PER_RADIUS = 4.0, 2.0
+"""Least number of edges in a wavelength, and in a radius, of the object."""
+
+_FINER, _TRIES = 0.8, 80
+"""Ratio of successive edge lengths in the search for one that resolves the object, and their number."""
+
+_PATCH = 3
+"""Half width, in edges, of the patch of contact points in that search."""
+
+_SLOPE_STEP = 1e-6
+"""Step of the finite difference of the object's slope, over the height of the finger."""
+
+_REACH = 50
+"""Half width, in edges, of the patch of contact points before there is a mesh."""
 
 
 @dataclass(frozen=True)
-class Hidden:
+class UnresolvedOverlap:
     """Part of the object that the contact points do not resolve.
 
     Attributes
     ----------
-    share : largest hidden depth over the depth of the press
-    seen : whether any contact point is reached
-    depth_mm, target, place : hidden depth, the target where it is largest, and where (2,) along x and z
+    share : largest unresolved overlap over the depth of the press
+    in_contact : whether the object reaches any contact point
+    depth_mm : the unresolved overlap, mm
+    target : the pose where it is largest
+    place : (2,) array, where it is largest, along x and z, mm
     """
 
     share: float
-    seen: bool
+    in_contact: bool
     depth_mm: float
     target: ObjectPose
     place: Float
 
 
-def hidden(
-    model: Model, face: BoundarySurface, touch_mm: float, tips: Float | None, axes: tuple[str, ...] = ()
-) -> Hidden:
-    """Largest hidden depth over a model's path.
+def unresolved_overlap(
+    model: Model, face: BoundarySurface, touch_mm: float, landmarks: Float | None, axes: tuple[str, ...] = ()
+) -> UnresolvedOverlap:
+    """Return the largest unresolved overlap over the path of a model.
 
     Parameters
     ----------
     face : contact points of the meshed part
     touch_mm : height of the object's lowest point at first touch
-    tips : (k, 2) mm, places along x and z to look at, which the object carries along, see `tips_of`; None: not known
+    landmarks : (k, 2) array, mm, or None
+        Places along x and z that move with the object, see `landmarks_of`; None if they are not known.
     axes : symmetry planes of the meshed part
     """
     d = face.points.shape[1]
-    upright = -float(model.object.frame(d)[0, 1])
-    tree, count = KDTree(_flat(face.points)), min(_BESIDE[d], len(face.points))
-    beside = tree.query(_flat(face.samples), k=count)[1].reshape(-1, count)
+    cosine = -float(model.object.frame(d)[0, 1])
+    tree, count = KDTree(_horizontal(face.points)), min(_NEAREST_POINTS[d], len(face.points))
+    nearest = tree.query(_horizontal(face.samples), k=count)[1].reshape(-1, count)
     path = targets(tuple(replace(leg, steps=_STATIONS) for leg in model.legs))
     deepest = max(t.depth_mm for t in path)
-    found = Hidden(0.0, deepest <= 0.0, 0.0, path[-1], np.zeros(2))
-    # at one place nothing that was hidden comes into sight by pressing less
+    found = UnresolvedOverlap(0.0, deepest <= 0.0, 0.0, path[-1], np.zeros(2))
+    # at a given slide the unresolved overlap is largest at the largest depth
     deepest_at = {(t.slide_x_mm, t.slide_z_mm): t for t in sorted(path, key=lambda t: t.depth_mm) if t.depth_mm > 0.0}
     for slide, target in deepest_at.items():
-        seen = np.maximum(-rigid_gap(model, face, touch_mm, target), 0.0)
-        found = replace(found, seen=found.seen or bool(seen.any()))
-        at = np.zeros((0, d)) if tips is None else _on_finger(model, tips + slide, d)
-        near = tree.query(np.where([a in axes for a in "xz"[: d - 1]], np.abs(_flat(at)), _flat(at)), k=count)[1]
-        places, around = np.vstack([face.samples, at]), np.vstack([beside, near.reshape(-1, count)])
-        missed = _overlap(model, places, touch_mm, target) - seen[around].max(axis=1) / upright
+        overlap = np.maximum(-rigid_gap(model, face, touch_mm, target), 0.0)
+        found = replace(found, in_contact=found.in_contact or bool(overlap.any()))
+        at = np.zeros((0, d)) if landmarks is None else _surface_points(model, landmarks + slide, d)
+        mirrored = np.where([a in axes for a in "xz"[: d - 1]], np.abs(_horizontal(at)), _horizontal(at))
+        near = tree.query(mirrored, k=count)[1]
+        places, around = np.vstack([face.samples, at]), np.vstack([nearest, near.reshape(-1, count)])
+        missed = _overlap(model, places, touch_mm, target) - overlap[around].max(axis=1) / cosine
         worst = int(missed.argmax())
         depth = float(missed[worst])
-        if tips is None and not any(slide):  # the place of first touch, wherever it is, is the deepest
-            depth = max(depth, target.depth_mm - float(seen.max()) / upright)
+        if landmarks is None and not any(slide):  # the overlap is largest at first touch, wherever that is
+            depth = max(depth, target.depth_mm - float(overlap.max()) / cosine)
         if depth > found.depth_mm:
-            place = np.append(_flat(places[worst]), np.zeros(3 - d))
-            found = Hidden(depth / deepest, found.seen, depth, target, place)
+            place = np.append(_horizontal(places[worst]), np.zeros(3 - d))
+            found = UnresolvedOverlap(depth / deepest, found.in_contact, depth, target, place)
     return found
 
 
-def tips_of(model: Model, place: tuple[float, float] | None) -> Float | None:
-    """Places (k, 2) mm that a search could step over: the object's corners and tips, and that of first touch.
+def landmarks_of(model: Model, place: tuple[float, float] | None) -> Float | None:
+    """Return the corners and tips of the object and the place of first touch (k, 2), mm, which sampling could miss.
 
-    None where the finger's surface is not known between its samples.
+    They are None if the surface of the finger is not known between its samples.
     """
     if place is None or isinstance(model.design, DesignSummary):
         return None
@@ -113,51 +131,51 @@ def tips_of(model: Model, place: tuple[float, float] | None) -> Float | None:
 def check(
     model: Model, face: BoundarySurface, touch_mm: float, place: tuple[float, float] | None, axes: tuple[str, ...] = ()
 ) -> None:
-    """Refuse a press whose object passes between the contact points.
+    """Raise an error if the object passes between the contact points.
 
     Raises
     ------
     UnresolvedError
-        With the edge length that resolves the object.
+        It names the edge length that resolves the object.
     """
-    tips = tips_of(model, place)
-    found = hidden(model, face, touch_mm, tips, axes)
-    if found.share > REFUSED or not found.seen:
-        size = needed_mm(model, touch_mm, found, tips)
-        raise UnresolvedError(_sentence(model, found, size), size)
+    landmarks = landmarks_of(model, place)
+    found = unresolved_overlap(model, face, touch_mm, landmarks, axes)
+    if found.share > REFUSE_ABOVE or not found.in_contact:
+        size = resolving_size(model, touch_mm, found, landmarks)
+        raise UnresolvedError(_refusal(model, found, size), size)
 
 
 def warnings(problem: Problem) -> list[str]:
-    """Warnings about an object that the contact points do not resolve."""
+    """Return warnings about an object that the contact points do not resolve."""
     model, touch = problem.model, problem.system.first_contact_mm
-    tips = tips_of(model, problem.system.place_mm)
-    return _messages(model, touch, tips, hidden(model, problem.surface, touch, tips, problem.axes))
+    landmarks = landmarks_of(model, problem.system.place_mm)
+    found = unresolved_overlap(model, problem.surface, touch, landmarks, problem.axes)
+    return _messages(model, touch, landmarks, found)
 
 
-def foreseen(model: Model, axes: tuple[str, ...]) -> list[str]:
-    """The same before there is a mesh, for regular contact points around first touch, as far apart as its edges."""
-    way, size = initial_contact(model.contact_path), model.mesh.size_mm
-    reach = _FORESEEN * size
-    (x0, x1, z0, z1), (x, z) = way.contact_box, way.place
+def warnings_before_meshing(model: Model, axes: tuple[str, ...]) -> list[str]:
+    """Return the same warnings before meshing, for a regular grid of contact points around first touch."""
+    contact, size = initial_contact(model.contact_path), model.mesh.size_mm
+    reach = _REACH * size
+    (x0, x1, z0, z1), (x, z) = contact.contact_box, contact.place
     box = (max(x0, x - reach), min(x1, x + reach), max(z0, z - reach), min(z1, z + reach))
     # a mesh has points on its symmetry planes
-    at = np.array([0.5 * size if axis in axes else place for axis, place in zip("xz", way.place, strict=True)])
-    tips = tips_of(model, way.place)
-    tips = None if tips is None else _within(tips, box)
-    return _messages(
-        model, way.first_contact_mm, tips, hidden(model, regular(model, box, size, at), way.first_contact_mm, tips)
-    )
+    at = np.array([0.5 * size if axis in axes else place for axis, place in zip("xz", contact.place, strict=True)])
+    landmarks = landmarks_of(model, contact.place)
+    landmarks = None if landmarks is None else _within(landmarks, box)
+    touch, points = contact.first_contact_mm, regular_points(model, box, size, at)
+    return _messages(model, touch, landmarks, unresolved_overlap(model, points, touch, landmarks))
 
 
-def _messages(model: Model, touch_mm: float, tips: Float | None, found: Hidden) -> list[str]:
+def _messages(model: Model, touch_mm: float, landmarks: Float | None, found: UnresolvedOverlap) -> list[str]:
     messages = _details(model)
-    if found.share > _WARNED or not found.seen:
-        messages.append(_sentence(model, found, needed_mm(model, touch_mm, found, tips)))
+    if found.share > _WARN_ABOVE or not found.in_contact:
+        messages.append(_refusal(model, found, resolving_size(model, touch_mm, found, landmarks)))
     return messages
 
 
-def unseen(problem: Problem, frames: Sequence[StepResult]) -> list[str]:
-    """Warnings about increments in which the object overlaps the finger at rest but reaches no contact point."""
+def increments_without_contact(problem: Problem, frames: Sequence[StepResult]) -> list[str]:
+    """Return warnings about increments in which the object overlaps the finger at rest but reaches no contact point."""
     model, face, touch, missed = problem.model, problem.surface, problem.system.first_contact_mm, list[float]()
     for frame in frames:
         end = frame.target
@@ -177,13 +195,14 @@ def unseen(problem: Problem, frames: Sequence[StepResult]) -> list[str]:
 
 
 def penetration(problem: Problem, frame: StepResult, u: Float) -> tuple[float, Float]:
-    """Largest penetration (mm) of the deformed contact face into a rigid object, and the point where it occurs.
+    """Return the largest penetration (mm) of the deformed contact face into a rigid object, and where it occurs (d,).
 
-    In small strain displacements count along the normal only, as in the gap.
+    In small strain only the displacement along the normal counts, as in the gap.
 
     Parameters
     ----------
-    u : (n, d) mm, nodal displacement of the meshed part
+    u : (n, d) array, mm
+        Nodal displacement of the meshed part.
     """
     model, face, target, d = problem.model, problem.surface, frame.target, problem.dim
     moved = face.interpolate @ u
@@ -195,23 +214,23 @@ def penetration(problem: Problem, frame: StepResult, u: Float) -> tuple[float, F
     at, over = at[over > 0.0], over[over > 0.0]
     if not len(at):
         return 0.0, np.zeros(d)
-    if isinstance(model.object, MeshObject):  # beside a wall the vertical overlap says little
+    if isinstance(model.object, MeshObject):  # near a wall the vertical overlap is not the distance
         there = np.zeros((len(at), 3))
         there[:, :d] = at
         there -= [target.slide_x_mm, problem.system.first_contact_mm - target.depth_mm, target.slide_z_mm]
         over = np.minimum(over, -model.object.signed_distance(there)[0])
     else:
-        over = over * _upright(model, at, target)
+        over = over * _slope_cosine(model, at, target)
     worst = int(over.argmax())
     return max(float(over[worst]), 0.0), at[worst]
 
 
-def inside(problem: Problem, frame: StepResult, u: Float) -> list[str]:
-    """Warnings about penetration between the contact points at the end of a press."""
-    if problem.model.object_compliance is not None:  # its surface has moved as well
+def penetration_warnings(problem: Problem, frame: StepResult, u: Float) -> list[str]:
+    """Return warnings about penetration between the contact points at the end of a press."""
+    if problem.model.object_compliance is not None:  # its surface is deformed as well
         return []
     depth, at = penetration(problem, frame, u)
-    if depth <= _WARNED * max(leg.depth_mm for leg in problem.model.legs):
+    if depth <= _WARN_ABOVE * max(leg.depth_mm for leg in problem.model.legs):
         return []
     where = ", ".join(f"{axis} = {value:.3g}" for axis, value in zip("xyz", at, strict=False))
     return [
@@ -220,8 +239,8 @@ def inside(problem: Problem, frame: StepResult, u: Float) -> list[str]:
     ]
 
 
-def _upright(model: Model, at: Float, target: ObjectPose) -> Float:
-    """Cosine (n,) of the object's slope over points (n, d)."""
+def _slope_cosine(model: Model, at: Float, target: ObjectPose) -> Float:
+    """Return the cosine (n,) of the slope of the object at points (n, d)."""
     x = at[:, 0] - target.slide_x_mm
     z = at[:, 2] - target.slide_z_mm if at.shape[1] == 3 else np.zeros(len(at))
     step = _SLOPE_STEP * model.design.height_mm
@@ -229,22 +248,23 @@ def _upright(model: Model, at: Float, target: ObjectPose) -> Float:
     return 1.0 / np.sqrt(1.0 + sum((slope / (2.0 * step)) ** 2 for slope in slopes[: at.shape[1] - 1]))
 
 
-def needed_mm(model: Model, touch_mm: float, found: Hidden, tips: Float | None) -> float | None:
-    """Edge length at which regular contact points, around the place where most was hidden, see enough of the object.
+def resolving_size(model: Model, touch_mm: float, found: UnresolvedOverlap, landmarks: Float | None) -> float | None:
+    """Return the edge length at which a regular patch of contact points resolves the object.
 
-    None where no length of use does, or the finger's surface is not known.
+    The patch is where the unresolved overlap is largest.  The length is None if there is none of use, or if the surface
+    of the finger is not known.
     """
-    if tips is None:
+    if landmarks is None:
         return None
     at, end, size = found.place, found.target, model.mesh.size_mm
-    # the object stays where it is, so that what counts is beside it
+    # the object does not move: only its shape near the place counts
     there = replace(model, legs=(Leg(end.depth_mm, end.slide_x_mm, end.slide_z_mm, steps=1),))
     for _ in range(_TRIES):
         size *= _FINER
         reach = _PATCH * size
         box = (at[0] - reach, at[0] + reach, at[1] - reach, at[1] + reach)
-        tips = _within(tips + [end.slide_x_mm, end.slide_z_mm], box) - [end.slide_x_mm, end.slide_z_mm]
-        if hidden(there, regular(model, box, size, at), touch_mm, tips).share <= _AIM:
+        landmarks = _within(landmarks + [end.slide_x_mm, end.slide_z_mm], box) - [end.slide_x_mm, end.slide_z_mm]
+        if unresolved_overlap(there, regular_points(model, box, size, at), touch_mm, landmarks).share <= _RESOLVED:
             return _rounded(min(size, _resolving(model.object)))
     return None
 
@@ -254,8 +274,16 @@ def _within(places: Float, box: Box) -> Float:
     return places[np.all((places >= low) & (places <= high), axis=1)]
 
 
-def regular(model: Model, box: Box, size_mm: float, at: Float | None = None) -> BoundarySurface:
-    """Contact points a distance apart over a box (x_min, x_max, z_min, z_max) mm, `at` (2,) in the middle of four."""
+def regular_points(model: Model, box: Box, size_mm: float, at: Float | None = None) -> BoundarySurface:
+    """Return a regular grid of contact points over a box.
+
+    Parameters
+    ----------
+    box : (x_min, x_max, z_min, z_max), mm
+    size_mm : distance of the points
+    at : (2,) array, mm
+        Place in the middle of four points; by default the origin.
+    """
     design, solid = model.design, model.domain == "solid"
     half = (design.half_length_mm, 0.5 * design.width_mm)
     at = np.zeros(2) if at is None else at
@@ -277,7 +305,7 @@ def regular(model: Model, box: Box, size_mm: float, at: Float | None = None) -> 
 
 
 def _lines(box: Sequence[float], half: float, size: float, at: float) -> Float:
-    """Places of contact points along one axis, the finger's ends among them."""
+    """Return the coordinates of contact points along one axis, with the ends of the finger."""
     low, high = max(box[0] - size, -half), min(box[1] + size, half)
     first, last = math.ceil((low - at) / size - 0.5), math.floor((high - at) / size - 0.5)
     inner = at + (np.arange(first, last + 1) + 0.5) * size
@@ -287,7 +315,7 @@ def _lines(box: Sequence[float], half: float, size: float, at: float) -> Float:
 
 
 def _hats(line: Float) -> tuple[Float, sp.csr_matrix]:
-    """Quadrature points (q,) between places (n,), and the mean of samples there over each place's hat (n, q)."""
+    """Return quadrature points (q,) between coordinates (n,), and the mean of samples over each hat function (n, q)."""
     x, w = np.polynomial.legendre.leggauss(4)
     share = 0.5 * (x + 1.0)
     steps = np.diff(line)
@@ -300,29 +328,29 @@ def _hats(line: Float) -> tuple[Float, sp.csr_matrix]:
     return places, sp.csr_matrix(rows / rows.sum(axis=1, keepdims=True))
 
 
-def _flat(points: Float) -> Float:
-    """Places (..., d - 1) along x and z."""
+def _horizontal(points: Float) -> Float:
+    """Return the coordinates (..., d - 1) of points (..., d) along x and z."""
     return points[..., ::2] if points.shape[-1] == 3 else points[..., :1]
 
 
 def _overlap(model: Model, at: Float, touch: float, target: ObjectPose) -> Float:
-    """Vertical overlap (n,) mm of the object with points (n, d) of the finger at rest; -inf outside the object."""
+    """Return the vertical overlap (n,), mm, of the object with points (n, d) of the finger; -inf outside the object."""
     z = at[:, 2] if at.shape[1] == 3 else np.zeros(len(at))
     height = model.object.height(at[:, 0] - target.slide_x_mm, z - target.slide_z_mm)
     return np.nan_to_num(at[:, 1] - (height + touch - target.depth_mm), nan=-np.inf)
 
 
-def _on_finger(model: Model, places: Float, dim: int) -> Float:
-    """Points (n, d) mm of the finger's surface at places (k, 2) along x and z, less those beside it."""
+def _surface_points(model: Model, places: Float, dim: int) -> Float:
+    """Return the points (n, d), mm, of the surface of the finger at places (k, 2), without those outside it."""
     half = np.array([model.design.half_length_mm, 0.5 * model.design.width_mm])
     at = places[np.all(np.abs(places) <= half, axis=1)]
     y = model.design.top(at[:, 0], at[:, 1])
     return np.stack([at[:, 0], y, at[:, 1]], axis=1)[np.isfinite(y)][:, :dim]
 
 
-def _sentence(model: Model, found: Hidden, size: float | None) -> str:
+def _refusal(model: Model, found: UnresolvedOverlap, size: float | None) -> str:
     depth, now = found.target.depth_mm, f"mesh.size_mm = {model.mesh.size_mm:g}"
-    if found.seen:
+    if found.in_contact:
         what = f"at a depth of {depth:.4g} mm the object is up to {found.depth_mm:.2g} mm deeper between the contact "
         what += "points than they see"
     else:
