@@ -1,4 +1,4 @@
-"""The model: what is pressed, on what, how. The baseline is the paper; effects fill slots."""
+"""The model of a press: finger, object, path and friction.  The default is that of Maeno 2004; effects fill slots."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ Domain = Literal["solid", "plane-strain", "plane-stress"]
 
 @dataclass(frozen=True)
 class Leg:
-    """A target reached from the one before, in equal steps; "auto": as many as `finger3d.mechanics.step_halving`
-    chooses.
+    """Straight part of the path of the object, from the end of the leg before, in equal increments.
 
-    A scene's default is "auto"; a leg made in Python has 10.
+    With ``steps = "auto"`` their number is chosen by the estimated error (`finger3d.mechanics.step_halving`).  This is
+    the default of a scene; a leg made in Python has 10.
     """
 
     depth_mm: float
@@ -62,16 +62,19 @@ class MeshOptions:
 
 @dataclass(frozen=True)
 class EmbeddedBars:
-    """Stiff things laid into a meshed part, cut into bars.
+    """Stiff inclusions of a meshed part, divided into bars.
 
     Attributes
     ----------
     rows : (s, n d) sparse
         Strain of every bar from displacements.
-    bar_stiffness : (s,) N mm, their stiffness in the part
-    gauge_weights : (g, s) what each of the model's gauges reads of them
-    self_compliance : (s, s) 1/(N mm)
-        How the bars unload themselves and each other, in a body without end; in place of what the mesh says.
+    bar_stiffness : (s,) array, N mm
+        Stiffness of the bars that belongs to the part.
+    gauge_weights : (g, s) array
+        Strain of each gauge of the model from the strains of the bars.
+    self_compliance : (s, s) array, 1/(N mm)
+        Strain of the bars per unit force of the bars in an infinite body; it replaces that of the mesh, which does not
+        resolve a bar.
     """
 
     rows: sp.csr_matrix
@@ -83,24 +86,24 @@ class EmbeddedBars:
         freeze_arrays(self)
 
     def subgrid_compliance(self, compliance: Float) -> Float:
-        """What rows of gauges and bars yield (g + s, g + s) beyond the mesh, from its compliance (s, s) of bars."""
+        """Return the compliance (g + s, g + s) of gauges and bars that the mesh lacks, from its compliance (s, s)."""
         both = np.vstack([self.gauge_weights, np.eye(len(self.bar_stiffness))])
         return both @ (self.self_compliance - compliance) @ both.T
 
 
 class Inclusions(Protocol):
-    """Stiff things in the body that need no mesh of their own."""
+    """Stiff inclusions of the body that need no mesh of their own."""
 
     def added_cost(self, model: Model, press: PressCost) -> AddedCost:
         """Return the cost that the inclusions add."""
         ...
 
     def mirrors(self, model: Model) -> frozenset[str]:
-        """Planes, "x" and "z", about which they are mirror images."""
+        """Return the planes, "x" and "z", about which the inclusions are symmetric."""
         ...
 
     def discretise(self, model: Model, mesh: Mesh, axes: tuple[str, ...]) -> EmbeddedBars:
-        """Cut them into bars."""
+        """Divide the inclusions into bars."""
         ...
 
 
@@ -146,16 +149,16 @@ class ObjectCompliance(Protocol):
 
 @dataclass(frozen=True)
 class Model:
-    """Everything that determines the numbers.
+    """Body, object, path, friction and effects of a press: everything that determines its numbers.
 
     Attributes
     ----------
     design : a frozen dataclass from geometries/
     domain : solid, or a 2D section; forces are always N, for the design's width
     held_ends : both end faces held in z (plane strain realised in 3D; Python only)
-    symmetry : planes used, "x" and "z"; None finds them
-    filled : (slot, effect) of the slots that an effect has set
-    warnings : for the summary
+    symmetry : symmetry planes that are used, "x" and "z"; None determines them
+    filled : slots that an effect has set, as pairs (slot, effect)
+    warnings : entries of the summary
     """
 
     design: Design
@@ -177,12 +180,12 @@ class Model:
 
     @property
     def contact_path(self) -> ContactPath:
-        """The object's way into the finger."""
+        """The object and its path into the finger."""
         return contact_path(self.design, self.object, self.legs, self.domain)
 
 
 def contact_path(design: Design, obj: RigidObject, legs: tuple[Leg, ...], domain: Domain) -> ContactPath:
-    """Return an object's way into a finger, by the quarters of every leg."""
+    """Return an object and its path into a finger, with poses at the quarters of every leg."""
     at, targets = np.zeros(3), []
     for leg in legs:
         end = np.array([leg.depth_mm, leg.slide_x_mm, leg.slide_z_mm])

@@ -28,8 +28,8 @@ def between(a: ObjectPose, b: ObjectPose, share: float) -> ObjectPose:
     return ObjectPose(*(a.coordinates + share * (b.coordinates - a.coordinates)).tolist())
 
 
-def straight_on(before: ObjectPose, a: ObjectPose, b: ObjectPose) -> float | None:
-    """Return the length of the way from a to b over that from `before` to a; None where the path turns."""
+def stride_ratio(before: ObjectPose, a: ObjectPose, b: ObjectPose) -> float | None:
+    """Return the length of the increment from a to b over that from `before` to a; None if the direction changes."""
     last, now = a.coordinates - before.coordinates, b.coordinates - a.coordinates
     ratio = float(now @ last) / float(last @ last)
     return None if ratio <= 0.0 or not np.allclose(now, ratio * last) else ratio

@@ -15,7 +15,7 @@ from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.mechanics.energy import external_work, frictional_dissipation
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.history import ObjectPose, StepResult
-from finger3d.mechanics.path import between, straight_on, targets
+from finger3d.mechanics.path import between, stride_ratio, targets
 from finger3d.mechanics.problem import Problem
 
 _CUTS = 6
@@ -113,7 +113,7 @@ def _extrapolated(
     if previous is None:
         return None
     pose, force = previous
-    ratio = straight_on(pose, a, b)
+    ratio = stride_ratio(pose, a, b)
     return None if ratio is None else state.force + ratio * (state.force - force)
 
 
