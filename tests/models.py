@@ -1,0 +1,51 @@
+"""Models that several tests press."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from finger3d.contact.friction import Coulomb
+from finger3d.fem.material import Isotropic
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.build import build
+from finger3d.mechanics.history import StepResult, measure
+from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.solve import march
+from finger3d.objects import Sphere
+
+
+def fig9(**changes: object) -> Model:
+    """The finger of Maeno 2004, Fig. 9, 20 mm wide."""
+    finger = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
+    model = Model(
+        finger, Isotropic(1.0, 0.49), MeshOptions(2.0, 8.0, "swept"), (Leg(10.0, steps=10),), friction=Coulomb(0.25),
+        gauges=(Gauge("g36", 36.0, 40.0, 0.0, np.deg2rad(30.0)),),
+    )  # fmt: skip
+    return replace(model, **changes)
+
+
+def block(**changes: object) -> Model:
+    """A block under a rigid ball."""
+    body = designs()["block"](half_length_mm=4.0, height_mm=3.0, width_mm=4.0)
+    model = Model(
+        body, Isotropic(1.0, 0.3), MeshOptions(0.8, 1.2, "swept"), (Leg(0.3, steps=3),), object=Sphere(radius_mm=4.0),
+        friction=Coulomb(0.25),
+    )  # fmt: skip
+    return replace(model, **changes)
+
+
+def run(model: Model) -> tuple[Problem, list[StepResult]]:
+    """Condense and press a model; every increment converges."""
+    problem = build(model)
+    frames = list(march(problem))
+    assert all(f.outcome.ok and f.residual <= 1e-8 for f in frames)
+    return problem, frames
+
+
+def last(model: Model) -> dict[str, float]:
+    """Quantities at the end of a press."""
+    problem, frames = run(model)
+    return measure(problem.points, frames[-1])
