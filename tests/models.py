@@ -49,3 +49,18 @@ def last(model: Model) -> dict[str, float]:
     """Quantities at the end of a press."""
     problem, frames = run(model)
     return measure(problem.points, frames[-1])
+
+
+def half_cylinder(size: float, steps: int = 10) -> Model:
+    """A section of the finger of Maeno 2004, Fig. 1, on a swept mesh."""
+    design = designs()["half_cylinder"](radius_mm=5.0, width_mm=1.0)
+    return Model(
+        design, Isotropic(1.0, 0.45), MeshOptions(size, 5.0 * size, "swept"), (Leg(1.0, steps=steps),),
+        friction=Coulomb(0.25), gauges=(Gauge("g", 1.5, 4.0, angle=0.5),), domain="plane-strain",
+    )  # fmt: skip
+
+
+def swept_fig9(size: float, mu: float = 0.125, nu: float = 0.4) -> Model:
+    """The finger of Fig. 9 as a solid without gauges."""
+    mesh = MeshOptions(size, 4.0 * size, "swept")
+    return fig9(material=Isotropic(1.0, nu), mesh=mesh, friction=Coulomb(mu), gauges=())
