@@ -1,0 +1,28 @@
+"""Contact that goes beyond the candidate points is noticed."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from finger3d.mechanics.build import build
+from finger3d.mechanics.coverage import candidates_cover_face, contact_within_candidates, step_within_candidates
+from finger3d.mechanics.model import Domain, Leg
+from finger3d.mechanics.solve import march
+from tests.models import fig9
+
+
+@pytest.mark.parametrize("domain", ["plane-strain", "solid"])
+def test_too_few_candidate_points_are_noticed(domain: Domain) -> None:
+    model = fig9(domain=domain, gauges=(), legs=(Leg(3.0, steps=10),))
+    narrow, usual, whole = (build(model, margin=margin) for margin in (-0.6, 0.3, math.inf))
+    assert len(narrow.surface.nodes) < len(usual.surface.nodes) < len(whole.surface.nodes)
+    steps = [list(march(problem)) for problem in (narrow, usual, whole)]
+    covered = [step_within_candidates(p, s[-1]) for p, s in zip((narrow, usual, whole), steps, strict=True)]
+    assert covered == [False, True, True]
+    assert candidates_cover_face(whole)
+    assert not candidates_cover_face(usual)
+    # the first increments stay within the few points
+    assert contact_within_candidates(narrow, steps[0])[0]
+    assert not contact_within_candidates(narrow, steps[0])[-1]
