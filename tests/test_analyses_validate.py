@@ -97,7 +97,7 @@ def test_a_run_of_all_leaves_out_what_is_up_to_date(folder: Path) -> None:
     again = run_studies(list(known.values()), False, folder, resume=True, known=known)
     assert (ran(folder, "good"), ran(folder, "bad")) == before
     assert not again["bad"][0].passed, "a failure is not forgotten because it is old"
-    (folder / "bad.py").write_text(BAD + "\n")
+    (folder / "bad.py").write_text(BAD.replace("2e-8", "3e-8"))
     run_studies(list(known.values()), False, folder, resume=True, known=known)
     assert ran(folder, "good") == before[0]
     assert ran(folder, "bad") > before[1]
@@ -108,6 +108,15 @@ def test_a_changed_helper_makes_those_old_that_use_it(folder: Path) -> None:
     before = {name: known[name].stamp() for name in known}
     (folder / "_shared.py").write_text("VALUE = 1.4\n")
     assert {name for name in known if known[name].stamp() != before[name]} == {"good"}
+
+
+def test_comments_and_docstrings_make_no_results_old(folder: Path) -> None:
+    good = studies(folder)["good"]
+    before = good.stamp()
+    (folder / "_shared.py").write_text('"""A value."""\n\n# one and a half\nVALUE = 1.5\n"""In mm."""\n')
+    assert good.stamp() == before
+    (folder / "_shared.py").write_text("VALUE = 1.25\n")
+    assert good.stamp() != before
 
 
 def test_results_are_out_of_date_under_another_version_of_a_library(

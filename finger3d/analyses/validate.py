@@ -16,6 +16,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -59,14 +60,38 @@ class Study:
         return result
 
     def stamp(self) -> str:
-        """Return a hash of all that shapes the study's numbers: sources, data files, and versions of the libraries."""
+        """Return a hash of all that shapes the study's numbers: sources, data files, and versions of the libraries.
+
+        Comments and docstrings do not count.
+        """
         package = Path(__file__).resolve().parents[1]
         digest = hashlib.sha256()
         for path in [*sources(package), *_scenes(package), *_with_helpers(self.path)]:
-            digest.update(path.read_bytes())
+            digest.update(_content(path))
         installed = versions()
         digest.update(repr([(name, installed.get(name)) for name in _LIBRARIES]).encode())
         return digest.hexdigest()[:16]
+
+
+def _content(path: Path) -> bytes:
+    """Return what a file contributes to a stamp."""
+    return _without_docstrings(path.read_bytes()) if path.suffix == ".py" else path.read_bytes()
+
+
+@cache
+def _without_docstrings(source: bytes) -> bytes:
+    """Return the syntax tree of a Python source, which has no comments, without its docstrings."""
+    tree = ast.parse(source)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+            node.body = [statement for statement in node.body if not _is_docstring(statement)]
+    return ast.dump(tree).encode()
+
+
+def _is_docstring(statement: ast.stmt) -> bool:
+    if not (isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)):
+        return False
+    return isinstance(statement.value.value, str)
 
 
 def sources(package: Path) -> list[Path]:
