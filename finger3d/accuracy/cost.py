@@ -109,7 +109,7 @@ def _added_cost(slot: str, model: Model, press: PressCost) -> AddedCost:
 
 
 def _size(model: Model, zone: tuple[float, float, float, float], axes: tuple[str, ...], mixed: bool) -> _Size:
-    """Structured meshes are counted by making them, which is quick; pytetwild's by the integral of its size field."""
+    """Return the size of a structured mesh, or an estimate from the size field of pytetwild."""
     from finger3d.meshing.generate import mesh_solid
     from finger3d.meshing.swept import mesh_section
 

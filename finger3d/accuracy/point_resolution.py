@@ -38,7 +38,7 @@ class PointResolution:
 
     @classmethod
     def of(cls, problem: Problem, frame: StepResult) -> PointResolution:
-        """Of a frame; medians where points touch."""
+        """Return the resolution of an increment; medians over the points in contact."""
         points, reach = problem.points, measure(problem.points, frame)["contact_half_length_mm"]
         alone = reach == 0.0 and problem.model.friction.largest > 0.0
         half_width = points.half_width_mm

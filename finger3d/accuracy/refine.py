@@ -48,7 +48,7 @@ class Round:
     seconds: float
 
     def line(self, count: int) -> str:
-        """For people."""
+        """Return the round as one line of text."""
         return (
             f"round {count}: size {self.size_mm:.4g} mm, base {self.base_size_mm:.4g} mm, {self.dofs} dofs, "
             f"error {100 * self.error:.2g} % ({self.number}), {self.seconds:.1f} s"
@@ -93,7 +93,7 @@ class Refinement:
         )
 
     def as_dict(self) -> Tree:
-        """For summary.json."""
+        """Return the entry of summary.json."""
         return {
             "tolerance": self.tolerance,
             "met": self.met,
@@ -108,19 +108,19 @@ def refined(
     max_seconds: float | None = None,
     say: Callable[[str], None] = lambda text: None,
 ) -> Refinement:
-    """Refine a model's edge lengths, from those it has, until its estimated errors are below a tolerance.
+    """Refine the mesh of a model until its estimated errors are below a tolerance.
 
     Parameters
     ----------
     model : with the edge lengths of the first round
     tolerance : relative, see `relative`
     max_seconds : no round is begun that is forecast to end later, output included
-    say : told one line a round
+    say : receives a line for each round
 
     Raises
     ------
     Finger3dError
-        Where not even the first mesh can be made or pressed.
+        If even the first mesh cannot be generated or pressed.
     """
     start, rounds = time.perf_counter(), list[Round]()
     options, problem = model.mesh, None
@@ -156,7 +156,7 @@ def refined(
 
 
 def relative(numbers: Mapping[str, float], errors: Mapping[str, float]) -> dict[str, float]:
-    """Errors as shares: of a force, of itself; of a length, of the contact's; of a strain, of the largest read."""
+    """Return relative errors; of lengths relative to that of the contact, of strains to the largest."""
     strain = largest_strain(numbers)
     found = {}
     for name, error in errors.items():
@@ -177,7 +177,7 @@ def worst(numbers: Mapping[str, float], errors: Mapping[str, float]) -> tuple[st
 
 
 def judged(problem: Problem, names: Iterable[str]) -> list[str]:
-    """The numbers that a tolerance bounds: forces, strains and lengths, but in solids not the length of stick.
+    """Return the quantities that a tolerance applies to: forces, strains, and lengths but the stick length of a solid.
 
     The stick zone of a solid is often less than three points wide on any affordable mesh, and then of unknown length.
     Areas have bars of the same kind as lengths.
@@ -213,7 +213,7 @@ def _next(
     fine: Mapping[str, float],
     coarse: Mapping[str, float] | None,
 ) -> MeshOptions:
-    """Smaller edge lengths, of the contact, of the base, or both, as the worst number asks for."""
+    """Return smaller edge lengths of contact, base or both, according to the quantity with the largest error."""
     options = problem.model.mesh
     if error <= tolerance:
         return options
@@ -229,7 +229,7 @@ def _next(
 def _shares(
     problem: Problem, number: str, fine: Mapping[str, float], coarse: Mapping[str, float] | None
 ) -> tuple[float, float]:
-    """What part of the change to the companion comes from the contact's edge length, and from the base's."""
+    """Return the shares of the difference to the companion that the edge lengths of contact and base cause."""
     options = problem.model.mesh
     size = min(FACTOR * options.size_mm, options.base_size_mm)
     if coarse is None or size < 1.1 * options.size_mm:
@@ -246,7 +246,7 @@ def _swept(problem: Problem, options: MeshOptions) -> MeshOptions:
 
 
 def _affordable(now: MeshOptions, wanted: MeshOptions, seconds: float, left: float, dim: int) -> MeshOptions | None:
-    """The edge lengths wanted, or less of a step where time asks for it; None where not even the least step fits."""
+    """Return the wanted edge lengths, or longer ones if time is short; None if no refinement is affordable."""
     left /= _AFTER
     factor = min(wanted.size_mm / now.size_mm, wanted.base_size_mm / now.base_size_mm)
     power = dim * _GROWTH[dim]

@@ -35,7 +35,7 @@ def press(
     ----------
     scene : a loaded scene, or the path of a TOML file
     out : folder, made if it is not there; None: a temporary one, which is removed together with what is returned
-    report : told about stages and steps
+    report : receives the progress
     figures : whether to draw PNG files and to write report.html; None: if a folder is given
     error : whether to estimate the errors by mesh and increments, from a run on another mesh
 
@@ -123,7 +123,7 @@ def _solve(scene: Scene, writer: ResultWriter, report: Progress, started: float)
 
 
 def _refined(scene: Scene, report: Progress) -> Refinement | None:
-    """Edge lengths for mesh.tolerance, if the scene asks for one."""
+    """Return the refined mesh, if the scene has mesh.tolerance."""
     mesh = scene.tables.mesh
     if mesh.tolerance is None:
         return None

@@ -161,7 +161,7 @@ def history_table(steps: Sequence[TreeView]) -> dict[str, ArrayLike]:
 
 
 def _on_surface(mesh: Mesh, nodes: NDArray[np.int64], table: TreeView, step: StepResult) -> dict[str, Array]:
-    """Contact quantities on all nodes (n,): as computed at vertices, interpolated between them."""
+    """Return contact quantities at all nodes (n,), interpolated between the vertices."""
     ends, between = middles(mesh.facets["contact"], mesh.dim)
     out = {}
     for name in ("pressure", "shear_x", "shear_z"):

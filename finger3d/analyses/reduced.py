@@ -52,7 +52,7 @@ class ReducedModel:
     about: TreeView
 
     def __repr__(self) -> str:
-        """One line: the compliance would fill pages."""
+        """Return one line without the compliance."""
         where = f"{len(self.problem.points.nodes)} contact points"
         read = f", gauges {', '.join(self.gauges)}" if self.gauges else ""
         return f"<ReducedModel: {where}, {self.problem.model.domain}{read}>"

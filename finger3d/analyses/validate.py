@@ -132,7 +132,7 @@ def studies(folder: Path | None = None) -> dict[str, Study]:
 
 
 def chosen(names: Sequence[str], known: Mapping[str, Study], quick: bool = False) -> list[Study]:
-    """The studies of these names; without names all, in full less those that run only by name.
+    """Return the studies of these names; without names all studies, in full runs without those that run only by name.
 
     Raises
     ------
@@ -160,7 +160,7 @@ def validate(
     names : of studies; none: those whose results are out of date, but for those that run only by name
     quick : small meshes and few steps
     out : folder for the results; None: validation/, or a temporary folder for quick results
-    report : told about every study
+    report : receives the progress
 
     Returns
     -------
@@ -201,7 +201,7 @@ def run_studies(
     ----------
     quick : small meshes and few steps
     out : folder for results/ and figures/; with `known` given also for README.md, the index of all results there
-    report : told about every study
+    report : receives the progress
     resume : leave out studies whose results in `out` were made by the sources as they are now
 
     Returns

@@ -1,4 +1,4 @@
-"""Lemke's method for the friction problem as a linear complementarity problem: slow, and it cannot cycle.
+"""Lemke's method for frictional contact as a linear complementarity problem; it is slow, but cannot cycle.
 
 With the friction circle as a polygon of directions D, find n, beta, lam >= 0 with ``0 <= n _|_ gap >= 0``,
 ``0 <= beta _|_ D^T slip + lam >= 0``, ``0 <= lam _|_ mu n - sum(beta) >= 0``.  Its matrix is copositive, and Lemke's
@@ -29,10 +29,10 @@ def directions(tangents: int, facets: int = 8) -> Float:
 
 
 def lemke(matrix: Float, q: Float, limit: int) -> Float | None:
-    """Solution z (m,) of ``0 <= z _|_ matrix z + q >= 0``; None if it ends in a ray or after `limit` pivots.
+    """Return the solution z (m,) of ``0 <= z _|_ matrix z + q >= 0``; None if it ends in a ray or after `limit` pivots.
 
-    A small irregular perturbation of q stands for the lexicographic rule that excludes ties, so z is good to about
-    1e-8 of the largest q: enough to read the sets off it.
+    A small irregular perturbation of q replaces the lexicographic rule against ties.  The relative error of z is about
+    1e-8, which is enough to determine the active set.
     """
     m = len(q)
     if q.min() >= 0.0:
@@ -65,7 +65,7 @@ def lemke(matrix: Float, q: Float, limit: int) -> Float | None:
 
 
 def friction_start(problem: ContactProblem, points: NDArray[np.int64]) -> tuple[NDArray[np.int8], Float] | None:
-    """States (c,) and slip directions (c, d - 1) of the polygonal problem over `points`; None if none was found."""
+    """Return status (c,) and slip directions (c, d - 1) of the polygonal problem over `points`, or None."""
     c, d = problem.free_motion.shape
     span = directions(d - 1)
     k, p = len(span), len(points)

@@ -42,7 +42,7 @@ class ContactState:
 
     @classmethod
     def at_rest(cls, gap: Float, dim: int) -> ContactState:
-        """No force, no displacement; gap (c,) mm."""
+        """Return the state without forces and displacements; gap (c,), mm."""
         c = len(gap)
         return cls(
             np.full(c, OPEN, dtype=np.int8), np.zeros((c, dim)), gap, np.zeros((c, dim - 1)), np.zeros((c, dim - 1))

@@ -51,20 +51,20 @@ class Step:
         return long_time_share(self.prony) + float(self.gain.sum())
 
     def history_load(self, memory: InternalVariables) -> Float:
-        """Vector (k,) with ``alpha now' - past`` the stress at the end of the step."""
+        """Return the vector (k,) of the past: the stress at the end of the step is ``alpha now - past``."""
         return np.asarray(self.gain.sum() * memory.elastic - self.decay @ memory.branches)
 
     def after(self, memory: InternalVariables, now: Float) -> InternalVariables:
-        """The memory once the shape is `now`."""
+        """Return the internal variables at the end of the step, when the shape is `now`."""
         branches = self.decay[:, None] * memory.branches + self.gain[:, None] * (now - memory.elastic)
         return InternalVariables(now, branches)
 
 
 def long_time_share(prony: Prony) -> float:
-    """r_inf."""
+    """Return the long-time modulus over the instantaneous one, r_inf."""
     return 1.0 - math.fsum(share for share, _ in prony)
 
 
 def relaxed(prony: Prony, memory: InternalVariables) -> Float:
-    """Vector (k,) of which the present stress is the instantaneous elastic one."""
+    """Return the vector (k,) whose instantaneous elastic stress is the present stress."""
     return np.asarray(long_time_share(prony) * memory.elastic + memory.branches.sum(axis=0))

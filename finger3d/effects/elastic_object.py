@@ -59,7 +59,7 @@ class SoftObject:
         )
 
     def respond(self, problem: Problem, zone: Zone, say: Say) -> ObjectResponse:
-        """Mesh and condense the object, and read its compliance at the contact points of the finger."""
+        """Mesh and condense the object; return its compliance at the contact points of the finger."""
         model, axes, d = problem.model, problem.axes, problem.dim
         start = time.perf_counter()
         body = ObjectBody(model, self.height_mm or model.design.height_mm, zone, axes, say)
@@ -84,7 +84,7 @@ class SoftObject:
 
 
 def _all_images(problem: Problem, mesh: Mesh, frame: Float) -> sp.csr_matrix:
-    """Rows that sum the displacement of every contact point and of its mirror images, each in its own frame."""
+    """Return rows that sum the displacements of every contact point and its mirror images, each in its own frame."""
     d = problem.dim
     signs = [np.ones(d)]
     for axis in axis_numbers(problem.axes):
@@ -110,7 +110,7 @@ class ObjectBody:
     say: Say
 
     def mesh(self) -> tuple[Mesh, bool]:
-        """The mesh, and whether it is whole although the finger is not."""
+        """Return the mesh, and whether it is a whole object although only a part of the finger is meshed."""
         obj = self.model.object
         if isinstance(obj, MeshObject):
             return self._file(obj), True
@@ -124,7 +124,7 @@ class ObjectBody:
         return self._block(), False
 
     def _made(self, design: Design, zone: Zone, mesher: str = "swept", axes: tuple[str, ...] | None = None) -> Mesh:
-        """A design's mesh, as fine as the finger's, contact up."""
+        """Return the mesh of a design with the edge lengths of the finger; its contact face is on top."""
         extents = [design.height_mm, design.half_length_mm]
         solid = self.model.domain == "solid"
         size = min([self.model.mesh.size_mm, *(0.5 * e for e in extents), *([0.5 * design.width_mm] if solid else [])])
@@ -141,7 +141,7 @@ class ObjectBody:
         return zone[0] - x, zone[1] - x, zone[2] - z, zone[3] - z
 
     def _bar(self, obj: Cylinder) -> Mesh:
-        """Half a cylinder along z, as long as the finger is wide; in a section, of one along x, a rectangle."""
+        """Return half a cylinder along z, as wide as the finger; in a section of a cylinder along x, a rectangle."""
         width = self.model.design.width_mm
         if obj.axis == "z":
             design = designs()["half_cylinder"](radius_mm=obj.radius_mm, width_mm=width)
@@ -154,7 +154,7 @@ class ObjectBody:
         )
 
     def _crosswise(self, obj: Cylinder) -> Mesh:
-        """Half a cylinder along x, as long as the finger: meshed along z, then x and z change places."""
+        """Return half a cylinder along x, as long as the finger; it is meshed along z and turned."""
         design = designs()["half_cylinder"](radius_mm=obj.radius_mm, width_mm=2.0 * self.model.design.half_length_mm)
         x0, x1, z0, z1 = self._moved(self.zone, 0.0, obj.z_mm)
         axes = tuple({"x": "z", "z": "x"}[a] for a in self.axes)
@@ -164,7 +164,7 @@ class ObjectBody:
         return Mesh(points, mesh.cells, {_TURNED.get(label, label): f for label, f in mesh.facets.items()})
 
     def _ball(self, obj: Sphere, solid: bool) -> Mesh:
-        """Half a ball; in a section, half a disc."""
+        """Return half a ball; in a section, half a disc."""
         zone = self._moved(self.zone, obj.x_mm, obj.z_mm)
         if solid:
             return _placed(
@@ -174,7 +174,7 @@ class ObjectBody:
         return _placed(self._made(design, zone), obj.x_mm, 0.0)
 
     def _block(self) -> Mesh:
-        """A block behind the surface, as long and wide as the finger; its far face is flat."""
+        """Return a block behind the surface with the length and width of the finger and a flat far face."""
         finger, obj = self.model.design, self.model.object
         tilt = obj.tilt if isinstance(obj, Plane) else 0.0
         reach = finger.half_length_mm / np.cos(tilt)
@@ -205,7 +205,7 @@ class ObjectBody:
         return Mesh(points, mesh.cells, mesh.facets)
 
     def _file(self, obj: MeshObject) -> Mesh:
-        """A body from a file, held on its highest plane."""
+        """Return the mesh of a body from a file, held on its highest plane."""
         from finger3d.geometry.imported import imported, of_surface
 
         body = imported(obj.path, True, obj.scale) if obj.path else of_surface(obj.surface, "object", True)
@@ -223,7 +223,7 @@ class ObjectBody:
 
 
 def _placed(mesh: Mesh, x: float, z: float) -> Mesh:
-    """A mesh with its contact turned down and its middle over (x, z)."""
+    """Return a mesh turned upside down, with its middle over (x, z)."""
     down = reflected(mesh, 1)
     return Mesh(down.points + np.array([x, 0.0, z])[: mesh.dim], down.cells, down.facets)
 

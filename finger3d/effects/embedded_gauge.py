@@ -62,7 +62,7 @@ class Strips:
         )
 
     def mirrors(self, model: Model) -> frozenset[str]:
-        """Planes about which the foils, all together, are mirror images."""
+        """Return the symmetry planes of all foils together."""
         places = [_place(gauge) for gauge in model.gauges]
         images = {
             "x": [replace(g, x_mm=-g.x_mm, angle=math.pi - g.angle) for g in model.gauges],
@@ -73,9 +73,9 @@ class Strips:
         )
 
     def discretise(self, model: Model, mesh: Mesh, axes: tuple[str, ...]) -> EmbeddedBars:
-        """The bars of all foils, those that are images of each other as one row.
+        """Return the bars of all foils; bars that are mirror images of each other share a row.
 
-        The part has its share of the foils' energy: all of them count, read from the part where they lie in an image.
+        The meshed part has its share of the energy of all foils, those in a mirror image included.
         """
         copies = 2 ** len(axes)
         foils = [
@@ -95,7 +95,7 @@ class Strips:
 
 
 def _alone(model: Model, foils: list[FoilPatches]) -> Float:
-    """Compliance of all bars in a body without end."""
+    """Return the compliance of all bars in an infinite body."""
     section = None if model.domain == "solid" else model.design.width_mm
     material = model.material.isotropic("effects.embedded_gauge")
     body = InfiniteBody(material.E_MPa, material.nu, model.domain == "plane-stress", section)
@@ -104,7 +104,7 @@ def _alone(model: Model, foils: list[FoilPatches]) -> Float:
 
 
 def _enter(rows: dict[tuple[float, ...], sp.csr_matrix], foil: FoilPatches, mesh: Mesh, axes: tuple[str, ...]) -> Int:
-    """Numbers (bars,) of the rows of a foil's bars; those that are not there yet are added."""
+    """Return the numbers (bars,) of the rows of a foil's bars; missing rows are added."""
     at, known, numbers = foil.places, {}, []
     order = {key: i for i, key in enumerate(rows)}
 
@@ -123,13 +123,13 @@ def _enter(rows: dict[tuple[float, ...], sp.csr_matrix], foil: FoilPatches, mesh
 
 
 def _key(a: Float, b: Float, axes: tuple[str, ...], dim: int) -> tuple[float, ...]:
-    """The same for all bars that are images of one."""
+    """Return a key that a bar shares with its mirror images."""
     images = sorted((reflect_into_part(p, p, axes, dim)[0] for p in (a, b)), key=tuple)
     return tuple(np.round(np.concatenate(images), 9) + 0.0)
 
 
 def _place(gauge: Gauge) -> Float:
-    """Middle (mm), direction within half a turn, and length: what tells foils apart."""
+    """Return middle (mm), direction within half a turn, and length, which identify a foil."""
     return np.array([gauge.x_mm, gauge.y_mm, gauge.z_mm, gauge.angle % math.pi, gauge.length_mm])
 
 
@@ -156,7 +156,7 @@ class Effect:
     width_mm: Length
 
     def apply(self, model: Model) -> Model:
-        """Fill the inclusions slot; every gauge must be a foil that fits."""
+        """Fill the slot of the inclusions; every gauge must be a foil inside the finger."""
         here = "effects.embedded_gauge"
         if not model.gauges:
             raise Finger3dError(f"{here}: the scene has no [[gauge]]; add one, or take the effect out")

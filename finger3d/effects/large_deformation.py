@@ -148,7 +148,7 @@ class FiniteStrain:
         guess: Float | None,
         workspace: Workspace,
     ) -> ContactSolution:
-        """Newton iterations until equilibrium and contact conditions hold in the deformed configuration."""
+        """Iterate until equilibrium and contact conditions hold in the deformed configuration."""
         assert isinstance(state, DeformedState)
         assert isinstance(workspace, NewtonWorkspace)
         newton = _NewtonIncrement(problem, state, a, b, workspace)
@@ -267,7 +267,7 @@ class _NewtonIncrement:
         force: Float,
         condensation: Condensation | None,
     ) -> Condensation:
-        """Condense the tangent under contact forces (c, d); a tangent that is None was condensed before."""
+        """Condense the tangent under contact forces (c, d); a tangent of None has been condensed before."""
         if configuration.tangent is None:
             assert condensation is not None
             return condensation

@@ -66,15 +66,15 @@ class ViscoelasticBody(Protocol):
         ...
 
     def respond(self, step: Step, memory: InternalVariables, workspace: RelaxationWorkspace) -> Response:
-        """Rows over a step."""
+        """Return the response of the rows over a step."""
         ...
 
     def unknowns(self, now: Float) -> Float:
-        """All unknowns (N,) of a shape; pressures as the instantaneous modulus would have them."""
+        """Return all unknowns (N,) of a shape, with the pressures of the instantaneous modulus."""
         ...
 
     def read(self, now: Float) -> Float:
-        """Row displacements (r,) of a shape."""
+        """Return the row displacements (r,) of a shape."""
         ...
 
     def stress(self, prony: Prony, memory: InternalVariables) -> Float:
@@ -100,15 +100,15 @@ class ConstantPoissonRatio:
         return Response(compliance, compliance @ past, lambda rows: (rows + past) / alpha)
 
     def unknowns(self, now: Float) -> Float:
-        """With the factor at hand."""
+        """Return the unknowns by a back-substitution."""
         return self.problem.part.condensed.unknowns(now)
 
     def read(self, now: Float) -> Float:
-        """Through the compliance."""
+        """Return the row displacements by the compliance."""
         return self.problem.part.condensed.compliance @ now
 
     def stress(self, prony: Prony, memory: InternalVariables) -> Float:
-        """That of the elastic body under the forces that are left."""
+        """Return the stress of the elastic body under the relaxed forces."""
         problem = self.problem
         unknowns = self.unknowns(relaxed(prony, memory))
         strain = nodal_strain(problem.mesh, displacement(problem.mesh, unknowns))
@@ -146,7 +146,7 @@ class ConstantBulkModulus:
         return self._bulk - 2.0 / 3.0 * alpha * self._elastic.shear
 
     def respond(self, step: Step, memory: InternalVariables, workspace: RelaxationWorkspace) -> Response:
-        """The body with its shear modulus times alpha; the past is a load on all of it."""
+        """Return the response of the body with its shear modulus multiplied by alpha, loaded by the past."""
         # steps of one length differ by round-off of their ends
         alpha = Step(step.prony, float(f"{step.seconds:.12g}")).alpha
         problem = self.problem
@@ -165,7 +165,7 @@ class ConstantBulkModulus:
         return Response(compliance, moved, shape)
 
     def _shear_part(self, workspace: RelaxationWorkspace) -> sp.csr_matrix:
-        """K_s (displacement form): the deviatoric stiffness, in the plane of a section too."""
+        """Return the deviatoric stiffness K_s of the displacement form; in a section, that in its plane."""
         if workspace.shear_part is None:
             problem, shear = self.problem, self._elastic.shear
             part = Elasticity(shear, -2.0 / 3.0 * shear, False)
@@ -173,7 +173,7 @@ class ConstantBulkModulus:
         return workspace.shear_part
 
     def _stiffness(self, alpha: float, workspace: RelaxationWorkspace) -> Stiffness:
-        """K_b + alpha K_s; in the mixed form every block has its own factor."""
+        """Return K_b + alpha K_s; in the mixed form every block has a factor of its own."""
         problem = self.problem
         whole: Stiffness = problem.part.stiffness
         if not problem.part.elastic.mixed:
@@ -185,7 +185,7 @@ class ConstantBulkModulus:
         return Stiffness(upper, whole.pressure_vertices, whole.pressure_scale)
 
     def _shear_force(self, shape: Float, workspace: RelaxationWorkspace) -> Float:
-        """K_s times a shape (N,), as loads (N,)."""
+        """Return the loads (N,), K_s times a shape (N,)."""
         problem, n = self.problem, self.problem.mesh.points.size
         if not problem.part.elastic.mixed:
             return _times(self._shear_part(workspace), shape)
@@ -196,20 +196,20 @@ class ConstantBulkModulus:
         return load
 
     def unknowns(self, now: Float) -> Float:
-        """The displacements as they are."""
+        """Return the displacements, which are the shape."""
         n = self.problem.mesh.points.size
         out = now[: self._own].copy()
         out[n:] *= self._elastic.lame / self.problem.part.stiffness.pressure_scale
         return out
 
     def read(self, now: Float) -> Float:
-        """From the displacements, and what the mesh does not see."""
+        """Return the row displacements, with the compliance that the mesh lacks."""
         rows, beyond = self.problem.part.condensed.read(now[: self._own]), self.problem.inclusions.subgrid_compliance
         rows[len(rows) - len(beyond) :] += beyond @ now[self._own :]
         return rows
 
     def stress(self, prony: Prony, memory: InternalVariables) -> Float:
-        """2 G dev(eps) of what has not relaxed, and the bulk modulus times the dilatation as it is; (n, 3, 3)."""
+        """Return the stress (n, 3, 3): 2 G dev(eps) relaxed, and the bulk modulus times the dilatation."""
         shear, left = self._elastic.shear, relaxed(prony, memory)
         strain, swelling = self._strain(left[: self._own])
         spherical = self._bulk * self._strain(memory.elastic[: self._own])[1] - 2.0 / 3.0 * shear * swelling
@@ -227,7 +227,7 @@ class ConstantBulkModulus:
 
 
 def _times(upper: sp.csr_matrix, vector: Float) -> Float:
-    """A symmetric matrix, given by its upper triangle, times a vector."""
+    """Return the product of a symmetric matrix, given by its upper triangle, and a vector."""
     return np.asarray(upper @ vector + upper.T @ vector - upper.diagonal() * vector)
 
 
@@ -270,7 +270,7 @@ class Viscoelastic(SmallStrain):
         return (1 + len(self.prony)) * (press.dim * press.contact_points if self.bulk else press.dofs)
 
     def workspace(self) -> RelaxationWorkspace:
-        """No factor yet."""
+        """Return a workspace without a factor."""
         return RelaxationWorkspace()
 
     def _body(self, problem: Problem) -> ViscoelasticBody:
@@ -296,7 +296,7 @@ class Viscoelastic(SmallStrain):
         guess: Float | None,
         workspace: Workspace,
     ) -> ContactSolution:
-        """One call of the contact rule, with the compliance of this length of step and points moved by the past."""
+        """Apply the contact rule once, with the compliance for this time step and the displacement due to the past."""
         assert isinstance(workspace, RelaxationWorkspace)
         memory, step = self._memory(state), Step(self.prony, b.time_s - a.time_s)
         body = self._body(problem).respond(step, memory, workspace)
@@ -308,7 +308,7 @@ class Viscoelastic(SmallStrain):
         c, d = len(problem.surface.nodes), problem.dim
         free = problem.free_motion(b)
         free.reshape(-1)[problem.system.active_dofs] += moved[: len(problem.system.active_dofs)]
-        # what is elastic beside the body (an object that yields) stays so
+        # an elastic object does not relax
         rest = problem.delassus - scatter_to_points(
             stiffened(problem.part.condensed.compliance, springs), problem.system.active_dofs, c, d
         )
@@ -323,17 +323,17 @@ class Viscoelastic(SmallStrain):
         return ContactSolution(after, found.outcome, found.residual, found.iterations, found.method)
 
     def all_unknowns(self, problem: Problem, states: Sequence[ContactState]) -> Iterator[Float]:
-        """From each memory."""
+        """Yield the unknowns of each state from its internal variables."""
         return (self._body(problem).unknowns(self._memory(state).elastic) for state in states)
 
     def gauges(self, problem: Problem, state: ContactState) -> dict[str, float]:
-        """From the memory, through the gauges' rows."""
+        """Return the strains from the internal variables by the rows of the gauges."""
         first = len(problem.system.active_dofs)
         rows = self._body(problem).read(self._memory(state).elastic)[first:]
         return {g.name: float(strain) for g, strain in zip(problem.model.gauges, rows, strict=False)}
 
     def fields(self, problem: Problem, state: ContactState) -> tuple[Float, Float, Float]:
-        """Linear strain, and the stress that has not relaxed."""
+        """Return displacement, linear strain and relaxed stress."""
         u = displacement(problem.mesh, self.unknowns(problem, state))
         strain = nodal_strain(problem.mesh, u)
         sigma = self._body(problem).stress(self.prony, self._memory(state))

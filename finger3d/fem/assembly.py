@@ -41,14 +41,14 @@ class Stiffness:
     pressure_scale: float
 
     def less(self, part: sp.csr_matrix) -> Stiffness:
-        """The stiffness less a symmetric matrix (m, m) on its first unknowns, whose entries it must have places for."""
+        """Return the stiffness minus a symmetric matrix (m, m) on its first unknowns, within its sparsity pattern."""
         upper = self.upper.copy()
         upper.data = upper.data - on_places(sp.triu(part, format="csr"), upper)
         return replace(self, upper=upper)
 
 
 def on_places(matrix: sp.csr_matrix, places: sp.csr_matrix) -> Float:
-    """Values (nnz,) of a matrix on the entries of another that has all of its, in sorted rows of the same width."""
+    """Return the values (nnz,) of a matrix on the sparsity pattern of another that includes its own."""
     wide = places.shape[1]
     rows = np.repeat(np.arange(places.shape[0]), np.diff(places.indptr))
     found = matrix.tocoo()
@@ -143,23 +143,23 @@ class Pattern:
 
 
 def cell_parts(mesh: Mesh) -> Iterator[slice]:
-    """The cells, some at a time."""
+    """Yield slices of the cells, in portions of limited memory."""
     return (slice(start, start + _CHUNK) for start in range(0, len(mesh.cells), _CHUNK))
 
 
 def _pairs(k: int) -> tuple[Int, Int]:
-    """Local pairs a <= b: each with itself, then those of two."""
+    """Return local pairs a <= b: the diagonal ones, then the others."""
     a, b = np.triu_indices(k, 1)
     return np.concatenate([np.arange(k), a]), np.concatenate([np.arange(k), b])
 
 
 def _key(first: Int, second: Int, count: int) -> Int:
-    """Pairs as numbers, the same both ways round, which sort by the lesser, then by the greater."""
+    """Return a number for each unordered pair, which sorts by the smaller node, then by the larger."""
     return np.minimum(first, second) * count + np.maximum(first, second)
 
 
 def _numbered(key: Int) -> tuple[Int, NDArray[np.int32]]:
-    """The different keys, ascending, and which of them each one is; np.unique takes twice the memory."""
+    """Return the unique keys and the index of each key among them; np.unique takes twice the memory."""
     order = np.argsort(key)
     ranked = key[order]
     new = np.zeros(len(key), dtype=np.bool_)
@@ -194,7 +194,7 @@ def _places(row: Int, col: Int, n: int, pressures: int, d: int) -> tuple[AnyInt,
 
 
 def _rows(start: Int, length: Int, count: int) -> Iterator[Int]:
-    """Numbers among the nnz of the first entry of every row of blocks, were the diagonal ones stored whole."""
+    """Yield the index of the first entry of every row of the blocks, as if diagonal blocks were stored in full."""
     for _ in range(count):
         yield start
         length = length - 1
@@ -238,5 +238,5 @@ def stiffness(mesh: Mesh, elastic: LinearElasticity, thickness: float = 1.0) -> 
 
 
 def pressure_scale(mesh: Mesh, shear: float) -> float:
-    """Unit (MPa) of the pressure unknowns in which their entries are of the size of the displacements'."""
+    """Return the unit (MPa) of the pressure unknowns, so that their entries have the size of the others."""
     return float(shear * len(mesh.cells) ** (1.0 / mesh.dim) / np.ptp(mesh.points, axis=0).max())

@@ -1,7 +1,7 @@
-"""Foils in a body without end: what their forces do to themselves, which no mesh of the body is fine enough to tell.
+"""Foils in an infinite body: their compliance under their own forces, which a mesh of the body does not resolve.
 
-A foil hands its force to the body in patches, and a patch pushes the body as Kelvin's point force does (Timoshenko and
-Goodier 1970, sec. 130; in the plane sec. 42): ``u = c [(3 - 4 nu) t/r + x (x.t)/r^3]``, in plane stress
+A foil transfers its force to the body in patches, and a patch displaces the body as Kelvin's point force does
+(Timoshenko and Goodier 1970, sec. 130; in the plane sec. 42): ``u = c [(3 - 4 nu) t/r + x (x.t)/r^3]``, in plane stress
 ``c [-(3 - nu) t log r + (1 + nu) x (x.t)/r^2]``.  On the foil itself the patches are integrated, on others they are
 points.  Bars between the patches' middles pull at both their ends, and read the strain between them.
 """
@@ -20,7 +20,7 @@ _BLUNT = 0.3  # of a patch's size: what a point force of another foil is spread 
 
 @dataclass(frozen=True)
 class InfiniteBody:
-    """A body without end; a section of it is `thickness` mm wide, a solid has none."""
+    """Infinite elastic body; a section of it is `thickness` mm wide, and None stands for a solid."""
 
     E_MPa: float
     nu: float
@@ -29,13 +29,13 @@ class InfiniteBody:
 
     @property
     def _plane(self) -> tuple[float, float]:
-        """Young's modulus and Poisson's ratio with which plane strain is plane stress."""
+        """Young's modulus and Poisson's ratio of the equivalent plane stress."""
         if self.plane_stress:
             return self.E_MPa, self.nu
         return self.E_MPa / (1.0 - self.nu**2), self.nu / (1.0 - self.nu)
 
     def pushed(self, reach: Float, t: Float, force: Float, blunt: Float) -> Float:
-        """Displacement along t (3,) at `reach` (..., 3) mm from 1 N along `force` (3,) spread over `blunt` (...) mm."""
+        """Return the displacement along t (3,) at `reach` (..., 3), mm, of 1 N along `force` spread over `blunt`."""
         square = (reach**2).sum(axis=-1) + blunt**2
         ahead = (reach @ t) * (reach @ force) / square
         if self.thickness is None:
@@ -46,7 +46,7 @@ class InfiniteBody:
         return np.asarray(scale * ((1.0 + nu) * ahead - 0.5 * (3.0 - nu) * float(t @ force) * np.log(square)))
 
     def pushed_by_own(self, begin: Float, end: Float, low: Float, high: Float, s: Float, z: Float) -> Float:
-        """Displacement along a foil at s (along, from its middle) and z (across) from 1 N on its patches."""
+        """Return the displacement along a foil at s (along it) and z (across it) due to 1 N on each of its patches."""
         if self.thickness is None:
             whole = sum(
                 sign * _corner(x - s, y - z, self.nu)
@@ -74,7 +74,7 @@ class FoilPatches:
 
     @classmethod
     def of(cls, middle: Float, direction: Float, length: float, width: float, count: int, lines: int) -> FoilPatches:
-        """Cut by cosines both ways: dense at the ends, where a foil hands over most of its force."""
+        """Divide a foil at Chebyshev points: densely at its ends, where it transfers most of its force."""
         return cls(middle, direction, _cosines(length, count), _cosines(width, lines))
 
     @property
@@ -89,7 +89,7 @@ class FoilPatches:
         return np.asarray(self.middle + _middles(self.along)[:, None, None] * self.direction + aside)
 
     def strained_by(self, other: FoilPatches, body: InfiniteBody) -> Float:
-        """Strain of this foil's bars (n m - m, n' m' - m') by the pull of the other's, 1 N mm each: 1/(N mm)."""
+        """Return the strain (n m - m, n' m' - m') of the bars per unit force of the bars of another foil, 1/(N mm)."""
         if other is self:
             s, z = _middles(self.along)[:, None, None, None], _middles(self.across)[None, :, None, None]
             begin, end = self.along[:-1, None], self.along[1:, None]

@@ -38,7 +38,7 @@ class NeoHooke:
 
     @classmethod
     def of(cls, E_MPa: float, nu: float, plane_stress: bool = False) -> NeoHooke:
-        """Same small-strain limit as Young's modulus and Poisson's ratio."""
+        """Return the law with this Young's modulus and Poisson's ratio in the limit of small strain."""
         shear = E_MPa / (2.0 * (1.0 + nu))
         compressibility = max(3.0 * (1.0 - 2.0 * nu) / E_MPa, LEAST_COMPRESSIBILITY / shear)
         return cls(shear, 1.0 / compressibility, nu >= MIXED_FROM and not plane_stress, plane_stress)

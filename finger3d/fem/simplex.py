@@ -159,7 +159,7 @@ def unfold(mesh: Mesh, axes: tuple[int, ...]) -> tuple[Mesh, Int, Float]:
 def middles(facets: Int, dim: int) -> tuple[Int, Int]:
     """Ends (k, 2) of the edges of quadratic facets of a d-dimensional mesh, and the nodes (k,) at their middles.
 
-    What is known at vertices only, as contact is, is shown between them by what the ends have; linear facets have none.
+    Contact is known at vertices only, and is interpolated at these nodes; linear facets have none.
     """
     element = element_of(dim - 1, facets.shape[1])
     edges = element.edges if element.is_quadratic else np.zeros((0, 2), dtype=np.int64)

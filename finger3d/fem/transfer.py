@@ -18,10 +18,10 @@ _COVERED = 0.5  # least share of a point's hat that must be under the other surf
 
 
 def facing_trace(surface: BoundarySurface, mesh: Mesh, label: str) -> sp.csr_matrix:
-    """Weighted mean (c, n) at the points of a surface of what lies straight over it on the facets `label` of a mesh.
+    """Return the weighted mean (c, n), at the points of a surface, of a field on the facets `label` of a mesh above.
 
-    The weights are those of the surface's own trace, so that forces on its points reach the other mesh undiminished:
-    every row sums to 1, or to 0 where less than half of the point's hat has something over it.
+    The weights are those of the trace of the surface, so that the forces on its points are preserved: every row sums to
+    1, or to 0 where less than half of the hat function of the point has facets above it.
     """
     values, there = values_over(mesh, label, surface.samples)
     share = np.asarray(surface.average @ there.astype(float))
@@ -30,7 +30,7 @@ def facing_trace(surface: BoundarySurface, mesh: Mesh, label: str) -> sp.csr_mat
 
 
 def values_over(mesh: Mesh, label: str, places: Float) -> tuple[sp.csr_matrix, NDArray[np.bool_]]:
-    """Rows (q, n) that interpolate a field on the lowest facets over places (q, d), and where there are any."""
+    """Return rows (q, n) that interpolate a field on the lowest facets above points (q, d), and where there are any."""
     facets = mesh.facets[label]
     d = mesh.dim
     across = [0] if d == 2 else [0, 2]
@@ -49,7 +49,7 @@ def _triangles_over(mesh: Mesh, facets: Int, places: Float) -> tuple[Int, Float]
 
 
 def _edges_over(coords: Float, x: Float) -> tuple[Int, Float]:
-    """Edge (q,) over every x, -1 for none, and barycentric coordinates (q, 2) on its chord."""
+    """Return the edge (q,) above every x, or -1, and the barycentric coordinates (q, 2) on its chord."""
     start, stop = coords[:, 0, 0], coords[:, 1, 0]
     low, high = np.minimum(start, stop), np.maximum(start, stop)
     slack = 1e-12 * float(np.ptp(coords[:, :, 0]))

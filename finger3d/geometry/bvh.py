@@ -1,4 +1,4 @@
-"""A tree of boxes around triangles, walked for many queries at once: each level is one step of array operations."""
+"""Bounding volume hierarchy of triangles, traversed for many queries at once, level by level, with array operations."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _CHUNK = 8192
 
 @dataclass(frozen=True)
 class Tree:
-    """A complete tree, four children to a node, over triangles that lie near each other in order.
+    """Complete tree with four children for each node, over triangles in spatial order.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class Tree:
 
     @classmethod
     def over(cls, corners: Float) -> Tree:
-        """From the corners (m, 3, 3) of triangles, sorted along a Z-shaped curve (Morton 1966)."""
+        """Return the tree of triangles with corners (m, 3, 3), sorted along a Z-order curve (Morton 1966)."""
         low, high = corners.min(axis=1), corners.max(axis=1)
         order = np.argsort(_morton(0.5 * (low + high)), kind="stable")
         leaves = 1
@@ -51,9 +51,9 @@ class Tree:
         return cls(items, tuple(np.hstack([b[:, :3], -b[:, 3:]]) for b in reversed(levels)))
 
     def pucks(self, corners: Float, area_vectors: Float) -> tuple[Float, ...]:
-        """Flat cylinders around the nodes, per level (4^level, 8): middle, axis, radius, half thickness (mm).
+        """Return bounding cylinders, for each level (4^level, 8): middle, axis, radius, half thickness (mm).
 
-        A surface is flat from near: its distance from a far point is bounded far better by these than by boxes.
+        A small part of a surface is nearly flat, so that flat cylinders bound its distance much better than boxes.
         """
         empty = np.repeat((self.items < 0).ravel(), 3)
         points = corners[self.items].reshape(-1, 3)
@@ -77,7 +77,7 @@ class Tree:
         return tuple(levels)
 
     def pairs(self, count: int, test: Test) -> Iterator[tuple[Int, Int]]:
-        """Pairs (query, triangle), in portions, whose node and all nodes around it pass `test(query, level, node)`."""
+        """Yield portions of pairs (query, triangle) whose nodes at all levels pass `test(query, level, node)`."""
         for start in range(0, count, _CHUNK):
             query = np.arange(start, min(start + _CHUNK, count))
             node = np.zeros(len(query), dtype=np.int64)
@@ -92,7 +92,7 @@ class Tree:
 
 
 def puck_distance(p: Float, puck: Float) -> Float:
-    """Lower bound (n,) of the distance of points (n, 3) from what is in the pucks (n, 8); inf for an empty one."""
+    """Return a lower bound (n,) of the distance of points (n, 3) from the contents of bounding cylinders (n, 8)."""
     off = p - puck[:, :3]
     along = np.einsum("ij,ij->i", off, puck[:, 3:6])
     across = np.sqrt(np.maximum(np.einsum("ij,ij->i", off, off) - along**2, 0.0))
@@ -101,7 +101,7 @@ def puck_distance(p: Float, puck: Float) -> Float:
 
 
 def _morton(points: Float) -> Int:
-    """Interleaved bits (n,) of coordinates scaled to their box."""
+    """Return the interleaved bits (n,) of coordinates scaled to their bounding box."""
     low = points.min(axis=0)
     span = np.maximum(np.ptp(points, axis=0).max(), 1e-300)
     scaled = np.minimum((points - low) / span * 2**_BITS, 2**_BITS - 1).astype(np.int64)

@@ -46,7 +46,7 @@ class Network:
         return found
 
     def meeting(self, patches: tuple[int, ...], points: Float) -> Float | None:
-        """The closest points (n, 3) in which all these patches meet; None if they do not meet."""
+        """Return the closest points (n, 3) where all these patches meet, or None if they do not meet."""
         if len(patches) == 2:
             edges, sides = self._sides
             shared = edges[np.all(sides == sorted(patches), axis=1)]
@@ -109,14 +109,14 @@ class Faceted:
 
 
 def moved_onto(surfaces: list[Faceted], points: Float) -> Float | None:
-    """Points moved to where they belong: onto one patch, or to where several meet; None if these do not meet."""
+    """Return points moved onto one patch, or to where several meet; None if these do not meet."""
     if len(surfaces) == 1:
         return surfaces[0].triangles.closest(points)[0]
     return surfaces[0].network.meeting(tuple(s.number for s in surfaces), points)
 
 
 def body(surface: Triangles) -> Tessellation:
-    """A closed surface with its base on y = 0 as a body of labelled patches."""
+    """Return a closed surface with its base on y = 0 as a body of labelled patches."""
     base = (surface.corners[:, :, 1] == 0.0).all(axis=1)
     up = _looks_up(surface, base)
     patch = _joined(surface, 2 * base + up)
@@ -136,7 +136,7 @@ def body(surface: Triangles) -> Tessellation:
 
 
 def _looks_up(surface: Triangles, base: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Mask (m,) of contact triangles: those that look up, less the few that differ from the smooth patch around."""
+    """Return the mask (m,) of contact triangles: those that face up, without single ones in a patch that does not."""
     up = (surface.normals[:, 1] > _LEAST_UPWARD_NORMAL) & ~base
     smooth = _joined(surface, base.astype(np.int64))
     area = np.linalg.norm(surface.area_vectors, axis=1)
@@ -147,7 +147,7 @@ def _looks_up(surface: Triangles, base: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def _joined(surface: Triangles, kind: Int) -> Int:
-    """Number (m,) of the patch of every triangle: those of one kind that join without a crease."""
+    """Return the number (m,) of the patch of each triangle; a patch is of one kind and has no crease."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
@@ -168,10 +168,10 @@ def _neighbours(surface: Triangles) -> tuple[Int, Int, Int]:
 
 
 def coarser(body: Tessellation, tolerance: float) -> Tessellation:
-    """The body with fewer triangles for the mesher, which is slow on many; its patches, for snapping, stay as fine.
+    """Return the body with fewer triangles for the mesher; its patches, which nodes are snapped to, stay as they are.
 
-    `tolerance` (mm) is what one removal may move the surface; removals add up to some twenty times that. A surface
-    that does not come out closed is made again with less, and left as it was in the end.
+    `tolerance` (mm) bounds the displacement of the surface by one removal; removals add up to some twenty times that.
+    If the result is not closed, smaller tolerances are tried, and the body is returned unchanged in the end.
     """
     if len(body.triangles) <= _DECIMATE_FROM:
         return body

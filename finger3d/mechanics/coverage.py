@@ -20,7 +20,7 @@ def step_within_candidates(problem: Problem, step: StepResult) -> bool:
 
 
 def contact_within_candidates(problem: Problem, steps: Sequence[StepResult]) -> list[bool]:
-    """Return the same for each of several steps; in small strain at the cost of one back-substitution."""
+    """Return, for each step, whether contact stayed within the candidates; in small strain by one back-substitution."""
     if candidates_cover_face(problem):
         return [True] * len(steps)
     face = surface(problem.part.mesh, "contact", problem.part.thickness)
@@ -31,7 +31,7 @@ def contact_within_candidates(problem: Problem, steps: Sequence[StepResult]) -> 
 
 
 def candidates_cover_face(problem: Problem) -> bool:
-    """Return whether all of the contact face are candidates."""
+    """Return whether all points of the contact face are candidates."""
     mesh = problem.part.mesh
     corners = mesh.facets["contact"][:, : mesh.dim]
     return len(np.unique(corners)) == len(problem.system.surface.nodes)

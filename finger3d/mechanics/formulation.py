@@ -100,7 +100,7 @@ class Formulation(Protocol):
         ...
 
     def all_unknowns(self, problem: Problem, states: Sequence[ContactState]) -> Iterator[Float]:
-        """The same in each of several states, which may cost less than one after another."""
+        """Yield the unknowns of each of several states, which may cost less than one after another."""
         ...
 
     def gauges(self, problem: Problem, state: ContactState) -> dict[str, float]:
@@ -119,7 +119,7 @@ class Formulation(Protocol):
 
 
 def length_scale(problem: Problem, a: ObjectPose, b: ObjectPose) -> float:
-    """What gaps are measured by (mm): the depth, or that of the deepest leg while the finger is let go."""
+    """Return the length (mm) that gaps are divided by: the depth, or that of the deepest leg during release."""
     return max(a.depth_mm, b.depth_mm) or max(leg.depth_mm for leg in problem.model.legs)
 
 
@@ -159,11 +159,11 @@ class SmallStrain:
         return 0.0
 
     def workspace(self) -> Workspace:
-        """Nothing is kept: the compliance is that of the build."""
+        """Return an empty workspace; the compliance is that of the build."""
         return Workspace()
 
     def start(self, problem: Problem) -> ContactState:
-        """No force, gaps at rest."""
+        """Return the state without forces, with the gaps at rest."""
         return ContactState.at_rest(problem.gap(problem.origin), problem.dim)
 
     def increment(
@@ -175,27 +175,27 @@ class SmallStrain:
         guess: Float | None,
         workspace: Workspace,
     ) -> ContactSolution:
-        """One call of the contact rule."""
+        """Apply the contact rule once."""
         return solve_contact(
             problem, state, problem.free_motion(b), problem.delassus, length_scale(problem, a, b), guess
         )
 
     def unknowns(self, problem: Problem, state: ContactState) -> Float:
-        """Those of one state."""
+        """Return the unknowns of one state."""
         return next(iter(self.all_unknowns(problem, [state])))
 
     def all_unknowns(self, problem: Problem, states: Sequence[ContactState]) -> Iterator[Float]:
-        """From the forces, with the factor at hand: one back-substitution for many states."""
+        """Yield the unknowns from the forces, by one back-substitution for many states."""
         return problem.unknowns_of([state.force for state in states])
 
     def gauges(self, problem: Problem, state: ContactState) -> dict[str, float]:
-        """From the forces, through the gauges' rows."""
+        """Return the strains from the forces, by the rows of the gauges."""
         return problem.gauge_strains(state.force)
 
     def gaps(
         self, problem: Problem, states: Sequence[ContactState], targets: Sequence[ObjectPose], face: BoundarySurface
     ) -> list[Float]:
-        """Gap at rest, changed by the displacement along the object's normal."""
+        """Return the gaps at rest plus the displacement along the normal of the object."""
         from finger3d.fem.recover import displacement
 
         normal = problem.points.basis[0]
@@ -205,7 +205,7 @@ class SmallStrain:
         ]
 
     def fields(self, problem: Problem, state: ContactState) -> tuple[Float, Float, Float]:
-        """Linear strain and stress; a section gets the component across it that its assumption implies."""
+        """Return displacement, linear strain and stress; in a section also the out-of-plane components."""
         from finger3d.fem.recover import across, displacement, nodal_strain, pressure, stress
 
         unknowns = self.unknowns(problem, state)

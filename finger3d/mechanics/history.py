@@ -70,13 +70,13 @@ class ContactPoints:
         return int(self.basis.shape[-1])
 
     def with_basis_of(self, state: ContactState) -> ContactPoints:
-        """The points with the directions of a state, where they turn with the motion."""
+        """Return the points with the bases of a state, if these change during the motion."""
         return self if state.bases is None else replace(self, basis=state.bases)
 
     def middle_line(self) -> tuple[Float, NDArray[np.int64]]:
-        """Where the surface mesh meets the line z = 0: x (k,) mm, and the number (k,) of the point nearest on the edge.
+        """Return where the surface mesh meets the line z = 0: x (k,), mm, and the number (k,) of the nearest point.
 
-        The vertices on the line, and the intersections of edges that cross it; all points of a section.
+        These are the vertices on the line and the intersections of edges with it, or all points of a section.
         """
         x, z = self.points[:, 0], self.points[:, 2]
         z = np.where(np.abs(z) <= _ON_LINE * self.half_width_mm, 0.0, z)
@@ -87,7 +87,7 @@ class ContactPoints:
         return np.concatenate([x[on], crossing]), np.concatenate([on, np.where(share <= 0.5, i, j)])
 
     def rim(self, inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Points (m,) of a zone that an edge joins with a point outside it."""
+        """Return which points (m,) of a zone an edge joins with a point outside it."""
         i, j = self.edges.T
         out = np.zeros(len(inside), dtype=bool)
         out[i[inside[i] & ~inside[j]]] = True
@@ -95,7 +95,7 @@ class ContactPoints:
         return out
 
     def resolved(self, inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Points (m,) of a zone where it is at least three points wide: inner ones, and their neighbours in it."""
+        """Return which points (m,) of a zone lie where it is three points wide: inner ones and their neighbours."""
         inner = inside & ~self.rim(inside)
         i, j = self.edges.T
         out = inner.copy()

@@ -245,7 +245,7 @@ def rigid_gap(model: Model, where: BoundarySurface, touch: float, target: Object
 def scatter_to_points(rows: Float, kept: NDArray[np.int64], count: int, dim: int) -> Float:
     """Compliance (c, d, c, d) of contact points from that of the condensed rows (r, r), of which they are the first.
 
-    A point on a symmetry plane cannot move across it: that direction is left uncoupled, and never sees a force.
+    A point on a symmetry plane cannot move across it: that direction is not coupled, and its force is always zero.
     """
     own = rows[: len(kept), : len(kept)]
     out = np.diag(np.full(count * dim, np.diagonal(own).max()))

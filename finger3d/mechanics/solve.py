@@ -109,7 +109,7 @@ def _free_strain(problem: Problem, without_inclusions: Iterator[StepResult] | No
 def _extrapolated(
     state: ContactState, a: ObjectPose, b: ObjectPose, previous: tuple[ObjectPose, Float] | None
 ) -> Float | None:
-    """Forces continued linearly where the path goes straight on from the previous increment."""
+    """Return the forces extrapolated linearly, if the path continues in the direction of the previous increment."""
     if previous is None:
         return None
     pose, force = previous

@@ -104,7 +104,7 @@ def _outline(section: Section, u: Float) -> Float:
 
 
 def _spread(u: Float, points: Float, size: Float, least: int) -> Float:
-    """Parameters of points on a row sampled at `u`, one edge length apart by the size field."""
+    """Return the parameters of points on a row sampled at `u`, one edge length of the size field apart."""
     step = np.hypot(*np.diff(points, axis=0).T)
     total = np.concatenate([[0.0], np.cumsum(step * 0.5 * (1.0 / size[1:] + 1.0 / size[:-1]))])
     n = max(least, int(round(total[-1])))
@@ -153,7 +153,7 @@ def rows(section: Section, sizes: Sizes) -> Rows:
 
 
 def _zip(upper: Int, lower: Int, at_upper: Float, at_lower: Float) -> Int:
-    """Triangles between two rows of nodes, taken in the order in which their edges' middles follow each other."""
+    """Return the triangles between two rows of nodes, in the order of the middles of their edges."""
     mid_upper = 0.5 * (at_upper[1:] + at_upper[:-1])
     mid_lower = 0.5 * (at_lower[1:] + at_lower[:-1])
     below = np.searchsorted(mid_lower, mid_upper, side="left")

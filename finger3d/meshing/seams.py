@@ -45,9 +45,9 @@ class Seams:
                 self._samples[i, j] = at, np.einsum("ij,ij->i", a, b) > SMOOTH
 
     def one_of_each(self, points: Float, sets: Bool, beside: Bool | None = None) -> Bool:
-        """The sets (n, f) with one face of every smooth group: a pinned plane, or the nearest, at points (n, 3).
+        """Return the sets (n, f) with one face of each smooth group: a pinned plane, or the one nearest to the point.
 
-        The faces `beside` (n, f) compete with those of the sets that they join smoothly.
+        The faces `beside` (n, f) are candidates as well if they join a face of the set smoothly.
         """
         from scipy.sparse import coo_matrix
         from scipy.sparse.csgraph import connected_components
@@ -76,7 +76,7 @@ class Seams:
         return rows
 
     def nearest_only(self, points: Float, sets: Bool) -> Bool:
-        """The sets (n, f) with the pinned planes and the nearest of the other faces only."""
+        """Return the sets (n, f) reduced to the pinned planes and the nearest of the other faces."""
         others = sets & ~self.pinned
         node, face = np.nonzero(others)
         order = np.lexsort([self.distance(points, node, face), node])
@@ -87,7 +87,7 @@ class Seams:
         return rows
 
     def pinned_only(self, points: Float, sets: Bool) -> Bool:
-        """The sets (n, f) with the pinned planes only, where there are any."""
+        """Return the sets (n, f) reduced to the pinned planes, if there are any."""
         planes = sets & self.pinned
         return np.where(planes.any(axis=1)[:, None], planes, sets)
 

@@ -38,12 +38,12 @@ class UnusableMeshError(Exception):
 
 
 def snap(points: Float, tets: Int, body: Tessellation) -> Mesh:
-    """The quadratic mesh with labelled facets, on the CAD surfaces, made from linear tets near them.
+    """Return a quadratic mesh with labelled facets on the CAD surfaces, from linear tets near them.
 
     Raises
     ------
     UnusableMeshError
-        The boundary is open, a node finds no place, or cells stay flat or inverted.
+        If the boundary is open, a node cannot be placed, or cells remain flat or inverted.
     """
     seams = Seams(body)
     faces = boundary(tets, 3)
@@ -71,7 +71,7 @@ def _edge_lengths(points: Float, faces: Int) -> Float:
 
 
 def _straightened(mesh: Mesh) -> Mesh:
-    """The mesh with straight edges in the cells that curved edges turned inside out, if these are few."""
+    """Return the mesh with straight edges in cells that curved edges have inverted, if these are few."""
     bad = curved_jacobians(mesh) <= 0.0
     if not bad.any() or bad.mean() > _FEW:
         return mesh
@@ -81,7 +81,7 @@ def _straightened(mesh: Mesh) -> Mesh:
 
 
 def check_closed(faces: Int) -> None:
-    """Refuse a boundary in which some edge does not belong to exactly two facets."""
+    """Raise an error if an edge of the boundary does not belong to exactly two facets."""
     edges = np.sort(faces[:, TRI3.edges].reshape(-1, 2), axis=1)
     count = np.unique(edges, axis=0, return_counts=True)[1]
     if not len(faces) or (count != 2).any():
@@ -89,7 +89,7 @@ def check_closed(faces: Int) -> None:
 
 
 def _cad_faces(points: Float, faces: Int, body: Tessellation, sets: Bool | None = None) -> Int:
-    """Number of the CAD face (m,) under every boundary facet; of those all its nodes lie on, if `sets` is given."""
+    """Return the number (m,) of the CAD face of each boundary facet; with `sets`, one that all its nodes lie on."""
     a, b, c = (points[faces[:, i]] for i in range(3))
     normal = np.cross(b - a, c - a)
     twice = np.linalg.norm(normal, axis=1)
@@ -113,7 +113,7 @@ def _cad_faces(points: Float, faces: Int, body: Tessellation, sets: Bool | None 
 
 
 def _node_sets(points: Float, faces: Int, owner: Int, body: Tessellation) -> Bool:
-    """Which CAD faces (n, f) every node belongs to; each CAD corner takes its nearest boundary node."""
+    """Return which CAD faces (n, f) each node belongs to; each CAD corner takes its nearest boundary node."""
     sets = np.zeros((len(points), len(body.faces)), dtype=bool)
     sets[faces.ravel(), np.repeat(owner, 3)] = True
     nodes = np.unique(faces)
@@ -124,15 +124,15 @@ def _node_sets(points: Float, faces: Int, owner: Int, body: Tessellation) -> Boo
 
 
 def placed(points: Float, sets: Bool, seams: Seams, reach: Float, beside: Bool | None = None) -> tuple[Float, Bool]:
-    """Points (n, 3) moved onto the CAD faces of their sets (n, f), and the faces each is on.
+    """Return points (n, 3) moved onto the CAD faces of their sets (n, f), and the faces that each lies on.
 
-    A point that finds no place where its faces meet, or only beyond its reach (n,), mm, goes onto the nearest of them,
-    and does not leave the base and the planes of symmetry.
+    A point that cannot be moved to where its faces meet, or only by more than its reach (n,), mm, is moved onto the
+    nearest of them.  It does not leave the base and the symmetry planes.
 
     Raises
     ------
     UnusableMeshError
-        A point finds no place there either.
+        If that fails as well.
     """
     rows = seams.one_of_each(points, sets, beside)
     moved, missed = _moved(points, rows, seams.faces)
@@ -156,7 +156,7 @@ def project(points: Float, sets: Bool, faces: tuple[CadFace, ...]) -> Float:
 
 
 def _moved(points: Float, sets: Bool, faces: tuple[CadFace, ...]) -> tuple[Float, Bool]:
-    """As :func:`project`, and a mask (n,) of the points that did not come onto all surfaces of their sets."""
+    """Return points as :func:`project` does, and a mask (n,) of those that do not lie on all surfaces of their sets."""
     points, missed = points.copy(), np.zeros(len(points), dtype=bool)
     scale = max((float((f.high - f.low).max()) for f in faces), default=0.0)
     groups, member = np.unique(sets, axis=0, return_inverse=True)
@@ -189,7 +189,7 @@ def _moved(points: Float, sets: Bool, faces: tuple[CadFace, ...]) -> tuple[Float
 
 
 def repair(points: Float, tets: Int, sets: Bool) -> tuple[Float, Int, Bool]:
-    """Collapse short edges until no cell is flat or inverted; points and sets without the nodes that went."""
+    """Collapse short edges until no cell is flat or inverted; return points, cells and sets that are left."""
     for _ in range(_REPAIRS):
         angles = cell_angles_deg(points, tets)
         worst = int(np.argmin(angles))
@@ -205,7 +205,7 @@ def repair(points: Float, tets: Int, sets: Bool) -> tuple[Float, Int, Bool]:
 
 
 def _collapsed(points: Float, tets: Int, sets: Bool, cell: Int) -> Int:
-    """The tets after the shortest edge of a cell that may go has gone."""
+    """Return the tets after the shortest collapsible edge of a cell has been collapsed."""
     edges = cell[TET4.edges]
     faces = boundary(tets, 3)
     outer = {tuple(e) for e in np.sort(faces[:, TRI3.edges].reshape(-1, 2), axis=1).tolist()}

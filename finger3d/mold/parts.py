@@ -232,7 +232,7 @@ def _strip(foil: FoilSlot, scale: float, length: float, thickness: float, z_low:
 
 
 def _ports(body: Solid, options: MoldOptions) -> Ports:
-    """Openings as large as the base allows, or as asked for."""
+    """Return the openings, as large as the base allows or as given."""
     base = [f for f in body.faces() if is_base(f)]
     corners = np.array([[*getattr(f.bounding_box(optimal=True), end)] for f in base for end in ("min", "max")])
     low, high = corners.min(axis=0)[::2], corners.max(axis=0)[::2]

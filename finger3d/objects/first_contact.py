@@ -27,7 +27,7 @@ _NOTHING = 1e-9  # of the finger's extent: a contact as narrow as this has no ar
 
 @dataclass(frozen=True)
 class ContactPath:
-    """An object and its way into the finger.
+    """Rigid object and its path into the finger.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class ContactPath:
 
 @dataclass(frozen=True)
 class InitialContact:
-    """How an object comes near: height (mm) of its lowest point at first touch, and the box that it will overlap.
+    """First touch of an object: height (mm) of its lowest point, place, and the box that it will overlap on its path.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ def _grid(half_length: float, half_width: float, count: tuple[int, int] = _GRID)
 def _touching(
     top: Top, obj: RigidObject, half_length: float, half_width: float, marks: Float | None
 ) -> tuple[float, Float]:
-    """Height of the lowest point at first touch, and the place (2,) of it; -inf where nothing is above anything."""
+    """Return the height of the lowest point at first touch, and its place (2,); -inf without overlap in plan."""
 
     def difference(at: Float) -> Float:
         return np.nan_to_num(top(at[:, 0], at[:, 1]) - obj.height(at[:, 0], at[:, 1]), nan=-np.inf)
@@ -104,7 +104,7 @@ def _touching(
 
 
 def _apart(at: Float, value: Float, distance: Float) -> Float:
-    """The places (k, 2) of the largest values that are `distance` (2,) from each other."""
+    """Return the places (k, 2) of the largest values, at least `distance` (2,) apart."""
     order = np.argsort(-value, kind="stable")[:2000]
     kept: list[Float] = []
     for i in order:
@@ -118,9 +118,9 @@ def _apart(at: Float, value: Float, distance: Float) -> Float:
 def first_contact_height(
     top: Top, obj: RigidObject, half_length: float, half_width: float, marks: Float | None = None
 ) -> float:
-    """Height (mm) of the object's lowest point at first touch: the largest difference of the two surfaces.
+    """Return the height (mm) of the object's lowest point at first touch: the largest difference of the two surfaces.
 
-    The maximum is searched on a grid and at corners that stand out, then on finer grids around the best places.
+    The maximum is searched on a grid and at landmarks, then on finer grids around the best places.
 
     Parameters
     ----------
@@ -189,14 +189,14 @@ def _box(
 
 
 def _overlap(top: Top, obj: RigidObject, at: Float, touch: float, target: Sequence[float] | Float) -> Float:
-    """How deep (n,) the object would reach into the finger at rest, mm; -inf where there is one of them only."""
+    """Return the overlap (n,), mm, of the object with the finger at rest; -inf outside either of them."""
     depth, slide_x, slide_z = target
     over = top(*at.T) - (obj.height(at[:, 0] - slide_x, at[:, 1] - slide_z) + touch - depth)
     return np.nan_to_num(over, nan=-np.inf, posinf=np.inf, neginf=-np.inf)
 
 
 def _not_a_wall(obj: RigidObject, place: Float, half_length: float, half_width: float) -> None:
-    """Refuse a first touch at the finger's rim by a flank that hangs down beside it, or along its wall."""
+    """Raise an error if the object first touches the rim of the finger with a flank that extends below it."""
     reach = 1e-3 * half_length
     for axis, limit in ((0, half_length), (1, half_width)):
         if limit == 0.0 or abs(place[axis]) < limit * (1.0 - 1e-9):
@@ -212,7 +212,7 @@ def _not_a_wall(obj: RigidObject, place: Float, half_length: float, half_width: 
 
 
 def _no_side(top: Top, obj: RigidObject, touch: float, path: Float, half_length: float, half_width: float) -> None:
-    """Refuse a slide during which the object enters the finger's rim at once, as a wall does, and not by its slope."""
+    """Raise an error if a wall of the object runs into the side of the finger during a slide."""
     t = np.linspace(-1.0, 1.0, _GRID[1])
     sides = np.vstack([np.stack([t, s + 0.0 * t], axis=1) for s in (-1.0, 1.0)])
     rim = np.vstack([sides, sides[:, ::-1]] if half_width else [[[-1.0, 0.0], [1.0, 0.0]]]) * [half_length, half_width]

@@ -48,7 +48,7 @@ class MeshObject(RigidObject):
         return Triangles(self.surface.points + shift, self.surface.faces)
 
     def height(self, x: Float, z: Float) -> Float:
-        """Where a vertical line from below meets the body first, exact on its triangles; nan beside the body."""
+        """Return where a vertical line from below first meets the body, exact on its triangles; NaN outside it."""
         x, z = (np.ascontiguousarray(v, dtype=float) for v in np.broadcast_arrays(x, z))
         # Every increment of a press asks at the same places again: the answer is kept until others are asked for.
         key = (x.tobytes(), z.tobytes())
@@ -69,7 +69,7 @@ class MeshObject(RigidObject):
         return self.moved.signed_distance(points)
 
     def mirrors(self) -> tuple[str, ...]:
-        """Axes along which the body is its own image about the finger's middle, tested on its points."""
+        """Return the symmetry planes of the body about the middle of the finger, tested on its points."""
         return self._mirrors
 
     @cached_property
@@ -90,7 +90,7 @@ class MeshObject(RigidObject):
         return tuple(found)
 
     def landmarks(self) -> Float:
-        """The corners of the triangles that look down."""
+        """Return the corners of the triangles that face down."""
         down = self.surface.normals[:, 1] < 0.0
         return self.moved.points[np.unique(self.surface.faces[down])][:, ::2]
 
@@ -109,7 +109,7 @@ class ObjectFile(RigidObject):
     scale: Scale = field(default=1.0, kw_only=True)
 
     def height(self, x: Float, z: Float) -> Float:
-        """Refuse: the file is not read yet."""
+        """Raise an error: the file has not been read."""
         raise TypeError("read() the object first")
 
     def read(self) -> MeshObject:

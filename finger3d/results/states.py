@@ -69,7 +69,7 @@ class States:
         return self.facets[:, : self.dim]
 
     def on_points(self, name: str, k: int) -> Array:
-        """A contact field of the k-th kept increment at all points (n,), as in fields.vtu: 0 off the contact face."""
+        """Return a contact field of the k-th kept increment at all points (n,), 0 off the contact face."""
         values = getattr(self, name)[k]
         out = np.zeros(len(self.points), dtype=values.dtype)
         out[self.nodes] = values
@@ -192,12 +192,12 @@ def _check(states: States) -> None:
 
 
 def label(step: int, target: Array) -> str:
-    """What a step is called, from its number and its depth and slides (3,) mm."""
+    """Return the label of a step from its number, its depth and its slides (3,), mm."""
     depth, x, z = (float(v) for v in target)
     slid = "".join(f", slid {v:.4g} mm along {axis}" for v, axis in ((x, "x"), (z, "z")) if v)
     return f"step {step}: {depth:.4g} mm deep{slid}"
 
 
 def captions(states: States) -> list[str]:
-    """What each kept step is called."""
+    """Return the label of each kept step."""
     return [label(int(s), t) for s, t in zip(states.step, states.target, strict=True)]

@@ -1,4 +1,4 @@
-"""What is read from a folder of results: JSON, CSV, the title, the gauges and the error bars of a summary."""
+"""Files in a folder of results: JSON and CSV, and title, gauges and steps of a summary."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def read_json(path: Path) -> Tree:
 
 
 def read_rows(path: Path) -> list[dict[str, str]]:
-    """Lines of a CSV file by column; none, if it is not there.
+    """Return the rows of a CSV file by column; none if the file does not exist.
 
     Raises
     ------
@@ -110,13 +110,13 @@ def read_rows(path: Path) -> list[dict[str, str]]:
 
 
 def title_of(scene: TreeView) -> str:
-    """The scene's title, or what is pressed onto what."""
+    """Return the title of the scene, or the names of finger and object."""
     object_ = (scene.get("object") or {}).get("shape", "plane")
     return scene.get("title") or f"{scene['finger']['geometry']} on a {object_}"
 
 
 def gauges_of(scene: TreeView) -> list[Gauge]:
-    """The gauges of a scene as summary.json holds it.
+    """Return the gauges of a scene, as in summary.json.
 
     Raises
     ------

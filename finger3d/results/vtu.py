@@ -106,7 +106,7 @@ class _Appended:
 
 
 def grid(folder: str | Path, step: int | None = None) -> pyvista.UnstructuredGrid:
-    """The finger at rest with its fields, from a folder that press wrote.
+    """Return the finger at rest with its fields, from a folder of results.
 
     Parameters
     ----------

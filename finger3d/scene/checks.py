@@ -73,7 +73,7 @@ def _target(leg: LegTable) -> tuple[float, float, float]:
 
 
 def smallest_mm(design: Design, solid: bool) -> float:
-    """Smallest extent of what is meshed, mm."""
+    """Return the smallest extent of the meshed part, mm."""
     extents = [design.height_mm, 2.0 * design.half_length_mm]
     if solid:
         extents.append(design.width_mm)
@@ -124,7 +124,7 @@ def chosen(mesh: MeshTable, design: Design, domain: Domain, obj: RigidObject, bo
 
 
 def _detail(obj: RigidObject, box: Box, solid: bool) -> float:
-    """Edge length, mm, at which an object that is not flat has some elements across its contact, or a crest."""
+    """Return the edge length, mm, that gives a curved object some elements across its contact or its crest."""
     if obj.is_flat:
         return math.inf
     x0, x1, z0, z1 = box

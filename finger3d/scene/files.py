@@ -23,7 +23,7 @@ def is_file(geometry: object) -> bool:
 
 
 def absolute(given: TreeView, scene: Path | None) -> Tree:
-    """The tree with the paths of its bodies, which are relative to the scene's file, made absolute."""
+    """Return the tree with absolute paths of its bodies; those in it are relative to the file of the scene."""
     folder = scene.parent if scene else Path()
     tree = dict(given)
     for table, key in (("finger", "geometry"), ("object", "path")):
@@ -34,14 +34,14 @@ def absolute(given: TreeView, scene: Path | None) -> Tree:
 
 
 def finger(path: str) -> Imported:
-    """The finger in a file."""
+    """Return the finger in a file."""
     from finger3d.geometry.imported import imported
 
     return imported(path)
 
 
 def unit_mistake(design: Design, obj: RigidObject) -> str:
-    """Say in one line that a triangulated object is far too large or far too small beside the finger; else nothing."""
+    """Return a line if a triangulated object is far too large or far too small for the finger, else an empty text."""
     if not isinstance(obj, MeshObject):
         return ""
     longest = max(design.height_mm, 2.0 * design.half_length_mm, design.width_mm)

@@ -48,7 +48,7 @@ def listed(names: Iterable[str], last: str = "or") -> str:
 
 
 def nearest(name: str, names: Iterable[str]) -> str | None:
-    """The known name that `name` was probably meant to be; case does not count, nor does a forgotten unit."""
+    """Return the known name that `name` was probably meant to be, ignoring case and a missing unit."""
     known = {n.lower(): n for n in names}
     bare = {n.removesuffix("_mm").removesuffix("_deg").removesuffix("_mpa"): n for n in known}
     for pool in (known, bare):
@@ -58,14 +58,14 @@ def nearest(name: str, names: Iterable[str]) -> str | None:
 
 
 def choose(place: Place, value: object, names: Sequence[str]) -> str:
-    """Word a name that is not one of `names`."""
+    """Return the message about a value that is not one of `names`."""
     near = nearest(value, names) if isinstance(value, str) else None
     hint = f'did you mean "{near}"? ' if near else ""
     return f"{dotted(place)} = {shown(value)}: {hint}must be {listed(names)}"
 
 
 def unknown(place: Place, value: object, names: Sequence[str], kind: str = "key") -> str:
-    """Word a key (or an effect) that is not one of `names`."""
+    """Return the message about a key or an effect that is not one of `names`."""
     near = nearest(str(place[-1]), names)
     hint = f'; did you mean "{near}"?' if near else ""
     holder = dotted(tuple(p for p in place[:-1] if isinstance(p, str)))
@@ -100,14 +100,14 @@ def _number(value: object) -> str:
 
 
 def _text(metadata: Sequence[object]) -> str:
-    """Say what a text with bounds on its length, and perhaps of one line, may be."""
+    """Return a description of the texts that a type with bounds on their length allows."""
     lines = "one line of printable text" if any(isinstance(m, at.Predicate) for m in metadata) else "a text"
     longest = next((f", of at most {m.max_length} characters" for m in metadata if isinstance(m, at.MaxLen)), "")
     return lines + (", not empty" if any(isinstance(m, at.MinLen) for m in metadata) else "") + longest
 
 
 def described(hint: Any) -> str:
-    """Say in words what a type with bounds allows, for instance ``a number from 0 to 0.5``."""
+    """Return a description of what a type with bounds allows, for instance ``a number from 0 to 0.5``."""
     origin = typing.get_origin(hint)
     if hint == Zero:
         return "0"

@@ -82,7 +82,7 @@ def _default(field: typing.Any) -> str:
 
 
 def _said(documented: type) -> dict[str, str]:
-    """What the docstrings of a class and of those it comes from say of each key."""
+    """Return the description of each key in the docstrings of a class and its bases."""
     found: dict[str, str] = {}
     for base in reversed(documented.__mro__):
         for names, text in _SAID.findall(base.__doc__ or ""):

@@ -74,7 +74,7 @@ class Scene:
         return f"<Scene {self.title}: {self.design}, {self.domain}{effects}>"
 
     def _repr_html_(self) -> str:
-        """The tables with every default filled in."""
+        """Return the tables with all defaults, as HTML."""
         from finger3d._notebook import card
 
         rows = [
@@ -99,7 +99,7 @@ class Scene:
         return tuple(Leg(**leg) for leg in (press["leg"] if "leg" in press else (press,)))
 
     def with_mesh(self, mesh: MeshOptions) -> Scene:
-        """The scene with edge lengths in place of a tolerance."""
+        """Return the scene with edge lengths in place of a tolerance."""
         return parse({**self.given, "mesh": mesh.as_table()}, self.path)
 
     def model(self) -> Model:
@@ -275,7 +275,7 @@ def _checked(
 
 
 def _built(record: type[Record], settings: TomlTable, place: Place, found: dict[Place, str]) -> Record | None:
-    """Build a design or an effect; what its own rules refuse is a mistake like any other."""
+    """Build a design or an effect; values that it refuses are collected as mistakes."""
     try:
         return record_of(record, settings)
     except Finger3dError as error:
@@ -298,7 +298,7 @@ def _design(geometry: str, dimensions: TomlTable | None, found: dict[Place, str]
 
 
 def _object(shape: str, placed: TomlTable | None, found: dict[Place, str]) -> RigidObject | None:
-    """Build the object; what is wrong with its file is a mistake like any other."""
+    """Build the object; defects of its file are collected as mistakes."""
     if placed is None:
         return None
     try:
@@ -310,7 +310,7 @@ def _object(shape: str, placed: TomlTable | None, found: dict[Place, str]) -> Ri
 
 
 def _shaped(table: Any) -> Any:
-    """The [object] table with the default shape, a plane, where it names none."""
+    """Return the [object] table, with the default shape if it names none."""
     if not isinstance(table, Mapping) or "shape" in table or any(nearest(k, ("shape",)) for k in table):
         return table
     return {"shape": "plane", **table}

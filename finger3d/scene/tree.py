@@ -78,7 +78,7 @@ def override(tree: Tree, overrides: Iterable[str], option: str = "--set") -> Tre
 
 
 def parsed(text: str) -> Any:
-    """The value that a text means in TOML; a text that is no TOML stands for itself."""
+    """Return the TOML value of a text, or the text itself if it is no TOML."""
     try:
         found = tomllib.loads(f"value = {text}")
     except (ValueError, RecursionError):

@@ -52,13 +52,13 @@ class Range:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """Something that is not known exactly: its standard deviation, and what it does to the strain.
+    """Quantity with a tolerance: its standard deviation and its effect on the strain.
 
     Attributes
     ----------
     sd : in `unit`
     slope : (n,) strain per unit at the calibration's mu
-    spread : (n,) strain error: root mean square of what plus and minus one sd do, which need not be the same
+    spread : (n,) strain error, the root mean square of the effects of plus and minus one standard deviation
     """
 
     name: str
@@ -93,7 +93,7 @@ class Calibration:
     about: TreeView = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Refuse too few points."""
+        """Raise an error if there are too few points."""
         if len(self.mu) < FEWEST:
             raise MissingError(
                 f"calibrate: only {len(self.mu)} of {len(self.mu) + len(self.failed)} values of mu converged, {FEWEST} "
@@ -101,7 +101,7 @@ class Calibration:
             )
 
     def __repr__(self) -> str:
-        """One line: gauge, range of mu, points."""
+        """Return one line: gauge, range of mu, number of points."""
         return f"<Calibration of gauge {self.gauge}: {len(self.mu)} values of mu, {self.mu[0]:g} to {self.mu[-1]:g}>"
 
     def _repr_html_(self) -> str:
@@ -123,21 +123,21 @@ class Calibration:
         return PchipInterpolator(self.mu, self.strain)
 
     def at(self, mu: ArrayLike, shape: Shape = "interpolation") -> Float:
-        """Strain at mu within the calibrated range: by monotone cubic interpolation (PCHIP), or by the fit."""
+        """Return the strain at mu in the calibrated range, by monotone cubic interpolation (PCHIP) or by the fit."""
         if shape == "fit":
             c0, c1, c2 = self.fit.coefficients
             return np.asarray(c0 + c1 * np.asarray(mu) + c2 * np.asarray(mu) ** 2)
         return np.asarray(self._pchip(mu))
 
     def slope(self, mu: ArrayLike, shape: Shape = "interpolation") -> Float:
-        """d strain / d mu."""
+        """Return d strain / d mu."""
         if shape == "fit":
             _, c1, c2 = self.fit.coefficients
             return np.asarray(c1 + 2.0 * c2 * np.asarray(mu))
         return np.asarray(self._pchip(mu, 1))
 
     def resolution(self, mu: ArrayLike, shape: Shape = "interpolation") -> Float:
-        """Standard deviation of mu from the reading's noise alone: noise / |d strain / d mu|; infinite where flat."""
+        """Return the standard deviation of mu due to the noise alone, noise / |d strain / d mu|."""
         with np.errstate(divide="ignore"):
             return np.asarray(self.noise / np.abs(self.slope(mu, shape)))
 
@@ -161,9 +161,10 @@ class Calibration:
         return np.asarray(np.max([found, np.append(found[1:], 0.0), np.append(0.0, found[:-1])], axis=0))
 
     def curve_error(self, mu: ArrayLike, shape: Shape = "interpolation") -> Float:
-        """Strain error (m,) of the curve used at mu (m,).
+        """Return the error (m,) of the strain of the curve at mu (m,).
 
-        Of the fit the residual, rms; of the interpolation what leaving out every second point changes at these, over 4.
+        For the fit it is the rms residual; for the interpolation a quarter of the change at points that are left out,
+        every second one.
         """
         at = np.asarray(mu, dtype=float)
         return np.full(at.shape, self.fit.rms) if shape == "fit" else np.interp(at, self.mu, self._missed)
@@ -176,19 +177,19 @@ class Calibration:
         return np.append(inner.ravel(), self.mu[-1])
 
     def tolerance_sd(self, mu: ArrayLike) -> Float:
-        """Strain error (k, m) of every tolerance at mu (m,)."""
+        """Return the strain error (k, m) of every tolerance at mu (m,)."""
         at = np.atleast_1d(np.asarray(mu, dtype=float))
         rows = [np.interp(at, self.mu, t.spread) for t in self.tolerances]
         return np.array(rows).reshape(len(rows), len(at))
 
     def mu_sd(self, mu: ArrayLike, strain_sd: ArrayLike | None = None) -> Float:
-        """Standard deviation of mu at mu (m,), from all of :meth:`strain_sd` or the one given; infinite where flat."""
+        """Return the standard deviation of mu at mu (m,), from that of the strain; infinite where the curve is flat."""
         whole = self.strain_sd(mu) if strain_sd is None else np.asarray(strain_sd)
         slope = np.abs(self.slope(mu))
         return np.where(slope > 0.0, whole / np.where(slope > 0.0, slope, 1.0), np.inf)
 
     def strain_sd(self, mu: ArrayLike, std: ArrayLike | None = None, shape: Shape = "interpolation") -> Float:
-        """Standard deviation of a reading about the curve: noise (or `std`), error of the curve, tolerances."""
+        """Return the standard deviation of a reading: noise (or `std`), error of the curve, and tolerances."""
         noise = np.asarray(self.noise if std is None else std, dtype=float)
         squares = noise**2 + self.curve_error(mu, shape) ** 2 + np.sum(self.tolerance_sd(mu) ** 2, axis=0)
         return np.asarray(np.sqrt(squares))
@@ -222,7 +223,7 @@ class Calibration:
         return tuple(sorted(found, key=lambda r: r.low - r.high))
 
     def _elsewhere(self, first: int, last: int) -> tuple[tuple[float, float], ...]:
-        """Stretches outside grid[first:last] whose strain is that of a place inside, by more than the noise."""
+        """Return intervals outside grid[first:last] whose strain also occurs inside, by more than the noise."""
         strain = self.at(self.grid)
         low, high = strain[first:last].min() + self.noise, strain[first:last].max() - self.noise
         same = (strain > low) & (strain < high)
@@ -231,7 +232,7 @@ class Calibration:
         return tuple((float(self.grid[a]), float(self.grid[b - 1])) for a, b in edges.reshape(-1, 2))
 
     def verdict(self) -> str:
-        """What the gauge is good for, in one or two sentences."""
+        """Return in one or two sentences where the gauge resolves mu."""
         ends = f"{self.mu[0]:g} to {self.mu[-1]:g}"
         if not self.usable:
             return (
@@ -269,7 +270,7 @@ def _ranges(stretches: Sequence[Range]) -> str:
 
 
 def summary(calibration: Calibration) -> list[tuple[str, str]]:
-    """The closing table of a calibration."""
+    """Return the table that concludes a calibration."""
     c = calibration
     at = float(c.mu[np.argmin(np.abs(c.mu - 0.5))]) if c.mu[0] <= 0.5 <= c.mu[-1] else float(c.mu[len(c.mu) // 2])
     shares = sorted(c.shares(at).items(), key=lambda item: -item[1])

@@ -61,7 +61,7 @@ def save(calibration: Calibration, path: str | Path) -> Path:
 
 
 def as_dict(calibration: Calibration) -> Tree:
-    """What calibration.json holds; what can be worked out from the curve stands in it too, for other readers."""
+    """Return the content of calibration.json, including what follows from the curve."""
     c = calibration
     fit = c.fit
     return {

@@ -114,7 +114,7 @@ def estimate(
 
 
 def _check(name: str, values: Float, least: float) -> None:
-    """Refuse values (m,) outside of `least` to `LARGEST_STRAIN`, and nan."""
+    """Raise an error for values (m,) outside the range from `least` to `LARGEST_STRAIN`, and for NaN."""
     bad = ~((values >= least) & (values <= LARGEST_STRAIN))
     if bad.any():
         i = int(np.argmax(bad))
@@ -136,9 +136,9 @@ def _estimates(calibration: Calibration, strain: Float, noise: Float, shape: Sha
 
 
 def _inside(away: Float, sd: Float) -> tuple[Float, Float]:
-    """Ends (m, cells), as shares of each cell of the grid, of the part where |away| <= sd; low > high where empty.
+    """Return the ends (m, cells), as shares of each grid cell, of the part where |away| <= sd; low > high if empty.
 
-    Both are taken as straight within a cell, so each of away <= sd and -away <= sd holds on one side of a point.
+    Both are linear within a cell, so that away <= sd and -away <= sd each hold on one side of a point.
     """
     low, high = np.zeros(away[:, 1:].shape), np.ones(away[:, 1:].shape)
     for over in (away - sd, -away - sd):
@@ -152,7 +152,7 @@ def _inside(away: Float, sd: Float) -> tuple[Float, Float]:
 
 
 def _joined(grid: Float, low: Float, high: Float) -> list[tuple[float, float]]:
-    """Intervals of mu, those of neighbouring cells as one."""
+    """Return intervals of mu, with those of neighbouring cells joined."""
     found: list[tuple[float, float]] = []
     step = np.diff(grid)
     for i in np.flatnonzero(low <= high):
@@ -165,7 +165,7 @@ def _joined(grid: Float, low: Float, high: Float) -> list[tuple[float, float]]:
 
 
 def _candidates(grid: Float, found: list[tuple[float, float]], away: Float, sd: Float) -> Iterator[Candidate]:
-    """An answer for each interval, with its part of the likelihood; parts end where that is least in between."""
+    """Yield a candidate for each interval, with its share of the likelihood, divided at the minima."""
     cuts = [float(grid[0])]
     for (_, before), (after, _) in pairwise(found):
         first, last = np.searchsorted(grid, [before, after])
@@ -181,7 +181,7 @@ def _candidates(grid: Float, found: list[tuple[float, float]], away: Float, sd: 
 def _spread(
     grid: Float, mu: float, ends: tuple[float, float], part: tuple[float, float], away: Float, sd: Float
 ) -> float:
-    """Root mean square distance from mu, over the likelihood in a part of the grid."""
+    """Return the root mean square distance from mu, weighted with the likelihood in a part of the grid."""
     (low, high), (first, last) = ends, part
     beside = _REACH * (high - low)
     near = np.linspace(max(first, low - beside), min(last, high + beside), _NODES)
@@ -193,7 +193,7 @@ def _spread(
 
 
 def _best(grid: Float, ends: tuple[float, float], away: Float, sd: Float) -> float:
-    """The best mu of an interval: where the curve has the strain, else where it is nearest in standard deviations."""
+    """Return the best mu of an interval: where the curve has the strain, else where it is nearest."""
     low, high = ends
     first, last = np.searchsorted(grid, [low, high])
     at = np.concatenate([[low], grid[first:last], [high]])
@@ -301,7 +301,7 @@ def _verdict(calibration: Calibration, status: Status, best: Candidate) -> str:
 
 
 def _blame(calibration: Calibration, mu: float) -> str:
-    """Which tolerance is most at fault, where the noise is not."""
+    """Return the tolerance with the largest effect, unless it is the noise."""
     name, share = max(calibration.shares(mu).items(), key=lambda item: item[1])
     return f"; {100.0 * share:.0f} % of the variance is from {name}" if name not in ("noise", "curve") else ""
 

@@ -31,7 +31,7 @@ ANGLES = np.radians(np.arange(0.0, 180.0, 5.0))
 
 
 def check(model: Model) -> None:
-    """Refuse a body whose gauges do not read the small strain of a displacement field."""
+    """Raise an error for a body whose gauges do not read the small strain of a displacement field."""
     if model.formulation.finite_strain:
         name = dict(model.filled).get("formulation", "formulation")
         raise Finger3dError(f"--map: not with effects.{name}; take the effect out, or the map")
@@ -70,7 +70,7 @@ class Reader:
         return cls(mesh, inside, cells[inside], reference @ np.linalg.inv(jacobian), turn[inside][:, :d])
 
     def strain(self, u: Float) -> Float:
-        """In-plane strain (p, 3), xx yy xy (tensor component), of displacements (n, d); nan outside the body."""
+        """Return the in-plane strain (p, 3), components xx, yy, xy, of displacements (n, d); NaN outside the body."""
         slope = np.einsum("ekj,eki->eji", u[self.mesh.cells[self.cells]], self.gradients)
         slope = slope * self.turn[:, :, None] * self.turn[:, None, :]
         out = np.full((len(self.inside), 3), np.nan)
@@ -115,7 +115,7 @@ class StrainMap:
         return cls(mus, x, y, z_mm, np.array(fields))
 
     def along(self, angle: float) -> Float:
-        """Normal strain (m, ny, nx) along a direction (radians)."""
+        """Return the normal strain (m, ny, nx) along a direction (radians)."""
         c, s = math.cos(angle), math.sin(angle)
         return np.asarray(self.strain @ np.array([c * c, s * s, 2.0 * s * c]))
 
@@ -131,7 +131,7 @@ class StrainMap:
         return int(np.clip(np.searchsorted(self.mu, mu, side="right") - 1, 0, len(self.mu) - 2))
 
     def worst_slope(self, angle: float, low: float = -math.inf, high: float = math.inf) -> Float:
-        """Least |d strain / d mu| (ny, nx) over mu from `low` to `high`; 0 where it changes its sign."""
+        """Return the smallest |d strain / d mu| (ny, nx) over mu from `low` to `high`; 0 where it changes its sign."""
         middle = 0.5 * (self.mu[1:] + self.mu[:-1])
         part = self.slope(angle)[(middle >= low) & (middle <= high)]
         least, most = part.min(axis=0), part.max(axis=0)
@@ -140,7 +140,7 @@ class StrainMap:
         )
 
     def best(self, low: float = -math.inf, high: float = math.inf) -> tuple[Float, Float]:
-        """Largest worst slope (ny, nx) over mu from `low` to `high`, and its direction (radians)."""
+        """Return the largest worst slope (ny, nx) over mu from `low` to `high`, and its direction (radians)."""
         every = np.array([self.worst_slope(float(a), low, high) for a in ANGLES])
         pick = np.nan_to_num(every, nan=-1.0).argmax(axis=0)
         value = np.take_along_axis(every, pick[None], axis=0)[0]

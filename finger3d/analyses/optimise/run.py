@@ -65,7 +65,7 @@ class _Pressed:
 
 
 def _whole(model: Model) -> bool:
-    """Whether gauges are read in the body's own way, so that a gauge moved is a press of its own."""
+    """Return whether a displaced gauge needs a press of its own."""
     return model.inclusions is not None or model.formulation.finite_strain
 
 
@@ -82,11 +82,11 @@ class _Bench:
         return [Variant.of(replace(self._model, friction=law, legs=legs)) for law in laws]
 
     def ends(self, mus: Sequence[float], legs: tuple[Leg, ...]) -> list[StepResult]:
-        """The last frame under every mu."""
+        """Return the last increment for every mu."""
         return [frames[-1] for frames in self.body.frames(self._variants(mus, legs))]
 
     def reader(self, ends: Sequence[StepResult]) -> Callable[[Gauge], Float]:
-        """Gauge -> strain (m,) of frames (m,)."""
+        """Return a function that gives the strain (m,) of any gauge in increments (m,)."""
         body = self.body
         if self._apart:
             (variant,) = self._variants((0.0,), self._model.legs)
@@ -98,7 +98,7 @@ class _Bench:
         return lambda g: np.asarray(g.row(mesh, axes)[:, : mesh.points.size] @ u.T).ravel()
 
     def strain(self, gauge: Gauge, mus: Sequence[float], legs: tuple[Leg, ...]) -> Float:
-        """Strain (m,) of a gauge under mus (m,), nan where a press failed."""
+        """Return the strain (m,) of a gauge for values of mu (m,), NaN where a press failed."""
         ends = self.ends(mus, legs)
         return np.where([f.outcome.ok for f in ends], self.reader(ends)(gauge), math.nan)
 
@@ -121,7 +121,7 @@ class _Search:
     _pressed: dict[str, _Pressed] = field(default_factory=dict)
 
     def evaluate(self, values: Sequence[float] | Float) -> Evaluation:
-        """Judge a design, unless that was done before; a new one is appended to the journal at once."""
+        """Evaluate a design unless it is known; a new evaluation is appended to the journal at once."""
         place = tuple(float(v) for v in values)
         if place not in self.known:
             self._keep(self._judged(place))
@@ -168,11 +168,11 @@ class _Search:
         return _Pressed(tuple(measure(bench.body.problem.points, frame) for frame in ends), bench.reader(ends))
 
     def _gauge(self, model: Model) -> Gauge | None:
-        """The gauge that is designed, if the scene has one."""
+        """Return the gauge that is optimised, if the scene has one."""
         return next((g for g in model.gauges if self.problem.gauge in (None, g.name)), None)
 
     def _legs(self, bench: _Bench, model: Model) -> tuple[Leg, ...]:
-        """The path with as many increments as the first design asked for: errors are then alike."""
+        """Return the path with the increments chosen for the first design, so that errors are comparable."""
         gauge = self._gauge(model)
         if gauge is None or all(isinstance(leg.steps, int) for leg in model.legs):
             return model.legs
@@ -193,7 +193,7 @@ class _Search:
             pass  # as at first: the first design that can be built chooses
 
     def increments(self, values: Sequence[float]) -> Tree:
-        """The increments of a design, and the error that they leave in its strain, by presses of more or fewer."""
+        """Return the increments of a design and the error that they leave in its strain."""
         model = self.problem.scene(values).model()
         gauge, mus = self._gauge(model), _three(self.problem.mus)
         if gauge is None:
@@ -226,11 +226,11 @@ class _Search:
         write_csv(path, {**columns, "objective": [e.value for e in judged], "outcome": [e.outcome for e in judged]})
 
     def best(self) -> Evaluation | None:
-        """The largest objective so far."""
+        """Return the evaluation with the largest objective so far."""
         return max((e for e in self.done if math.isfinite(e.value)), key=lambda e: e.value, default=None)
 
     def run(self, start: Sequence[float]) -> None:
-        """Search until the optimiser settles or the budget is spent."""
+        """Search until the optimiser converges or the budget is spent."""
         p = self.problem
         gauges = [i for i, key in enumerate(p.keys()) if key.startswith("gauge.")]
         body = [i for i in range(len(p.free)) if i not in gauges]
@@ -256,7 +256,7 @@ class _Search:
             pass
 
     def _inner(self, here: Float, inner: list[int]) -> float:
-        """The best objective over the gauges' keys in one body."""
+        """Return the largest objective over the keys of gauges on one body."""
         count, values = 0, []
 
         def cost(chosen: Float) -> float:
@@ -280,7 +280,7 @@ class _Search:
 
 
 def _three(mus: Sequence[float]) -> tuple[float, ...]:
-    """The first, the middle and the last."""
+    """Return the first, the middle and the last value."""
     return tuple(dict.fromkeys((mus[0], mus[len(mus) // 2], mus[-1])))
 
 

@@ -71,10 +71,10 @@ class ObjectiveTable:
 
 
 def sensitivity(table: ObjectiveTable) -> float:
-    """The paper's criterion (Sec. III-B): sensitive to mu throughout a large range.
+    """Return the criterion of Maeno 2004, Sec. III-B: sensitive to mu throughout a large range.
 
-    The least change of strain per mu between neighbouring mu, in units of noise: the inverse of the worst resolution of
-    mu.  Negative where the strain turns back, for there it tells two mu.
+    It is the smallest change of strain per mu between neighbouring values of mu, in units of the noise, which is the
+    inverse of the worst resolution of mu.  It is negative where the strain is not monotone.
     """
     strain = table.strain[table.gauge]
     slope = np.diff(strain) / np.diff(table.mu)
@@ -135,18 +135,18 @@ class OptimisationProblem:
     seed: int = 0
 
     def keys(self) -> tuple[str, ...]:
-        """Keys as they are set, gauges by number."""
+        """Return the keys as they are set, with the numbers of gauges."""
         return tuple(numbered(f.key, self.given, "--free") for f in self.free)
 
     def scene(self, values: Sequence[float]) -> Scene:
-        """The scene with the free keys at these values."""
+        """Return the scene with these values of the free keys."""
         keys = self.keys()
         changes = [f"{key}={value!r}" for key, value in zip(keys, values, strict=True)]
         changed = tree.override(dict(self.given), changes, "--free")
         return parse(changed, path=self.path, set_keys=dict.fromkeys(keys, "--free"))
 
     def identity(self) -> Tree:
-        """What two runs must share for one to go on with the other's evaluations; more budget is no other search."""
+        """Return what two runs must have in common to continue each other's evaluations; the budget may differ."""
         path = Path(self.objective)
         judged = hashlib.sha256(path.read_bytes()).hexdigest()[:16] if path.is_file() else self.objective
         return {
@@ -162,7 +162,7 @@ class OptimisationProblem:
 
 
 def checked_start(problem: OptimisationProblem) -> tuple[float, ...]:
-    """The scene's own values where they are within the bounds, else the middle."""
+    """Return the values of the scene, or the middle of the bounds where they lie outside."""
     if problem.method not in METHODS:
         raise Finger3dError(f"--method {problem.method}: must be one of {', '.join(METHODS)}")
     if problem.budget < 1:

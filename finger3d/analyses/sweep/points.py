@@ -67,7 +67,7 @@ def _split(values: str) -> list[str]:
 
 
 def varied(texts: Iterable[str]) -> tuple[Vary, ...]:
-    """What ``--vary`` says; no key twice."""
+    """Return what the options ``--vary`` give; no key may occur twice."""
     found = tuple(Vary.of(text) for text in texts)
     if not found:
         raise Finger3dError(f"sweep: nothing varies; give at least one key, for instance {_EXAMPLE}")
@@ -145,7 +145,7 @@ class Sweep:
     title: str
 
     def identity(self) -> Tree:
-        """What makes two sweeps the same; bodies stand for the contents of files too."""
+        """Return what identifies the sweep; the hashes of bodies include the contents of files."""
         return {
             "scene": tree.plain(self.given),
             "vary": {v.key: list(v.texts) for v in self.vary},

@@ -138,7 +138,7 @@ def _press(store: ResultStore, scheduler: str | None, workers: int | None, progr
 
 
 def _bodies(store: ResultStore) -> list[_BodyPoints]:
-    """The bodies with points that are left, those with most points first."""
+    """Return the bodies with unfinished points, those with most points first."""
     members: dict[str, list[Point]] = {}
     for point in store.left():
         members.setdefault(point.body, []).append(point)
