@@ -1,4 +1,4 @@
-"""What a press left out that would matter, with numbers: cheap estimates from its own result."""
+"""Advice: effects that a press has left out although they may matter, estimated from its own result."""
 
 from __future__ import annotations
 

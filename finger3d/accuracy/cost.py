@@ -1,4 +1,4 @@
-"""What a press will take, before anything is solved: size, time and memory from a calibrated model.
+"""Forecast of the size, time and memory of a press from a calibrated cost model.
 
 Calibrated on the Fig. 9 finger on 2 cores, by the runs of validation/cost_of_accuracy.py and scaling.py: up to 386 000
 unknowns in 2D and 509 000 in 3D; good to a factor 2.

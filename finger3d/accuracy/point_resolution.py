@@ -1,4 +1,4 @@
-"""How finely the contact points resolve the zones of contact and stick: the least error bars of lengths and areas."""
+"""Resolution of the zones of contact and stick by the contact points: lower bounds of the error bars of their size."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ bars, and 89 % with 0.1."""
 
 @dataclass(frozen=True)
 class PointResolution:
-    """How finely the contact points tell: their distance (mm) along x, and the larger of that over the half-length of
+    """Resolution of the contact points: their distance (mm) along x, and the larger of that over the half-length of
     the contact and of their distance along z over the half width.
 
     `alone`: contact with friction has no length, so that it tells nothing of the friction.

@@ -1,4 +1,4 @@
-"""Edge lengths for a tolerance: refined where it pays, until the estimated error of every main number is met.
+"""Mesh refinement until the estimated error of every main quantity is below a tolerance.
 
 Two lengths are free, that of the contact (its edge, the border of stick and slip, what a gauge below it reads) and that
 of the body far from it (the corners of the base).  A second coarse run, coarse at the contact only, tells which of them
@@ -57,7 +57,7 @@ class Round:
 
 @dataclass(frozen=True)
 class Refinement:
-    """What the refinement came to.
+    """Result of a mesh refinement.
 
     Attributes
     ----------
@@ -196,7 +196,7 @@ def _round(model: Model, tolerance: float) -> tuple[Problem, Round, MeshOptions]
     last = last_step(beside)
     errors = compared(problem, frame, beside, last)
     number, error = worst(numbers, {name: errors[name] for name in judged(problem, errors)})
-    # a finer companion, beside the coarsest of meshes, does not tell the two lengths apart
+    # a finer companion changes both lengths, so that their effects cannot be separated
     coarse = main_numbers(beside, last) if beside.model.mesh.base_size_mm >= model.mesh.base_size_mm else None
     sizes = _next(problem, number, error, tolerance, numbers, coarse)
     seconds = time.perf_counter() - start

@@ -1,1 +1,1 @@
-"""What a user asks for: press, compare, calibrate, sweep, optimise and validate."""
+"""Analyses: press, compare, calibrate, sweep, optimise and validate."""

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Plan:
-    """What a press will take, before anything is solved.
+    """Forecast of a press.
 
     Attributes
     ----------

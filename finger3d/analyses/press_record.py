@@ -31,7 +31,7 @@ _RESOLVED_POINTS = {2: 6, 3: 100}
 
 @dataclass
 class PressRecord:
-    """All that is known of a press while it runs.
+    """Data of a press while it runs.
 
     Attributes
     ----------

@@ -18,7 +18,7 @@ Prony = tuple[tuple[float, float], ...]
 
 @dataclass(frozen=True)
 class InternalVariables:
-    """What a body remembers: a vector (k,) that says its shape, and each branch's share of it that has not relaxed."""
+    """Internal variables: the shape of the body as a vector (k,), and the part of it that no branch has relaxed."""
 
     elastic: Float
     branches: Float

@@ -16,7 +16,7 @@ _FACTORS_KEPT = 5
 
 @dataclass
 class RelaxationWorkspace(Workspace):
-    """The body condensed for the lengths of step used last, by alpha, and the shear part of its stiffness."""
+    """Condensed bodies for the last time steps, by alpha, and the shear part of the stiffness."""
 
     shear_part: sp.csr_matrix | None = None
     _condensations: dict[float, Condensation] = field(default_factory=dict)

@@ -44,7 +44,7 @@ _TURNED = {"symmetry_x": "symmetry_z", "symmetry_z": "symmetry_x", "ends": "wall
 
 @dataclass(frozen=True)
 class SoftObject:
-    """Material of the object: Young's modulus (MPa), Poisson's ratio; height (mm) of a block, None: the finger's."""
+    """Material of the object: Young's modulus (MPa), Poisson's ratio, and height (mm) of a block."""
 
     E_MPa: float
     nu: float
@@ -101,7 +101,7 @@ def _all_images(problem: Problem, mesh: Mesh, frame: Float) -> sp.csr_matrix:
 
 @dataclass(frozen=True)
 class ObjectBody:
-    """How the object is meshed: with the finger's edge lengths, contact facing down, in place along x and z."""
+    """Mesh of the object with the edge lengths of the finger; its contact face points down."""
 
     model: Model
     height_mm: float

@@ -1,4 +1,4 @@
-"""The gauges' own stiffness: every gauge is a thin foil in the body, stiff along its length.
+"""Stiffness of embedded gauges: every gauge is a thin foil in the body, stiff along its length.
 
 A foil of section thickness x width adds ``int E A eps(u) eps(v) ds`` to the body's stiffness, eps the strain along it.
 It is cut into bars whose ends follow the mesh's displacements; each bar's strain is one more condensed row, and its

@@ -1,4 +1,4 @@
-"""Where CAD faces run into each other smoothly: there a node belongs on one of them, not on the line where they meet.
+"""Seams where CAD faces meet smoothly: a node there is placed on one of the faces, not on the seam.
 
 Two faces without a crease between them, a fillet and the flat it starts from, define no line that a node near it could
 be put on: a node of an edge length h beside the seam lies up to h^2/8R off the one or the other surface, and moved onto

@@ -1,4 +1,4 @@
-"""Put the nodes of a tetrahedral mesh back onto the CAD faces that fTetWild left by up to its envelope.
+"""Move boundary nodes of a tetrahedral mesh onto the CAD faces, which fTetWild leaves by up to its envelope.
 
 A boundary facet belongs to the CAD face it is nearest to and parallel with; a node belongs to the faces of its facets,
 and goes where these surfaces meet; of faces that join smoothly there it goes onto the nearest. Mid-edge nodes likewise.
@@ -34,7 +34,7 @@ _FEW = 0.01  # of all cells: where a crease of the surface runs through them
 
 
 class UnusableMeshError(Exception):
-    """This mesh will not do; another attempt may."""
+    """The mesh is unusable; another attempt of the mesher may succeed."""
 
 
 def snap(points: Float, tets: Int, body: Tessellation) -> Mesh:

@@ -1,1 +1,1 @@
-"""From a scene to printable parts: the finger as STEP and STL, and a mold of it."""
+"""Printable parts of a scene: the finger as STEP and STL, and a mold of it."""

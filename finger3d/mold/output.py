@@ -1,4 +1,4 @@
-"""A mold's files: the parts as STL, all of them as 3MF, the assembly as STEP, the sheet and the picture."""
+"""Files of a mold: parts as STL and 3MF, the assembly as STEP, instructions and a picture."""
 
 from __future__ import annotations
 

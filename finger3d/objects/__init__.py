@@ -1,4 +1,4 @@
-"""Rigid objects: the shape of the surface that is pressed on the finger, analytic or triangulated; where it touches."""
+"""Rigid objects, analytic or triangulated, and their first contact with the finger."""
 
 from finger3d.objects.first_contact import ContactPath, InitialContact, first_contact_height, initial_contact
 from finger3d.objects.registry import OBJECTS

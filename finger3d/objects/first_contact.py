@@ -1,4 +1,4 @@
-"""Where finger and object touch first, and approaches that the vertical gap cannot describe."""
+"""First touch of finger and object, and paths that the vertical gap cannot describe."""
 
 from __future__ import annotations
 

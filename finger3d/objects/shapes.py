@@ -1,4 +1,4 @@
-"""Rigid objects: the shape of the surface that is pressed on the finger.
+"""Rigid objects with an analytic surface.
 
 An object is a height function over the x-z plane, 0 at its lowest point, and one frame of directions.  In small
 strain the gap is measured along the frame's normal: vertical, as in the paper, and a plane's own normal when it tilts.

@@ -1,4 +1,4 @@
-"""How steep the touching surfaces are, and what measuring the gap vertically then leaves out."""
+"""Slopes of the touching surfaces, and the error of the vertical gap that follows from them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Triangulated rigid objects: any closed body, pressed on the finger with what is below it."""
+"""Triangulated rigid objects: closed bodies whose lower side touches the finger."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class MeshObject(RigidObject):
     def height(self, x: Float, z: Float) -> Float:
         """Return where a vertical line from below first meets the body, exact on its triangles; NaN outside it."""
         x, z = (np.ascontiguousarray(v, dtype=float) for v in np.broadcast_arrays(x, z))
-        # Every increment of a press asks at the same places again: the answer is kept until others are asked for.
+        # Every increment evaluates the same points: their heights are kept until other points are given.
         key = (x.tobytes(), z.tobytes())
         if key not in self._known:
             self._known.clear()

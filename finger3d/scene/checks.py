@@ -1,4 +1,4 @@
-"""What no single key can tell: presses against the finger's height, gauges against its outline, sizes against both."""
+"""Checks that involve several keys: depth and height of the finger, gauges and outline, edge lengths and both."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bodies that a scene names by file: where the file is, and in which unit it was drawn."""
+"""Files of bodies that a scene names: their paths and units."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Mistakes in a scene, each worded in one line: which key, which value, what is allowed, which name is near."""
+"""Messages about mistakes in a scene, each in one line: key, value, what is allowed, and the nearest name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every key of a scene in Markdown, from the tables that check them: for the README, and for who reads it."""
+"""Reference of all keys of a scene in Markdown, from the tables that check them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which effects this version knows. Asking for the names imports none of them."""
+"""Registry of the effects. Reading the names imports none of them."""
 
 from __future__ import annotations
 

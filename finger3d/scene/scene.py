@@ -1,4 +1,4 @@
-"""From a tree of tables to a Scene, and from a Scene to a Model."""
+"""Construction of a Scene from a tree of tables, and of a Model from a Scene."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ AnyTable = TypeVar("AnyTable", bound=TomlTable)
 
 @dataclass(frozen=True, repr=False)
 class Scene:
-    """A checked scene. Two scenes are equal when they say the same after defaults are filled in.
+    """A checked scene. Two scenes are equal if they are the same with all defaults.
 
     Attributes
     ----------
@@ -178,7 +178,7 @@ def parse(given: TreeView, path: Path | None = None, set_keys: Iterable[str] | M
 
 @dataclass(frozen=True)
 class _Parts:
-    """The tables of a scene, each checked by itself, and what is built from them."""
+    """Tables of a scene, each checked separately, and the objects built from them."""
 
     tables: SceneTable
     geometry: str

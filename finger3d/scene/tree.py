@@ -1,4 +1,4 @@
-"""A scene file as a tree of dicts and tuples: read it, override keys in it, write it back."""
+"""Scene files as trees of dicts and tuples: reading, overriding keys, and writing."""
 
 from __future__ import annotations
 

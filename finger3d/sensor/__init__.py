@@ -1,4 +1,4 @@
-"""What the sensor is for: from a scene to strain against mu, and from a strain back to mu with its uncertainty."""
+"""Calibration curves of gauges, and the friction coefficient from a strain with its uncertainty."""
 
 from finger3d.sensor.curve import Calibration, Fit, Range, Tolerance
 from finger3d.sensor.files import load, save

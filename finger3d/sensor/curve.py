@@ -1,4 +1,4 @@
-"""A calibration: strain of one gauge against mu, how well it tells mu, and what else moves it."""
+"""Calibration of a gauge: strain against mu, resolution of mu, and effects of the tolerances."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Fit:
 
 @dataclass(frozen=True)
 class Range:
-    """A stretch of mu over which the curve is monotone and the resolution within the limit.
+    """Interval of mu in which the curve is monotone and the resolution is within the limit.
 
     `elsewhere` are the stretches outside where the same strains occur: there a reading has two answers.
     """

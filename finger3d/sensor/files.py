@@ -1,4 +1,4 @@
-"""calibration.json: written whole, and refused in one line where it is cut short or of another version."""
+"""calibration.json: written at once, and refused in one line if it is damaged or of another version."""
 
 from __future__ import annotations
 

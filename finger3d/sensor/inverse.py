@@ -1,4 +1,4 @@
-"""From a strain to mu: the set of mu that a reading does not contradict, in words where it is not one interval.
+"""Friction coefficient from a strain: the values of mu that are consistent with a reading.
 
 With a standard deviation s(mu) of a reading about the curve e(mu), the 68 % set of a strain is ``|strain - e(mu)| <=
 s(mu)``: it holds the true mu as often as a normal error stays within one standard deviation, whatever the curve looks
@@ -35,7 +35,7 @@ _REACH, _NODES = 4.0, 129  # of the likelihood beside an interval, in its widths
 
 @dataclass(frozen=True)
 class Candidate:
-    """One answer: mu with its standard deviation (see the module), and the ends of its 68 % interval."""
+    """Candidate of mu with its standard deviation and its 68 % interval."""
 
     mu: float
     std: float
@@ -45,7 +45,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a reading says about mu.
+    """Estimate of mu from a reading.
 
     Attributes
     ----------

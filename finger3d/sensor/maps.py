@@ -1,4 +1,4 @@
-"""Strain over a section for a whole sweep of mu, from one condensation: where, and which way, a gauge would tell mu.
+"""Maps of strain over a section for several values of mu, which show where a gauge is sensitive to mu.
 
 The displacement is linear in the contact forces, so the kept factor gives the field of every mu for one solve.  It is
 read at the middle of every square of a grid, inside the cell that holds it, as a point gauge there would be.

@@ -1,4 +1,4 @@
-"""The search itself: designs are judged one by one, and every one is kept at once."""
+"""Search for the best design: designs are evaluated one by one, and each evaluation is stored at once."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _KEPT = 4
 
 @dataclass(frozen=True)
 class OptimisationResult:
-    """What a search came to; `scene` is the best design, ready to be pressed.
+    """Result of a search; `scene` is the best design.
 
     `evaluations` are in the order asked for, some more than once; `judged` designs are in evaluations.csv.
     """
@@ -57,7 +57,7 @@ class OptimisationResult:
 
 @dataclass(frozen=True)
 class _Pressed:
-    """A body at every mu: what gauges are read from, or why there is nothing to read."""
+    """Increments of a body for every mu, which gauges are read from, or the reason why there are none."""
 
     steps: tuple[dict[str, float], ...] = ()
     read: Callable[[Gauge], Float] | None = None
@@ -70,7 +70,7 @@ def _whole(model: Model) -> bool:
 
 
 class _Bench:
-    """A design's body, built once and pressed under several mu."""
+    """Body of a design, built once and pressed with several values of mu."""
 
     def __init__(self, model: Model, mus: Sequence[float], say: Callable[[str], None]) -> None:
         self._model, self._apart = model, _whole(model)
@@ -104,7 +104,7 @@ class _Bench:
 
 
 class _Spent(Exception):
-    """The budget is used up."""
+    """The budget is spent."""
 
 
 @dataclass

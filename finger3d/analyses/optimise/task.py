@@ -1,4 +1,4 @@
-"""What is searched: free keys and their bounds, the objective, and what is refused before any work."""
+"""Problem of a design search: free keys, bounds and objective, checked before anything is solved."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _MISTAKES = (ArithmeticError, AttributeError, LookupError, NameError, TypeError,
 
 @dataclass(frozen=True)
 class FreeKey:
-    """A key of the scene, and the bounds within which it may be chosen."""
+    """Free key of the scene and its bounds."""
 
     key: str
     low: float
@@ -50,7 +50,7 @@ class FreeKey:
 
 @dataclass(frozen=True)
 class ObjectiveTable:
-    """What an objective judges: one design, pressed at several mu.
+    """Argument of an objective: one design, pressed with several values of mu.
 
     Attributes
     ----------
@@ -114,7 +114,7 @@ def objective_of(text: str) -> Objective:
 
 @dataclass(frozen=True)
 class OptimisationProblem:
-    """What is searched.
+    """Problem of a design search.
 
     Attributes
     ----------

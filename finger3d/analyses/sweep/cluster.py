@@ -1,4 +1,4 @@
-"""Where a sweep runs: worker processes of this machine, or a Dask cluster that is there already."""
+"""Clusters for sweeps: worker processes of this machine, or an existing Dask cluster."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The points of a sweep: every combination of the values, each a checked scene, before anything is solved."""
+"""Points of a sweep: every combination of the values, each a checked scene."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ class Point:
 
 @dataclass(frozen=True)
 class BodySpec:
-    """What is needed to build a body that several points share.
+    """Specification of a body that several points share.
 
     Attributes
     ----------
