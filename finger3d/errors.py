@@ -1,4 +1,4 @@
-"""Errors a user can mend, and outcomes a solver can report."""
+"""Errors that a user can correct, and outcomes of a solution."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from enum import Enum
 
 
 class Finger3dError(Exception):
-    """A mistake in the input, told in one line: what, where, and what to do. Exit code 2."""
+    """A mistake in the input, described in one line: what, where, and what to do. Exit code 2."""
 
     exit_code = 2
 
 
 class MissingError(Finger3dError):
-    """Something needed is not there (a package, a driver, a finished step). Exit code 3."""
+    """Something required is missing, for instance a package or a converged step. Exit code 3."""
 
     exit_code = 3
 
@@ -51,7 +51,7 @@ def out_of_memory(error: BaseException) -> bool:
 
 
 class Outcome(Enum):
-    """How a step ended. The value of a member is the text a user reads: what failed, and what to try."""
+    """Outcome of a step. The value of a member is the text that a user reads: what failed, and what to try."""
 
     CONVERGED = "converged"
     NO_CONVERGENCE = (

@@ -1,4 +1,4 @@
-"""Files for others to read: CSV and JSON, each written whole or not at all."""
+"""CSV, JSON and npz files, each written completely or not at all."""
 
 from __future__ import annotations
 

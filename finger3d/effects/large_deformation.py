@@ -66,7 +66,7 @@ _OUTSIDE_GAP = 2.0
 
 @dataclass(frozen=True, kw_only=True)
 class DeformedState(ContactState):
-    """A contact state with the unknowns (N,) of the meshed part that belong to it."""
+    """Contact state with the unknowns (N,) of the meshed part."""
 
     unknowns: Float
 

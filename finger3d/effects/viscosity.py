@@ -42,7 +42,7 @@ from finger3d.mechanics.problem import Problem, scatter_to_points
 
 @dataclass(frozen=True)
 class Response:
-    """A body over one step, seen at its condensed rows.
+    """Response of the condensed rows of a body over one step.
 
     Attributes
     ----------
@@ -233,14 +233,14 @@ def _times(upper: sp.csr_matrix, vector: Float) -> Float:
 
 @dataclass(frozen=True, kw_only=True)
 class ViscousState(ContactState):
-    """A contact state with the memory of the meshed part that goes with it."""
+    """Contact state with the internal variables of the meshed part."""
 
     memory: InternalVariables
 
 
 @dataclass(frozen=True)
 class Viscoelastic(SmallStrain):
-    """Small strain, with moduli that relax."""
+    """Small strain with relaxing moduli."""
 
     is_linear_elastic: ClassVar[bool] = False
 

@@ -60,7 +60,7 @@ def on_places(matrix: sp.csr_matrix, places: sp.csr_matrix) -> Float:
 
 @dataclass(frozen=True)
 class Pattern:
-    """Where the entries of cells go in the upper triangle; one per mesh, for any number of assemblies.
+    """Sparsity pattern of the upper triangle and the places of the entries of cells, for repeated assemblies.
 
     The matrix is made of blocks: (d, d) of two nodes, (d, 1) of a node and a pressure, (1, 1) of two pressures.  A row
     of a node is one shorter than the row before it, since of the diagonal block only the upper triangle is stored.

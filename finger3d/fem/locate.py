@@ -1,4 +1,4 @@
-"""Places in a mesh: the inverse isoparametric map, and the cells that hold given points."""
+"""Location of points in a mesh: the inverse isoparametric map, and the cells that contain given points."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ _THICKNESS_ITERATIONS = 30
 
 
 class InvertedError(ArithmeticError):
-    """A cell was turned inside out: the increment is too large for the mesh."""
+    """A cell was inverted: the increment is too large for the mesh."""
 
 
 @dataclass(frozen=True)

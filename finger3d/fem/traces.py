@@ -1,4 +1,4 @@
-"""What the contact and the gauges read from a displacement field: weighted traces and strains, as sparse rows.
+"""Traces and strains of a displacement field as sparse rows, for contact points and gauges.
 
 Contact unknowns live at surface vertices: with phi_i the linear hats, a point's displacement is
 ``int phi_i u / int phi_i`` and a nodal force f_i acts as the traction ``f_i phi_i / int phi_i``.

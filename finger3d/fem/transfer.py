@@ -1,4 +1,4 @@
-"""What points of one surface read from a displacement field on another that lies over them; the two need not match."""
+"""Interpolation of a displacement field from one surface to points of another below it; meshes need not match."""
 
 from __future__ import annotations
 

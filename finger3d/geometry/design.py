@@ -1,4 +1,4 @@
-"""The shape of a finger: what a design states about itself, and what the designs of geometries/ share."""
+"""Shape of a finger: the protocol of designs, and base classes of the designs in geometries/."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a body answers to contact: the slot that small strain fills, and that effects replace or wrap."""
+"""Formulation of the body, its strain measure and material response: small strain, which effects replace or wrap."""
 
 from __future__ import annotations
 

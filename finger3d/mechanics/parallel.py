@@ -1,4 +1,4 @@
-"""Presses of one condensed body under several laws of friction and paths, at once where that pays."""
+"""Presses of one condensed body with several friction laws and paths, in parallel if that is faster."""
 
 from __future__ import annotations
 
