@@ -19,15 +19,13 @@ from finger3d.fem.traces import surface
 from finger3d.fem.transfer import facing_trace, values_over
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
-from finger3d.mechanics.build import build
-from finger3d.mechanics.history import StepResult, measure
+from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.solve import march
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.swept import mesh_section
 from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
 from finger3d.scene import parse
+from tests.models import last, run
 
 DESIGNS = designs()
 SHAPES: list[RigidObject] = [
@@ -43,18 +41,6 @@ def pad(**changes: Any) -> Model:
         body, Isotropic(1.0, 0.3), MeshOptions(0.6, 1.2, "swept"), (Leg(0.3, steps=2),), friction=Coulomb(0.3)
     )  # fmt: skip
     return replace(model, **changes)
-
-
-def run(model: Model) -> tuple[Problem, list[StepResult]]:
-    problem = build(model)
-    frames = list(march(problem))
-    assert all(f.outcome.ok and f.residual <= 1e-8 for f in frames)
-    return problem, frames
-
-
-def last(model: Model) -> dict[str, Any]:
-    problem, frames = run(model)
-    return measure(problem.points, frames[-1])
 
 
 def faced(dim: int) -> tuple[Mesh, Mesh]:
