@@ -29,7 +29,7 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
 
-from ._common import convergence, rate
+from ._common import rate
 
 Float = NDArray[np.float64]
 _ALWAYS = "balance of the whole body; REFERENCES.md, 7.1"
@@ -147,12 +147,18 @@ def _energy(problem: Problem, name: str, quick: bool, curves: Any, table: list[t
 
 
 def draw(figure: Any, curves: dict[str, dict[str, tuple[Float, Float]]]) -> None:
-    """What is missing from the work over the step."""
+    """Draw the work that is neither stored nor dissipated against the size of the increments."""
     for (mu, both), axes in zip(curves.items(), figure.subplots(1, 2), strict=True):
         for name, (steps, errors) in both.items():
-            convergence(
-                axes, steps, {name: errors}, 2.0, "1 / increments a leg", "work less stored and lost, over the work"
-            )
+            axes.loglog(steps, errors, "o-", label=name)
+        if mu != "mu = 0":
+            steps, errors = next(iter(both.values()))
+            axes.loglog(steps, 2.0 * errors[-1] * (steps / steps[-1]) ** 2, "k--", label="second order")
+        axes.set_xlabel("1 / increments of a leg")
+        axes.set_ylabel("work not stored or dissipated, over the work")
+        axes.legend(fontsize=8)
+        axes.grid(alpha=0.3)
         ticks = sorted({float(s) for steps, _ in both.values() for s in steps})
         axes.set_xticks(ticks, [f"1/{round(1 / t)}" for t in ticks])
-        axes.set_title(f"press{'' if mu == 'mu = 0' else ' and slide'}, {mu}")
+        axes.set_title(f"press, {mu}: round-off" if mu == "mu = 0" else f"press and slide, {mu}")
+        axes.set_xticks([], minor=True)

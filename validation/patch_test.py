@@ -139,7 +139,7 @@ def draw(figure: Any, table: list[tuple[str, int, int, float]]) -> None:
         axes.set_xticks(n, [f"{v:g}" for v in n])
         axes.set_xticks([], minor=True)
         axes.set_xlabel("cells along a side")
-        axes.set_title(f"{dim}D: round-off at every size (dashed: 1e-12)")
+        axes.set_title(f"{dim}D: errors are round-off (dashed: 1e-12)")
         axes.grid(alpha=0.3)
         axes.legend(fontsize=7, loc="upper left")
         axes.set_ylim(1e-17, 1e-2)
