@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from finger3d.geometry.bvh import Tree, puck_distance
+from finger3d.geometry.bvh import Tree, cylinder_distance
 from tests.bodies import ball
 
 SURFACE = ball(3.0, rings=12, sectors=20)
@@ -49,11 +49,11 @@ def test_flat_cylinders_bound_the_distance_from_below() -> None:
     tree = Tree.over(CORNERS)
     areas = np.cross(CORNERS[:, 1] - CORNERS[:, 0], CORNERS[:, 2] - CORNERS[:, 0])
     points = np.random.default_rng(2).normal(scale=5.0, size=(50, 3))
-    for level, pucks in enumerate(tree.pucks(CORNERS, areas)):
+    for level, cylinders in enumerate(tree.bounding_cylinders(CORNERS, areas)):
         nodes = tree.items.reshape(4**level, -1)
-        for items, puck in zip(nodes, pucks, strict=True):
+        for items, cylinder in zip(nodes, cylinders, strict=True):
             vertices = CORNERS[items[items >= 0]].reshape(-1, 3)
-            bound = puck_distance(points, np.broadcast_to(puck, (50, 8)))
+            bound = cylinder_distance(points, np.broadcast_to(cylinder, (50, 8)))
             if not len(vertices):
                 assert np.isinf(bound).all()
                 continue

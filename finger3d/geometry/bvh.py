@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from finger3d._types import Float, Int
 
 Bool = NDArray[np.bool_]
-Test = Callable[[Int, int, Int], Bool]
+NodeTest = Callable[[Int, int, Int], Bool]
 
-_FAN = 4  # children of a node, and triangles in a leaf
+_ARITY = 4  # children of a node, and triangles in a leaf
 _BITS = 16
 _CHUNK = 8192
 
@@ -37,21 +37,21 @@ class Tree:
         low, high = corners.min(axis=1), corners.max(axis=1)
         order = np.argsort(_morton(0.5 * (low + high)), kind="stable")
         leaves = 1
-        while leaves * _FAN < len(low):
-            leaves *= _FAN
-        slots = np.full(leaves * _FAN, -1, dtype=np.int64)
+        while leaves * _ARITY < len(low):
+            leaves *= _ARITY
+        slots = np.full(leaves * _ARITY, -1, dtype=np.int64)
         slots[: len(order)] = order
-        items = slots.reshape(leaves, _FAN)
+        items = slots.reshape(leaves, _ARITY)
         empty = (items < 0)[:, :, None]
         # low corner and minus high corner: one minimum does for both
         both = np.where(empty, np.inf, np.hstack([low, -high])[items]).min(axis=1)
         levels = [both]
         while len(levels[-1]) > 1:
-            levels.append(levels[-1].reshape(-1, _FAN, 6).min(axis=1))
+            levels.append(levels[-1].reshape(-1, _ARITY, 6).min(axis=1))
         return cls(items, tuple(np.hstack([b[:, :3], -b[:, 3:]]) for b in reversed(levels)))
 
-    def pucks(self, corners: Float, area_vectors: Float) -> tuple[Float, ...]:
-        """Return bounding cylinders, for each level (4^level, 8): middle, axis, radius, half thickness (mm).
+    def bounding_cylinders(self, corners: Float, area_vectors: Float) -> tuple[Float, ...]:
+        """Return bounding cylinders of the nodes, per level (4^level, 8): centre, axis, radius, half height (mm).
 
         A small part of a surface is nearly flat, so that flat cylinders bound its distance much better than boxes.
         """
@@ -62,41 +62,41 @@ class Tree:
         for box in self.boxes:
             n = len(box)
             used = np.isfinite(box[:, :3]).all(axis=1)
-            middle = np.zeros((n, 3))
-            middle[used] = 0.5 * (box[used, :3] + box[used, 3:])
+            centre = np.zeros((n, 3))
+            centre[used] = 0.5 * (box[used, :3] + box[used, 3:])
             axis = areas.reshape(n, -1, 3).sum(axis=1)
             axis /= np.maximum(np.linalg.norm(axis, axis=1), 1e-300)[:, None]
-            off = points.reshape(n, -1, 3) - middle[:, None]
-            along = np.matmul(off, axis[:, :, None])[:, :, 0]
-            across = np.einsum("nkx,nkx->nk", off, off) - along**2
+            offset = points.reshape(n, -1, 3) - centre[:, None]
+            along = np.matmul(offset, axis[:, :, None])[:, :, 0]
+            across = np.einsum("nkx,nkx->nk", offset, offset) - along**2
             along, across = np.abs(along).ravel(), across.ravel()
             along[empty] = across[empty] = -np.inf
-            thick, square = along.reshape(n, -1).max(axis=1), across.reshape(n, -1).max(axis=1)
+            half_height, square = along.reshape(n, -1).max(axis=1), across.reshape(n, -1).max(axis=1)
             radius = np.where(used, np.sqrt(np.maximum(square, 0.0)), -np.inf)
-            levels.append(np.hstack([middle, axis, radius[:, None], thick[:, None]]))
+            levels.append(np.hstack([centre, axis, radius[:, None], half_height[:, None]]))
         return tuple(levels)
 
-    def pairs(self, count: int, test: Test) -> Iterator[tuple[Int, Int]]:
+    def pairs(self, count: int, test: NodeTest) -> Iterator[tuple[Int, Int]]:
         """Yield portions of pairs (query, triangle) whose nodes at all levels pass `test(query, level, node)`."""
         for start in range(0, count, _CHUNK):
             query = np.arange(start, min(start + _CHUNK, count))
             node = np.zeros(len(query), dtype=np.int64)
             for level in range(len(self.boxes)):
                 if level:
-                    query, node = np.repeat(query, _FAN), (_FAN * node[:, None] + np.arange(_FAN)).ravel()
+                    query, node = np.repeat(query, _ARITY), (_ARITY * node[:, None] + np.arange(_ARITY)).ravel()
                 keep = test(query, level, node)
                 query, node = query[keep], node[keep]
             found = self.items[node].ravel()
-            query = np.repeat(query, _FAN)
+            query = np.repeat(query, _ARITY)
             yield query[found >= 0], found[found >= 0]
 
 
-def puck_distance(p: Float, puck: Float) -> Float:
-    """Return a lower bound (n,) of the distance of points (n, 3) from the contents of bounding cylinders (n, 8)."""
-    off = p - puck[:, :3]
-    along = np.einsum("ij,ij->i", off, puck[:, 3:6])
-    across = np.sqrt(np.maximum(np.einsum("ij,ij->i", off, off) - along**2, 0.0))
-    value: Float = np.hypot(np.maximum(np.abs(along) - puck[:, 7], 0.0), np.maximum(across - puck[:, 6], 0.0))
+def cylinder_distance(p: Float, cylinder: Float) -> Float:
+    """Return the distance (n,) mm of points (n, 3) from cylinders (n, 8), a lower bound of that from their contents."""
+    offset = p - cylinder[:, :3]
+    along = np.einsum("ij,ij->i", offset, cylinder[:, 3:6])
+    across = np.sqrt(np.maximum(np.einsum("ij,ij->i", offset, offset) - along**2, 0.0))
+    value: Float = np.hypot(np.maximum(np.abs(along) - cylinder[:, 7], 0.0), np.maximum(across - cylinder[:, 6], 0.0))
     return value
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from finger3d._arrays import freeze_arrays
 from finger3d._types import Float, Int
-from finger3d.geometry.bvh import Tree, puck_distance
+from finger3d.geometry.bvh import Tree, cylinder_distance
 
 _SLACK = 1e-12  # over the surface's size: tolerance that makes vertical lines through shared edges hit a triangle
 _EDGES = ((0, 1), (1, 2), (2, 0))
@@ -60,7 +60,7 @@ class Triangles:
     @cached_property
     def normals(self) -> Float:
         """Unit normals (m, 3); 0 for a triangle without area."""
-        return _unit(self.area_vectors)
+        return _normalise(self.area_vectors)
 
     @property
     def volume(self) -> float:
@@ -103,12 +103,12 @@ class Triangles:
         return facing, Tree.over(self.corners[facing])
 
     @cached_property
-    def _pucks(self) -> tuple[Float, ...]:
-        return self.tree.pucks(self.corners, self.area_vectors)
+    def _bounding_cylinders(self) -> tuple[Float, ...]:
+        return self.tree.bounding_cylinders(self.corners, self.area_vectors)
 
     @cached_property
-    def _discs(self) -> Float:
-        """Every triangle as a puck (m, 8) without thickness."""
+    def _bounding_discs(self) -> Float:
+        """Bounding disc of every triangle: a cylinder (m, 8) of height zero."""
         middle = self.corners.mean(axis=1)
         radius = np.linalg.norm(self.corners - middle[:, None], axis=2).max(axis=1)
         # without area there is no axis, and nothing lies off the middle's plane
@@ -134,7 +134,7 @@ class Triangles:
             sine = np.linalg.norm(np.cross(along, back), axis=1)
             angle = np.arctan2(sine, np.einsum("ij,ij->i", along, back))
             np.add.at(vertex, self.faces[:, i], angle[:, None] * self.normals)
-        return _unit(edge)[number], _unit(vertex)[self.faces]
+        return _normalise(edge)[number], _normalise(vertex)[self.faces]
 
     def hits(self, x: Float, z: Float, lowest: bool = True) -> tuple[Int, Float]:
         """Find the first intersection of vertical lines with a closed surface, from below or from above.
@@ -163,7 +163,7 @@ class Triangles:
         flat = self.corners[:, :, ::2]
         for query, number in tree.pairs(len(at), inside):
             item = facing[number]
-            weight, met = _in_triangle(at[query], flat[item], slack)
+            weight, met = _barycentric(at[query], flat[item], slack)
             query, item, weight = query[met], item[met], weight[met]
             y = np.einsum("ij,ij->i", weight, self.corners[item, :, 1]) * (1.0 if lowest else -1.0)
             order = np.lexsort((item, y, query))  # the number breaks ties, so that a result can be repeated
@@ -187,17 +187,17 @@ class Triangles:
         face : (n,) a triangle it lies on
         feature : (n,) 0 inside the triangle, 1 to 3 on its edge 01, 12, 20, 4 to 6 at its corner
         """
-        reach = self._bound(points)
+        reach = self._distance_bound(points)
         closest, face = np.zeros_like(points), np.full(len(points), -1, dtype=np.int64)
         feature, best = np.zeros(len(points), dtype=np.int64), np.full(len(points), np.inf)
 
         def near(query: Int, level: int, node: Int) -> NDArray[np.bool_]:
-            return puck_distance(points[query], self._pucks[level][node]) <= reach[query]
+            return cylinder_distance(points[query], self._bounding_cylinders[level][node]) <= reach[query]
 
         for query, item in self.tree.pairs(len(points), near):
-            close = puck_distance(points[query], self._discs[item]) <= reach[query]
+            close = cylinder_distance(points[query], self._bounding_discs[item]) <= reach[query]
             query, item = query[close], item[close]
-            p, which = _on_triangle(points[query], self.corners[item], self.normals[item])
+            p, which = _closest_on_triangle(points[query], self.corners[item], self.normals[item])
             distance = np.linalg.norm(points[query] - p, axis=1)
             order = np.lexsort((item, distance, query))
             first = order[np.unique(query[order], return_index=True)[1]]
@@ -205,7 +205,7 @@ class Triangles:
             feature[query[first]], best[query[first]] = which[first], distance[first]
         return closest, face, feature
 
-    def _bound(self, points: Float) -> Float:
+    def _distance_bound(self, points: Float) -> Float:
         """Return an upper bound (n,) of the distance, from the nearest corner and from one descent of the tree."""
         from scipy.spatial import cKDTree
 
@@ -213,13 +213,13 @@ class Triangles:
         reach = cKDTree(vertices, balanced_tree=False, compact_nodes=False).query(points)[0]
         # The corners of a large triangle may be far away; the triangles in a leaf of the tree give a better bound.
         node = np.zeros(len(points), dtype=np.int64)
-        for puck in self._pucks[1:]:
-            children = np.stack([puck_distance(points, puck[4 * node + i]) for i in range(4)])
+        for cylinder in self._bounding_cylinders[1:]:
+            children = np.stack([cylinder_distance(points, cylinder[4 * node + i]) for i in range(4)])
             node = 4 * node + np.argmin(children, axis=0)
         for column in range(self.tree.items.shape[1]):
             item = self.tree.items[node, column]
             there = item >= 0
-            p = _on_triangle(points[there], self.corners[item[there]], self.normals[item[there]])[0]
+            p = _closest_on_triangle(points[there], self.corners[item[there]], self.normals[item[there]])[0]
             reach[there] = np.minimum(reach[there], np.linalg.norm(points[there] - p, axis=1))
         value: Float = reach * (1.0 + 1e-9) + 1e-12 * self.size
         return value
@@ -243,13 +243,13 @@ class Triangles:
         return sign * length, normal
 
 
-def _unit(vectors: Float) -> Float:
+def _normalise(vectors: Float) -> Float:
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     value: Float = np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0)
     return value
 
 
-def _in_triangle(p: Float, corner: Float, slack: float) -> tuple[Float, NDArray[np.bool_]]:
+def _barycentric(p: Float, corner: Float, slack: float) -> tuple[Float, NDArray[np.bool_]]:
     """Barycentric coordinates (n, 3) of points (n, 2) in triangles (n, 3, 2) of the plane; whether they lie inside."""
     weight = np.empty((len(p), 3))
     inside = np.ones(len(p), dtype=bool)
@@ -267,7 +267,7 @@ def _in_triangle(p: Float, corner: Float, slack: float) -> tuple[Float, NDArray[
     return weight / np.maximum(weight.sum(axis=1), 1e-300)[:, None], inside
 
 
-def _on_triangle(p: Float, corner: Float, normal: Float) -> tuple[Float, Int]:
+def _closest_on_triangle(p: Float, corner: Float, normal: Float) -> tuple[Float, Int]:
     """Closest points (n, 3) of triangles (n, 3, 3) with unit normals (n, 3), and the feature they lie on."""
     out = np.zeros_like(p)
     feature = np.zeros(len(p), dtype=np.int64)
