@@ -199,7 +199,7 @@ def test_a_foil_in_a_long_plate_reads_what_the_wing_equation_says() -> None:
     kernel = (1.0 + nu) * (3.0 - nu) / 4.0 * 2.0 / length
     first = np.linalg.solve(sine / stiff + kernel * n * sine / np.sin(theta)[:, None], np.ones(100))[0]
     alone = FoilPatches.of(np.zeros(3), np.array([1.0, 0.0, 0.0]), length, 1.0, 32, 1)
-    bars = alone.strained_by(alone, InfiniteBody(1.0, nu, True, 4.0))
+    bars = alone.strain_due_to(alone, InfiniteBody(1.0, nu, True, 4.0))
     springs = 3000.0 * 0.02 * alone.area
     strain = np.linalg.solve(np.eye(31) + bars * springs, np.ones(31))
     assert strain @ alone.area / alone.area.sum() == pytest.approx(0.25 * np.pi * first / stiff, rel=0.002)
@@ -217,11 +217,11 @@ def test_a_bar_far_away_feels_a_pair_of_point_forces(body: InfiniteBody) -> None
         plane, ratio = (E, nu) if body.plane_stress else (E / (1.0 - nu**2), nu / (1.0 - nu))
         wanted = -(1.0 + ratio) * (3.0 - ratio) / (4.0 * np.pi * plane * 5.0) / 20.0**2
     short = np.array([-0.02, 0.0, 0.02])
-    assert foil(short, 20.0).strained_by(foil(short), body)[0, 0] == pytest.approx(wanted, rel=1e-3)
+    assert foil(short, 20.0).strain_due_to(foil(short), body)[0, 0] == pytest.approx(wanted, rel=1e-3)
     # and so it does where patches are integrated: the first and the last bar of one foil
     long = foil(np.array([-0.02, 0.0, 0.02, 19.98, 20.0, 20.02]))
-    unequal = long.strained_by(foil(short), body)[3, 0]  # from the last patch of 0.02 mm to the first
-    assert long.strained_by(long, body)[3, 0] == pytest.approx(unequal, rel=1e-3)
+    unequal = long.strain_due_to(foil(short), body)[3, 0]  # from the last patch of 0.02 mm to the first
+    assert long.strain_due_to(long, body)[3, 0] == pytest.approx(unequal, rel=1e-3)
     assert unequal == pytest.approx(wanted, rel=1e-3)
 
 
@@ -229,7 +229,7 @@ def test_what_two_foils_do_to_each_other_is_mutual() -> None:
     a = FoilPatches.of(np.zeros(3), np.array([1.0, 0.0, 0.0]), 2.0, 1.0, 8, 4)
     b = FoilPatches.of(np.array([0.3, 0.1, 0.3]), np.array([0.6, 0.8, 0.0]), 1.0, 1.0, 6, 4)
     for body in (InfiniteBody(1.0, 0.4), InfiniteBody(1.0, 0.4, False, 2.0)):
-        forth, back = a.strained_by(b, body), b.strained_by(a, body)
+        forth, back = a.strain_due_to(b, body), b.strain_due_to(a, body)
         assert forth == pytest.approx(back.T, abs=1e-12)
 
 

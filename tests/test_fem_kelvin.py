@@ -18,8 +18,9 @@ def test_a_point_force_moves_a_body_as_kelvin_says() -> None:
     r, shear = np.linalg.norm(at), E / (2.0 * (1.0 + NU))
     expected = ((3.0 - 4.0 * NU) + at[0] ** 2 / r**2) / (16.0 * np.pi * shear * (1.0 - NU) * r)
     body = InfiniteBody(E, NU)
-    assert body.pushed(at, X, X, np.array(0.0)) == pytest.approx(expected, rel=1e-12)
-    assert body.pushed(at, X, Y, np.array(0.0)) == pytest.approx(body.pushed(at, Y, X, np.array(0.0)), rel=1e-12)
+    assert body.displacement(at, X, X, np.array(0.0)) == pytest.approx(expected, rel=1e-12)
+    forth, back = (body.displacement(at, s, t, np.array(0.0)) for s, t in ((X, Y), (Y, X)))
+    assert forth == pytest.approx(back, rel=1e-12)
 
 
 def test_plane_strain_is_the_integral_of_point_forces_along_the_width() -> None:
@@ -30,10 +31,10 @@ def test_plane_strain_is_the_integral_of_point_forces_along_the_width() -> None:
 
     def difference(z: float) -> float:
         along = np.array([0.0, 0.0, z])
-        return float(solid.pushed(near + along, X, X, none) - solid.pushed(far + along, X, X, none))
+        return float(solid.displacement(near + along, X, X, none) - solid.displacement(far + along, X, X, none))
 
     expected = 2.0 * quad(difference, 0.0, np.inf, limit=200)[0]
-    found = plane.pushed(near, X, X, none) - plane.pushed(far, X, X, none)
+    found = plane.displacement(near, X, X, none) - plane.displacement(far, X, X, none)
     assert found == pytest.approx(expected, rel=1e-7)
 
 
@@ -43,10 +44,10 @@ def test_a_patch_is_the_integral_of_its_point_forces() -> None:
     none = np.array(0.0)
 
     def point(across: float, along: float) -> float:
-        return float(body.pushed(np.array([s - along, 0.0, z - across]), X, X, none))
+        return float(body.displacement(np.array([s - along, 0.0, z - across]), X, X, none))
 
     expected = dblquad(point, begin, end, low, high)[0] / ((end - begin) * (high - low))
-    found = body.pushed_by_own(*(np.array(v) for v in (begin, end, low, high, s, z)))
+    found = body.self_displacement(*(np.array(v) for v in (begin, end, low, high, s, z)))
     assert found == pytest.approx(expected, rel=1e-7)
 
 
@@ -54,7 +55,7 @@ def test_a_patch_is_the_integral_of_its_point_forces() -> None:
 def test_bars_unload_themselves_and_the_matrix_is_symmetric(thickness: float | None) -> None:
     body = InfiniteBody(E, NU, thickness=thickness)
     foil = FoilPatches.of(np.zeros(3), X, 4.0, 1.0, 8, 1 if thickness else 3)
-    own = foil.strained_by(foil, body)
+    own = foil.strain_due_to(foil, body)
     assert own.shape == (len(foil.area), len(foil.area))
     pull = own * foil.area if thickness is None else own
     assert (np.diag(own) > 0.0).all()  # a bar that pulls at its ends stretches the body between them

@@ -39,7 +39,7 @@ _ROWS = {2: 16, 3: 96}
 _FOIL_S = {2: 0.02, 3: 0.2}
 """Seconds to discretise a foil, by dimension."""
 
-_SAME = 1e-9  # mm, and radians
+_COINCIDENT = 1e-9  # mm, and radians
 
 
 @dataclass(frozen=True)
@@ -63,13 +63,13 @@ class Strips:
 
     def mirrors(self, model: Model) -> frozenset[str]:
         """Return the symmetry planes of all foils together."""
-        places = [_place(gauge) for gauge in model.gauges]
+        foils = [_geometry(gauge) for gauge in model.gauges]
         images = {
             "x": [replace(g, x_mm=-g.x_mm, angle=math.pi - g.angle) for g in model.gauges],
             "z": [replace(g, z_mm=-g.z_mm) for g in model.gauges],
         }
         return frozenset(
-            axis for axis, seen in images.items() if all(any(_same(_place(g), p) for p in places) for g in seen)
+            axis for axis, image in images.items() if all(any(_coincide(_geometry(g), h) for h in foils) for g in image)
         )
 
     def discretise(self, model: Model, mesh: Mesh, axes: tuple[str, ...]) -> EmbeddedBars:
@@ -82,42 +82,42 @@ class Strips:
             FoilPatches.of(g.middle, g.direction, g.length_mm, self.width_mm, *_PATCHES[mesh.dim]) for g in model.gauges
         ]
         rows: dict[tuple[float, ...], sp.csr_matrix] = {}
-        numbers = np.concatenate([_enter(rows, foil, mesh, axes) for foil in foils])
+        numbers = np.concatenate([_insert(rows, foil, mesh, axes) for foil in foils])
         stiff = self.E_MPa * self.thickness_mm * np.concatenate([foil.area for foil in foils])
-        springs = np.bincount(numbers, stiff, len(rows)) / copies
+        bar_stiffness = np.bincount(numbers, stiff, len(rows)) / copies
         gauge = np.repeat(np.arange(len(foils)), [len(foil.area) for foil in foils])
-        reads = np.zeros((len(foils), len(rows)))
-        np.add.at(reads, (gauge, numbers), stiff / np.bincount(gauge, stiff)[gauge])
-        share = np.zeros((len(rows), len(numbers)))
-        share[numbers, np.arange(len(numbers))] = stiff / (copies * springs[numbers])
-        alone = copies * share @ _alone(model, foils) @ share.T
-        return EmbeddedBars(sp.vstack(list(rows.values()), format="csr"), springs, reads, alone)
+        gauge_weights = np.zeros((len(foils), len(rows)))
+        np.add.at(gauge_weights, (gauge, numbers), stiff / np.bincount(gauge, stiff)[gauge])
+        weights = np.zeros((len(rows), len(numbers)))
+        weights[numbers, np.arange(len(numbers))] = stiff / (copies * bar_stiffness[numbers])
+        self_compliance = copies * weights @ _infinite_body_compliance(model, foils) @ weights.T
+        return EmbeddedBars(sp.vstack(list(rows.values()), format="csr"), bar_stiffness, gauge_weights, self_compliance)
 
 
-def _alone(model: Model, foils: list[FoilPatches]) -> Float:
+def _infinite_body_compliance(model: Model, foils: list[FoilPatches]) -> Float:
     """Return the compliance of all bars in an infinite body."""
     section = None if model.domain == "solid" else model.design.width_mm
     material = model.material.isotropic("effects.embedded_gauge")
     body = InfiniteBody(material.E_MPa, material.nu, model.domain == "plane-stress", section)
-    whole = np.block([[a.strained_by(b, body) for b in foils] for a in foils])
-    return np.asarray(0.5 * (whole + whole.T))
+    compliance = np.block([[a.strain_due_to(b, body) for b in foils] for a in foils])
+    return np.asarray(0.5 * (compliance + compliance.T))
 
 
-def _enter(rows: dict[tuple[float, ...], sp.csr_matrix], foil: FoilPatches, mesh: Mesh, axes: tuple[str, ...]) -> Int:
-    """Return the numbers (bars,) of the rows of a foil's bars; missing rows are added."""
-    at, known, numbers = foil.places, {}, []
+def _insert(rows: dict[tuple[float, ...], sp.csr_matrix], foil: FoilPatches, mesh: Mesh, axes: tuple[str, ...]) -> Int:
+    """Insert the rows of a foil's bars that are missing, and return the numbers (bars,) of all of its rows."""
+    ends, known, numbers = foil.centres, {}, []
     order = {key: i for i, key in enumerate(rows)}
 
-    def moved(place: Float) -> sp.csr_matrix:
-        if tuple(place) not in known:
-            known[tuple(place)] = displacement_row(mesh, *reflect_into_part(place, foil.direction, axes, mesh.dim))
-        return known[tuple(place)]
+    def displacement(point: Float) -> sp.csr_matrix:
+        if tuple(point) not in known:
+            known[tuple(point)] = displacement_row(mesh, *reflect_into_part(point, foil.direction, axes, mesh.dim))
+        return known[tuple(point)]
 
-    for a, b in zip(at[:-1].reshape(-1, 3), at[1:].reshape(-1, 3), strict=True):
+    for a, b in zip(ends[:-1].reshape(-1, 3), ends[1:].reshape(-1, 3), strict=True):
         key = _key(a, b, axes, mesh.dim)
         if key not in rows:
             order[key] = len(rows)
-            rows[key] = sp.csr_matrix((moved(b) - moved(a)) / np.linalg.norm(b - a))
+            rows[key] = sp.csr_matrix((displacement(b) - displacement(a)) / np.linalg.norm(b - a))
         numbers.append(order[key])
     return np.array(numbers)
 
@@ -128,15 +128,15 @@ def _key(a: Float, b: Float, axes: tuple[str, ...], dim: int) -> tuple[float, ..
     return tuple(np.round(np.concatenate(images), 9) + 0.0)
 
 
-def _place(gauge: Gauge) -> Float:
+def _geometry(gauge: Gauge) -> Float:
     """Return middle (mm), direction within half a turn, and length, which identify a foil."""
     return np.array([gauge.x_mm, gauge.y_mm, gauge.z_mm, gauge.angle % math.pi, gauge.length_mm])
 
 
-def _same(a: Float, b: Float) -> bool:
+def _coincide(a: Float, b: Float) -> bool:
     apart = np.abs(a - b)
     apart[3] = min(apart[3], math.pi - apart[3])
-    return bool((apart <= _SAME).all())
+    return bool((apart <= _COINCIDENT).all())
 
 
 @dataclass(frozen=True)

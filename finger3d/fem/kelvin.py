@@ -15,7 +15,7 @@ import numpy as np
 
 from finger3d._types import Float
 
-_BLUNT = 0.3  # of a patch's size: what a point force of another foil is spread over, where they cross
+_REGULARISATION = 0.3  # of a patch's size: length over which a point force is spread, since foils may cross
 
 
 @dataclass(frozen=True)
@@ -28,33 +28,33 @@ class InfiniteBody:
     thickness: float | None = None
 
     @property
-    def _plane(self) -> tuple[float, float]:
+    def _equivalent_plane_stress(self) -> tuple[float, float]:
         """Young's modulus and Poisson's ratio of the equivalent plane stress."""
         if self.plane_stress:
             return self.E_MPa, self.nu
         return self.E_MPa / (1.0 - self.nu**2), self.nu / (1.0 - self.nu)
 
-    def pushed(self, reach: Float, t: Float, force: Float, blunt: Float) -> Float:
-        """Return the displacement along t (3,) at `reach` (..., 3), mm, of 1 N along `force` spread over `blunt`."""
-        square = (reach**2).sum(axis=-1) + blunt**2
-        ahead = (reach @ t) * (reach @ force) / square
+    def displacement(self, x: Float, t: Float, force: Float, length: Float) -> Float:
+        """Return the displacement along t (3,) at x (..., 3) mm due to 1 N at 0 along `force`, spread over `length`."""
+        square = (x**2).sum(axis=-1) + length**2
+        radial = (x @ t) * (x @ force) / square
         if self.thickness is None:
             scale = (1.0 + self.nu) / (8.0 * math.pi * self.E_MPa * (1.0 - self.nu))
-            return np.asarray(scale * ((3.0 - 4.0 * self.nu) * float(t @ force) + ahead) / np.sqrt(square))
-        E, nu = self._plane
+            return np.asarray(scale * ((3.0 - 4.0 * self.nu) * float(t @ force) + radial) / np.sqrt(square))
+        E, nu = self._equivalent_plane_stress
         scale = (1.0 + nu) / (4.0 * math.pi * E * self.thickness)
-        return np.asarray(scale * ((1.0 + nu) * ahead - 0.5 * (3.0 - nu) * float(t @ force) * np.log(square)))
+        return np.asarray(scale * ((1.0 + nu) * radial - 0.5 * (3.0 - nu) * float(t @ force) * np.log(square)))
 
-    def pushed_by_own(self, begin: Float, end: Float, low: Float, high: Float, s: Float, z: Float) -> Float:
+    def self_displacement(self, begin: Float, end: Float, low: Float, high: Float, s: Float, z: Float) -> Float:
         """Return the displacement along a foil at s (along it) and z (across it) due to 1 N on each of its patches."""
         if self.thickness is None:
-            whole = sum(
-                sign * _corner(x - s, y - z, self.nu)
+            integral = sum(
+                sign * _kernel_integral(x - s, y - z, self.nu)
                 for x, y, sign in ((end, high, 1.0), (begin, high, -1.0), (end, low, -1.0), (begin, low, 1.0))
             )
             scale = (1.0 + self.nu) / (8.0 * math.pi * self.E_MPa * (1.0 - self.nu))
-            return scale * np.asarray(whole) / ((end - begin) * (high - low))
-        E, nu = self._plane
+            return scale * np.asarray(integral) / ((end - begin) * (high - low))
+        E, nu = self._equivalent_plane_stress
         scale = (1.0 + nu) * (3.0 - nu) / (4.0 * math.pi * E * self.thickness)
         return scale * (_log(begin - s) - _log(end - s)) / (end - begin) * np.ones(np.broadcast(s, z, low).shape)
 
@@ -75,7 +75,7 @@ class FoilPatches:
     @classmethod
     def of(cls, middle: Float, direction: Float, length: float, width: float, count: int, lines: int) -> FoilPatches:
         """Divide a foil at Chebyshev points: densely at its ends, where it transfers most of its force."""
-        return cls(middle, direction, _cosines(length, count), _cosines(width, lines))
+        return cls(middle, direction, _chebyshev_points(length, count), _chebyshev_points(width, lines))
 
     @property
     def area(self) -> Float:
@@ -83,23 +83,23 @@ class FoilPatches:
         return np.outer(np.diff(_middles(self.along)), np.diff(self.across)).ravel()
 
     @property
-    def places(self) -> Float:
-        """Middles (n, m, 3) mm of the patches: the ends of the bars."""
-        aside = _middles(self.across)[None, :, None] * np.array([0.0, 0.0, 1.0])
-        return np.asarray(self.middle + _middles(self.along)[:, None, None] * self.direction + aside)
+    def centres(self) -> Float:
+        """Centres (n, m, 3) mm of the patches: the ends of the bars."""
+        across = _middles(self.across)[None, :, None] * np.array([0.0, 0.0, 1.0])
+        return np.asarray(self.middle + _middles(self.along)[:, None, None] * self.direction + across)
 
-    def strained_by(self, other: FoilPatches, body: InfiniteBody) -> Float:
+    def strain_due_to(self, other: FoilPatches, body: InfiniteBody) -> Float:
         """Return the strain (n m - m, n' m' - m') of the bars per unit force of the bars of another foil, 1/(N mm)."""
         if other is self:
             s, z = _middles(self.along)[:, None, None, None], _middles(self.across)[None, :, None, None]
             begin, end = self.along[:-1, None], self.along[1:, None]
-            moved = body.pushed_by_own(begin, end, self.across[:-1], self.across[1:], s, z)
+            displacement = body.self_displacement(begin, end, self.across[:-1], self.across[1:], s, z)
         else:
-            reach = self.places[:, :, None, None] - other.places
+            offset = self.centres[:, :, None, None] - other.centres
             size = np.hypot(self._sizes(body)[:, :, None, None], other._sizes(body))
-            moved = body.pushed(reach, self.direction, other.direction, _BLUNT * size)
+            displacement = body.displacement(offset, self.direction, other.direction, _REGULARISATION * size)
         steps = [np.diff(np.eye(len(f.along) - 1), axis=0) / np.diff(_middles(f.along))[:, None] for f in (self, other)]
-        found = np.einsum("ia,akbl,jb->ikjl", steps[0], moved, steps[1], optimize=True)
+        found = np.einsum("ia,akbl,jb->ikjl", steps[0], displacement, steps[1], optimize=True)
         return np.asarray(found.reshape(len(self.area), len(other.area)))
 
     def _sizes(self, body: InfiniteBody) -> Float:
@@ -112,11 +112,11 @@ def _middles(edges: Float) -> Float:
     return 0.5 * (edges[1:] + edges[:-1])
 
 
-def _cosines(length: float, count: int) -> Float:
+def _chebyshev_points(length: float, count: int) -> Float:
     return -0.5 * length * np.cos(np.pi * np.arange(count + 1) / count)
 
 
-def _corner(x: Float, z: Float, nu: float) -> Float:
+def _kernel_integral(x: Float, z: Float, nu: float) -> Float:
     """Integral of (3 - 4 nu)/r + x^2/r^3 over the rectangle from the origin to (x, z)."""
     x, z = np.broadcast_arrays(x, z)
     first = z * np.arcsinh(np.divide(x, np.abs(z), out=np.zeros(x.shape), where=z != 0.0))
