@@ -14,7 +14,7 @@ from finger3d.geometry.registry import designs
 from finger3d.geometry.tessellate import CadFace, Tessellation, tessellate
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.seams import Seams
-from finger3d.meshing.snap import MIN_DIHEDRAL_DEG, UnusableMeshError, check_closed, placed, project, repair, snap
+from finger3d.meshing.snap import MIN_DIHEDRAL_DEG, UnusableMeshError, check_closed, project, repair, snap, snap_nodes
 
 FIG9 = designs()["clipped_cylinder"](100.0, 50.0, 36.6, 20.0)
 HALF = designs()["half_cylinder"](5.0, 10.0)
@@ -127,7 +127,7 @@ def placed_on(rounded: tuple[Tessellation, dict[str, int]], point: list[float], 
     body, number = rounded
     sets = np.zeros((1, len(body.faces)), dtype=bool)
     sets[0, [number[n] for n in names.split()]] = True
-    moved, rows = placed(np.array([point]), sets, Seams(body), np.array([reach]))
+    moved, rows = snap_nodes(np.array([point]), sets, Seams(body), np.array([reach]))
     return moved[0], {n for n, i in number.items() if rows[0, i]}
 
 
@@ -166,7 +166,7 @@ def test_a_crease_between_faces_is_no_seam(rounded: tuple[Tessellation, dict[str
     sets = np.zeros((3, len(body.faces)), dtype=bool)
     for row, names in enumerate((("top", "end"), ("wall", "base"), ("fillet", "end"))):
         sets[row, [number[n] for n in names]] = True
-    np.testing.assert_array_equal(Seams(body).one_of_each(np.zeros((3, 3)), sets), sets)
+    np.testing.assert_array_equal(Seams(body).one_per_smooth_group(np.zeros((3, 3)), sets), sets)
 
 
 def test_points_without_a_place_are_reported() -> None:

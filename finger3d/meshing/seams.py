@@ -24,7 +24,7 @@ SMOOTH = np.cos(np.radians(6.0))
 """Creases below 6 degrees count as none: an edge of length h that cuts across one misses it by h/80 at most, and a node
 put onto two surfaces at a smaller angle moves by more than ten times what it was off them."""
 
-_PINNED = ("base", "symmetry_x", "symmetry_z")  # exactly planar, whatever runs into them
+_PLANES = ("base", "symmetry_x", "symmetry_z")  # stay exactly planar, whatever runs into them
 
 
 class Seams:
@@ -32,7 +32,7 @@ class Seams:
 
     def __init__(self, body: Tessellation) -> None:
         self.faces = body.faces
-        self.pinned = np.array([f.label in _PINNED and isinstance(f.surface, ImplicitPlane) for f in body.faces])
+        self.exact_plane = np.array([f.label in _PLANES and isinstance(f.surface, ImplicitPlane) for f in body.faces])
         self._triangles = [Triangles(body.points, body.triangles[body.face == i]) for i in range(len(body.faces))]
         self._samples: dict[tuple[int, int], tuple[Float, Bool]] = {}
         if any(isinstance(f.surface, Faceted) for f in body.faces):
@@ -44,17 +44,17 @@ class Seams:
                 a, b = (body.faces[k].sign * body.faces[k].surface.distance(at)[1] for k in (i, j))
                 self._samples[i, j] = at, np.einsum("ij,ij->i", a, b) > SMOOTH
 
-    def one_of_each(self, points: Float, sets: Bool, beside: Bool | None = None) -> Bool:
-        """Return the sets (n, f) with one face of each smooth group: a pinned plane, or the one nearest to the point.
+    def one_per_smooth_group(self, points: Float, sets: Bool, candidates: Bool | None = None) -> Bool:
+        """Return the sets (n, f) with one face of each smooth group: an exact plane, or the one nearest to the point.
 
-        The faces `beside` (n, f) are candidates as well if they join a face of the set smoothly.
+        The `candidates` (n, f) belong to a group as well if they join a face of the set smoothly.
         """
         from scipy.sparse import coo_matrix
         from scipy.sparse.csgraph import connected_components
         from scipy.spatial import cKDTree
 
         count = sets.shape[1]
-        known = sets if beside is None else sets | beside
+        known = sets if candidates is None else sets | candidates
         links = []
         for (i, j), (at, smooth) in self._samples.items():
             both = np.flatnonzero(known[:, i] & known[:, j])
@@ -68,27 +68,27 @@ class Seams:
         several = np.unique(pairs)
         several = several[np.isin(group[several], group[several[sets.ravel()[several]]])]
         distance = self.distance(points, several // count, several % count)
-        first = several[np.lexsort([distance, ~self.pinned[several % count], group[several]])]
+        first = several[np.lexsort([distance, ~self.exact_plane[several % count], group[several]])]
         chosen = first[np.unique(group[first], return_index=True)[1]]
         rows = sets.copy()
         rows.ravel()[several] = False
         rows.ravel()[chosen] = True
         return rows
 
-    def nearest_only(self, points: Float, sets: Bool) -> Bool:
-        """Return the sets (n, f) reduced to the pinned planes and the nearest of the other faces."""
-        others = sets & ~self.pinned
+    def reduce_to_nearest(self, points: Float, sets: Bool) -> Bool:
+        """Return the sets (n, f) reduced to the exact planes and the nearest of the other faces."""
+        others = sets & ~self.exact_plane
         node, face = np.nonzero(others)
         order = np.lexsort([self.distance(points, node, face), node])
         node, face = node[order], face[order]
         first = np.unique(node, return_index=True)[1]
-        rows: NDArray[np.bool_] = sets & self.pinned
+        rows: NDArray[np.bool_] = sets & self.exact_plane
         rows[node[first], face[first]] = True
         return rows
 
-    def pinned_only(self, points: Float, sets: Bool) -> Bool:
-        """Return the sets (n, f) reduced to the pinned planes, if there are any."""
-        planes = sets & self.pinned
+    def reduce_to_exact_planes(self, points: Float, sets: Bool) -> Bool:
+        """Return the sets (n, f) reduced to the exact planes, if there are any."""
+        planes = sets & self.exact_plane
         return np.where(planes.any(axis=1)[:, None], planes, sets)
 
     def distance(self, points: Float, node: Int, face: Int) -> Float:

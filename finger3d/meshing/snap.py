@@ -26,11 +26,11 @@ Bool = NDArray[np.bool_]
 MIN_DIHEDRAL_DEG = 3.0
 """Cells flatter than this are repaired, or the mesh is made anew. Good meshes were seen at 12 to 27 degrees."""
 
-_PARALLEL = 0.05  # singular values below this share stem from faces that are parallel: one condition, not two
-_REACH = 0.5  # of its edges' mean length: a node that would have to go farther to a crease stays beside it
-_FAR = 2.0  # of its longest edge: a facet that lies farther outside a face's box is not on it
-_REPAIRS = 100
-_FEW = 0.01  # of all cells: where a crease of the surface runs through them
+_RANK_TOLERANCE = 0.05  # singular values below this share stem from faces that are parallel: one condition, not two
+_MAX_MOVE = 0.5  # of its edges' mean length: a node that would have to move farther to a crease is not placed on it
+_MAX_OUTSIDE = 2.0  # of its longest edge: a facet that lies farther outside a face's box is not on it
+_MAX_COLLAPSES = 100
+_MAX_STRAIGHTENED = 0.01  # of all cells: where a crease of the surface runs through them
 
 
 class UnusableMeshError(Exception):
@@ -49,14 +49,14 @@ def snap(points: Float, tets: Int, body: Tessellation) -> Mesh:
     faces = boundary(tets, 3)
     check_closed(faces)
     sets = _node_sets(points, faces, _cad_faces(points, faces, body), body)
-    points, sets = placed(points, sets, seams, _REACH * _edge_lengths(points, faces))
+    points, sets = snap_nodes(points, sets, seams, _MAX_MOVE * _edge_lengths(points, faces))
     points, tets, sets = repair(points, tets, sets)
     faces = boundary(tets, 3)
     check_closed(faces)
     owner = _cad_faces(points, faces, body, sets)
     label = np.array([f.label for f in body.faces])[owner]
     mesh = quadratic(Mesh(points, tets, {str(name): faces[label == name] for name in np.unique(label)}))
-    mesh = _straightened(_curve(mesh, owner[np.argsort(label, kind="stable")], sets, seams))
+    mesh = _straighten_inverted(_snap_mid_edge_nodes(mesh, owner[np.argsort(label, kind="stable")], sets, seams))
     if (bad := int(np.sum(curved_jacobians(mesh) <= 0.0))) > 0:
         raise UnusableMeshError(f"{bad} curved cells turned inside out at the surface")
     return mesh
@@ -70,10 +70,10 @@ def _edge_lengths(points: Float, faces: Int) -> Float:
     return np.asarray(np.bincount(edges.ravel(), np.repeat(length, 2), len(points)) / np.maximum(count, 1))
 
 
-def _straightened(mesh: Mesh) -> Mesh:
+def _straighten_inverted(mesh: Mesh) -> Mesh:
     """Return the mesh with straight edges in cells that curved edges have inverted, if these are few."""
     bad = curved_jacobians(mesh) <= 0.0
-    if not bad.any() or bad.mean() > _FEW:
+    if not bad.any() or bad.mean() > _MAX_STRAIGHTENED:
         return mesh
     cells, points = mesh.cells[bad], mesh.points.copy()
     points[cells[:, 4:]] = points[cells[:, TET4.edges]].mean(axis=2)
@@ -99,7 +99,7 @@ def _cad_faces(points: Float, faces: Int, body: Tessellation, sets: Bool | None 
     cost = np.empty((len(body.faces), len(faces)))
     for i, f in enumerate(body.faces):
         outside = np.linalg.norm(np.maximum(0.0, np.maximum(f.low - middle, middle - f.high)), axis=1) / longest
-        near = outside < _FAR
+        near = outside < _MAX_OUTSIDE
         cost[i] = outside + 2.0
         distance, gradient = f.surface.distance(middle[near])
         aligned = f.sign * np.einsum("ij,ij->i", normal[near], gradient)
@@ -123,7 +123,9 @@ def _node_sets(points: Float, faces: Int, owner: Int, body: Tessellation) -> Boo
     return sets
 
 
-def placed(points: Float, sets: Bool, seams: Seams, reach: Float, beside: Bool | None = None) -> tuple[Float, Bool]:
+def snap_nodes(
+    points: Float, sets: Bool, seams: Seams, reach: Float, candidates: Bool | None = None
+) -> tuple[Float, Bool]:
     """Return points (n, 3) moved onto the CAD faces of their sets (n, f), and the faces that each lies on.
 
     A point that cannot be moved to where its faces meet, or only by more than its reach (n,), mm, is moved onto the
@@ -134,30 +136,30 @@ def placed(points: Float, sets: Bool, seams: Seams, reach: Float, beside: Bool |
     UnusableMeshError
         If that fails as well.
     """
-    rows = seams.one_of_each(points, sets, beside)
-    moved, missed = _moved(points, rows, seams.faces)
-    for fewer in (seams.nearest_only, seams.pinned_only):
-        lost = missed | ((rows.sum(axis=1) > 1) & (np.linalg.norm(moved - points, axis=1) > reach))
-        if lost.any():
+    rows = seams.one_per_smooth_group(points, sets, candidates)
+    projected, failed = _projection(points, rows, seams.faces)
+    for reduced in (seams.reduce_to_nearest, seams.reduce_to_exact_planes):
+        again = failed | ((rows.sum(axis=1) > 1) & (np.linalg.norm(projected - points, axis=1) > reach))
+        if again.any():
             rows = rows.copy()
-            rows[lost] = fewer(points[lost], rows[lost])
-            moved[lost], missed[lost] = _moved(points[lost], rows[lost], seams.faces)
-    if missed.any():
+            rows[again] = reduced(points[again], rows[again])
+            projected[again], failed[again] = _projection(points[again], rows[again], seams.faces)
+    if failed.any():
         raise UnusableMeshError("a surface node finds no place on its CAD faces")
-    return moved, rows
+    return projected, rows
 
 
 def project(points: Float, sets: Bool, faces: tuple[CadFace, ...]) -> Float:
     """Move every point (n, 3) onto all surfaces of its set (n, f), by Newton steps of least length."""
-    moved, missed = _moved(points, sets, faces)
-    if missed.any():
+    projected, failed = _projection(points, sets, faces)
+    if failed.any():
         raise UnusableMeshError("a surface node finds no place on its CAD faces")
-    return moved
+    return projected
 
 
-def _moved(points: Float, sets: Bool, faces: tuple[CadFace, ...]) -> tuple[Float, Bool]:
-    """Return points as :func:`project` does, and a mask (n,) of those that do not lie on all surfaces of their sets."""
-    points, missed = points.copy(), np.zeros(len(points), dtype=bool)
+def _projection(points: Float, sets: Bool, faces: tuple[CadFace, ...]) -> tuple[Float, Bool]:
+    """Return the points of :func:`project`, and a mask (n,) of those that do not lie on all surfaces of their sets."""
+    points, failed = points.copy(), np.zeros(len(points), dtype=bool)
     scale = max((float((f.high - f.low).max()) for f in faces), default=0.0)
     groups, member = np.unique(sets, axis=0, return_inverse=True)
     member = member.reshape(-1)
@@ -168,9 +170,9 @@ def _moved(points: Float, sets: Bool, faces: tuple[CadFace, ...]) -> tuple[Float
         at = np.flatnonzero(member == g)
         p = points[at]
         if faceted := [f.surface for f in chosen if isinstance(f.surface, Faceted)]:
-            found = moved_onto(faceted, p)
-            missed[at] = found is None
-            points[at] = p if found is None else found
+            onto = moved_onto(faceted, p)
+            failed[at] = onto is None
+            points[at] = p if onto is None else onto
             continue
         for _ in range(20):
             pairs = [f.surface.distance(p) for f in chosen]
@@ -178,24 +180,24 @@ def _moved(points: Float, sets: Bool, faces: tuple[CadFace, ...]) -> tuple[Float
             normals = np.stack([n for _, n in pairs], axis=1)
             if np.abs(distance).max() < 1e-13 * scale:
                 break
-            inverse = np.linalg.pinv(normals, rcond=_PARALLEL)
+            inverse = np.linalg.pinv(normals, rcond=_RANK_TOLERANCE)
             p = p - np.einsum("nxk,nk->nx", inverse, distance)
-        missed[at] = ~(np.abs(distance).max(axis=1) <= 1e-7 * scale)
+        failed[at] = ~(np.abs(distance).max(axis=1) <= 1e-7 * scale)
         for f in chosen:
             if isinstance(f.surface, ImplicitPlane) and f.surface.axis is not None:
                 p[:, f.surface.axis] = f.surface.origin[f.surface.axis]
         points[at] = p
-    return points, missed
+    return points, failed
 
 
 def repair(points: Float, tets: Int, sets: Bool) -> tuple[Float, Int, Bool]:
     """Collapse short edges until no cell is flat or inverted; return points, cells and sets that are left."""
-    for _ in range(_REPAIRS):
+    for _ in range(_MAX_COLLAPSES):
         angles = cell_angles_deg(points, tets)
         worst = int(np.argmin(angles))
         if angles[worst] >= MIN_DIHEDRAL_DEG:
             break
-        tets = _collapsed(points, tets, sets, tets[worst])
+        tets = _collapse_edge(points, tets, sets, tets[worst])
     else:
         raise UnusableMeshError("too many flat cells")
     used = np.unique(tets)
@@ -204,7 +206,7 @@ def repair(points: Float, tets: Int, sets: Bool) -> tuple[Float, Int, Bool]:
     return points[used], number[tets], sets[used]
 
 
-def _collapsed(points: Float, tets: Int, sets: Bool, cell: Int) -> Int:
+def _collapse_edge(points: Float, tets: Int, sets: Bool, cell: Int) -> Int:
     """Return the tets after the shortest collapsible edge of a cell has been collapsed."""
     edges = cell[TET4.edges]
     faces = boundary(tets, 3)
@@ -213,31 +215,31 @@ def _collapsed(points: Float, tets: Int, sets: Bool, cell: Int) -> Int:
         on_surface = sets[u].any() and sets[v].any()
         if on_surface and (min(u, v), max(u, v)) not in outer:
             continue
-        for gone, kept in ((u, v), (v, u)):
-            if (sets[gone] & ~sets[kept]).any():
+        for removed, kept in ((u, v), (v, u)):
+            if (sets[removed] & ~sets[kept]).any():
                 continue
-            near = (tets == gone).any(axis=1)
-            moved = tets[near & ~(tets == kept).any(axis=1)]
-            moved = np.where(moved == gone, kept, moved)
-            if len(moved) and cell_angles_deg(points, moved).min() < MIN_DIHEDRAL_DEG:
+            star = (tets == removed).any(axis=1)
+            changed = tets[star & ~(tets == kept).any(axis=1)]
+            changed = np.where(changed == removed, kept, changed)
+            if len(changed) and cell_angles_deg(points, changed).min() < MIN_DIHEDRAL_DEG:
                 continue
-            fewer = np.vstack([tets[~near], moved])
+            left = np.vstack([tets[~star], changed])
             try:
-                check_closed(boundary(fewer, 3))
+                check_closed(boundary(left, 3))
             except UnusableMeshError:
                 continue
-            return fewer
+            return left
     raise UnusableMeshError("a flat cell at the surface could not be removed")
 
 
-def _curve(mesh: Mesh, owner: Int, known: Bool, seams: Seams) -> Mesh:
-    """Put the mid-edge nodes of boundary facets onto CAD faces: those that own (m,) the facets that hold the edge, or
+def _snap_mid_edge_nodes(mesh: Mesh, owner: Int, known: Bool, seams: Seams) -> Mesh:
+    """Move the mid-edge nodes of boundary facets onto CAD faces: those that own (m,) the facets that hold the edge, or
     what these join smoothly if that is nearer and an end of the edge, known (n, f), is on it."""
     faces = np.vstack(list(mesh.facets.values()))
     sets = np.zeros((len(mesh.points), len(seams.faces)), dtype=bool)
     sets[faces[:, 3:].ravel(), np.repeat(owner, 3)] = True
-    beside, reach = np.zeros_like(sets), np.zeros(len(sets))
+    candidates, reach = np.zeros_like(sets), np.zeros(len(sets))
     for middle, (a, b) in zip(faces[:, 3:].T, faces[:, TRI3.edges].transpose(1, 2, 0), strict=True):
-        beside[middle] = known[a] | known[b]
-        reach[middle] = 0.5 * _REACH * np.linalg.norm(mesh.points[a] - mesh.points[b], axis=1)
-    return replace(mesh, points=placed(mesh.points, sets, seams, reach, beside)[0])
+        candidates[middle] = known[a] | known[b]
+        reach[middle] = 0.5 * _MAX_MOVE * np.linalg.norm(mesh.points[a] - mesh.points[b], axis=1)
+    return replace(mesh, points=snap_nodes(mesh.points, sets, seams, reach, candidates)[0])
