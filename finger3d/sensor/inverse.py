@@ -28,9 +28,9 @@ from finger3d.sensor.curve import Calibration, Shape
 Status = Literal["ok", "coarse", "ambiguous", "above", "below", "outside", "blind"]
 
 _CHUNK = 256  # readings at a time: each asks the whole grid
-_JOINED = 1e-9
-_TINY = 1e-12  # of strain, where nothing is uncertain
-_REACH, _NODES = 4.0, 129  # of the likelihood beside an interval, in its widths; nodes there
+_MERGE_TOLERANCE = 1e-9
+_LEAST_SD = 1e-12  # of strain, where nothing is uncertain
+_MARGIN, _NODES = 4.0, 129  # of integrals over an interval: margin on each side, in its widths, and nodes
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Estimate:
     status : ok; coarse: worse than the calibration's limit; ambiguous: several answers; above, below: beyond the end of
         what can be told apart; blind: nothing can; outside: no mu has this strain
     verdict : the same in words
-    candidates : every answer
+    candidates : one for each interval of the 68 % set
     """
 
     strain: float
@@ -127,22 +127,22 @@ def _estimates(calibration: Calibration, strain: Float, noise: Float, shape: Sha
     grid, curve = calibration.grid, calibration.at(calibration.grid, shape)
     spread = calibration.strain_sd(grid, 0.0, shape)
     sd = np.hypot(noise[:, None], spread)
-    away = strain[:, None] - curve
-    low, high = _inside(away, sd)
+    residual = strain[:, None] - curve
+    low, high = _consistent_parts(residual, sd)
     return [
-        _estimate(calibration, strain[i], noise[i], _joined(grid, low[i], high[i]), away[i], sd[i], shape)
+        _estimate(calibration, strain[i], noise[i], _merge_intervals(grid, low[i], high[i]), residual[i], sd[i], shape)
         for i in range(len(strain))
     ]
 
 
-def _inside(away: Float, sd: Float) -> tuple[Float, Float]:
-    """Return the ends (m, cells), as shares of each grid cell, of the part where |away| <= sd; low > high if empty.
+def _consistent_parts(residual: Float, sd: Float) -> tuple[Float, Float]:
+    """Return the ends (m, cells), as shares of each grid cell, of the part where |residual| <= sd; low > high if empty.
 
-    Both are linear within a cell, so that away <= sd and -away <= sd each hold on one side of a point.
+    Both are linear within a cell, so that residual <= sd and -residual <= sd each hold on one side of a point.
     """
-    low, high = np.zeros(away[:, 1:].shape), np.ones(away[:, 1:].shape)
-    for over in (away - sd, -away - sd):
-        a, b = over[:, :-1], over[:, 1:]
+    low, high = np.zeros(residual[:, 1:].shape), np.ones(residual[:, 1:].shape)
+    for excess in (residual - sd, -residual - sd):
+        a, b = excess[:, :-1], excess[:, 1:]
         with np.errstate(divide="ignore", invalid="ignore"):
             root = np.where(a == b, 0.0, a / (a - b))
         low = np.where((a > 0.0) & (b <= 0.0), np.maximum(low, root), low)
@@ -151,58 +151,58 @@ def _inside(away: Float, sd: Float) -> tuple[Float, Float]:
     return low, high
 
 
-def _joined(grid: Float, low: Float, high: Float) -> list[tuple[float, float]]:
+def _merge_intervals(grid: Float, low: Float, high: Float) -> list[tuple[float, float]]:
     """Return intervals of mu, with those of neighbouring cells joined."""
     found: list[tuple[float, float]] = []
     step = np.diff(grid)
     for i in np.flatnonzero(low <= high):
         a, b = float(grid[i] + low[i] * step[i]), float(grid[i] + high[i] * step[i])
-        if found and a - found[-1][1] <= _JOINED * step[i]:
+        if found and a - found[-1][1] <= _MERGE_TOLERANCE * step[i]:
             found[-1] = (found[-1][0], b)
         else:
             found.append((a, b))
     return found
 
 
-def _candidates(grid: Float, found: list[tuple[float, float]], away: Float, sd: Float) -> Iterator[Candidate]:
+def _candidates(grid: Float, found: list[tuple[float, float]], residual: Float, sd: Float) -> Iterator[Candidate]:
     """Yield a candidate for each interval, with its share of the likelihood, divided at the minima."""
     cuts = [float(grid[0])]
     for (_, before), (after, _) in pairwise(found):
         first, last = np.searchsorted(grid, [before, after])
         between = grid[first:last]
-        times = np.abs(away[first:last]) / np.maximum(sd[first:last], _TINY)
-        cuts.append(float(between[np.argmax(times)]) if len(between) else 0.5 * (before + after))
+        deviation = np.abs(residual[first:last]) / np.maximum(sd[first:last], _LEAST_SD)
+        cuts.append(float(between[np.argmax(deviation)]) if len(between) else 0.5 * (before + after))
     cuts.append(float(grid[-1]))
     for ends, part in zip(found, pairwise(cuts), strict=True):
-        mu = _best(grid, ends, away, sd)
-        yield Candidate(mu, _spread(grid, mu, ends, part, away, sd), *ends)
+        mu = _point_estimate(grid, ends, residual, sd)
+        yield Candidate(mu, _rms_deviation(grid, mu, ends, part, residual, sd), *ends)
 
 
-def _spread(
-    grid: Float, mu: float, ends: tuple[float, float], part: tuple[float, float], away: Float, sd: Float
+def _rms_deviation(
+    grid: Float, mu: float, ends: tuple[float, float], part: tuple[float, float], residual: Float, sd: Float
 ) -> float:
     """Return the root mean square distance from mu, weighted with the likelihood in a part of the grid."""
     (low, high), (first, last) = ends, part
-    beside = _REACH * (high - low)
-    near = np.linspace(max(first, low - beside), min(last, high + beside), _NODES)
+    margin = _MARGIN * (high - low)
+    near = np.linspace(max(first, low - margin), min(last, high + margin), _NODES)
     at = np.sort(np.concatenate([part, near, grid[(grid > first) & (grid < last)]]))
-    std = np.maximum(np.interp(at, grid, sd), _TINY)
-    weight = np.exp(-0.5 * (np.interp(at, grid, away) / std) ** 2) / std
-    whole = float(np.trapezoid(weight, at))
-    return math.sqrt(float(np.trapezoid(weight * (at - mu) ** 2, at)) / whole) if whole else 0.5 * (high - low)
+    std = np.maximum(np.interp(at, grid, sd), _LEAST_SD)
+    weight = np.exp(-0.5 * (np.interp(at, grid, residual) / std) ** 2) / std
+    total = float(np.trapezoid(weight, at))
+    return math.sqrt(float(np.trapezoid(weight * (at - mu) ** 2, at)) / total) if total else 0.5 * (high - low)
 
 
-def _best(grid: Float, ends: tuple[float, float], away: Float, sd: Float) -> float:
-    """Return the best mu of an interval: where the curve has the strain, else where it is nearest."""
+def _point_estimate(grid: Float, ends: tuple[float, float], residual: Float, sd: Float) -> float:
+    """Return the point estimate of mu in an interval: where the curve has the strain, else where it is nearest."""
     low, high = ends
     first, last = np.searchsorted(grid, [low, high])
     at = np.concatenate([[low], grid[first:last], [high]])
-    left = np.interp(at, grid, away)
-    cross = np.flatnonzero(np.sign(left[:-1]) * np.sign(left[1:]) <= 0.0)
+    values = np.interp(at, grid, residual)
+    cross = np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) <= 0.0)
     if len(cross):
-        roots = [_root(at[i], at[i + 1], left[i], left[i + 1]) for i in cross]
+        roots = [_root(at[i], at[i + 1], values[i], values[i + 1]) for i in cross]
         return float(np.mean([roots[0], roots[-1]]))
-    return float(at[np.argmin(np.abs(left) / np.maximum(np.interp(at, grid, sd), _TINY))])
+    return float(at[np.argmin(np.abs(values) / np.maximum(np.interp(at, grid, sd), _LEAST_SD))])
 
 
 def _root(a: float, b: float, at_a: float, at_b: float) -> float:
@@ -214,7 +214,7 @@ def _estimate(
     strain: float,
     noise: float,
     intervals: list[tuple[float, float]],
-    away: Float,
+    residual: Float,
     sd: Float,
     shape: Shape,
 ) -> Estimate:
@@ -222,21 +222,21 @@ def _estimate(
 
     Parameters
     ----------
-    away, sd : (m,) reading minus curve on the grid of the calibration, and its standard deviation
+    residual, sd : (m,) reading minus curve on the grid of the calibration, and its standard deviation
     """
     first, last = float(calibration.mu[0]), float(calibration.mu[-1])
-    candidates = tuple(_candidates(calibration.grid, intervals, away, sd)) if intervals else ()
+    candidates = tuple(_candidates(calibration.grid, intervals, residual, sd)) if intervals else ()
     low = high = math.nan
     if intervals:
         low = 0.0 if intervals[0][0] <= first else intervals[0][0]
         high = math.inf if intervals[-1][1] >= last else intervals[-1][1]
     status = _status(candidates, low, high, calibration.limit)
     if status == "outside":
-        verdict = _nearest(calibration, away, sd)
+        verdict = _outside_verdict(calibration, residual, sd)
     elif status == "ambiguous":
-        verdict = _alternatives(calibration, candidates, shape)
+        verdict = _ambiguous_verdict(calibration, candidates, shape)
     else:
-        verdict = _verdict(calibration, status, candidates[0])
+        verdict = _interval_verdict(calibration, status, candidates[0])
     known = status in ("ok", "coarse")
     return Estimate(
         strain=float(strain),
@@ -265,32 +265,32 @@ def _status(candidates: tuple[Candidate, ...], low: float, high: float, limit: f
     return "coarse" if candidates[0].std > limit else "ok"
 
 
-def _nearest(calibration: Calibration, away: Float, sd: Float) -> str:
+def _outside_verdict(calibration: Calibration, residual: Float, sd: Float) -> str:
     """Return the verdict on a strain that no mu has."""
-    times = np.abs(away) / np.maximum(sd, _TINY)
-    i = int(np.argmin(times))
+    deviation = np.abs(residual) / np.maximum(sd, _LEAST_SD)
+    i = int(np.argmin(deviation))
     return (
         f"out of range: no mu from {calibration.mu[0]:g} to {calibration.mu[-1]:g} has this strain; it lies "
-        f"{times[i]:.2g} standard deviations {'above' if away[i] > 0.0 else 'below'} the nearest, "
+        f"{deviation[i]:.2g} standard deviations {'above' if residual[i] > 0.0 else 'below'} the nearest, "
         f"at mu = {calibration.grid[i]:.3g}"
     )
 
 
-def _alternatives(calibration: Calibration, candidates: tuple[Candidate, ...], shape: Shape) -> str:
+def _ambiguous_verdict(calibration: Calibration, candidates: tuple[Candidate, ...], shape: Shape) -> str:
     """Return the verdict on a strain that several mu have."""
-    names = " or ".join(_named(c, float(calibration.mu[0]), float(calibration.mu[-1])) for c in candidates)
+    names = " or ".join(_candidate_text(c, float(calibration.mu[0]), float(calibration.mu[-1])) for c in candidates)
     steps = np.sign(np.diff(calibration.at(calibration.grid, shape)))
     turns = bool((steps > 0.0).any() and (steps < 0.0).any())
     why = "the curve is not monotone" if turns else "what is not known exactly reaches that far"
     return f"ambiguous: {names}; {why}"
 
 
-def _verdict(calibration: Calibration, status: Status, best: Candidate) -> str:
+def _interval_verdict(calibration: Calibration, status: Status, best: Candidate) -> str:
     """Return the verdict on a strain with one interval of mu."""
     first, last, limit = calibration.mu[0], calibration.mu[-1], calibration.limit
     if status == "blind":
         text = f"out of range: no mu from {first:g} to {last:g} can be told apart by this strain"
-        return text + _blame(calibration, best.mu)
+        return text + _dominant_tolerance(calibration, best.mu)
     if status in ("above", "below"):
         side, edge, end = (">", best.low, last) if status == "above" else ("<", best.high, first)
         if 0.5 * (best.high - best.low) <= limit:
@@ -300,15 +300,15 @@ def _verdict(calibration: Calibration, status: Status, best: Candidate) -> str:
     return text if status == "ok" else f"{text}: coarser than the limit of {limit:g}"
 
 
-def _blame(calibration: Calibration, mu: float) -> str:
+def _dominant_tolerance(calibration: Calibration, mu: float) -> str:
     """Return the tolerance with the largest effect, unless it is the noise."""
     name, share = max(calibration.shares(mu).items(), key=lambda item: item[1])
     return f"; {100.0 * share:.0f} % of the variance is from {name}" if name not in ("noise", "curve") else ""
 
 
-def _named(answer: Candidate, first: float, last: float) -> str:
-    if answer.high >= last:
-        return f"mu > {answer.low:.3g}"
-    if answer.low <= first:
-        return f"mu < {answer.high:.3g}"
-    return f"mu = {answer.mu:.3g} +- {answer.std:.2g}"
+def _candidate_text(candidate: Candidate, first: float, last: float) -> str:
+    if candidate.high >= last:
+        return f"mu > {candidate.low:.3g}"
+    if candidate.low <= first:
+        return f"mu < {candidate.high:.3g}"
+    return f"mu = {candidate.mu:.3g} +- {candidate.std:.2g}"
