@@ -8,7 +8,7 @@ import pytest
 
 from finger3d.accuracy.estimate import estimate, main_numbers
 from finger3d.accuracy.point_resolution import PointResolution
-from finger3d.accuracy.refine import judged
+from finger3d.accuracy.refine import controlled_quantities
 from finger3d.accuracy.richardson import mesh_error
 from finger3d.contact.friction import STICK, Coulomb
 from finger3d.mechanics.build import build
@@ -54,5 +54,5 @@ def test_a_stick_zone_one_row_wide_is_not_resolved() -> None:
 def test_in_solids_a_tolerance_leaves_out_the_stick_zone() -> None:
     section = build(half_cylinder(0.4))
     names = list(main_numbers(section, list(march(section))[-1]))
-    assert "stick_half_length_mm" in judged(section, names)
-    assert not {"stick_half_length_mm", "stick_area_mm2"} & set(judged(build(swept_fig9(8.0)), names))
+    assert "stick_half_length_mm" in controlled_quantities(section, names)
+    assert not {"stick_half_length_mm", "stick_area_mm2"} & set(controlled_quantities(build(swept_fig9(8.0)), names))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from finger3d.accuracy.refine import Refinement, Round, _affordable, refined
+from finger3d.accuracy.refine import Refinement, Round, _affordable, refine_mesh
 from finger3d.cli import main
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.material import Isotropic
@@ -49,7 +49,7 @@ def section(size: float) -> Model:
 
 def test_it_refines_until_the_estimate_is_met_and_says_every_round() -> None:
     said: list[str] = []
-    found = refined(section(0.4), 0.03, say=said.append)
+    found = refine_mesh(section(0.4), 0.03, say=said.append)
     assert found.met
     assert found.stopped == "met"
     assert found.warning == ""
@@ -66,7 +66,7 @@ def test_it_refines_until_the_estimate_is_met_and_says_every_round() -> None:
 
 
 def test_the_time_stops_it_with_the_best_so_far() -> None:
-    found = refined(section(0.4), 1e-4, max_seconds=0.0)
+    found = refine_mesh(section(0.4), 1e-4, max_seconds=0.0)
     assert len(found.rounds) == 1
     assert not found.met
     assert found.warning.startswith("mesh.tolerance = 0.0001 was not met (max_seconds = 0): ")
@@ -80,7 +80,7 @@ def test_too_large_a_mesh_stops_it_with_the_best_so_far(monkeypatch: pytest.Monk
     # 4.1 unknowns a triangle at 2 kB, 80 % of memory may be used (finger3d/meshing/limits.py)
     enough = int(2 * cells * 4.1 * 2e3 / 0.8)
     monkeypatch.setattr("finger3d.meshing.limits.memory_bytes", lambda: (enough, enough))
-    found = refined(model, 1e-4)
+    found = refine_mesh(model, 1e-4)
     assert found.rounds
     assert found.stopped.startswith("no finer mesh: mesh.size_mm = ")
     assert "allowed: at most" in found.warning

@@ -214,9 +214,9 @@ def test_a_condensed_body_refuses_a_path_that_its_points_do_not_see(tmp_path: Pa
 
 
 def test_a_tolerance_begins_with_a_mesh_that_resolves_the_object() -> None:
-    from finger3d.accuracy.refine import refined
+    from finger3d.accuracy.refine import refine_mesh
 
-    found = refined(fig9(Sphere(radius_mm=4.0), 0.3, 4.0), 0.9)
+    found = refine_mesh(fig9(Sphere(radius_mm=4.0), 0.3, 4.0), 0.9)
     assert found.rounds[0].size_mm < 4.0
     assert found.met
 

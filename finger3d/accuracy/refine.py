@@ -22,12 +22,12 @@ from finger3d.mechanics.model import MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.step_halving import last_step
 
-MOST_ROUNDS = 8
-_PART = 0.3  # of the change: a length that makes less of it is left alone
-_STEP = (0.4, 0.85)  # a round changes an edge length at least and at most by these factors
-_AIM = 0.9  # of the tolerance, so that the last round does not just miss it
-_AFTER = 1.3  # a press takes so many times its last round, whose contact it marches again and draws
-_GROWTH = {2: 1.2, 3: 1.6}  # seconds grow with this power of the unknowns (measured from 161 000 to 523 000 in 3D)
+MAX_ROUNDS = 8
+_MIN_SHARE = 0.3  # of the difference to the companion: an edge length that causes less is kept
+_FACTOR_RANGE = (0.4, 0.85)  # a round changes an edge length at least and at most by these factors
+_SAFETY = 0.9  # of the tolerance, so that the last round does not just miss it
+_PRESS_TO_ROUND = 1.3  # a press takes so many times its last round, whose contact it marches again and draws
+_EXPONENT = {2: 1.2, 3: 1.6}  # seconds grow with this power of the unknowns (measured from 161 000 to 523 000 in 3D)
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Round:
 
     Attributes
     ----------
-    error, number : largest estimated error, relative (see `relative`), and the number that has it
+    error, number : largest estimated error, relative (see `relative_errors`), and the number that has it
     seconds : of this round, estimate included
     """
 
@@ -102,7 +102,7 @@ class Refinement:
         }
 
 
-def refined(
+def refine_mesh(
     model: Model,
     tolerance: float,
     max_seconds: float | None = None,
@@ -113,7 +113,7 @@ def refined(
     Parameters
     ----------
     model : with the edge lengths of the first round
-    tolerance : relative, see `relative`
+    tolerance : relative, see `relative_errors`
     max_seconds : no round is begun that is forecast to end later, output included
     say : receives a line for each round
 
@@ -124,11 +124,11 @@ def refined(
     """
     start, rounds = time.perf_counter(), list[Round]()
     options, problem = model.mesh, None
-    stopped = f"{MOST_ROUNDS} rounds"
-    while len(rounds) < MOST_ROUNDS:
+    stopped = f"{MAX_ROUNDS} rounds"
+    while len(rounds) < MAX_ROUNDS:
         problem = None  # two factors at once would halve the mesh that memory allows
         try:
-            problem, done, wanted = _round(replace(model, mesh=options), tolerance)
+            problem, done, wanted = _run_round(replace(model, mesh=options), tolerance)
         except UnresolvedError as error:
             if error.size_mm is None or error.size_mm >= options.size_mm:
                 raise
@@ -155,7 +155,7 @@ def refined(
     return Refinement(tolerance, mesh, tuple(rounds), stopped, problem if best is rounds[-1] else None)
 
 
-def relative(numbers: Mapping[str, float], errors: Mapping[str, float]) -> dict[str, float]:
+def relative_errors(numbers: Mapping[str, float], errors: Mapping[str, float]) -> dict[str, float]:
     """Return relative errors; of lengths relative to that of the contact, of strains to the largest."""
     strain = largest_strain(numbers)
     found = {}
@@ -169,14 +169,14 @@ def relative(numbers: Mapping[str, float], errors: Mapping[str, float]) -> dict[
     return found
 
 
-def worst(numbers: Mapping[str, float], errors: Mapping[str, float]) -> tuple[str, float]:
-    """The number with the largest relative error, and that error."""
-    shares = relative(numbers, errors)
-    name = max(shares, key=lambda k: shares[k])
-    return name, shares[name]
+def largest_error(numbers: Mapping[str, float], errors: Mapping[str, float]) -> tuple[str, float]:
+    """Return the number with the largest relative error, and that error."""
+    relative = relative_errors(numbers, errors)
+    name = max(relative, key=lambda k: relative[k])
+    return name, relative[name]
 
 
-def judged(problem: Problem, names: Iterable[str]) -> list[str]:
+def controlled_quantities(problem: Problem, names: Iterable[str]) -> list[str]:
     """Return the quantities that a tolerance applies to: forces, strains, and lengths but the stick length of a solid.
 
     The stick zone of a solid is often less than three points wide on any affordable mesh, and then of unknown length.
@@ -186,26 +186,26 @@ def judged(problem: Problem, names: Iterable[str]) -> list[str]:
     return [name for name in names if name not in left_out and Quantity.of(name).kind is not Kind.AREA]
 
 
-def _round(model: Model, tolerance: float) -> tuple[Problem, Round, MeshOptions]:
-    """Press on one mesh; the edge lengths to try next."""
+def _run_round(model: Model, tolerance: float) -> tuple[Problem, Round, MeshOptions]:
+    """Press on one mesh; return its problem, its round, and the edge lengths to try next."""
     start = time.perf_counter()
     problem = build(model)
     frame = last_step(problem)
     numbers = main_numbers(problem, frame)
-    beside = companion(problem)
-    last = last_step(beside)
-    errors = compared(problem, frame, beside, last)
-    number, error = worst(numbers, {name: errors[name] for name in judged(problem, errors)})
+    other = companion(problem)
+    last = last_step(other)
+    errors = compared(problem, frame, other, last)
+    number, error = largest_error(numbers, {name: errors[name] for name in controlled_quantities(problem, errors)})
     # a finer companion changes both lengths, so that their effects cannot be separated
-    coarse = main_numbers(beside, last) if beside.model.mesh.base_size_mm >= model.mesh.base_size_mm else None
-    sizes = _next(problem, number, error, tolerance, numbers, coarse)
+    coarse = main_numbers(other, last) if other.model.mesh.base_size_mm >= model.mesh.base_size_mm else None
+    sizes = _next_sizes(problem, number, error, tolerance, numbers, coarse)
     seconds = time.perf_counter() - start
     options = model.mesh
     dofs = int(problem.part.stiffness.upper.shape[0])
     return problem, Round(options.size_mm, options.base_size_mm, dofs, error, number, seconds), sizes
 
 
-def _next(
+def _next_sizes(
     problem: Problem,
     number: str,
     error: float,
@@ -218,15 +218,15 @@ def _next(
     if error <= tolerance:
         return options
     is_length = Quantity.of(number).kind.is_length
-    shares = (1.0, 0.0) if is_length else _shares(problem, number, fine, coarse)
+    shares = (1.0, 0.0) if is_length else _error_shares(problem, number, fine, coarse)
     power = 1.0 if is_length else ORDER
-    factor = min(max((_AIM * tolerance / error) ** (1.0 / power), _STEP[0]), _STEP[1])
-    size = options.size_mm * (factor if shares[0] >= _PART else 1.0)
-    base = options.base_size_mm * (factor if shares[1] >= _PART else 1.0)
+    factor = min(max((_SAFETY * tolerance / error) ** (1.0 / power), _FACTOR_RANGE[0]), _FACTOR_RANGE[1])
+    size = options.size_mm * (factor if shares[0] >= _MIN_SHARE else 1.0)
+    base = options.base_size_mm * (factor if shares[1] >= _MIN_SHARE else 1.0)
     return replace(options, size_mm=_rounded(size), base_size_mm=_rounded(max(size, base)))
 
 
-def _shares(
+def _error_shares(
     problem: Problem, number: str, fine: Mapping[str, float], coarse: Mapping[str, float] | None
 ) -> tuple[float, float]:
     """Return the shares of the difference to the companion that the edge lengths of contact and base cause."""
@@ -234,26 +234,26 @@ def _shares(
     size = min(FACTOR * options.size_mm, options.base_size_mm)
     if coarse is None or size < 1.1 * options.size_mm:
         return 1.0, 1.0
-    third = build(replace(problem.model, mesh=replace(_swept(problem, options), size_mm=size)))
+    third = build(replace(problem.model, mesh=replace(_with_swept_mesher(problem, options), size_mm=size)))
     middle = main_numbers(third, last_step(third))[number]
     contact, base = abs(fine[number] - middle), abs(middle - coarse[number])
     total = contact + base
     return (contact / total, base / total) if total > 0.0 else (1.0, 0.0)
 
 
-def _swept(problem: Problem, options: MeshOptions) -> MeshOptions:
+def _with_swept_mesher(problem: Problem, options: MeshOptions) -> MeshOptions:
     return replace(options, mesher="swept") if problem.model.design.section() is not None else options
 
 
 def _affordable(now: MeshOptions, wanted: MeshOptions, seconds: float, left: float, dim: int) -> MeshOptions | None:
     """Return the wanted edge lengths, or longer ones if time is short; None if no refinement is affordable."""
-    left /= _AFTER
+    left /= _PRESS_TO_ROUND
     factor = min(wanted.size_mm / now.size_mm, wanted.base_size_mm / now.base_size_mm)
-    power = dim * _GROWTH[dim]
+    power = dim * _EXPONENT[dim]
     if seconds * factor**-power <= left:
         return wanted
     least = (seconds / left) ** (1.0 / power) if left > 0.0 else 1.0
-    if least > _STEP[1]:
+    if least > _FACTOR_RANGE[1]:
         return None
     # as far as the time allows, each length in proportion
     part = math.log(least) / math.log(factor)

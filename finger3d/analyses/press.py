@@ -104,7 +104,7 @@ def _solve(scene: Scene, writer: ResultWriter, report: Progress, started: float)
     from finger3d.mechanics.build import build
     from finger3d.mechanics.coverage import step_within_candidates
 
-    refinement = _refined(scene, report)
+    refinement = _refine_mesh(scene, report)
     if refinement:
         scene = scene.with_mesh(refinement.mesh)
     writer.scene(scene.to_toml())
@@ -122,15 +122,15 @@ def _solve(scene: Scene, writer: ResultWriter, report: Progress, started: float)
     return record
 
 
-def _refined(scene: Scene, report: Progress) -> Refinement | None:
+def _refine_mesh(scene: Scene, report: Progress) -> Refinement | None:
     """Return the refined mesh, if the scene has mesh.tolerance."""
     mesh = scene.tables.mesh
     if mesh.tolerance is None:
         return None
-    from finger3d.accuracy.refine import refined
+    from finger3d.accuracy.refine import refine_mesh
 
     report.stage(f"refining to an error of {mesh.tolerance:g}")
-    return refined(scene.model(), mesh.tolerance, mesh.max_seconds, report.say)
+    return refine_mesh(scene.model(), mesh.tolerance, mesh.max_seconds, report.say)
 
 
 def _march(record: PressRecord, writer: ResultWriter, report: Progress) -> None:
