@@ -82,7 +82,7 @@ def optimise(
         [
             ("objective", f"{found.best.value:.5g}, at the start {found.start.value:.5g}"),
             *((key, f"{value:.5g}") for key, value in chosen),
-            ("evaluated", f"{found.judged} designs, {found.bodies} bodies condensed"),
+            ("evaluated", f"{found.distinct_designs} designs, {found.bodies} bodies condensed"),
             ("results", str(out / "best.toml")),
             ("", str(out / "evaluations.csv")),
             ("", str(out / "report.html")),

@@ -25,7 +25,7 @@ class Evaluation:
     outcome: str
 
 
-def mistake(problem: OptimisationProblem) -> Callable[[object], str]:
+def row_check(problem: OptimisationProblem) -> Callable[[object], str]:
     """Return a function that describes the mistake in a line of evaluations.jsonl, or returns an empty string."""
 
     def found(row: object) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 
 from finger3d._types import Float, Tree
 from finger3d.analyses.calibrate.increments import choose_increments, strain_error_of_increments
-from finger3d.analyses.optimise.evaluation import Evaluation, evaluation_of, mistake
+from finger3d.analyses.optimise.evaluation import Evaluation, evaluation_of, row_check
 from finger3d.analyses.optimise.task import (
     METHODS,
     FreeKey,
@@ -35,28 +35,28 @@ from finger3d.report.optimise import optimise_page
 from finger3d.results.journal import Journal, opened
 from finger3d.scene import Scene
 
-_INNER = 60  # readings of gauges in one body
-_WORST = 1e30  # stands for what cannot be built: finite, as annealing asks
-_KEPT = 4
+_GAUGE_BUDGET = 60  # evaluations of gauges on one body
+_INFEASIBLE = 1e30  # cost of a design that cannot be built: finite, as annealing asks
+_MAX_STORED = 4  # bodies with their increments
 
 
 @dataclass(frozen=True)
 class OptimisationResult:
     """Result of a search; `scene` is the best design.
 
-    `evaluations` are in the order asked for, some more than once; `judged` designs are in evaluations.csv.
+    `evaluations` are in the order asked for, some more than once; the `distinct_designs` are in evaluations.csv.
     """
 
     best: Evaluation
     start: Evaluation
     evaluations: tuple[Evaluation, ...]
-    judged: int
+    distinct_designs: int
     bodies: int
     scene: Scene
 
 
 @dataclass(frozen=True)
-class _Pressed:
+class _PressedBody:
     """Increments of a body for every mu, which gauges are read from, or the reason why there are none."""
 
     steps: tuple[dict[str, float], ...] = ()
@@ -64,18 +64,18 @@ class _Pressed:
     outcome: str = "converged"
 
 
-def _whole(model: Model) -> bool:
+def _gauges_need_own_press(model: Model) -> bool:
     """Return whether a displaced gauge needs a press of its own."""
     return model.inclusions is not None or model.formulation.finite_strain
 
 
-class _Bench:
+class _DesignBody:
     """Body of a design, built once and pressed with several values of mu."""
 
     def __init__(self, model: Model, mus: Sequence[float], say: Callable[[str], None]) -> None:
-        self._model, self._apart = model, _whole(model)
+        self._model, self._own_press = model, _gauges_need_own_press(model)
         variants = self._variants(mus, model.legs)
-        self.body = SharedBody(model, variants if self._apart else [replace(v, gauges=()) for v in variants], say)
+        self.shared = SharedBody(model, variants if self._own_press else [replace(v, gauges=()) for v in variants], say)
 
     def _variants(self, mus: Sequence[float], legs: tuple[Leg, ...]) -> list[Variant]:
         laws = [self._model.friction.with_mu(mu) for mu in mus]
@@ -83,12 +83,12 @@ class _Bench:
 
     def ends(self, mus: Sequence[float], legs: tuple[Leg, ...]) -> list[StepResult]:
         """Return the last increment for every mu."""
-        return [frames[-1] for frames in self.body.frames(self._variants(mus, legs))]
+        return [frames[-1] for frames in self.shared.frames(self._variants(mus, legs))]
 
     def reader(self, ends: Sequence[StepResult]) -> Callable[[Gauge], Float]:
         """Return a function that gives the strain (m,) of any gauge in increments (m,)."""
-        body = self.body
-        if self._apart:
+        body = self.shared
+        if self._own_press:
             (variant,) = self._variants((0.0,), self._model.legs)
             strains = [body.strains(variant, frame.gauges) for frame in ends]
             return lambda g: np.array([strain[g.name] for strain in strains])
@@ -103,112 +103,112 @@ class _Bench:
         return np.where([f.outcome.ok for f in ends], self.reader(ends)(gauge), math.nan)
 
 
-class _Spent(Exception):
-    """The budget is spent."""
+class _BudgetExhausted(Exception):
+    """The budget of evaluations is used up."""
 
 
 @dataclass
 class _Search:
     problem: OptimisationProblem
     report: Progress
-    judge: Objective
+    objective: Objective
     journal: Journal
     known: dict[tuple[float, ...], Evaluation] = field(default_factory=dict)
     done: list[Evaluation] = field(default_factory=list)
     bodies: int = 0
-    spent: int = 0
+    evaluated: int = 0
     chosen: tuple[int | Literal["auto"], ...] | None = None
-    _pressed: dict[str, _Pressed] = field(default_factory=dict)
+    _stored: dict[str, _PressedBody] = field(default_factory=dict)
 
     def evaluate(self, values: Sequence[float] | Float) -> Evaluation:
         """Evaluate a design unless it is known; a new evaluation is appended to the journal at once."""
-        place = tuple(float(v) for v in values)
-        if place not in self.known:
-            self._keep(self._judged(place))
-        found = self.known[place]
+        point = tuple(float(v) for v in values)
+        if point not in self.known:
+            self._record(self._evaluate_new(point))
+        found = self.known[point]
         self.done.append(found)
         return found
 
-    def _judged(self, place: tuple[float, ...]) -> Evaluation:
+    def _evaluate_new(self, point: tuple[float, ...]) -> Evaluation:
         try:
-            scene = self.problem.scene(place)
+            scene = self.problem.scene(point)
         except Finger3dError as error:
-            return Evaluation(place, math.nan, " ".join(str(error).split()))
+            return Evaluation(point, math.nan, " ".join(str(error).split()))
         pressed = self._press(scene)
         if pressed.read is None:
-            return Evaluation(place, math.nan, pressed.outcome)
+            return Evaluation(point, math.nan, pressed.outcome)
         strain = {g.name: pressed.read(g) for g in scene.model().gauges}
         gauge = self.problem.gauge or next(iter(strain))
         table = ObjectiveTable(np.array(self.problem.mus), strain, pressed.steps, self.problem.noise, gauge, scene)
-        value = self.judge(table)
-        return Evaluation(place, value, "converged" if math.isfinite(value) else "the objective is no finite number")
+        value = self.objective(table)
+        return Evaluation(point, value, "converged" if math.isfinite(value) else "the objective is no finite number")
 
-    def _press(self, scene: Scene) -> _Pressed:
+    def _press(self, scene: Scene) -> _PressedBody:
         key = json.dumps([body_key(scene), scene.as_dict()["press"], scene.as_dict()["contact"]])
         model = scene.model()
-        if _whole(model):
+        if _gauges_need_own_press(model):
             key += repr(model.gauges)
-        if key not in self._pressed:
-            while len(self._pressed) >= _KEPT:
-                self._pressed.pop(next(iter(self._pressed)))
-            self._pressed[key] = self._pressed_new(model)
+        if key not in self._stored:
+            while len(self._stored) >= _MAX_STORED:
+                self._stored.pop(next(iter(self._stored)))
+            self._stored[key] = self._press_body(model)
             self.bodies += 1
-        return self._pressed[key]
+        return self._stored[key]
 
-    def _pressed_new(self, model: Model) -> _Pressed:
+    def _press_body(self, model: Model) -> _PressedBody:
         mus = self.problem.mus
         try:
-            bench = _Bench(model, mus, self.report.say)
-            ends = bench.ends(mus, self._legs(bench, model))
+            body = _DesignBody(model, mus, self.report.say)
+            ends = body.ends(mus, self._legs(body, model))
         except Finger3dError as error:
-            return _Pressed(outcome=" ".join(str(error).split()))
+            return _PressedBody(outcome=" ".join(str(error).split()))
         for mu, frame in zip(mus, ends, strict=True):
             if not frame.outcome.ok:
-                return _Pressed(outcome=f"mu = {mu:g}: {frame.outcome}")
-        return _Pressed(tuple(measure(bench.body.problem.points, frame) for frame in ends), bench.reader(ends))
+                return _PressedBody(outcome=f"mu = {mu:g}: {frame.outcome}")
+        return _PressedBody(tuple(measure(body.shared.problem.points, frame) for frame in ends), body.reader(ends))
 
     def _gauge(self, model: Model) -> Gauge | None:
         """Return the gauge that is optimised, if the scene has one."""
         return next((g for g in model.gauges if self.problem.gauge in (None, g.name)), None)
 
-    def _legs(self, bench: _Bench, model: Model) -> tuple[Leg, ...]:
+    def _legs(self, body: _DesignBody, model: Model) -> tuple[Leg, ...]:
         """Return the path with the increments chosen for the first design, so that errors are comparable."""
         gauge = self._gauge(model)
         if gauge is None or all(isinstance(leg.steps, int) for leg in model.legs):
             return model.legs
         if self.chosen is None:
-            mus, noise = _three(self.problem.mus), self.problem.noise
-            found = choose_increments(bench.body.problem, lambda p: bench.strain(gauge, mus, p.model.legs), noise)
+            mus, noise = _first_middle_last(self.problem.mus), self.problem.noise
+            found = choose_increments(body.shared.problem, lambda p: body.strain(gauge, mus, p.model.legs), noise)
             self.report.say(str(found))
             self.chosen = tuple(leg.steps for leg in found.legs)
         return tuple(replace(leg, steps=n) for leg, n in zip(model.legs, self.chosen, strict=True))
 
-    def begin(self, start: Sequence[float]) -> None:
+    def restore_increments(self, start: Sequence[float]) -> None:
         """Let the start choose the increments where its own press is remembered and would not."""
         try:
             model = self.problem.scene(start).model()
             if any(leg.steps == "auto" for leg in model.legs):
-                self._legs(_Bench(model, _three(self.problem.mus), self.report.say), model)
+                self._legs(_DesignBody(model, _first_middle_last(self.problem.mus), self.report.say), model)
         except Finger3dError:
             pass  # as at first: the first design that can be built chooses
 
     def increments(self, values: Sequence[float]) -> Tree:
         """Return the increments of a design and the error that they leave in its strain."""
         model = self.problem.scene(values).model()
-        gauge, mus = self._gauge(model), _three(self.problem.mus)
+        gauge, mus = self._gauge(model), _first_middle_last(self.problem.mus)
         if gauge is None:
             return {}
-        bench = _Bench(model, mus, self.report.say)
-        legs = self._legs(bench, model)
-        problem = replace(bench.body.problem, model=replace(bench.body.problem.model, legs=legs))
+        body = _DesignBody(model, mus, self.report.say)
+        legs = self._legs(body, model)
+        problem = replace(body.shared.problem, model=replace(body.shared.problem.model, legs=legs))
 
         def strain(other: Any) -> Float:
-            return bench.strain(gauge, mus, other.model.legs)
+            return body.strain(gauge, mus, other.model.legs)
 
         left = strain_error_of_increments(problem, strain(problem), legs != model.legs, strain)
         return {"steps": [leg.steps for leg in legs], "chosen": legs != model.legs, "strain_error": float(left.max())}
 
-    def _keep(self, found: Evaluation) -> None:
+    def _record(self, found: Evaluation) -> None:
         self.known[found.values] = found
         try:
             self.journal.append({"values": list(found.values), "objective": found.value, "outcome": found.outcome})
@@ -218,19 +218,19 @@ class _Search:
             ) from None
 
     def write_table(self, path: Path) -> None:
-        """Write every design that was judged as a line of a CSV file."""
-        judged = list(self.known.values())
+        """Write every evaluated design as a line of a CSV file."""
+        known = list(self.known.values())
         columns: dict[str, list[float] | list[str]] = {
-            key.key: [e.values[i] for e in judged] for i, key in enumerate(self.problem.free)
+            key.key: [e.values[i] for e in known] for i, key in enumerate(self.problem.free)
         }
-        write_csv(path, {**columns, "objective": [e.value for e in judged], "outcome": [e.outcome for e in judged]})
+        write_csv(path, {**columns, "objective": [e.value for e in known], "outcome": [e.outcome for e in known]})
 
     def best(self) -> Evaluation | None:
         """Return the evaluation with the largest objective so far."""
         return max((e for e in self.done if math.isfinite(e.value)), key=lambda e: e.value, default=None)
 
     def run(self, start: Sequence[float]) -> None:
-        """Search until the optimiser converges or the budget is spent."""
+        """Search until the optimiser converges or the budget is used up."""
         p = self.problem
         gauges = [i for i, key in enumerate(p.keys()) if key.startswith("gauge.")]
         body = [i for i in range(len(p.free)) if i not in gauges]
@@ -239,47 +239,47 @@ class _Search:
         x = np.array(start)
 
         def cost(values: Float) -> float:
-            if self.spent >= p.budget:
-                raise _Spent
-            self.spent += 1
-            here = x.copy()
-            here[outer] = values
-            value = self._inner(here, inner) if inner else self.evaluate(here).value
+            if self.evaluated >= p.budget:
+                raise _BudgetExhausted
+            self.evaluated += 1
+            trial = x.copy()
+            trial[outer] = values
+            value = self._search_gauges(trial, inner) if inner else self.evaluate(trial).value
             best = self.best()
-            said = f"best {best.value:.4g}" if best else "none can be built yet"
-            self.report.step(self.spent, p.budget, said)
-            return -value if math.isfinite(value) else _WORST
+            text = f"best {best.value:.4g}" if best else "none can be built yet"
+            self.report.step(self.evaluated, p.budget, text)
+            return -value if math.isfinite(value) else _INFEASIBLE
 
         try:
             _minimise(p.method, cost, [p.free[i] for i in outer], x[outer], p.seed)
-        except _Spent:
+        except _BudgetExhausted:
             pass
 
-    def _inner(self, here: Float, inner: list[int]) -> float:
+    def _search_gauges(self, here: Float, inner: list[int]) -> float:
         """Return the largest objective over the keys of gauges on one body."""
         count, values = 0, []
 
         def cost(chosen: Float) -> float:
             nonlocal count
-            if count >= _INNER:
-                raise _Spent
+            if count >= _GAUGE_BUDGET:
+                raise _BudgetExhausted
             count += 1
-            at = here.copy()
-            at[inner] = chosen
-            value = self.evaluate(at).value
-            values.append(value if math.isfinite(value) else -_WORST)
+            trial = here.copy()
+            trial[inner] = chosen
+            value = self.evaluate(trial).value
+            values.append(value if math.isfinite(value) else -_INFEASIBLE)
             return -values[-1]
 
         try:
             free = [self.problem.free[i] for i in inner]
             _minimise(METHODS[0], cost, free, here[inner], self.problem.seed)
-        except _Spent:
+        except _BudgetExhausted:
             pass
         best = max(values)
-        return best if best > -_WORST else math.nan
+        return best if best > -_INFEASIBLE else math.nan
 
 
-def _three(mus: Sequence[float]) -> tuple[float, ...]:
+def _first_middle_last(mus: Sequence[float]) -> tuple[float, ...]:
     """Return the first, the middle and the last value."""
     return tuple(dict.fromkeys((mus[0], mus[len(mus) // 2], mus[-1])))
 
@@ -302,7 +302,7 @@ def optimise(problem: OptimisationProblem, out: str | Path, report: Progress | N
 
     Parameters
     ----------
-    out : folder for evaluations.jsonl (every design as soon as it is judged), evaluations.csv, best.toml, design.json,
+    out : folder for evaluations.jsonl (every design once it is evaluated), evaluations.csv, best.toml, design.json,
         design.png and report.html; the same search is continued there
 
     Raises
@@ -311,25 +311,25 @@ def optimise(problem: OptimisationProblem, out: str | Path, report: Progress | N
         For a mistake in the problem, or if no design within the bounds can be built.
     """
     report = report or Progress()
-    judge = objective_of(problem.objective)
+    objective = objective_of(problem.objective)
     start = checked_start(problem)
     with (
         claimed(out, "optimise") as folder,
-        opened(folder / "evaluations.jsonl", folder / "search.json", problem.identity(), mistake(problem)) as journal,
+        opened(folder / "evaluations.jsonl", folder / "search.json", problem.identity(), row_check(problem)) as journal,
     ):
         for name in ("design.png", "report.html"):
             (folder / name).unlink(missing_ok=True)
         known = {e.values: e for e in map(evaluation_of, journal.rows)}
-        search = _Search(problem, report, judge, journal, known)
-        first = _searched(search, folder, start)
-        return _written(search, folder, first)
+        search = _Search(problem, report, objective, journal, known)
+        first = _run_search(search, folder, start)
+        return _write_result(search, folder, first)
 
 
-def _searched(search: _Search, folder: Path, start: tuple[float, ...]) -> Evaluation:
+def _run_search(search: _Search, folder: Path, start: tuple[float, ...]) -> Evaluation:
     """Search, and write the best design even if interrupted; return the evaluation of the start."""
     if search.known:
         search.report.say(f"{len(search.known)} designs are kept from an earlier run")
-        search.begin(start)
+        search.restore_increments(start)
     search.report.stage("searching")
     try:
         first = search.evaluate(start)
@@ -343,19 +343,19 @@ def _searched(search: _Search, folder: Path, start: tuple[float, ...]) -> Evalua
     return first
 
 
-def _written(search: _Search, folder: Path, first: Evaluation) -> OptimisationResult:
+def _write_result(search: _Search, folder: Path, first: Evaluation) -> OptimisationResult:
     """Write the best design with its increments, the figure and the page."""
     problem, best = search.problem, search.best()
     if best is None:
         raise Finger3dError(f"optimise: no design within the bounds gives a number; the first: {first.outcome}")
     search.report.stage("increments of the best")
     _write_best(search, folder, best, first, search.increments(best.values))
-    judged = tuple(search.known.values())
+    known = tuple(search.known.values())
     draw(
         folder / "design.png",
         [f.key for f in problem.free],
-        [e.values for e in judged],
-        [e.value for e in judged],
+        [e.values for e in known],
+        [e.value for e in known],
         first.values,
         Path(problem.objective).stem,
     )
@@ -364,7 +364,7 @@ def _written(search: _Search, folder: Path, first: Evaluation) -> OptimisationRe
         best=best,
         start=first,
         evaluations=tuple(search.done),
-        judged=len(judged),
+        distinct_designs=len(known),
         bodies=search.bodies,
         scene=problem.scene(best.values),
     )

@@ -22,7 +22,7 @@ Objective = Callable[["ObjectiveTable"], float]
 
 MUS = tuple(float(v) for v in np.round(np.linspace(0.05, 1.0, 9), 5))
 METHODS = ("differential-evolution", "dual-annealing", "nelder-mead")
-_MISTAKES = (ArithmeticError, AttributeError, LookupError, NameError, TypeError, ValueError)
+_OBJECTIVE_ERRORS = (ArithmeticError, AttributeError, LookupError, NameError, TypeError, ValueError)
 
 
 @dataclass(frozen=True)
@@ -81,35 +81,35 @@ def sensitivity(table: ObjectiveTable) -> float:
     return float((slope * np.sign(strain[-1] - strain[0])).min() / table.noise)
 
 
-NAMED: dict[str, Objective] = {"sensitivity": sensitivity}
+OBJECTIVES: dict[str, Objective] = {"sensitivity": sensitivity}
 
 
 def objective_of(text: str) -> Objective:
     """A named objective, or the function ``objective`` of a Python file."""
-    if text in NAMED:
-        return NAMED[text]
+    if text in OBJECTIVES:
+        return OBJECTIVES[text]
     path = Path(text)
     if path.suffix != ".py" or not path.is_file():
-        raise Finger3dError(f"--objective {text}: must be {' or '.join(NAMED)}, or a Python file that is there")
+        raise Finger3dError(f"--objective {text}: must be {' or '.join(OBJECTIVES)}, or a Python file that is there")
     spec = importlib.util.spec_from_file_location("finger3d_objective", path)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
-    except (*_MISTAKES, ImportError, SyntaxError) as error:
+    except (*_OBJECTIVE_ERRORS, ImportError, SyntaxError) as error:
         raise Finger3dError(f"--objective {text}: {type(error).__name__}: {error}") from None
     found = getattr(module, "objective", None)
     if not callable(found):
         raise Finger3dError(f"--objective {text}: has no function objective(table) -> number, the larger the better")
 
-    def judged(table: ObjectiveTable) -> float:
+    def objective(table: ObjectiveTable) -> float:
         try:
             return float(found(table))
-        except _MISTAKES as error:
+        except _OBJECTIVE_ERRORS as error:
             raise Finger3dError(f"--objective {text}: objective(table): {type(error).__name__}: {error}") from None
 
-    return judged
+    return objective
 
 
 @dataclass(frozen=True)
@@ -148,11 +148,11 @@ class OptimisationProblem:
     def identity(self) -> Tree:
         """Return what two runs must have in common to continue each other's evaluations; the budget may differ."""
         path = Path(self.objective)
-        judged = hashlib.sha256(path.read_bytes()).hexdigest()[:16] if path.is_file() else self.objective
+        objective = hashlib.sha256(path.read_bytes()).hexdigest()[:16] if path.is_file() else self.objective
         return {
             "scene": tree.plain(self.given),
             "free": [[f.key, f.low, f.high] for f in self.free],
-            "objective": judged,
+            "objective": objective,
             "gauge": self.gauge,
             "mu": list(self.mus),
             "noise": self.noise,
