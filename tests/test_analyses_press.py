@@ -24,7 +24,8 @@ STEP_KEYS = set(
     stick_half_length_mm external_work_mJ dissipation_mJ gauges iterations residual outcome""".split()
 )
 CONTACT_COLUMNS = (
-    "x_mm y_mm z_mm area_mm2 pressure_MPa shear_x_MPa shear_z_MPa gap_mm slip_x_mm slip_z_mm status".split()
+    "x_mm y_mm z_mm area_mm2 normal_x normal_y normal_z pressure_MPa shear_x_MPa shear_y_MPa shear_z_MPa gap_mm "
+    "slip_x_mm slip_y_mm slip_z_mm status".split()
 )
 
 

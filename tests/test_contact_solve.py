@@ -203,7 +203,7 @@ def test_one_point_coulomb_is_unique_below_its_critical_coefficient() -> None:
     # validation/REFERENCES.md, 8.1: stiffness [[1, .8], [.8, 2]] in (t, n), critical at K_tt / |K_tn| = 1.25
     stiffness = np.array([[2.0, 0.8], [0.8, 1.0]])  # (n, t)
     compliance = np.linalg.inv(stiffness).reshape(1, 2, 1, 2)
-    assert uniqueness(np.array([1.25]), compliance.reshape(2, 2), 2) == pytest.approx(1.0, rel=1e-12)
+    assert uniqueness(np.array([1.25]), compliance.reshape(1, 2, 2)) == pytest.approx(1.0, rel=1e-12)
     rng = np.random.default_rng(0)
     for mu in (0.5, 1.2, 2.0, 10.0):
         for _ in range(50):

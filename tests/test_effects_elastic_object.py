@@ -117,11 +117,12 @@ def test_equal_bodies_do_not_rub() -> None:
         legs=(Leg(1.0, steps=4),),
     )  # fmt: skip
     equal = last(Effect(1.0, 0.3).apply(plain))
-    assert equal["friction_sum_N"] < 1e-6 * equal["normal_force_N"]
+    # the surface of contact is the mean of both, one of facets and one of quadrature points
+    assert equal["friction_sum_N"] < 2e-3 * equal["normal_force_N"]
     # the plane between two mirror images does not move: half the depth on a rigid, smooth one
     half = replace(plain, object=Plane(), legs=(Leg(0.5, steps=4),), friction=Coulomb(0.0))
-    assert equal["normal_force_N"] == pytest.approx(last(half)["normal_force_N"], rel=1e-6)
-    assert last(Effect(1.0, 0.45).apply(plain))["friction_sum_N"] > 1e-3 * equal["normal_force_N"]
+    assert equal["normal_force_N"] == pytest.approx(last(half)["normal_force_N"], rel=1e-3)
+    assert last(Effect(1.0, 0.45).apply(plain))["friction_sum_N"] > 5e-3 * equal["normal_force_N"]
 
 
 def test_compliances_add_under_a_rigid_punch_of_uniform_pressure() -> None:
@@ -145,9 +146,7 @@ def test_energy_goes_into_both_bodies() -> None:
     problem, frames = run(
         Effect(1.0, 0.3).apply(pad(object=Cylinder(radius_mm=4.0), friction=Coulomb(0.0), legs=(Leg(0.3, steps=20),)))
     )
-    own = np.all(problem.symmetry.mirror_sign == 1.0, axis=1)
-    part = np.zeros((len(problem.surface.nodes), 3))
-    part[problem.symmetry.image_of[own]] = frames[-1].state.force[own] / problem.symmetry.multiplicity[own, None]
+    part = problem.upright_force(frames[-1].part)
     stored = 0.5 * 4.0 * np.einsum("id,idje,je->", part, problem.delassus, part)
     assert frames[-1].external_work_mJ == pytest.approx(stored, rel=1e-10)
 

@@ -13,9 +13,9 @@ from finger3d.errors import Outcome
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
-from finger3d.mechanics.formulation import SmallStrain
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.small_strain import SmallStrain
 from finger3d.mechanics.solve import march
 from finger3d.objects import Cylinder, Plane
 

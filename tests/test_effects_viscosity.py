@@ -47,6 +47,12 @@ def block(**changes: object) -> Model:
     return replace(model, **changes)
 
 
+def dome(**changes: object) -> Model:
+    """A half cylinder under a plane, whose normals do not turn as it yields."""
+    body = designs()["half_cylinder"](radius_mm=4.0, width_mm=4.0)
+    return block(design=body, mesh=MeshOptions(0.6, 1.5, "swept"), object=Plane(), gauges=(), **changes)
+
+
 def viscous(problem: Problem, prony: tuple = TWO, bulk: bool = True, **changes: object) -> Problem:
     return replace(problem, model=Effect(prony, bulk).apply(replace(problem.model, **changes)))
 
@@ -75,7 +81,7 @@ def mean_relaxation(prony: tuple, low: np.ndarray, high: np.ndarray) -> np.ndarr
 @pytest.mark.parametrize("mu", [0.0, 1e6], ids=["frictionless", "full stick"])
 def test_a_growing_contact_is_the_convolution_of_the_elastic_one_to_round_off(mu: float) -> None:
     # Lee and Radok 1960: while contact grows, f(t) = int r(t - s) df_e; linear within a step, as the integrator has it
-    problem = build(block(legs=RAMP_AND_HOLD, friction=Coulomb(mu)))
+    problem = build(dome(legs=RAMP_AND_HOLD, friction=Coulomb(mu)))
     elastic, slow = run(problem), run(viscous(problem))
     t = np.array([0.0] + [f.target.time_s for f in elastic])
     rates = np.diff(np.array([np.zeros_like(elastic[0].part.force)] + [f.part.force for f in elastic]), axis=0)
@@ -99,7 +105,7 @@ def test_the_error_of_the_step_falls_with_its_square() -> None:
 
 
 def test_a_hold_is_exact_in_one_step() -> None:
-    problem = build(block(legs=RAMP_AND_HOLD, friction=Coulomb(0.0)))
+    problem = build(dome(legs=RAMP_AND_HOLD, friction=Coulomb(0.0)))
     many, one = run(viscous(problem)), run(viscous(problem, legs=(*RAMP, replace(RAMP_AND_HOLD[1], steps=1))))
     assert one[-1].part.force == pytest.approx(many[-1].part.force, abs=1e-12)
 
@@ -241,7 +247,7 @@ def test_a_finger_let_go_creeps_back_and_is_met_later(bulk: bool) -> None:
 @pytest.mark.parametrize("bulk", [True, False])
 def test_an_increment_cut_in_two_starts_from_the_state_restored(monkeypatch: pytest.MonkeyPatch, bulk: bool) -> None:
     legs = (*RAMP, Leg(0.0, steps=1, duration_s=0.5))
-    problem = build(block())
+    problem = build(dome())
     cut_problem = viscous(problem, TWO, bulk, legs=legs)
     true_rule = formulation.RULES["projection"]
     seen = SimpleNamespace(calls=0)

@@ -18,7 +18,7 @@ from tests.models import block, fig9
 
 def stored(problem: Problem, frame: StepResult) -> float:
     """Elastic energy (mJ), f C f / 2, summed over the whole finger's points."""
-    force = frame.part.force
+    force = problem.upright_force(frame.part)
     each = 0.5 * np.einsum("id,idje,je->i", force, problem.delassus, force)
     return float((each[problem.symmetry.image_of] * problem.symmetry.multiplicity).sum())
 

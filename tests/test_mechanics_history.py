@@ -12,10 +12,10 @@ from finger3d.errors import Outcome
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
-from finger3d.mechanics.history import ContactPoints, ObjectPose, StepResult, measure
+from finger3d.mechanics.history import ContactPoints, StepResult, measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.solve import march
-from finger3d.objects import Sphere
+from finger3d.objects import ObjectPose, Sphere
 
 
 def grid(nx: int, nz: int, shift: float = 0.0) -> ContactPoints:
@@ -78,7 +78,9 @@ def test_an_area_is_uncertain_by_half_a_spacing_all_round() -> None:
         np.where(touching, STICK, OPEN), np.zeros((len(touching), 3)), np.zeros(len(touching)),
         np.zeros((len(touching), 2)), np.zeros((len(touching), 2)),
     )  # fmt: skip
-    frame = StepResult(ObjectPose(1.0), state, state, (15.0, 0.0), {}, 0.0, 0.0, Outcome.CONVERGED, 0.0, 1, "newton")
+    frame = StepResult(
+        ObjectPose(1.0), state, state, (15.0, 0.0), np.zeros(3), {}, 0.0, 0.0, Outcome.CONVERGED, 0.0, 1, "newton"
+    )
     bars = least_bars(points, frame, 1.0)
     assert bars["contact_area_mm2"] == bars["stick_area_mm2"] == pytest.approx(8.0 * np.pi, rel=0.15)
     # the zone is three points wide along all of the line but its two tips

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from finger3d.mechanics.history import ObjectPose
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.path import AUTO_START, between, stride_ratio, targets
+from finger3d.objects import ObjectPose
 
 
 def test_targets_pass_through_every_leg() -> None:

@@ -89,7 +89,9 @@ def test_press_slide_release_returns_to_rest() -> None:
     problem, frames = run(block(legs=legs))
     assert problem.axes == ("z",)
     slid, released = measure(problem.points, frames[7]), measure(problem.points, frames[10])
-    assert slid["friction_sum_N"] == pytest.approx(0.25 * slid["normal_force_N"], rel=1e-9)  # all slips
+    pressed = frames[7].state.force[:, 0].sum()  # along the normals of the ball
+    assert pressed > slid["normal_force_N"]
+    assert slid["friction_sum_N"] == pytest.approx(0.25 * pressed, rel=1e-9)  # all slips
     assert released["normal_force_N"] == 0.0
     lost = [f.dissipation_mJ for f in frames]
     assert all(b >= a for a, b in zip(lost, lost[1:], strict=False))
@@ -99,13 +101,13 @@ def test_tilted_plane_pushes_along_its_own_normal() -> None:
     tilt = np.deg2rad(5.0)
     body = block(object=Plane(tilt=tilt), friction=Coulomb(0.0), legs=(Leg(0.5, steps=2),))
     problem, frames = run(body)
-    world = problem.points.to_global(frames[-1].state.force).sum(axis=0)
+    world = problem.points.with_basis_of(frames[-1].state).to_global(frames[-1].state.force).sum(axis=0)
     assert world[0] / -world[1] == pytest.approx(np.tan(tilt), rel=1e-12)
     assert world[1] < 0
 
 
 def test_an_increment_that_fails_is_cut_and_the_state_restored(monkeypatch: pytest.MonkeyPatch) -> None:
-    problem = build(block(legs=(Leg(0.3, steps=1),)))
+    problem = build(block(object=Plane(), legs=(Leg(0.3, steps=1),)))
     true_rule = formulation.RULES["projection"]
 
     def timid(state, free, *more):  # fails on strides above a quarter of the leg
@@ -122,5 +124,5 @@ def test_an_increment_that_fails_is_cut_and_the_state_restored(monkeypatch: pyte
     four = list(march(replace(problem, model=replace(problem.model, legs=(Leg(0.3, steps=4),)))))
     assert cut.method == "cut back"
     assert cut.outcome.ok
-    assert np.array_equal(cut.state.force, four[-1].state.force)
-    assert cut.dissipation_mJ == four[-1].dissipation_mJ
+    np.testing.assert_allclose(cut.state.force, four[-1].state.force, atol=1e-14)
+    assert cut.dissipation_mJ == pytest.approx(four[-1].dissipation_mJ, rel=1e-12)

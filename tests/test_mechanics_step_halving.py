@@ -84,7 +84,7 @@ def test_rules_that_have_no_limit_in_increments_take_ten(name: str) -> None:
 
 
 def test_a_run_in_few_increments_that_fails_does_not_fail_the_press(monkeypatch: pytest.MonkeyPatch) -> None:
-    problem = build(block(legs=(Leg(0.3, steps="auto"),)))
+    problem = build(block(object=Plane(), legs=(Leg(0.3, steps="auto"),)))
     true_rule = formulation.RULES["projection"]
 
     def timid(state, free, *more):  # fails on increments above 0.3 / 8 mm

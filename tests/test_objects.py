@@ -1,8 +1,9 @@
-"""Rigid objects: exact heights, where they touch first, approaches that are refused, slopes."""
+"""Rigid objects: exact heights, where they touch first, approaches that are refused."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +22,8 @@ from finger3d.objects import (
     ContactPath,
     Cylinder,
     MeshObject,
+    ObjectPose,
+    PlacedObject,
     Plane,
     RigidObject,
     Sphere,
@@ -28,16 +31,16 @@ from finger3d.objects import (
     Wedge,
     first_contact_height,
     initial_contact,
-    slope_of,
 )
 
 FIG9 = designs()["clipped_cylinder"](100.0, 50.0, 36.6, 20.0)
 TOP = 36.6 + 100.0 - math.sqrt(100.0**2 - 50.0**2)
-PRESS = np.array([[10.0, 0.0, 0.0]])
+PRESS = ((10.0, 0.0, 0.0),)
 
 
-def near(obj: RigidObject, path: np.ndarray = PRESS) -> float:
-    return initial_contact(ContactPath(FIG9.top, obj, 50.0, 10.0, np.asarray(path, dtype=float))).first_contact_mm
+def near(obj: RigidObject, path: Sequence[Sequence[float]] = PRESS) -> float:
+    poses = tuple(ObjectPose(*target) for target in path)
+    return initial_contact(ContactPath(FIG9.top, obj, 50.0, 10.0, poses)).first_contact_mm
 
 
 # heights at (x, z) = (3, 4) above the lowest point at (0, 0), and one mm beside it along x
@@ -55,7 +58,7 @@ def near(obj: RigidObject, path: np.ndarray = PRESS) -> float:
     ],
 )  # fmt: skip
 def test_heights_in_closed_form(obj: RigidObject, far: float, close: float) -> None:
-    height = obj.height(np.array([0.0, 3.0, 1.0]), np.array([0.0, 4.0, 0.0]))
+    height = obj.profile(np.array([0.0, 3.0, 1.0]), np.array([0.0, 4.0, 0.0]))
     np.testing.assert_allclose(height, [0.0, far, close], atol=1e-14)
 
 
@@ -67,7 +70,7 @@ def test_heights_in_closed_form(obj: RigidObject, far: float, close: float) -> N
 def test_first_touch_is_the_largest_overlap_of_the_real_surfaces(obj: RigidObject) -> None:
     touch = first_contact_height(FIG9.top, obj, 50.0, 10.0)
     x, z = np.random.default_rng(0).uniform(-1.0, 1.0, (2, 200_000)) * [[50.0], [10.0]]
-    tried = (FIG9.top(x, z) - obj.height(x, z)).max()
+    tried = np.nan_to_num(FIG9.top(x, z) - PlacedObject.of(obj, 0.0).height(x, z), nan=-np.inf).max()
     assert tried <= touch + 1e-9
     if obj.x_mm == 0.0:
         assert touch == pytest.approx(TOP, abs=1e-9)
@@ -98,7 +101,7 @@ def test_several_bumps_as_high_are_all_tried() -> None:
     ("obj", "path", "text"),
     [
         (MeshObject(90.0, surface=ball(20.0)), PRESS, "never touches"),
-        (Sphere(90.0, radius_mm=20.0), PRESS, "touches the base first"),
+        (Sphere(90.0, radius_mm=20.0), PRESS, "never touches"),
         (MeshObject(surface=channel(110.0, 45.0)), PRESS, "touches the base first"),
         (MeshObject(69.95, surface=ball(20.0)), PRESS, "a wall touches first"),
         (MeshObject(surface=channel(100.0, 20.0)), PRESS, "a wall touches first"),
@@ -109,7 +112,7 @@ def test_several_bumps_as_high_are_all_tried() -> None:
     ids=["beside", "sphere beside", "hangs to the base", "flank at the rim", "tight channel", "only the rim",
          "slides into the side", "beside along z"],
 )  # fmt: skip
-def test_approaches_that_are_refused(obj: RigidObject, path: np.ndarray, text: str) -> None:
+def test_approaches_that_are_refused(obj: RigidObject, path: Sequence[Sequence[float]], text: str) -> None:
     with pytest.raises(Finger3dError, match=text) as refused:
         near(obj, path)
     assert "\n" not in str(refused.value)
@@ -127,54 +130,44 @@ def test_approaches_that_are_not(obj: RigidObject) -> None:
 
 def test_the_zone_finds_a_tip_between_the_points_of_its_grid() -> None:
     tip = Sphere(0.1317, 0.077, radius_mm=1e-3)
-    x0, x1, z0, z1 = initial_contact(ContactPath(FIG9.top, tip, 50.0, 10.0, np.array([[1e-4, 0, 0]]))).contact_box
+    x0, x1, z0, z1 = initial_contact(ContactPath(FIG9.top, tip, 50.0, 10.0, (ObjectPose(1e-4),))).contact_box
     assert x0 <= 0.1317 <= x1 < x0 + 2e-3
     assert z0 <= 0.077 <= z1 < z0 + 2e-3
-
-
-def test_slopes_are_those_of_the_surfaces() -> None:
-    x = np.array([-10.0, 0.0, 4.0])
-    found = slope_of(Sphere(radius_mm=20.0), FIG9.top, x, 0.0 * x)
-    assert found.object_deg == pytest.approx(30.0, abs=1e-3)
-    assert found.finger_deg == pytest.approx(math.degrees(math.asin(0.1)), abs=1e-3)
-    assert all(number in found.advice for number in ("30 deg", "15 %", "0.58"))  # 1/cos 30 and tan 30
-    assert slope_of(Sphere(radius_mm=20.0), FIG9.top, x, 0.0 * x, slide=(-10.0, 0.0)).object_deg == pytest.approx(
-        math.degrees(math.asin(0.7)), abs=1e-3
-    )
-    assert slope_of(Plane(tilt=0.3), FIG9.top, x[1:2], x[1:2]).object_deg < 1e-4  # along its own normal
-    assert slope_of(Wedge(angle=0.4), FIG9.top, np.zeros(1), np.zeros(1)).object_deg == pytest.approx(
-        math.degrees(0.4), abs=1e-3
-    )
-    steep = np.array([-4.9, 0.0, 4.9])  # the half cylinder slopes by 78 degrees, which a flat object need not know
-    round_top = designs()["half_cylinder"](5.0, 20.0).top
-    for obj in (Plane(), Plane(tilt=0.3), MeshObject(surface=box(40.0, 1.0, 4.0))):
-        assert slope_of(obj, round_top, steep, 0.0 * steep).finger_deg > 60.0
-        assert slope_of(obj, round_top, steep, 0.0 * steep).advice == ""
-    assert slope_of(Plane(), FIG9.top, x[:0], x[:0]).finger_deg == 0.0
-    flat = slope_of(MeshObject(surface=box(4.0, 1.0, 4.0)), FIG9.top, x, 0.0 * x)
-    assert flat.object_deg < 1e-4  # and nothing beside the box
 
 
 def test_a_mesh_object_stands_on_its_lowest_point() -> None:
     surface = ball(5.0)
     moved = MeshObject(3.0, -2.0, surface=replace(surface, points=surface.points + [7.0, 8.0, 9.0]))
-    assert moved.height(np.array([3.0]), np.array([-2.0]))[0] == pytest.approx(0.0, abs=1e-12)
-    assert moved.lowest(1.0, 0.5) == (4.0, -1.5)
-    distance, normal = moved.signed_distance(np.array([[3.0, -1.0, -2.0], [3.0, 1.0, -2.0]]))
+    placed = PlacedObject.of(moved, 0.0)
+    assert placed.height(np.array([3.0]), np.array([-2.0]))[0] == pytest.approx(0.0, abs=1e-12)
+    assert PlacedObject.of(moved, 0.0, ObjectPose(0.0, 1.0, 0.5)).lowest == pytest.approx((4.0, -1.5))
+    distance, normal = placed.distance(np.array([[3.0, -1.0, -2.0], [3.0, 1.0, -2.0]]))
     np.testing.assert_allclose(distance, [1.0, -1.0], atol=2e-2)
     np.testing.assert_allclose(normal, [[0, -1, 0]] * 2, atol=0.1)
     flat = MeshObject(surface=box(4.0, 1.0, 2.0, (1.0, 2.0, 3.0)))  # of many lowest points the middle
-    assert flat.height(np.array([1.99, 2.01]), np.zeros(2)).tolist()[0] == 0.0
-    assert np.isnan(flat.height(np.array([2.01]), np.zeros(1))[0])
+    height = flat.profile(np.array([1.99, 2.01]), np.zeros(2))
+    assert height[0] == 0.0
+    assert np.isnan(height[1])
 
 
-def test_mirrors_of_a_mesh_object() -> None:
-    assert MeshObject(surface=ball(5.0)).mirrors() == ("x", "z")
-    assert MeshObject(1.0, surface=ball(5.0)).mirrors() == ("z",)
+def mirrors(obj: RigidObject) -> tuple[str, ...]:
+    return PlacedObject.of(obj, 0.0).mirrors()
+
+
+def test_mirrors_of_an_object_in_its_pose() -> None:
+    assert mirrors(MeshObject(surface=ball(5.0))) == ("x", "z")
+    assert mirrors(MeshObject(1.0, surface=ball(5.0))) == ("z",)
     skew = ball(5.0)
-    assert MeshObject(
-        surface=replace(skew, points=skew.points + 0.1 * skew.points[:, [1, 0, 2]] * [1, 0, 0])
-    ).mirrors() == ("z",)
+    sheared = replace(skew, points=skew.points + 0.1 * skew.points[:, [1, 0, 2]] * [1, 0, 0])
+    assert mirrors(MeshObject(surface=sheared)) == ("z",)
+    assert mirrors(Plane()) == ("x", "z")
+    assert mirrors(Plane(tilt=0.1)) == ("z",)
+    assert mirrors(Cylinder(2.0, radius_mm=5.0)) == ("z",)
+    assert mirrors(Cylinder(radius_mm=5.0, turn_y=math.pi / 2.0)) == ("x", "z")
+    assert mirrors(Cylinder(radius_mm=5.0, turn_y=0.3)) == ()
+    assert mirrors(Sphere(radius_mm=5.0, turn_x=0.3, turn_y=1.0)) == ("x", "z")
+    assert mirrors(Wave(2.5, wavelength_mm=5.0, amplitude_mm=0.3)) == ("x", "z")  # half a wavelength
+    assert mirrors(Wedge(angle=0.4, turn_z=0.1)) == ("z",)
 
 
 def pad(**changes: object) -> Model:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from finger3d.errors import Finger3dError
-from finger3d.objects import Cylinder, Plane, Sphere, Wedge, initial_contact
+from finger3d.objects import Cylinder, ObjectPose, Plane, Sphere, Wave, Wedge, initial_contact
 from finger3d.objects.first_contact import ContactPath, first_contact_height
 
 
@@ -16,7 +16,7 @@ def dome(x: np.ndarray, z: np.ndarray) -> np.ndarray:
 
 
 def path(obj: object, depth: float = 1.0, slide: float = 0.0) -> ContactPath:
-    return ContactPath(dome, obj, 10.0, 8.0, np.array([[depth, 0.0, 0.0], [depth, slide, 0.0]]))
+    return ContactPath(dome, obj, 10.0, 8.0, (ObjectPose(depth), ObjectPose(depth, slide)))
 
 
 def test_a_plane_touches_at_the_top() -> None:
@@ -52,3 +52,23 @@ def test_the_contact_box_follows_a_slide() -> None:
 def test_an_object_that_touches_the_base_first_is_refused() -> None:
     with pytest.raises(Finger3dError, match="touches the base first"):
         initial_contact(path(Cylinder(radius_mm=40.0, x_mm=45.0, axis="z"), depth=9.0))
+
+
+def test_a_body_turned_to_extend_downwards_would_start_in_the_finger() -> None:
+    for obj in (Plane(turn_z=np.pi), Wave(wavelength_mm=4.0, amplitude_mm=0.5, turn_x=np.pi)):
+        with pytest.raises(Finger3dError, match="starts? inside"):
+            initial_contact(path(obj))
+
+
+def test_a_turned_cylinder_touches_where_its_own_lowest_line_meets_the_dome() -> None:
+    along_x = initial_contact(path(Cylinder(radius_mm=5.0, axis="x")))
+    turned = initial_contact(path(Cylinder(radius_mm=5.0, axis="z", turn_y=np.pi / 2.0)))
+    assert turned.first_contact_mm == pytest.approx(along_x.first_contact_mm, abs=1e-9)
+    assert turned.contact_box == pytest.approx(along_x.contact_box, abs=1e-9)
+
+
+def test_a_turn_that_takes_the_object_off_the_finger_is_refused() -> None:
+    beside = Sphere(15.0, radius_mm=30.0)  # its lowest point, about which it turns, is beside the dome
+    poses = (ObjectPose(1.0), ObjectPose(1.0, turn_z=-np.pi / 2.0))
+    with pytest.raises(Finger3dError, match="does not touch it"):
+        initial_contact(ContactPath(dome, beside, 10.0, 8.0, poses))

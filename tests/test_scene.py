@@ -236,7 +236,8 @@ def test_as_dict_is_json_with_every_default() -> None:
     tree = scene.as_dict()
     assert json.loads(json.dumps(tree)) == tree
     assert tree["friction"] == {"mu": 0.0}
-    assert tree["object"] == {"shape": "plane", "x_mm": 0.0, "z_mm": 0.0, "tilt_deg": 0.0}
+    turns = {f"turn_{axis}_deg": 0.0 for axis in "xyz"}
+    assert tree["object"] == {"shape": "plane", "x_mm": 0.0, "z_mm": 0.0, "tilt_deg": 0.0, **turns}
     assert tree["press"]["steps"] == "auto"
     assert tree["mesh"]["mesher"] == "ftetwild"
     assert tree["effects"] == {}

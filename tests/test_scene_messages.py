@@ -305,7 +305,7 @@ def test_an_empty_file(tmp_path, capsys) -> None:
 @pytest.mark.parametrize(
     ("legs", "text"),
     [
-        ([{"depth_mm": 0.0, "slide_x_mm": 1.0}], "slides before first touch"),
+        ([{"depth_mm": 0.0, "slide_x_mm": 1.0}], "moves before first touch"),
         ([{"depth_mm": 1.0}, {"depth_mm": 1.0}], "goes nowhere"),
     ],
 )

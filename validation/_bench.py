@@ -25,19 +25,23 @@ from statistics import median
 from typing import Any
 
 import numpy as np
+import trimesh
 
 from finger3d._machine import cores
 from finger3d.analyses.calibrate.presses import presses
 from finger3d.analyses.study_rows import Row
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.material import Isotropic
+from finger3d.geometry.files import read_surface
 from finger3d.geometry.registry import designs
+from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.build import build, contact_box
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
 from finger3d.mechanics.symmetry import symmetry
 from finger3d.meshing.generate import mesh_solid
+from finger3d.objects import MeshObject, Plane, RigidObject, Sphere
 
 LARGE, MIDDLE, QUICK = 1.1, 1.25, 3.0  # mm: 150 000, 47 000 and 8 000 unknowns
 MUS = (0.06, 0.125, 0.25, 0.5, 1.0)
@@ -243,11 +247,41 @@ def run(quick: bool) -> tuple[Row, ...]:
     if made:
         what = f"pytetwild on a warm cache against a cold one ({made[0]:.1f} s)"
         rows.append(_row(what, 0.02, made[1] / made[0], load, "0: only reading the file is left"))
+    rows += _objects(5.0 if quick else 1.8, load, repeats)
     rows += _beside_calculix(quick, load)
     for size, most in zip(sizes, (2.0,) if quick else (2.0, 5.0), strict=True):
         peak = max(r["peak_MB"] for r in runs[size]) / 1024.0
         rows.append(_row(f"peak memory, GB, {best[size]['dofs']:.0f} unknowns", most, peak, load))
     return tuple(rows)
+
+
+def _objects(size: float, load: float, repeats: int) -> list[Row]:
+    """Return time of whole presses on a ball and on a gear wheel over one on a plane, on one mesh; and of distances."""
+    gear = MeshObject(surface=read_surface(str(Path(__file__).parents[1] / "geometries" / "gear.stl"), 1.0))
+    objects: dict[str, RigidObject] = {"a plane": Plane(), "a ball": Sphere(radius_mm=30.0), "a gear wheel": gear}
+    model = replace(fig9(size), mesh=MeshOptions(size, size, "swept"), legs=(Leg(4.0, steps=10),))
+
+    def seconds(obj: RigidObject) -> float:
+        begin = time.perf_counter()
+        *_, frame = march(build(replace(model, object=obj, symmetry=())))
+        if not frame.outcome.ok:
+            raise AssertionError(f"{obj}: {frame.outcome}")
+        return time.perf_counter() - begin
+
+    took = {name: min(seconds(obj) for _ in range(repeats)) for name, obj in objects.items()}
+    rows = [
+        _row(f"a press on {name} against one on a plane, edges of {size:g} mm", 1.5, took[name] / took["a plane"], load)
+        for name in list(objects)[1:]
+    ]
+    points = np.random.default_rng(0).normal(size=(5000, 3))
+    points *= np.linspace(9.5, 10.5, 5000)[:, None] / np.linalg.norm(points, axis=1)[:, None]
+    ball = trimesh.creation.icosphere(subdivisions=7, radius=10.0)
+    surface = Triangles(np.array(ball.vertices), np.array(ball.faces))
+    surface.signed_distance(points[:10])
+    begin = time.perf_counter()
+    surface.signed_distance(points)
+    what = f"distances of 5000 points from {len(ball.faces)} triangles, s"
+    return [*rows, _row(what, 0.5, time.perf_counter() - begin, load)]
 
 
 def _beside_calculix(quick: bool, load: float) -> list[Row]:

@@ -20,7 +20,9 @@ from finger3d.fem.elements import quadrature
 from finger3d.fem.material import Elasticity
 from finger3d.fem.simplex import Mesh, boundary, quadratic, signed_volumes
 from finger3d.fem.traces import BoundarySurface, local_rows, restrict, surface
-from finger3d.objects import vertical_frame
+from finger3d.mechanics.contact_geometry import contact_geometry
+from finger3d.mechanics.problem import Problem
+from finger3d.objects import ObjectPose, vertical_frame
 
 Float = NDArray[np.float64]
 Field = Callable[[Float], Float]
@@ -256,3 +258,11 @@ def quarter_block(x: Float, depths: Float) -> tuple[Mesh, NDArray[np.bool_]]:
     """Quarter of a square block on a fixed base: coordinates along x and z, and depths from the top."""
     mesh = quadratic(box([x, depths[-1] - depths[::-1], x]))
     return mesh, held_at(mesh, {"x-": [0], "z-": [2], "y-": [0, 1, 2]})
+
+
+def free_motion(problem: Problem, target: ObjectPose) -> Float:
+    """Gap and tangential displacement (c, d), mm, of every point relative to a plane under no contact force."""
+    geometry = contact_geometry(problem.placed(target).distance, problem.surface, axes=problem.axes)
+    out = -(geometry.bases @ target.displacement[: problem.dim])
+    out[:, 0] = geometry.gap
+    return out

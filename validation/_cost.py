@@ -31,7 +31,7 @@ from finger3d.mechanics.symmetry import active_dofs, held_dofs, symmetry, unfold
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.report import MeshReport
 from finger3d.meshing.swept import mesh_section
-from finger3d.objects import initial_contact
+from finger3d.objects import initial_contact, vertical_frame
 
 Float = NDArray[np.float64]
 
@@ -134,7 +134,7 @@ def assembled(model: Model, element: str) -> Parts:
     matrix = stiffness(mesh, elastic, thickness)
     face = candidate_points(model, surface(mesh, "contact", thickness), way.first_contact_mm, MARGIN)
     kept = active_dofs(face, axes)
-    rows = local_rows(face, model.object.frame(mesh.dim))[kept]
+    rows = local_rows(face, vertical_frame(mesh.dim))[kept]
     gauges = sp.vstack([g.row(mesh, axes) for g in model.gauges], format="csr")
     seconds = {**report.seconds, "assembly": time.perf_counter() - start}
     held = held_dofs(mesh, axes, model.held_ends)

@@ -11,6 +11,7 @@ import numpy as np
 from finger3d.contact.friction import OPEN
 from finger3d.geometry.registry import designs
 
+from ._common import free_motion
 from ._cost import Case, assembled, condensed, in_steps, model_of, numbers
 from ._each_iteration import EachIteration
 
@@ -93,7 +94,7 @@ def single(given: dict[str, Any]) -> dict[str, Any]:
     state = frames[1].part
     c, d = state.force.shape
     # the state found with the rounded compliance, held against the true one; position is the change from the start
-    moved = problem.free_motion(frames[1].target) + np.einsum("aibj,bj->ai", problem.delassus, state.force)
+    moved = free_motion(problem, frames[1].target) + np.einsum("aibj,bj->ai", problem.delassus, state.force)
     gap = np.where(state.status == OPEN, np.maximum(-moved[:, 0], 0.0), np.abs(moved[:, 0]))
     dense = problem.delassus.reshape(c * d, c * d)
     seconds = {}

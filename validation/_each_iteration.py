@@ -16,6 +16,7 @@ from finger3d.mechanics.path import targets
 from finger3d.mechanics.problem import ContactSystem, Problem
 from finger3d.mechanics.symmetry import unfold_points
 
+from ._common import free_motion
 from ._cost import MU, Parts
 
 Float = NDArray[np.float64]
@@ -66,7 +67,7 @@ class EachIteration:
         shell = Problem(model=parts.model, body=None, symmetry=symmetry, system=system)
         state = ContactState.at_rest(np.maximum(shell.gap(targets(legs)[0]), 0.0), d)
         for target in targets(legs):
-            free = shell.free_motion(target)
+            free = free_motion(shell, target)
             free[:, 1:] -= state.tangential_displacement
             problem = ContactProblem(free, np.zeros((0, 0)), np.full(c, MU), self.rho, target.depth_mm)
             force, moved, status, u = self._settle(problem, state.force)

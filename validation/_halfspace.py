@@ -105,7 +105,7 @@ def _part(compliance: Float, free: Float) -> Float:
 
 def _gap(half_space: Body) -> Float:
     ball = Sphere(radius_mm=RADIUS)
-    return half_space.gap(lambda p: ball.height(p[:, 0], p[:, 2]))
+    return half_space.gap(lambda p: ball.profile(p[:, 0], p[:, 2]))
 
 
 def press(ball: Ball, mu: float, path: Sequence[tuple[float, float]]) -> list[Step]:

@@ -30,6 +30,8 @@ from finger3d.mechanics.solve import march
 from finger3d.objects import Plane
 from finger3d.scene import load
 
+from ._common import free_motion
+
 POINT = "Klarbring 1990; REFERENCES.md, 8.1"
 ROBUST = "what a robust method does; REFERENCES.md, 8.2"
 SCENE = """
@@ -89,7 +91,7 @@ def one_point(quick: bool) -> Iterator[Row]:
         more = f"{what}, those with several answers"
         unique = _is(more, 0, several, source=POINT)
         yield unique if name == "below" else _least(more, 1, several, "some loads have several", POINT)
-    at_limit = uniqueness(np.array([1.25]), compliance, 2)
+    at_limit = uniqueness(np.array([1.25]), compliance.reshape(1, 2, 2))
     yield _is("one-point Coulomb: mu |K_tt^-1 K_tn| at mu = 1.25", 1, at_limit, 1e-12, "round-off", POINT)
 
 
@@ -119,7 +121,7 @@ def touch(quick: bool) -> Iterator[Row]:
     arch = designs()["clipped_cylinder"](radius_mm=20.0, half_length_mm=10.0, edge_height_mm=5.0, width_mm=1.0)
     problem = _block(0.3, (Leg(1.0, steps=1),), arch)
     apart = solve_increment(
-        ContactState.at_rest(problem.gap(problem.origin), 2), problem.free_motion(problem.origin) + [1e-6, 0.0],
+        ContactState.at_rest(problem.gap(problem.origin), 2), free_motion(problem, problem.origin) + [1e-6, 0.0],
         problem.delassus, Coulomb(0.25), 1.0,
     )  # fmt: skip
     yield _is("no point touches: settled, without force", 0, np.abs(apart.state.force).max() + (not apart.outcome.ok))
@@ -273,7 +275,7 @@ def turned(quick: bool) -> Iterator[Row]:
         state = ContactState.at_rest(problem.gap(problem.origin), 3)
         for frame in march(problem):
             state = solve_increment(
-                state, problem.free_motion(frame.target) @ turn.T, compliance, Coulomb(0.25), 0.3
+                state, free_motion(problem, frame.target) @ turn.T, compliance, Coulomb(0.25), 0.3
             ).state
         states.append(state.force @ turn)
     apart = np.abs(states[1] - states[0]).max() / np.abs(states[0]).max()
@@ -288,7 +290,7 @@ def refusals(quick: bool) -> Iterator[Row]:
     """Bad input: a clear outcome or one line, nothing lost."""
     problem = _block(0.3, (Leg(0.5, steps=1),))
     state = ContactState.at_rest(problem.gap(problem.origin), 2)
-    free = problem.free_motion(targets(problem.model.legs)[-1])
+    free = free_motion(problem, targets(problem.model.legs)[-1])
     hole = free.copy()
     hole[0, 0] = np.nan
     c = len(free)
@@ -306,7 +308,7 @@ def refusals(quick: bool) -> Iterator[Row]:
     legs = "[[press.leg]]\ndepth_mm = {}\nslide_x_mm = {}\n[[press.leg]]\ndepth_mm = 0.5\nslide_x_mm = 1.0\n"
     with tempfile.TemporaryDirectory() as folder:
         for what, first, word in (
-            ("slide before first touch", (0.0, 1.0), "slides before first touch"),
+            ("slide before first touch", (0.0, 1.0), "moves before first touch"),
             ("leg that goes nowhere", (0.5, 1.0), "goes nowhere"),
         ):
             text = SCENE.split("[press]")[0] + legs.format(*first)

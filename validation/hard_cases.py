@@ -31,6 +31,7 @@ from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
 
 from . import _hard
+from ._common import free_motion
 
 DEPTH = 10.0
 NU = (0.0, 0.3, 0.45, 0.49, 0.499, 0.4999, 0.5)
@@ -92,7 +93,7 @@ def violation(problem: Problem, before: Any, frame: StepResult) -> float:
     """Largest violation of the conditions: lengths over DEPTH, forces over the largest; from compliance and forces."""
     mu, state = problem.model.friction.mu, frame.part
     force, status = state.force, state.status
-    moved = problem.free_motion(frame.target) + np.einsum("idje,je->id", problem.delassus, force)
+    moved = free_motion(problem, frame.target) + np.einsum("idje,je->id", problem.delassus, force)
     gap, change = moved[:, 0], moved[:, 1:] - before.tangential_displacement
     normal, friction = force[:, 0], force[:, 1:]
     size = np.linalg.norm(friction, axis=1)

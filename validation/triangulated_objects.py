@@ -28,7 +28,7 @@ from finger3d.mechanics.build import build
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.solve import march
-from finger3d.objects import Cylinder, MeshObject, RigidObject, Sphere, first_contact_height
+from finger3d.objects import Cylinder, MeshObject, PlacedObject, RigidObject, Sphere, first_contact_height
 
 from ._common import convergence, rate
 
@@ -110,7 +110,15 @@ def run(quick: bool) -> Result:
         for sectors in levels:
             obj = MeshObject(0.7, 0.4 if name == "ball" else 0.0, surface=make(sectors))
             got = pressed(obj, size)
-            errors["height"].append(float(np.sqrt(np.mean((obj.height(x, z) - exact.height(x, z)) ** 2))))
+            errors["height"].append(
+                float(
+                    np.sqrt(
+                        np.mean(
+                            (PlacedObject.of(obj, 0.0).height(x, z) - PlacedObject.of(exact, 0.0).height(x, z)) ** 2
+                        )
+                    )
+                )
+            )
             errors["first touch"].append(abs(first_contact_height(dome.top, replace(obj, x_mm=4.0), 12.0, 4.0) - touch))
             errors["force"].append(abs(got["normal_force_N"] / true["normal_force_N"] - 1.0))
             table.append((name, sectors, len(obj.surface.faces), *(e[-1] for e in errors.values())))

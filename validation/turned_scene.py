@@ -24,7 +24,7 @@ from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing.generate import mesh_solid
-from finger3d.objects import MeshObject, first_contact_height
+from finger3d.objects import MeshObject, PlacedObject, first_contact_height
 
 from ._common import Body, body
 from .triangulated_objects import ball
@@ -74,7 +74,7 @@ def dragged(soft: Body, degrees: float, steps: int, obj: MeshObject, touch: floa
         near = np.hypot(samples[:, 0], samples[:, 2]) < 3.0
         gap = np.full(len(samples), 10.0)
         x, y, z = samples[near].T
-        gap[near] = obj.height(x - moved[0], z - moved[2]) + touch - depth - y
+        gap[near] = PlacedObject.of(obj, 0.0).height(x - moved[0], z - moved[2]) + touch - depth - y
         free = np.empty((len(soft.surface.nodes), 3))
         free[:, 0] = soft.surface.average @ gap
         free[:, 1:] = -moved[[0, 2]]

@@ -18,6 +18,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.integrate import quad
 from scipy.optimize import brentq
@@ -25,17 +26,18 @@ from scipy.signal import residue
 
 from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import OPEN, Coulomb
+from finger3d.contact.state import ContactState
 from finger3d.effects.viscosity import Viscoelastic
 from finger3d.fem.assembly import Stiffness, stiffness
 from finger3d.fem.condense import Condensation, condense
 from finger3d.fem.material import Elasticity, Isotropic
 from finger3d.fem.simplex import Mesh, quadratic
 from finger3d.fem.traces import BoundarySurface, local_rows, restrict, surface
-from finger3d.mechanics.formulation import Formulation, SmallStrain
-from finger3d.mechanics.history import ObjectPose
+from finger3d.mechanics.formulation import Formulation
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.problem import AddedStiffness
-from finger3d.objects import Sphere, vertical_frame
+from finger3d.mechanics.small_strain import SmallStrain
+from finger3d.objects import ObjectPose, PlacedObject, Plane, Sphere, vertical_frame
 
 from . import _rings
 from ._common import box, graded, held_at
@@ -77,8 +79,9 @@ class StandIn:
     def model(self) -> Any:
         material = Isotropic(1.0, self.nu)
         return SimpleNamespace(
-            rule="projection", friction=Coulomb(0.0), legs=(Leg(DEPTH),), domain="solid", gauges=(), material=material
-        )
+            rule="projection", friction=Coulomb(0.0), legs=(Leg(DEPTH),), domain="solid", gauges=(), material=material,
+            object=Plane(),
+        )  # fmt: skip
 
     @property
     def part(self) -> StandIn:
@@ -93,16 +96,30 @@ class StandIn:
         return int(self.delassus.shape[1])
 
     @property
-    def surface(self) -> Any:
-        return SimpleNamespace(nodes=np.arange(len(self.rest)), area=self.area)
+    def surface(self) -> BoundarySurface:
+        """Points so high under a plane that their gaps are those under the ball: the half-space has no slopes."""
+        count, none = len(self.rest), sp.csr_matrix((len(self.rest), 0))
+        points = np.zeros((count, self.dim))
+        points[:, 1] = -self.rest
+        same = sp.eye_array(count, format="csr")
+        return BoundarySurface(
+            nodes=np.arange(count), points=points, area=self.area, normals=np.zeros_like(points), trace=none,
+            samples=points, average=same, interpolate=none, hats=same,
+        )  # fmt: skip
 
-    def gap(self, target: ObjectPose) -> Float:
-        return self.rest - target.depth_mm
+    @property
+    def axes(self) -> tuple[str, ...]:
+        return ()
 
-    def free_motion(self, target: ObjectPose) -> Float:
-        out = np.zeros((len(self.rest), self.dim))
-        out[:, 0] = self.gap(target)
-        return out
+    @property
+    def object_share(self) -> None:
+        return None
+
+    def placed(self, pose: ObjectPose) -> PlacedObject:
+        return PlacedObject.of(Plane(), 0.0, pose)
+
+    def upright_force(self, state: ContactState) -> Float:
+        return np.asarray(state.scene_force @ vertical_frame(self.dim).T)
 
     def row_forces(self, force: Float) -> Float:
         return force.ravel()[self.active_dofs]
@@ -139,7 +156,7 @@ def on_tets(nu: float, points: int) -> StandIn:
 
 def _rest(face: BoundarySurface) -> Float:
     at = face.samples
-    return np.asarray(face.average @ Sphere(radius_mm=RADIUS).height(at[:, 0], at[:, 2]))
+    return np.asarray(face.average @ Sphere(radius_mm=RADIUS).profile(at[:, 0], at[:, 2]))
 
 
 def _widened(small: Condensation, kept: NDArray[np.int64], count: int) -> Float:

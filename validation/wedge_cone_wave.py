@@ -57,7 +57,7 @@ def wedge(count: int) -> Errors:
     mesh = mapped(box([x, HEIGHT - y[::-1]]), lambda p: p)
     held = held_at(mesh, {"x-": [0], "y-": [0, 1]})
     block = body(mesh, Elasticity.of(1.0, NU), held, "y+", lambda p: p[:, 0] < 1.5)
-    gap = block.gap(lambda p: TIP.height(p[:, 0], 0.0 * p[:, 0]))
+    gap = block.gap(lambda p: TIP.profile(p[:, 0], 0.0 * p[:, 0]))
     order = np.argsort(block.surface.points[:, 0])
     at, area = block.surface.points[order, 0], block.surface.area[order]
     found = []
@@ -116,7 +116,7 @@ def wavy(count: int, dim: int) -> tuple[Body, Float, Float]:
     held = {"x-": [0], "x+": [0], "y-": range(dim)} | ({"z-": [2], "z+": [2]} if dim == 3 else {})
     half = body(mesh, Elasticity.of(1.0, NU), held_at(mesh, held), "y+")
     profile = Wave(wavelength_mm=1.0, amplitude_mm=AMPLITUDE)
-    gap = half.gap(lambda p: profile.height(p[:, 0], 0.0 * p[:, 0]))
+    gap = half.gap(lambda p: profile.profile(p[:, 0], 0.0 * p[:, 0]))
     return half, gap, half.gap(lambda p: np.sin(np.pi * p[:, 0]) ** 2)
 
 

@@ -5,11 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.contact.friction import OPEN
-from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.problem import Problem
-from finger3d.objects.slope import slope_of
 
 _STRAIN = 0.1
 _QUANTILE = 0.99  # the clamped corners are singular, their strain says nothing
@@ -20,16 +16,9 @@ _AGAINST_FINITE_STRAIN = (
 )  # slots whose effects need linear elasticity
 
 
-def advise(problem: Problem, frame: StepResult, strain: Float) -> list[str]:
-    """Advice for a finished press.
-
-    Parameters
-    ----------
-    frame : the last good one
-    strain : (n, 3, 3) at the nodes
-    """
-    model = problem.model
-    found = [] if model.formulation.finite_strain else [*_strain(model, strain), *_slopes(problem, frame)]
+def advise(model: Model, strain: Float) -> list[str]:
+    """Advice for a finished press, from its nodal strains (n, 3, 3)."""
+    found = [] if model.formulation.finite_strain else _strain(model, strain)
     return found + _width(model)
 
 
@@ -52,16 +41,6 @@ def _finite_strain(model: Model) -> str:
         return "[effects.large_deformation] accounts for it"
     named = " and ".join(f"[effects.{name}]" for name in others)
     return f"[effects.large_deformation] would account for it, but cannot be combined with {named}"
-
-
-def _slopes(problem: Problem, frame: StepResult) -> list[str]:
-    touching = frame.state.status != OPEN
-    if not touching.any():
-        return []
-    x, z = problem.points.points[touching][:, 0], problem.points.points[touching][:, 2]
-    slide = (frame.target.slide_x_mm, frame.target.slide_z_mm)
-    text = slope_of(problem.model.object, problem.model.design.top, x, z, slide, problem.dim).advice
-    return [f"{text}; {_finite_strain(problem.model)}"] if text else []
 
 
 def _width(model: Model) -> list[str]:

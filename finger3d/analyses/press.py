@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -103,6 +104,7 @@ def _solve(scene: Scene, writer: ResultWriter, report: Progress, started: float)
     """
     from finger3d.mechanics.build import build
     from finger3d.mechanics.coverage import step_within_candidates
+    from finger3d.mechanics.force_control import at_depth_reached
 
     refinement = _refine_mesh(scene, report)
     if refinement:
@@ -113,10 +115,17 @@ def _solve(scene: Scene, writer: ResultWriter, report: Progress, started: float)
     problem = (refinement.problem if refinement else None) or build(model, report.say)
     record = PressRecord(scene, problem, started, refinement)
     _march(record, writer, report)
+    reached = max((step.target.depth_mm for step in record.converged_steps), default=0.0)
+    if legs := at_depth_reached(problem.model.legs, reached):
+        report.say(f"the force is reached at {reached:.3g} mm, deeper than was forecast; meshing again")
+        report.stage("meshing")
+        problem = build(replace(problem.model, legs=legs), report.say)
+        record = PressRecord(scene, problem, started, refinement, record.all_factorizations)
+        _march(record, writer, report)
     if record.steps and record.steps[-1].outcome.ok and not step_within_candidates(problem, record.steps[-1]):
         report.say("contact reached beyond the candidate points; solving again with all of the contact face")
         report.stage("meshing")
-        problem = build(model, report.say, math.inf)
+        problem = build(problem.model, report.say, math.inf)
         record = PressRecord(scene, problem, started, refinement, record.all_factorizations)
         _march(record, writer, report)
     return record
@@ -200,7 +209,7 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fie
     if good:
         u, strain, stress = problem.model.formulation.fields(problem, good[-1].part)
         record.warnings += resolution.penetration_warnings(problem, good[-1], u)
-        record.advice = advise(problem, good[-1], strain)
+        record.advice = advise(problem.model, strain)
         if record.step_estimate and record.step_estimate.advice:
             record.advice.append(record.step_estimate.advice)
         fields = Fields.of(record, u, strain, stress)

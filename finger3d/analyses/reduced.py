@@ -30,7 +30,7 @@ from finger3d.mechanics.problem import Problem, rigid_gap
 from finger3d.mechanics.resolution import check
 from finger3d.mechanics.solve import march
 
-_PATH = ("depth_mm", "slide_x_mm", "slide_z_mm")
+_PATH = ("depth_mm", "slide_x_mm", "slide_z_mm", "turn_x", "turn_y", "turn_z")
 
 _GAP_LEFT = 0.5 * MARGIN
 """Least rigid gap of the points that are no candidates, over the press depth: half that of the farthest candidate."""
@@ -143,6 +143,11 @@ class ReducedModel:
                 raise Finger3dError(
                     f"press: depth {leg.depth_mm} mm, slides {leg.slide_x_mm}, {leg.slide_z_mm} mm: must be finite "
                     "numbers, the depth from 0 up"
+                )
+            if problem.axes and any((leg.turn_x, leg.turn_y, leg.turn_z)):
+                raise Finger3dError(
+                    "press: the body was condensed as a mirror image and its object cannot turn; condense a scene with "
+                    "this turn"
                 )
             for axis in problem.axes:
                 if getattr(leg, f"slide_{axis}_mm"):

@@ -26,9 +26,9 @@ from finger3d.mechanics.history import ContactPoints
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.problem import ContactSystem, Problem
 from finger3d.mechanics.symmetry import Symmetry
-from finger3d.objects import OBJECTS, MeshObject, RigidObject
+from finger3d.objects import OBJECTS, MeshObject, RigidObject, vertical_frame
 
-FORMAT, VERSION = "finger3d condensed body", 2
+FORMAT, VERSION = "finger3d condensed body", 3
 _SHAPES: dict[str, type[RigidObject]] = {r.__name__: r for r in OBJECTS.values()} | {"MeshObject": MeshObject}
 _MAX_STEPS = 1_000_000
 """Largest number of increments of a leg in a file."""
@@ -91,34 +91,43 @@ def read(path: str | Path) -> tuple[Problem, BoundarySurface, TreeView]:
 
 
 def _face_arrays(name: str, face: BoundarySurface) -> dict[str, Array]:
-    mean = face.average.tocsr()
+    mean, hats = face.average.tocsr(), face.hats.tocsr()
     return {
         f"{name}_nodes": face.nodes,
         f"{name}_points": face.points,
         f"{name}_area": face.area,
+        f"{name}_normals": face.normals,
         f"{name}_samples": face.samples,
         f"{name}_mean": mean.data,
         f"{name}_mean_at": mean.indices,
         f"{name}_mean_rows": mean.indptr,
+        f"{name}_hats": hats.data,
     }
 
 
 def _face(name: str, arrays: TreeView, dim: int) -> BoundarySurface:
     """Return a surface with the quadrature points of the gap, and without traces of a mesh."""
     samples, nodes = arrays[f"{name}_samples"].reshape(-1, dim), arrays[f"{name}_nodes"]
-    parts = (arrays[f"{name}_mean"], arrays[f"{name}_mean_at"], arrays[f"{name}_mean_rows"])
-    mean = sp.csr_matrix(parts, shape=(len(nodes), len(samples)))
+    pattern, shape = (arrays[f"{name}_mean_at"], arrays[f"{name}_mean_rows"]), (len(nodes), len(samples))
+    mean, hats = (sp.csr_matrix((arrays[f"{name}_{data}"], *pattern), shape=shape) for data in ("mean", "hats"))
     mean.check_format(full_check=True)  # of a file: its indices must be in range
     points = arrays[f"{name}_points"].reshape(-1, dim)
-    none = sp.csr_matrix((len(nodes), 0)), sp.csr_matrix((len(samples), 0))
-    return BoundarySurface(nodes, points, arrays[f"{name}_area"], none[0], samples, mean, none[1])
+    return BoundarySurface(
+        nodes=nodes,
+        points=points,
+        area=arrays[f"{name}_area"],
+        normals=arrays[f"{name}_normals"].reshape(-1, dim),
+        trace=sp.csr_matrix((len(nodes), 0)),
+        samples=samples,
+        average=mean,
+        interpolate=sp.csr_matrix((len(samples), 0)),
+        hats=hats,
+    )
 
 
 def bare(face: BoundarySurface) -> BoundarySurface:
-    """Return the surface with only those quadrature points that its vertices use."""
-    used = np.unique(face.average.tocsr().indices)
-    light = replace(face, samples=face.samples[used], average=face.average.tocsr()[:, used])
-    return _face("it", _face_arrays("it", light), face.points.shape[1])
+    """Return the surface without traces of a mesh."""
+    return _face("it", _face_arrays("it", face), face.points.shape[1])
 
 
 def arrays_of(problem: Problem) -> dict[str, Array]:
@@ -137,6 +146,8 @@ def arrays_of(problem: Problem) -> dict[str, Array]:
         "edges": problem.points.edges,
         **_face_arrays("face", bare(problem.surface)),
     }
+    if problem.system.object_share is not None:
+        arrays["object_share"] = problem.system.object_share
     if problem.without_inclusions:
         arrays |= {
             "bare_compliance": problem.without_inclusions.delassus.reshape(c * d, c * d),
@@ -156,7 +167,7 @@ def assembled(model: Model, arrays: TreeView, touch_mm: float, axes: tuple[str, 
             nodes=arrays["nodes"],
             points=arrays["points"],
             area=arrays["area"],
-            basis=model.object.frame(d),
+            basis=vertical_frame(d),
             half_width_mm=float(half_width),
             band_mm=float(band),
             edges=arrays["edges"],
@@ -165,6 +176,7 @@ def assembled(model: Model, arrays: TreeView, touch_mm: float, axes: tuple[str, 
         gauge_rows=arrays["gauge_rows"].reshape(len(model.gauges), c * d),
         active_dofs=np.zeros(0, dtype=np.int64),
         first_contact_mm=touch_mm,
+        object_share=arrays.get("object_share"),
     )
     symmetry = Symmetry(axes=axes, image_of=arrays["parent"], mirror_sign=arrays["sign"], multiplicity=arrays["share"])
     problem = Problem(model=model, body=None, symmetry=symmetry, system=system)
@@ -295,6 +307,8 @@ def _check_arrays(arrays: TreeView, d: int, gauges: int) -> None:
         "area": (p,),
         "band": (2,),
     }
+    if "object_share" in arrays:
+        wanted["object_share"] = (c,)
     if "bare_compliance" in arrays:
         wanted |= {"bare_compliance": (c * d, c * d), "bare_gauge_rows": (gauges, c * d)}
     for face in ("face", "other"):
@@ -303,10 +317,12 @@ def _check_arrays(arrays: TreeView, d: int, gauges: int) -> None:
             f"{face}_nodes": (m,),
             f"{face}_points": (m, d),
             f"{face}_area": (m,),
+            f"{face}_normals": (m, d),
             f"{face}_samples": (samples, d),
             f"{face}_mean": (entries,),
             f"{face}_mean_at": (entries,),
             f"{face}_mean_rows": (m + 1,),
+            f"{face}_hats": (entries,),
         }
     if not c:
         raise ValueError("no contact points")

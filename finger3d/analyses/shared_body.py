@@ -303,11 +303,11 @@ class _Run:
 def shared_legs(variants: Sequence[Variant]) -> tuple[Leg, ...]:
     """Return a path that is the union of the paths of the variants.
 
-    Among paths without slides it is the deepest. Otherwise all paths follow one another, each traced back to first
-    contact before the next.
+    Among paths without slides and turns it is the deepest. Otherwise all paths follow one another, each traced back to
+    first contact before the next.
     """
     paths = list(dict.fromkeys(v.legs for v in variants))
-    if not any(leg.slide_x_mm or leg.slide_z_mm for legs in paths for leg in legs):
+    if not any(leg.moves_sideways for legs in paths for leg in legs):
         return max(paths, key=lambda legs: max(leg.depth_mm for leg in legs))
     union: list[Leg] = []
     for number, legs in enumerate(paths):
@@ -319,5 +319,5 @@ def shared_legs(variants: Sequence[Variant]) -> tuple[Leg, ...]:
     return tuple(union)
 
 
-def _end(leg: Leg) -> tuple[float, float, float]:
-    return leg.depth_mm, leg.slide_x_mm, leg.slide_z_mm
+def _end(leg: Leg) -> tuple[float, ...]:
+    return leg.depth_mm, leg.slide_x_mm, leg.slide_z_mm, leg.turn_x, leg.turn_y, leg.turn_z

@@ -359,13 +359,11 @@ def block_gauss_seidel(problem: ContactProblem, start: Float, count: int) -> Flo
     return force
 
 
-def uniqueness(mu: Float, delassus: Float, dim: int) -> float:
-    """Return the largest mu |K_tt^-1 K_tn| over the points, K the inverse of a point's own block of W (c d, c d).
+def uniqueness(mu: Float, blocks: Float) -> float:
+    """Return the largest mu |K_tt^-1 K_tn| over the points, K the inverse of a point's own block (d, d) of W (c, d, d).
 
     Above 1 there may be several solutions.
     """
-    c = len(mu)
-    blocks = delassus.reshape(c, dim, c, dim)[np.arange(c), :, np.arange(c)]
     stiff = np.linalg.inv(blocks)
     coupling = np.linalg.solve(stiff[:, 1:, 1:], stiff[:, 1:, :1])[:, :, 0]
     return float(np.max(mu * np.linalg.norm(coupling, axis=1), initial=0.0))

@@ -48,6 +48,30 @@ class ContactState:
             np.full(c, OPEN, dtype=np.int8), np.zeros((c, dim)), gap, np.zeros((c, dim - 1)), np.zeros((c, dim - 1))
         )
 
+    @property
+    def scene_force(self) -> Float:
+        """Forces (c, d) N in x, y, z.
+
+        Raises
+        ------
+        ValueError
+            If the directions of the points are not known.
+        """
+        if self.bases is None:
+            raise ValueError("the directions of the points are not known")
+        return np.asarray(np.einsum("ca,cak->ck", self.force, self.bases))
+
+    def of_points(self, points: NDArray[np.intp]) -> ContactState:
+        """Return the state of some points (k,)."""
+        return ContactState(
+            self.status[points],
+            self.force[points],
+            self.gap[points],
+            self.tangential_displacement[points],
+            self.accumulated_slip[points],
+            None if self.bases is None else self.bases[points],
+        )
+
 
 @dataclass(frozen=True)
 class ContactSolution:

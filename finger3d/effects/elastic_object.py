@@ -33,7 +33,7 @@ from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.symmetry import held_dofs
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.swept import mesh_section
-from finger3d.objects import Cylinder, MeshObject, Plane, Sphere
+from finger3d.objects import Cylinder, MeshObject, PlacedObject, Plane, Sphere, vertical_frame
 
 Zone = tuple[float, float, float, float]
 Say = Callable[[str], None]
@@ -66,7 +66,7 @@ class SoftObject:
         mesh, whole = body.mesh()
         meshing = time.perf_counter() - start
         trace = facing_trace(problem.surface, mesh, "contact")
-        frame = model.object.frame(d)
+        frame = vertical_frame(d)
         rows = sp.kron(trace, frame, format="csr")
         images = 1
         if whole and axes:  # the body is meshed whole: all images of a point are pressed alike
@@ -184,7 +184,9 @@ class ObjectBody:
             x, z = np.meshgrid(
                 np.linspace(-reach, reach, _SURFACE), np.linspace(-0.5 * finger.width_mm, 0.5 * finger.width_mm, 41)
             )
-            rises = obj.height(x.ravel(), z.ravel() if self.model.domain == "solid" else 0.0 * z.ravel())
+            rises = PlacedObject.of(obj, 0.0).height(
+                x.ravel(), z.ravel() if self.model.domain == "solid" else 0.0 * z.ravel()
+            )
             low, high = float(rises.min()), float(rises.max())
         height = self.height_mm + high - low
         design = designs()["block"](half_length_mm=reach, height_mm=height, width_mm=finger.width_mm)
@@ -201,7 +203,9 @@ class ObjectBody:
             return Mesh(points, mesh.cells, mesh.facets)
         behind = 1.0 + points[:, 1] / height  # 0 on the surface, 1 on the far face
         z_at = points[:, 2] if mesh.dim == 3 else 0.0 * points[:, 0]
-        points[:, 1] = obj.height(points[:, 0], z_at) * (1.0 - behind) + (high + self.height_mm) * behind
+        points[:, 1] = (
+            PlacedObject.of(obj, 0.0).height(points[:, 0], z_at) * (1.0 - behind) + (high + self.height_mm) * behind
+        )
         return Mesh(points, mesh.cells, mesh.facets)
 
     def _file(self, obj: MeshObject) -> Mesh:
@@ -254,11 +258,15 @@ class Effect:
             )
         if isinstance(obj, MeshObject) and model.domain != "solid":
             raise Finger3dError('effects.elastic_object: a mesh as object has no section; set model.domain = "solid"')
+        if obj.is_turned and not isinstance(obj, Sphere):
+            raise Finger3dError(
+                "effects.elastic_object: not with a turned object; take turn_x_deg, turn_y_deg and turn_z_deg out"
+            )
         soft = SoftObject(self.E_MPa, self.nu, self.height_mm)
         model = fill(model, "object_compliance", soft, "elastic_object")
-        if any(leg.slide_x_mm or leg.slide_z_mm for leg in model.legs):
+        if any(leg.moves_sideways for leg in model.legs):
             model = warn(
                 model,
-                "elastic_object: the object's shape slides, its compliance stays that of where it was touched first",
+                "elastic_object: the object's shape moves, its compliance stays that of where it was touched first",
             )
         return model

@@ -31,10 +31,10 @@ from finger3d.fem.neo_hooke import InvertedError, NeoHooke, assemble, nodal_fiel
 from finger3d.fem.recover import displacement
 from finger3d.fem.traces import BoundarySurface
 from finger3d.mechanics.cost import FACTORISATIONS, AddedCost, PressCost
-from finger3d.mechanics.formulation import Workspace, length_scale, solve_contact
-from finger3d.mechanics.history import ObjectPose
+from finger3d.mechanics.formulation import Workspace, length_scale, moment_of, solve_contact
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem, scatter_to_points
+from finger3d.objects import ObjectPose
 
 _ITERATIONS = 19
 """Newton iterations of an increment, at most."""
@@ -48,9 +48,6 @@ _LARGEST_STEP = 10.0
 _STEP_LENGTHS = (1.0, 0.5, 0.25, 0.125)
 """Fractions of a Newton step tried in the line search, until no cell is inverted."""
 
-_SLOPE_STEP = 1e-5
-"""Step of the central differences of the object's height, in depths of the press; any step is exact for a plane."""
-
 _NUMERIC_FACTORISATION = 0.8
 """Time of a factorisation whose ordering is known, over that of a condensation."""
 
@@ -59,9 +56,6 @@ _TANGENT_ASSEMBLY = 0.8
 
 _OTHER_S = {2: 0.008, 3: 0.12}
 """Further seconds of an increment, by dimension."""
-
-_OUTSIDE_GAP = 2.0
-"""Gap of points that no part of the object covers, in heights of the finger."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -194,6 +188,14 @@ class FiniteStrain:
         mesh, axes = problem.mesh, problem.axes
         u = displacement(mesh, self.unknowns(problem, state))
         return {gauge.name: gauge.finite_strain(mesh, u, axes) for gauge in problem.model.gauges}
+
+    def moment(self, problem: Problem, state: ContactState, target: ObjectPose) -> Float:
+        """Return the moment about the middle of the base, of nodal forces at the displaced nodes."""
+        mesh = problem.mesh
+        u = displacement(mesh, self.unknowns(problem, state))
+        contact = _contact(problem, problem.surface, u, target)
+        nodal = (contact.rows.T @ state.force.ravel()).reshape(u.shape)
+        return moment_of(mesh.points + u, nodal)
 
     def gaps(
         self, problem: Problem, states: Sequence[ContactState], targets: Sequence[ObjectPose], face: BoundarySurface
@@ -357,27 +359,15 @@ class _NewtonIncrement:
 
 def _contact(problem: Problem, face: BoundarySurface, u: Float, target: ObjectPose) -> DeformedContact:
     """Contact of a face displaced by u (n, d) with the object at a pose; gaps are means over the deformed area."""
-    model, d = problem.model, problem.dim
-    height = model.object.height
+    placed = problem.placed(target)
     position = face.samples + face.interpolate @ u
-    x, step = position[:, 0] - target.slide_x_mm, _SLOPE_STEP * max(target.depth_mm, 1e-3)
-    z = position[:, 2] - target.slide_z_mm if d == 3 else np.zeros(len(x))
-    level = height(x, z)
-    covered = np.isfinite(level)
-    slope_x = (height(x + step, z) - height(x - step, z)) / (2.0 * step)
-    slope_z = (height(x, z + step) - height(x, z - step)) / (2.0 * step)
-    normal = np.stack([slope_x, np.full(len(x), -1.0), slope_z], axis=1)[:, :d]
-    has_slope = covered & np.isfinite(normal).all(axis=1)
-    normal = np.where(has_slope[:, None], normal, problem.points.basis[0])
-    length = np.linalg.norm(normal, axis=1)
-    vertical = level + problem.system.first_contact_mm - target.depth_mm - position[:, 1]
-    gap = np.where(covered, vertical / length, _OUTSIDE_GAP * model.design.height_mm)
+    gap, normal = placed.distance(position)
     return deformed_contact(
         face,
         points=problem.mesh.points,
         displacement=u,
         gap=gap,
-        normal=normal / length[:, None],
+        normal=normal,
         axes=problem.axes,
     )
 

@@ -34,10 +34,12 @@ from finger3d.fem.condense import spring_forces, stiffened
 from finger3d.fem.material import Elasticity
 from finger3d.fem.recover import across, displacement, nodal_strain, pressure, stress
 from finger3d.mechanics.cost import AddedCost, PressCost
-from finger3d.mechanics.formulation import SmallStrain, Workspace, length_scale, solve_contact
-from finger3d.mechanics.history import ObjectPose
+from finger3d.mechanics.formulation import Workspace
+from finger3d.mechanics.linear_contact import LinearBody, LinearState, solve_increment
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem, scatter_to_points
+from finger3d.mechanics.small_strain import SmallStrain
+from finger3d.objects import ObjectPose
 
 
 @dataclass(frozen=True)
@@ -232,7 +234,7 @@ def _times(upper: sp.csr_matrix, vector: Float) -> Float:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ViscousState(ContactState):
+class ViscousState(LinearState):
     """Contact state with the internal variables of the meshed part."""
 
     memory: InternalVariables
@@ -298,6 +300,7 @@ class Viscoelastic(SmallStrain):
     ) -> ContactSolution:
         """Apply the contact rule once, with the compliance for this time step and the displacement due to the past."""
         assert isinstance(workspace, RelaxationWorkspace)
+        assert isinstance(state, ViscousState)
         memory, step = self._memory(state), Step(self.prony, b.time_s - a.time_s)
         body = self._body(problem).respond(step, memory, workspace)
         own, springs = body.compliance, problem.inclusions.bar_stiffness
@@ -306,17 +309,17 @@ class Viscoelastic(SmallStrain):
         if len(springs):
             moved = moved + own[:, first:] @ spring_forces(own, springs, moved)
         c, d = len(problem.surface.nodes), problem.dim
-        free = problem.free_motion(b)
-        free.reshape(-1)[problem.system.active_dofs] += moved[: len(problem.system.active_dofs)]
+        past = np.zeros(c * d)
+        past[problem.system.active_dofs] = moved[: len(problem.system.active_dofs)]
         # an elastic object does not relax
         rest = problem.delassus - scatter_to_points(
             stiffened(problem.part.condensed.compliance, springs), problem.system.active_dofs, c, d
         )
         compliance = scatter_to_points(stiffened(own, springs), problem.system.active_dofs, c, d) + rest
-        found = solve_contact(problem, state, free, compliance, length_scale(problem, a, b), guess)
+        found = solve_increment(problem, state, a, b, LinearBody(compliance, past.reshape(c, d)), guess, workspace)
         if found.state is state:
             return found
-        rows = problem.row_forces(found.state.force)
+        rows = problem.row_forces(problem.upright_force(found.state))
         if len(springs):
             rows[first:] = spring_forces(own, springs, body.moved + own @ rows)
         after = ViscousState(**vars(found.state), memory=step.after(memory, body.shape(rows)))

@@ -32,11 +32,15 @@ class BoundarySurface:
     points : (c, d) mm, at rest
     area : (c,) mm2
         Integral of the hat: a nodal force over it is the nodal pressure.
+    normals : (c, d)
+        Outward unit normals, weighted means as of anything sampled.
     trace : (c, n)
         Weighted displacement of a point = trace @ u.
     samples : (q, d) mm, quadrature points on the boundary at rest
     average : (c, q)
         Weighted mean at a point of anything sampled at `samples`.
+    hats : (c, q)
+        Hat function of every point at `samples`, with the sparsity pattern of `average`.
     interpolate : (q, n)
         Value of a nodal field at `samples`.
     along : d - 1 times (q, n)
@@ -46,14 +50,29 @@ class BoundarySurface:
     nodes: Int
     points: Float
     area: Float
+    normals: Float
     trace: sp.csr_matrix
     samples: Float
     average: sp.csr_matrix
     interpolate: sp.csr_matrix
+    hats: sp.csr_matrix
     along: tuple[sp.csr_matrix, ...] = ()
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
+
+    @property
+    def centroids(self) -> Float:
+        """Centroids (c, d) mm of the hat functions, where nodal forces act."""
+        return np.asarray(self.average @ self.samples)
+
+    def interpolated(self, values: Float) -> Float:
+        """Return values (q, k) at the samples, linear between those of the points (c, k).
+
+        Where a neighbour is not among the points, those that are share its weight.
+        """
+        total = np.asarray(self.hats.sum(axis=0)).ravel()
+        return np.asarray((self.hats.T @ values) / total[:, None])
 
 
 def surface(mesh: Mesh, label: str, thickness: float = 1.0) -> BoundarySurface:
@@ -73,7 +92,9 @@ def surface(mesh: Mesh, label: str, thickness: float = 1.0) -> BoundarySurface:
     area: Float = np.bincount(number.ravel(), hat.sum(axis=1).ravel(), minlength=len(nodes)).astype(np.float64)
     which = np.broadcast_to(number[:, None, :], hat.shape)
     at = np.broadcast_to(np.arange(m * q).reshape(m, q, 1), hat.shape)
-    average = sp.csr_matrix(((hat / area[which]).ravel(), (which.ravel(), at.ravel())), shape=(len(nodes), m * q))
+    places = (which.ravel(), at.ravel())
+    average = sp.csr_matrix(((hat / area[which]).ravel(), places), shape=(len(nodes), m * q))
+    hats = sp.csr_matrix((np.broadcast_to(phi, hat.shape).ravel(), places), shape=average.shape)
     spread = np.broadcast_to(facets[:, None, :], (m, q, facets.shape[1]))
     sample = np.repeat(np.arange(m * q), facets.shape[1])
 
@@ -83,18 +104,35 @@ def surface(mesh: Mesh, label: str, thickness: float = 1.0) -> BoundarySurface:
 
     values, slopes = sampled(psi), element.gradient(bary)
     along = tuple(sampled(slopes[:, :, k]) for k in range(d - 1))
-    return BoundarySurface(nodes, mesh.points[nodes], area, (average @ values).tocsr(), samples, average, values, along)
+    trace = (average @ values).tocsr()
+    normals = np.asarray(average @ _outward([slope @ mesh.points for slope in along]))
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    return BoundarySurface(nodes, mesh.points[nodes], area, normals, trace, samples, average, values, hats, along)
+
+
+def _outward(tangents: list[Float]) -> Float:
+    """Outward unit normals (q, d) from d - 1 tangents (q, d) of a boundary."""
+    first, *others = tangents
+    normal = np.cross(first, others[0]) if others else np.stack([first[:, 1], -first[:, 0]], axis=1)
+    return np.asarray(normal / np.linalg.norm(normal, axis=1)[:, None])
 
 
 def restrict(surface: BoundarySurface, keep: NDArray[np.bool_] | Int) -> BoundarySurface:
-    """The contact points where `keep` (c,) holds, or those of the numbers `keep` in this order."""
+    """The contact points where `keep` (c,) holds, or those of the numbers `keep` in this order, with their samples."""
+    average = surface.average[keep]
+    used = np.unique(average.indices)
     return replace(
         surface,
         nodes=surface.nodes[keep],
         points=surface.points[keep],
         area=surface.area[keep],
+        normals=surface.normals[keep],
         trace=surface.trace[keep],
-        average=surface.average[keep],
+        samples=surface.samples[used],
+        average=average[:, used],
+        interpolate=surface.interpolate[used],
+        hats=surface.hats[keep][:, used],
+        along=tuple(slope[used] for slope in surface.along),
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +14,14 @@ from finger3d._arrays import freeze_arrays
 from finger3d._types import Float, Int
 from finger3d.geometry.bvh import Tree, cylinder_distance
 
+if TYPE_CHECKING:
+    from scipy.spatial import KDTree
+
 _SLACK = 1e-12  # over the surface's size: tolerance that makes vertical lines through shared edges hit a triangle
 _EDGES = ((0, 1), (1, 2), (2, 0))
+_SLENDER = 6.0  # longest edge squared over twice the area, from which a triangle is cut for its bounds
+_SHORT = 2e-3  # longest edge over the surface's size, below which it is not
+_MOST_CUTS, _MOST_PIECES = 12, 32
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,16 +110,50 @@ class Triangles:
         return facing, Tree.over(self.corners[facing])
 
     @cached_property
+    def _pieces(self) -> tuple[Float, Int, Tree]:
+        """Slender triangles cut across: corners (p, 3, 3), the triangle (p,) of each piece, and their tree.
+
+        Pieces are closer to their bounding cylinders than a slender triangle is.
+        """
+        corners, owner = self.corners, np.arange(len(self.faces))
+        for _ in range(_MOST_CUTS):
+            edges = np.linalg.norm(corners[:, [1, 2, 0]] - corners, axis=2)
+            longest = edges.max(axis=1)
+            area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+            slender = np.flatnonzero((longest**2 > _SLENDER * area) & (longest > _SHORT * self.size))
+            if not len(slender) or len(corners) + len(slender) > _MOST_PIECES * len(self.faces):
+                break
+            start = edges[slender].argmax(axis=1)
+            a, b, c = (corners[slender, (start + i) % 3] for i in range(3))
+            middle = 0.5 * (a + b)
+            whole = np.setdiff1d(np.arange(len(corners)), slender)
+            corners = np.concatenate([corners[whole], np.stack([a, middle, c], 1), np.stack([middle, b, c], 1)])
+            owner = np.concatenate([owner[whole], owner[slender], owner[slender]])
+        return corners, owner, Tree.over(corners)
+
+    @cached_property
+    def _vertices(self) -> KDTree:
+        """Corners of all pieces."""
+        from scipy.spatial import KDTree
+
+        corners, _, _ = self._pieces
+        cut = [] if len(corners) == len(self.faces) else [corners.reshape(-1, 3)]
+        vertices = np.vstack([self.points[np.unique(self.faces)], *cut])
+        return KDTree(vertices, balanced_tree=False, compact_nodes=False)
+
+    @cached_property
     def _bounding_cylinders(self) -> tuple[Float, ...]:
-        return self.tree.bounding_cylinders(self.corners, self.area_vectors)
+        corners, owner, tree = self._pieces
+        return tree.bounding_cylinders(corners, self.normals[owner])
 
     @cached_property
     def _bounding_discs(self) -> Float:
-        """Bounding disc of every triangle: a cylinder (m, 8) of height zero."""
-        middle = self.corners.mean(axis=1)
-        radius = np.linalg.norm(self.corners - middle[:, None], axis=2).max(axis=1)
+        """Bounding disc of every piece: a cylinder (p, 8) of height zero."""
+        corners, owner, _ = self._pieces
+        middle = corners.mean(axis=1)
+        radius = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
         # without area there is no axis, and nothing lies off the middle's plane
-        return np.hstack([middle, self.normals, radius[:, None], np.zeros((len(radius), 1))])
+        return np.hstack([middle, self.normals[owner], radius[:, None], np.zeros((len(radius), 1))])
 
     @cached_property
     def _corner_normals(self) -> tuple[Float, Float]:
@@ -194,9 +235,11 @@ class Triangles:
         def near(query: Int, level: int, node: Int) -> NDArray[np.bool_]:
             return cylinder_distance(points[query], self._bounding_cylinders[level][node]) <= reach[query]
 
-        for query, item in self.tree.pairs(len(points), near):
-            close = cylinder_distance(points[query], self._bounding_discs[item]) <= reach[query]
-            query, item = query[close], item[close]
+        _, owner, tree = self._pieces
+        for query, piece in tree.pairs(len(points), near):
+            close = cylinder_distance(points[query], self._bounding_discs[piece]) <= reach[query]
+            pair = np.unique(query[close] * len(self.faces) + owner[piece[close]])
+            query, item = np.divmod(pair, len(self.faces))
             p, which = _closest_on_triangle(points[query], self.corners[item], self.normals[item])
             distance = np.linalg.norm(points[query] - p, axis=1)
             order = np.lexsort((item, distance, query))
@@ -207,18 +250,16 @@ class Triangles:
 
     def _distance_bound(self, points: Float) -> Float:
         """Return an upper bound (n,) of the distance, from the nearest corner and from one descent of the tree."""
-        from scipy.spatial import cKDTree
-
-        vertices = self.points[np.unique(self.faces)]
-        reach = cKDTree(vertices, balanced_tree=False, compact_nodes=False).query(points)[0]
+        _, owner, tree = self._pieces
+        reach = self._vertices.query(points)[0]
         # The corners of a large triangle may be far away; the triangles in a leaf of the tree give a better bound.
         node = np.zeros(len(points), dtype=np.int64)
         for cylinder in self._bounding_cylinders[1:]:
             children = np.stack([cylinder_distance(points, cylinder[4 * node + i]) for i in range(4)])
             node = 4 * node + np.argmin(children, axis=0)
-        for column in range(self.tree.items.shape[1]):
-            item = self.tree.items[node, column]
-            there = item >= 0
+        for column in range(tree.items.shape[1]):
+            piece = tree.items[node, column]
+            item, there = owner[piece], piece >= 0
             p = _closest_on_triangle(points[there], self.corners[item[there]], self.normals[item[there]])[0]
             reach[there] = np.minimum(reach[there], np.linalg.norm(points[there] - p, axis=1))
         value: Float = reach * (1.0 + 1e-9) + 1e-12 * self.size

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -15,6 +16,7 @@ from finger3d.fem.assembly import stiffness
 from finger3d.fem.condense import condense, stiffened
 from finger3d.fem.simplex import Mesh
 from finger3d.fem.traces import BoundarySurface, local_rows, restrict, surface
+from finger3d.mechanics.contact_geometry import contact_geometry
 from finger3d.mechanics.model import EmbeddedBars, Leg, Model, ObjectResponse
 from finger3d.mechanics.path import targets
 from finger3d.mechanics.problem import (
@@ -22,7 +24,7 @@ from finger3d.mechanics.problem import (
     ContactSystem,
     Part,
     Problem,
-    rigid_gap,
+    object_share,
     scatter_to_points,
 )
 from finger3d.mechanics.resolution import check
@@ -31,7 +33,7 @@ from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.limits import check_rows
 from finger3d.meshing.report import MeshReport
 from finger3d.meshing.swept import mesh_section
-from finger3d.objects import initial_contact
+from finger3d.objects import DistanceTracker, ObjectPose, PlacedObject, initial_contact, vertical_frame
 
 Say = Callable[[str], None]
 
@@ -79,7 +81,7 @@ def build(model: Model, say: Say = lambda text: None, margin: float = MARGIN) ->
     active = active_dofs(candidates, axes)
     check_rows(len(active), len(model.gauges))
     bars = model.inclusions.discretise(model, mesh, axes) if model.inclusions else None
-    rows = local_rows(candidates, model.object.frame(mesh.dim))[active]
+    rows = local_rows(candidates, vertical_frame(mesh.dim))[active]
     rows = sp.vstack([rows, *_readings(model, mesh, axes, bars, say)], format="csr")
     assembly = time.perf_counter() - start
     say(f"condensing {matrix.upper.shape[0]} unknowns to {len(candidates.nodes)} contact points")
@@ -142,6 +144,7 @@ def with_object_compliance(problem: Problem, response: ObjectResponse) -> Proble
             problem.system,
             delassus=problem.system.delassus + response.compliance,
             object_factorizations=response.factorizations,
+            object_share=object_share(problem.surface, problem.system.delassus, response.compliance),
         ),
         seconds=problem.seconds | response.seconds,
         without_inclusions=with_object_compliance(body, response) if body else None,
@@ -184,8 +187,15 @@ def candidate_points(model: Model, face: BoundarySurface, touch: float, margin: 
     margin : rigid gap that the points reach to, in depths of the press
     """
     path = targets(tuple(replace(leg, steps=_stations(leg)) for leg in model.legs))
-    nearest = np.min([rigid_gap(model, face, touch, pose) for pose in path], axis=0)
-    reach = margin * max(pose.depth_mm for pose in path) + max(float(nearest.min()), 0.0)
+    reach = margin * max(pose.depth_mm for pose in path)
+    tracker, near = DistanceTracker(), reach + model.mesh.size_mm if math.isfinite(reach) else 0.0
+
+    def gap(pose: ObjectPose) -> Float:
+        placed = PlacedObject.of(model.object, touch, pose)
+        return contact_geometry(lambda points: tracker.distance(placed, points, near), face).gap
+
+    nearest = np.min([gap(pose) for pose in path], axis=0)
+    reach += max(float(nearest.min()), 0.0)
     order = np.argsort(nearest, kind="stable")  # so that points which touch come before those which do not
     near = order[nearest[order] < reach]
     return restrict(face, order if len(near) >= _WHOLE_FACE * len(order) else near)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from finger3d.fem.traces import restrict, surface
+from finger3d.fem.traces import surface
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.problem import Problem
 
@@ -26,8 +26,8 @@ def contact_within_candidates(problem: Problem, steps: Sequence[StepResult]) -> 
     face = surface(problem.part.mesh, "contact", problem.part.thickness)
     others = ~np.isin(face.nodes, problem.system.surface.nodes)
     parts, ends = [f.part for f in steps], [f.target for f in steps]
-    gaps = problem.model.formulation.gaps(problem, parts, ends, restrict(face, others))
-    return [bool(gap.min() > -_TOUCHES * end.depth_mm) for gap, end in zip(gaps, ends, strict=True)]
+    gaps = problem.model.formulation.gaps(problem, parts, ends, face)
+    return [bool(gap[others].min() > -_TOUCHES * end.depth_mm) for gap, end in zip(gaps, ends, strict=True)]
 
 
 def candidates_cover_face(problem: Problem) -> bool:

@@ -6,30 +6,32 @@ import numpy as np
 
 from finger3d.contact.friction import SLIP
 from finger3d.contact.state import ContactState
-from finger3d.mechanics.history import ObjectPose
+from finger3d.mechanics.linear_contact import LinearState, transported
 from finger3d.mechanics.problem import Problem
+from finger3d.objects import ObjectPose
 
 
 def external_work(problem: Problem, before: ContactState, after: ContactState, a: ObjectPose, b: ObjectPose) -> float:
-    """Return the work (mJ) of the object on the finger: mean contact force times the displacement of its point.
+    """Return the work (mJ) of the object on the finger.
 
-    A point that comes into contact, or leaves it, has its force for a part of the increment only; the change of its
-    gap is not part of the path of the force.  In small strain the sum over increments is exactly the change of stored
-    energy plus the trapezoidal sum of friction times slip.
+    In small strain it is the mean contact force times the displacement of the finger's points, which adds up to the
+    energy stored, and what friction takes, the trapezoidal sum of friction times slip.  At finite strain it is the mean
+    force times the displacement of the object, less the part of a point that comes into contact or leaves it.
     """
+    if isinstance(before, LinearState) and isinstance(after, LinearState):
+        force = 0.5 * (before.scene_force + after.scene_force)
+        on_body = np.einsum("ck,ck->c", force, after.displacement - before.displacement)
+        assert after.bases is not None
+        start = transported(before, after.bases)
+        friction = 0.5 * (start.force + after.force)[:, 1:]
+        rubbed = np.einsum("ct,ct->c", friction, after.tangential_displacement - start.tangential_displacement)
+        return problem.symmetry.total(on_body - rubbed)
     moved = b.displacement - a.displacement
     mean = 0.5 * (problem.world_force(before) + problem.world_force(after))
     normal = 0.5 * (before.force[:, 0] + after.force[:, 0])
-    if not problem.model.formulation.finite_strain:
-        closed = after.gap - before.gap
-        if moved[0] or moved[2]:
-            # The object's profile moves under a point: its force does work where the finger follows the profile.
-            n = problem.model.object.frame(problem.dim)[0]
-            closed -= problem.gap(b) - problem.gap(a) + n @ moved[: problem.dim]
-    else:
-        # Beside the object the gap is arbitrary; no gap is closed by more than the object moves.
-        reach = float(np.linalg.norm(moved))
-        closed = np.minimum(after.gap, reach) - np.minimum(before.gap, reach)
+    # Beside the object the gap is arbitrary; no gap is closed by more than the object moves.
+    reach = float(np.linalg.norm(moved))
+    closed = np.minimum(after.gap, reach) - np.minimum(before.gap, reach)
     return float(mean.sum(axis=0) @ moved) + problem.symmetry.total(normal * closed)
 
 

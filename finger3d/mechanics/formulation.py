@@ -1,21 +1,25 @@
-"""Formulation of the body, its strain measure and material response: small strain, which effects replace or wrap."""
+"""Formulation of the body, its strain measure and material response: the interface that effects implement."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Protocol
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 from finger3d._types import Float
 from finger3d.contact.rules import RULES
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.mechanics.cost import AddedCost, PressCost
+from finger3d.objects import DistanceTracker
 
 if TYPE_CHECKING:
     from finger3d.fem.traces import BoundarySurface
-    from finger3d.mechanics.history import ObjectPose
     from finger3d.mechanics.model import Model
     from finger3d.mechanics.problem import Problem
+    from finger3d.objects import ObjectPose
 
 
 @dataclass
@@ -27,9 +31,11 @@ class Workspace:
     Attributes
     ----------
     factorizations : number of factorisations made with this workspace
+    tracker : distances of the finger's surface from the object
     """
 
     factorizations: int = 0
+    tracker: DistanceTracker = field(default_factory=DistanceTracker)
 
 
 class Formulation(Protocol):
@@ -107,6 +113,10 @@ class Formulation(Protocol):
         """Strain of every gauge by name."""
         ...
 
+    def moment(self, problem: Problem, state: ContactState, target: ObjectPose) -> Float:
+        """Moment (3,) N mm of the contact forces on the meshed part about the middle of the base."""
+        ...
+
     def gaps(
         self, problem: Problem, states: Sequence[ContactState], targets: Sequence[ObjectPose], face: BoundarySurface
     ) -> list[Float]:
@@ -116,6 +126,12 @@ class Formulation(Protocol):
     def fields(self, problem: Problem, state: ContactState) -> tuple[Float, Float, Float]:
         """Displacement (n, d) mm, strain (n, 3, 3) and stress (n, 3, 3) MPa at the nodes of the meshed part."""
         ...
+
+
+def moment_of(places: Float, forces: Float) -> Float:
+    """Return the moment (3,) N mm about the origin of forces (n, d) N at places (n, d) mm."""
+    arms, loads = (np.pad(v, ((0, 0), (0, 3 - v.shape[1]))) for v in (places, forces))
+    return np.asarray(np.cross(arms, loads).sum(axis=0))
 
 
 def length_scale(problem: Problem, a: ObjectPose, b: ObjectPose) -> float:
@@ -131,89 +147,12 @@ def solve_contact(
     scale: float,
     guess: Float | None,
     weights: Float | None = None,
+    points: NDArray[np.intp] | None = None,
 ) -> ContactSolution:
-    """Solve one increment by the model's stick rule and friction law; see `finger3d.contact.solve.solve_increment`."""
-    model = problem.model
-    return RULES[model.rule](state, free, compliance, model.friction, scale, guess, weights, problem.surface.area)
+    """Solve one increment by the model's stick rule and friction law; see `finger3d.contact.solve.solve_increment`.
 
-
-@dataclass(frozen=True)
-class SmallStrain:
-    """Linear elasticity over the condensed compliance: the paper's baseline."""
-
-    finite_strain: ClassVar[bool] = False
-    is_linear_elastic: ClassVar[bool] = True
-    supported_slots: ClassVar[frozenset[str]] = frozenset({"inclusions", "object_compliance"})
-
-    @property
-    def refactorises(self) -> bool:
-        """False: the factor of the build serves every increment."""
-        return False
-
-    def added_cost(self, model: Model, press: PressCost) -> AddedCost:
-        """Return zero cost."""
-        return AddedCost()
-
-    def state_size(self, press: PressCost) -> float:
-        """Return 0: the contact forces determine the displacements."""
-        return 0.0
-
-    def workspace(self) -> Workspace:
-        """Return an empty workspace; the compliance is that of the build."""
-        return Workspace()
-
-    def start(self, problem: Problem) -> ContactState:
-        """Return the state without forces, with the gaps at rest."""
-        return ContactState.at_rest(problem.gap(problem.origin), problem.dim)
-
-    def increment(
-        self,
-        problem: Problem,
-        state: ContactState,
-        a: ObjectPose,
-        b: ObjectPose,
-        guess: Float | None,
-        workspace: Workspace,
-    ) -> ContactSolution:
-        """Apply the contact rule once."""
-        return solve_contact(
-            problem, state, problem.free_motion(b), problem.delassus, length_scale(problem, a, b), guess
-        )
-
-    def unknowns(self, problem: Problem, state: ContactState) -> Float:
-        """Return the unknowns of one state."""
-        return next(iter(self.all_unknowns(problem, [state])))
-
-    def all_unknowns(self, problem: Problem, states: Sequence[ContactState]) -> Iterator[Float]:
-        """Yield the unknowns from the forces, by one back-substitution for many states."""
-        return problem.unknowns_of([state.force for state in states])
-
-    def gauges(self, problem: Problem, state: ContactState) -> dict[str, float]:
-        """Return the strains from the forces, by the rows of the gauges."""
-        return problem.gauge_strains(state.force)
-
-    def gaps(
-        self, problem: Problem, states: Sequence[ContactState], targets: Sequence[ObjectPose], face: BoundarySurface
-    ) -> list[Float]:
-        """Return the gaps at rest plus the displacement along the normal of the object."""
-        from finger3d.fem.recover import displacement
-
-        normal = problem.points.basis[0]
-        return [
-            problem.gap(target, face) + (face.trace @ displacement(problem.mesh, unknowns)) @ normal
-            for target, unknowns in zip(targets, self.all_unknowns(problem, states), strict=True)
-        ]
-
-    def fields(self, problem: Problem, state: ContactState) -> tuple[Float, Float, Float]:
-        """Return displacement, linear strain and stress; in a section also the out-of-plane components."""
-        from finger3d.fem.recover import across, displacement, nodal_strain, pressure, stress
-
-        unknowns = self.unknowns(problem, state)
-        u = displacement(problem.mesh, unknowns)
-        strain = nodal_strain(problem.mesh, u)
-        p = pressure(problem.mesh, problem.part.stiffness, unknowns) if problem.part.elastic.mixed else None
-        sigma = stress(strain, problem.part.elastic, p)
-        if problem.dim == 3:
-            return u, strain, sigma
-        material, plane_strain = problem.model.material, problem.model.domain == "plane-strain"
-        return u, *across(strain, sigma, material, plane_strain)
+    `points` (k,) are the contact points that the arguments belong to, all unless given.
+    """
+    model, area = problem.model, problem.surface.area
+    own = area if points is None else area[points]
+    return RULES[model.rule](state, free, compliance, model.friction, scale, guess, weights, own)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,29 +13,10 @@ from finger3d._types import Float, Tree
 from finger3d.contact.friction import OPEN, STATUS_NAMES, STICK
 from finger3d.contact.state import ContactState
 from finger3d.errors import Outcome
+from finger3d.objects import ObjectPose
 
 _ON_LINE = 1e-9
 """Distance from the line z = 0, in half widths, below which a vertex lies on it: round-off of its coordinates."""
-
-
-@dataclass(frozen=True)
-class ObjectPose:
-    """Pose of the object: depth and slides along x and z, at a time (s)."""
-
-    depth_mm: float
-    slide_x_mm: float = 0.0
-    slide_z_mm: float = 0.0
-    time_s: float = 0.0
-
-    @property
-    def displacement(self) -> Float:
-        """Displacement (3,) mm along x, y and z since first touch."""
-        return np.array([self.slide_x_mm, -self.depth_mm, self.slide_z_mm])
-
-    @property
-    def coordinates(self) -> Float:
-        """Depth and slides (mm), and time (s): array (4,)."""
-        return np.array([self.depth_mm, self.slide_x_mm, self.slide_z_mm, self.time_s])
 
 
 @dataclass(frozen=True)
@@ -121,13 +103,15 @@ class ContactPoints:
 class StepResult:
     """Result of an increment: contact state of the whole finger (m points), gauge strains, work and convergence.
 
-    `part` is the state of the meshed part (c points), from which fields are recovered.
+    `part` is the state of the meshed part (c points), from which fields are recovered; `moment` (3,), N mm, is that of
+    all contact forces on the finger about the middle of the base.
     """
 
     target: ObjectPose
     state: ContactState
     part: ContactState
     lowest: tuple[float, float]
+    moment: Float
     gauges: dict[str, float]
     external_work_mJ: float
     dissipation_mJ: float
@@ -178,11 +162,14 @@ def measure(points: ContactPoints, step: StepResult) -> Tree:
         "depth_mm": target.depth_mm,
         "slide_x_mm": target.slide_x_mm,
         "slide_z_mm": target.slide_z_mm,
+        **{f"turn_{axis}_deg": round(math.degrees(turn), 12) for axis, turn in zip("xyz", target.turns, strict=True)},
         "time_s": target.time_s,
         "normal_force_N": -float(world[:, 1].sum()),
         "tangential_force_x_N": float(friction[:, 0].sum()),
         "tangential_force_z_N": float(friction[:, 2].sum()),
         "friction_sum_N": float(np.linalg.norm(friction, axis=1).sum()),
+        **{f"force_{axis}_N": float(force) for axis, force in zip("xyz", world.sum(axis=0), strict=True)},
+        **{f"moment_{axis}_Nmm": float(moment) for axis, moment in zip("xyz", step.moment, strict=True)},
         "outward_friction_x_N": float(outward_x.sum()),
         "outward_friction_z_N": float(outward_z.sum()),
         "contact_area_mm2": float(points.area[touching].sum()),
@@ -205,22 +192,28 @@ def measure(points: ContactPoints, step: StepResult) -> Tree:
 
 
 def contact_table(points: ContactPoints, state: ContactState) -> Tree:
-    """Columns of contact.csv; pressure and shear are the traction on the finger, slip is in x and z."""
+    """Columns of contact.csv; pressure and shear are the traction on the finger, normals point into it."""
     points = points.with_basis_of(state)
     friction = points.friction(state.force)
     padded = np.zeros((len(state.accumulated_slip), points.dim))
     padded[:, 1:] = state.accumulated_slip
     slip = points.to_global(padded)
+    along = np.zeros_like(padded)
+    along[:, 0] = 1.0
+    normal = points.to_global(along)
     return {
         "x_mm": points.points[:, 0],
         "y_mm": points.points[:, 1],
         "z_mm": points.points[:, 2],
         "area_mm2": points.area,
+        **{f"normal_{axis}": normal[:, k] for k, axis in enumerate("xyz")},
         "pressure_MPa": state.force[:, 0] / points.area,
         "shear_x_MPa": friction[:, 0] / points.area,
+        "shear_y_MPa": friction[:, 1] / points.area,
         "shear_z_MPa": friction[:, 2] / points.area,
         "gap_mm": state.gap,
         "slip_x_mm": slip[:, 0],
+        "slip_y_mm": slip[:, 1],
         "slip_z_mm": slip[:, 2],
         "status": [STATUS_NAMES[s] for s in state.status],
     }

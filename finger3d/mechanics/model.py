@@ -17,9 +17,10 @@ from finger3d.fem.material import Material
 from finger3d.fem.simplex import Mesh
 from finger3d.geometry.design import Design
 from finger3d.mechanics.cost import AddedCost, PressCost
-from finger3d.mechanics.formulation import Formulation, SmallStrain
+from finger3d.mechanics.formulation import Formulation
 from finger3d.mechanics.gauges import Gauge
-from finger3d.objects import ContactPath, Plane, RigidObject
+from finger3d.mechanics.small_strain import SmallStrain
+from finger3d.objects import ContactPath, ObjectPose, Plane, RigidObject, between
 
 if TYPE_CHECKING:
     from finger3d.mechanics.problem import Problem
@@ -31,6 +32,8 @@ Domain = Literal["solid", "plane-strain", "plane-stress"]
 class Leg:
     """Straight part of the path of the object, from the end of the leg before, in equal increments.
 
+    With a `force_N` the increments are equal in the normal force, which determines the depth; `depth_mm` is a forecast.
+
     With ``steps = "auto"`` their number is chosen by the estimated error (`finger3d.mechanics.step_halving`).  This is
     the default of a scene; a leg made in Python has 10.
     """
@@ -40,6 +43,22 @@ class Leg:
     slide_z_mm: float = 0.0
     steps: int | Literal["auto"] = 10
     duration_s: float | None = None
+    turn_x: float = 0.0
+    turn_y: float = 0.0
+    turn_z: float = 0.0
+    force_N: float | None = None
+
+    @property
+    def moves_sideways(self) -> bool:
+        """Whether the object is slid or turned at its end."""
+        return any((self.slide_x_mm, self.slide_z_mm, self.turn_x, self.turn_y, self.turn_z))
+
+    def end(self, start: ObjectPose) -> ObjectPose:
+        """Return the pose at the end of the leg, which begins at `start`."""
+        time_s = start.time_s + (self.duration_s or 0.0)
+        return ObjectPose(
+            self.depth_mm, self.slide_x_mm, self.slide_z_mm, time_s, self.turn_x, self.turn_y, self.turn_z
+        )
 
 
 @dataclass(frozen=True)
@@ -186,16 +205,16 @@ class Model:
 
 def contact_path(design: Design, obj: RigidObject, legs: tuple[Leg, ...], domain: Domain) -> ContactPath:
     """Return an object and its path into a finger, with poses at the quarters of every leg."""
-    at, targets = np.zeros(3), []
+    at, poses = ObjectPose(0.0), list[ObjectPose]()
     for leg in legs:
-        end = np.array([leg.depth_mm, leg.slide_x_mm, leg.slide_z_mm])
-        targets += [at + share * (end - at) for share in (0.25, 0.5, 0.75, 1.0)]
+        end = leg.end(at)
+        poses += [between(at, end, share) for share in (0.25, 0.5, 0.75, 1.0)]
         at = end
     return ContactPath(
         top=design.top,
         object=obj,
         half_length_mm=design.half_length_mm,
         half_width_mm=design.width_mm / 2.0 if domain == "solid" else 0.0,
-        targets=np.array(targets),
+        poses=tuple(poses),
         landmarks=design.landmarks(),
     )

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from finger3d.mechanics.history import ObjectPose
 from finger3d.mechanics.model import Leg
+from finger3d.objects import ObjectPose, between
 
 AUTO_START = 10
 """Increments that ``steps = "auto"`` begins with."""
@@ -17,15 +17,20 @@ def targets(legs: tuple[Leg, ...]) -> list[ObjectPose]:
     at = ObjectPose(0.0)
     for leg in legs:
         count = leg.steps if isinstance(leg.steps, int) else AUTO_START
-        end = ObjectPose(leg.depth_mm, leg.slide_x_mm, leg.slide_z_mm, at.time_s + (leg.duration_s or 0.0))
+        end = leg.end(at)
         out += [between(at, end, k / count) for k in range(1, count)] + [end]
         at = end
     return out
 
 
-def between(a: ObjectPose, b: ObjectPose, share: float) -> ObjectPose:
-    """Return the pose a share of the way from a to b."""
-    return ObjectPose(*(a.coordinates + share * (b.coordinates - a.coordinates)).tolist())
+def prescribed_forces(legs: tuple[Leg, ...]) -> list[tuple[int, int, float] | None]:
+    """Return the number of every increment in its leg, the leg's count and force (N); None in a leg with a depth."""
+    out: list[tuple[int, int, float] | None] = []
+    for leg in legs:
+        count = leg.steps if isinstance(leg.steps, int) else AUTO_START
+        force = leg.force_N
+        out += [None if force is None else (k, count, force) for k in range(1, count + 1)]
+    return out
 
 
 def stride_ratio(before: ObjectPose, a: ObjectPose, b: ObjectPose) -> float | None:

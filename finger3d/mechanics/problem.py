@@ -18,13 +18,13 @@ from finger3d.fem.condense import Condensation, spring_forces
 from finger3d.fem.material import LinearElasticity
 from finger3d.fem.simplex import Mesh
 from finger3d.fem.traces import BoundarySurface
-from finger3d.mechanics.history import ContactPoints, ObjectPose
+from finger3d.mechanics.contact_geometry import contact_geometry
+from finger3d.mechanics.history import ContactPoints
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.symmetry import Symmetry
 from finger3d.meshing.report import MeshReport
+from finger3d.objects import ObjectPose, PlacedObject, vertical_frame
 
-_COVERED = 0.5  # least share of a point's hat that must be under the object
-_OUTSIDE_GAP = 2.0  # gap of points that the object does not cover, in heights of the finger; never closed
 _AT_ONCE = 8_000_000  # unknowns solved for at once: 64 MB, and a few times as much in between
 
 
@@ -59,12 +59,13 @@ class ContactSystem:
     ----------
     surface : the candidate points
     points : the contact points of the whole finger
-    delassus : (c, d, c, d) mm/N, in the object's frame
-    gauge_rows : (g, c d) strain per N
+    delassus : (c, d, c, d) mm/N, in the directions of an upright object
+    gauge_rows : (g, c d) strain per N, in the same directions
     active_dofs : (r,) directions among c d that the condensed rows stand for
     first_contact_mm : height of the object's lowest point at first touch
     place_mm : (x, z) of first touch, if the finger's surface is known
     object_factorizations : factorisations of an elastic object
+    object_share : (c,) share of an elastic object in the normal compliance of each point; None if it is rigid
     """
 
     surface: BoundarySurface
@@ -75,6 +76,7 @@ class ContactSystem:
     first_contact_mm: float
     place_mm: tuple[float, float] | None = None
     object_factorizations: int = 0
+    object_share: Float | None = None
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
@@ -168,23 +170,32 @@ class Problem:
         return ObjectPose(0.0)
 
     @property
+    def last_pose(self) -> ObjectPose:
+        """Pose at the end of the path."""
+        at = self.origin
+        for leg in self.model.legs:
+            at = leg.end(at)
+        return at
+
+    @property
     def dim(self) -> int:
         """Space dimensions."""
         return self.system.points.dim
 
-    def gap(self, target: ObjectPose, surface: BoundarySurface | None = None) -> Float:
-        """Weighted gap (c,) mm at rest under a target, from the exact object at the surface's quadrature points."""
-        where = surface or self.system.surface
-        return rigid_gap(self.model, where, self.system.first_contact_mm, target)
+    def placed(self, pose: ObjectPose) -> PlacedObject:
+        """Return the object in a pose."""
+        return PlacedObject.of(self.model.object, self.system.first_contact_mm, pose)
 
-    def free_motion(self, target: ObjectPose) -> Float:
-        """Gap and tangential position (c, d) mm of every point under no contact force."""
-        frame = self.model.object.frame(self.dim)
-        moved = target.displacement[: self.dim]
-        out = np.empty((len(self.system.surface.nodes), self.dim))
-        out[:, 0] = self.gap(target)
-        out[:, 1:] = -(frame[1:] @ moved)
-        return out
+    def gap(
+        self, target: ObjectPose, surface: BoundarySurface | None = None, displacement: Float | None = None
+    ) -> Float:
+        """Gap (c,) mm of a surface's points, the candidates unless given, at rest or displaced by (c, d) mm."""
+        where = surface or self.system.surface
+        return contact_geometry(self.placed(target).distance, where, displacement, self.axes).gap
+
+    def upright_force(self, state: ContactState) -> Float:
+        """Forces (c, d) N on the part's points in the directions of an upright object."""
+        return np.asarray(state.scene_force @ vertical_frame(self.dim).T)
 
     def world_force(self, state: ContactState) -> Float:
         """Forces (m, 3) N on the whole finger's points in x, y, z, from the part's state."""
@@ -193,8 +204,11 @@ class Problem:
 
     def coupling(self) -> float:
         """Largest mu |K_tt^-1 K_tn| over points; above 1 a contact state need not be the only one."""
-        c, d = self.system.delassus.shape[:2]
-        return uniqueness(np.full(c, self.model.friction.largest), self.system.delassus.reshape(c * d, c * d), d)
+        c = len(self.system.delassus)
+        own = self.system.delassus[np.arange(c), :, np.arange(c)]
+        last = PlacedObject.of(self.model.object, self.system.first_contact_mm, self.last_pose)
+        turned = contact_geometry(last.distance, self.surface, axes=self.axes).from_reference
+        return uniqueness(np.full(c, self.model.friction.largest), turned @ own @ turned.transpose(0, 2, 1))
 
     def gauge_strains(self, force: Float) -> dict[str, float]:
         """Strain by gauge name under contact forces (c, d), through the condensed rows."""
@@ -227,19 +241,8 @@ class Problem:
 
 
 def rigid_gap(model: Model, where: BoundarySurface, touch: float, target: ObjectPose) -> Float:
-    """Weighted gap (c,) mm between the object under a target and a surface at rest, along the object's normal."""
-    x, y = where.samples[:, 0], where.samples[:, 1]
-    z = where.samples[:, 2] if where.samples.shape[1] == 3 else np.zeros_like(x)
-    height = model.object.height(x - target.slide_x_mm, z - target.slide_z_mm)
-    vertical = height + touch - target.depth_mm - y
-    upright = -model.object.frame(where.samples.shape[1])[0, 1]
-    there = np.isfinite(vertical)
-    if there.all():
-        return np.asarray(np.asarray(where.average @ vertical) * upright)
-    # The mean is over the part of a point's hat that the object covers, if that is at least half of it.
-    share = np.asarray(where.average @ there)
-    mean = np.asarray(where.average @ np.where(there, vertical, 0.0)) / np.maximum(share, _COVERED)
-    return np.where(share < _COVERED, _OUTSIDE_GAP * model.design.height_mm, mean * upright)
+    """Gap (c,) mm between the object under a target and the points of a surface at rest."""
+    return contact_geometry(PlacedObject.of(model.object, touch, target).distance, where).gap
 
 
 def scatter_to_points(rows: Float, kept: NDArray[np.int64], count: int, dim: int) -> Float:
@@ -251,3 +254,15 @@ def scatter_to_points(rows: Float, kept: NDArray[np.int64], count: int, dim: int
     out = np.diag(np.full(count * dim, np.diagonal(own).max()))
     out[np.ix_(kept, kept)] = own
     return out.reshape(count, dim, count, dim)
+
+
+def object_share(surface: BoundarySurface, finger: Float, thing: Float) -> Float:
+    """Return the share (c,) of an elastic object in the normal displacement under uniform pressure.
+
+    Parameters
+    ----------
+    finger, thing : (c, d, c, d) mm/N
+        Compliance of the two bodies at the surface's points.
+    """
+    own, other = (np.einsum("ij,j->i", w[:, 0, :, 0], surface.area) for w in (finger, thing))
+    return np.asarray(np.clip(other / (own + other), 0.0, 1.0))

@@ -21,11 +21,11 @@ from finger3d.contact.friction import OPEN
 from finger3d.errors import UnresolvedError
 from finger3d.fem.traces import BoundarySurface
 from finger3d.geometry.design import DesignSummary
-from finger3d.mechanics.history import ObjectPose, StepResult
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.path import targets
 from finger3d.mechanics.problem import Problem, rigid_gap
-from finger3d.objects import MeshObject, RigidObject, initial_contact
+from finger3d.objects import ObjectPose, PlacedObject, RigidObject, initial_contact
 
 Box = tuple[float, float, float, float]
 
@@ -41,6 +41,9 @@ _STATIONS = 4
 _NEAREST_POINTS = {2: 4, 3: 16}
 """Contact points compared with a place: with two rings of neighbours, all may lie under the foot of a step."""
 
+_COVERED = 0.5
+"""Least share of a point's hat function that the object must cover for its overlap to be seen."""
+
 _PER_WAVE, _PER_RADIUS = 4.0, 2.0
 """Least number of edges in a wavelength, and in a radius, of the object."""
 
@@ -49,9 +52,6 @@ _FINER, _TRIES = 0.8, 80
 
 _PATCH = 3
 """Half width, in edges, of the patch of contact points in that search."""
-
-_SLOPE_STEP = 1e-6
-"""Step of the finite difference of the object's slope, over the height of the finger."""
 
 _REACH = 50
 """Half width, in edges, of the patch of contact points before there is a mesh."""
@@ -86,46 +86,55 @@ def unresolved_overlap(
     ----------
     face : contact points of the meshed part
     touch_mm : height of the object's lowest point at first touch
-    landmarks : (k, 2) array, mm, or None
-        Places along x and z that move with the object, see `landmarks_of`; None if they are not known.
+    landmarks : (k, 3) array, mm, or None
+        Points in the object's own coordinates, see `landmarks_of`; None if they are not known.
     axes : symmetry planes of the meshed part
     """
     d = face.points.shape[1]
-    cosine = -float(model.object.frame(d)[0, 1])
     tree, count = KDTree(_horizontal(face.points)), min(_NEAREST_POINTS[d], len(face.points))
     nearest = tree.query(_horizontal(face.samples), k=count)[1].reshape(-1, count)
     path = targets(tuple(replace(leg, steps=_STATIONS) for leg in model.legs))
     deepest = max(t.depth_mm for t in path)
     found = UnresolvedOverlap(0.0, deepest <= 0.0, 0.0, path[-1], np.zeros(2))
     # at a given slide the unresolved overlap is largest at the largest depth
-    deepest_at = {(t.slide_x_mm, t.slide_z_mm): t for t in sorted(path, key=lambda t: t.depth_mm) if t.depth_mm > 0.0}
+    poses = [t for t in sorted(path, key=lambda t: t.depth_mm) if t.depth_mm > 0.0]
+    deepest_at = {(t.slide_x_mm, t.slide_z_mm, *t.turns): t for t in poses}
     for slide, target in deepest_at.items():
-        overlap = np.maximum(-rigid_gap(model, face, touch_mm, target), 0.0)
+        overlap = _mean_overlap(model, face, touch_mm, target)
         found = replace(found, in_contact=found.in_contact or bool(overlap.any()))
-        at = np.zeros((0, d)) if landmarks is None else _surface_points(model, landmarks + slide, d)
+        placed = PlacedObject.of(model.object, touch_mm, target)
+        at = np.zeros((0, d)) if landmarks is None else _surface_points(model, _over(placed, landmarks, d), d)
         mirrored = np.where([a in axes for a in "xz"[: d - 1]], np.abs(_horizontal(at)), _horizontal(at))
         near = tree.query(mirrored, k=count)[1]
         places, around = np.vstack([face.samples, at]), np.vstack([nearest, near.reshape(-1, count)])
-        missed = _overlap(model, places, touch_mm, target) - overlap[around].max(axis=1) / cosine
+        missed = _overlap(model, places, touch_mm, target) - overlap[around].max(axis=1)
         worst = int(missed.argmax())
         depth = float(missed[worst])
         if landmarks is None and not any(slide):  # the overlap is largest at first touch, wherever that is
-            depth = max(depth, target.depth_mm - float(overlap.max()) / cosine)
+            depth = max(depth, target.depth_mm - float(overlap.max()))
         if depth > found.depth_mm:
             place = np.append(_horizontal(places[worst]), np.zeros(3 - d))
             found = UnresolvedOverlap(depth / deepest, found.in_contact, depth, target, place)
     return found
 
 
-def landmarks_of(model: Model, place: tuple[float, float] | None) -> Float | None:
-    """Return the corners and tips of the object and the place of first touch (k, 2), mm, which sampling could miss.
+def landmarks_of(model: Model, touch_mm: float, place: tuple[float, float] | None) -> Float | None:
+    """Return the corners and tips of the object and the point of first touch (k, 3), mm, which sampling could miss.
 
-    They are None if the surface of the finger is not known between its samples.
+    They are given in the object's own coordinates, and are None if the surface of the finger is not known between its
+    samples.
     """
     if place is None or isinstance(model.design, DesignSummary):
         return None
-    at = np.vstack([model.object.landmarks(), [place]])
-    return at if model.domain == "solid" else at * [1.0, 0.0]
+    placed = PlacedObject.of(model.object, touch_mm)
+    x, z = np.array([place]).T
+    return np.vstack([model.object.landmarks(), placed.to_own(np.stack([x, placed.height(x, z), z], axis=1))])
+
+
+def _over(placed: PlacedObject, landmarks: Float, dim: int) -> Float:
+    """Return the places (k, 2) along x and z of points (k, 3) of an object in a pose; z = 0 in a section."""
+    places = placed.to_scene(landmarks)[:, ::2]
+    return places if dim == 3 else places * [1.0, 0.0]
 
 
 def check(
@@ -138,7 +147,7 @@ def check(
     UnresolvedError
         It names the edge length that resolves the object.
     """
-    landmarks = landmarks_of(model, place)
+    landmarks = landmarks_of(model, touch_mm, place)
     found = unresolved_overlap(model, face, touch_mm, landmarks, axes)
     if found.share > REFUSE_ABOVE or not found.in_contact:
         size = resolving_size(model, touch_mm, found, landmarks)
@@ -148,7 +157,7 @@ def check(
 def warnings(problem: Problem) -> list[str]:
     """Return warnings about an object that the contact points do not resolve."""
     model, touch = problem.model, problem.system.first_contact_mm
-    landmarks = landmarks_of(model, problem.system.place_mm)
+    landmarks = landmarks_of(model, touch, problem.system.place_mm)
     found = unresolved_overlap(model, problem.surface, touch, landmarks, problem.axes)
     return _messages(model, touch, landmarks, found)
 
@@ -161,9 +170,10 @@ def warnings_before_meshing(model: Model, axes: tuple[str, ...]) -> list[str]:
     box = (max(x0, x - reach), min(x1, x + reach), max(z0, z - reach), min(z1, z + reach))
     # a mesh has points on its symmetry planes
     at = np.array([0.5 * size if axis in axes else place for axis, place in zip("xz", contact.place, strict=True)])
-    landmarks = landmarks_of(model, contact.place)
-    landmarks = None if landmarks is None else _within(landmarks, box)
     touch, points = contact.first_contact_mm, regular_points(model, box, size, at)
+    landmarks = landmarks_of(model, touch, contact.place)
+    if landmarks is not None:
+        landmarks = _within(landmarks, PlacedObject.of(model.object, touch), box, points.points.shape[1])
     return _messages(model, touch, landmarks, unresolved_overlap(model, points, touch, landmarks))
 
 
@@ -181,7 +191,7 @@ def increments_without_contact(problem: Problem, frames: Sequence[StepResult]) -
         end = frame.target
         if end.depth_mm <= 0.0 or not frame.outcome.ok or (frame.state.status != OPEN).any():
             continue
-        slid = end.slide_x_mm or end.slide_z_mm
+        slid = end.slide_x_mm or end.slide_z_mm or end.is_turned
         if (rigid_gap(model, face, touch, end) < 0.0).any():  # the finger has not followed yet
             continue
         if not slid or (_overlap(model, face.samples, touch, end) > 0.0).any():
@@ -197,32 +207,16 @@ def increments_without_contact(problem: Problem, frames: Sequence[StepResult]) -
 def penetration(problem: Problem, frame: StepResult, u: Float) -> tuple[float, Float]:
     """Return the largest penetration (mm) of the deformed contact face into a rigid object, and where it occurs (d,).
 
-    In small strain only the displacement along the normal counts, as in the gap.
-
     Parameters
     ----------
     u : (n, d) array, mm
         Nodal displacement of the meshed part.
     """
-    model, face, target, d = problem.model, problem.surface, frame.target, problem.dim
-    moved = face.interpolate @ u
-    if not model.formulation.finite_strain:
-        normal = model.object.frame(d)[0]
-        moved = np.outer(moved @ normal, normal)
-    at = face.samples + moved
-    over = _overlap(model, at, problem.system.first_contact_mm, target)
-    at, over = at[over > 0.0], over[over > 0.0]
-    if not len(at):
-        return 0.0, np.zeros(d)
-    if isinstance(model.object, MeshObject):  # near a wall the vertical overlap is not the distance
-        there = np.zeros((len(at), 3))
-        there[:, :d] = at
-        there -= [target.slide_x_mm, problem.system.first_contact_mm - target.depth_mm, target.slide_z_mm]
-        over = np.minimum(over, -model.object.signed_distance(there)[0])
-    else:
-        over = over * _slope_cosine(model, at, target)
-    worst = int(over.argmax())
-    return max(float(over[worst]), 0.0), at[worst]
+    face, placed = problem.surface, problem.placed(frame.target)
+    at = face.samples + face.interpolate @ u
+    value, _ = placed.distance(at)
+    worst = int(value.argmin())
+    return max(-float(value[worst]), 0.0), at[worst]
 
 
 def penetration_warnings(problem: Problem, frame: StepResult, u: Float) -> list[str]:
@@ -239,15 +233,6 @@ def penetration_warnings(problem: Problem, frame: StepResult, u: Float) -> list[
     ]
 
 
-def _slope_cosine(model: Model, at: Float, target: ObjectPose) -> Float:
-    """Return the cosine (n,) of the slope of the object at points (n, d)."""
-    x = at[:, 0] - target.slide_x_mm
-    z = at[:, 2] - target.slide_z_mm if at.shape[1] == 3 else np.zeros(len(at))
-    step = _SLOPE_STEP * model.design.height_mm
-    slopes = [model.object.height(x + a, z + b) - model.object.height(x - a, z - b) for a, b in ((step, 0), (0, step))]
-    return 1.0 / np.sqrt(1.0 + sum((slope / (2.0 * step)) ** 2 for slope in slopes[: at.shape[1] - 1]))
-
-
 def resolving_size(model: Model, touch_mm: float, found: UnresolvedOverlap, landmarks: Float | None) -> float | None:
     """Return the edge length at which a regular patch of contact points resolves the object.
 
@@ -258,20 +243,23 @@ def resolving_size(model: Model, touch_mm: float, found: UnresolvedOverlap, land
         return None
     at, end, size = found.place, found.target, model.mesh.size_mm
     # the object does not move: only its shape near the place counts
-    there = replace(model, legs=(Leg(end.depth_mm, end.slide_x_mm, end.slide_z_mm, steps=1),))
+    leg = Leg(end.depth_mm, end.slide_x_mm, end.slide_z_mm, 1, None, *end.turns)
+    there, placed = replace(model, legs=(leg,)), PlacedObject.of(model.object, touch_mm, end)
     for _ in range(_TRIES):
         size *= _FINER
         reach = _PATCH * size
         box = (at[0] - reach, at[0] + reach, at[1] - reach, at[1] + reach)
-        landmarks = _within(landmarks + [end.slide_x_mm, end.slide_z_mm], box) - [end.slide_x_mm, end.slide_z_mm]
-        if unresolved_overlap(there, regular_points(model, box, size, at), touch_mm, landmarks).share <= _RESOLVED:
+        points = regular_points(model, box, size, at)
+        landmarks = _within(landmarks, placed, box, points.points.shape[1])
+        if unresolved_overlap(there, points, touch_mm, landmarks).share <= _RESOLVED:
             return _rounded(min(size, _resolving(model.object)))
     return None
 
 
-def _within(places: Float, box: Box) -> Float:
-    low, high = np.array([box[0], box[2]]), np.array([box[1], box[3]])
-    return places[np.all((places >= low) & (places <= high), axis=1)]
+def _within(landmarks: Float, placed: PlacedObject, box: Box, dim: int) -> Float:
+    """Return those of an object's points (k, 3) that lie over a box in a pose."""
+    low, high, places = np.array([box[0], box[2]]), np.array([box[1], box[3]]), _over(placed, landmarks, dim)
+    return landmarks[np.all((places >= low) & (places <= high), axis=1)]
 
 
 def regular_points(model: Model, box: Box, size_mm: float, at: Float | None = None) -> BoundarySurface:
@@ -300,8 +288,17 @@ def regular_points(model: Model, box: Box, size_mm: float, at: Float | None = No
     kept = (weight > 0.0) & np.isfinite(y)
     mean = sp.csr_matrix(sp.diags_array(1.0 / weight[kept]) @ mean[kept])
     samples, points = (np.insert(p, 1, v, axis=1) for p, v in ((samples[used], height[used]), (points[kept], y[kept])))
-    none = sp.csr_matrix((len(points), 0)), sp.csr_matrix((len(samples), 0))
-    return BoundarySurface(np.arange(len(points)), points, np.ones(len(points)), none[0], samples, mean, none[1])
+    return BoundarySurface(
+        nodes=np.arange(len(points)),
+        points=points,
+        area=np.ones(len(points)),
+        normals=np.zeros_like(points),
+        trace=sp.csr_matrix((len(points), 0)),
+        samples=samples,
+        average=mean,
+        interpolate=sp.csr_matrix((len(samples), 0)),
+        hats=mean,
+    )
 
 
 def _lines(box: Sequence[float], half: float, size: float, at: float) -> Float:
@@ -336,8 +333,20 @@ def _horizontal(points: Float) -> Float:
 def _overlap(model: Model, at: Float, touch: float, target: ObjectPose) -> Float:
     """Return the vertical overlap (n,), mm, of the object with points (n, d) of the finger; -inf outside the object."""
     z = at[:, 2] if at.shape[1] == 3 else np.zeros(len(at))
-    height = model.object.height(at[:, 0] - target.slide_x_mm, z - target.slide_z_mm)
-    return np.nan_to_num(at[:, 1] - (height + touch - target.depth_mm), nan=-np.inf)
+    height = PlacedObject.of(model.object, touch, target).height(at[:, 0], z)
+    return np.nan_to_num(at[:, 1] - height, nan=-np.inf)
+
+
+def _mean_overlap(model: Model, face: BoundarySurface, touch: float, target: ObjectPose) -> Float:
+    """Return the vertical overlap (c,), mm, that contact points see at rest: the mean over what the object covers.
+
+    It is 0 for a point of whose hat function the object covers less than half.
+    """
+    overlap = _overlap(model, face.samples, touch, target)
+    covered = np.isfinite(overlap)
+    share = np.asarray(face.average @ covered)
+    mean = np.asarray(face.average @ np.where(covered, overlap, 0.0)) / np.maximum(share, _COVERED)
+    return np.where(share < _COVERED, 0.0, np.maximum(mean, 0.0))
 
 
 def _surface_points(model: Model, places: Float, dim: int) -> Float:

@@ -13,10 +13,12 @@ from finger3d._types import Float
 from finger3d.contact.rules import STEP_DEPENDENT_RULES
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.mechanics.energy import external_work, frictional_dissipation
+from finger3d.mechanics.force_control import depth_of_force
 from finger3d.mechanics.formulation import Workspace
-from finger3d.mechanics.history import ObjectPose, StepResult
-from finger3d.mechanics.path import between, stride_ratio, targets
+from finger3d.mechanics.history import StepResult
+from finger3d.mechanics.path import prescribed_forces, stride_ratio, targets
 from finger3d.mechanics.problem import Problem
+from finger3d.objects import ObjectPose, between
 
 _CUTS = 6
 """Times that an increment which does not converge is halved, at most."""
@@ -64,11 +66,20 @@ def march(
     state, at = model.formulation.start(problem), problem.origin
     previous: tuple[ObjectPose, Float] | None = None
     work = dissipation = 0.0
-    for number, target in enumerate(targets(model.legs)):
+    start_force = 0.0
+    for number, (target, load) in enumerate(zip(targets(model.legs), prescribed_forces(model.legs), strict=True)):
         if cancel is not None and cancel.is_set():
             raise CancelledError
         guess = near[number] if number < len(near) else _extrapolated(state, at, target, previous)
-        found, substeps = _increment(problem, workspace, state, at, target, most_cuts, guess)
+        if load is None:
+            found, substeps = _increment(problem, workspace, state, at, target, most_cuts, guess)
+        else:
+            if load[0] == 1:
+                start_force = _normal_force(problem, state)
+            wanted = start_force + load[0] / load[1] * (load[2] - start_force)
+            found, substeps, target = _to_force(
+                problem, workspace, state, at, target, most_cuts, (wanted, load[2]), previous
+            )
         for part in substeps:
             work += external_work(problem, part.before, part.after, part.a, part.b)
             dissipation += frictional_dissipation(problem, part.before, part.after)
@@ -78,7 +89,8 @@ def march(
             target=target,
             state=problem.symmetry.unfold(state),
             part=state,
-            lowest=model.object.lowest(target.slide_x_mm, target.slide_z_mm),
+            lowest=problem.placed(target).lowest,
+            moment=problem.symmetry.total_moment(model.formulation.moment(problem, state, target)),
             gauges=model.formulation.gauges(problem, state) | _free_strain(problem, without_inclusions),
             external_work_mJ=work,
             dissipation_mJ=dissipation,
@@ -104,6 +116,45 @@ def _free_strain(problem: Problem, without_inclusions: Iterator[StepResult] | No
     step = next(without_inclusions, None)
     known = step is not None and (step.outcome.ok or step.outcome.is_cycle)
     return {f"{g.name}_free": step.gauges[g.name] if step and known else np.nan for g in problem.model.gauges}
+
+
+def _normal_force(problem: Problem, state: ContactState) -> float:
+    return -float(problem.world_force(state)[:, 1].sum())
+
+
+def _to_force(
+    problem: Problem,
+    workspace: Workspace,
+    state: ContactState,
+    a: ObjectPose,
+    b: ObjectPose,
+    cuts: int,
+    load: tuple[float, float],
+    previous: tuple[ObjectPose, Float] | None,
+) -> tuple[ContactSolution, list[_Substep], ObjectPose]:
+    """Advance from a to the pose b, at the depth where the normal force is `load[0]`, N; the leg ends at `load[1]`."""
+
+    def pose(depth: float) -> ObjectPose:
+        return replace(b, depth_mm=depth)
+
+    def force_at(depth: float) -> float:
+        found, _ = _increment(problem, workspace, state, a, pose(depth), cuts)
+        if not found.outcome.ok:
+            raise _FailedError
+        return _normal_force(problem, found.state)
+
+    height = problem.model.design.height_mm
+    guess = a.depth_mm + (a.depth_mm - previous[0].depth_mm if previous else b.depth_mm)
+    try:
+        target = pose(depth_of_force(force_at, load[0], a.depth_mm, guess, height, load[1]))
+    except _FailedError:
+        target = b
+    found, substeps = _increment(problem, workspace, state, a, target, cuts)
+    return found, substeps, target
+
+
+class _FailedError(Exception):
+    """An increment at a trial depth did not converge."""
 
 
 def _extrapolated(

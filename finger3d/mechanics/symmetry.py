@@ -14,6 +14,7 @@ from finger3d.fem.simplex import Mesh, axis_numbers, reflect_into_part, unfold
 from finger3d.fem.traces import BoundarySurface
 from finger3d.mechanics.history import ContactPoints
 from finger3d.mechanics.model import Model
+from finger3d.objects import PlacedObject, vertical_frame
 
 LOCAL_DIRECTIONS = (1, 0, 2)
 """World axis of the normal and of each tangent of a contact point under an upright object."""
@@ -26,11 +27,15 @@ def symmetry(model: Model) -> tuple[str, ...]:
     """Return the planes, "x" and "z", about which body, object and path are mirror images."""
     if model.symmetry is not None:
         return model.symmetry
-    slides = {"x": [leg.slide_x_mm for leg in model.legs], "z": [leg.slide_z_mm for leg in model.legs]}
+    moves = {  # a turn about x is its own mirror image along x
+        "x": [(leg.slide_x_mm, leg.turn_y, leg.turn_z) for leg in model.legs],
+        "z": [(leg.slide_z_mm, leg.turn_x, leg.turn_y) for leg in model.legs],
+    }
+    thing = PlacedObject.of(model.object, 0.0).mirrors()
     axes = ("x", "z") if model.domain == "solid" else ("x",)
     body = model.design.mirrors()
     inner = model.inclusions.mirrors(model) if model.inclusions else axes
-    return tuple(a for a in axes if a in body and a in inner and a in model.object.mirrors() and not any(slides[a]))
+    return tuple(a for a in axes if a in body and a in inner and a in thing and not np.any(moves[a]))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,6 +78,16 @@ class Symmetry:
     def total(self, values: Float) -> float:
         """Return the sum over the whole finger of values (c,) at the part's points."""
         return float((values[self.image_of] * self.multiplicity).sum())
+
+    def total_moment(self, moment: Float) -> Float:
+        """Return the moment (3,) on the whole finger about a point of all symmetry planes from that on the part.
+
+        Reflected in a plane, the components of a moment in the plane change sign.
+        """
+        whole = np.array(moment, dtype=float)
+        for axis in axis_numbers(self.axes):
+            whole *= np.where(np.arange(3) == axis, 2.0, 0.0)
+        return whole
 
     def reflect(self, point: Float, direction: Float) -> tuple[Float, Float]:
         """Return a place and a direction (3,) in the meshed part (d,), reflected if they lie in a mirror image."""
@@ -135,7 +150,7 @@ def unfold_points(
         nodes=nodes,
         points=at,
         area=face.area[parent] * multiplicity,
-        basis=model.object.frame(d),
+        basis=vertical_frame(d),
         half_width_mm=model.design.width_mm / 2.0,
         band_mm=_BAND * model.mesh.size_mm,
         edges=_edges(shape.facets["contact"][:, :d], nodes),

@@ -1,26 +1,31 @@
 """Rigid objects, analytic or triangulated, and their first contact with the finger."""
 
 from finger3d.objects.first_contact import ContactPath, InitialContact, first_contact_height, initial_contact
+from finger3d.objects.placed import PlacedObject
+from finger3d.objects.pose import ObjectPose, between
 from finger3d.objects.registry import OBJECTS
-from finger3d.objects.shapes import Axis, Cylinder, Plane, RigidObject, Sphere, Wave, Wedge, vertical_frame
-from finger3d.objects.slope import Slopes, slope_of
+from finger3d.objects.shapes import Axis, Cylinder, Plane, RigidObject, Sphere, Wedge, vertical_frame
+from finger3d.objects.tracking import DistanceTracker
 from finger3d.objects.triangulated import MeshObject
+from finger3d.objects.wave import Wave
 
 __all__ = [
     "OBJECTS",
     "Axis",
     "ContactPath",
     "Cylinder",
+    "DistanceTracker",
     "InitialContact",
     "MeshObject",
+    "ObjectPose",
+    "PlacedObject",
     "Plane",
     "RigidObject",
-    "Slopes",
     "Sphere",
     "Wave",
     "Wedge",
+    "between",
     "first_contact_height",
     "initial_contact",
-    "slope_of",
     "vertical_frame",
 ]

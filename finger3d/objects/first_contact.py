@@ -11,6 +11,8 @@ import numpy as np
 from finger3d._arrays import freeze_arrays
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
+from finger3d.objects.placed import PlacedObject
+from finger3d.objects.pose import ObjectPose, between
 from finger3d.objects.shapes import RigidObject
 
 Top = Callable[[Float, Float], Float]
@@ -34,7 +36,7 @@ class ContactPath:
     top : the finger's height over (x, z), nan beside it
     object : the rigid object
     half_length_mm, half_width_mm : half extents of the finger; a section has half width 0
-    targets : (n, 3) depth, slide along x, slide along z, mm
+    poses : of the object on its path
     landmarks : (k, 2) mm, corners of the finger that a search on a grid could miss
     """
 
@@ -42,7 +44,7 @@ class ContactPath:
     object: RigidObject
     half_length_mm: float
     half_width_mm: float
-    targets: Float
+    poses: tuple[ObjectPose, ...]
     landmarks: Float | None = None
 
     def __post_init__(self) -> None:
@@ -76,12 +78,14 @@ def _touching(
     top: Top, obj: RigidObject, half_length: float, half_width: float, marks: Float | None
 ) -> tuple[float, Float]:
     """Return the height of the lowest point at first touch, and its place (2,); -inf without overlap in plan."""
+    placed = PlacedObject.of(obj, 0.0)
 
     def difference(at: Float) -> Float:
-        return np.nan_to_num(top(at[:, 0], at[:, 1]) - obj.height(at[:, 0], at[:, 1]), nan=-np.inf)
+        return np.nan_to_num(top(at[:, 0], at[:, 1]) - placed.height(at[:, 0], at[:, 1]), nan=-np.inf, posinf=np.inf)
 
     limit = np.array([half_length, half_width])
-    hints = obj.landmarks() if marks is None else np.vstack([obj.landmarks(), marks])
+    hints = placed.to_scene(obj.landmarks())[:, ::2]
+    hints = hints if marks is None else np.vstack([hints, marks])
     if half_width == 0.0:
         hints = hints * [1.0, 0.0]
     at = np.vstack([_grid(half_length, half_width), hints[np.all(np.abs(hints) <= limit, axis=1)]])
@@ -138,25 +142,31 @@ def initial_contact(way: ContactPath) -> InitialContact:
     Finger3dError
         If the object is nowhere above the finger, reaches the base beside it, or runs into its side.
     """
-    top, obj, path = way.top, way.object, way.targets
+    top, obj, path = way.top, way.object, way.poses
     half_length, half_width = way.half_length_mm, way.half_width_mm
     touch, place = _touching(top, obj, half_length, half_width, way.landmarks)
+    if touch == math.inf:
+        raise Finger3dError(
+            "object: in the pose it comes in, it extends downwards without end over the finger, which would start "
+            "inside it; change its turn_x_deg, turn_y_deg, turn_z_deg"
+        )
     if not math.isfinite(touch):
         raise Finger3dError(
             f"object: no part of it is above the finger (|x| <= {half_length:g}, |z| <= {half_width:g} mm), so that it "
             "never touches; change x_mm, z_mm"
         )
-    if obj.is_flat:  # it has no end that could hang down, and its gap is measured along its own normal
+    if obj.is_flat:  # it has no end that could hang down
         return InitialContact(touch, _box(top, obj, half_length, half_width, touch, place, path), _pair(place))
-    deepest = float(path[:, 0].max())
+    deepest = max(pose.depth_mm for pose in path)
     if touch <= deepest:
         raise Finger3dError(
             f"object: at depth {deepest:g} mm its lowest point, beside the finger, is {deepest - touch:.4g} mm below "
             "the finger's base: it touches the base first; press less deep, or change x_mm, z_mm"
         )
+    _stays_on_finger(way, touch)
     zone = _box(top, obj, half_length, half_width, touch, place, path)
     _not_a_wall(obj, place, half_length, half_width)
-    _no_side(top, obj, touch, path, half_length, half_width)
+    _no_side(way, touch)
     return InitialContact(touch, zone, _pair(place))
 
 
@@ -164,8 +174,27 @@ def _pair(place: Float) -> tuple[float, float]:
     return float(place[0]), float(place[1])
 
 
+def _stays_on_finger(way: ContactPath, touch: float) -> None:
+    """Raise an error if a turn takes the object off the finger."""
+    at = _grid(way.half_length_mm, way.half_width_mm, _COARSE)
+    for pose in way.poses:
+        turned = pose.is_turned and pose.depth_mm > 0.0
+        if turned and not (_overlap(way.top, way.object, at, touch, pose) > 0.0).any():
+            x, y, z = np.degrees(pose.turns)
+            raise Finger3dError(
+                f"press: turned by {x:.4g}, {y:.4g}, {z:.4g} deg about x, y, z at a depth of {pose.depth_mm:.4g} mm, "
+                "the object is nowhere inside the finger at rest and does not touch it; turn it less, or press deeper"
+            )
+
+
 def _box(
-    top: Top, obj: RigidObject, half_length: float, half_width: float, touch: float, place: Float, path: Float
+    top: Top,
+    obj: RigidObject,
+    half_length: float,
+    half_width: float,
+    touch: float,
+    place: Float,
+    path: Sequence[ObjectPose],
 ) -> tuple[float, float, float, float]:
     limit = np.array([half_length, half_width])
     t = np.linspace(-1.0, 1.0, _ZOOM)
@@ -173,12 +202,17 @@ def _box(
     at = [_grid(half_length, half_width, _COARSE)]
     for k in range(_ZOOMS):  # a tip may lie between the points of the grid
         near = window * 10.0**-k
-        at += [np.clip(place + [sx, sz] + near, -limit, limit) for sx, sz in {(p[1], p[2]) for p in path}]
+        slides = {(pose.slide_x_mm, pose.slide_z_mm) for pose in path}
+        at += [np.clip(place + [sx, sz] + near, -limit, limit) for sx, sz in slides]
     points = np.vstack(at)
     inside = np.zeros(len(points), dtype=bool)
-    for slide in np.unique(path[:, 1:], axis=0):  # deeper at the same place covers what was touched before
-        depth = path[np.all(path[:, 1:] == slide, axis=1), 0].max()
-        inside |= _overlap(top, obj, points, touch, (depth, *slide)) > 0.0
+    deepest: dict[tuple[float, ...], ObjectPose] = {}
+    for pose in path:  # deeper at the same place covers what was touched before
+        key = (pose.slide_x_mm, pose.slide_z_mm, *pose.turns)
+        if key not in deepest or pose.depth_mm > deepest[key].depth_mm:
+            deepest[key] = pose
+    for pose in deepest.values():
+        inside |= _overlap(top, obj, points, touch, pose) > 0.0
     (x0, z0), (x1, z1) = (f(points[inside], axis=0) if inside.any() else place for f in (np.min, np.max))
     if x1 - x0 <= _NOTHING * half_length or z1 - z0 < _NOTHING * half_width:
         raise Finger3dError(
@@ -188,10 +222,9 @@ def _box(
     return float(x0), float(x1), float(z0), float(z1)
 
 
-def _overlap(top: Top, obj: RigidObject, at: Float, touch: float, target: Sequence[float] | Float) -> Float:
+def _overlap(top: Top, obj: RigidObject, at: Float, touch: float, pose: ObjectPose) -> Float:
     """Return the overlap (n,), mm, of the object with the finger at rest; -inf outside either of them."""
-    depth, slide_x, slide_z = target
-    over = top(*at.T) - (obj.height(at[:, 0] - slide_x, at[:, 1] - slide_z) + touch - depth)
+    over = top(*at.T) - PlacedObject.of(obj, touch, pose).height(*at.T)
     return np.nan_to_num(over, nan=-np.inf, posinf=np.inf, neginf=-np.inf)
 
 
@@ -203,7 +236,8 @@ def _not_a_wall(obj: RigidObject, place: Float, half_length: float, half_width: 
             continue
         step = np.zeros(2)
         step[axis] = math.copysign(reach, place[axis])
-        here, beside, before = obj.height(*np.stack([place, place + step, place - step], axis=1))
+        at = np.stack([place, place + step, place - step], axis=1)
+        here, beside, before = PlacedObject.of(obj, 0.0).height(*at)
         if here - beside > _STEEP * reach or before - here > _STEEP * reach:
             raise Finger3dError(
                 f"object: it touches the finger's rim at x = {place[0]:.4g}, z = {place[1]:.4g} mm with a flank that "
@@ -211,24 +245,27 @@ def _not_a_wall(obj: RigidObject, place: Float, half_length: float, half_width: 
             )
 
 
-def _no_side(top: Top, obj: RigidObject, touch: float, path: Float, half_length: float, half_width: float) -> None:
-    """Raise an error if a wall of the object runs into the side of the finger during a slide."""
+def _no_side(way: ContactPath, touch: float) -> None:
+    """Raise an error if a wall of the object runs into the side of the finger as it slides or turns."""
     t = np.linspace(-1.0, 1.0, _GRID[1])
     sides = np.vstack([np.stack([t, s + 0.0 * t], axis=1) for s in (-1.0, 1.0)])
-    rim = np.vstack([sides, sides[:, ::-1]] if half_width else [[[-1.0, 0.0], [1.0, 0.0]]]) * [half_length, half_width]
-    before = np.zeros(3)
-    for target in path:
-        stride = math.hypot(*(target - before)[1:])
-        count = max(1, math.ceil(_STRIDES * stride / half_length))
+    rim = np.vstack([sides, sides[:, ::-1]] if way.half_width_mm else [[[-1.0, 0.0], [1.0, 0.0]]])
+    rim = rim * [way.half_length_mm, way.half_width_mm]
+    reach = math.hypot(way.half_length_mm, way.half_width_mm)
+    before = ObjectPose(0.0)
+    for pose in way.poses:
+        change = pose.coordinates - before.coordinates
+        stride = math.hypot(change[1], change[2]) + reach * float(np.abs(change[4:]).sum())
+        count = max(1, math.ceil(_STRIDES * stride / way.half_length_mm))
         over = None
         for share in np.linspace(0.0, 1.0, count + 1) if stride else ():
-            at = before + share * (target - before)
-            now = np.maximum(_overlap(top, obj, rim, touch, at), 0.0)
+            at = between(before, pose, float(share))
+            now = np.maximum(_overlap(way.top, way.object, rim, touch, at), 0.0)
             if over is not None and (jump := now - over - _STEEP * stride / count).max() > 0.02 * touch:
                 x, z = rim[np.argmax(jump)]
                 raise Finger3dError(
-                    f"object: near slide ({at[1]:.4g}, {at[2]:.4g}) mm a wall of it runs into the finger's side at "
-                    f"x = {x:.4g}, z = {z:.4g} mm; slide less, or change x_mm, z_mm"
+                    f"object: near slide ({at.slide_x_mm:.4g}, {at.slide_z_mm:.4g}) mm a wall of it runs into the "
+                    f"finger's side at x = {x:.4g}, z = {z:.4g} mm; move it less, or change x_mm, z_mm"
                 )
             over = now
-        before = target
+        before = pose

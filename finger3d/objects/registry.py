@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from finger3d.objects.shapes import Cylinder, Plane, RigidObject, Sphere, Wave, Wedge
+from finger3d.objects.shapes import Cylinder, Plane, RigidObject, Sphere, Wedge
 from finger3d.objects.triangulated import ObjectFile
+from finger3d.objects.wave import Wave
 
 OBJECTS: Mapping[str, type[RigidObject]] = MappingProxyType(
     {"plane": Plane, "cylinder": Cylinder, "sphere": Sphere, "wedge": Wedge, "wave": Wave, "mesh": ObjectFile}

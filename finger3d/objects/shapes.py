@@ -1,7 +1,7 @@
 """Rigid objects with an analytic surface.
 
-An object is a height function over the x-z plane, 0 at its lowest point, and one frame of directions.  In small
-strain the gap is measured along the frame's normal: vertical, as in the paper, and a plane's own normal when it tilts.
+An object is a closed or endless body, given by its signed distance in coordinates of its own: y up, its reference
+point, which is its lowest one, at the origin.  `finger3d.objects.placed.PlacedObject` is an object in a pose.
 
 The fields of an object's dataclass are its keys under ``[object]`` in a scene; an angle (`Radians`) is given there in
 degrees.
@@ -15,12 +15,13 @@ from dataclasses import dataclass, field
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
-from annotated_types import Gt, Lt
+from annotated_types import Ge, Gt, Le, Lt
 
 from finger3d._ranges import Length, Place, Radians, Zero
 from finger3d._types import Float
 
 Axis = Literal["x", "z"]
+Turn = Annotated[float, Radians(Ge(-360), Le(360))]
 
 
 class Detail(NamedTuple):
@@ -39,56 +40,90 @@ class Detail(NamedTuple):
 
 
 def vertical_frame(dim: int) -> Float:
-    """Normal -y, tangents +x and +z."""
+    """Return the directions (d, d) of an upright object: normal -y into the finger, then tangents +x and +z."""
     return np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])[:dim, :dim]
 
 
-def _circle(r: Float, radius: float) -> Float:
-    # Beyond the equator there is no surface; a steep cone keeps the gap finite and open there.
-    inside = np.minimum(r, radius)
-    return radius - np.sqrt(radius**2 - inside**2) + 10.0 * np.maximum(r - radius, 0.0)
+def rotation(turn_x: float, turn_y: float, turn_z: float) -> Float:
+    """Return the rotation (3, 3) about x, then y, then z, all fixed axes; angles in radians."""
+    turned = np.eye(3)
+    for axis, angle in enumerate((turn_x, turn_y, turn_z)):
+        i, j = (axis + 1) % 3, (axis + 2) % 3
+        about = np.eye(3)
+        about[i, i] = about[j, j] = math.cos(angle)
+        about[j, i] = math.sin(angle)
+        about[i, j] = -about[j, i]
+        if angle:
+            turned = about @ turned
+    return turned
 
 
 @dataclass(frozen=True)
 class RigidObject(ABC):
-    """A rigid object, by default with a vertical gap and one lowest point.
+    """A rigid object.
 
     Attributes
     ----------
     x_mm, z_mm : where the object's lowest point is
+    turn_x, turn_y, turn_z : pose that it comes in, turned about x, then y, then z, all fixed axes
     """
 
     x_mm: Place = 0.0
     z_mm: Place = 0.0
+    turn_x: Turn = field(default=0.0, kw_only=True)
+    turn_y: Turn = field(default=0.0, kw_only=True)
+    turn_z: Turn = field(default=0.0, kw_only=True)
 
     @abstractmethod
-    def height(self, x: Float, z: Float) -> Float:
-        """Return the height (n,) mm of the surface above its lowest point at x (n,), z (n,) mm; nan where there is no
-        surface.
+    def distance(self, points: Float) -> tuple[Float, Float]:
+        """Return the signed distance (n,) mm of points (n, 3), negative inside, and its gradient (n, 3), a unit vector.
+
+        The points are given in the object's own coordinates.
         """
 
-    def frame(self, dim: int) -> Float:
-        """Return the directions (d, d): row 0 the normal into the finger, then the tangents."""
-        return vertical_frame(dim)
+    @abstractmethod
+    def profile(self, x: Float, z: Float) -> Float:
+        """Return the height (n,) mm of the lower side at x, z (n,) mm, in own coordinates; nan beside it."""
 
-    def mirrors(self) -> tuple[str, ...]:
-        """Return the axes along which the object is its own mirror image about the finger's middle."""
-        return tuple(a for a, c in (("x", self.x_mm), ("z", self.z_mm)) if c == 0.0)
+    def lowest_point(self, turned: Float) -> Float:
+        """Return the point (3,) mm, in own coordinates, that is lowest after a rotation (3, 3).
 
-    def lowest(self, slide_x: float, slide_z: float) -> tuple[float, float]:
-        """Return the place (x, z) mm of the lowest point after a slide."""
-        return self.x_mm + slide_x, self.z_mm + slide_z
+        It is the reference point for a body that then extends downwards without end.
+        """
+        return np.zeros(3)
+
+    def probes(self) -> Float:
+        """Return points (k, 3) mm, in own coordinates, at which mirror images are compared."""
+        return np.random.default_rng(0).uniform(-1.0, 1.0, (200, 3)) * self.probe_reach
+
+    @property
+    def probe_reach(self) -> float:
+        """Half edge length (mm) of the box of `probes`."""
+        return self.detail.length_mm if self.detail else 10.0
+
+    @property
+    def initial_rotation(self) -> Float:
+        """Rotation (3, 3) of the pose that the object comes in."""
+        return rotation(self.turn_x, self.turn_y, self.turn_z)
+
+    @property
+    def is_turned(self) -> bool:
+        """Whether the object comes in a pose of its own."""
+        return bool(self.turn_x or self.turn_y or self.turn_z)
 
     def landmarks(self) -> Float:
-        """Return the places (k, 2), x and z mm, of tips and corners that may touch first and that a search on a grid
-        could miss.
-        """
-        return np.array([[self.x_mm, self.z_mm]])
+        """Return points (k, 3) mm, in own coordinates, of tips and corners that may touch first."""
+        return np.zeros((1, 3))
 
     @property
     def is_flat(self) -> bool:
         """Whether the surface is one plane."""
         return False
+
+    @property
+    def is_convex(self) -> bool:
+        """Whether the body is convex."""
+        return True
 
     @property
     def detail(self) -> Detail | None:
@@ -105,18 +140,39 @@ class Prism(RigidObject):
 
     axis: Axis
 
-    def across(self, x: Float, z: Float) -> Float:
-        """Return the distance (n,) mm from the line of lowest points."""
-        return np.abs(x - self.x_mm) if self.axis == "z" else np.abs(z - self.z_mm)
+    @property
+    def direction(self) -> Float:
+        """Unit vector (3,) of the axis."""
+        return np.array([1.0, 0.0, 0.0] if self.axis == "x" else [0.0, 0.0, 1.0])
 
-    def mirrors(self) -> tuple[str, ...]:
-        """Return both axes if the object is centred, else the one along which it is constant."""
-        return tuple(sorted({self.axis, *super().mirrors()}))
+    @abstractmethod
+    def section_distance(self, r: Float, y: Float) -> tuple[Float, Float, Float]:
+        """Return the signed distance (n,) and its derivatives (n,) by r and y, in the section across the axis."""
+
+    @abstractmethod
+    def section_profile(self, r: Float) -> Float:
+        """Return the height (n,) of the lower side at a distance r (n,) from the line of lowest points."""
+
+    def distance(self, points: Float) -> tuple[Float, Float]:
+        """Return the distance in the section across the axis."""
+        across = 2 if self.axis == "x" else 0
+        value, by_r, by_y = self.section_distance(points[:, across], points[:, 1])
+        gradient = np.zeros_like(points)
+        gradient[:, across], gradient[:, 1] = by_r, by_y
+        return value, gradient
+
+    def profile(self, x: Float, z: Float) -> Float:
+        """Return the height of the section."""
+        return self.section_profile(x + 0.0 * z if self.axis == "z" else z + 0.0 * x)
+
+    def is_level(self, turned: Float) -> bool:
+        """Whether the axis is horizontal after a rotation (3, 3)."""
+        return abs(float((turned @ self.direction)[1])) <= 1e-12
 
 
 @dataclass(frozen=True)
 class Plane(RigidObject):
-    """A plane.
+    """A plane: all that is above it is the object.
 
     Attributes
     ----------
@@ -125,22 +181,18 @@ class Plane(RigidObject):
 
     tilt: Annotated[float, Radians(Gt(-90), Lt(90))] = 0.0
 
-    def height(self, x: Float, z: Float) -> Float:
-        """Return the height above the point (x_mm, z_mm)."""
-        return math.tan(self.tilt) * (x - self.x_mm) + 0.0 * z
+    @property
+    def normal(self) -> Float:
+        """Outward unit normal (3,) in own coordinates."""
+        return np.array([math.sin(self.tilt), -math.cos(self.tilt), 0.0])
 
-    def frame(self, dim: int) -> Float:
-        """Return the plane's own normal and tangents."""
-        c, s = math.cos(self.tilt), math.sin(self.tilt)
-        return np.array([[s, -c, 0.0], [c, s, 0.0], [0.0, 0.0, 1.0]])[:dim, :dim]
+    def distance(self, points: Float) -> tuple[Float, Float]:
+        """Return the distance along the plane's normal."""
+        return points @ self.normal, np.broadcast_to(self.normal, points.shape)
 
-    def mirrors(self) -> tuple[str, ...]:
-        """Return both axes for a level plane, z for a tilted one."""
-        return ("x", "z") if self.tilt == 0.0 else ("z",)
-
-    def lowest(self, slide_x: float, slide_z: float) -> tuple[float, float]:
-        """Return the placed point: a plane that slides in itself stays what it is."""
-        return self.x_mm, self.z_mm
+    def profile(self, x: Float, z: Float) -> Float:
+        """Return the height above the reference point."""
+        return math.tan(self.tilt) * x + 0.0 * z
 
     @property
     def is_flat(self) -> bool:
@@ -161,9 +213,17 @@ class Cylinder(Prism):
     radius_mm: Length = field(kw_only=True)
     axis: Axis = field(default="z", kw_only=True)
 
-    def height(self, x: Float, z: Float) -> Float:
-        """Return the height of the circle across the axis."""
-        return _circle(self.across(x, z), self.radius_mm)
+    def section_distance(self, r: Float, y: Float) -> tuple[Float, Float, Float]:
+        """Return the distance to a circle."""
+        return _circle_distance(r, y, self.radius_mm)
+
+    def section_profile(self, r: Float) -> Float:
+        """Return the height of the lower half of the circle."""
+        return _arc(r, self.radius_mm)
+
+    def lowest_point(self, turned: Float) -> Float:
+        """Return the point of the circle that is lowest, if the axis is horizontal."""
+        return _lowest_of_sphere(turned, self.radius_mm) if self.is_level(turned) else np.zeros(3)
 
     @property
     def detail(self) -> Detail:
@@ -182,9 +242,20 @@ class Sphere(RigidObject):
 
     radius_mm: Length = field(kw_only=True)
 
-    def height(self, x: Float, z: Float) -> Float:
-        """Return the height of the circle around the lowest point."""
-        return _circle(np.hypot(x - self.x_mm, z - self.z_mm), self.radius_mm)
+    def distance(self, points: Float) -> tuple[Float, Float]:
+        """Return the distance to the sphere."""
+        r = np.hypot(points[:, 0], points[:, 2])
+        value, by_r, by_y = _circle_distance(r, points[:, 1], self.radius_mm)
+        radial = points[:, ::2] * (by_r / np.where(r > 0.0, r, 1.0))[:, None]
+        return value, np.stack([radial[:, 0], by_y, radial[:, 1]], axis=1)
+
+    def profile(self, x: Float, z: Float) -> Float:
+        """Return the height of the lower half."""
+        return _arc(np.hypot(x, z), self.radius_mm)
+
+    def lowest_point(self, turned: Float) -> Float:
+        """Return the point that is lowest after a rotation."""
+        return _lowest_of_sphere(turned, self.radius_mm)
 
     @property
     def detail(self) -> Detail:
@@ -207,12 +278,28 @@ class Wedge(Prism):
     tip_radius_mm: Zero | Length = field(default=0.0, kw_only=True)
     axis: Axis = field(default="z", kw_only=True)
 
-    def height(self, x: Float, z: Float) -> Float:
+    def section_distance(self, r: Float, y: Float) -> tuple[Float, Float, Float]:
+        """Return the distance to a sharp edge through the circle's middle, less the circle's radius."""
+        c, s, side = math.cos(self.angle), math.sin(self.angle), np.where(r < 0.0, -1.0, 1.0)
+        y = y - self.tip_radius_mm
+        along = c * np.abs(r) + s * y
+        value, by_r, by_y = _circle_distance(r, y + self.tip_radius_mm, self.tip_radius_mm)
+        on_face = along > 0.0
+        value = np.where(on_face, s * np.abs(r) - c * y - self.tip_radius_mm, value)
+        return value, np.where(on_face, s * side, by_r), np.where(on_face, -c, by_y)
+
+    def section_profile(self, r: Float) -> Float:
         """Return the height of the tip's circle and of the face tangent to it."""
-        r = self.across(x, z)
+        r = np.abs(r)
         edge = self.tip_radius_mm * math.sin(self.angle)
-        tip = self.tip_radius_mm - np.sqrt(self.tip_radius_mm**2 - np.minimum(r, edge) ** 2)
-        return tip + math.tan(self.angle) * np.maximum(r - edge, 0.0)
+        return _arc(np.minimum(r, edge), self.tip_radius_mm) + math.tan(self.angle) * np.maximum(r - edge, 0.0)
+
+    def lowest_point(self, turned: Float) -> Float:
+        """Return the point of the tip's circle that is lowest, if both faces rise from it."""
+        lowest = _lowest_of_sphere(turned, self.tip_radius_mm)
+        down = -turned[1]
+        rises = math.cos(self.angle) <= -float(down[1]) if self.is_level(turned) else False
+        return lowest if rises else np.zeros(3)
 
     @property
     def detail(self) -> Detail | None:
@@ -220,26 +307,27 @@ class Wedge(Prism):
         return Detail("tip_radius_mm", self.tip_radius_mm, "radius") if self.tip_radius_mm > 0.0 else None
 
 
-@dataclass(frozen=True)
-class Wave(Prism):
-    """A cosine, lowest at (x_mm, z_mm): height = amplitude (1 - cos(2 pi r / wavelength)).
+def _arc(r: Float, radius: float) -> Float:
+    """Return the height (n,) of the lower half of a circle above its lowest point; nan beyond the equator."""
+    inside = np.where(np.abs(r) <= radius, r, np.nan)
+    return inside**2 / (radius + np.sqrt(radius**2 - inside**2)) if radius > 0.0 else 0.0 * inside
 
-    Attributes
-    ----------
-    wavelength_mm : from crest to crest
-    amplitude_mm : half of crest to valley
-    axis : direction of the crests
-    """
 
-    wavelength_mm: Length = field(kw_only=True)
-    amplitude_mm: Zero | Length = field(kw_only=True)
-    axis: Axis = field(default="z", kw_only=True)
+def _circle_distance(r: Float, y: Float, radius: float) -> tuple[Float, Float, Float]:
+    """Return the signed distance (n,) from a circle whose lowest point is the origin, and its derivatives."""
+    out = y - radius
+    length = np.hypot(r, out)
+    known = length > 0.0
+    divisor = np.where(known, length, 1.0)
+    # length - radius would lose the digits of points near a large circle
+    total = np.where(length + radius > 0.0, length + radius, 1.0)
+    return (
+        (r**2 + y**2 - 2.0 * y * radius) / total,
+        np.where(known, r / divisor, 0.0),
+        np.where(known, out / divisor, -1.0),
+    )
 
-    def height(self, x: Float, z: Float) -> Float:
-        """Return amplitude (1 - cos(2 pi r / wavelength)), r the distance from a valley's line."""
-        return self.amplitude_mm * (1.0 - np.cos(2.0 * math.pi * self.across(x, z) / self.wavelength_mm))
 
-    @property
-    def detail(self) -> Detail:
-        """The wavelength."""
-        return Detail("wavelength_mm", self.wavelength_mm, "wavelength")
+def _lowest_of_sphere(turned: Float, radius: float) -> Float:
+    """Return the point (3,) of a sphere above the origin that is lowest after a rotation."""
+    return np.asarray([0.0, radius, 0.0] - radius * turned[1])

@@ -22,10 +22,13 @@ class PressStep:
     ----------
     depth_mm : press depth, the way of the object along -y from first touch
     slide_x_mm, slide_z_mm : way of the object along x and z from where it touched first
+    turn_x_deg, turn_y_deg, turn_z_deg : turns of the object from where it touched first
     time_s : time at the end of the increment
     normal_force_N : sum of the contact forces along -y on the finger
     tangential_force_x_N, tangential_force_z_N : net friction on the finger
     friction_sum_N : sum of |friction| over the contact points
+    force_x_N, force_y_N, force_z_N : the whole contact force on the finger, pressure and friction
+    moment_x_Nmm, moment_y_Nmm, moment_z_Nmm : its moment about the middle of the base
     outward_friction_x_N, outward_friction_z_N : sum of the friction away from the object's lowest point
     contact_area_mm2, stick_area_mm2 : area of the points in contact, and of those that stick
     contact_half_length_mm, stick_half_length_mm : half the extent along x of contact and stick zone at z = 0
@@ -41,11 +44,20 @@ class PressStep:
     depth_mm: float
     slide_x_mm: float
     slide_z_mm: float
+    turn_x_deg: float
+    turn_y_deg: float
+    turn_z_deg: float
     time_s: float
     normal_force_N: float
     tangential_force_x_N: float
     tangential_force_z_N: float
     friction_sum_N: float
+    force_x_N: float
+    force_y_N: float
+    force_z_N: float
+    moment_x_Nmm: float
+    moment_y_Nmm: float
+    moment_z_Nmm: float
     outward_friction_x_N: float
     outward_friction_z_N: float
     contact_area_mm2: float

@@ -51,9 +51,16 @@ def _legs(press: Tree, legs: tuple[LegTable, ...], design: Design, solid: bool) 
         at = ("press", "leg", i) if "leg" in press else ("press",)
         allowed = f"a number above 0 and below the finger's height of {at_most(height)} mm"
         if i > 0 and _target(leg) == _target(legs[i - 1]) and leg.duration_s is None:
-            lines.append(f"{dotted(at)}: goes nowhere, its depth and slide are those of the leg before; take it out")
-        if i == 0 and leg.depth_mm == 0.0 and (leg.slide_x_mm or leg.slide_z_mm):
-            lines.append(f"{dotted(at)}: slides before first touch; give the first leg a depth_mm above 0")
+            lines.append(f"{dotted(at)}: goes nowhere, its target is that of the leg before; take it out")
+        if (leg.depth_mm is None) == (leg.force_N is None):
+            both = f"must not stand beside force_N = {shown(leg.force_N)}; give either a depth or a force"
+            what = f"{dotted((*at, 'depth_mm'))}"
+            lines.append(f"{what} is missing: give it, or force_N" if leg.force_N is None else f"{what}: {both}")
+            continue
+        if leg.depth_mm is None:
+            pass
+        elif i == 0 and leg.depth_mm == 0.0 and any(_target(leg)[2:]):
+            lines.append(f"{dotted(at)}: moves before first touch; give the first leg a depth_mm above 0")
         elif leg.depth_mm >= height or (i == 0 and leg.depth_mm == 0.0):
             lines.append(f"{dotted((*at, 'depth_mm'))} = {shown(leg.depth_mm)}: must be {allowed}")
         for key in ("slide_x_mm", "slide_z_mm"):
@@ -63,13 +70,14 @@ def _legs(press: Tree, legs: tuple[LegTable, ...], design: Design, solid: bool) 
                     f"{dotted((*at, key))} = {shown(value)}: must be a number from -{at_most(far)} to {at_most(far)}, "
                     f"{LONGEST_SLIDE:g} times the finger's half length"
                 )
-        if not solid and leg.slide_z_mm != 0.0:
-            lines.append(f"{dotted((*at, 'slide_z_mm'))} = {shown(leg.slide_z_mm)}: must be 0.0 in a 2D domain")
+        for key in () if solid else ("slide_z_mm", "turn_x_deg", "turn_y_deg"):
+            if (value := getattr(leg, key)) != 0.0:
+                lines.append(f"{dotted((*at, key))} = {shown(value)}: must be 0.0 in a 2D domain")
     return lines
 
 
-def _target(leg: LegTable) -> tuple[float, float, float]:
-    return leg.depth_mm, leg.slide_x_mm, leg.slide_z_mm
+def _target(leg: LegTable) -> tuple[float | None, ...]:
+    return leg.force_N, leg.depth_mm, leg.slide_x_mm, leg.slide_z_mm, leg.turn_x_deg, leg.turn_y_deg, leg.turn_z_deg
 
 
 def smallest_mm(design: Design, solid: bool) -> float:

@@ -23,6 +23,7 @@ from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model, contact_path
 from finger3d.objects import OBJECTS, RigidObject, initial_contact
 from finger3d.scene import checks, files, tree
+from finger3d.scene.legs import legs_of
 from finger3d.scene.messages import Place, choose, described, dotted, listed, messages_from, nearest, shown, unknown
 from finger3d.scene.registry import effect_names, effect_type
 from finger3d.scene.tables import (
@@ -96,7 +97,8 @@ class Scene:
     def legs(self) -> tuple[Leg, ...]:
         """Targets of the press; the shorthand is one leg."""
         press = self.tables.press
-        return tuple(Leg(**leg) for leg in (press["leg"] if "leg" in press else (press,)))
+        legs = press["leg"] if "leg" in press else (press,)
+        return legs_of(legs, self.design, self.object, self.tables)
 
     def with_mesh(self, mesh: MeshOptions) -> Scene:
         """Return the scene with edge lengths in place of a tolerance."""
@@ -209,7 +211,8 @@ class _Parts:
             If the object's way into the finger is none that the contact conditions can describe.
         """
         domain = self.tables.model.domain
-        way = contact_path(self.design, self.object, tuple(Leg(**dict(leg)) for leg in self.legs), domain)
+        legs = legs_of([dict(leg) for leg in self.legs], self.design, self.object, self.tables)
+        way = contact_path(self.design, self.object, legs, domain)
         return checks.chosen(self.tables.mesh, self.design, domain, self.object, initial_contact(way).contact_box)
 
     def filled_in(self, mesh: MeshOptions) -> SceneTable:

@@ -16,6 +16,7 @@ from finger3d._ranges import (
     Angle,
     Count,
     Edge,
+    Force,
     Friction,
     Length,
     Modulus,
@@ -73,14 +74,20 @@ class LegTable(TomlTable):
     Attributes
     ----------
     depth_mm : of the object below the first touch, less than the finger's height
+    force_N : normal force, in place of the depth, which follows
     slide_x_mm, slide_z_mm : where the object then is, from where it was at first
+    turn_x_deg, turn_y_deg, turn_z_deg : how it then is turned about its lowest point, about x, then y, then z
     steps : equal increments; "auto": as many as their estimated error asks for, 1 % of forces and strains
     duration_s : read only with viscosity
     """
 
-    depth_mm: Zero | Length
+    depth_mm: Zero | Length | None = None
+    force_N: Force | None = None
     slide_x_mm: Place = 0.0
     slide_z_mm: Place = 0.0
+    turn_x_deg: Angle = 0.0
+    turn_y_deg: Angle = 0.0
+    turn_z_deg: Angle = 0.0
     steps: Steps = "auto"
     duration_s: Seconds | None = None
 
@@ -88,7 +95,7 @@ class LegTable(TomlTable):
 class PressTable(LegTable):
     """[press] that stands for one leg."""
 
-    depth_mm: Length
+    depth_mm: Length | None = None
 
 
 class LegsTable(TomlTable):

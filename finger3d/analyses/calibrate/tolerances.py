@@ -33,7 +33,7 @@ from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.path import targets
-from finger3d.mechanics.problem import Problem, scatter_to_points
+from finger3d.mechanics.problem import Problem, object_share, scatter_to_points
 from finger3d.objects import Plane
 from finger3d.sensor.curve import Tolerance
 
@@ -349,8 +349,10 @@ def with_modulus(problem: Problem, factor: float) -> Problem:
         changed = stiffened(one.part.condensed.compliance / factor, one.inclusions.bar_stiffness)
         rows = np.zeros_like(one.system.gauge_rows)
         rows[:, active] = changed[len(active) : len(active) + gauges, : len(active)]
-        delassus = scatter_to_points(changed, active, c, d) + of_object
-        return replace(one, system=replace(one.system, delassus=delassus, gauge_rows=rows))
+        finger = scatter_to_points(changed, active, c, d)
+        share = None if one.system.object_share is None else object_share(one.surface, finger, of_object)
+        system = replace(one.system, delassus=finger + of_object, gauge_rows=rows, object_share=share)
+        return replace(one, system=system)
 
     changed, bare = scaled(problem), problem.without_inclusions
     return replace(changed, without_inclusions=scaled(bare)) if bare else changed

@@ -16,6 +16,7 @@ from finger3d.mechanics.history import ContactPoints, StepResult, contact_table,
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.step_halving import march_automatic
+from finger3d.objects import PlacedObject
 from finger3d.results.comparison import Case
 
 _POINTS = 600
@@ -33,7 +34,7 @@ def resized(model: Model, size_mm: float) -> Model:
 def widened(model: Model, width_mm: float) -> Model:
     """Return a solid of another width on a swept mesh, coarser than the scene's where needed for `_POINTS` points."""
     design = replace(model.design, width_mm=width_mm)
-    free = 4 // 2 ** len(set(model.object.mirrors()) & {"x", "z"})
+    free = 4 // 2 ** len(set(PlacedObject.of(model.object, 0.0).mirrors()) & {"x", "z"})
     size = min(model.mesh.size_mm, width_mm / FACTOR)
     largest = min(min(design.height_mm, design.half_length_mm) / 4.0, width_mm) / FACTOR
 

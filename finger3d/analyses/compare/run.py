@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from finger3d._machine import versions
+from finger3d._ranges import FARTHEST_MM
 from finger3d._types import Tree
 from finger3d.analyses.compare.cases import press_with_errors, widened
 from finger3d.analyses.compare.verdict import WITHIN, Deviation, crossing_width, deviations, verdict
 from finger3d.errors import Finger3dError, Outcome, UnresolvedError
 from finger3d.io import atomic, claimed, write_csv, write_json
 from finger3d.mechanics.model import Model
+from finger3d.objects import PlacedObject
 from finger3d.progress import Progress
 from finger3d.results.comparison import Case
 
@@ -188,7 +190,8 @@ def _verdict(model: Model, cases: Sequence[Case]) -> list[str]:
 def _varies_along_width(model: Model) -> bool:
     half = 0.5 * model.design.width_mm
     x, z = np.meshgrid(np.linspace(-1.0, 1.0, 21) * model.design.half_length_mm, np.linspace(-half, half, 21))
-    height = model.object.height(x.ravel(), z.ravel()).reshape(x.shape)
+    height = PlacedObject.of(model.object, 0.0).height(x, z)
+    height[np.isnan(height)] = FARTHEST_MM  # beside the object
     return bool(np.ptp(height, axis=0).max() > 1e-9 * model.design.height_mm)
 
 

@@ -1,0 +1,283 @@
+"""One increment of contact between a linear body and an object, along the true normals of the object.
+
+The displacement U of the contact points is linear in their forces, U = W f + U_past, and the gap and the normal of each
+point follow from its present place.  In turn, contact is solved with gaps linearised at a displacement, and the
+displacement is found from the forces, until both agree.  Without curvature and turns one solution is exact.
+
+At an edge of the object the normal of a point may jump.  Where directions do not settle, they are held: every normal
+between those of the adjacent faces is one of the edge (its generalised gradient, Clarke 1983).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d._types import Float
+from finger3d.contact.conditions import TOLERANCE
+from finger3d.contact.friction import OPEN
+from finger3d.contact.state import ContactSolution, ContactState, next_state
+from finger3d.errors import Outcome
+from finger3d.mechanics.contact_geometry import ContactGeometry, contact_geometry
+from finger3d.mechanics.formulation import Workspace, length_scale, solve_contact
+from finger3d.objects import DistanceTracker, ObjectPose, vertical_frame
+
+if TYPE_CHECKING:
+    from finger3d.mechanics.problem import Problem
+
+_TARGET = 1e-9
+"""Error of the geometry at which the iteration ends; below `TOLERANCE` by what the residual may add."""
+
+_ITERATIONS = 30
+"""Largest number of solutions of an increment."""
+
+_HOLD_FROM, _HOLD_ABOVE = 4, 1e-4
+"""Iteration from which mean gradients of the distance are held that still change by more than this."""
+
+_NEAR = 0.05
+"""Distance, over the depth, within which points are evaluated again while an increment is solved."""
+
+_ON_WAY = (0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875)
+"""Shares of an increment at which points are looked for inside the object."""
+
+_LEAVES = 0.5
+"""Least cosine between the normal and the way of a point that leaves the object."""
+
+_MEMORY = 3
+"""Earlier displacements from which the next is extrapolated (Anderson 1965)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinearState(ContactState):
+    """Contact state with the displacement (c, d) mm of every contact point, in x, y, z."""
+
+    displacement: Float
+
+
+@dataclass(frozen=True)
+class LinearBody:
+    """A linear body at its contact points, over one increment.
+
+    Attributes
+    ----------
+    delassus : (c, d, c, d) mm/N
+        In the directions of an upright object.
+    past : (c, d) mm
+        Displacement without contact forces, in the same directions.
+    """
+
+    delassus: Float
+    past: Float
+
+    def displacement(self, force: Float, bases: Float) -> Float:
+        """Return the displacement (c, d) in x, y, z under forces (c, d) along each point's own directions (c, d, d)."""
+        frame = vertical_frame(force.shape[1])
+        upright = np.einsum("ca,cak->ck", force, bases) @ frame.T
+        touched = int(np.flatnonzero(force.any(axis=1))[-1:].sum()) + 1  # the deepest points come first
+        rows = self.delassus.reshape(force.size, force.size)[:, : touched * force.shape[1]]
+        moved = self.past + (rows @ upright[:touched].ravel()).reshape(force.shape)
+        return np.asarray(moved @ frame)
+
+    def turned(self, rotations: Float, points: NDArray[np.intp]) -> Float:
+        """Return the Delassus operator (k, d, k, d) of some points along their own directions.
+
+        Parameters
+        ----------
+        rotations : (k, d, d) from the directions of an upright object
+        points : (k,)
+        """
+        k, d = len(points), rotations.shape[-1]
+        own = self.delassus[points[:, None, None, None], np.arange(d)[:, None, None], points[:, None], np.arange(d)]
+        half = (rotations @ own.reshape(k, d, k * d)).reshape(k * d, k, d)
+        return (half.transpose(1, 0, 2) @ rotations.transpose(0, 2, 1)).transpose(1, 0, 2).reshape(k, d, k, d)
+
+
+def solve_increment(
+    problem: Problem,
+    state: LinearState,
+    a: ObjectPose,
+    b: ObjectPose,
+    body: LinearBody,
+    guess: Float | None,
+    workspace: Workspace,
+) -> ContactSolution:
+    """Advance a state as the object moves from pose a to pose b.
+
+    Returns
+    -------
+    ContactSolution
+        With a `LinearState`.  It is CONVERGED only if gaps and directions at the displacement found agree with those
+        that the forces were solved with.
+    """
+    assert state.bases is not None
+    increment = _Increment(problem, state, a, b, body, workspace.tracker)
+    flat = problem.model.object.is_flat
+    at = np.zeros_like(body.past) if flat else body.displacement(state.force if guess is None else guess, state.bases)
+    geometry = increment.geometry(at)
+    held = np.zeros(len(at), dtype=bool)
+    spent, error, start = 0, np.inf, guess
+    tried: list[Float] = []
+    found: list[Float] = []
+    for iteration in range(1, _ITERATIONS + 1):
+        solution = increment.solve(geometry, at, start)
+        spent += solution.iterations
+        if not (solution.outcome.ok or solution.outcome.is_cycle):
+            return replace(solution, state=state, iterations=spent)
+        start = solution.state.force
+        displacement = body.displacement(start, geometry.bases)
+        if flat or solution.outcome.is_cycle:
+            error = 0.0
+            break
+        after = increment.geometry(displacement).holding(held, geometry)
+        error = increment.error(after, after.angles(geometry), displacement, solution.state)
+        if error <= _TARGET:
+            break
+        if iteration >= _HOLD_FROM:
+            change = np.linalg.norm(after.gradient - geometry.gradient, axis=1)
+            held |= (change > _HOLD_ABOVE) & (start[:, 0] > 0.0)
+        tried, found = [*tried, at][-_MEMORY:], [*found, displacement][-_MEMORY:]
+        at = _extrapolated(tried, found)
+        following = after if at is displacement else increment.geometry(at)
+        geometry = following.holding(held, geometry)
+    if error > TOLERANCE or (not flat and increment.passes_through(displacement)):
+        return ContactSolution(state, Outcome.NO_CONVERGENCE, float(error), spent, "none")
+    gap = None if flat else increment.geometry(displacement, np.inf).holding(held, geometry).gap
+    after_state = increment.reached(geometry, at, displacement, solution.state, gap)
+    return replace(solution, state=after_state, residual=max(solution.residual, error), iterations=spent)
+
+
+def _extrapolated(tried: list[Float], found: list[Float]) -> Float:
+    """Return the next displacement from those tried and those found from them, by Anderson's method."""
+    if len(tried) == 1:
+        return found[-1]
+    residuals = np.stack([(g - x).ravel() for x, g in zip(tried, found, strict=True)])
+    change = residuals[1:] - residuals[:-1]
+    moved = np.stack([(b - a).ravel() for a, b in zip(found, found[1:], strict=False)])
+    weights = np.linalg.lstsq(change.T, residuals[-1], rcond=1e-10)[0]
+    return np.asarray(found[-1] - (weights @ moved).reshape(found[-1].shape))
+
+
+@dataclass(frozen=True)
+class _Increment:
+    """An increment from a state, as the object moves from pose a to pose b."""
+
+    problem: Problem
+    state: LinearState
+    a: ObjectPose
+    b: ObjectPose
+    body: LinearBody
+    tracker: DistanceTracker
+
+    def geometry(self, displacement: Float, within: float = _NEAR) -> ContactGeometry:
+        """Return the contact geometry at the end of the increment, at a displacement (c, d).
+
+        It is exact for points nearer to the object than `within`, over the depth.
+        """
+        problem, reach = self.problem, within * length_scale(self.problem, self.a, self.b)
+        placed, share = problem.placed(self.b), problem.system.object_share
+
+        def distance(points: Float) -> tuple[Float, Float]:
+            return self.tracker.distance(placed, points, reach)
+
+        return contact_geometry(distance, problem.surface, displacement, problem.axes, share)
+
+    def solve(self, geometry: ContactGeometry, at: Float, guess: Float | None) -> ContactSolution:
+        """Solve contact with the gaps linearised at a displacement (c, d); far points cannot touch."""
+        problem, bases = self.problem, geometry.bases
+        d = bases.shape[-1]
+        start = transported(self.state, bases)
+        free = self._relative(geometry, at, self.body.past @ vertical_frame(d))
+        free[:, 1:] += start.tangential_displacement
+        scale = length_scale(problem, self.a, self.b)
+        rotations = geometry.from_reference
+        if (rotations == np.eye(d)).all():
+            return solve_contact(problem, start, free, self.body.delassus, scale, guess)
+        expected = start.force if guess is None else guess
+        near = np.flatnonzero((geometry.gap < 2.0 * _NEAR * scale) | (expected[:, 0] > 0.0))
+        delassus = self.body.turned(rotations[near], near)
+        part = solve_contact(problem, start.of_points(near), free[near], delassus, scale, expected[near], points=near)
+        force, status = np.zeros_like(expected), np.full(len(expected), OPEN, dtype=np.int8)
+        force[near], status[near] = part.state.force, part.state.status
+        return replace(part, state=replace(start, force=force, status=status))
+
+    def _relative(self, geometry: ContactGeometry, at: Float, displacement: Float) -> Float:
+        """Return gap and slip (c, d) mm of the increment at a displacement, the gap linearised at another one, `at`."""
+        bases = geometry.bases
+        out: Float = np.einsum("cak,ck->ca", bases, displacement - at)
+        out[:, 0] += geometry.gap
+        slid = displacement - self.state.displacement - carried_by_object(self.problem, self.a, self.b, at)
+        out[:, 1:] = np.einsum("ctk,ck->ct", bases[:, 1:], slid)
+        return out
+
+    def error(self, after: ContactGeometry, turned: Float, displacement: Float, found: ContactState) -> float:
+        """Return the largest violation by gaps at the displacement found, and by directions that have turned.
+
+        Gaps are divided by the depth; turns (c,) rad count by the force of their point over the largest.
+        """
+        scale = length_scale(self.problem, self.a, self.b)
+        closed = found.status != OPEN
+        gap = np.where(closed, np.abs(after.gap), np.maximum(-after.gap, 0.0)) / scale
+        size = np.linalg.norm(found.force, axis=1)
+        return float(max(gap.max(initial=0.0), (turned * size).max(initial=0.0) / (size.max(initial=0.0) or 1.0)))
+
+    def passes_through(self, displacement: Float) -> bool:
+        """Whether a contact point would enter the object and leave it again on the way to a displacement (c, d).
+
+        It leaves in the direction of the surface's normal.  Along the chord of an arc, on which a point slides over a
+        round object, that is nearly across the way.
+        """
+        problem, thing = self.problem, self.problem.model.object
+        before, after = problem.placed(self.a), problem.placed(self.b)
+        start, end = (
+            placed.to_own(np.pad(problem.surface.points + u, ((0, 0), (0, 3 - u.shape[1]))))
+            for placed, u in ((before, self.state.displacement), (after, displacement))
+        )
+        way = end - start
+        length = np.linalg.norm(way, axis=1)
+        near = np.flatnonzero(np.maximum(self.state.gap, 0.0) < length)
+        if not len(near):
+            return False
+        enters = np.einsum("ni,ni->n", thing.distance(start[near])[1], way[near]) < 0.0
+        outside, normal = thing.distance(end[near])
+        leaves = np.einsum("ni,ni->n", normal, way[near]) > _LEAVES * length[near]
+        through = near[enters & leaves & (outside > 0.0)]
+        return any((thing.distance(start[through] + share * way[through])[0] < 0.0).any() for share in _ON_WAY)
+
+    def reached(
+        self, geometry: ContactGeometry, at: Float, displacement: Float, found: ContactState, gap: Float | None
+    ) -> LinearState:
+        """Return the state at the end of the increment, with gaps (c,) or those linearised at a displacement, `at`."""
+        start, relative = transported(self.state, geometry.bases), self._relative(geometry, at, displacement)
+        if gap is not None:
+            relative[:, 0] = gap
+        after = next_state(start, found.force, relative, found.status)
+        return LinearState(**(vars(after) | {"bases": geometry.bases, "displacement": displacement}))
+
+
+def transported(state: ContactState, bases: Float) -> ContactState:
+    """Return a state whose tangential vectors (c, d - 1) are expressed in other bases (c, d, d)."""
+    if state.bases is None or state.bases is bases or (state.bases == bases).all():
+        return state
+    turn = np.einsum("ctk,csk->cts", bases[:, 1:], state.bases[:, 1:])
+    force = state.force.copy()
+    force[:, 1:] = np.einsum("cts,cs->ct", turn, state.force[:, 1:])
+    return replace(
+        state,
+        force=force,
+        tangential_displacement=np.einsum("cts,cs->ct", turn, state.tangential_displacement),
+        accumulated_slip=np.einsum("cts,cs->ct", turn, state.accumulated_slip),
+        bases=bases,
+    )
+
+
+def carried_by_object(problem: Problem, a: ObjectPose, b: ObjectPose, at: Float) -> Float:
+    """Return how far (c, d) mm the object's material at points displaced by `at` (c, d) moves from pose a to pose b."""
+    d = at.shape[1]
+    if a.turns == b.turns:
+        return np.broadcast_to((b.displacement - a.displacement)[:d], at.shape)
+    points = np.zeros((len(at), 3))
+    points[:, :d] = problem.surface.points + at
+    return problem.placed(b).moved_from(problem.placed(a), points)[:, :d]

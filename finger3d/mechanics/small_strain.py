@@ -1,0 +1,111 @@
+"""Small-strain elasticity over the condensed compliance: the paper's baseline, which effects replace or wrap."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from finger3d._types import Float
+from finger3d.contact.state import ContactSolution, ContactState
+from finger3d.mechanics.contact_geometry import contact_geometry
+from finger3d.mechanics.cost import AddedCost, PressCost
+from finger3d.mechanics.formulation import Workspace, moment_of
+from finger3d.mechanics.linear_contact import LinearBody, LinearState, solve_increment
+
+if TYPE_CHECKING:
+    from finger3d.fem.traces import BoundarySurface
+    from finger3d.mechanics.model import Model
+    from finger3d.mechanics.problem import Problem
+    from finger3d.objects import ObjectPose
+
+
+@dataclass(frozen=True)
+class SmallStrain:
+    """Linear elasticity over the condensed compliance: the paper's baseline."""
+
+    finite_strain: ClassVar[bool] = False
+    is_linear_elastic: ClassVar[bool] = True
+    supported_slots: ClassVar[frozenset[str]] = frozenset({"inclusions", "object_compliance"})
+
+    @property
+    def refactorises(self) -> bool:
+        """False: the factor of the build serves every increment."""
+        return False
+
+    def added_cost(self, model: Model, press: PressCost) -> AddedCost:
+        """Return zero cost."""
+        return AddedCost()
+
+    def state_size(self, press: PressCost) -> float:
+        """Return 0: the contact forces determine the displacements."""
+        return 0.0
+
+    def workspace(self) -> Workspace:
+        """Return an empty workspace; the compliance is that of the build."""
+        return Workspace()
+
+    def start(self, problem: Problem) -> LinearState:
+        """Return the state without forces, with the gaps at rest."""
+        distance, share = problem.placed(problem.origin).distance, problem.system.object_share
+        geometry = contact_geometry(distance, problem.surface, axes=problem.axes, share=share)
+        rest = ContactState.at_rest(geometry.gap, problem.dim)
+        still = np.zeros_like(problem.surface.points)
+        return LinearState(**(vars(rest) | {"bases": geometry.bases, "displacement": still}))
+
+    def increment(
+        self,
+        problem: Problem,
+        state: ContactState,
+        a: ObjectPose,
+        b: ObjectPose,
+        guess: Float | None,
+        workspace: Workspace,
+    ) -> ContactSolution:
+        """Solve contact along the normals of the object."""
+        assert isinstance(state, LinearState)
+        body = LinearBody(problem.delassus, np.zeros_like(state.displacement))
+        return solve_increment(problem, state, a, b, body, guess, workspace)
+
+    def unknowns(self, problem: Problem, state: ContactState) -> Float:
+        """Return the unknowns of one state."""
+        return next(iter(self.all_unknowns(problem, [state])))
+
+    def all_unknowns(self, problem: Problem, states: Sequence[ContactState]) -> Iterator[Float]:
+        """Yield the unknowns from the forces, by one back-substitution for many states."""
+        return problem.unknowns_of([problem.upright_force(state) for state in states])
+
+    def gauges(self, problem: Problem, state: ContactState) -> dict[str, float]:
+        """Return the strains from the forces, by the rows of the gauges."""
+        return problem.gauge_strains(problem.upright_force(state))
+
+    def moment(self, problem: Problem, state: ContactState, target: ObjectPose) -> Float:
+        """Return the moment about the middle of the base, of forces at the centroids of their points at rest."""
+        return moment_of(problem.surface.centroids, state.scene_force)
+
+    def gaps(
+        self, problem: Problem, states: Sequence[ContactState], targets: Sequence[ObjectPose], face: BoundarySurface
+    ) -> list[Float]:
+        """Return the gaps at the displaced points."""
+        from finger3d.fem.recover import displacement
+
+        return [
+            problem.gap(target, face, face.trace @ displacement(problem.mesh, unknowns))
+            for target, unknowns in zip(targets, self.all_unknowns(problem, states), strict=True)
+        ]
+
+    def fields(self, problem: Problem, state: ContactState) -> tuple[Float, Float, Float]:
+        """Return displacement, linear strain and stress; in a section also the out-of-plane components."""
+        from finger3d.fem.recover import across, displacement, nodal_strain, pressure, stress
+
+        unknowns = self.unknowns(problem, state)
+        u = displacement(problem.mesh, unknowns)
+        strain = nodal_strain(problem.mesh, u)
+        p = pressure(problem.mesh, problem.part.stiffness, unknowns) if problem.part.elastic.mixed else None
+        sigma = stress(strain, problem.part.elastic, p)
+        if problem.dim == 3:
+            return u, strain, sigma
+        material, plane_strain = problem.model.material, problem.model.domain == "plane-strain"
+        return u, *across(strain, sigma, material, plane_strain)

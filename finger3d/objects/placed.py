@@ -1,0 +1,161 @@
+"""A rigid object in a pose: signed distance, heights and material points in the coordinates of the scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from finger3d._arrays import freeze_arrays
+from finger3d._types import Float
+from finger3d.geometry.surface import Triangles
+from finger3d.objects.pose import ObjectPose
+from finger3d.objects.shapes import RigidObject
+from finger3d.objects.triangulated import MeshObject
+
+_SURFACE = 1e-13
+"""Distance at which a point on a vertical line counts as on the surface, over the coordinates."""
+
+_ITERATIONS = 200
+"""Largest number of steps along a vertical line."""
+
+_LOWEST_START = 1e7
+"""Depth (mm) from which a vertical line starts; a body that is there extends downwards without end."""
+
+
+@dataclass(frozen=True)
+class PlacedObject:
+    """A rigid object in a pose.
+
+    Attributes
+    ----------
+    object : RigidObject
+    turned : (3, 3) rotation of the object's own coordinates, that of its initial pose included
+    place : (3,) mm, where the origin of its own coordinates is
+    """
+
+    object: RigidObject
+    turned: Float
+    place: Float
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
+
+    @classmethod
+    def of(cls, obj: RigidObject, first_contact_mm: float, pose: ObjectPose | None = None) -> PlacedObject:
+        """Return an object in a pose.
+
+        Parameters
+        ----------
+        first_contact_mm : height of its lowest point at first touch
+        pose : since first touch; that of first touch unless given
+        """
+        pose = pose or ObjectPose(0.0)
+        initial = obj.initial_rotation
+        turned = pose.turn @ initial if pose.is_turned else initial
+        reference = np.array([obj.x_mm, first_contact_mm, obj.z_mm]) + pose.displacement
+        return cls(obj, turned, reference - turned @ obj.lowest_point(initial))
+
+    @property
+    def is_upright(self) -> bool:
+        """Whether the object is not turned."""
+        return bool((self.turned == np.eye(3)).all())
+
+    def to_own(self, points: Float) -> Float:
+        """Return points (n, 3) in the object's own coordinates."""
+        return (points - self.place) if self.is_upright else (points - self.place) @ self.turned
+
+    def to_scene(self, points: Float) -> Float:
+        """Return points (n, 3), given in the object's own coordinates, in those of the scene."""
+        return points @ self.turned.T + self.place
+
+    def to_scene_direction(self, vectors: Float) -> Float:
+        """Return vectors (n, 3), given in the object's own coordinates, in those of the scene."""
+        return vectors if self.is_upright else vectors @ self.turned.T
+
+    def distance(self, points: Float) -> tuple[Float, Float]:
+        """Return the signed distance (n,) mm of points (n, d), negative inside, and its gradient (n, d), a unit vector.
+
+        In two dimensions it is that from the section z = 0: exact on the surface and wherever the section is the same
+        along z, else to first order.
+        """
+        at = points if points.shape[1] == 3 else np.column_stack([points, np.zeros(len(points))])
+        value, gradient = self.object.distance(self.to_own(at))
+        gradient = self.to_scene_direction(gradient)
+        return (value, gradient) if points.shape[1] == 3 else in_section(value, gradient)
+
+    def height(self, x: Float, z: Float) -> Float:
+        """Return the height (n,) mm where vertical lines first meet the object from below; nan where they miss it."""
+        x, z = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(z, dtype=float))
+        if self.is_upright:
+            return np.asarray(self.object.profile(x - self.place[0], z - self.place[2]) + self.place[1])
+        if isinstance(self.object, MeshObject):
+            return np.asarray(self._triangles.height(x - self.place[0], z - self.place[2]) + self.place[1])
+        return self._traced(x.ravel(), z.ravel()).reshape(x.shape)
+
+    @cached_property
+    def _triangles(self) -> Triangles:
+        assert isinstance(self.object, MeshObject)
+        own = self.object.triangles
+        return Triangles(own.points @ self.turned.T, own.faces)
+
+    def _traced(self, x: Float, z: Float) -> Float:
+        """Follow vertical lines up to the surface by steps that cannot pass it.
+
+        Steps have the length of the distance; for a convex body they are Newton's, whose zero is never beyond that of
+        a convex function.
+        """
+        at = np.stack([x, np.full(len(x), -_LOWEST_START), z], axis=1)
+        out = np.full(len(x), np.nan)
+        inside = self.distance(at)[0] < 0.0
+        out[inside] = -np.inf
+        moving = np.flatnonzero(~inside)
+        for _ in range(_ITERATIONS):
+            value, gradient = self.distance(at[moving])
+            step = value
+            if self.object.is_convex:
+                rate = -gradient[:, 1]
+                step = np.where(rate > _SURFACE, value / np.where(rate > _SURFACE, rate, 1.0), np.inf)
+            arrived = np.abs(step) <= _SURFACE * (1.0 + np.abs(at[moving, 1]))
+            missed = ~(at[moving, 1] + step < _LOWEST_START)
+            out[moving[arrived]] = at[moving[arrived], 1]
+            moving, step = moving[~(arrived | missed)], step[~(arrived | missed)]
+            at[moving, 1] += step
+            if not len(moving):
+                break
+        out[moving] = at[moving, 1]
+        return out
+
+    @property
+    def lowest(self) -> tuple[float, float]:
+        """Place (x, z) mm of the lowest point; of a plane, which may be shifted in itself, the place in the scene."""
+        if self.object.is_flat:
+            return self.object.x_mm, self.object.z_mm
+        x, _, z = self.to_scene(self.object.lowest_point(self.turned)[None])[0]
+        return float(x), float(z)
+
+    def moved_from(self, before: PlacedObject, points: Float) -> Float:
+        """Return how far (n, 3) mm the object's material at points (n, 3) has moved since a pose before."""
+        return points - before.to_scene(self.to_own(points))
+
+    def mirrors(self) -> tuple[str, ...]:
+        """Return the axes, "x" and "z", along which the object is its own mirror image about the finger's middle."""
+        probes = self.to_scene(self.object.probes())
+        value = self.distance(probes)[0]
+        bound = 1e-6 if isinstance(self.object, MeshObject) else 1e-10
+        scale = bound * max(self.object.probe_reach, float(np.abs(self.place).max()))
+        found = []
+        for axis, image in (("x", [-1.0, 1.0, 1.0]), ("z", [1.0, 1.0, -1.0])):
+            if np.abs(self.distance(probes * image)[0] - value).max() <= scale:
+                found.append(axis)
+        return tuple(found)
+
+
+def in_section(value: Float, gradient: Float) -> tuple[Float, Float]:
+    """Return the distance (n,) from a section, to first order, and its gradient (n, 2), from those in space."""
+    flat = gradient[:, :2]
+    length = np.linalg.norm(flat, axis=1)
+    known = length > _SURFACE
+    divisor = np.where(known, length, _SURFACE)
+    return value / divisor, np.where(known[:, None], flat / divisor[:, None], [0.0, -1.0])

@@ -1,0 +1,56 @@
+"""Pose of the object on its path: depth, slides and turns since first touch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from finger3d._types import Float
+from finger3d.objects.shapes import rotation
+
+
+@dataclass(frozen=True)
+class ObjectPose:
+    """Pose of the object: depth, slides along x and z, and turns (rad) about its reference point, at a time (s).
+
+    It is turned about x, then y, then z, all fixed axes, from the pose that it comes in.
+    """
+
+    depth_mm: float
+    slide_x_mm: float = 0.0
+    slide_z_mm: float = 0.0
+    time_s: float = 0.0
+    turn_x: float = 0.0
+    turn_y: float = 0.0
+    turn_z: float = 0.0
+
+    @property
+    def displacement(self) -> Float:
+        """Displacement (3,) mm of the reference point along x, y and z since first touch."""
+        return np.array([self.slide_x_mm, -self.depth_mm, self.slide_z_mm])
+
+    @property
+    def turns(self) -> tuple[float, float, float]:
+        """Turns about x, y and z, rad."""
+        return self.turn_x, self.turn_y, self.turn_z
+
+    @property
+    def is_turned(self) -> bool:
+        """Whether the object is turned."""
+        return any(self.turns)
+
+    @property
+    def turn(self) -> Float:
+        """Rotation (3, 3) from the pose that the object comes in."""
+        return rotation(*self.turns)
+
+    @property
+    def coordinates(self) -> Float:
+        """Depth and slides (mm), time (s) and turns (rad): array (7,)."""
+        return np.array([self.depth_mm, self.slide_x_mm, self.slide_z_mm, self.time_s, *self.turns])
+
+
+def between(a: ObjectPose, b: ObjectPose, share: float) -> ObjectPose:
+    """Return the pose a share of the way from a to b."""
+    return ObjectPose(*(a.coordinates + share * (b.coordinates - a.coordinates)).tolist())

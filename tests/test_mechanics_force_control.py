@@ -1,0 +1,129 @@
+"""Force control: the depth follows from the force, whatever the effects; forces out of reach are refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from models import block, fig9
+
+from finger3d.cli import main
+from finger3d.effects.large_deformation import Effect as LargeDeformation
+from finger3d.effects.viscosity import Effect as Viscosity
+from finger3d.errors import Finger3dError, MissingError
+from finger3d.mechanics.build import build
+from finger3d.mechanics.force_control import at_depth_reached, depth_of_force, forecast_depth
+from finger3d.mechanics.history import measure
+from finger3d.mechanics.model import Leg, Model
+from finger3d.mechanics.solve import march
+from finger3d.scene import load
+
+
+def ends(model: Model) -> list[dict[str, float]]:
+    problem = build(model)
+    steps = list(march(problem))
+    assert all(step.outcome.ok for step in steps)
+    return [measure(problem.points, step) for step in steps]
+
+
+def test_the_same_forces_are_reached_at_the_same_depths() -> None:
+    by_depth = ends(block(legs=(Leg(0.3, steps=3),)))
+    legs = tuple(Leg(0.3, steps=1, force_N=step["normal_force_N"]) for step in by_depth)
+    by_force = ends(block(legs=legs))
+    for a, b in zip(by_depth, by_force, strict=True):
+        assert b["depth_mm"] == pytest.approx(a["depth_mm"], rel=1e-8)
+        assert b["friction_sum_N"] == pytest.approx(a["friction_sum_N"], rel=1e-6)
+
+
+def test_increments_are_equal_in_force_on_the_way_up_and_down_and_constant_in_a_slide() -> None:
+    legs = (
+        Leg(0.2, steps=4, force_N=0.2),
+        Leg(0.2, slide_x_mm=0.3, steps=3, force_N=0.2),
+        Leg(0.1, slide_x_mm=0.3, steps=2, force_N=0.1),
+    )
+    forces = [step["normal_force_N"] for step in ends(block(legs=legs))]
+    assert forces == pytest.approx([0.05, 0.1, 0.15, 0.2, 0.2, 0.2, 0.2, 0.15, 0.1], rel=1e-8)
+
+
+@pytest.mark.parametrize("effect", [LargeDeformation(), Viscosity(((0.4, 1.0),))], ids=["large", "viscous"])
+def test_a_force_is_reached_with_an_effect(effect: LargeDeformation | Viscosity) -> None:
+    legs = (Leg(0.2, steps=2, force_N=0.2, duration_s=1.0), Leg(0.2, steps=2, force_N=0.2, duration_s=3.0))
+    found = ends(effect.apply(block(legs=legs, domain="plane-strain")))
+    assert [step["normal_force_N"] for step in found] == pytest.approx([0.1, 0.2, 0.2, 0.2], rel=1e-6)
+    creeps = found[3]["depth_mm"] - found[1]["depth_mm"]
+    assert creeps > 0.01 if isinstance(effect, Viscosity) else abs(creeps) < 1e-6
+
+
+def test_a_force_beyond_the_height_is_refused_with_the_largest_that_can() -> None:
+    model = block(legs=(Leg(1.0, steps=1, force_N=1e6),))
+    with pytest.raises(MissingError, match=r"force_N = 1e\+06: not reached .* the largest force is .* mm"):
+        list(march(build(model)))
+
+
+def test_the_depth_of_a_force_is_a_root() -> None:
+    def force(depth: float) -> float:
+        return depth**1.5
+
+    for start, guess in ((0.0, 0.1), (2.0, 3.0), (0.0, 5.0)):
+        assert depth_of_force(force, 1.0, start, guess, 10.0, 1.0) == pytest.approx(1.0, rel=1e-9)
+
+
+def test_a_forecast_is_good_to_a_factor_of_two() -> None:
+    model = fig9(domain="plane-strain")
+    found = ends(replace(model, legs=(Leg(5.0, steps=1),)))[0]
+    design, material = model.design, model.material.isotropic("a test")
+    forecast = forecast_depth(model.contact_path, material, found["normal_force_N"], design.height_mm, design.width_mm)
+    assert 2.5 < forecast < 10.0
+
+
+def test_a_forecast_that_was_too_small_is_replaced() -> None:
+    legs = (Leg(1.0, force_N=2.0), Leg(0.0))
+    assert at_depth_reached(legs, 1.05) is None
+    deeper = at_depth_reached(legs, 2.0)
+    assert deeper is not None
+    assert [leg.depth_mm for leg in deeper] == [2.0, 0.0]
+    assert at_depth_reached((Leg(1.0),), 2.0) is None
+
+
+SCENE = """
+[finger]
+geometry = "half_cylinder"
+radius_mm = 5.0
+width_mm = 2.0
+[material]
+E_MPa = 1.0
+nu = 0.3
+[press]
+force_N = 0.5
+steps = 2
+[model]
+domain = "plane-strain"
+"""
+
+
+def test_a_scene_gives_either_a_depth_or_a_force(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE)
+    scene = load(path)
+    assert scene.legs[0].force_N == 0.5
+    assert load_again(scene.to_toml(), tmp_path) == scene
+    with pytest.raises(Finger3dError, match="must not stand beside force_N"):
+        load(path, ["press.depth_mm=0.1"])
+    path.write_text(SCENE.replace("force_N = 0.5\n", ""))
+    with pytest.raises(Finger3dError, match="press.depth_mm is missing: give it, or force_N"):
+        load(path)
+
+
+def load_again(text: str, folder: Path) -> object:
+    (folder / "again.toml").write_text(text)
+    return load(folder / "again.toml")
+
+
+def test_a_press_by_force_tells_the_depth(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE)
+    assert main(["press", str(path), "--out", str(tmp_path / "out"), "--no-figures", "--no-error"]) == 0
+    assert "0.5 N" in capsys.readouterr().out
+    assert main(["press", str(path), "--out", str(tmp_path / "far"), "--set", "press.force_N=1e4"]) == 3
+    assert capsys.readouterr().err.strip().count("\n") < 8
