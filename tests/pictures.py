@@ -51,10 +51,12 @@ def pressed(mesh: Mesh) -> dict[str, Any]:
     shear = wanted * np.minimum(1.0, limit / np.maximum(size, 1e-12))[:, None]
     status = np.where(~inside, OPEN, np.where(size < limit, STICK, SLIP))
     table = {
+        "face": ["contact"] * len(nodes),
         "x_mm": x[nodes],
         "z_mm": mesh.points[nodes, 2] if mesh.dim == 3 else np.zeros(len(nodes)),
         "pressure_MPa": pressure,
         "shear_x_MPa": shear[:, 0],
+        "shear_y_MPa": np.zeros(len(nodes)),
         "shear_z_MPa": shear[:, 1] if mesh.dim == 3 else np.zeros(len(nodes)),
         "status": [STATUS_NAMES[s] for s in status],
     }

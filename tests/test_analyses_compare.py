@@ -225,6 +225,15 @@ def test_a_deviation_within_its_error_bar_of_the_limit_is_not_significant() -> N
     assert "not significantly more or less than 5 % in force (+5.2 %)" in told
 
 
+def test_an_object_that_twists_has_a_moment_that_no_section_has() -> None:
+    solid = case("solid", 20.0, 10.0)
+    solid.numbers["moment_y_Nmm_per_mm"] = 3.25
+    for turns in (True, False):
+        told = " ".join(verdict([case("plane strain", 20.0, 10.0), solid], 20.0, 50.0, turns))
+        assert ("torsion has no 2D model" in told) == turns
+        assert ("solid 3.25" in told) == turns
+
+
 def test_without_a_solid_there_is_no_verdict() -> None:
     failed = Case("solid", 20.0, 2.0, "swept", Outcome.NO_CONVERGENCE)
     text = verdict([case("plane strain", 20.0, 10.0), failed], 20.0, 50.0)

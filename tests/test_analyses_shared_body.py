@@ -13,7 +13,7 @@ from finger3d.contact.friction import Coulomb
 from finger3d.fem.recover import displacement
 from finger3d.fem.traces import surface
 from finger3d.mechanics.build import build
-from finger3d.mechanics.coverage import candidates_cover_face, contact_within_candidates, step_within_candidates
+from finger3d.mechanics.coverage import beyond_candidates, contact_within_candidates, step_within_candidates
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.solve import march
@@ -179,7 +179,7 @@ def test_several_presses_are_proved_as_each_on_its_own(effect, at_once, monkeypa
     monkeypatch.setattr("finger3d.mechanics.problem._AT_ONCE", at_once)
     model = scene(*effect).model()
     problem = build(model)
-    assert not candidates_cover_face(problem)
+    assert 0 in beyond_candidates(problem).face
     ends = [
         list(
             march(
@@ -192,14 +192,13 @@ def test_several_presses_are_proved_as_each_on_its_own(effect, at_once, monkeypa
     ]
     face = surface(problem.mesh, "contact", problem.part.thickness)
     kinematics = model.formulation
-    together = kinematics.gaps(problem, [f.part for f in ends], [f.target for f in ends], face)
-    for frame, found in zip(ends, together, strict=True):
-        (alone,) = kinematics.gaps(problem, [frame.part], [frame.target], face)
-        assert np.abs(found - alone).max() <= 1e-12 * frame.target.depth_mm
-        if not kinematics.finite_strain:
-            u = displacement(problem.mesh, kinematics.unknowns(problem, frame.part))
-            moved = problem.gap(frame.target, face, face.trace @ u)
-            assert np.abs(found - moved).max() <= 1e-12 * frame.target.depth_mm
+    together = kinematics.all_unknowns(problem, [f.part for f in ends])
+    for frame, unknowns in zip(ends, together, strict=True):
+        alone = kinematics.unknowns(problem, frame.part)
+        found, expected = (
+            kinematics.gap(problem, displacement(problem.mesh, x), frame.target, face)[0] for x in (unknowns, alone)
+        )
+        assert np.abs(found - expected).max() <= 1e-12 * frame.target.depth_mm
     assert (
         contact_within_candidates(problem, ends)
         == [step_within_candidates(problem, frame) for frame in ends]
@@ -219,10 +218,11 @@ def test_one_solver_proves_as_the_other(monkeypatch) -> None:
 
 
 def test_a_face_that_is_touched_nearly_everywhere_is_all_candidates() -> None:
-    """Then nothing is beyond them, and no press pays a proof."""
+    """Then nothing that a plane could touch is beyond them, and no press pays a proof."""
     level = ["object={shape='plane'}", "finger={geometry='block', half_length_mm=4.0, height_mm=3.0, width_mm=4.0}"]
-    assert candidates_cover_face(build(scene(*level).model()))
-    assert not candidates_cover_face(build(scene().model()))
+    whole, part = build(scene(*level).model()), build(scene().model())
+    assert set(beyond_candidates(whole).face) == {1}
+    assert 0 in beyond_candidates(part).face
 
 
 NARROW = -0.8
@@ -289,11 +289,11 @@ def test_presses_that_cannot_be_proved_fail_and_what_failed_before_keeps_its_rea
             raise ArithmeticError("its own")
         return march(problem, **arguments)
 
-    def unproved(problem, step):
+    def unproved(problem, steps):
         raise MemoryError("no proof")
 
     monkeypatch.setattr("finger3d.mechanics.step_halving.march", failing)
-    monkeypatch.setattr("finger3d.mechanics.coverage.step_within_candidates", unproved)
+    monkeypatch.setattr("finger3d.mechanics.coverage.check_surface", unproved)
     assert [str(p) for p in body.presses(variants)] == ["no proof", "its own"]
 
 

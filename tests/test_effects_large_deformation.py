@@ -18,6 +18,7 @@ from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.small_strain import SmallStrain
 from finger3d.mechanics.solve import march
 from finger3d.objects import Cylinder, Plane
+from tests.models import block, last
 
 
 def fig9(nu: float, size: float = 2.0, **changes: object) -> Model:
@@ -144,3 +145,14 @@ def test_a_press_too_deep_ends_in_an_outcome_with_all_earlier_steps_kept() -> No
     assert frames[-1].outcome in {Outcome.INVERTED, Outcome.NEWTON, Outcome.NO_CONVERGENCE}
     assert all(f.outcome.ok for f in frames[:-1])
     assert "try" in str(frames[-1].outcome)
+
+
+@pytest.mark.parametrize("friction", [0.3, 5.0])
+def test_a_twist_is_that_of_small_strain_under_a_light_load(friction: float) -> None:
+    """Strains of a percent: the moment differs by a few percent, sliding and sticking."""
+    legs = (Leg(0.02, steps=1), Leg(0.02, turn_y=np.radians(0.5), steps=2))
+    model = block(object=Plane(), legs=legs, mesh=MeshOptions(1.0, 1.5, "swept"), friction=Coulomb(friction))
+    small, finite = last(model), last(Effect().apply(model))
+    assert small["moment_y_Nmm"] > 0.1
+    assert finite["moment_y_Nmm"] == pytest.approx(small["moment_y_Nmm"], rel=0.05)
+    assert finite["normal_force_N"] == pytest.approx(small["normal_force_N"], rel=0.05)

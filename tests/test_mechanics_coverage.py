@@ -7,7 +7,7 @@ import math
 import pytest
 
 from finger3d.mechanics.build import build
-from finger3d.mechanics.coverage import candidates_cover_face, contact_within_candidates, step_within_candidates
+from finger3d.mechanics.coverage import beyond_candidates, contact_within_candidates, step_within_candidates
 from finger3d.mechanics.model import Domain, Leg
 from finger3d.mechanics.solve import march
 from tests.models import fig9
@@ -21,8 +21,8 @@ def test_too_few_candidate_points_are_noticed(domain: Domain) -> None:
     steps = [list(march(problem)) for problem in (narrow, usual, whole)]
     covered = [step_within_candidates(p, s[-1]) for p, s in zip((narrow, usual, whole), steps, strict=True)]
     assert covered == [False, True, True]
-    assert candidates_cover_face(whole)
-    assert not candidates_cover_face(usual)
+    assert 0 not in beyond_candidates(whole).face
+    assert 0 in beyond_candidates(usual).face
     # the first increments stay within the few points
     assert contact_within_candidates(narrow, steps[0])[0]
     assert not contact_within_candidates(narrow, steps[0])[-1]

@@ -27,7 +27,9 @@ def grid(nx: int, nz: int, shift: float = 0.0) -> ContactPoints:
     ]  # fmt: skip
     edges = np.vstack([np.stack([a.ravel(), b.ravel()], axis=1) for a, b in pairs])
     at = np.stack([x.ravel(), np.zeros(x.size), z.ravel()], axis=1)
-    return ContactPoints(np.arange(x.size), at, np.ones(x.size), np.eye(3)[[1, 0, 2]], 10.0, 0.75, edges)
+    return ContactPoints(
+        np.arange(x.size), np.zeros(x.size, dtype=np.int8), at, np.ones(x.size), np.eye(3)[[1, 0, 2]], 10.0, 0.75, edges
+    )
 
 
 def test_where_no_vertex_lies_on_the_line_its_edges_are_cut() -> None:
@@ -79,7 +81,7 @@ def test_an_area_is_uncertain_by_half_a_spacing_all_round() -> None:
         np.zeros((len(touching), 2)), np.zeros((len(touching), 2)),
     )  # fmt: skip
     frame = StepResult(
-        ObjectPose(1.0), state, state, (15.0, 0.0), np.zeros(3), {}, 0.0, 0.0, Outcome.CONVERGED, 0.0, 1, "newton"
+        ObjectPose(1.0), state, state, (15.0, 0.0), np.zeros(3), {}, 0.0, 0.0, Outcome.CONVERGED, 0.0, 1, "newton", 0.0
     )
     bars = least_bars(points, frame, 1.0)
     assert bars["contact_area_mm2"] == bars["stick_area_mm2"] == pytest.approx(8.0 * np.pi, rel=0.15)

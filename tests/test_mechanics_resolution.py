@@ -18,17 +18,15 @@ from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.effects.large_deformation import Effect
 from finger3d.errors import UnresolvedError
 from finger3d.fem.material import Isotropic
-from finger3d.fem.recover import displacement
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
+from finger3d.mechanics.coverage import check_surface, penetration_warnings
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.resolution import (
     UnresolvedOverlap,
     landmarks_of,
-    penetration,
-    penetration_warnings,
     unresolved_overlap,
     warnings_before_meshing,
 )
@@ -79,11 +77,11 @@ def overlap_of(problem: Problem) -> UnresolvedOverlap:
     ("obj", "depth", "size"),
     [
         (Sphere(radius_mm=0.5), 5.0, 4.0),
-        (Plane(tilt=math.radians(89.0)), 5.0, 4.0),
+        (Cylinder(40.0, radius_mm=0.5), 3.0, 4.0),
         (Plane(), 0.01, 4.0),
         (Cylinder(radius_mm=1.0), 2.0, 8.0),
     ],
-    ids=["ball", "steep plane", "shallow", "cylinder"],
+    ids=["ball", "beside the apex", "shallow", "cylinder"],
 )
 @pytest.mark.parametrize("finite", [False, True])
 def test_what_touches_no_point_is_refused_with_the_size_that_resolves_it(
@@ -146,6 +144,18 @@ def test_what_points_see_well_is_neither_refused_nor_warned_of(
     model = fig9(obj, depth, size, domain=domain, legs=(Leg(depth, steps=2), Leg(0.5 * depth, steps=1)))
     assert overlap_of(build(model)).share < 0.1
     assert not warnings_before_meshing(model, symmetry(model))
+
+
+def test_a_flank_that_touches_the_wall_is_resolved_by_points_of_the_wall() -> None:
+    """The plane is all but parallel to the wall: it comes 0.09 mm closer to it as it goes down 5 mm."""
+    problem = build(fig9(Plane(tilt=math.radians(89.0)), 5.0, 1.0))
+    *_, end = march(problem)
+    assert end.outcome.ok
+    walls = problem.points.face == 1
+    assert (end.state.status[walls] != OPEN).any()
+    force = problem.world_force(end.part)
+    pushed, down = np.abs(force[:, :2].sum(axis=0))
+    assert math.atan2(down, pushed) == pytest.approx(math.radians(1.0) + math.atan(0.25), abs=0.01)  # it slides down
 
 
 def test_what_is_hidden_is_the_sagitta_of_the_hats() -> None:
@@ -246,11 +256,11 @@ def test_the_end_of_a_press_tells_how_deep_the_object_is_between_the_points(fini
         model = fig9(obj, depth, size, legs=(Leg(depth, steps=4),))
         problem = build(Effect().apply(model) if finite else model)
         *_, end = march(problem)
-        u = displacement(problem.mesh, problem.model.formulation.unknowns(problem, end.part))
-        shares.append(penetration(problem, end, u)[0] / depth)
+        checks = check_surface(problem, [end])
+        shares.append(checks[0].penetration_mm / depth)
         # what is hidden at rest, measured vertically, foretells the distance
         assert shares[-1] == pytest.approx(overlap_of(problem).share, abs=0.08)
-        assert len(penetration_warnings(problem, end, u)) == (shares[-1] > 0.1)
+        assert len(penetration_warnings(problem, checks)) == (shares[-1] > 0.1)
     assert shares[0] > 0.1 > shares[1]
 
 
@@ -260,9 +270,8 @@ def test_an_edge_that_cuts_between_points_which_moved_is_told() -> None:
     model = fig9(MeshObject(surface=box(10.0, 5.0, 40.0)), 4.0, 2.5, legs=(Leg(4.0, steps=5),))
     problem = build(Effect().apply(model))
     *_, end = march(problem)
-    u = displacement(problem.mesh, problem.model.formulation.unknowns(problem, end.part))
     assert overlap_of(problem).share < 0.01
-    assert len(penetration_warnings(problem, end, u)) == 1
+    assert len(penetration_warnings(problem, check_surface(problem, [end]))) == 1
 
 
 def test_an_object_that_slides_off_is_no_mistake() -> None:

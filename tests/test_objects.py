@@ -38,9 +38,10 @@ TOP = 36.6 + 100.0 - math.sqrt(100.0**2 - 50.0**2)
 PRESS = ((10.0, 0.0, 0.0),)
 
 
-def near(obj: RigidObject, path: Sequence[Sequence[float]] = PRESS) -> float:
+def near(obj: RigidObject, path: Sequence[Sequence[float]] = PRESS, walls_touch: bool = True) -> float:
     poses = tuple(ObjectPose(*target) for target in path)
-    return initial_contact(ContactPath(FIG9.top, obj, 50.0, 10.0, poses)).first_contact_mm
+    way = ContactPath(FIG9.top, obj, 50.0, 10.0, poses, walls_touch=walls_touch)
+    return initial_contact(way).first_contact_mm
 
 
 # heights at (x, z) = (3, 4) above the lowest point at (0, 0), and one mm beside it along x
@@ -103,19 +104,30 @@ def test_several_bumps_as_high_are_all_tried() -> None:
         (MeshObject(90.0, surface=ball(20.0)), PRESS, "never touches"),
         (Sphere(90.0, radius_mm=20.0), PRESS, "never touches"),
         (MeshObject(surface=channel(110.0, 45.0)), PRESS, "touches the base first"),
-        (MeshObject(69.95, surface=ball(20.0)), PRESS, "a wall touches first"),
-        (MeshObject(surface=channel(100.0, 20.0)), PRESS, "a wall touches first"),
         (MeshObject(55.0, surface=box(10.0, 5.0, 30.0)), PRESS, "over no area: an edge or a wall touches first"),
-        (MeshObject(surface=channel(110.0, 20.0)), [[5, 0, 0], [5, 8, 0]], "runs into the finger's side at x = -50"),
         (MeshObject(0.0, 20.0, surface=box(10.0, 10.0, 10.0)), PRESS, "never touches"),
     ],
-    ids=["beside", "sphere beside", "hangs to the base", "flank at the rim", "tight channel", "only the rim",
-         "slides into the side", "beside along z"],
+    ids=["beside", "sphere beside", "hangs to the base", "only the rim", "beside along z"],
 )  # fmt: skip
 def test_approaches_that_are_refused(obj: RigidObject, path: Sequence[Sequence[float]], text: str) -> None:
     with pytest.raises(Finger3dError, match=text) as refused:
         near(obj, path)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("obj", "path", "text"),
+    [
+        (MeshObject(69.95, surface=ball(20.0)), PRESS, "a wall touches first"),
+        (MeshObject(surface=channel(100.0, 20.0)), PRESS, "a wall touches first"),
+        (MeshObject(surface=channel(110.0, 20.0)), [[5, 0, 0], [5, 8, 0]], "runs into the finger's side at x = -50"),
+    ],
+    ids=["flank at the rim", "tight channel", "slides into the side"],
+)
+def test_only_a_rigid_object_touches_the_walls(obj: RigidObject, path: Sequence[Sequence[float]], text: str) -> None:
+    assert near(obj, path) > 0.0
+    with pytest.raises(Finger3dError, match=text):
+        near(obj, path, walls_touch=False)
 
 
 @pytest.mark.parametrize(

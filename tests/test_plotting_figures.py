@@ -13,6 +13,7 @@ import pytest
 from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
 from finger3d.errors import MissingError
 from finger3d.fem.simplex import Mesh
+from finger3d.objects import Plane
 from finger3d.plotting import renderer
 from finger3d.plotting import solid as render
 from finger3d.plotting.figures import contact_figure, finger_picture, force_figure, zones
@@ -41,7 +42,8 @@ def assert_shows_the_zones(path: Path) -> None:
     assert share(path, "#33638d", within=0.2) > 0.003
 
 
-PROFILE = np.array([[-55.0, 40.0], [55.0, 40.0]])
+PLATE = Plane().drawing(60.0)
+OBJECT = (PLATE.points + [0.0, 40.0, 0.0])[PLATE.faces]
 
 
 def test_a_solid_is_drawn_by_matplotlib_when_asked_for(
@@ -49,7 +51,7 @@ def test_a_solid_is_drawn_by_matplotlib_when_asked_for(
 ) -> None:
     monkeypatch.setenv("FINGER3D_RENDERER", "matplotlib")
     mesh, result = solid
-    assert finger_picture(tmp_path / "f.png", mesh, **result, title="Fig. 9", profile=PROFILE) == "matplotlib"
+    assert finger_picture(tmp_path / "f.png", mesh, **result, title="Fig. 9", thing=OBJECT) == "matplotlib"
     assert_shows_the_zones(tmp_path / "f.png")
 
 
@@ -60,7 +62,7 @@ def test_pyvista_draws_a_solid_or_tells_that_opengl_is_missing(
     mesh, result = solid
     tiny = "import pyvista as pv; p = pv.Plotter(off_screen=True); p.add_mesh(pv.Sphere()); p.screenshot()"
     if renderer.run_child([sys.executable, "-c", tiny]) is None:
-        assert finger_picture(tmp_path / "f.png", mesh, **result, title="Fig. 9", profile=PROFILE) == "pyvista"
+        assert finger_picture(tmp_path / "f.png", mesh, **result, title="Fig. 9", thing=OBJECT) == "pyvista"
         assert_shows_the_zones(tmp_path / "f.png")
     else:
         with pytest.raises(MissingError, match="PyVista cannot render here"):
@@ -129,9 +131,10 @@ def test_the_skin_is_the_whole_boundary_and_lies_on_the_curved_surface(solid: tu
     mesh, result = solid
     table = result["table"]
     status = np.array([STATUS_NAMES.index(s) for s in table["status"]])
-    shear = np.column_stack([table["shear_x_MPa"], table["shear_z_MPa"]])
+    shear = np.column_stack([table[f"shear_{axis}_MPa"] for axis in "xyz"])
     still = np.zeros_like(mesh.points)
-    skin = render.skin_of(mesh, still, table["pressure_MPa"], shear, status, result["contact_nodes"], None)
+    nodes = result["contact_nodes"]
+    skin = render.skin_of(mesh, still, table["pressure_MPa"], shear, status, nodes, np.zeros(len(nodes), dtype=int))
     assert len(skin.contact) == 6 * len(mesh.facets["contact"])
     assert len(skin.body) == sum(len(f) for k, f in mesh.facets.items() if k != "contact")
     assert np.abs(skin.contact[..., 1] - top(skin.contact[..., 0])).max() < 0.2  # sagitta of a facet 5 mm long

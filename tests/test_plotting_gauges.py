@@ -68,8 +68,8 @@ def test_the_render_and_the_marks_have_one_scale(tmp_path: Path, monkeypatch: py
     """What the renderer crops is put back where the viewer sees it: the picture's ends are those of the body."""
     mesh = finger((12, 5, 4))
     skin = solid.skin_of(
-        mesh, np.zeros_like(mesh.points), np.zeros(0), np.zeros((0, 2)), np.zeros(0, dtype=int),
-        np.zeros(0, dtype=int), None,
+        mesh, np.zeros_like(mesh.points), np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=int),
+        np.zeros(0, dtype=int), np.zeros(0, dtype=int),
     )  # fmt: skip
     middle, size = skin.frame
     wide, high = solid.WINDOW

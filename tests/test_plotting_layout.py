@@ -45,13 +45,13 @@ def contact(path: Path) -> None:
 
 def section(path: Path) -> None:
     mesh = finger((20, 4))
-    finger_picture(path, mesh, **pressed(mesh), title="9 N", marks=marks_of(mesh, [GAUGE]), profile=np.eye(2))
+    finger_picture(path, mesh, **pressed(mesh), title="9 N", marks=marks_of(mesh, [GAUGE]), thing=np.eye(3)[None])
 
 
 def solid(path: Path) -> None:
     mesh = finger((20, 4, 3))
     marks = marks_of(mesh, [GAUGE], near=True)
-    finger_picture(path, mesh, **pressed(mesh), title="9 N", marks=marks, profile=np.eye(2))
+    finger_picture(path, mesh, **pressed(mesh), title="9 N", marks=marks, thing=np.eye(3)[None])
 
 
 def comparison(path: Path) -> None:

@@ -46,8 +46,8 @@ def orange(image: np.ndarray) -> float:
 
 
 def marked(image: np.ndarray) -> int:
-    """Pixels in the colour of gauges."""
-    return int((np.abs(image - np.array([0xB0, 0x00, 0x6A])).max(axis=2) < 12).sum())
+    """Pixels in the colour of gauges, or in that colour seen through the object."""
+    return int((np.abs(image - np.array([0xB0, 0x00, 0x6A])).max(axis=2) < 40).sum())
 
 
 def frames(path: Path) -> list[np.ndarray]:
@@ -167,7 +167,7 @@ def damaged_steps(arrays: dict[str, np.ndarray]) -> Iterator[tuple[str, dict[str
             "text": np.full(a.shape, "x"), "scalar": np.array(1.0), "one more axis": a[..., None], "empty": a[:0],
             "complex": a.astype(complex),
         }  # fmt: skip
-        if name not in ("cells",):
+        if name not in ("cells", "object_faces"):
             changed["shorter"] = a[:-1]
         if a.dtype.kind == "f":
             changed |= {"nan": np.full_like(a, np.nan), "infinite": np.full_like(a, np.inf)}

@@ -167,7 +167,7 @@ def test_steps_hold_the_last_state_of_the_other_files(solid: Path) -> None:
 
 def test_every_kept_step_is_the_finger_at_that_depth(solid: Path) -> None:
     states = load_states(solid / "steps.npz")
-    for k, (depth, _, _) in enumerate(states.target):
+    for k, (depth, *_) in enumerate(states.target):
         at = states.points[states.nodes] + states.displacement[k][states.nodes]
         # vertices that touch lie on the plane up to the weighting of the gap over their facets, h^2 / 8 R, twice
         touching = states.status[k] != 0
@@ -190,21 +190,23 @@ def test_the_view_keeps_to_its_budget(solid: Path, section: Path) -> None:
     whole = view_of(states)
     assert whole is not None
     assert len(whole.labels) == 4
-    # every corner of every facet, once
-    assert len(whole.rest) == len(np.unique(states.corners))
+    # every corner of every facet, once on the faces that may touch and once on the others
+    on = states.on_contact
+    assert len(whole.rest) == len(np.unique(states.corners[on])) + len(np.unique(states.corners[~on]))
     assert len(whole.body) + len(whole.contact) == len(states.facets)
     each = len(whole.rest) * 17 * 4 // 3
-    less = view_of(states, budget=states.corners.size * 16 // 3 + 2 * each)
-    one = view_of(states, budget=states.corners.size * 16 // 3 + each)
+    fixed = (states.corners.size + states.object_points.size + states.object_faces.size) * 16 // 3
+    less = view_of(states, budget=fixed + 2 * each)
+    one = view_of(states, budget=fixed + each)
     assert less is not None
     assert one is not None
     assert (less.labels[-1], one.labels) == (whole.labels[-1], whole.labels[-1:])
     assert len(less.labels) == 2
     assert view_of(states, budget=1000) is None
     assert view_of(load_states(section / "steps.npz")) is None
-    slid = view_of(replace(states, target=states.target + [0.0, 1.5, 0.0]))
+    slid = view_of(replace(states, target=states.target + [0.0, 1.5, 0.0, 0.0, 2.5, 0.0]))
     assert slid is not None
-    assert slid.labels[-1] == "step 4: 0.5 mm deep, slid 1.5 mm along x"
+    assert slid.labels[-1] == "step 4: 0.5 mm deep, slid 1.5 mm along x, turned 2.5 deg about y"
 
 
 def test_the_view_carries_the_gauges_of_every_step_on_the_face_in_front(solid: Path) -> None:

@@ -247,7 +247,7 @@ def run(quick: bool) -> tuple[Row, ...]:
     if made:
         what = f"pytetwild on a warm cache against a cold one ({made[0]:.1f} s)"
         rows.append(_row(what, 0.02, made[1] / made[0], load, "0: only reading the file is left"))
-    rows += _objects(5.0 if quick else 1.8, load, repeats)
+    rows += _objects(5.0 if quick else 2.5, load, repeats)
     rows += _beside_calculix(quick, load)
     for size, most in zip(sizes, (2.0,) if quick else (2.0, 5.0), strict=True):
         peak = max(r["peak_MB"] for r in runs[size]) / 1024.0

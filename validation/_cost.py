@@ -20,12 +20,12 @@ from finger3d.fem.assembly import Stiffness, stiffness
 from finger3d.fem.condense import condense
 from finger3d.fem.material import Elasticity, Isotropic
 from finger3d.fem.simplex import Mesh
-from finger3d.fem.traces import BoundarySurface, local_rows, surface
+from finger3d.fem.traces import BoundarySurface, local_rows
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import MARGIN, candidate_points, contact_rows
 from finger3d.mechanics.history import ContactPoints, StepResult, measure
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.problem import ContactSystem, Part, Problem
+from finger3d.mechanics.problem import ContactSystem, Part, Problem, free_surface
 from finger3d.mechanics.solve import march
 from finger3d.mechanics.symmetry import active_dofs, held_dofs, symmetry, unfold_points
 from finger3d.meshing.generate import mesh_solid
@@ -132,7 +132,7 @@ def assembled(model: Model, element: str) -> Parts:
     elastic = replace(constants, mixed=element == "mixed")
     thickness = 1.0 if mesh.dim == 3 else model.design.width_mm
     matrix = stiffness(mesh, elastic, thickness)
-    face = candidate_points(model, surface(mesh, "contact", thickness), way.first_contact_mm, MARGIN)
+    face = candidate_points(model, free_surface(model, mesh, thickness), way.first_contact_mm, MARGIN)
     kept = active_dofs(face, axes)
     rows = local_rows(face, vertical_frame(mesh.dim))[kept]
     gauges = sp.vstack([g.row(mesh, axes) for g in model.gauges], format="csr")

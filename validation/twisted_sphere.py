@@ -1,10 +1,17 @@
 """Does a rigid ball that is twisted on an elastic body carry the torque of partial and of full slip?
 
 A ball of radius 100 mm is pressed into a block so that it touches over a circle of radius a = 1 mm, and turned about
-the vertical.  With friction that holds, the torque is that of a bonded disc, M = 16/3 G a^3 theta (Lubkin 1951, small
-angles; Johnson 1985, Sec. 7.6).  When every point slips, it is M = 3 pi/16 mu P a, the moment of mu times Hertz's
-pressure (Johnson 1985, Sec. 3.9).  Contact points lie up to an edge length inside of the circle, and shear is singular
-there: both torques converge from below.  Torsion has no 2D counterpart.
+the vertical by t.  With friction that holds, the torque is that of a bonded disc, M = 16/3 G a^3 t (Johnson 1985,
+Sec. 7.6).  With friction a ring c < r < a slips at once (Lubkin 1951): with Hertz's pressure of the maximum p0,
+
+    t = mu p0/(2 G) [K(k') - E(k')],   k'^2 = 1 - c^2/a^2,   M = (16/3) G int_c^a s^3 dt(s)
+
+a sum of bonded discs of the radii c to a that carries mu p in the ring (Jaeger 1995; REFERENCES.md, 3.5).  When every
+point slips, M = 3 pi/16 mu P a.  As in the theory, friction acts from the beginning of the turn on, except in the rows
+"friction while pressed", where it is radial before it turns: full slip is the same.
+
+Contact points lie up to an edge length inside of the circle, and shear is singular there: torques converge from below.
+Torsion has no 2D counterpart.
 """
 
 from __future__ import annotations
@@ -13,8 +20,11 @@ import math
 from dataclasses import replace
 from typing import Any
 
+from scipy.integrate import quad
+from scipy.special import ellipe, ellipkm1
+
 from finger3d.analyses.study_rows import Result, Row
-from finger3d.contact.friction import Coulomb
+from finger3d.contact.friction import STICK, Coulomb
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
@@ -22,13 +32,15 @@ from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
-from finger3d.objects import Sphere
+from finger3d.objects import ObjectPose, Sphere
 
 RADIUS, E, NU = 100.0, 1.0, 0.3
 SHEAR, EFFECTIVE = E / (2.0 * (1.0 + NU)), E / (1.0 - NU**2)
 DEPTH = 1.0 / RADIUS  # a = 1 mm on a half-space
 MU = 0.1
 TURNED = math.radians(4.0)
+STUCK = (0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1)  # c/a
+LUBKIN = "Lubkin 1951; REFERENCES.md, 3.5"
 
 
 def block(size: float) -> Problem:
@@ -57,46 +69,115 @@ def radius_of(force: float) -> float:
     return float((3.0 * force * RADIUS / (4.0 * EFFECTIVE)) ** (1.0 / 3.0))
 
 
+def discs(share: float) -> float:
+    """K - E of the modulus sqrt(1 - c^2/a^2), for c/a = `share`: what discs from c to a add to the turn."""
+    return float(ellipkm1(share**2) - ellipe(1.0 - share**2))
+
+
+def turn_of(share: float) -> float:
+    """Turn over mu p0/G at which the circle of radius c = `share` times a sticks."""
+    return 0.5 * discs(share)
+
+
+def torque_of(share: float) -> float:
+    """Torque over that of full slip where the circle of radius c = `share` times a sticks; by parts."""
+    inner = share**3 * discs(share) if share > 0.0 else 0.0
+    total = inner + 3.0 * float(quad(lambda s: s**2 * discs(s), share, 1.0, epsabs=1e-12)[0])
+    return 4.0 / math.pi * total / (3.0 * math.pi / 16.0)
+
+
+def partial(problem: Problem, shares: tuple[float, ...]) -> list[tuple[float, float, float, float, float]]:
+    """Press without friction and turn with it, to the radii of stick `shares` of the theory, one after another.
+
+    Returns c/a, turn over mu p0/G, torque over that of full slip, stuck radius over that of the contact, both found,
+    and the turn, rad.
+    """
+    smooth = replace(problem.model, friction=Coulomb(0.0), legs=(Leg(DEPTH, steps=3),))
+    *_, frame = march(replace(problem, model=smooth))
+    state, start = frame.part, ObjectPose(DEPTH)
+    force = float(state.force[:, 0].sum())
+    a = radius_of(force)
+    unit = MU * 1.5 * force / (math.pi * a**2) / SHEAR
+    rough, formulation = replace(problem, model=replace(problem.model, friction=Coulomb(MU))), problem.model.formulation
+    place, area, out = problem.surface.centroids, problem.surface.area, []
+    for share in shares:
+        end = ObjectPose(DEPTH, turn_y=unit * turn_of(share))
+        found = formulation.increment(rough, state, start, end, None, formulation.workspace())
+        assert found.outcome.ok, found.outcome
+        state, start = found.state, end
+        pull = state.scene_force
+        torque = float((place[:, 2] * pull[:, 0] - place[:, 0] * pull[:, 2]).sum())
+        stuck = area[state.status == STICK].sum() / area[state.force[:, 0] > 0.0].sum()
+        full = 3.0 * math.pi / 16.0 * MU * force * a
+        out.append((share, turn_of(share), torque / full, math.sqrt(float(stuck)), end.turn_y))
+    return out
+
+
 def run(quick: bool) -> Result:
-    """Full stick and partial slip on meshes of 3, 4 and 5 edges to a."""
+    """Full stick, partial slip and full slip on meshes of 2, 3 and 4 edges to a."""
     edges = (3,) if quick else (2, 3, 4)
     rows, table, held = [], [], []
     for count in edges:
         problem = block(1.0 / count)
-        (_, torque, force, share), *_ = twisted(problem, 1e3, 1e-3, 1)
+        _, torque, force, share = twisted(problem, 1e3, 1e-3, 1)[0]
         held.append(torque / (16.0 / 3.0 * SHEAR * radius_of(force) ** 3 * 1e-3))
         slips = twisted(problem, MU, TURNED, 12)
         full = 3.0 * math.pi / 16.0 * MU * slips[-1][2] * radius_of(slips[-1][2])
-        table += [(count, math.degrees(t), m / full, s, m, f) for t, m, f, s in slips]
+        steps = partial(problem, (*STUCK, 0.001))
+        once = partial(problem, STUCK[5:6])[0][2]
+        table += [(count, c, t, m, torque_of(c), stuck, math.degrees(angle)) for c, t, m, stuck, angle in steps]
     at = f"{edges[-1]} edges to a"
     rows = [
-        Row(f"torque that sticks over 16/3 G a^3 theta, {at}", "Lubkin 1951", 1.0, held[-1], 1.2 / edges[-1],
+        Row(f"torque that sticks over 16/3 G a^3 t, {at}", "Johnson 1985, Sec. 7.6", 1.0, held[-1], 1.2 / edges[-1],
             "the circle is an edge length smaller, its torque 3/n, less at the mean"),
-        Row(f"stuck share of the contact, {at}", "it holds", 1.0, share, 1e-12, "every point"),
-        Row(f"torque of full slip over 3 pi/16 mu P a, {at}", "Johnson 1985, Sec. 3.9", 1.0, slips[-1][1] / full,
-            0.25 / edges[-1], "the pressure vanishes where the points end"),
-        Row(f"stuck share in full slip, {at}", "none but the middle", 0.0, slips[-1][3], 1.0 / edges[-1] ** 2,
-            "the middle point cannot slip", measure="absolute"),
+        Row(f"stuck share of the contact, mu = 1000, {at}", "it holds", 1.0, share, 1e-12, "every point"),
+        Row(f"torque of full slip over 3 pi/16 mu P a, friction while pressed, {at}", "Johnson 1985, Sec. 3.9", 1.0,
+            slips[-1][1] / full, 0.25 / edges[-1], "the pressure vanishes where the points end"),
+        Row(f"stuck share in full slip, friction while pressed, {at}", "none but the middle", 0.0, slips[-1][3],
+            1.0 / edges[-1] ** 2, "the middle point cannot slip", measure="absolute"),
+        Row("closed form of partial slip, c = 0, over 3 pi/16 mu P a", "Johnson 1985, Sec. 3.9", 1.0, torque_of(0.0),
+            1e-10, "quadrature"),
+        Row("closed form of partial slip, c = 0.999 a, over 16/3 G a^3 t", "Johnson 1985, Sec. 7.6", 1.0,
+            torque_of(0.999) * 3.0 * math.pi / 16.0 * 2.0 * math.pi / 3.0 / (16.0 / 3.0 * turn_of(0.999)), 2e-3,
+            "of the order 1 - c/a"),
+        Row(f"torque at c = 0.5 a in one increment over that in six, {at}", "it grows in one direction", 1.0,
+            once / steps[5][2], 1e-3, "slip of a coarse mesh is not exactly along circles"),
     ]  # fmt: skip
+    for c, _, torque, stuck, angle in steps[1:8:2]:
+        what = f"at {math.degrees(angle):.3f} deg, c = {c:g} a, {at}"
+        rows += [
+            Row(f"torque over that of full slip, {what}", LUBKIN, torque_of(c), torque, 0.25 / edges[-1],
+                "as in full slip", measure="absolute"),
+            Row(f"the same over the torque found in full slip, {what}", LUBKIN, torque_of(c), torque / steps[-1][2],
+                0.15 / edges[-1], "rings of points slip one by one: 0.033 and 0.015 with 3 and 4 edges to a",
+                measure="absolute"),
+            Row(f"stuck radius over that of the contact, {what}", LUBKIN, c, stuck, 1.0 / edges[-1], "an edge length",
+                measure="absolute"),
+        ]  # fmt: skip
     if not quick:
         rows.append(
-            Row("torque that sticks, extrapolated to points without number", "Lubkin 1951", 1.0,
+            Row("torque that sticks, extrapolated to points without number", "Johnson 1985, Sec. 7.6", 1.0,
                 held[-1] + (held[-1] - held[-3]) * edges[-3] / (edges[-1] - edges[-3]), 0.1, "of first order in 1/n")
         )  # fmt: skip
-    columns = "edges_per_a turn_deg torque_over_full stuck_share moment_Nmm force_N".split()
+    columns = "edges_per_a c_over_a turn_G_over_mu_p0 torque_over_full theory stuck_radius turn_deg".split()
     data = dict(zip(columns, map(list, zip(*table, strict=True)), strict=True))
     return Result(tuple(rows), data, lambda figure: _draw(figure, data))
 
 
 def _draw(figure: Any, data: dict[str, list[float]]) -> None:
     left, right = figure.subplots(1, 2)
+    shares = [1.0 - 0.005 * k for k in range(1, 199)] + [0.005, 0.002, 0.001]
+    turns = [0.0, *(turn_of(c) for c in shares)]
+    left.plot(turns, [0.0, *(torque_of(c) for c in shares)], "k-", lw=0.8, label="Lubkin 1951")
+    right.plot(turns, [1.0, *shares], "k-", lw=0.8, label="Lubkin 1951")
     for count in sorted(set(data["edges_per_a"])):
         own = [k for k, c in enumerate(data["edges_per_a"]) if c == count]
-        turn = [data["turn_deg"][k] for k in own]
-        left.plot(turn, [data["torque_over_full"][k] for k in own], "o-", ms=3, label=f"{count:g} edges to a")
-        right.plot(turn, [data["stuck_share"][k] for k in own], "o-", ms=3, label=f"{count:g} edges to a")
-    left.axhline(1.0, color="k", lw=0.8, label="full slip, 3 pi/16 mu P a")
-    left.set(xlabel="turn (deg)", ylabel="torque over that of full slip", ylim=(0.0, 1.15))
-    right.set(xlabel="turn (deg)", ylabel="stuck share of the contact", ylim=(0.0, 1.0))
-    for axes in (left, right):
-        axes.legend(fontsize=8)
+        turn = [data["turn_G_over_mu_p0"][k] for k in own]
+        for axes, name in ((left, "torque_over_full"), (right, "stuck_radius")):
+            axes.plot(turn, [data[name][k] for k in own], "o", mfc="none", ms=5, label=f"{count:g} edges to a")
+    left.set(ylabel="torque over that of full slip", ylim=(0.0, 1.05))
+    right.set(ylabel="stuck radius over that of the contact", ylim=(0.0, 1.05))
+    for axes, where in ((left, "lower right"), (right, "upper right")):
+        axes.set(xlabel="turn G / (mu p0)", xlim=(0.0, 2.0))
+        axes.grid(alpha=0.3)
+        axes.legend(fontsize=8, loc=where)

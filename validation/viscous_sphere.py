@@ -103,8 +103,8 @@ class StandIn:
         points[:, 1] = -self.rest
         same = sp.eye_array(count, format="csr")
         return BoundarySurface(
-            nodes=np.arange(count), points=points, area=self.area, normals=np.zeros_like(points), trace=none,
-            samples=points, average=same, interpolate=none, hats=same,
+            nodes=np.arange(count), face=np.zeros(count, dtype=np.int8), points=points, area=self.area,
+            normals=np.zeros_like(points), trace=none, samples=points, average=same, interpolate=none, hats=same,
         )  # fmt: skip
 
     @property

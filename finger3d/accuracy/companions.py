@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from finger3d.errors import Finger3dError, UnresolvedError
-from finger3d.fem.traces import surface
+from finger3d.fem.traces import contact_face, surface
 from finger3d.mechanics.build import build, contact_box
 from finger3d.mechanics.model import MeshOptions, Model
 from finger3d.mechanics.problem import Problem
@@ -115,7 +115,8 @@ def _built_if(problem: Problem, model: Model, enough: Callable[[float], bool], s
 
 def built_like(problem: Problem, model: Model, say: Say = lambda text: None) -> Problem:
     """Return another model condensed, onto its whole contact face if the problem keeps its whole contact face."""
-    everything = len(surface(problem.mesh, "contact", problem.part.thickness).nodes) == len(problem.surface.nodes)
+    face = surface(problem.mesh, "contact", problem.part.thickness)
+    everything = len(face.nodes) == len(contact_face(problem.surface).nodes)
     return build(model, say, margin=math.inf) if everything else build(model, say)
 
 

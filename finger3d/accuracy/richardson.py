@@ -53,6 +53,7 @@ _KINDS = {
     "friction_along_x_N_per_mm": Kind.FORCE,
     "friction_along_z_N_per_mm": Kind.FORCE,
     "outward_friction_x_N_per_mm": Kind.FORCE,
+    "moment_y_Nmm_per_mm": Kind.FORCE,
     "peak_pressure_MPa": Kind.PRESSURE,
     "external_work_mJ": Kind.ENERGY,
     "dissipation_mJ": Kind.ENERGY,

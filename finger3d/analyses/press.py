@@ -99,11 +99,11 @@ def run_press(
 
 
 def _solve(scene: Scene, writer: ResultWriter, report: Progress, started: float) -> PressRecord:
-    """Build the problem and march through its increments, again with the whole contact face if contact reaches beyond
-    the candidate points.
+    """Build the problem and march through its increments, again with all points of the free faces if contact reaches
+    beyond the candidate points.
     """
     from finger3d.mechanics.build import build
-    from finger3d.mechanics.coverage import step_within_candidates
+    from finger3d.mechanics.coverage import check_surface
     from finger3d.mechanics.force_control import at_depth_reached
 
     refinement = _refine_mesh(scene, report)
@@ -122,12 +122,16 @@ def _solve(scene: Scene, writer: ResultWriter, report: Progress, started: float)
         problem = build(replace(problem.model, legs=legs), report.say)
         record = PressRecord(scene, problem, started, refinement, record.all_factorizations)
         _march(record, writer, report)
-    if record.steps and record.steps[-1].outcome.ok and not step_within_candidates(problem, record.steps[-1]):
-        report.say("contact reached beyond the candidate points; solving again with all of the contact face")
+    record.surface_checks = check_surface(problem, record.converged_steps)
+    if not all(check.within_candidates for check in record.surface_checks):
+        report.say("contact reached beyond the candidate points; solving again with all points of the free faces")
         report.stage("meshing")
         problem = build(problem.model, report.say, math.inf)
         record = PressRecord(scene, problem, started, refinement, record.all_factorizations)
         _march(record, writer, report)
+        record.surface_checks = check_surface(problem, record.converged_steps)
+    record.keep_penetration()
+    writer.progress(record)
     return record
 
 
@@ -202,13 +206,14 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fie
     """Recover and write the fields after the last converged increment, and judge from them; None without increments."""
     from finger3d.accuracy.advice import advise
     from finger3d.mechanics import resolution
+    from finger3d.mechanics.coverage import penetration_warnings
 
     begin = time.perf_counter()
     report.stage("writing fields")
     fields, good, problem = None, record.converged_steps, record.problem
     if good:
         u, strain, stress = problem.model.formulation.fields(problem, good[-1].part)
-        record.warnings += resolution.penetration_warnings(problem, good[-1], u)
+        record.warnings += penetration_warnings(problem, record.surface_checks)
         record.advice = advise(problem.model, strain)
         if record.step_estimate and record.step_estimate.advice:
             record.advice.append(record.step_estimate.advice)

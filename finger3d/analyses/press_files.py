@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from finger3d._types import Array, Float, Tree, TreeView
 from finger3d.contact.friction import STICK
-from finger3d.fem.simplex import Mesh, axis_numbers, middles, unfold
+from finger3d.fem.simplex import CONTACT, FREE_FACES, Mesh, axis_numbers, middles, unfold
 from finger3d.io import atomic, write_csv, write_json
-from finger3d.mechanics.history import StepResult, contact_table, measure
-from finger3d.results.states import states_of, write_states
+from finger3d.mechanics.history import ContactPoints, StepResult, contact_table, measure
+from finger3d.results.states import object_drawing, states_of, write_states
 from finger3d.results.vtu import write_vtu
 
 if TYPE_CHECKING:
@@ -116,7 +116,7 @@ class ResultWriter:
         """Write fields.vtu, the fields after the last converged increment, and steps.npz, displacements of them all."""
         good = record.converged_steps
         mesh, step = fields.mesh, good[-1]
-        surface = _on_surface(mesh, record.problem.points.nodes, contact_table(record.problem.points, step.state), step)
+        surface = _on_surface(mesh, record.problem.points, step)
         states = states_of(record.problem, good, mesh, fields.image_of, fields.mirror_sign, fields.displacement)
         write_states(self.folder / "steps.npz", states)
         write_vtu(
@@ -138,6 +138,8 @@ class ResultWriter:
         problem, good, mesh = record.problem, record.converged_steps, fields.mesh
         steps = [measure(problem.points, step) for step in good]
         table = contact_table(problem.points, good[-1].state)
+        placed = problem.placed(good[-1].target)
+        thing = object_drawing(problem, [placed])
         half_width = problem.points.half_width_mm if problem.dim == 3 else None
         stuck = np.full(len(table["status"]), STICK)
         mu = problem.model.friction.coefficients(stuck, table["pressure_MPa"])
@@ -149,7 +151,8 @@ class ResultWriter:
             fields.displacement,
             table,
             problem.points.nodes,
-            f"{steps[-1]['normal_force_N']:.4g} N at {good[-1].target.depth_mm:g} mm",
+            thing=placed.to_scene(thing.points)[thing.faces],
+            title=f"{steps[-1]['normal_force_N']:.4g} N at {good[-1].target.depth_mm:g} mm",
             marks=marks_of(mesh, problem.model.gauges, near=mesh.dim == 3),
         )
 
@@ -160,16 +163,26 @@ def history_table(steps: Sequence[TreeView]) -> dict[str, ArrayLike]:
     return {name: [row[name] for row in rows] for name in rows[0] if name != "gauges"}
 
 
-def _on_surface(mesh: Mesh, nodes: NDArray[np.int64], table: TreeView, step: StepResult) -> dict[str, Array]:
-    """Return contact quantities at all nodes (n,), interpolated between the vertices."""
-    ends, between = middles(mesh.facets["contact"], mesh.dim)
-    out = {}
-    for name in ("pressure", "shear_x", "shear_z"):
-        out[name] = np.zeros(len(mesh.points))
-        out[name][nodes] = table[f"{name}_MPa"]
-        out[name][between] = out[name][ends].mean(axis=1)
+def _on_surface(mesh: Mesh, points: ContactPoints, step: StepResult) -> dict[str, Array]:
+    """Return contact quantities at all nodes (n,), interpolated between the vertices.
+
+    At a crease they are those of the face with the larger pressure.
+    """
+    table = contact_table(points, step.state)
+    own = np.argsort(table["pressure_MPa"], kind="stable")  # the last of equal indices counts
+    labels = [FREE_FACES[k] for k in np.union1d(points.face, CONTACT)]
+    ends, between = middles(np.concatenate([mesh.facets[label] for label in labels if label in mesh.facets]), mesh.dim)
+
+    def nodal(values: Float) -> Float:
+        out = np.zeros((len(mesh.points), *values.shape[1:]))
+        out[points.nodes[own]] = values[own]
+        out[between] = out[ends].mean(axis=1)
+        return out
+
+    out = {name: nodal(table[f"{name}_MPa"]) for name in ("pressure", "shear_x", "shear_y", "shear_z")}
+    out["normal"] = nodal(np.stack([table[f"normal_{axis}"] for axis in "xyz"], axis=1))
     out["status"] = np.zeros(len(mesh.points))
-    out["status"][nodes] = step.state.status
+    out["status"][points.nodes[own]] = step.state.status[own]
     out["status"][between] = out["status"][ends].min(axis=1)
     return out
 

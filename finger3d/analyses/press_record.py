@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import resource
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +17,7 @@ from finger3d.mechanics.history import History, StepResult, measure
 if TYPE_CHECKING:
     from finger3d.accuracy.estimate import ErrorEstimate
     from finger3d.accuracy.refine import Refinement
+    from finger3d.mechanics.coverage import SurfaceCheck
     from finger3d.mechanics.formulation import Workspace
     from finger3d.mechanics.problem import Problem
     from finger3d.mechanics.step_halving import StepEstimate
@@ -41,6 +42,7 @@ class PressRecord:
     refinement : the mesh refinement that chose the mesh, if the scene asks for an error instead of sizes
     factorizations_before : factorisations of an earlier attempt with too few candidate points
     steps : the increments so far
+    surface_checks : the finger's free surface after each converged increment, once all are solved
     step_estimate : how automatic increments were chosen
     error_estimate : errors by mesh and increments
     warnings, advice : lines for the user
@@ -54,6 +56,7 @@ class PressRecord:
     refinement: Refinement | None = None
     factorizations_before: int = 0
     steps: list[StepResult] = field(default_factory=list)
+    surface_checks: list[SurfaceCheck] = field(default_factory=list)
     step_estimate: StepEstimate | None = None
     error_estimate: ErrorEstimate | None = None
     warnings: list[str] = field(default_factory=list)
@@ -85,6 +88,13 @@ class PressRecord:
     def converged_steps(self) -> list[StepResult]:
         """Increments that converged; all but the last of a press that failed."""
         return [step for step in self.steps if step.outcome.ok]
+
+    def keep_penetration(self) -> None:
+        """Enter the penetration of the surface checks into the steps."""
+        left = iter(self.surface_checks)
+        self.steps = [
+            replace(step, penetration_mm=next(left).penetration_mm) if step.outcome.ok else step for step in self.steps
+        ]
 
     @property
     def all_factorizations(self) -> int:

@@ -13,16 +13,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
 
-import numpy as np
-
 from finger3d._machine import versions
 from finger3d._types import TreeView
 from finger3d.analyses.reduced_file import arrays_of, assembled, bare, read, write
 from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.errors import Finger3dError
-from finger3d.fem.traces import BoundarySurface, restrict, surface
+from finger3d.fem.traces import BoundarySurface
 from finger3d.geometry.design import DesignSummary
 from finger3d.mechanics.build import MARGIN
+from finger3d.mechanics.coverage import beyond_candidates
 from finger3d.mechanics.history import History
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.path import targets
@@ -43,7 +42,7 @@ class ReducedModel:
     Attributes
     ----------
     problem : the problem that `finger3d.mechanics.solve.march` solves; its mesh and factor are empty
-    others : the points of the contact face that are no candidates
+    others : the points of the free faces that are no candidates
     about : versions, mesh hash, number of unknowns and effects of the body
     """
 
@@ -73,8 +72,7 @@ class ReducedModel:
                 f"effects.{name}: a body with it has no reduced model, its compliance is not constant; "
                 "take the effect out, or press the scene itself"
             )
-        face = surface(problem.mesh, "contact", problem.part.thickness)
-        others = restrict(face, ~np.isin(face.nodes, problem.surface.nodes))
+        others = beyond_candidates(problem)
         about = {
             "versions": versions(),
             "mesh_hash": problem.part.report.hash,
@@ -130,9 +128,8 @@ class ReducedModel:
         problem = replace(self.problem, model=replace(model, friction=law, legs=tuple(legs or model.legs)))
         if legs is not None:
             self._check(problem)
-            check(
-                problem.model, problem.surface, problem.system.first_contact_mm, problem.system.place_mm, problem.axes
-            )
+            system = problem.system
+            check(problem.model, problem.surface, system.first_contact_mm, system.place_mm, problem.axes)
         return History(problem.points, tuple(march(problem)))
 
     def _check(self, problem: Problem) -> None:
@@ -161,9 +158,7 @@ class ReducedModel:
             return
         path = targets(legs)
         deepest = max(t.depth_mm for t in path)
-        nearest = min(
-            float(rigid_gap(problem.model, self.others, problem.system.first_contact_mm, t).min()) for t in path
-        )
+        nearest = min(float(rigid_gap(problem.placed(t), self.others).min()) for t in path)
         if nearest < _GAP_LEFT * deepest:
             raise Finger3dError(
                 f"press: at depth {deepest:g} mm contact may leave the {self.contact_points} points that were "

@@ -18,6 +18,7 @@ from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.contact.rules import RULES
 from finger3d.errors import Finger3dError
 from finger3d.fem.material import Isotropic
+from finger3d.fem.simplex import FREE_FACES
 from finger3d.fem.traces import BoundarySurface
 from finger3d.geometry.design import DesignSummary
 from finger3d.io import atomic, read_arrays
@@ -28,7 +29,7 @@ from finger3d.mechanics.problem import ContactSystem, Problem
 from finger3d.mechanics.symmetry import Symmetry
 from finger3d.objects import OBJECTS, MeshObject, RigidObject, vertical_frame
 
-FORMAT, VERSION = "finger3d condensed body", 3
+FORMAT, VERSION = "finger3d condensed body", 4
 _SHAPES: dict[str, type[RigidObject]] = {r.__name__: r for r in OBJECTS.values()} | {"MeshObject": MeshObject}
 _MAX_STEPS = 1_000_000
 """Largest number of increments of a leg in a file."""
@@ -94,6 +95,7 @@ def _face_arrays(name: str, face: BoundarySurface) -> dict[str, Array]:
     mean, hats = face.average.tocsr(), face.hats.tocsr()
     return {
         f"{name}_nodes": face.nodes,
+        f"{name}_face": face.face,
         f"{name}_points": face.points,
         f"{name}_area": face.area,
         f"{name}_normals": face.normals,
@@ -114,6 +116,7 @@ def _face(name: str, arrays: TreeView, dim: int) -> BoundarySurface:
     points = arrays[f"{name}_points"].reshape(-1, dim)
     return BoundarySurface(
         nodes=nodes,
+        face=arrays[f"{name}_face"],
         points=points,
         area=arrays[f"{name}_area"],
         normals=arrays[f"{name}_normals"].reshape(-1, dim),
@@ -133,13 +136,14 @@ def bare(face: BoundarySurface) -> BoundarySurface:
 def arrays_of(problem: Problem) -> dict[str, Array]:
     """Return the arrays of a problem that a press needs, by their name in the file."""
     c, d = problem.delassus.shape[:2]
-    arrays = {
+    arrays: dict[str, Array] = {
         "compliance": problem.delassus.reshape(c * d, c * d),
         "gauge_rows": problem.system.gauge_rows,
         "parent": problem.symmetry.image_of,
         "sign": problem.symmetry.mirror_sign,
         "share": problem.symmetry.multiplicity,
         "nodes": problem.points.nodes,
+        "face": problem.points.face,
         "points": problem.points.points,
         "area": problem.points.area,
         "band": np.array([problem.points.half_width_mm, problem.points.band_mm]),
@@ -165,6 +169,7 @@ def assembled(model: Model, arrays: TreeView, touch_mm: float, axes: tuple[str, 
         surface=_face("face", arrays, d),
         points=ContactPoints(
             nodes=arrays["nodes"],
+            face=arrays["face"],
             points=arrays["points"],
             area=arrays["area"],
             basis=vertical_frame(d),
@@ -303,6 +308,7 @@ def _check_arrays(arrays: TreeView, d: int, gauges: int) -> None:
         "sign": (p, d),
         "share": (p,),
         "nodes": (p,),
+        "face": (p,),
         "points": (p, 3),
         "area": (p,),
         "band": (2,),
@@ -315,6 +321,7 @@ def _check_arrays(arrays: TreeView, d: int, gauges: int) -> None:
         m, samples, entries = (len(arrays[f"{face}_{name}"]) for name in ("nodes", "samples", "mean"))
         wanted |= {
             f"{face}_nodes": (m,),
+            f"{face}_face": (m,),
             f"{face}_points": (m, d),
             f"{face}_area": (m,),
             f"{face}_normals": (m, d),
@@ -326,7 +333,7 @@ def _check_arrays(arrays: TreeView, d: int, gauges: int) -> None:
         }
     if not c:
         raise ValueError("no contact points")
-    whole = ("nodes", "parent", "mean_at", "mean_rows")
+    whole = ("nodes", "face", "parent", "mean_at", "mean_rows")
     for name, shape in wanted.items():
         values = arrays[name]
         kinds = "iu" if name.endswith(whole) else "f"
@@ -337,6 +344,8 @@ def _check_arrays(arrays: TreeView, d: int, gauges: int) -> None:
             raise ValueError(f"{name} holds other things than finite numbers")
     if not ((arrays["parent"] >= 0) & (arrays["parent"] < c)).all():
         raise ValueError("parent is out of range")
+    if not all(((arrays[name] >= 0) & (arrays[name] < len(FREE_FACES))).all() for name in ("face", "face_face")):
+        raise ValueError("face is out of range")
     edges = arrays["edges"]
     if edges.ndim != 2 or edges.shape[1] != 2 or edges.dtype.kind not in "iu" or not ((edges >= 0) & (edges < p)).all():
         raise ValueError("edges do not fit")

@@ -266,17 +266,22 @@ class _Run:
     seconds: float
 
     def with_coverage(self) -> tuple[_Run, bool]:
-        """Return the run, and whether contact stayed within the candidate points; the check counts as part of it."""
-        from finger3d.mechanics.coverage import step_within_candidates
+        """Return the run with its last penetration, and whether contact stayed within the candidate points.
+
+        The check counts as part of the run.
+        """
+        from finger3d.mechanics.coverage import check_surface
 
         if isinstance(self.frames, Exception) or not self.frames[-1].outcome.ok:
             return self, True
         start = time.perf_counter()
         try:
-            covered = step_within_candidates(self.problem, self.frames[-1])
+            (check,) = check_surface(self.problem, self.frames[-1:])
         except TROUBLE as error:
             return replace(self, frames=error.with_traceback(None)), True
-        return replace(self, seconds=self.seconds + time.perf_counter() - start), covered
+        last = replace(self.frames[-1], penetration_mm=check.penetration_mm)
+        seconds = self.seconds + time.perf_counter() - start
+        return replace(self, frames=(*self.frames[:-1], last), seconds=seconds), check.within_candidates
 
     def steps_or_raise(self) -> tuple[StepResult, ...]:
         """Return the steps, or raise the reason why there are none."""

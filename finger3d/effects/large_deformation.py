@@ -32,6 +32,7 @@ from finger3d.fem.recover import displacement
 from finger3d.fem.traces import BoundarySurface
 from finger3d.mechanics.cost import FACTORISATIONS, AddedCost, PressCost
 from finger3d.mechanics.formulation import Workspace, length_scale, moment_of, solve_contact
+from finger3d.mechanics.linear_contact import carried_by_object
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem, scatter_to_points
 from finger3d.objects import ObjectPose
@@ -197,12 +198,10 @@ class FiniteStrain:
         nodal = (contact.rows.T @ state.force.ravel()).reshape(u.shape)
         return moment_of(mesh.points + u, nodal)
 
-    def gaps(
-        self, problem: Problem, states: Sequence[ContactState], targets: Sequence[ObjectPose], face: BoundarySurface
-    ) -> list[Float]:
-        """Gap (c,) mm of the points of a face in each deformed configuration."""
-        fields = (displacement(problem.mesh, unknowns) for unknowns in self.all_unknowns(problem, states))
-        return [_contact(problem, face, u, target).gap for u, target in zip(fields, targets, strict=True)]
+    def gap(self, problem: Problem, u: Float, target: ObjectPose, surface: BoundarySurface) -> tuple[Float, Float]:
+        """Return gaps and normals in the deformed configuration."""
+        contact = _contact(problem, surface, u, target)
+        return contact.gap, contact.bases[:, 0]
 
     def fields(self, problem: Problem, state: ContactState) -> tuple[Float, Float, Float]:
         """Displacement, Green-Lagrange strain and Cauchy stress."""
@@ -289,7 +288,7 @@ class _NewtonIncrement:
         problem, start = self.problem, self.start
         c, d = start.force.shape
         relaxation = condensation.solve(-configuration.internal)
-        free = self._relative_displacement(contact, configuration.x + relaxation)
+        free = self._relative_displacement(contact, configuration, relaxation)
         free[:, 0] += (contact.rows @ relaxation[: problem.mesh.points.size])[::d]
         free[:, 1:] += start.tangential_displacement
         delassus = scatter_to_points(condensation.compliance, problem.system.active_dofs, c, d)
@@ -297,12 +296,19 @@ class _NewtonIncrement:
         forces = solution.state.force.ravel()[problem.system.active_dofs]
         return solution, relaxation + condensation.unknowns(forces)
 
-    def _relative_displacement(self, contact: DeformedContact, x: Float) -> Float:
-        """Gap and increment of tangential displacement (c, d) at unknowns x (N,), in the directions of `contact`."""
+    def _relative_displacement(
+        self, contact: DeformedContact, configuration: _Configuration, step: Float | None = None
+    ) -> Float:
+        """Gap and increment of tangential displacement (c, d) in a configuration, in the directions of `contact`.
+
+        The displacement may be that after a further step (N,), with the object's material where it is without.
+        """
         problem = self.problem
         n, d = problem.mesh.points.size, problem.dim
-        travel = (self.b.displacement - self.a.displacement)[:d]
-        increment = problem.surface.trace @ (x - self.start.unknowns)[:n].reshape(-1, d) - travel
+        at, before = (problem.surface.trace @ x[:n].reshape(-1, d) for x in (configuration.x, self.start.unknowns))
+        increment = at - before - carried_by_object(problem, self.a, self.b, at)
+        if step is not None:
+            increment = increment + problem.surface.trace @ step[:n].reshape(-1, d)
         out = np.empty((len(contact.gap), d))
         out[:, 0] = contact.gap
         out[:, 1:] = np.einsum("ctk,ck->ct", contact.bases[:, 1:], increment)
@@ -347,12 +353,12 @@ class _NewtonIncrement:
         volume = float(np.abs(np.linalg.det(np.diff(mesh.points[mesh.cells[:, : mesh.dim + 1]], axis=1))).mean())
         volume *= problem.part.thickness / math.factorial(mesh.dim) * pressure_scale(mesh, self._law.shear)
         dilatation = float(np.abs(out_of_balance[n:]).max(initial=0.0)) / volume
-        moved = self._relative_displacement(contact, configuration.x)
+        moved = self._relative_displacement(contact, configuration)
         return max(residual(force, moved, solution.status, mu, self._length_scale), equilibrium, dilatation)
 
     def state(self, configuration: _Configuration, contact: DeformedContact, solution: ContactState) -> DeformedState:
         """Return the state at the end of the increment."""
-        moved = self._relative_displacement(contact, configuration.x)
+        moved = self._relative_displacement(contact, configuration)
         after = next_state(self.start, solution.force, moved, solution.status)
         return DeformedState(**(vars(after) | {"bases": contact.bases}), unknowns=configuration.x)
 

@@ -9,6 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from finger3d._types import Float
+from finger3d.fem.directions import bases_of
 from finger3d.fem.simplex import axis_numbers
 from finger3d.fem.traces import BoundarySurface
 
@@ -80,7 +81,7 @@ def deformed_contact(
     mean_gap = (face.average @ (gap * area_ratio)) / area
     for k in axis_numbers(axes):
         mean_normal[face.points[:, k] == 0.0, k] = 0.0
-    bases = _bases(mean_normal)
+    bases = bases_of(mean_normal / np.linalg.norm(mean_normal, axis=1)[:, None])
     d_gap = _rows([sp.diags_array(normal[:, k]) @ face.interpolate for k in range(d)])
     # d(mean gap) = mean of d(gap) and of (gap - mean gap) d(area)
     weight = sp.diags_array(1.0 / area) @ face.average
@@ -157,13 +158,3 @@ def _change(face: BoundarySurface, moved: list[Float], i: int) -> sp.csr_matrix:
         + sp.diags_array(first[:, j]) @ _component(face.along[1], k)
         - sp.diags_array(first[:, k]) @ _component(face.along[1], j)
     )
-
-
-def _bases(normal: Float) -> Float:
-    """Orthonormal bases (c, d, d) with the given normals (c, d); the first tangent is +x projected on the plane."""
-    d = normal.shape[1]
-    n = normal / np.linalg.norm(normal, axis=1)[:, None]
-    along = np.eye(d)[0] - n[:, :1] * n
-    along /= np.linalg.norm(along, axis=1)[:, None]
-    rows = [n, along] if d == 2 else [n, along, np.cross(n, along)]
-    return np.stack(rows, axis=1)

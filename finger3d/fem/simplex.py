@@ -21,6 +21,12 @@ FACETS = {
 }
 """Facets of a simplex, oriented outward for a positive cell."""
 
+FREE_FACES = ("contact", "walls", "ends")
+"""Labels of the faces that may touch an object; a contact point knows the number of its own."""
+
+CONTACT = 0
+"""Number of the contact face."""
+
 
 @dataclass(frozen=True, repr=False)
 class Mesh:

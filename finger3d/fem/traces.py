@@ -6,6 +6,7 @@ Contact unknowns live at surface vertices: with phi_i the linear hats, a point's
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +18,7 @@ from finger3d._types import Float, Int
 from finger3d.errors import Finger3dError
 from finger3d.fem.elements import quadrature
 from finger3d.fem.locate import cells_at
-from finger3d.fem.simplex import Mesh
+from finger3d.fem.simplex import CONTACT, FREE_FACES, Mesh
 
 _SURFACE_DEGREE = 5  # hats times quadratic traces are cubic, curvature adds a little
 
@@ -29,6 +30,8 @@ class BoundarySurface:
     Attributes
     ----------
     nodes : (c,) vertex numbers
+    face : (c,) number in `FREE_FACES` of the face that each point belongs to, -1 for any other
+        A vertex on a crease is a point of each of its faces.
     points : (c, d) mm, at rest
     area : (c,) mm2
         Integral of the hat: a nodal force over it is the nodal pressure.
@@ -48,6 +51,7 @@ class BoundarySurface:
     """
 
     nodes: Int
+    face: NDArray[np.int8]
     points: Float
     area: Float
     normals: Float
@@ -107,7 +111,34 @@ def surface(mesh: Mesh, label: str, thickness: float = 1.0) -> BoundarySurface:
     trace = (average @ values).tocsr()
     normals = np.asarray(average @ _outward([slope @ mesh.points for slope in along]))
     normals /= np.linalg.norm(normals, axis=1)[:, None]
-    return BoundarySurface(nodes, mesh.points[nodes], area, normals, trace, samples, average, values, hats, along)
+    face = np.full(len(nodes), FREE_FACES.index(label) if label in FREE_FACES else -1, dtype=np.int8)
+    return BoundarySurface(nodes, face, mesh.points[nodes], area, normals, trace, samples, average, values, hats, along)
+
+
+def joined(surfaces: Sequence[BoundarySurface]) -> BoundarySurface:
+    """Contact points of several faces, each with the samples of its own face only."""
+    if len(surfaces) == 1:
+        return surfaces[0]
+
+    def rows(parts: Sequence[sp.csr_matrix]) -> sp.csr_matrix:
+        return sp.csr_matrix(sp.vstack(parts, format="csr"))
+
+    def blocks(parts: Sequence[sp.csr_matrix]) -> sp.csr_matrix:
+        return sp.csr_matrix(sp.block_diag(parts, format="csr"))
+
+    return BoundarySurface(
+        nodes=np.concatenate([s.nodes for s in surfaces]),
+        face=np.concatenate([s.face for s in surfaces]),
+        points=np.concatenate([s.points for s in surfaces]),
+        area=np.concatenate([s.area for s in surfaces]),
+        normals=np.concatenate([s.normals for s in surfaces]),
+        trace=rows([s.trace for s in surfaces]),
+        samples=np.concatenate([s.samples for s in surfaces]),
+        average=blocks([s.average for s in surfaces]),
+        interpolate=rows([s.interpolate for s in surfaces]),
+        hats=blocks([s.hats for s in surfaces]),
+        along=tuple(rows(slopes) for slopes in zip(*(s.along for s in surfaces), strict=True)),
+    )
 
 
 def _outward(tangents: list[Float]) -> Float:
@@ -124,6 +155,7 @@ def restrict(surface: BoundarySurface, keep: NDArray[np.bool_] | Int) -> Boundar
     return replace(
         surface,
         nodes=surface.nodes[keep],
+        face=surface.face[keep],
         points=surface.points[keep],
         area=surface.area[keep],
         normals=surface.normals[keep],
@@ -134,6 +166,12 @@ def restrict(surface: BoundarySurface, keep: NDArray[np.bool_] | Int) -> Boundar
         hats=surface.hats[keep][:, used],
         along=tuple(slope[used] for slope in surface.along),
     )
+
+
+def contact_face(surface: BoundarySurface) -> BoundarySurface:
+    """Return the points of the contact face."""
+    on_face = surface.face == CONTACT
+    return surface if on_face.all() else restrict(surface, np.flatnonzero(on_face))
 
 
 def local_rows(surface: BoundarySurface, frame: Float) -> sp.csr_matrix:

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from finger3d._types import Float
 from finger3d.fem.assembly import stiffness
 from finger3d.fem.condense import condense, stiffened
-from finger3d.fem.simplex import Mesh
-from finger3d.fem.traces import BoundarySurface, local_rows, restrict, surface
-from finger3d.mechanics.contact_geometry import contact_geometry
+from finger3d.fem.simplex import CONTACT, Mesh
+from finger3d.fem.traces import BoundarySurface, local_rows, restrict
+from finger3d.mechanics.contact_geometry import contact_geometry, may_touch
 from finger3d.mechanics.model import EmbeddedBars, Leg, Model, ObjectResponse
 from finger3d.mechanics.path import targets
 from finger3d.mechanics.problem import (
@@ -24,6 +24,7 @@ from finger3d.mechanics.problem import (
     ContactSystem,
     Part,
     Problem,
+    free_surface,
     object_share,
     scatter_to_points,
 )
@@ -40,8 +41,8 @@ Say = Callable[[str], None]
 MARGIN = 0.3
 """Rigid gap that candidate points reach to, in depths of the press; checked after the solution."""
 
-_STATIONS = 20
-"""Poses along a leg at which rigid gaps are taken to find the candidate points, at most."""
+_STATIONS = 4, 20
+"""Least and largest number of poses along a leg at which rigid gaps are taken to find the candidate points."""
 
 _WHOLE_FACE = 0.95
 """Share of the contact face from which all its points are candidates: a few more rows cost less than the check."""
@@ -71,13 +72,13 @@ def build(model: Model, say: Say = lambda text: None, margin: float = MARGIN) ->
     contact, axes = initial_contact(model.contact_path), symmetry(model)
     mesh, report = _mesh(model, contact.contact_box, axes, say)
     thickness = 1.0 if mesh.dim == 3 else model.design.width_mm
-    face = surface(mesh, "contact", thickness)
-    check(model, face, contact.first_contact_mm, contact.place, axes)
+    free = free_surface(model, mesh, thickness)
+    check(model, free, contact.first_contact_mm, contact.place, axes)
     say("assembling")
     start = time.perf_counter()
     elastic = model.material.elasticity(model.domain == "plane-stress")
     matrix = stiffness(mesh, elastic, thickness)
-    candidates = candidate_points(model, face, contact.first_contact_mm, margin)
+    candidates = candidate_points(model, free, contact.first_contact_mm, margin)
     active = active_dofs(candidates, axes)
     check_rows(len(active), len(model.gauges))
     bars = model.inclusions.discretise(model, mesh, axes) if model.inclusions else None
@@ -178,28 +179,31 @@ def contact_rows(rows: Float, active: NDArray[np.int64], face: BoundarySurface, 
     return scatter_to_points(rows, active, count, dim), strain
 
 
-def candidate_points(model: Model, face: BoundarySurface, touch: float, margin: float) -> BoundarySurface:
-    """Return the points of a contact face that the path brings near the object, the nearest first.
+def candidate_points(model: Model, free: BoundarySurface, touch: float, margin: float) -> BoundarySurface:
+    """Return the points of the free faces that the path brings near the object, the nearest first.
 
     Parameters
     ----------
     touch : height of the object's lowest point at first touch, mm
     margin : rigid gap that the points reach to, in depths of the press
     """
-    path = targets(tuple(replace(leg, steps=_stations(leg)) for leg in model.legs))
+    path = [ObjectPose(0.0), *targets(tuple(replace(leg, steps=_stations(leg)) for leg in model.legs))]
     reach = margin * max(pose.depth_mm for pose in path)
     tracker, near = DistanceTracker(), reach + model.mesh.size_mm if math.isfinite(reach) else 0.0
 
     def gap(pose: ObjectPose) -> Float:
         placed = PlacedObject.of(model.object, touch, pose)
-        return contact_geometry(lambda points: tracker.distance(placed, points, near), face).gap
+        geometry = contact_geometry(lambda points: tracker.distance(placed, points, near), free)
+        return np.where(may_touch(free, geometry.bases[:, 0]), geometry.gap, np.inf)
 
     nearest = np.min([gap(pose) for pose in path], axis=0)
     reach += max(float(nearest.min()), 0.0)
+    chosen, on_contact = nearest < reach, free.face == CONTACT
+    if np.count_nonzero(chosen & on_contact) >= _WHOLE_FACE * np.count_nonzero(on_contact):
+        chosen |= on_contact
     order = np.argsort(nearest, kind="stable")  # so that points which touch come before those which do not
-    near = order[nearest[order] < reach]
-    return restrict(face, order if len(near) >= _WHOLE_FACE * len(order) else near)
+    return restrict(free, order[chosen[order]])
 
 
 def _stations(leg: Leg) -> int:
-    return min(leg.steps, _STATIONS) if isinstance(leg.steps, int) else _STATIONS
+    return int(np.clip(leg.steps, *_STATIONS)) if isinstance(leg.steps, int) else _STATIONS[1]

@@ -19,11 +19,15 @@ from numpy.typing import NDArray
 
 from finger3d._arrays import freeze_arrays
 from finger3d._types import Float
-from finger3d.fem.simplex import axis_numbers
+from finger3d.fem.directions import bases_of
+from finger3d.fem.simplex import CONTACT, axis_numbers
 from finger3d.fem.traces import BoundarySurface
 from finger3d.objects import vertical_frame
 
 Distance = Callable[[Float], tuple[Float, Float]]
+
+_FACING = -0.1
+"""Product of the normals of object and finger below which the two surfaces face each other."""
 
 _LEAST_SLOPE = 0.1
 """Length of the mean of unit normals below which they oppose each other: the object is narrower than a hat."""
@@ -85,6 +89,16 @@ class ContactGeometry:
         return self.bases @ vertical_frame(self.dim).T
 
 
+def may_touch(surface: BoundarySurface, normal: Float) -> NDArray[np.bool_]:
+    """Return which points (c,) can touch an object with normals (c, d) there.
+
+    Those of the contact face can.  On other faces the surfaces must face each other, or an object above the finger
+    would count as touching its walls.
+    """
+    facing = np.einsum("ck,ck->c", normal, surface.normals) < _FACING
+    return np.asarray(facing | (surface.face == CONTACT))
+
+
 def contact_geometry(
     distance: Distance,
     surface: BoundarySurface,
@@ -128,22 +142,3 @@ def _in_planes(vectors: Float, surface: BoundarySurface, axes: tuple[str, ...]) 
     for k in axis_numbers(axes):
         out[surface.points[:, k] == 0.0, k] = 0.0
     return out
-
-
-def bases_of(normal: Float) -> Float:
-    """Return orthonormal bases (c, d, d) with unit normals (c, d), turned from that of an upright object the short way.
-
-    The normal of an upright object is -y, and its tangents are x and z.
-    """
-    d = normal.shape[1]
-    n = np.zeros((len(normal), 3))
-    n[:, :d] = normal
-    # Rodrigues' formula for the rotation that takes -y to n
-    cosine = -n[:, 1]
-    half = np.maximum(1.0 + cosine, 0.0)
-    opposite = half < 1e-12
-    factor = 1.0 / np.where(opposite, 1.0, half)
-    along = np.stack([1.0 - factor * n[:, 0] ** 2, n[:, 0], -factor * n[:, 0] * n[:, 2]], axis=1)
-    across = np.stack([-factor * n[:, 0] * n[:, 2], n[:, 2], 1.0 - factor * n[:, 2] ** 2], axis=1)
-    along[opposite], across[opposite] = [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]
-    return np.stack([n, along, across], axis=1)[:, :d, :d]

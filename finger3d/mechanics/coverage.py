@@ -1,37 +1,124 @@
-"""Whether contact stayed within the candidate points of a condensed body."""
+"""Whether the finger's free surface stayed out of the object, between the candidate points and beyond them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from finger3d.fem.traces import surface
+from finger3d._types import Float
+from finger3d.fem.recover import displacement
+from finger3d.fem.simplex import CONTACT, FREE_FACES
+from finger3d.fem.traces import BoundarySurface, restrict
+from finger3d.mechanics.contact_geometry import may_touch
+from finger3d.mechanics.formulation import length_scale
 from finger3d.mechanics.history import StepResult
-from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.problem import Problem, free_surface
+from finger3d.objects import DistanceTracker, ObjectPose
 
-_TOUCHES = 1e-9
-"""Overlap outside the candidate points that counts as contact there, in depths of the press: round-off of a gap."""
+_TOUCHES = {True: 1e-9, False: 1e-3}
+"""Overlap outside the candidate points, over the depth, that counts as contact there: on the contact face, where points
+are chosen with a margin, and on other faces, where those at a crease overlap by what the mesh does not resolve."""
 
 
-def step_within_candidates(problem: Problem, step: StepResult) -> bool:
-    """Return whether no point of the contact face outside the candidates went through the object."""
-    return contact_within_candidates(problem, [step])[0]
+_WARN_ABOVE = 0.1
+"""Penetration, over the depth of the press, above which a press is warned of."""
+
+
+@dataclass(frozen=True)
+class SurfaceCheck:
+    """The finger's free surface after an increment.
+
+    Attributes
+    ----------
+    within_candidates : whether no point outside the candidates went through the object
+    penetration_mm : how deep its deepest place is inside the object; of an elastic object's deformed surface only what
+        the contact points know is told
+    place : (d,) mm, that place
+    """
+
+    within_candidates: bool
+    penetration_mm: float
+    place: Float
+
+
+def check_surface(problem: Problem, steps: Sequence[StepResult]) -> list[SurfaceCheck]:
+    """Check the free surface after each step; in small strain by one back-substitution for all of them."""
+    tracker, rigid = DistanceTracker(), problem.model.object_compliance is None
+    free, others = _surfaces(problem, steps)
+    out = []
+    for u, step in zip(_displacements(problem, steps), steps, strict=True):
+        within = _stays_out(problem, u, step.target, others)
+        at = free.samples + free.interpolate @ u
+        value, _ = tracker.distance(problem.placed(step.target), at, 0.0)
+        worst = int(value.argmin())
+        depth = max(-float(value[worst]), 0.0) if rigid else step.penetration_mm
+        out.append(SurfaceCheck(within, depth, at[worst]))
+    return out
 
 
 def contact_within_candidates(problem: Problem, steps: Sequence[StepResult]) -> list[bool]:
-    """Return, for each step, whether contact stayed within the candidates; in small strain by one back-substitution."""
-    if candidates_cover_face(problem):
+    """Return, for each step, whether no point of the free surface outside the candidates went through the object."""
+    _, others = _surfaces(problem, steps)
+    if not len(others.nodes):
         return [True] * len(steps)
-    face = surface(problem.part.mesh, "contact", problem.part.thickness)
-    others = ~np.isin(face.nodes, problem.system.surface.nodes)
-    parts, ends = [f.part for f in steps], [f.target for f in steps]
-    gaps = problem.model.formulation.gaps(problem, parts, ends, face)
-    return [bool(gap[others].min() > -_TOUCHES * end.depth_mm) for gap, end in zip(gaps, ends, strict=True)]
+    fields = _displacements(problem, steps)
+    return [_stays_out(problem, u, step.target, others) for u, step in zip(fields, steps, strict=True)]
 
 
-def candidates_cover_face(problem: Problem) -> bool:
-    """Return whether all points of the contact face are candidates."""
-    mesh = problem.part.mesh
-    corners = mesh.facets["contact"][:, : mesh.dim]
-    return len(np.unique(corners)) == len(problem.system.surface.nodes)
+def step_within_candidates(problem: Problem, step: StepResult) -> bool:
+    """Return whether contact stayed within the candidates after one step."""
+    return contact_within_candidates(problem, [step])[0]
+
+
+def penetration_warnings(problem: Problem, checks: Sequence[SurfaceCheck]) -> list[str]:
+    """Return warnings about penetration between the contact points during a press."""
+    deepest = max(checks, key=lambda check: check.penetration_mm, default=None)
+    if deepest is None or (depth := deepest.penetration_mm) <= _WARN_ABOVE * problem.model.largest_depth_mm:
+        return []
+    where = ", ".join(f"{axis} = {value:.3g}" for axis, value in zip("xyz", deepest.place, strict=False))
+    return [
+        f"the finger's surface is up to {depth:.2g} mm inside the object between the contact points ({where} mm); "
+        "lower mesh.size_mm, or mesh.base_size_mm if that is on a wall"
+    ]
+
+
+def _displacements(problem: Problem, steps: Sequence[StepResult]) -> Iterator[Float]:
+    """Yield the nodal displacement (n, d) mm after each step."""
+    for unknowns in problem.model.formulation.all_unknowns(problem, [step.part for step in steps]):
+        yield displacement(problem.mesh, unknowns)
+
+
+def beyond_candidates(problem: Problem, free: BoundarySurface | None = None) -> BoundarySurface:
+    """Return the points of the free surface that are no candidates."""
+    free = free or free_surface(problem.model, problem.part.mesh, problem.part.thickness)
+    return restrict(free, np.flatnonzero(~np.isin(_key(free), _key(problem.system.surface))))
+
+
+def _surfaces(problem: Problem, steps: Sequence[StepResult]) -> tuple[BoundarySurface, BoundarySurface]:
+    """Return the free surface, and those of its points that are no candidates and could touch after some step."""
+    free = free_surface(problem.model, problem.part.mesh, problem.part.thickness)
+    others = beyond_candidates(problem, free)
+    if problem.model.object.is_flat and steps:  # its normal is known everywhere
+        normals = [problem.placed(step.target).distance(others.points)[1] for step in steps]
+        others = restrict(others, np.any([may_touch(others, normal) for normal in normals], axis=0))
+    return free, others
+
+
+def _key(points: BoundarySurface) -> NDArray[np.int64]:
+    """Return a number for every point, different for the faces that a vertex belongs to."""
+    return np.asarray(points.nodes * len(FREE_FACES) + points.face)
+
+
+def _stays_out(problem: Problem, u: Float, target: ObjectPose, others: BoundarySurface) -> bool:
+    """Return whether no point of `others` went through the object."""
+    if not len(others.nodes):
+        return True
+    gap, normal = problem.model.formulation.gap(problem, u, target, others)
+    for on_contact, share in _TOUCHES.items():
+        points = may_touch(others, normal) & ((others.face == CONTACT) == on_contact)
+        if gap[points].min(initial=np.inf) <= -share * length_scale(problem, target, target):
+            return False
+    return True

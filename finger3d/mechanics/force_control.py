@@ -12,13 +12,13 @@ from scipy.optimize import brentq
 from finger3d.errors import MissingError
 from finger3d.fem.material import Isotropic
 from finger3d.mechanics.model import Leg
-from finger3d.objects import ContactPath, ObjectPose, PlacedObject, first_contact_height
+from finger3d.objects import ContactPath, ObjectPose, PlacedObject, RigidObject, first_contact_height
 
-DEEPEST = 0.99
-"""Largest depth, over the finger's height, at which a force is looked for."""
+_DEEPEST = 0.99
+"""Depth at which a force is looked for at most, over that at which the object would reach the finger's base."""
 
 _TOLERANCE = 1e-12
-"""Error of the depth, over the finger's height."""
+"""Error of the depth, over the largest one."""
 
 _GRID = (81, 21)
 
@@ -26,8 +26,19 @@ _BEYOND = 1.1
 """Depth reached, over its forecast, from which the contact may lie beyond the fine part of the mesh."""
 
 
+def deepest(obj: RigidObject, first_contact_mm: float, height: float) -> float:
+    """Return the largest depth (mm) at which a force is looked for: neither finger nor object reaches the base there.
+
+    Parameters
+    ----------
+    first_contact_mm : height of the object's lowest point at first touch
+    height : of the finger, mm
+    """
+    return _DEEPEST * (height if obj.is_flat else min(height, first_contact_mm))
+
+
 def depth_of_force(
-    force_at: Callable[[float], float], wanted: float, start: float, guess: float, height: float, asked: float
+    force_at: Callable[[float], float], wanted: float, start: float, guess: float, most: float, asked: float
 ) -> float:
     """Return the depth (mm) at which the force (N), which increases with the depth, is the one wanted.
 
@@ -35,7 +46,7 @@ def depth_of_force(
     ----------
     force_at : function of a depth
     start, guess : depths, mm, between which it is looked for first
-    height : of the finger, mm
+    most : largest depth, mm, see `deepest`
     asked : force at the end of the leg, N, for the message
 
     Raises
@@ -43,23 +54,22 @@ def depth_of_force(
     MissingError
         If the force is not reached within the finger's height.
     """
-    deepest = DEEPEST * height
-    low, high = sorted((min(start, deepest), min(max(guess, 1e-6 * height), deepest)))
-    stride = max(high - low, 1e-3 * height)
+    low, high = sorted((min(start, most), min(max(guess, 1e-6 * most), most)))
+    stride = max(high - low, 1e-3 * most)
     above, below = force_at(high), force_at(low) if low > 0.0 else 0.0
     while above < wanted:
-        if high >= deepest:
+        if high >= most:
             raise MissingError(
                 f"press.force_N = {asked:.6g}: not reached within the finger's height; the largest force is "
                 f"{above:.4g} N, at a depth of {high:.4g} mm"
             )
-        low, below, high, stride = high, above, min(high + stride, deepest), 2.0 * stride
+        low, below, high, stride = high, above, min(high + stride, most), 2.0 * stride
         above = force_at(high)
     while below > wanted and low > 0.0:
         high, low, stride = low, max(low - stride, 0.0), 2.0 * stride
         below = force_at(low) if low > 0.0 else 0.0
     return float(brentq(lambda depth: force_at(depth) - wanted if depth > 0.0 else -wanted, low, high,
-                        xtol=_TOLERANCE * height, rtol=4.0 * np.finfo(float).eps))  # fmt: skip
+                        xtol=_TOLERANCE * most, rtol=4.0 * np.finfo(float).eps))  # fmt: skip
 
 
 def forecast_depth(way: ContactPath, material: Isotropic, force: float, height: float, width: float) -> float:
@@ -87,7 +97,7 @@ def forecast_depth(way: ContactPath, material: Isotropic, force: float, height: 
         half = 0.5 * float(np.ptp(inside)) if len(inside) else 0.0
         return modulus * float(overlap.sum()) * plan / max(min(height, half), 1e-3 * height)
 
-    low, high = 0.0, DEEPEST * height
+    low, high = 0.0, deepest(way.object, touch, height)
     for _ in range(40):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if pressed(middle) > force else (middle, high)

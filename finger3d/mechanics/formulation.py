@@ -117,10 +117,8 @@ class Formulation(Protocol):
         """Moment (3,) N mm of the contact forces on the meshed part about the middle of the base."""
         ...
 
-    def gaps(
-        self, problem: Problem, states: Sequence[ContactState], targets: Sequence[ObjectPose], face: BoundarySurface
-    ) -> list[Float]:
-        """Gap (c,) mm of any points of the contact face, candidates or not, in each state under its target."""
+    def gap(self, problem: Problem, u: Float, target: ObjectPose, surface: BoundarySurface) -> tuple[Float, Float]:
+        """Gap (c,) mm and normal (c, d) of any points of the surface, candidates or not, at nodal displacements."""
         ...
 
     def fields(self, problem: Problem, state: ContactState) -> tuple[Float, Float, Float]:
@@ -135,8 +133,12 @@ def moment_of(places: Float, forces: Float) -> Float:
 
 
 def length_scale(problem: Problem, a: ObjectPose, b: ObjectPose) -> float:
-    """Return the length (mm) that gaps are divided by: the depth, or that of the deepest leg during release."""
-    return max(a.depth_mm, b.depth_mm) or max(leg.depth_mm for leg in problem.model.legs)
+    """Return the length (mm) that gaps are divided by: the depth, or that of the deepest leg during release.
+
+    It is that of the deepest leg, too, while the object is turned: the depth is that of the point which was lowest.
+    """
+    depth = 0.0 if a.is_turned or b.is_turned else max(a.depth_mm, b.depth_mm)
+    return depth if depth > 0.0 else problem.model.largest_depth_mm
 
 
 def solve_contact(

@@ -13,6 +13,7 @@ from finger3d._types import Float, Tree
 from finger3d.contact.friction import OPEN, STATUS_NAMES, STICK
 from finger3d.contact.state import ContactState
 from finger3d.errors import Outcome
+from finger3d.fem.simplex import CONTACT, FREE_FACES
 from finger3d.objects import ObjectPose
 
 _ON_LINE = 1e-9
@@ -26,6 +27,7 @@ class ContactPoints:
     Attributes
     ----------
     nodes : (m,) numbers in the whole mesh
+    face : (m,) number in `finger3d.fem.traces.FREE_FACES` of the face that each point belongs to
     points : (m, 3) mm at rest, z = 0 in a section
     area : (m,) mm2
     basis : (d, d), or (m, d, d) where each point has its own: normal into the finger, then tangents
@@ -36,6 +38,7 @@ class ContactPoints:
     """
 
     nodes: NDArray[np.int64]
+    face: NDArray[np.int8]
     points: Float
     area: Float
     basis: Float
@@ -56,14 +59,16 @@ class ContactPoints:
         return self if state.bases is None else replace(self, basis=state.bases)
 
     def middle_line(self) -> tuple[Float, NDArray[np.int64]]:
-        """Return where the surface mesh meets the line z = 0: x (k,), mm, and the number (k,) of the nearest point.
+        """Return where the contact face meets the line z = 0: x (k,), mm, and the number (k,) of the nearest point.
 
         These are the vertices on the line and the intersections of edges with it, or all points of a section.
         """
         x, z = self.points[:, 0], self.points[:, 2]
         z = np.where(np.abs(z) <= _ON_LINE * self.half_width_mm, 0.0, z)
-        on = np.flatnonzero(z == 0.0)
-        i, j = self.edges[z[self.edges[:, 0]] * z[self.edges[:, 1]] < 0.0].T
+        upper = self.face == CONTACT
+        on = np.flatnonzero((z == 0.0) & upper)
+        across = (z[self.edges[:, 0]] * z[self.edges[:, 1]] < 0.0) & upper[self.edges[:, 0]]
+        i, j = self.edges[across].T
         share = z[i] / (z[i] - z[j])
         crossing = x[i] + share * (x[j] - x[i])
         return np.concatenate([x[on], crossing]), np.concatenate([on, np.where(share <= 0.5, i, j)])
@@ -104,7 +109,8 @@ class StepResult:
     """Result of an increment: contact state of the whole finger (m points), gauge strains, work and convergence.
 
     `part` is the state of the meshed part (c points), from which fields are recovered; `moment` (3,), N mm, is that of
-    all contact forces on the finger about the middle of the base.
+    all contact forces on the finger about the middle of the base; `penetration_mm` is how deep the deepest contact
+    point is inside the object, or the deepest place of the free surface (`finger3d.mechanics.coverage`).
     """
 
     target: ObjectPose
@@ -119,6 +125,7 @@ class StepResult:
     residual: float
     iterations: int
     method: str
+    penetration_mm: float
 
 
 @dataclass(frozen=True, repr=False)
@@ -178,9 +185,10 @@ def measure(points: ContactPoints, step: StepResult) -> Tree:
         "stick_half_length_mm": _half_extent(line[sticking[nearest]]),
     }
     if points.dim == 3:
-        end = np.abs(z - points.half_width_mm) <= 1e-6 * points.half_width_mm
+        end = (np.abs(z - points.half_width_mm) <= 1e-6 * points.half_width_mm) & (points.face == CONTACT)
         numbers["contact_half_length_end_mm"] = _half_extent(x[touching & end])
     return numbers | {
+        "largest_penetration_mm": step.penetration_mm,
         "external_work_mJ": step.external_work_mJ,
         "dissipation_mJ": step.dissipation_mJ,
         "gauges": dict(step.gauges),
@@ -192,7 +200,10 @@ def measure(points: ContactPoints, step: StepResult) -> Tree:
 
 
 def contact_table(points: ContactPoints, state: ContactState) -> Tree:
-    """Columns of contact.csv; pressure and shear are the traction on the finger, normals point into it."""
+    """Columns of contact.csv; pressure and shear are the traction on the finger, normals point into it.
+
+    A vertex on a crease has a row for each of its faces.
+    """
     points = points.with_basis_of(state)
     friction = points.friction(state.force)
     padded = np.zeros((len(state.accumulated_slip), points.dim))
@@ -202,6 +213,7 @@ def contact_table(points: ContactPoints, state: ContactState) -> Tree:
     along[:, 0] = 1.0
     normal = points.to_global(along)
     return {
+        "face": [FREE_FACES[k] for k in points.face],
         "x_mm": points.points[:, 0],
         "y_mm": points.points[:, 1],
         "z_mm": points.points[:, 2],

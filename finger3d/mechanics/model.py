@@ -198,13 +198,23 @@ class Model:
     warnings: tuple[str, ...] = ()
 
     @property
+    def largest_depth_mm(self) -> float:
+        """Depth of the deepest leg."""
+        return max(leg.depth_mm for leg in self.legs)
+
+    @property
     def contact_path(self) -> ContactPath:
         """The object and its path into the finger."""
-        return contact_path(self.design, self.object, self.legs, self.domain)
+        return contact_path(self.design, self.object, self.legs, self.domain, self.object_compliance is None)
 
 
-def contact_path(design: Design, obj: RigidObject, legs: tuple[Leg, ...], domain: Domain) -> ContactPath:
-    """Return an object and its path into a finger, with poses at the quarters of every leg."""
+def contact_path(
+    design: Design, obj: RigidObject, legs: tuple[Leg, ...], domain: Domain, rigid: bool = True
+) -> ContactPath:
+    """Return an object and its path into a finger, with poses at the quarters of every leg.
+
+    An elastic object, which is not `rigid`, touches the contact face only.
+    """
     at, poses = ObjectPose(0.0), list[ObjectPose]()
     for leg in legs:
         end = leg.end(at)
@@ -217,4 +227,5 @@ def contact_path(design: Design, obj: RigidObject, legs: tuple[Leg, ...], domain
         half_width_mm=design.width_mm / 2.0 if domain == "solid" else 0.0,
         poses=tuple(poses),
         landmarks=design.landmarks(),
+        walls_touch=rigid,
     )

@@ -34,7 +34,12 @@ def prescribed_forces(legs: tuple[Leg, ...]) -> list[tuple[int, int, float] | No
 
 
 def stride_ratio(before: ObjectPose, a: ObjectPose, b: ObjectPose) -> float | None:
-    """Return the length of the increment from a to b over that from `before` to a; None if the direction changes."""
+    """Return the length of the increment from a to b over that from `before` to a; None if the direction changes.
+
+    It is None, too, if the object did not move before.
+    """
     last, now = a.coordinates - before.coordinates, b.coordinates - a.coordinates
+    if not last.any():
+        return None
     ratio = float(now @ last) / float(last @ last)
     return None if ratio <= 0.0 or not np.allclose(now, ratio * last) else ratio

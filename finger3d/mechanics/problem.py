@@ -16,9 +16,9 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import Stiffness
 from finger3d.fem.condense import Condensation, spring_forces
 from finger3d.fem.material import LinearElasticity
-from finger3d.fem.simplex import Mesh
-from finger3d.fem.traces import BoundarySurface
-from finger3d.mechanics.contact_geometry import contact_geometry
+from finger3d.fem.simplex import FREE_FACES, Mesh
+from finger3d.fem.traces import BoundarySurface, joined, surface
+from finger3d.mechanics.contact_geometry import contact_geometry, may_touch
 from finger3d.mechanics.history import ContactPoints
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.symmetry import Symmetry
@@ -240,9 +240,16 @@ class Problem:
         return condensed.unknowns(rows)
 
 
-def rigid_gap(model: Model, where: BoundarySurface, touch: float, target: ObjectPose) -> Float:
-    """Gap (c,) mm between the object under a target and the points of a surface at rest."""
-    return contact_geometry(PlacedObject.of(model.object, touch, target).distance, where).gap
+def free_surface(model: Model, mesh: Mesh, thickness: float) -> BoundarySurface:
+    """Return the points of all faces that may touch the object; an elastic one touches the contact face only."""
+    labels = FREE_FACES if model.object_compliance is None else FREE_FACES[:1]
+    return joined([surface(mesh, label, thickness) for label in labels if len(mesh.facets.get(label, ()))])
+
+
+def rigid_gap(placed: PlacedObject, surface: BoundarySurface) -> Float:
+    """Gap (c,) mm between an object in a pose and the points of a surface at rest; inf where they cannot touch."""
+    geometry = contact_geometry(placed.distance, surface)
+    return np.where(may_touch(surface, geometry.bases[:, 0]), geometry.gap, np.inf)
 
 
 def scatter_to_points(rows: Float, kept: NDArray[np.int64], count: int, dim: int) -> Float:

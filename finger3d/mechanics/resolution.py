@@ -4,6 +4,9 @@ The gap of a contact point is an average over its hat function, so that a part o
 one that is lost in the average, is not represented.  The *unresolved overlap* at a place is the overlap of object and
 finger at rest there, less the largest overlap at the nearest contact points.  It is evaluated at the quadrature
 points of the contact face and at the landmarks of the object, its corners and tips.
+
+Overlaps are vertical.  At a flank of an object that is wide compared with an edge of the mesh, they are taken along the
+normal, and points of walls and ends count too: a flank may touch the finger from the side.
 """
 
 from __future__ import annotations
@@ -13,21 +16,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.sparse as sp
 from scipy.spatial import KDTree
 
 from finger3d._types import Float
 from finger3d.contact.friction import OPEN
 from finger3d.errors import UnresolvedError
-from finger3d.fem.traces import BoundarySurface
+from finger3d.fem.simplex import CONTACT
+from finger3d.fem.traces import BoundarySurface, contact_face, restrict
 from finger3d.geometry.design import DesignSummary
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.path import targets
 from finger3d.mechanics.problem import Problem, rigid_gap
+from finger3d.mechanics.regular_points import Box, regular_points
 from finger3d.objects import ObjectPose, PlacedObject, RigidObject, initial_contact
-
-Box = tuple[float, float, float, float]
 
 REFUSE_ABOVE, _WARN_ABOVE = 0.5, 0.1
 """Unresolved overlap, over the depth of the press, above which a press is refused, and above which it is warned of."""
@@ -43,6 +45,18 @@ _NEAREST_POINTS = {2: 4, 3: 16}
 
 _COVERED = 0.5
 """Least share of a point's hat function that the object must cover for its overlap to be seen."""
+
+_WIDE = 2.0
+"""Thickness of an object, in edges, from which its flanks are resolved by points along their normals."""
+
+_COLUMN = (0.2, 0.4, 0.6, 0.8, 1.0)
+"""Shares of an overlap, from below, at which the thickness of the object is looked at."""
+
+_GRAZES = 1e-9
+"""Distance, in edges, at which a place counts as inside the object."""
+
+_AT_ONCE = 100
+"""Places whose overlap along normals is found at once."""
 
 _PER_WAVE, _PER_RADIUS = 4.0, 2.0
 """Least number of edges in a wavelength, and in a radius, of the object."""
@@ -78,19 +92,19 @@ class UnresolvedOverlap:
 
 
 def unresolved_overlap(
-    model: Model, face: BoundarySurface, touch_mm: float, landmarks: Float | None, axes: tuple[str, ...] = ()
+    model: Model, free: BoundarySurface, touch_mm: float, landmarks: Float | None, axes: tuple[str, ...] = ()
 ) -> UnresolvedOverlap:
     """Return the largest unresolved overlap over the path of a model.
 
     Parameters
     ----------
-    face : contact points of the meshed part
+    free : contact points of the meshed part, on all faces
     touch_mm : height of the object's lowest point at first touch
     landmarks : (k, 3) array, mm, or None
         Points in the object's own coordinates, see `landmarks_of`; None if they are not known.
     axes : symmetry planes of the meshed part
     """
-    d = face.points.shape[1]
+    face, beside, d = contact_face(free), restrict(free, free.face != CONTACT), free.points.shape[1]
     tree, count = KDTree(_horizontal(face.points)), min(_NEAREST_POINTS[d], len(face.points))
     nearest = tree.query(_horizontal(face.samples), k=count)[1].reshape(-1, count)
     path = targets(tuple(replace(leg, steps=_STATIONS) for leg in model.legs))
@@ -101,21 +115,83 @@ def unresolved_overlap(
     deepest_at = {(t.slide_x_mm, t.slide_z_mm, *t.turns): t for t in poses}
     for slide, target in deepest_at.items():
         overlap = _mean_overlap(model, face, touch_mm, target)
-        found = replace(found, in_contact=found.in_contact or bool(overlap.any()))
         placed = PlacedObject.of(model.object, touch_mm, target)
+        touched = bool(overlap.any()) or (len(beside.nodes) > 0 and bool((rigid_gap(placed, beside) < 0.0).any()))
+        found = replace(found, in_contact=found.in_contact or touched)
         at = np.zeros((0, d)) if landmarks is None else _surface_points(model, _over(placed, landmarks, d), d)
         mirrored = np.where([a in axes for a in "xz"[: d - 1]], np.abs(_horizontal(at)), _horizontal(at))
         near = tree.query(mirrored, k=count)[1]
         places, around = np.vstack([face.samples, at]), np.vstack([nearest, near.reshape(-1, count)])
-        missed = _overlap(model, places, touch_mm, target) - overlap[around].max(axis=1)
-        worst = int(missed.argmax())
-        depth = float(missed[worst])
+        vertical = _overlap(model, places, touch_mm, target)
+        missed = vertical - overlap[around].max(axis=1)
+        worst, depth = _worst(model, free, placed, places, vertical, missed, _WARN_ABOVE * deepest)
         if landmarks is None and not any(slide):  # the overlap is largest at first touch, wherever that is
             depth = max(depth, target.depth_mm - float(overlap.max()))
         if depth > found.depth_mm:
             place = np.append(_horizontal(places[worst]), np.zeros(3 - d))
             found = UnresolvedOverlap(depth / deepest, found.in_contact, depth, target, place)
     return found
+
+
+def _worst(
+    model: Model,
+    free: BoundarySurface,
+    placed: PlacedObject,
+    places: Float,
+    overlap: Float,
+    missed: Float,
+    least: float,
+) -> tuple[int, float]:
+    """Return the number of the place with the largest unresolved overlap, and that overlap (mm).
+
+    The vertical ones are bounds of those along normals, which are looked at from the largest down to `least`.
+    """
+    order, left, largest = np.argsort(-missed), missed.copy(), -math.inf
+    for first in range(0, len(order), _AT_ONCE):
+        some = order[first : first + _AT_ONCE]
+        if missed[some[0]] <= max(largest, least):
+            break
+        left[some] = _along_normals(model, free, placed, places[some], overlap[some], missed[some])
+        largest = max(largest, float(left[some].max()))
+    worst = int(left.argmax())
+    return worst, float(left[worst])
+
+
+def _along_normals(
+    model: Model, free: BoundarySurface, placed: PlacedObject, places: Float, overlap: Float, missed: Float
+) -> Float:
+    """Return the unresolved overlaps (k,) at places (k, d): along the normals of wide flanks where that is less.
+
+    The column below a place, down to the object's lower surface, must nowhere lie in a thin part of the object.
+
+    Parameters
+    ----------
+    overlap, missed : (k,) mm, vertical overlaps, and what of them is not resolved
+    """
+    wide, found = np.flatnonzero(np.isfinite(overlap)), np.full(len(places), -np.inf)
+    for share in _COLUMN:
+        at = places[wide] - np.outer((1.0 - share) * overlap[wide], np.eye(places.shape[1])[1])
+        value, gradient = placed.distance(at)
+        inwards = np.maximum(np.minimum(share * overlap[wide], _WIDE * model.mesh.size_mm) + value, 0.0)
+        touching = value < _GRAZES * model.mesh.size_mm
+        thin = touching & (placed.distance(at - inwards[:, None] * gradient)[0] >= 0.0)
+        inside = touching & ~thin
+        if inside.any():
+            unseen = -value[inside] - _seen(free, placed, at[inside])
+            found[wide[inside]] = np.maximum(found[wide[inside]], unseen)
+        wide = wide[~thin]
+    known = wide[np.isfinite(found[wide])]
+    out = missed.copy()
+    out[known] = np.minimum(missed[known], found[known])
+    return out
+
+
+def _seen(free: BoundarySurface, placed: PlacedObject, places: Float) -> Float:
+    """Return the largest penetration (k,) mm that the contact points nearest to some places (k, d) see."""
+    count = min(_NEAREST_POINTS[places.shape[1]], len(free.points))
+    points, near = np.unique(KDTree(free.points).query(places, k=count)[1], return_inverse=True)
+    depth = np.maximum(-rigid_gap(placed, restrict(free, points)), 0.0)
+    return np.asarray(depth[near.reshape(len(places), count)].max(axis=1))
 
 
 def landmarks_of(model: Model, touch_mm: float, place: tuple[float, float] | None) -> Float | None:
@@ -138,7 +214,7 @@ def _over(placed: PlacedObject, landmarks: Float, dim: int) -> Float:
 
 
 def check(
-    model: Model, face: BoundarySurface, touch_mm: float, place: tuple[float, float] | None, axes: tuple[str, ...] = ()
+    model: Model, free: BoundarySurface, touch_mm: float, place: tuple[float, float] | None, axes: tuple[str, ...] = ()
 ) -> None:
     """Raise an error if the object passes between the contact points.
 
@@ -148,7 +224,7 @@ def check(
         It names the edge length that resolves the object.
     """
     landmarks = landmarks_of(model, touch_mm, place)
-    found = unresolved_overlap(model, face, touch_mm, landmarks, axes)
+    found = unresolved_overlap(model, free, touch_mm, landmarks, axes)
     if found.share > REFUSE_ABOVE or not found.in_contact:
         size = resolving_size(model, touch_mm, found, landmarks)
         raise UnresolvedError(_refusal(model, found, size), size)
@@ -186,13 +262,14 @@ def _messages(model: Model, touch_mm: float, landmarks: Float | None, found: Unr
 
 def increments_without_contact(problem: Problem, frames: Sequence[StepResult]) -> list[str]:
     """Return warnings about increments in which the object overlaps the finger at rest but reaches no contact point."""
-    model, face, touch, missed = problem.model, problem.surface, problem.system.first_contact_mm, list[float]()
+    model, face, touch = problem.model, contact_face(problem.surface), problem.system.first_contact_mm
+    missed: list[float] = []
     for frame in frames:
         end = frame.target
         if end.depth_mm <= 0.0 or not frame.outcome.ok or (frame.state.status != OPEN).any():
             continue
         slid = end.slide_x_mm or end.slide_z_mm or end.is_turned
-        if (rigid_gap(model, face, touch, end) < 0.0).any():  # the finger has not followed yet
+        if (rigid_gap(problem.placed(end), problem.surface) < 0.0).any():  # the finger has not followed yet
             continue
         if not slid or (_overlap(model, face.samples, touch, end) > 0.0).any():
             missed.append(end.depth_mm)
@@ -201,35 +278,6 @@ def increments_without_contact(problem: Problem, frames: Sequence[StepResult]) -
     return [
         f"{len(missed)} of {len(frames)} increments reach no contact point and have no force, at depths up to "
         f"{max(missed):.3g} mm; lower mesh.size_mm"
-    ]
-
-
-def penetration(problem: Problem, frame: StepResult, u: Float) -> tuple[float, Float]:
-    """Return the largest penetration (mm) of the deformed contact face into a rigid object, and where it occurs (d,).
-
-    Parameters
-    ----------
-    u : (n, d) array, mm
-        Nodal displacement of the meshed part.
-    """
-    face, placed = problem.surface, problem.placed(frame.target)
-    at = face.samples + face.interpolate @ u
-    value, _ = placed.distance(at)
-    worst = int(value.argmin())
-    return max(-float(value[worst]), 0.0), at[worst]
-
-
-def penetration_warnings(problem: Problem, frame: StepResult, u: Float) -> list[str]:
-    """Return warnings about penetration between the contact points at the end of a press."""
-    if problem.model.object_compliance is not None:  # its surface is deformed as well
-        return []
-    depth, at = penetration(problem, frame, u)
-    if depth <= _WARN_ABOVE * max(leg.depth_mm for leg in problem.model.legs):
-        return []
-    where = ", ".join(f"{axis} = {value:.3g}" for axis, value in zip("xyz", at, strict=False))
-    return [
-        f"at the end the finger's surface is up to {depth:.2g} mm inside the object between the contact points "
-        f"({where} mm); lower mesh.size_mm"
     ]
 
 
@@ -244,13 +292,14 @@ def resolving_size(model: Model, touch_mm: float, found: UnresolvedOverlap, land
     at, end, size = found.place, found.target, model.mesh.size_mm
     # the object does not move: only its shape near the place counts
     leg = Leg(end.depth_mm, end.slide_x_mm, end.slide_z_mm, 1, None, *end.turns)
-    there, placed = replace(model, legs=(leg,)), PlacedObject.of(model.object, touch_mm, end)
+    placed = PlacedObject.of(model.object, touch_mm, end)
     for _ in range(_TRIES):
         size *= _FINER
         reach = _PATCH * size
         box = (at[0] - reach, at[0] + reach, at[1] - reach, at[1] + reach)
         points = regular_points(model, box, size, at)
         landmarks = _within(landmarks, placed, box, points.points.shape[1])
+        there = replace(model, legs=(leg,), mesh=replace(model.mesh, size_mm=size))
         if unresolved_overlap(there, points, touch_mm, landmarks).share <= _RESOLVED:
             return _rounded(min(size, _resolving(model.object)))
     return None
@@ -260,69 +309,6 @@ def _within(landmarks: Float, placed: PlacedObject, box: Box, dim: int) -> Float
     """Return those of an object's points (k, 3) that lie over a box in a pose."""
     low, high, places = np.array([box[0], box[2]]), np.array([box[1], box[3]]), _over(placed, landmarks, dim)
     return landmarks[np.all((places >= low) & (places <= high), axis=1)]
-
-
-def regular_points(model: Model, box: Box, size_mm: float, at: Float | None = None) -> BoundarySurface:
-    """Return a regular grid of contact points over a box.
-
-    Parameters
-    ----------
-    box : (x_min, x_max, z_min, z_max), mm
-    size_mm : distance of the points
-    at : (2,) array, mm
-        Place in the middle of four points; by default the origin.
-    """
-    design, solid = model.design, model.domain == "solid"
-    half = (design.half_length_mm, 0.5 * design.width_mm)
-    at = np.zeros(2) if at is None else at
-    lines = [_lines(box[2 * k : 2 * k + 2], half[k], size_mm, at[k]) for k in range(2 if solid else 1)]
-    hats = [_hats(line) for line in lines]
-    places, means = [h[0] for h in hats], [h[1] for h in hats]
-    samples = np.stack(np.meshgrid(*places, indexing="ij"), axis=-1).reshape(-1, len(lines))
-    points = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, len(lines))
-    mean = means[0] if len(means) == 1 else sp.kron(*means, format="csr")
-    height, y = (design.top(p[:, 0], p[:, 1] if solid else 0.0 * p[:, 0]) for p in (samples, points))
-    used = np.isfinite(height)
-    mean = sp.csr_matrix(mean)[:, used]
-    weight = np.asarray(mean.sum(axis=1)).ravel()
-    kept = (weight > 0.0) & np.isfinite(y)
-    mean = sp.csr_matrix(sp.diags_array(1.0 / weight[kept]) @ mean[kept])
-    samples, points = (np.insert(p, 1, v, axis=1) for p, v in ((samples[used], height[used]), (points[kept], y[kept])))
-    return BoundarySurface(
-        nodes=np.arange(len(points)),
-        points=points,
-        area=np.ones(len(points)),
-        normals=np.zeros_like(points),
-        trace=sp.csr_matrix((len(points), 0)),
-        samples=samples,
-        average=mean,
-        interpolate=sp.csr_matrix((len(samples), 0)),
-        hats=mean,
-    )
-
-
-def _lines(box: Sequence[float], half: float, size: float, at: float) -> Float:
-    """Return the coordinates of contact points along one axis, with the ends of the finger."""
-    low, high = max(box[0] - size, -half), min(box[1] + size, half)
-    first, last = math.ceil((low - at) / size - 0.5), math.floor((high - at) / size - 0.5)
-    inner = at + (np.arange(first, last + 1) + 0.5) * size
-    ends = [v for v in (low, high) if abs(v) == half]
-    line = np.unique(np.concatenate([inner, ends]))
-    return line if len(line) > 1 else np.array([low, high])
-
-
-def _hats(line: Float) -> tuple[Float, sp.csr_matrix]:
-    """Return quadrature points (q,) between coordinates (n,), and the mean of samples over each hat function (n, q)."""
-    x, w = np.polynomial.legendre.leggauss(4)
-    share = 0.5 * (x + 1.0)
-    steps = np.diff(line)
-    places = (line[:-1, None] + share * steps[:, None]).ravel()
-    mean = np.zeros((len(line), len(steps), 4))
-    number = np.arange(len(steps))
-    mean[number, number] = (1.0 - share) * w * steps[:, None]
-    mean[number + 1, number] = share * w * steps[:, None]
-    rows = mean.reshape(len(line), -1)
-    return places, sp.csr_matrix(rows / rows.sum(axis=1, keepdims=True))
 
 
 def _horizontal(points: Float) -> Float:

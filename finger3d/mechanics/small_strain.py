@@ -85,16 +85,11 @@ class SmallStrain:
         """Return the moment about the middle of the base, of forces at the centroids of their points at rest."""
         return moment_of(problem.surface.centroids, state.scene_force)
 
-    def gaps(
-        self, problem: Problem, states: Sequence[ContactState], targets: Sequence[ObjectPose], face: BoundarySurface
-    ) -> list[Float]:
-        """Return the gaps at the displaced points."""
-        from finger3d.fem.recover import displacement
-
-        return [
-            problem.gap(target, face, face.trace @ displacement(problem.mesh, unknowns))
-            for target, unknowns in zip(targets, self.all_unknowns(problem, states), strict=True)
-        ]
+    def gap(self, problem: Problem, u: Float, target: ObjectPose, surface: BoundarySurface) -> tuple[Float, Float]:
+        """Return gaps and normals at the displaced points."""
+        placed = problem.placed(target)
+        geometry = contact_geometry(placed.distance, surface, surface.trace @ u, problem.axes)
+        return geometry.gap, geometry.bases[:, 0]
 
     def fields(self, problem: Problem, state: ContactState) -> tuple[Float, Float, Float]:
         """Return displacement, linear strain and stress; in a section also the out-of-plane components."""

@@ -13,7 +13,7 @@ from finger3d._types import Float
 from finger3d.contact.rules import STEP_DEPENDENT_RULES
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.mechanics.energy import external_work, frictional_dissipation
-from finger3d.mechanics.force_control import depth_of_force
+from finger3d.mechanics.force_control import deepest, depth_of_force
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.path import prescribed_forces, stride_ratio, targets
@@ -98,6 +98,7 @@ def march(
             residual=found.residual,
             iterations=found.iterations,
             method=found.method,
+            penetration_mm=max(-float(state.gap.min(initial=0.0)), 0.0),
         )
         if not (found.outcome.ok or found.outcome.is_cycle):
             return
@@ -143,10 +144,10 @@ def _to_force(
             raise _FailedError
         return _normal_force(problem, found.state)
 
-    height = problem.model.design.height_mm
+    most = deepest(problem.model.object, problem.system.first_contact_mm, problem.model.design.height_mm)
     guess = a.depth_mm + (a.depth_mm - previous[0].depth_mm if previous else b.depth_mm)
     try:
-        target = pose(depth_of_force(force_at, load[0], a.depth_mm, guess, height, load[1]))
+        target = pose(depth_of_force(force_at, load[0], a.depth_mm, guess, most, load[1]))
     except _FailedError:
         target = b
     found, substeps = _increment(problem, workspace, state, a, target, cuts)

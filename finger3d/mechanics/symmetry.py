@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from finger3d._arrays import freeze_arrays
 from finger3d._types import Float
 from finger3d.contact.state import ContactState
-from finger3d.fem.simplex import Mesh, axis_numbers, reflect_into_part, unfold
+from finger3d.fem.simplex import FREE_FACES, Mesh, axis_numbers, reflect_into_part, unfold
 from finger3d.fem.traces import BoundarySurface
 from finger3d.mechanics.history import ContactPoints
 from finger3d.mechanics.model import Model
@@ -128,12 +128,13 @@ def unfold_points(
     """Return the symmetry of a part's contact points, and the contact points of the whole finger."""
     d = mesh.dim
     numbers = axis_numbers(axes)
-    facets = {"contact": mesh.facets["contact"]}
+    labels = [FREE_FACES[k] for k in np.unique(face.face)]
+    facets = {label: mesh.facets[label] for label in labels}
     shape, parent_all, sign_all = unfold(Mesh(mesh.points, mesh.cells[:0], facets), numbers)
-    number = np.full(len(mesh.points), -1)
-    number[face.nodes] = np.arange(len(face.nodes))
-    nodes = np.flatnonzero(number[parent_all] >= 0)
-    parent, world_sign = number[parent_all[nodes]], sign_all[nodes]
+    images = [_images(face, label, shape, parent_all, d) for label in labels]
+    nodes, parent = (np.concatenate([found[k] for found in images]) for k in (0, 1))
+    before = np.cumsum([0] + [len(found[0]) for found in images])
+    world_sign = sign_all[nodes]
     planes = np.zeros(len(nodes))
     for i in numbers:
         planes += face.points[parent][:, i] == 0.0
@@ -148,14 +149,40 @@ def unfold_points(
     )
     points = ContactPoints(
         nodes=nodes,
+        face=face.face[parent],
         points=at,
         area=face.area[parent] * multiplicity,
         basis=vertical_frame(d),
         half_width_mm=model.design.width_mm / 2.0,
         band_mm=_BAND * model.mesh.size_mm,
-        edges=_edges(shape.facets["contact"][:, :d], nodes),
+        edges=np.vstack([found[2] + first for found, first in zip(images, before, strict=False)]),
     )
     return symmetric, points
+
+
+def _images(
+    face: BoundarySurface, label: str, whole: Mesh, image_of: NDArray[np.int64], dim: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Return the points of a face and all their mirror images.
+
+    Parameters
+    ----------
+    whole : facets of the whole finger
+    image_of : number of the part's node that each node of `whole` is an image of
+
+    Returns
+    -------
+    nodes : (k,) of the whole finger, ascending
+    parent : (k,) number of the part's contact point
+    edges : (e, 2) pairs of positions in `nodes`
+    """
+    corners = whole.facets[label][:, :dim]
+    number = np.full(image_of.max() + 1, -1)
+    own = np.flatnonzero(face.face == FREE_FACES.index(label))
+    number[face.nodes[own]] = own
+    on_face = np.unique(corners)
+    nodes = on_face[number[image_of[on_face]] >= 0]
+    return nodes, number[image_of[nodes]], _edges(corners, nodes)
 
 
 def _edges(corners: NDArray[np.int64], nodes: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -1,4 +1,4 @@
-"""First touch of finger and object, and paths that the vertical gap cannot describe."""
+"""First touch of finger and object, and paths that are refused."""
 
 from __future__ import annotations
 
@@ -38,6 +38,7 @@ class ContactPath:
     half_length_mm, half_width_mm : half extents of the finger; a section has half width 0
     poses : of the object on its path
     landmarks : (k, 2) mm, corners of the finger that a search on a grid could miss
+    walls_touch : whether the finger's walls and ends may touch the object too
     """
 
     top: Top
@@ -46,6 +47,7 @@ class ContactPath:
     half_width_mm: float
     poses: tuple[ObjectPose, ...]
     landmarks: Float | None = None
+    walls_touch: bool = True
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
@@ -135,12 +137,12 @@ def first_contact_height(
 
 
 def initial_contact(way: ContactPath) -> InitialContact:
-    """Return the first touch, as in :func:`first_contact_height`, of a path that the vertical gap can describe.
+    """Return the first touch, as in :func:`first_contact_height`, of a path.
 
     Raises
     ------
     Finger3dError
-        If the object is nowhere above the finger, reaches the base beside it, or runs into its side.
+        If the object is nowhere above the finger, reaches the base beside it, or runs into a side that may not touch.
     """
     top, obj, path = way.top, way.object, way.poses
     half_length, half_width = way.half_length_mm, way.half_width_mm
@@ -165,8 +167,9 @@ def initial_contact(way: ContactPath) -> InitialContact:
         )
     _stays_on_finger(way, touch)
     zone = _box(top, obj, half_length, half_width, touch, place, path)
-    _not_a_wall(obj, place, half_length, half_width)
-    _no_side(way, touch)
+    if not way.walls_touch:
+        _not_a_wall(obj, place, half_length, half_width)
+        _no_side(way, touch)
     return InitialContact(touch, zone, _pair(place))
 
 

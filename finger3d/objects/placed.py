@@ -103,20 +103,21 @@ class PlacedObject:
     def _traced(self, x: Float, z: Float) -> Float:
         """Follow vertical lines up to the surface by steps that cannot pass it.
 
-        Steps have the length of the distance; for a convex body they are Newton's, whose zero is never beyond that of
-        a convex function.
+        Steps have the length of a lower bound of the distance; for a convex body they are Newton's, whose zero is never
+        beyond that of a convex function.
         """
         at = np.stack([x, np.full(len(x), -_LOWEST_START), z], axis=1)
         out = np.full(len(x), np.nan)
-        inside = self.distance(at)[0] < 0.0
+        inside = self.object.clearance(self.to_own(at)) < 0.0
         out[inside] = -np.inf
         moving = np.flatnonzero(~inside)
         for _ in range(_ITERATIONS):
-            value, gradient = self.distance(at[moving])
-            step = value
             if self.object.is_convex:
+                value, gradient = self.distance(at[moving])
                 rate = -gradient[:, 1]
                 step = np.where(rate > _SURFACE, value / np.where(rate > _SURFACE, rate, 1.0), np.inf)
+            else:
+                step = self.object.clearance(self.to_own(at[moving]))
             arrived = np.abs(step) <= _SURFACE * (1.0 + np.abs(at[moving, 1]))
             missed = ~(at[moving, 1] + step < _LOWEST_START)
             out[moving[arrived]] = at[moving[arrived], 1]

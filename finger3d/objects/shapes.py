@@ -19,9 +19,14 @@ from annotated_types import Ge, Gt, Le, Lt
 
 from finger3d._ranges import Length, Place, Radians, Zero
 from finger3d._types import Float
+from finger3d.geometry.surface import Triangles
 
 Axis = Literal["x", "z"]
 Turn = Annotated[float, Radians(Ge(-360), Le(360))]
+
+
+_DRAWN = 201
+"""Points of a section in a picture."""
 
 
 class Detail(NamedTuple):
@@ -81,6 +86,10 @@ class RigidObject(ABC):
         The points are given in the object's own coordinates.
         """
 
+    def clearance(self, points: Float) -> Float:
+        """Return a lower bound (n,) mm of the distance of points (n, 3), and at most it where that is negative."""
+        return self.distance(points)[0]
+
     @abstractmethod
     def profile(self, x: Float, z: Float) -> Float:
         """Return the height (n,) mm of the lower side at x, z (n,) mm, in own coordinates; nan beside it."""
@@ -130,6 +139,10 @@ class RigidObject(ABC):
         """The shortest length of the surface, or None."""
         return None
 
+    @abstractmethod
+    def drawing(self, reach_mm: float) -> Triangles:
+        """Return triangles, in own coordinates, for pictures: of an endless surface, the part within +-reach_mm."""
+
     def read(self) -> RigidObject:
         """Return the object that a scene's table stands for: the object itself, unless a file holds it."""
         return self
@@ -165,6 +178,16 @@ class Prism(RigidObject):
         """Return the height of the section."""
         return self.section_profile(x + 0.0 * z if self.axis == "z" else z + 0.0 * x)
 
+    def drawing(self, reach_mm: float) -> Triangles:
+        """Return the lower side."""
+        r = np.linspace(-reach_mm, reach_mm, _DRAWN)
+        return self._swept(r, self.section_profile(r), reach_mm)
+
+    def _swept(self, r: Float, y: Float, reach: float) -> Triangles:
+        """Return a curve (n,) of the section, swept along the axis."""
+        grid = np.stack([np.stack([r, y, 0.0 * r + end], axis=-1) for end in (-reach, reach)], axis=1)
+        return _sheet(grid if self.axis == "z" else grid[..., ::-1])
+
     def is_level(self, turned: Float) -> bool:
         """Whether the axis is horizontal after a rotation (3, 3)."""
         return abs(float((turned @ self.direction)[1])) <= 1e-12
@@ -199,6 +222,11 @@ class Plane(RigidObject):
         """Whether the surface is one plane: yes."""
         return True
 
+    def drawing(self, reach_mm: float) -> Triangles:
+        """Return a square."""
+        x, z = np.meshgrid([-reach_mm, reach_mm], [-reach_mm, reach_mm], indexing="ij")
+        return _sheet(np.stack([x, self.profile(x, z), z], axis=-1))
+
 
 @dataclass(frozen=True)
 class Cylinder(Prism):
@@ -229,6 +257,11 @@ class Cylinder(Prism):
     def detail(self) -> Detail:
         """The radius."""
         return Detail("radius_mm", self.radius_mm, "radius")
+
+    def drawing(self, reach_mm: float) -> Triangles:
+        """Return the mantle, all around if its radius is within the reach."""
+        polar = _polar(self.radius_mm, reach_mm)
+        return self._swept(self.radius_mm * np.sin(polar), self.radius_mm * (1.0 - np.cos(polar)), reach_mm)
 
 
 @dataclass(frozen=True)
@@ -261,6 +294,13 @@ class Sphere(RigidObject):
     def detail(self) -> Detail:
         """The radius."""
         return Detail("radius_mm", self.radius_mm, "radius")
+
+    def drawing(self, reach_mm: float) -> Triangles:
+        """Return the sphere, or its lowest part if its radius exceeds the reach."""
+        polar, turn = _polar(self.radius_mm, reach_mm)[_DRAWN // 2 :: 4], np.linspace(0.0, 2.0 * math.pi, 49)
+        r, y = self.radius_mm * np.sin(polar), self.radius_mm * (1.0 - np.cos(polar))
+        level = np.broadcast_to(y[:, None], (len(polar), len(turn)))
+        return _sheet(np.stack([np.outer(r, np.cos(turn)), level, np.outer(r, np.sin(turn))], axis=-1))
 
 
 @dataclass(frozen=True)
@@ -305,6 +345,20 @@ class Wedge(Prism):
     def detail(self) -> Detail | None:
         """The radius of a rounded tip."""
         return Detail("tip_radius_mm", self.tip_radius_mm, "radius") if self.tip_radius_mm > 0.0 else None
+
+
+def _sheet(points: Float) -> Triangles:
+    """Return the triangles of a grid of points (m, n, 3)."""
+    number = np.arange(points.shape[0] * points.shape[1]).reshape(points.shape[:2])
+    a, b, c, d = (number[i : i - 1 or None, j : j - 1 or None] for i, j in ((0, 0), (1, 0), (1, 1), (0, 1)))
+    faces = np.stack([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)], axis=2)
+    return Triangles(points.reshape(-1, 3), faces.reshape(-1, 3))
+
+
+def _polar(radius: float, reach: float) -> Float:
+    """Return angles (n,) rad from the lowest point of a circle, both ways, as far as its points are within a reach."""
+    most = math.pi if radius <= reach else math.asin(reach / radius)
+    return np.linspace(-most, most, _DRAWN)
 
 
 def _arc(r: Float, radius: float) -> Float:

@@ -81,6 +81,10 @@ class MeshObject(RigidObject):
         """The size of the body."""
         return self.surface.size
 
+    def drawing(self, reach_mm: float) -> Triangles:
+        """Return all triangles."""
+        return self.triangles
+
     @property
     def is_convex(self) -> bool:
         """Whether the body is known to be convex: no."""
@@ -113,6 +117,10 @@ class ObjectFile(RigidObject):
         raise TypeError("read() the object first")
 
     def profile(self, x: Float, z: Float) -> Float:
+        """Raise an error: the file has not been read."""
+        raise TypeError("read() the object first")
+
+    def drawing(self, reach_mm: float) -> Triangles:
         """Raise an error: the file has not been read."""
         raise TypeError("read() the object first")
 

@@ -42,6 +42,12 @@ class Wave(Prism):
         # The normal of the nearest point is the gradient, on the surface too, where the difference is round-off.
         return sign * np.hypot(out_r, out_y), slope / root, -1.0 / root
 
+    def clearance(self, points: Float) -> Float:
+        """Return the vertical distance over that of the steepest slope: far quicker than the nearest point."""
+        r = points[:, 2 if self.axis == "x" else 0]
+        steepest = 2.0 * math.pi / self.wavelength_mm * self.amplitude_mm
+        return np.asarray((self.section_profile(r) - points[:, 1]) / math.hypot(1.0, steepest))
+
     def section_profile(self, r: Float) -> Float:
         """Return amplitude (1 - cos(2 pi r / wavelength))."""
         return self.amplitude_mm * (1.0 - np.cos(2.0 * math.pi * r / self.wavelength_mm))

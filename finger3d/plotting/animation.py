@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.fem.simplex import Mesh
+from finger3d.fem.simplex import FREE_FACES, Mesh
 from finger3d.io import atomic
 from finger3d.mechanics.gauges import Gauge
-from finger3d.plotting import figures as view
+from finger3d.plotting import panels as view
 from finger3d.plotting.camera import flat
 from finger3d.plotting.gauges import draw_marks, marks_of
-from finger3d.plotting.solid import BODY, LINE, REST, Skin, draw_solid, render_solids, skin_of
+from finger3d.plotting.solid import BODY, LINE, OBJECT, OBJECT_TINT, REST, Skin, draw_solid, render_solids, skin_of
 from finger3d.results.states import States
 
 if TYPE_CHECKING:
@@ -54,9 +54,11 @@ def frames(states: States, numbers: Sequence[int], title: str, gauges: Sequence[
         return _sections(states, numbers, titles, highest, marks)
     skins, colours = [], []
     for k in numbers:
-        shear = np.column_stack([states.shear_x[k], states.shear_z[k]])
+        shear = np.column_stack([states.shear_x[k], states.shear_y[k], states.shear_z[k]])
         u = states.displacement[k].astype(float)
-        skin = skin_of(mesh, u, states.pressure[k], shear, states.status[k].astype(int), states.nodes, None)
+        thing = states.object_at(k)
+        status = states.status[k].astype(int)
+        skin = skin_of(mesh, u, states.pressure[k], shear, status, states.nodes, states.face, thing)
         skins.append(skin)
         by_status = np.repeat(view.palette()[skin.status][:, None], 3, axis=1)
         colours.append((view.pressure_colours(skin.pressure, highest), by_status))
@@ -64,9 +66,9 @@ def frames(states: States, numbers: Sequence[int], title: str, gauges: Sequence[
 
 
 def mesh_of(states: States) -> Mesh:
-    """Return the undeformed mesh of the whole finger, with its facets labelled contact and body."""
-    on = states.on_contact
-    facets = {"contact": states.facets[on].astype(int), "body": states.facets[~on].astype(int)}
+    """Return the undeformed mesh of the whole finger; the facets that cannot touch are labelled body."""
+    labels = [*enumerate(FREE_FACES), (-1, "body")]
+    facets = {label: states.facets[states.facet_face == k].astype(int) for k, label in labels}
     return Mesh(states.points.astype(float), states.cells.astype(int), facets)
 
 
@@ -116,12 +118,13 @@ def _sections(
             axes.add_collection(PolyCollection(list(at[corners]), facecolor=BODY, edgecolor=BODY, lw=0.3))
             axes.add_collection(LineCollection(list(states.points[outline]), colors=REST, lw=0.8, linestyles=":"))
             axes.add_collection(LineCollection(list(at[outline]), colors=LINE, lw=0.8))
+            axes.add_collection(LineCollection(list(view.sliced(states.object_at(k))), colors=OBJECT, lw=1.0))
             axes.add_collection(LineCollection(list(halves), colors=colours, lw=5, capstyle="butt", zorder=3))
             axes.set(xlim=low[0] + span[0] * np.array([-0.04, 1.04]), ylim=low[1] + span[1] * np.array([-0.04, 1.1]))
             axes.set_xlabel("x (mm)", labelpad=1)
         panels[0].set_ylabel("y (mm)")
         draw_marks(panels[0], lines)
-        view.keys(figure, highest, {"finger at rest": REST})
+        view.keys(figure, highest, {"finger at rest": REST, "object": OBJECT})
         figures.append(figure)
     return figures
 
@@ -151,6 +154,6 @@ def _solids(
                 axes.set(xlim=(low[0], low[0] + span[0]), ylim=(low[1], low[1] + span[1]))
             axes.set_axis_off()
         draw_marks(panels[0], [(name, flat(line)) for name, line in marks[k]])
-        view.keys(figure, highest, {"finger at rest": REST})
+        view.keys(figure, highest, {"finger at rest": REST, "object": OBJECT_TINT})
         figures.append(figure)
     return figures

@@ -15,22 +15,30 @@ from numpy.typing import ArrayLike
 
 from finger3d._types import Float, Int
 from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
-from finger3d.fem.simplex import Mesh
+from finger3d.fem.simplex import CONTACT, FREE_FACES, Mesh
 from finger3d.plotting.camera import flat
 from finger3d.plotting.gauges import Mark, draw_marks
-from finger3d.plotting.layout import WIDEST, blank, save, sheet, style
+from finger3d.plotting.layout import WIDEST, save, sheet, style
 from finger3d.plotting.outlines import edges_of, outline_of
-from finger3d.plotting.solid import BODY, COLOURS, LINE, OBJECT, REST, Skin, draw_solid, render_solids, skin_of
+from finger3d.plotting.panels import Marks, highest_of, keys, palette, patches, pressure_colours, sliced, two_panels
+from finger3d.plotting.solid import (
+    BODY,
+    COLOURS,
+    LINE,
+    OBJECT,
+    OBJECT_TINT,
+    REST,
+    Skin,
+    draw_solid,
+    render_solids,
+    skin_of,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch
 
-Marks = Sequence[tuple[str, Float]]
-"""Labels of gauges, and their start, middle and end, shape (3, d), mm."""
-
-_CMAP = "viridis"  # of the contact pressure
 _FEWEST_POINTS = 5  # of a line z = const that is drawn
 _SHADES = {STICK: "#c9d9ee", SLIP: "#fde3c4"}
 
@@ -42,7 +50,7 @@ def finger_picture(
     table: Mapping[str, ArrayLike],
     contact_nodes: ArrayLike,
     title: str = "",
-    profile: Float | None = None,
+    thing: Float | None = None,
     marks: Sequence[Mark] = (),
 ) -> str:
     """Draw the deformed finger to scale: contact pressure on the left, stick and slip on the right.
@@ -52,12 +60,12 @@ def finger_picture(
     path : PNG file to write
     mesh : undeformed mesh of the whole finger (unfolded, if symmetry was used), mm
     displacement : (n, d) array, mm
-    table : columns of contact.csv, each (c,); pressure_MPa, shear_x_MPa, shear_z_MPa and status are used
+    table : columns of contact.csv, each (c,); face, pressure_MPa, the shears and status are used
     contact_nodes : (c,) array
         Nodes of `mesh` that are the contact points.
     title : title of the picture
-    profile : (k, 2) array, mm
-        Coordinates x and y of the surface of the object, drawn as a line (2D) or as the outline of a slab (3D).
+    thing : (t, 3, 3) array, mm
+        Corners of the object's triangles, drawn half transparent, or in a section as the line z = 0.
     marks : gauges to draw, from `finger3d.plotting.gauges.marks_of`
 
     Returns
@@ -68,11 +76,14 @@ def finger_picture(
     nodes, status = np.asarray(contact_nodes, dtype=np.int64), _status(table)
     pressure = _column(table, "pressure_MPa")
     lines = [(mark.label, mark.of(mesh.points + displacement)) for mark in marks]
+    faces = np.array([FREE_FACES.index(name) for name in np.asarray(table["face"]).tolist()], dtype=np.int64)
     if mesh.dim == 2:
-        figure, renderer = _section(mesh, displacement, pressure, status, nodes, profile, title, lines), "matplotlib"
+        line = None if thing is None else sliced(thing)
+        figure = _section(mesh, displacement, pressure, status, nodes, faces, line, title, lines)
+        renderer = "matplotlib"
     else:
-        shear = np.column_stack([_column(table, "shear_x_MPa"), _column(table, "shear_z_MPa")])
-        skin = skin_of(mesh, displacement, pressure, shear, status, nodes, profile)
+        shear = np.column_stack([_column(table, f"shear_{axis}_MPa") for axis in "xyz"])
+        skin = skin_of(mesh, displacement, pressure, shear, status, nodes, faces, thing)
         figure, renderer = _solid(skin, title, lines)
     save(figure, path)
     return renderer
@@ -88,10 +99,12 @@ def contact_figure(
 ) -> None:
     """Draw tractions f_n and f_t and the friction limit mu f_n along x, with stick and slip zones (Maeno 2004, Fig. 4).
 
+    Only the points of the contact face are drawn.
+
     Parameters
     ----------
     path : PNG file to write
-    table : columns of contact.csv, each (c,); x_mm, z_mm, pressure_MPa, shear_x_MPa, shear_z_MPa and status are used
+    table : columns of contact.csv, each (c,); face, places, pressure_MPa, shear_x_MPa, shear_z_MPa and status are used
     mu : scalar or (c,) array
         Coefficient of static friction.
     band_mm : largest distance from z = 0 of the points that represent that line if the mesh has no points on it;
@@ -100,16 +113,21 @@ def contact_figure(
     title : title of the picture
     """
     x, z, status = _column(table, "x_mm"), _column(table, "z_mm"), _status(table)
-    lines = [("", np.arange(len(x)))]
+    top = np.asarray(table["face"]) == FREE_FACES[CONTACT]
+    top |= not top.any()
+    lines = [("", np.flatnonzero(top))]
     if half_width_mm is not None:
         band = 0.4 * _spacing(x, z) if band_mm is None else band_mm
         # A mesh always has points on its end, and on its middle only if that is a plane of symmetry.
         exact = 1e-6 * half_width_mm
-        middle, end = np.flatnonzero(np.abs(z) <= exact), np.flatnonzero(np.abs(z - half_width_mm) <= exact)
-        lines = [
-            ("in the middle, z = 0", middle if len(middle) >= _FEWEST_POINTS else np.flatnonzero(np.abs(z) <= band))
-        ]
-        lines += [(f"at the end, z = {half_width_mm:g} mm", end)] if len(end) else []
+        middle, end = (np.flatnonzero(top & (np.abs(z - at) <= exact)) for at in (0.0, half_width_mm))
+        near = middle if len(middle) >= _FEWEST_POINTS else np.flatnonzero(top & (np.abs(z) <= band))
+        lines = [("in the middle, z = 0", near)]
+        lines += [(f"at the end, z = {half_width_mm:g} mm", end)]
+        lines = [line for line in lines if len(line[1])]
+        if not lines:  # contact is somewhere between
+            at = float(z[top][np.argmax(_column(table, "pressure_MPa")[top])])
+            lines = [(f"near z = {at:.3g} mm", np.flatnonzero(top & (np.abs(z - at) <= band)))]
     fn, fx, fz = (_column(table, name) for name in ("pressure_MPa", "shear_x_MPa", "shear_z_MPa"))
     coefficient = np.broadcast_to(np.asarray(mu, dtype=np.float64), x.shape)
     made = sheet(len(lines), 1, (WIDEST, 4.4), (0.95, 0.15, 1.25, 0.35), title)
@@ -185,88 +203,6 @@ def _spacing(x: Float, z: Float) -> float:
     return float(np.median(KDTree(points).query(points, k=2)[0][:, 1])) if len(points) > 1 else 0.0
 
 
-def _patches(colours: dict[int, str], states: Sequence[int]) -> list[Patch]:
-    """Return legend entries of contact states."""
-    from matplotlib.patches import Patch
-
-    return [Patch(facecolor=colours[s], edgecolor="#888888", lw=0.5, label=STATUS_NAMES[s]) for s in states]
-
-
-def two_panels(aspect: float, title: str, ticks: bool = False) -> tuple[Figure, list[Axes]]:
-    """Return a figure with two panels of equal scale, with space for a legend below them.
-
-    Parameters
-    ----------
-    aspect : height over width of a panel
-    title : title of the figure
-    ticks : reserve space for tick labels
-    """
-    width, panel, below = 2.0 * WIDEST, WIDEST - (0.8 if ticks else 0.2), 1.4 if ticks else 0.95
-    above = 0.85 if title else 0.45
-    high = panel * aspect
-    figure = blank(width, below + high + above)
-    total = below + high + above
-    panels = []
-    for left, name in ((width / 2 - panel - 0.1, "contact pressure"), (width - panel - 0.1, "stick and slip")):
-        axes = figure.add_axes((left / width, below / total, panel / width, high / total))
-        axes.set_title(name, fontsize=11)
-        axes.set_aspect("equal")
-        panels.append(axes)
-    if title:
-        figure.suptitle(title, fontsize=13, y=1.0 - 0.12 / total, va="top")
-    return figure, panels
-
-
-def keys(figure: Figure, highest: float, lines: dict[str, str]) -> None:
-    """Draw the colour bar of the pressure below the left panel, and the legend below the right one.
-
-    Parameters
-    ----------
-    figure : figure from `two_panels`
-    highest : upper end of the pressure scale, MPa
-    lines : name -> colour of further lines in the legend
-    """
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-    from matplotlib.lines import Line2D
-
-    inch = 1.0 / figure.get_figheight()
-    bar = figure.add_axes((0.10, 0.62 * inch, 0.3, 0.16 * inch))
-    figure.colorbar(ScalarMappable(Normalize(0.0, highest), _CMAP), cax=bar, orientation="horizontal")
-    bar.set_xlabel("contact pressure (MPa)")
-    handles = _patches(COLOURS, (STICK, SLIP, OPEN)) + [Line2D([], [], color=c, label=n) for n, c in lines.items()]
-    figure.legend(
-        handles=handles,
-        loc="center",
-        bbox_to_anchor=(0.75, 0.6 * inch),
-        ncols=len(handles),
-        frameon=False,
-        fontsize=11,
-        columnspacing=1.4,
-    )
-
-
-def palette() -> Float:
-    """Return the RGB colours of open, stick and slip, shape (3, 3)."""
-    from matplotlib.colors import to_rgb
-
-    return np.array([to_rgb(COLOURS[s]) for s in (OPEN, STICK, SLIP)])
-
-
-def pressure_colours(values: Float, highest: float) -> Float:
-    """Return RGB colours (..., 3) of pressures (...), in MPa; the colour of the body where the pressure is zero."""
-    import matplotlib
-    from matplotlib.colors import to_rgb
-
-    colours = matplotlib.colormaps[_CMAP](values / highest)[..., :3]
-    return np.where((values > 0.0)[..., None], colours, np.array(to_rgb(BODY)))
-
-
-def _highest(pressure: Float) -> float:
-    """Return the upper end of the pressure scale, MPa; 1 if nothing is in contact."""
-    return float(pressure.max(initial=0.0)) or 1.0
-
-
 # --- contact tractions --------------------------------------------------------------------------------------------
 
 
@@ -311,7 +247,7 @@ def _contact_line(axes: Axes, x: Float, fn: Float, fx: Float, fz: Float, status:
     if len(touching):
         reach = 1.15 * float(np.abs(x[touching]).max()) or float(np.abs(x).max()) or 1.0
         axes.set_xlim(-reach, reach)
-    handles += _patches(_SHADES, [s for s in (STICK, SLIP) if np.any(status == s)])
+    handles += patches(_SHADES, [s for s in (STICK, SLIP) if np.any(status == s)])
     axes.legend(
         handles=handles, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=3, columnspacing=1.4
     )
@@ -328,40 +264,47 @@ def _section(
     pressure: Float,
     status: Int,
     nodes: Int,
-    profile: Float | None,
+    faces: Int,
+    thing: Float | None,
     title: str,
     marks: Marks,
 ) -> Figure:
-    """Draw a 2D model, with the pressure and the status along its contact line."""
+    """Draw a 2D model, with the pressure and the status along the faces that may touch."""
     from matplotlib.collections import LineCollection
     from matplotlib.patches import PathPatch
 
     moved = mesh.points + u
-    value, state = np.zeros(len(moved)), np.full(len(moved), OPEN)
-    value[nodes], state[nodes] = pressure, status
-    arc = mesh.facets["contact"]
-    middle = moved[arc[:, 2]] if mesh.element.is_quadratic else moved[arc].mean(axis=1)
-    # Each facet is drawn in two halves, coloured by the mean pressure of the half and by the status of its end.
-    halves = np.stack([moved[arc[:, :2]], np.repeat(middle[:, None], 2, axis=1)], axis=2).reshape(-1, 2, 2)
-    of_half = (0.75 * value[arc[:, :2]] + 0.25 * value[arc[:, 1::-1]]).ravel()
-    highest = _highest(pressure)
+    halves, of_half, of_state = [], [], []
+    for k in np.union1d(faces, CONTACT):
+        arc, own = mesh.facets.get(FREE_FACES[k], mesh.facets["contact"][:0]), faces == k
+        value, state = np.zeros(len(moved)), np.full(len(moved), OPEN)
+        value[nodes[own]], state[nodes[own]] = pressure[own], status[own]
+        middle = moved[arc[:, 2]] if mesh.element.is_quadratic else moved[arc].mean(axis=1)
+        # Each facet is drawn in two halves, coloured by the mean pressure of the half and by the status of its end.
+        pairs = np.stack([moved[arc[:, :2]], np.repeat(middle[:, None], 2, axis=1)], axis=2)
+        halves.append(pairs.reshape(-1, 2, 2))
+        of_half.append((0.75 * value[arc[:, :2]] + 0.25 * value[arc[:, 1::-1]]).ravel())
+        of_state.append(state[arc[:, :2]].ravel())
+    highest = highest_of(pressure)
     low, span = moved.min(axis=0), np.ptp(moved, axis=0)
     limits = low - 0.04 * span, low + 1.08 * span
     figure, panels = two_panels(span[1] / span[0], title, ticks=True)
-    by_status = palette()[state[arc[:, :2]].ravel()]
+    by_status = palette()[np.concatenate(of_state)]
     outline, edges = outline_of(mesh, moved), edges_of(mesh, moved)
-    for axes, colours in zip(panels, (pressure_colours(of_half, highest), by_status), strict=True):
+    for axes, colours in zip(panels, (pressure_colours(np.concatenate(of_half), highest), by_status), strict=True):
         axes.add_artist(PathPatch(outline, facecolor=BODY, edgecolor=LINE, lw=0.5))
         axes.add_artist(PathPatch(edges, facecolor="none", edgecolor=LINE, lw=0.25))
-        if profile is not None:
-            axes.plot(*profile.T, color=OBJECT, lw=1.5, zorder=2)
-        axes.add_collection(LineCollection(list(halves), colors=colours, lw=5, capstyle="butt", zorder=3))
+        if thing is not None:
+            axes.add_collection(LineCollection(list(thing), colors=OBJECT, lw=1.2, zorder=2))
+        axes.add_collection(
+            LineCollection(list(np.concatenate(halves)), colors=colours, lw=5, capstyle="butt", zorder=3)
+        )
         axes.set(xlim=(limits[0][0], limits[1][0]), ylim=(limits[0][1], limits[1][1]))
         axes.set_xlabel("x (mm)", labelpad=1)
         axes.spines[["top", "right"]].set_visible(False)
     panels[0].set_ylabel("y (mm)")
     draw_marks(panels[0], marks)
-    keys(figure, highest, {} if profile is None else {"object": OBJECT})
+    keys(figure, highest, {} if thing is None else {"object": OBJECT})
     return figure
 
 
@@ -370,7 +313,7 @@ def _section(
 
 def _solid(skin: Skin, title: str, marks: Marks) -> tuple[Figure, str]:
     """Draw a solid; return the figure and the name of the renderer."""
-    highest = _highest(skin.pressure)
+    highest = highest_of(skin.pressure)
     by_pressure = pressure_colours(skin.pressure, highest)
     by_status = np.repeat(palette()[skin.status][:, None], 3, axis=1)
     images, extent = render_solids([(skin, by_pressure, False), (skin, by_status, True)]) or (None, None)
@@ -388,5 +331,5 @@ def _solid(skin: Skin, title: str, marks: Marks) -> tuple[Figure, str]:
     if skin.largest_shear > 0.0:
         text = f"stick and slip; arrows: friction on the finger, at most {skin.largest_shear:.3g} MPa"
         panels[1].set_title(text, fontsize=11)
-    keys(figure, highest, {"finger at rest": REST} | ({"object": OBJECT} if len(skin.outline) else {}))
+    keys(figure, highest, {"finger at rest": REST} | ({"object": OBJECT_TINT} if len(skin.thing) else {}))
     return figure, "matplotlib" if images is None else "pyvista"

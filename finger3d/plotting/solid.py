@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger3d._arrays import freeze_arrays
 from finger3d._types import Float, Int
 from finger3d.contact.friction import OPEN, SLIP, STICK
 from finger3d.fem.elements import TRI3, TRI6
-from finger3d.fem.simplex import Mesh
+from finger3d.fem.simplex import CONTACT, FREE_FACES, Mesh
 from finger3d.plotting.camera import AXES, WINDOW, flat, framed, half_height
 from finger3d.plotting.renderer import Arrows, Camera, Drawing, Image, Polygons, Polylines, render, unshared
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 BODY, LINE, REST, OBJECT = "#d9d6cf", "#8d8a84", "#777777", "#222222"
 COLOURS = {OPEN: "#c4c4c4", STICK: "#1f3f77", SLIP: "#f28e2b"}
+OBJECT_TINT, OBJECT_OPACITY = "#7fa7c9", 0.12
 ARROWS = {STICK: "#ffffff", SLIP: "#000000"}
 """Contact status -> colour of friction arrows."""
 
@@ -44,14 +46,14 @@ class Skin:
 
     Attributes
     ----------
-    body : (b, 6, 3) facets off the contact surface, nodes in VTK's order
-    contact : (t, 3, 3) triangles of the contact surface
+    body : (b, 6, 3) facets of the other faces, nodes in VTK's order
+    contact : (t, 3, 3) triangles of the faces that may touch
     pressure : (t, 3) contact pressure at their corners, MPa
     status : (t,) status of the contact point that each triangle belongs to
     lines : (k, 3, 3) edges of the facets of the body: end, middle, end
     features : (k, 3, 3) edges between the faces of the body
     rest : (k, 3, 3) edges of the undeformed contact surface
-    outline : (o, 3) closed line around the surface of the object; (0, 3) without one
+    thing : (k, 3, 3) triangles of the object; none without one
     arrow_at : (a, 3) contact points with a friction arrow
     arrow : (a, 3) direction and relative size of friction on the finger; the longest has length 1
     arrow_status : (a,) status of these contact points
@@ -65,7 +67,7 @@ class Skin:
     lines: Float
     features: Float
     rest: Float
-    outline: Float
+    thing: Float
     arrow_at: Float
     arrow: Float
     arrow_status: Int
@@ -88,7 +90,7 @@ class Skin:
     @property
     def arrow_length(self) -> float:
         """Length of the longest arrow, mm; limited by the distance between arrows."""
-        across = np.ptp(self.arrow_at[:, [0, 2]], axis=0) if len(self.arrow_at) else np.zeros(2)
+        across = np.ptp(flat(self.arrow_at), axis=0) if len(self.arrow_at) else np.zeros(2)
         apart = max(np.sqrt(across.prod() / max(len(self.arrow_at), 1)), across.max() / max(len(self.arrow_at), 1))
         return min(_ARROW_LENGTH * self.size, _ARROW_SPACINGS * float(apart) or np.inf)
 
@@ -102,13 +104,20 @@ class Skin:
 
     @property
     def points(self) -> Float:
-        """All points of surfaces and lines, shape (p, 3), mm."""
-        parts = (self.body, self.contact, self.rest, self.outline)
+        """All points of the finger's surfaces and lines, shape (p, 3), mm."""
+        parts = (self.body, self.contact, self.rest)
         return np.concatenate([part.reshape(-1, 3) for part in parts])
 
 
 def skin_of(
-    mesh: Mesh, u: Float, pressure: Float, shear: Float, status: Int, nodes: Int, profile: Float | None
+    mesh: Mesh,
+    u: Float,
+    pressure: Float,
+    shear: Float,
+    status: Int,
+    nodes: Int,
+    faces: Int,
+    thing: Float | None = None,
 ) -> Skin:
     """Return the skin of a deformed solid.
 
@@ -118,46 +127,56 @@ def skin_of(
     u : (n, 3) array, mm
         Displacement.
     pressure : (c,) array, MPa
-    shear : (c, 2) array, MPa
-        Friction on the finger along x and z.
+    shear : (c, 3) array, MPa
+        Friction on the finger.
     status : (c,) array
         Contact status.
-    nodes : (c,) array
-        Nodes of the contact points.
-    profile : (k, 2) array, mm
-        Coordinates x and y of the surface of the object, or None.
+    nodes, faces : (c,) arrays
+        Nodes of the contact points, and the numbers in `finger3d.fem.traces.FREE_FACES` of their faces.
+    thing : (t, 3, 3) array, mm
+        Corners of the object's triangles, or None.
     """
     moved = mesh.points + u
-    arc = mesh.facets["contact"]
-    others = [f for label, f in mesh.facets.items() if label != "contact" and len(f)]
-    value, state = np.zeros(len(moved)), np.full(len(moved), OPEN)
-    value[nodes], state[nodes] = pressure, status
-
-    corner = value[arc[:, :3]]
-    middle = 0.5 * (corner + np.roll(corner, -1, axis=1))
-    seven = np.hstack([corner, middle, corner.mean(axis=1, keepdims=True)])
-    rings = _six_nodes(arc, moved)
-    # Quadratic shape functions at the centroid: 4/9 at the mid-side nodes, -1/9 at the corners.
-    centre = (4.0 * rings[:, 3:].sum(axis=1) - rings[:, :3].sum(axis=1)) / 9.0
-    points = np.concatenate([rings, centre[:, None]], axis=1)
-
+    touched = [FREE_FACES[k] for k in np.union1d(faces, CONTACT) if len(mesh.facets.get(FREE_FACES[k], ()))]
+    others = [f for label, f in mesh.facets.items() if label not in touched and len(f)]
+    parts = []
+    for label in touched:
+        own = faces == FREE_FACES.index(label)
+        parts.append(_coloured(mesh.facets[label], moved, nodes[own], pressure[own], status[own]))
+    contact, values, states = (np.concatenate([part[k] for part in parts]) for k in range(3))
     body = np.concatenate([_six_nodes(f, moved) for f in others]) if others else np.zeros((0, 6, 3))
-    features = np.concatenate([_edge_points(_rim(f), moved) for f in (arc, *others)])
+    rims = [_rim(mesh.facets[label]) for label in touched]
     chosen, arrow, largest = _arrows(moved[nodes], shear, status)
     return Skin(
         body=body,
-        contact=points[:, _SIX].reshape(-1, 3, 3),
-        pressure=seven[:, _SIX].reshape(-1, 3),
-        status=state[arc[:, _OWNER]].ravel(),
+        contact=contact,
+        pressure=values,
+        status=states,
         lines=body[:, _SIDES].reshape(-1, 3, 3),
-        features=features,
-        rest=_edge_points(_rim(arc), mesh.points),
-        outline=_outline(profile, moved),
+        features=np.concatenate([_edge_points(edges, moved) for edges in (*rims, *map(_rim, others))]),
+        rest=_edge_points(rims[0], mesh.points),
+        thing=np.zeros((0, 3, 3)) if thing is None else thing,
         arrow_at=moved[nodes[chosen]],
         arrow=arrow,
         arrow_status=status[chosen],
         largest_shear=largest,
     )
+
+
+def _coloured(
+    facets: Int, moved: Float, nodes: Int, pressure: Float, status: Int
+) -> tuple[Float, Float, NDArray[np.int64]]:
+    """Return the triangles (t, 3, 3) of a face, and pressure (t, 3) and status (t,) on them."""
+    value, state = np.zeros(len(moved)), np.full(len(moved), OPEN)
+    value[nodes], state[nodes] = pressure, status
+    corner = value[facets[:, :3]]
+    middle = 0.5 * (corner + np.roll(corner, -1, axis=1))
+    seven = np.hstack([corner, middle, corner.mean(axis=1, keepdims=True)])
+    rings = _six_nodes(facets, moved)
+    # Quadratic shape functions at the centroid: 4/9 at the mid-side nodes, -1/9 at the corners.
+    centre = (4.0 * rings[:, 3:].sum(axis=1) - rings[:, :3].sum(axis=1)) / 9.0
+    points = np.concatenate([rings, centre[:, None]], axis=1)
+    return points[:, _SIX].reshape(-1, 3, 3), seven[:, _SIX].reshape(-1, 3), state[facets[:, _OWNER]].ravel()
 
 
 def _six_nodes(facets: Int, points: Float) -> Float:
@@ -184,15 +203,6 @@ def _edge_points(edges: Int, points: Float) -> Float:
     return np.stack([ends[:, 0], middle, ends[:, 1]], axis=1)
 
 
-def _outline(profile: Float | None, points: Float) -> Float:
-    """Return the outline of an extruded profile over the width of the body, shape (o, 3)."""
-    if profile is None:
-        return np.zeros((0, 3))
-    z = points[:, 2].min(), points[:, 2].max()
-    front, back = (np.column_stack([profile, np.full(len(profile), at)]) for at in z)
-    return np.concatenate([front, back[::-1], front[:1]])
-
-
 def _arrows(points: Float, shear: Float, status: Int) -> tuple[Int, Float, float]:
     """Select evenly distributed friction arrows: the contact point nearest to the centre of each square of a grid.
 
@@ -206,14 +216,14 @@ def _arrows(points: Float, shear: Float, status: Int) -> tuple[Int, Float, float
     largest = float(np.linalg.norm(shear[on], axis=1).max(initial=0.0))
     if largest == 0.0:
         return on[:0], np.zeros((0, 3)), 0.0
-    plane = points[on][:, [0, 2]]
+    plane = flat(points[on])
     low, extent = plane.min(axis=0), np.ptp(plane, axis=0)
     step = max(float(np.sqrt(extent.prod() / _ARROW_COUNT)), 1e-9)
     square = np.floor((plane - low) / step)
     order = np.argsort(np.linalg.norm((plane - low) / step - square - 0.5, axis=1), kind="stable")
     _, first = np.unique(square[order], axis=0, return_index=True)
     chosen = on[order[first]]
-    return chosen, np.column_stack([shear[chosen, 0], np.zeros(len(chosen)), shear[chosen, 1]]) / largest, largest
+    return chosen, shear[chosen] / largest, largest
 
 
 # --- matplotlib ---------------------------------------------------------------------------------------------------
@@ -244,8 +254,9 @@ def draw_solid(axes: Axes, skin: Skin, colours: Float, arrows: bool) -> None:
     axes.add_collection(
         PolyCollection([polygons[i] for i in order], facecolors=fill[order], edgecolors=edge[order], lw=0.25, zorder=2)
     )
-    if len(skin.outline):
-        axes.plot(*flat(skin.outline).T, color=OBJECT, lw=1.0, zorder=3)
+    if len(skin.thing):
+        seen, tint = _shaded(skin.thing, np.tile(to_rgb(OBJECT_TINT), (len(skin.thing), 1)))
+        axes.add_collection(PolyCollection(list(flat(seen)), facecolors=tint, alpha=OBJECT_OPACITY, lw=0.0, zorder=3))
     if arrows and len(skin.arrow):
         for state, colour in ARROWS.items():
             on = skin.arrow_status == state
@@ -325,13 +336,14 @@ def _parts(skin: Skin, colours: Float, arrows: bool) -> tuple[Polygons | Polylin
         Polylines(skin.lines, LINE, 1.0, 0.5),
         Polylines(skin.features, "#444444", 2.0),
         Polylines(skin.rest, REST, 1.5, 0.6),
-        Polylines(skin.outline[None], OBJECT, 3.0),
     )
     parts: list[Polygons | Polylines | Arrows] = [Polygons(*unshared(at), colour) for at, colour in surfaces if len(at)]
     parts += [part for part in lines if part.points.size]
     for state, colour in ARROWS.items() if arrows else ():
         on = skin.arrow_status == state
         if on.any():
-            above = skin.arrow_at[on] + [0.0, 0.004 * skin.size, 0.0]
-            parts.append(Arrows(above, skin.arrow_length * skin.arrow[on], colour))
+            before = skin.arrow_at[on] + 0.004 * skin.size * AXES[2]
+            parts.append(Arrows(before, skin.arrow_length * skin.arrow[on], colour))
+    if len(skin.thing):
+        parts.append(Polygons(*unshared(skin.thing), OBJECT_TINT, opacity=OBJECT_OPACITY))
     return tuple(parts)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from finger3d.plotting.animation import mesh_of
 from finger3d.plotting.gauges import COLOUR, marks_of
 from finger3d.plotting.show import found
+from finger3d.plotting.solid import OBJECT_OPACITY, OBJECT_TINT
 from finger3d.results.states import States, captions
 from finger3d.results.vtu import grid
 
@@ -62,6 +63,9 @@ class Window:
         else:
             self.plotter.add_mesh(self.shown, **look)
         self.mapper = self.plotter.mapper  # of the finger; the attribute of the plotter changes with the next mesh
+        self.thing = pv.PolyData(*self._object())
+        if self.thing.n_points:
+            self.plotter.add_mesh(self.thing, color=OBJECT_TINT, opacity=OBJECT_OPACITY)
         self.marks = marks_of(mesh_of(self.states), gauges, near=self.states.dim == 3)
         self.lines = [pv.lines_from_points(self.rest[:3]) for _ in self.marks]
         for line in self.lines:
@@ -83,8 +87,16 @@ class Window:
         self.plotter.view_vector(
             (-0.45, 1.05, 1.0) if self.states.dim == 3 else (0.0, 0.0, 1.0), viewup=(0.0, 1.0, 0.0)
         )
+        self.plotter.reset_camera(bounds=self.shown.bounds)  # the object may be far larger
         self.plotter.add_axes(color="black")
         self.update()
+
+    def _object(self) -> tuple[Array, NDArray[np.integer]]:
+        """Return points (v, 3) and triangles of the object at the current step, the latter in VTK's format."""
+        states = self.states
+        points = states.object_points @ states.object_rotation[self.step].T + states.object_place[self.step]
+        faces = states.object_faces
+        return points, np.hstack([np.full((len(faces), 1), 3, dtype=faces.dtype), faces]).ravel()
 
     def _front(self) -> tuple[float, float, float]:
         """Return the initial origin of the clip plane, mm, in front of the finger, where it removes nothing."""
@@ -104,6 +116,7 @@ class Window:
         """Apply the displacement and the colours of the current step and field."""
         u = padded(self.states.displacement[self.step])
         self.shown.points = self.rest + u
+        self.thing.points = self._object()[0]
         value = values(self.states, self.end, self.field, self.step)
         self.shown["value"] = value
         self.shown.Modified()
@@ -154,7 +167,8 @@ def values(states: States, end: pv.UnstructuredGrid, name: str, k: int) -> Array
         displacement: Array = np.linalg.norm(states.displacement[k], axis=1)
         return displacement
     if name == "shear":
-        return np.hypot(states.on_points("shear_x", k), states.on_points("shear_z", k))
+        parts = [states.on_points(f"shear_{axis}", k) for axis in "xyz"]
+        return np.asarray(np.linalg.norm(parts, axis=0))
     if name == "stress":
         if k != len(states.step) - 1:
             return np.full(len(states.points), np.nan)

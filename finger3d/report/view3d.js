@@ -8,7 +8,8 @@
   const n = data.vertices, names = ["open", "stick", "slip"];
   const stage = document.getElementById("view-stage"), field = document.getElementById("view-field");
   const slider = document.getElementById("view-step"), label = document.getElementById("view-label");
-  const gauges = document.getElementById("view-gauges");
+  const gauges = document.getElementById("view-gauges"), thing = document.getElementById("view-object");
+  const objectPoints = new Float32Array(bytes(data.objectPoints)), objectFaces = new Uint32Array(bytes(data.objectFaces));
   const show = (kind, on) => document.querySelectorAll(`.key .${kind}`).forEach((e) => { e.hidden = !on; });
 
   // Split each contact triangle into six around its centre, two for each corner, so that the status of a corner is drawn
@@ -92,7 +93,16 @@
           textposition: "bottom center" },
       ];
     });
-    return [...lines, side, face, ...(what === "pressure" ? [open] : [])];
+    const object = { ...base, hoverinfo: "skip", color: "#7fa7c9", opacity: 0.3, x: [], y: [], z: [], i: [], j: [], k: [] };
+    for (let p = 0; p < objectPoints.length; p += 3) {
+      const at = data.objectPoses[s].map((row) => row[3] + [0, 1, 2].reduce((sum, a) => sum + row[a] * objectPoints[p + a], 0));
+      object.x.push(at[0]); object.y.push(at[1]); object.z.push(at[2]);
+    }
+    for (let f = 0; f < objectFaces.length; f += 3) {
+      object.i.push(objectFaces[f]); object.j.push(objectFaces[f + 1]); object.k.push(objectFaces[f + 2]);
+    }
+    const shown = thing.checked && object.i.length ? [object] : [];
+    return [...lines, side, face, ...(what === "pressure" ? [open] : []), ...shown];
   }
 
   // The axes are the same for all steps, so that the motion of the finger is visible.
@@ -130,6 +140,7 @@
   field.addEventListener("change", draw);
   slider.addEventListener("input", draw);
   gauges.addEventListener("change", draw);
+  thing.addEventListener("change", draw);
   window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
   draw().then(() => { stage.dataset.drawn = "yes"; });
 })();

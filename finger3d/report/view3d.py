@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger3d._types import Array
-from finger3d.fem.simplex import Mesh
+from finger3d.fem.simplex import FREE_FACES, Mesh
 from finger3d.mechanics.gauges import Gauge
 from finger3d.plotting.gauges import marks_of
 from finger3d.report.html import asset, embedded
@@ -25,13 +25,15 @@ class View3D:
     Attributes
     ----------
     rest : (v, 3) undeformed vertices, mm
-    body, contact : (t, 3) triangles off and on the contact surface
+    body, contact : (t, 3) triangles of faces that cannot touch, and of those that may; they share no vertices
     moved : (s, v, 3) deformed vertices at each increment, mm
     pressure : (s, v) contact pressure, MPa
     status : (s, v) 0 open, 1 stick, 2 slip
     labels : (s,) label of each increment
     gauges : (s, g, 3, 3) start, middle and end of each gauge at each increment, projected onto the front face (+z), mm
     gauge_labels : (g,) label of each gauge
+    object_points, object_faces : (o, 3) mm, (f, 3) triangles of the object in its own coordinates
+    object_poses : (s, 3, 4) its rotation and place at each increment
     """
 
     rest: Array
@@ -43,18 +45,23 @@ class View3D:
     labels: tuple[str, ...]
     gauges: Array
     gauge_labels: tuple[str, ...]
+    object_points: Array
+    object_faces: Array
+    object_poses: Array
 
     def html(self) -> str:
         """Return the HTML element that holds the view and its controls."""
         last = len(self.labels) - 1
         hidden = " hidden" if last == 0 else ""
         none = "" if self.gauge_labels else " hidden"
+        no_object = "" if len(self.object_faces) else " hidden"
         return (
             '<div class="view"><div class="controls">'
             '<label>colour <select id="view-field"><option value="pressure">contact pressure</option>'
             '<option value="status">stick and slip</option><option value="moved">displacement</option></select></label>'
             f'<label{hidden}>step <input id="view-step" type="range" min="0" max="{last}" value="{last}"></label>'
             f'<label{none}><input id="view-gauges" type="checkbox"{"" if none else " checked"}>gauges</label>'
+            f'<label{no_object}><input id="view-object" type="checkbox"{"" if no_object else " checked"}>object</label>'
             '<output id="view-label"></output>'
             '<span class="key"><span class="zone"><i style="background:#1f3f77"></i>stick</span>'
             '<span class="zone"><i style="background:#f28e2b"></i>slip</span>'
@@ -78,6 +85,9 @@ class View3D:
             "contact": _packed(self.contact, "<u4"),
             "gauges": np.round(self.gauges, 3).tolist(),
             "gaugeLabels": self.gauge_labels,
+            "objectPoints": _packed(self.object_points, "<f4"),
+            "objectFaces": _packed(self.object_faces, "<u4"),
+            "objectPoses": np.round(self.object_poses, 6).tolist(),
         }
         numbers = f'<script type="application/json" id="view-data">{embedded(data)}</script>\n'
         return f"{numbers}<script>{asset('view3d.js')}</script>\n"
@@ -87,8 +97,13 @@ def view_of(states: States, gauges: Sequence[Gauge] = (), budget: int = _MOST_BY
     """Return a view of a solid with as many increments as `budget`, in bytes, allows; None if none fits, or for 2D."""
     if states.dim != 3:
         return None
-    corners, index = np.unique(states.corners, return_inverse=True)
+    # a vertex on a crease has a pressure on each face
+    faces = np.where(states.on_contact, states.facet_face.astype(int), -1)
+    key = states.corners.astype(np.int64) * (len(FREE_FACES) + 1) + (faces + 1)[:, None]
+    keys, index = np.unique(key, return_inverse=True)
+    corners, face_of = keys // (len(FREE_FACES) + 1), keys % (len(FREE_FACES) + 1) - 1
     triangles = index.reshape(states.corners.shape)
+    budget -= (states.object_points.size + states.object_faces.size) * 16 // 3
     each = len(corners) * (3 * 4 + 4 + 1) * 4 // 3
     most = (budget - triangles.size * 16 // 3) // each
     if most < 1:
@@ -97,16 +112,27 @@ def view_of(states: States, gauges: Sequence[Gauge] = (), budget: int = _MOST_BY
     rest = states.points[corners]
     marks = marks_of(Mesh(states.points.astype(float), states.cells, {}), gauges, near=True)
     at = [[mark.of(states.points + states.displacement[k]) for mark in marks] for k in kept]
+
+    def values(name: str, k: int) -> Array:
+        out = np.zeros(len(corners))
+        for face in np.unique(faces[faces >= 0]):
+            own = face_of == face
+            out[own] = states.on_points(name, k, int(face))[corners[own]]
+        return out
+
     return View3D(
         rest=rest,
         body=triangles[~states.on_contact],
         contact=triangles[states.on_contact],
         moved=rest + states.displacement[kept][:, corners],
-        pressure=np.array([states.on_points("pressure", k)[corners] for k in kept]),
-        status=np.array([states.on_points("status", k)[corners] for k in kept]),
+        pressure=np.array([values("pressure", k) for k in kept]),
+        status=np.array([values("status", k) for k in kept]),
         labels=tuple(label(int(states.step[k]), states.target[k]) for k in kept),
         gauges=np.array(at).reshape(len(kept), len(marks), 3, 3),
         gauge_labels=tuple(mark.label for mark in marks),
+        object_points=states.object_points,
+        object_faces=states.object_faces,
+        object_poses=np.concatenate([states.object_rotation, states.object_place[:, :, None]], axis=2)[kept],
     )
 
 

@@ -11,13 +11,18 @@ import numpy as np
 from finger3d._arrays import freeze_arrays
 from finger3d._types import Array
 from finger3d.errors import Finger3dError
-from finger3d.fem.simplex import Mesh, middles
+from finger3d.fem.simplex import CONTACT, FREE_FACES, Mesh, middles
+from finger3d.geometry.surface import Triangles
 from finger3d.io import atomic, read_arrays
 from finger3d.mechanics.history import StepResult, contact_table
 from finger3d.mechanics.problem import Problem
+from finger3d.objects import PlacedObject
 
 _LARGEST = 1e9
 """Bound of every number in steps.npz, in mm or MPa: far above any result, and far below an overflow in a drawing."""
+
+_MOST_TRIANGLES = 20_000
+"""Triangles of the object that are kept for pictures, at most."""
 
 MOST = 10
 """Increments kept: each costs a solution with the factor at hand, and a displacement of every node on disk."""
@@ -31,29 +36,38 @@ class States:
     ----------
     points : (n, d) mm at rest, in the order of fields.vtu
     cells, facets : (e, k), (t, j) as in `finger3d.fem.simplex.Mesh`; facets of all labels together
-    on_contact : (t,) whether a facet belongs to the contact surface
+    facet_face : (t,) number in `finger3d.fem.traces.FREE_FACES` of the face of each facet, -1 for any other
     nodes : (m,) numbers of the contact points among `points`, in the order of contact.csv
+    face : (m,) number of the face that each contact point belongs to
     step : (s,) number of each increment, from 1
-    target : (s, 3) depth_mm, slide_x_mm, slide_z_mm
+    target : (s, 6) depth_mm, slide_x_mm, slide_z_mm, turn_x_deg, turn_y_deg, turn_z_deg
     displacement : (s, n, d) mm
-    pressure, shear_x, shear_z : (s, m) MPa, traction on the finger
+    pressure, shear_x, shear_y, shear_z : (s, m) MPa, traction on the finger
     gap : (s, m) mm
     status : (s, m) 0 open, 1 stick, 2 slip
+    object_points, object_faces : (v, 3) mm, (f, 3) triangles of the object in its own coordinates; none if too many
+    object_rotation, object_place : (s, 3, 3), (s, 3) mm, its pose at each increment
     """
 
     points: Array
     cells: Array
     facets: Array
-    on_contact: Array
+    facet_face: Array
     nodes: Array
+    face: Array
     step: Array
     target: Array
     displacement: Array
     pressure: Array
     shear_x: Array
+    shear_y: Array
     shear_z: Array
     gap: Array
     status: Array
+    object_points: Array
+    object_faces: Array
+    object_rotation: Array
+    object_place: Array
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
@@ -68,14 +82,28 @@ class States:
         """Corners (t, d) of the boundary's facets, oriented outward."""
         return self.facets[:, : self.dim]
 
-    def on_points(self, name: str, k: int) -> Array:
-        """Return a contact field of the k-th kept increment at all points (n,), 0 off the contact face."""
-        values = getattr(self, name)[k]
+    @property
+    def on_contact(self) -> Array:
+        """Whether each facet (t,) belongs to a face with contact points."""
+        return np.isin(self.facet_face, np.append(np.unique(self.face), CONTACT))
+
+    def on_points(self, name: str, k: int, face: int | None = None) -> Array:
+        """Return a contact field of the k-th kept increment at all points (n,), 0 where there are no contact points.
+
+        It is that of the contact points of one face, or of all: at a crease, that with the larger pressure.
+        """
+        values, own = getattr(self, name)[k], np.argsort(self.pressure[k], kind="stable")
         out = np.zeros(len(self.points), dtype=values.dtype)
-        out[self.nodes] = values
-        ends, between = middles(self.facets[self.on_contact], self.dim)
+        own = own if face is None else own[self.face[own] == face]
+        out[self.nodes[own]] = values[own]  # the last of equal indices counts
+        ends, between = middles(self.facets[self.on_contact if face is None else self.facet_face == face], self.dim)
         out[between] = out[ends].min(axis=1) if name == "status" else out[ends].mean(axis=1)
         return out
+
+    def object_at(self, k: int) -> Array:
+        """Return the corners (f, 3, 3) mm of the object's triangles at the k-th kept increment."""
+        moved = self.object_points @ self.object_rotation[k].T + self.object_place[k]
+        return np.asarray(moved[self.object_faces])
 
 
 def chosen(count: int, most: int = MOST) -> list[int]:
@@ -108,7 +136,10 @@ def states_of(
     u[-1] = last
     tables = [contact_table(problem.points, frames[i].state) for i in kept]
     facets = {label: f for label, f in mesh.facets.items() if len(f)}
+    faces = {label: FREE_FACES.index(label) if label in FREE_FACES else -1 for label in facets}
     at = [frames[i].target for i in kept]
+    placed = [problem.placed(target) for target in at]
+    thing = object_drawing(problem, placed)
 
     def columns(name: str) -> Array:
         return np.array([t[name] for t in tables], dtype=np.float32)
@@ -117,17 +148,31 @@ def states_of(
         points=mesh.points.astype(np.float32),
         cells=mesh.cells.astype(np.int32),
         facets=np.concatenate(list(facets.values())).astype(np.int32),
-        on_contact=np.concatenate([np.full(len(f), label == "contact") for label, f in facets.items()]),
+        facet_face=np.concatenate([np.full(len(f), faces[label], dtype=np.int8) for label, f in facets.items()]),
         nodes=problem.points.nodes.astype(np.int32),
+        face=problem.points.face.astype(np.int8),
         step=np.array(kept) + 1,
-        target=np.array([(t.depth_mm, t.slide_x_mm, t.slide_z_mm) for t in at]),
+        target=np.array([(t.depth_mm, t.slide_x_mm, t.slide_z_mm, *np.degrees(t.turns)) for t in at]),
         displacement=u,
         pressure=columns("pressure_MPa"),
         shear_x=columns("shear_x_MPa"),
+        shear_y=columns("shear_y_MPa"),
         shear_z=columns("shear_z_MPa"),
         gap=columns("gap_mm"),
         status=np.array([frames[i].state.status for i in kept], dtype=np.int8),
+        object_points=thing.points.astype(np.float32),
+        object_faces=thing.faces.astype(np.int32),
+        object_rotation=np.array([p.turned for p in placed]),
+        object_place=np.array([p.place for p in placed]),
     )
+
+
+def object_drawing(problem: Problem, placed: Sequence[PlacedObject]) -> Triangles:
+    """Return the object's triangles in its own coordinates, as far as they reach over the finger in some poses."""
+    half = problem.model.design.half_length_mm, 0.5 * problem.model.design.width_mm
+    beside = max(float(np.hypot(*p.place[::2])) for p in placed)
+    found = problem.model.object.drawing(1.1 * float(np.hypot(*half)) + beside)
+    return found if len(found.faces) <= _MOST_TRIANGLES else Triangles(found.points[:0], found.faces[:0])
 
 
 def write_states(path: str | Path, states: States) -> None:
@@ -163,39 +208,51 @@ def _check(states: States) -> None:
         raise ValueError(f"points has the shape {states.points.shape}")
     s, m = len(np.atleast_1d(states.step)), len(np.atleast_1d(states.nodes))
     e, t = len(np.atleast_1d(states.cells)), len(np.atleast_1d(states.facets))
+    v, f = len(np.atleast_1d(states.object_points)), len(np.atleast_1d(states.object_faces))
     wanted: dict[str, tuple[tuple[tuple[int, ...], ...], str]] = {
         "points": (((n, d),), "f"),
         "cells": (((e, d + 1), (e, (d + 1) * (d + 2) // 2)), "iu"),
         "facets": (((t, d), (t, d * (d + 1) // 2)), "iu"),
-        "on_contact": (((t,),), "b"),
+        "facet_face": (((t,),), "i"),
         "nodes": (((m,),), "iu"),
+        "face": (((m,),), "i"),
         "step": (((s,),), "iu"),
-        "target": (((s, 3),), "iuf"),
+        "target": (((s, 6),), "iuf"),
         "displacement": (((s, n, d),), "f"),
-        **dict.fromkeys(("pressure", "shear_x", "shear_z", "gap"), (((s, m),), "f")),
+        **dict.fromkeys(("pressure", "shear_x", "shear_y", "shear_z", "gap"), (((s, m),), "f")),
         "status": (((s, m),), "iu"),
+        "object_points": (((v, 3),), "f"),
+        "object_faces": (((f, 3),), "iu"),
+        "object_rotation": (((s, 3, 3),), "f"),
+        "object_place": (((s, 3),), "f"),
     }
     for name, (shapes, kinds) in wanted.items():
         values = getattr(states, name)
-        if values.shape not in shapes or not values.size or values.dtype.kind not in kinds:
+        empty = not values.size and name not in ("object_points", "object_faces")
+        if values.shape not in shapes or empty or values.dtype.kind not in kinds:
             raise ValueError(f"{name} is an array of {values.dtype}, shape {values.shape}, and does not fit the others")
         if values.dtype.kind == "f" and not (np.abs(values) < _LARGEST).all():
             raise ValueError(f"{name} has a number that is not finite or too large")
-    for name, low, high in (("cells", 0, n), ("facets", 0, n), ("nodes", 0, n), ("status", 0, 3), ("step", 1, 2**31)):
+    bounds = {"cells": (0, n), "facets": (0, n), "nodes": (0, n), "status": (0, 3), "step": (1, 2**31)}
+    bounds |= {"object_faces": (0, v), "face": (0, len(FREE_FACES)), "facet_face": (-1, len(FREE_FACES))}
+    for name, (low, high) in bounds.items():
         values = getattr(states, name)
-        if values.min() < low or values.max() >= high:
+        if values.size and (values.min() < low or values.max() >= high):
             raise ValueError(f"{name} has a number out of range")
     if (np.diff(states.step.astype(np.int64)) <= 0).any():
         raise ValueError("step does not ascend")
+    if bool(v) != bool(f):
+        raise ValueError("the object has points without triangles")
     if not states.on_contact.any() or (np.ptp(states.points, axis=0) <= 0.0).any():
         raise ValueError("the body has no contact face, or no extent")
 
 
 def label(step: int, target: Array) -> str:
-    """Return the label of a step from its number, its depth and its slides (3,), mm."""
-    depth, x, z = (float(v) for v in target)
+    """Return the label of a step from its number, and depth, slides and turns (6,), mm and degrees."""
+    depth, x, z, *turns = (float(v) for v in target)
     slid = "".join(f", slid {v:.4g} mm along {axis}" for v, axis in ((x, "x"), (z, "z")) if v)
-    return f"step {step}: {depth:.4g} mm deep{slid}"
+    turned = "".join(f", turned {v:.4g} deg about {axis}" for v, axis in zip(turns, "xyz", strict=True) if v)
+    return f"step {step}: {depth:.4g} mm deep{slid}{turned}"
 
 
 def captions(states: States) -> list[str]:

@@ -11,9 +11,10 @@ import numpy as np
 from finger3d._types import Tree
 from finger3d.accuracy.companions import FACTOR
 from finger3d.accuracy.estimate import estimate
+from finger3d.fem.simplex import CONTACT
 from finger3d.mechanics.build import build
 from finger3d.mechanics.history import ContactPoints, StepResult, contact_table, measure
-from finger3d.mechanics.model import Model
+from finger3d.mechanics.model import Domain, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.step_halving import march_automatic
 from finger3d.objects import PlacedObject
@@ -29,6 +30,11 @@ def resized(model: Model, size_mm: float) -> Model:
     """Return the model with all edge lengths scaled alike."""
     base = model.mesh.base_size_mm * size_mm / model.mesh.size_mm
     return replace(model, mesh=replace(model.mesh, size_mm=size_mm, base_size_mm=base))
+
+
+def section_of(model: Model, domain: Domain) -> Model:
+    """Return the 2D model of a solid; its object does not turn out of the plane."""
+    return replace(model, domain=domain, legs=tuple(replace(leg, turn_x=0.0, turn_y=0.0) for leg in model.legs))
 
 
 def widened(model: Model, width_mm: float) -> Model:
@@ -94,6 +100,8 @@ def quantities(points: ContactPoints, frame: StepResult) -> dict[str, float]:
     }
     if "contact_half_length_end_mm" in numbers:
         out["contact_length_end_mm"] = 2.0 * numbers["contact_half_length_end_mm"]
+    if points.dim == 3:
+        out["moment_y_Nmm_per_mm"] = numbers["moment_y_Nmm"] / width
     middle = lines_along_x(points, frame)["z = 0"]
     out["peak_pressure_MPa"] = float(np.max(middle["pressure_MPa"], initial=0.0))
     return out | {f"gauge_{name}": float(strain) for name, strain in numbers["gauges"].items()}
@@ -104,12 +112,13 @@ def lines_along_x(points: ContactPoints, frame: StepResult) -> dict[str, Tree]:
     table = contact_table(points, frame.state)
     z = table["z_mm"]
     exact = 1e-6 * points.half_width_mm
-    middle = np.flatnonzero(np.abs(z) <= exact)
+    top = points.face == CONTACT
+    middle = np.flatnonzero((np.abs(z) <= exact) & top)
     if len(middle) < 5:
-        middle = np.flatnonzero(np.abs(z) <= points.band_mm)
+        middle = np.flatnonzero((np.abs(z) <= points.band_mm) & top)
     chosen = {"z = 0": middle}
     if points.dim == 3:
-        chosen["end"] = np.flatnonzero(np.abs(z - points.half_width_mm) <= exact)
+        chosen["end"] = np.flatnonzero((np.abs(z - points.half_width_mm) <= exact) & top)
     keys = ("x_mm", "pressure_MPa", "shear_x_MPa", "shear_z_MPa", "status")
     out = {}
     for name, on in chosen.items():

@@ -12,7 +12,7 @@ import numpy as np
 from finger3d._machine import versions
 from finger3d._ranges import FARTHEST_MM
 from finger3d._types import Tree
-from finger3d.analyses.compare.cases import press_with_errors, widened
+from finger3d.analyses.compare.cases import press_with_errors, section_of, widened
 from finger3d.analyses.compare.verdict import WITHIN, Deviation, crossing_width, deviations, verdict
 from finger3d.errors import Finger3dError, Outcome, UnresolvedError
 from finger3d.io import atomic, claimed, write_csv, write_json
@@ -150,15 +150,15 @@ def _check(model: Model, widths: Sequence[float]) -> None:
 
 def _variants(model: Model, widths: Sequence[float]) -> Iterator[tuple[str, Model]]:
     """Yield the name and the model of every case; solid and sections of one width have the same in-plane mesh."""
-    strain, stress = replace(model, domain="plane-strain"), replace(model, domain="plane-stress")
+    strain, stress = section_of(model, "plane-strain"), section_of(model, "plane-stress")
     yield "plane strain", strain
     yield "plane stress", stress
     yield "solid", model
     yield "solid, ends held", replace(model, held_ends=True, mesh=replace(model.mesh, mesher="swept"))
     for width in widths:
         wide = widened(model, width)
-        yield "plane strain", replace(wide, domain="plane-strain")
-        yield "plane stress", replace(wide, domain="plane-stress")
+        yield "plane strain", section_of(wide, "plane-strain")
+        yield "plane stress", section_of(wide, "plane-stress")
         yield "solid", wide
 
 
@@ -181,7 +181,8 @@ def _remark(case: Case) -> str:
 
 
 def _verdict(model: Model, cases: Sequence[Case]) -> list[str]:
-    lines = verdict(cases, model.design.width_mm, model.design.height_mm)
+    turns = any(leg.turn_x or leg.turn_y for leg in model.legs)
+    lines = verdict(cases, model.design.width_mm, model.design.height_mm, turns)
     if _varies_along_width(model):
         lines.append("The object changes along the width; the plane models take its section at z = 0.")
     return [*lines, *(f"Warning: {w}." for w in model.warnings)]

@@ -105,8 +105,11 @@ def _crossing(scale: Float, value: Float, limit: float) -> float | None:
     return float(scale[-1])
 
 
-def verdict(cases: Sequence[Case], own_width_mm: float, height_mm: float) -> list[str]:
-    """Return the verdict on the solved cases; it names those that did not converge."""
+def verdict(cases: Sequence[Case], own_width_mm: float, height_mm: float, turns: bool = False) -> list[str]:
+    """Return the verdict on the solved cases; it names those that did not converge.
+
+    `turns` is whether the object turns out of the plane of the sections.
+    """
     failed = [c for c in cases if not c.ok]
     out = [f"{c.model}, {c.width_mm:g} mm wide, has no result: {c.outcome}." for c in failed]
     own = {c.model: c for c in cases if c.ok and c.width_mm == own_width_mm and c.model != "solid"}
@@ -118,6 +121,7 @@ def verdict(cases: Sequence[Case], own_width_mm: float, height_mm: float) -> lis
     out += _ends(own)
     out += [_width_within(name, cases) for name in ("plane strain", "plane stress")]
     out += _others(planes, solid)
+    out += _torsion(solid) if turns else []
     out.append(_sufficient(planes, solid))
     return out
 
@@ -211,6 +215,14 @@ def _others(planes: Sequence[Case], solid: Case) -> list[str]:
             values = ", ".join(f"{c.model} {_with_error(c, key)}" for c in (solid, *planes))
             out.append(f"Gauge {key.removeprefix('gauge_')}: {values}.")
     return out
+
+
+def _torsion(solid: Case) -> list[str]:
+    """Name the moment about the press axis, which no section has."""
+    return [
+        "The object turns out of the plane of the sections, in which it cannot turn: torsion has no 2D model. Moment "
+        f"about the press axis: solid {_with_error(solid, 'moment_y_Nmm_per_mm')} N mm per mm of width, sections none."
+    ]
 
 
 def _sufficient(planes: Sequence[Case], solid: Case) -> str:

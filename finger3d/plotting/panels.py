@@ -1,0 +1,119 @@
+"""The two panels of pictures of a finger, contact pressure and status: their frames, colours and keys."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from finger3d._types import Float
+from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
+from finger3d.plotting.layout import WIDEST, blank
+from finger3d.plotting.solid import BODY, COLOURS
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.patches import Patch
+
+Marks = Sequence[tuple[str, Float]]
+"""Labels of gauges, and their start, middle and end, shape (3, d), mm."""
+
+_CMAP = "viridis"  # of the contact pressure
+
+
+def patches(colours: dict[int, str], states: Sequence[int]) -> list[Patch]:
+    """Return legend entries of contact states."""
+    from matplotlib.patches import Patch
+
+    return [Patch(facecolor=colours[s], edgecolor="#888888", lw=0.5, label=STATUS_NAMES[s]) for s in states]
+
+
+def two_panels(aspect: float, title: str, ticks: bool = False) -> tuple[Figure, list[Axes]]:
+    """Return a figure with two panels of equal scale, with space for a legend below them.
+
+    Parameters
+    ----------
+    aspect : height over width of a panel
+    title : title of the figure
+    ticks : reserve space for tick labels
+    """
+    width, panel, below = 2.0 * WIDEST, WIDEST - (0.8 if ticks else 0.2), 1.4 if ticks else 0.95
+    above = 0.85 if title else 0.45
+    high = panel * aspect
+    figure = blank(width, below + high + above)
+    total = below + high + above
+    panels = []
+    for left, name in ((width / 2 - panel - 0.1, "contact pressure"), (width - panel - 0.1, "stick and slip")):
+        axes = figure.add_axes((left / width, below / total, panel / width, high / total))
+        axes.set_title(name, fontsize=11)
+        axes.set_aspect("equal")
+        panels.append(axes)
+    if title:
+        figure.suptitle(title, fontsize=13, y=1.0 - 0.12 / total, va="top")
+    return figure, panels
+
+
+def keys(figure: Figure, highest: float, lines: dict[str, str]) -> None:
+    """Draw the colour bar of the pressure below the left panel, and the legend below the right one.
+
+    Parameters
+    ----------
+    figure : figure from `two_panels`
+    highest : upper end of the pressure scale, MPa
+    lines : name -> colour of further lines in the legend
+    """
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+    from matplotlib.lines import Line2D
+
+    inch = 1.0 / figure.get_figheight()
+    bar = figure.add_axes((0.10, 0.62 * inch, 0.3, 0.16 * inch))
+    figure.colorbar(ScalarMappable(Normalize(0.0, highest), _CMAP), cax=bar, orientation="horizontal")
+    bar.set_xlabel("contact pressure (MPa)")
+    handles = patches(COLOURS, (STICK, SLIP, OPEN)) + [Line2D([], [], color=c, label=n) for n, c in lines.items()]
+    figure.legend(
+        handles=handles,
+        loc="center",
+        bbox_to_anchor=(0.75, 0.6 * inch),
+        ncols=len(handles),
+        frameon=False,
+        fontsize=11,
+        columnspacing=1.4,
+    )
+
+
+def sliced(triangles: Float) -> Float:
+    """Return the segments (s, 2, 2), x and y, in which triangles (t, 3, 3) meet the plane z = 0."""
+    z = triangles[:, :, 2]
+    cut = triangles[(z.min(axis=1) < 0.0) & (z.max(axis=1) >= 0.0)]
+    ends = []
+    for i, j in ((0, 1), (1, 2), (2, 0)):
+        a, b = cut[:, i], cut[:, j]
+        crosses = (a[:, 2] < 0.0) != (b[:, 2] < 0.0)
+        share = a[:, 2] / np.where(crosses, a[:, 2] - b[:, 2], 1.0)
+        ends.append(np.where(crosses[:, None], a[:, :2] + share[:, None] * (b - a)[:, :2], np.nan))
+    found = np.stack(ends, axis=1)
+    return np.asarray(found[np.isfinite(found[:, :, 0])].reshape(-1, 2, 2))
+
+
+def palette() -> Float:
+    """Return the RGB colours of open, stick and slip, shape (3, 3)."""
+    from matplotlib.colors import to_rgb
+
+    return np.array([to_rgb(COLOURS[s]) for s in (OPEN, STICK, SLIP)])
+
+
+def pressure_colours(values: Float, highest: float) -> Float:
+    """Return RGB colours (..., 3) of pressures (...), in MPa; the colour of the body where the pressure is zero."""
+    import matplotlib
+    from matplotlib.colors import to_rgb
+
+    colours = matplotlib.colormaps[_CMAP](values / highest)[..., :3]
+    return np.where((values > 0.0)[..., None], colours, np.array(to_rgb(BODY)))
+
+
+def highest_of(pressure: Float) -> float:
+    """Return the upper end of the pressure scale, MPa; 1 if nothing is in contact."""
+    return float(pressure.max(initial=0.0)) or 1.0

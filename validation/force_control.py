@@ -1,0 +1,233 @@
+"""Is a press by force the press by the depths that it reports, on the way up and down, and does a held force creep?
+
+The finger of Maeno 2004, Fig. 9, in plane strain under a plane, and a block under a ball, both with friction, are
+pressed by equal increments of the force.  The depths found, prescribed as increments of a second press, give the same
+contact: the depth of a force is the root of a function that solves the same increment.  Brent's method stops within
+1e-12 of the finger's height h, which changes the force by 1e-12 h dP/dd.
+
+The force is then taken back.  With friction the depth at the same force differs from that on the way up (Spence 1975,
+Turner 1979); without, it is the same, since the elastic contact is unique.
+
+The finger, viscoelastic, is then held by a force.  While contact grows, the elastic force at the depth d(t) is the
+convolution of the force with the creep function (Lee and Radok 1960): J(t) = 2 - exp(-t/2) for the relaxation function
+1/2 + exp(-t)/2 and constant nu.  It ends at the depth of the elastic press with the relaxed modulus, E_inf = E/2; where
+only the shear modulus relaxes, with E_inf and nu_inf of K and G/2.  REFERENCES.md, 4.3 and 7.3.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from finger3d._types import Float, Tree
+from finger3d.analyses.study_rows import Result, Row
+from finger3d.contact.friction import Coulomb
+from finger3d.effects.viscosity import Effect as Viscosity
+from finger3d.fem.material import Isotropic
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.build import build
+from finger3d.mechanics.gauges import Gauge
+from finger3d.mechanics.history import measure
+from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.solve import march
+from finger3d.objects import Sphere
+
+E, PRONY = 1.0, ((0.5, 1.0),)
+RAMP, HELD = 1.0, 40.0  # s
+SAME = "the same increments"
+CREEP = "Lee and Radok 1960; REFERENCES.md, 4.3"
+CONTROL = "REFERENCES.md, 7.3"
+
+
+def finger(size: float, material: Isotropic, mu: float) -> Model:
+    """The section of Fig. 9; the depth of the leg meshes the contact."""
+    design = designs()["clipped_cylinder"](
+        radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0
+    )  # fmt: skip
+    gauges = (Gauge("g36", 36.0, 40.0, 0.0, math.radians(30.0)),)
+    mesh = MeshOptions(size, 8.0, "swept")
+    return Model(design, material, mesh, (Leg(6.0),), friction=Coulomb(mu), gauges=gauges, domain="plane-strain")
+
+
+def block(size: float, material: Isotropic, mu: float) -> Model:
+    """A block under a ball."""
+    design = designs()["block"](half_length_mm=4.0, height_mm=3.0, width_mm=8.0)
+    mesh = MeshOptions(size, 1.2, "swept")
+    return Model(design, material, mesh, (Leg(0.4),), object=Sphere(radius_mm=4.0), friction=Coulomb(mu))
+
+
+def history(problem: Problem, legs: tuple[Leg, ...]) -> list[Tree]:
+    """What is measured after every increment."""
+    out = []
+    for frame in march(replace(problem, model=replace(problem.model, legs=legs))):
+        assert frame.outcome.ok, frame.outcome
+        out.append(measure(problem.points, frame))
+    return out
+
+
+def by_depths(problem: Problem, steps: list[Tree]) -> list[Tree]:
+    """Press again by the depths of a history."""
+    return history(problem, tuple(Leg(step["depth_mm"], steps=1) for step in steps))
+
+
+def difference(one: Tree, other: Tree, height: float) -> float:
+    """Largest relative difference of all quantities of a step, over force, height and work where these are larger.
+
+    The area of sticking is left out: a point at the limit of friction that does not slip may be of either status.
+    """
+    force, work = one["normal_force_N"], one["external_work_mJ"]
+    floors = {"_N": force, "_Nmm": force * height, "_mJ": work, "_mm": 1e-3 * height}
+    out = [abs(other["gauges"][name] - value) / abs(value) for name, value in one["gauges"].items()]
+    for name, value in one.items():
+        if isinstance(value, float) and name != "residual" and not name.startswith("stick"):
+            floor = floors.get("_" + name.split("_")[-1], 0.0)
+            out.append(abs(other[name] - value) / (max(abs(value), floor) or 1.0))
+    return float(max(out))
+
+
+def column(steps: list[Tree], name: str) -> Float:
+    """One quantity after every increment."""
+    return np.array([step[name] for step in steps], dtype=float)
+
+
+def run(quick: bool) -> Result:
+    """Two bodies under a cycle of force, and a viscous one under a held force."""
+    count = 4 if quick else 10
+    rows: list[Row] = []
+    cycles = {}
+    for name, model, depth in (
+        ("finger, plane strain", finger(2.0 if quick else 1.0, Isotropic(E, 0.45), 0.25), 5.0),
+        ("ball on a block", block(0.4 if quick else 0.25, Isotropic(E, 0.3), 0.05), 0.3),
+    ):
+        problem = build(model)
+        force = history(problem, (Leg(depth, steps=4),))[-1]["normal_force_N"]
+        cycles[name] = _cycle(problem, depth, force, count)
+        rows += _cycle_rows(name, problem, cycles[name], count, force)
+        smooth = replace(problem, model=replace(problem.model, friction=Coulomb(0.0)))
+        free = _cycle(smooth, depth, force, count)
+        rows.append(
+            Row(f"depth on the way down less that on the way up, over it, mu = 0, {name}", "unique", 0.0,
+                float(_loop(free, count).max()), 1e-8, "the contact's residual", measure="absolute")
+        )  # fmt: skip
+    found, curve = _creep(quick)
+    rows += found
+    steps = cycles["finger, plane strain"]
+    table = {
+        "force_N": column(steps, "normal_force_N").tolist(),
+        "depth_mm": column(steps, "depth_mm").tolist(),
+        "friction_sum_N": column(steps, "friction_sum_N").tolist(),
+    }
+    return Result(tuple(rows), table, lambda figure: _draw(figure, cycles, count, curve))
+
+
+def _cycle(problem: Problem, depth: float, force: float, count: int) -> list[Tree]:
+    """Press by a force in equal increments, and take all of it back but one of them."""
+    up, down = Leg(depth, steps=count, force_N=force), Leg(depth, steps=count - 1, force_N=force / count)
+    return history(problem, (up, down))
+
+
+def _loop(steps: list[Tree], count: int) -> Float:
+    """Relative difference of the depths at equal forces below the largest."""
+    depth = column(steps, "depth_mm")
+    up, down = depth[: count - 1], depth[count:][::-1]
+    return np.asarray(np.abs(down - up) / up)
+
+
+def _cycle_rows(name: str, problem: Problem, steps: list[Tree], count: int, force: float) -> list[Row]:
+    again, height = by_depths(problem, steps), problem.model.design.height_mm
+    wanted = force * np.array([*range(1, count + 1), *range(count - 1, 0, -1)]) / count
+    found, depth = column(steps, "normal_force_N"), column(steps, "depth_mm")
+    stiffness = np.abs(np.gradient(found[:count], depth[:count])).max()
+    top, end = (difference(steps[k], again[k], height) for k in (count - 1, -1))
+    return [
+        Row(f"largest error of the force over it, {name}", CONTROL, 0.0, float((np.abs(found - wanted) / wanted).max()),
+            float(1e-12 * height * stiffness / wanted.min()) + 1e-10,
+            "1e-12 of the height times dP/dd, and the contact's residual", measure="absolute"),
+        Row(f"largest difference of any quantity from the press by depths, at the largest force, {name}", SAME, 0.0,
+            top, 1e-7, "the contact's residual of 1e-8 at worst: initial guesses differ", measure="absolute"),
+        Row(f"the same after the way down, {name}", SAME, 0.0, end, 1e-7, "as before", measure="absolute"),
+        Row(f"depth on the way down less that on the way up, over it, largest, {name}",
+            "Spence 1975, Turner 1979", 1e-6, float(_loop(steps, count).max()), 0.0,
+            "friction is not reversible: far above the residual", measure="at least"),
+    ]  # fmt: skip
+
+
+def creep(t: float) -> float:
+    """Elastic force over the largest force, for a force that grows during `RAMP` and is held."""
+
+    def integral(u: float) -> float:  # of J from 0 to u
+        return 2.0 * u - 2.0 * (1.0 - math.exp(-0.5 * u)) if u > 0.0 else 0.0
+
+    return (integral(t) - integral(t - RAMP)) / RAMP
+
+
+def _creep(quick: bool) -> tuple[list[Row], dict[str, Any]]:
+    size, per_second = (4.0, 4) if quick else (1.5, 16)
+    rows: list[Row] = []
+    curve: dict[str, Any] = {}
+    nu = 0.45
+    shear, bulk = E / (2.0 * (1.0 + nu)), E / (3.0 * (1.0 - 2.0 * nu))
+    long = 9.0 * bulk * 0.5 * shear / (3.0 * bulk + 0.5 * shear), (3.0 * bulk - shear) / (6.0 * bulk + shear)
+    force = history(build(finger(size, Isotropic(E, nu), 0.0)), (Leg(2.0, steps=4),))[-1]["normal_force_N"]
+    ramp = Leg(2.0, steps=per_second, force_N=force, duration_s=RAMP)
+    early = Leg(4.0, steps=4 * per_second, force_N=force, duration_s=4.0)
+    late = Leg(4.0, steps=2 * per_second, force_N=force, duration_s=HELD - RAMP - 4.0)
+    for constant, relaxed in ((True, Isotropic(0.5 * E, nu)), (False, Isotropic(*long))):
+        for mu in (0.0,) if quick else (0.0, 0.25):
+            elastic = finger(size, Isotropic(E, nu), mu)
+            viscous = Viscosity(PRONY, bulk=constant).apply(replace(elastic, legs=(Leg(6.0, duration_s=1.0),)))
+            steps = history(build(viscous), (ramp, early, late))
+            end = history(build(replace(elastic, material=relaxed)), (Leg(4.0, steps=per_second, force_N=force),))
+            what = f"{'constant nu' if constant else 'constant K'}, mu = {mu:g}"
+            ratio = steps[-1]["depth_mm"] / end[-1]["depth_mm"]
+            row = Row(f"depth after {HELD:g} s over that at the relaxed moduli, {what}", CREEP, 1.0, ratio, 1e-7,
+                      "exp(-20) of the creep is left")  # fmt: skip
+            if mu:
+                why = "the path differs: friction follows a force that grows, or a contact that grows while it is held"
+                row = replace(row, reference="elastic press", tolerance=1e-2, reason=why, kind="statement")
+            rows.append(row)
+            if constant and not mu:
+                rows += _creep_rows(elastic, steps, per_second, force)
+                curve = {"time": column(steps, "time_s"), "depth": column(steps, "depth_mm"),
+                         "end": end[-1]["depth_mm"]}  # fmt: skip
+    return rows, curve
+
+
+def _creep_rows(model: Model, steps: list[Tree], per_second: int, force: float) -> list[Row]:
+    time, depth = column(steps, "time_s"), column(steps, "depth_mm")
+    elastic = column(by_depths(build(model), steps), "normal_force_N") / force
+    away = np.abs(elastic - [creep(t) for t in time]) / elastic
+    early = int(np.argmin(np.abs(time - RAMP - 4.0)))
+    held = column(steps, "normal_force_N")[per_second:]
+    return [
+        Row("elastic force at the depth over F J, up to 4 s of the hold, largest error", CREEP, 0.0,
+            float(away[: early + 1].max()), 0.25 / per_second**2,
+            "second order in the increment: the elastic force is linear within it", measure="absolute"),
+        Row("largest error of the held force over it", CONTROL, 0.0, float(np.abs(held / force - 1.0).max()), 1e-9,
+            "1e-12 of the height times dP/dd, and the contact's residual", measure="absolute"),
+        Row("least increase of the depth in an increment of the hold, mm", "creep", 0.0,
+            float(np.diff(depth[per_second - 1 :]).min()), 1e-8, "it grows all the time", measure="at least"),
+    ]  # fmt: skip
+
+
+def _draw(figure: Any, cycles: dict[str, list[Tree]], count: int, curve: dict[str, Any]) -> None:
+    left, middle, right = figure.subplots(1, 3)
+    for name, steps in cycles.items():
+        force, depth = column(steps, "normal_force_N"), column(steps, "depth_mm")
+        force, depth = force / force.max(), depth / depth.max()
+        line = left.plot(depth[:count], force[:count], "o-", ms=4, label=f"{name}, up")[0]
+        left.plot(depth[count - 1 :], force[count - 1 :], "x--", ms=5, color=line.get_color(), label="down")
+        gap = depth[count:] - depth[: count - 1][::-1]
+        middle.plot(force[count:], 100.0 * gap, "o-", ms=4, color=line.get_color(), label=name)
+    left.set(xlabel="depth / largest", ylabel="force / largest")
+    middle.set(xlabel="force / largest", ylabel="depth down less depth up, % of the largest")
+    right.plot(curve["time"], curve["depth"], "o-", ms=2, label="held by force")
+    right.axhline(curve["end"], color="k", lw=0.8, label="elastic, relaxed modulus")
+    right.set(xlabel="time (s)", ylabel="depth (mm), finger without friction", ylim=(0.0, 1.1 * curve["end"]))
+    for axes, where in ((left, "upper left"), (middle, "best"), (right, "lower right")):
+        axes.legend(fontsize=7, loc=where)
+        axes.grid(alpha=0.3)

@@ -1,0 +1,257 @@
+"""Which tangential force and which torque about the press axis can a pressed finger transmit at the same time?
+
+The finger of Maeno 2004, Fig. 9, as a solid under a plane, is pressed by 2 mm; the plane is then slid and turned about
+the press axis at once, until every point slips in a steady state.  Each point then transmits mu times its normal force
+against its velocity, which is that of a rotation about a centre at a distance c from the middle of the contact.  The
+pairs of force F and torque M over all c are the limit surface (Goyal, Ruina and Papadopoulos 1991): F = mu P in a pure
+slide, and M = M_max, mu P times the mean of the distance r from the axis weighted with the pressure, in a pure twist.
+Robotics approximates it by the ellipse (F/mu P)^2 + (M/M_max)^2 = 1 (Howe and Cutkosky 1996).  Formulas: REFERENCES.md,
+3.3.
+
+A section has neither forces nor arms along z, so that its moment about the press axis is zero: the limit surface has no
+2D counterpart.  The torque of a solid grows with its width.  Widths below 10 mm are left out: such a finger bends along
+z by several millimetres before it slips, too far for small strain.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import dblquad
+
+from finger3d.analyses.study_rows import Result, Row
+from finger3d.contact.friction import STICK, Coulomb
+from finger3d.fem.material import Isotropic
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.build import build
+from finger3d.mechanics.history import StepResult, measure
+from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.solve import march
+from finger3d.objects import Plane
+
+Float = NDArray[np.float64]
+
+RADIUS, E, NU, MU = 100.0, 1.0, 0.45, 0.25
+DEPTH, WAY = 2.0, 30.0  # mm; WAY is about the mean way of the plane over the contact
+ACROSS = (0.0, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.2, 2.5, math.inf)  # distances of the centre over the width
+GOYAL = "Goyal, Ruina and Papadopoulos 1991"
+HOWE = "Howe and Cutkosky 1996"
+
+
+@dataclass(frozen=True)
+class Sliding:
+    """Full sliding about a centre at a distance c from the middle, in N and mm; torques about the centre of pressure.
+
+    Attributes
+    ----------
+    force, torque : (F_x, F_z) and M found
+    rigid_force, rigid_torque : the same from the normal forces and the velocities of the plane
+    largest : mu times the sum of normal forces times their distances from the centre of pressure
+    power : what the plane spends with the forces found, over what rigid sliding dissipates
+    step : turn of the last increment, rad
+    """
+
+    centre: float
+    normal: float
+    force: tuple[float, float]
+    torque: float
+    rigid_force: tuple[float, float]
+    rigid_torque: float
+    largest: float
+    power: float
+    stuck: int
+    step: float
+
+    @property
+    def pair(self) -> tuple[float, float]:
+        """F/mu P and M/M_max."""
+        return math.hypot(*self.force) / (MU * self.normal), self.torque / self.largest
+
+
+def model(width: float, size: float) -> Model:
+    """The finger of Fig. 9 with another width."""
+    design = designs()["clipped_cylinder"](
+        radius_mm=RADIUS, half_length_mm=50.0, edge_height_mm=36.6, width_mm=width
+    )  # fmt: skip
+    legs = (Leg(DEPTH, steps=4), Leg(DEPTH, slide_x_mm=5.0, slide_z_mm=5.0, turn_y=1.0))
+    return Model(design, Isotropic(E, NU), MeshOptions(size, 10.0, "swept"), legs, friction=Coulomb(MU))
+
+
+def centres(problem: Problem, width: float, across: tuple[float, ...]) -> list[float]:
+    """Distances of the centre, moved to the middle between the nearest contact points: one at the centre may stick."""
+    z = np.unique(np.round(problem.surface.points[:, 2], 6))
+    out = []
+    for share in across:
+        k = int(np.searchsorted(z, share * width))
+        out.append(share * width if share == 0.0 or k == len(z) else float(z[k - 1 : k + 1].mean()))
+    return out
+
+
+def slid(problem: Problem, centre: float, steps: int) -> Sliding:
+    """Press, then turn the plane about the point x = 0, z = -`centre` by a slide and a turn about the press axis."""
+    radius = 0.4 * problem.model.design.width_mm
+    turn = WAY / math.hypot(centre, radius) if math.isfinite(centre) else 0.0
+    path = [Leg(DEPTH, WAY, steps=steps)]
+    if turn:
+        angles = [turn * k / steps for k in range(1, steps + 1)]
+        path = [Leg(DEPTH, centre * math.sin(t), centre * (math.cos(t) - 1.0), turn_y=t, steps=1) for t in angles]
+    return _sliding(problem, centre, _last(problem, (Leg(DEPTH, steps=4), *path)), turn / steps)
+
+
+def _last(problem: Problem, legs: tuple[Leg, ...], plane: Plane | None = None) -> StepResult:
+    frames = list(march(replace(problem, model=replace(problem.model, legs=legs, object=plane or Plane()))))
+    assert all(frame.outcome.ok for frame in frames)
+    return frames[-1]
+
+
+def _sliding(problem: Problem, centre: float, frame: StepResult, turn: float) -> Sliding:
+    """Evaluate an increment in which the plane has turned by an angle about the centre, or has slid along x."""
+    state, at, arms = frame.part, problem.surface.points, problem.surface.centroids
+    normal = state.force[:, 0]
+    # the plane's material at a point has come along a chord
+    way = np.tile([1.0, 0.0], (len(at), 1))
+    if turn:
+        c, s = math.cos(turn), math.sin(turn)
+        from_centre = at[:, [0, 2]] + [0.0, centre]
+        way = from_centre - from_centre @ np.array([[c, s], [-s, c]])
+    length = np.linalg.norm(way, axis=1)
+    pull = MU * (normal / np.where(length > 0.0, length, 1.0))[:, None] * way
+    total = float(normal.sum())
+    middle = normal @ arms[:, [0, 2]] / total
+    arm = arms[:, [0, 2]] - middle
+    found = measure(problem.points, frame)
+    force = found["force_x_N"], found["force_z_N"]
+    return Sliding(
+        centre=centre,
+        normal=total,
+        force=force,
+        torque=found["moment_y_Nmm"] - middle[1] * force[0] + middle[0] * force[1],
+        rigid_force=(float(pull[:, 0].sum()), float(pull[:, 1].sum())),
+        rigid_torque=float(arm[:, 1] @ pull[:, 0] - arm[:, 0] @ pull[:, 1]),
+        largest=float(MU * normal @ np.linalg.norm(arm, axis=1)),
+        power=float((state.scene_force[:, [0, 2]] * way).sum() / (MU * normal @ length)),
+        stuck=int((state.status == STICK).sum()),
+        step=turn,
+    )
+
+
+def hertz_mean_distance(force: float, width: float) -> float:
+    """Mean distance (mm) from the middle, weighted with Hertz's pressure of a line contact along the whole width."""
+    half = math.sqrt(4.0 * force / width * RADIUS * (1.0 - NU**2) / (math.pi * E))
+
+    def share(z: float, t: float) -> float:  # x = half sin t
+        return 2.0 / math.pi * math.cos(t) ** 2 * math.hypot(half * math.sin(t), z)
+
+    return 2.0 * 2.0 / width * float(dblquad(share, 0.0, math.pi / 2.0, 0.0, width / 2.0)[0])
+
+
+def run(quick: bool) -> Result:
+    """The limit surface at two widths, and the largest torque at others."""
+    size, steps = (4.0, 40) if quick else (3.0, 100)
+    across = ACROSS[::3] if quick else ACROSS
+    rows: list[Row] = []
+    table: list[tuple[float, ...]] = []
+    for width in (20.0, 40.0):
+        problem = build(model(width, size))
+        found = [slid(problem, c, steps) for c in centres(problem, width, across)]
+        rows += _rows(found, width, size)
+        for one in found:
+            rigid = math.hypot(*one.rigid_force) / (MU * one.normal), one.rigid_torque / one.largest
+            table.append((width, one.centre, one.normal, one.largest / MU / one.normal, *one.pair, *rigid, one.stuck))
+        if width == 20.0:
+            rows += _beside(problem, found[1].centre)
+    for width in () if quick else (10.0, 30.0):
+        one = slid(build(model(width, size)), 0.0, steps)
+        table.append((width, 0.0, one.normal, one.largest / MU / one.normal, *one.pair, *one.pair, one.stuck))
+    ratio = [next(r[3] for r in table if r[0] == width) for width in (20.0, 40.0)]
+    rows.append(
+        Row("M_max/(mu P) at 40 mm over that at 20 mm", "at a width of 20 mm", 1.0, ratio[1] / ratio[0], 0.0,
+            "it grows with the width", measure="at least")
+    )  # fmt: skip
+    legs = (Leg(DEPTH, steps=4), Leg(DEPTH, slide_x_mm=WAY, steps=steps))
+    section = build(replace(model(20.0, size), legs=legs, domain="plane-strain"))
+    last = measure(section.points, _last(section, legs))
+    rows += [
+        Row("torque about the press axis, plane strain, slid, N mm", "statics", 0.0, last["moment_y_Nmm"], 0.0,
+            "a section has no z", measure="absolute"),
+        Row("F/mu P, plane strain, slid", "Coulomb", 1.0, last["force_x_N"] / MU / last["normal_force_N"], 1e-8,
+            "the solver's residual"),
+    ]  # fmt: skip
+    columns = "width_mm centre_mm normal_force_N mean_distance_mm F M rigid_F rigid_M stuck_points".split()
+    data = dict(zip(columns, map(list, zip(*table, strict=True)), strict=True))
+    return Result(tuple(rows), data, lambda figure: _draw(figure, data))
+
+
+def _rows(found: list[Sliding], width: float, size: float) -> list[Row]:
+    at = f"width {width:g} mm, edges of {size:g} mm"
+    force = max(math.dist(s.force, s.rigid_force) / (MU * s.normal) for s in found)
+    torque = max(abs(s.torque - s.rigid_torque) / s.largest for s in found)
+    twist, slide = found[0], found[-1]
+    deviation = [math.hypot(*s.pair) - 1.0 for s in found]
+    hertz = hertz_mean_distance(twist.normal, width)
+    left = "what is left of the way to the steady state"
+    return [
+        Row(f"F/mu P of a pure slide, {at}", "Coulomb", 1.0, slide.pair[0], 1e-8, "the solver's residual"),
+        Row(f"M/M_max of a pure twist, {at}", GOYAL, math.cos(twist.step / 2.0), twist.pair[1], 1e-3,
+            "friction opposes the chord of an increment's turn t, hence cos(t/2); forces act at the centroids of hats"),
+        Row(f"largest error of F over mu P, {len(found)} centres, {at}", GOYAL, 0.0, force, 1e-4, left,
+            measure="absolute"),
+        Row(f"largest error of M over M_max, {len(found)} centres, {at}", GOYAL, 0.0, torque, 1e-4, left,
+            measure="absolute"),
+        Row(f"largest power over that of rigid sliding, {at}", GOYAL, 1.0, max(s.power for s in found), 1e-8,
+            "no other friction dissipates more; the solver's residual", measure="at most"),
+        Row(f"least power over that of rigid sliding, {at}", GOYAL, 1.0, min(s.power for s in found), 1e-5,
+            "of the second order in errors of the direction", measure="at least"),
+        Row(f"points that stick, of all {len(found)} centres, {at}", "full sliding", 0.0,
+            float(sum(s.stuck for s in found)), 1.0, "the one in the middle of a twist", measure="absolute"),
+        Row(f"M_max/(mu P), mm, {at}", "Hertz's line contact", hertz, twist.largest / MU / twist.normal, 0.05,
+            "lower pressure towards free ends, points that end the contact", kind="statement"),
+        Row(f"deviation from the ellipse where it is largest, {at}", HOWE, 0.0, max(deviation, key=abs), 0.1,
+            "an approximation, whose size this row states", kind="statement", measure="absolute"),
+    ]  # fmt: skip
+
+
+def _beside(problem: Problem, centre: float) -> list[Row]:
+    """Turn a plane whose axis of turning is the centre, and a plane that slides and turns about the press axis."""
+    steps, turn = 10, 0.5
+    angles = [turn * k / steps for k in range(1, steps + 1)]
+    both = [Leg(DEPTH, centre * math.sin(t), centre * (math.cos(t) - 1.0), turn_y=t, steps=1) for t in angles]
+    press = Leg(DEPTH, steps=4)
+    one = measure(problem.points, _last(problem, (press, *both)))
+    other = measure(problem.points, _last(problem, (press, Leg(DEPTH, turn_y=turn, steps=steps)), Plane(z_mm=-centre)))
+    names = ("force_x_N", "force_y_N", "force_z_N", "moment_x_Nmm", "moment_y_Nmm", "moment_z_Nmm")
+    away = max(abs(one[name] - other[name]) / max(abs(one[name]), one["normal_force_N"]) for name in names)
+    return [
+        Row("largest difference of forces and moments between a slide with a turn and a turn about the centre, over P",
+            "kinematics", 0.0, away, 1e-8, "the solver's residual", measure="absolute")
+    ]  # fmt: skip
+
+
+def _draw(figure: Any, data: dict[str, list[float]]) -> None:
+    left, right = figure.subplots(1, 2)
+    angle = np.linspace(0.0, math.pi / 2.0, 91)
+    left.plot(np.cos(angle), np.sin(angle), "k--", lw=0.8, label="ellipse")
+    for own_width, colour in ((20.0, "C0"), (40.0, "C1")):
+        own = [k for k, w in enumerate(data["width_mm"]) if w == own_width]
+        rigid, found = (
+            [[data[name][k] for k in own] for name in pair] for pair in (("rigid_F", "rigid_M"), ("F", "M"))
+        )
+        left.plot(*rigid, colour, lw=1.0, label=f"{own_width:g} mm wide, rigid sliding")
+        left.plot(*found, colour + "o", mfc="none", label=f"{own_width:g} mm wide, found")
+    left.set(xlabel="F / (mu P)", ylabel="M / M_max", xlim=(0.0, 1.05), ylim=(0.0, 1.05), aspect="equal")
+    left.legend(fontsize=8, loc="lower left")
+    twists = sorted((k for k, c in enumerate(data["centre_mm"]) if c == 0.0), key=lambda k: data["width_mm"][k])
+    names = ("width_mm", "mean_distance_mm", "normal_force_N")
+    width, distance, force = ([data[name][k] for k in twists] for name in names)
+    right.plot(width, [hertz_mean_distance(p, w) for w, p in zip(width, force, strict=True)], "k-", lw=0.8,
+               label="Hertz's line contact")  # fmt: skip
+    right.plot(width, distance, "C2o", label="found")
+    right.set(xlabel="width (mm)", ylabel="M_max / (mu P) (mm)", xlim=(0.0, None), ylim=(0.0, None))
+    right.legend(fontsize=8, loc="lower right")
+    for axes in (left, right):
+        axes.grid(alpha=0.3)

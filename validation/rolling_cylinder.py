@@ -1,0 +1,245 @@
+"""Does a cylinder that rolls without creep transmit no tangential force, and one that turns or slides mu P?
+
+A rigid cylinder of radius R is pressed into a flat block and moves on with its axis at constant height.  It turns by t
+about its axis, which travels by X = -(1 + k) R t: rolling with a creep k.  At k = 0 the material of the cylinder at the
+contact is at rest.  Carter 1926 (Johnson 1985, Sec. 8.3) gives the tangential force Q of steady rolling:
+1 - Q/mu P = (1 - k R/(mu a))^2, and Q = mu P from k = mu a/R on.  It holds on a half-space that is incompressible
+(beta = 0), where pressure and friction do not act on each other.  The block approximates it up to the order a/h, with h
+its height.  For nu below 1/2 the surface is compressed in the contact, and rolling without creep drags it backwards
+(Johnson 1985, Sec. 8.2): that Q vanishes is no law.
+
+Exact on any body: forces without friction point at the axis and have no torque about it; with friction the torque is R
+times the sum of tangential forces; turning without travel and sliding without a turn have Q = mu P in opposite
+directions, and dissipate mu P times the way.  REFERENCES.md, 3.4.
+
+A round cylinder has no marks: every increment is described from its present lowest point, to which depth, slide and
+turn of an `ObjectPose` refer.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.analyses.study_rows import Result, Row
+from finger3d.contact.friction import Coulomb
+from finger3d.contact.state import ContactState
+from finger3d.fem.material import Isotropic
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.build import build
+from finger3d.mechanics.energy import frictional_dissipation
+from finger3d.mechanics.linear_contact import LinearState
+from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.solve import march
+from finger3d.objects import Cylinder, ObjectPose
+
+Float = NDArray[np.float64]
+
+R, DEPTH, WAY, MU, E = 10.0, 0.05, 6.0, 1.0, 1.0
+BEGIN = -0.5 * WAY
+CREEPS = (0.0, 0.25, 0.5, 0.75, 1.0)
+CARTER = "Carter 1926; REFERENCES.md, 3.4"
+STATICS = "statics; REFERENCES.md, 3.4"
+
+
+@dataclass(frozen=True)
+class Travel:
+    """Sums over the contact after every increment, N and mm.
+
+    Attributes
+    ----------
+    normal, tangential : of forces along the normals and tangents of the points
+    along : force along x, to which the normal forces contribute where the pressure is not symmetric
+    friction : of the magnitudes of friction
+    torque : on the finger about the cylinder's axis, of forces at the displaced points
+    """
+
+    way: Float
+    normal: Float
+    tangential: Float
+    along: Float
+    friction: Float
+    torque: Float
+    dissipation: Float
+
+    @property
+    def ratio(self) -> Float:
+        """Q/P, with the normal forces and tangential forces of the points."""
+        return self.tangential / self.normal
+
+    @property
+    def steady(self) -> float:
+        """Mean of Q/P over the last tenth of the way, within which a point enters the contact and another leaves it."""
+        return float(self.ratio[-max(1, len(self.way) // 10) :].mean())
+
+
+def block(nu: float, size: float, height: float, domain: Any = "plane-strain") -> Problem:
+    """A block with the contact fine along the way."""
+    solid = domain == "solid"
+    design = designs()["block"](half_length_mm=2.0 * height, height_mm=height, width_mm=2.0 if solid else 1.0)
+    legs = (Leg(DEPTH, steps=10), Leg(DEPTH, slide_x_mm=WAY))
+    mesh = MeshOptions(size, 1.5 if solid else 2.0, "swept")
+    thing = Cylinder(BEGIN, radius_mm=R)
+    return build(Model(design, Isotropic(E, nu), mesh, legs, object=thing, friction=Coulomb(MU), domain=domain))
+
+
+def pressed(problem: Problem) -> ContactState:
+    """The state after the press."""
+    *_, frame = march(replace(problem, model=replace(problem.model, legs=problem.model.legs[:1])))
+    assert frame.outcome.ok
+    return frame.part
+
+
+def travel(problem: Problem, state: ContactState, way: float, turn: float, steps: int) -> Travel:
+    """Move the axis by a way along x while the cylinder turns about it."""
+    formulation, model = problem.model.formulation, problem.model
+    angle = turn / steps
+    start = ObjectPose(DEPTH)
+    end = ObjectPose(DEPTH - R * (1.0 - math.cos(angle)), way / steps + R * math.sin(angle), turn_z=angle)
+    out, lost = [], 0.0
+    for k in range(steps):
+        here = replace(problem, model=replace(model, object=Cylinder(BEGIN + way * k / steps, radius_mm=R)))
+        found = formulation.increment(here, state, start, end, None, formulation.workspace())
+        assert found.outcome.ok, found.outcome
+        lost += frictional_dissipation(here, state, found.state)
+        state = found.state
+        out.append((way * (k + 1) / steps, *sums(problem, state, BEGIN + way * (k + 1) / steps), lost))
+    return Travel(*np.array(out).T)
+
+
+def sums(problem: Problem, state: ContactState, axis: float) -> tuple[float, ...]:
+    """Normal and tangential force, that along x, sum of friction and torque about the axis at x = `axis`."""
+    assert isinstance(state, LinearState)
+    height = problem.system.first_contact_mm - DEPTH + R
+    arm = (problem.surface.centroids + state.displacement)[:, :2] - [axis, height]
+    force, total = state.scene_force, problem.symmetry.total
+    torque = arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]
+    friction = np.linalg.norm(state.force[:, 1:], axis=1)
+    return total(state.force[:, 0]), total(state.force[:, 1]), total(force[:, 0]), total(friction), total(torque)
+
+
+def carter(creep: float) -> float:
+    """Q/mu P of steady rolling with a creep, over mu a/R."""
+    return 1.0 - max(0.0, 1.0 - creep) ** 2
+
+
+def run(quick: bool) -> Result:
+    """Carter's curve, rolling for a smaller Poisson's ratio, and the exact relations in a section and in a solid."""
+    height = 20.0
+    size, thick, count = (0.1, 0.25, 8) if quick else (0.05, 0.15, 24)
+    creeps = CREEPS[:3:2] if quick else CREEPS
+    steps = round(WAY / size)
+    problem = block(0.5, size, height)
+    start = pressed(problem)
+    force = sums(problem, start, BEGIN)[0]
+    a = math.sqrt(4.0 * force * R * (1.0 - 0.5**2) / (math.pi * E))
+    found = {c: travel(problem, start, WAY, -WAY / R / (1.0 + c * MU * a / R), steps) for c in creeps}
+    rows = []
+    for creep, one in found.items():
+        what = f"Q/mu P, creep {creep:g} mu a/R, edges of a/{a / size:.0f}"
+        why = f"the surface of a block of the height h is strained: 2 a/h with a/h = {a / height:.3f}"
+        rows.append(Row(what, CARTER, carter(creep), one.steady / MU, 2.0 * a / height, why, measure="absolute"))
+    other = block(0.3, size, height)
+    backwards = travel(other, pressed(other), WAY, -WAY / R, steps)
+    rows += [
+        Row("Q/mu P without creep, nu = 0.3", "Johnson 1985, Sec. 8.2", 0.0, backwards.steady / MU, 0.0,
+            "the surface in the contact is compressed: dragged against the travel", measure="at most"),
+        Row("dissipation of rolling without creep over that of sliding as far, nu = 1/2", "mu P times the way", 0.0,
+            found[0.0].dissipation[-1] / (MU * force * WAY), 1e-3, "points slip where the contact ends",
+            measure="absolute"),
+        Row("the same, nu = 0.3", "mu P times the way", 0.01,
+            backwards.dissipation[-1] / float(MU * backwards.normal[-1] * WAY), 0.0,
+            "far below that of sliding", measure="at most"),
+    ]  # fmt: skip
+    rows += _by_legs(other)
+    rows += _exact(other, "plane strain", size, count)
+    rows += _exact(block(0.3, thick, 3.0, "solid"), "solid", thick, count)
+    table = [
+        (creep, *(float(v) for v in line))
+        for creep, one in found.items()
+        for line in zip(one.way, one.way / a, one.ratio / MU, one.dissipation / (MU * force), strict=True)
+    ]
+    columns = "creep_R_over_mu_a way_mm way_over_a Q_over_mu_P dissipation_over_mu_P_mm".split()
+    data = dict(zip(columns, map(list, zip(*table, strict=True)), strict=True))
+    bent = (backwards.way / a).tolist(), (backwards.ratio / MU).tolist()
+    return Result(
+        tuple(rows), data, lambda figure: _draw(figure, data, bent, [one.steady / MU for one in found.values()])
+    )
+
+
+def _by_legs(problem: Problem) -> list[Row]:
+    """Roll by a leg of the path, as far as its depth stays above zero, and by increments of this study."""
+    way, steps = 0.4, 8
+    angles = [-way * k / steps / R for k in range(1, steps + 1)]
+    path = [Leg(DEPTH - R * (1.0 - math.cos(t)), R * (math.sin(t) - t), turn_z=t, steps=1) for t in angles]
+    *_, frame = march(replace(problem, model=replace(problem.model, legs=(*problem.model.legs[:1], *path))))
+    assert frame.outcome.ok
+    one = travel(problem, pressed(problem), way, -way / R, steps)
+    legs = sums(problem, frame.part, BEGIN + way)
+    away = max(abs(legs[0] - one.normal[-1]), abs(legs[1] - one.tangential[-1]), abs(legs[-1] - one.torque[-1]) / R)
+    return [
+        Row("difference of forces over P between legs and increments from the lowest point", "kinematics", 0.0,
+            away / legs[0], 1e-8, "the residual",
+            measure="absolute")
+    ]  # fmt: skip
+
+
+def _exact(problem: Problem, name: str, size: float, steps: int) -> list[Row]:
+    """Torque and force of turning, sliding and rolling."""
+    mu, way = 0.3, 0.6
+    rough = replace(problem, model=replace(problem.model, friction=Coulomb(mu)))
+    smooth = replace(problem, model=replace(problem.model, friction=Coulomb(0.0)))
+    start = pressed(rough)
+    turned, slid = travel(rough, start, 0.0, -way / R, steps), travel(rough, start, way, 0.0, steps)
+    rolled = travel(rough, start, way, -way / R, steps)
+    free = travel(smooth, pressed(smooth), way, -way / R, steps)
+    flat = 0.5 * size**2 / R**2
+    bent = "points are means over hats of an edge length s on an arc: s^2/2 R^2"
+    half = steps // 2  # the beginning is no steady state
+    work = 0.5 * (slid.along[half + 1 :] + slid.along[half:-1]).sum() * way / steps
+    spent = float(slid.dissipation[-1] - slid.dissipation[half]) / float(work)
+    solid = problem.dim == 3
+    aside, across = (1e-4, "points also slip along z, by Poisson's effect") if solid else (1e-8, "the residual")
+    rows = [
+        Row("torque over R P without friction", STATICS, 0.0, float(np.abs(free.torque / R / free.normal).max()), flat,
+            bent, measure="absolute"),
+        Row("Q/mu P, turned without travel", "Coulomb", -1.0, float(turned.ratio[-1] / mu), aside, across),
+        Row("torque/(mu P R), turned without travel", STATICS, -1.0,
+            float(turned.torque[-1] / (R * turned.normal[-1] * mu)), flat, bent),
+        Row("Q/mu P, slid without a turn", "Coulomb", 1.0, float(slid.ratio[-1] / mu), aside, across),
+        Row("sum of friction over mu P, slid without a turn", "Coulomb", 1.0,
+            float((slid.friction / slid.normal)[-1] / mu), 1e-8, "the residual"),
+        Row("largest difference of torque/R and Q over P, rolled", STATICS, 0.0,
+            float(np.abs((rolled.torque / R - rolled.tangential) / rolled.normal).max()), flat, bent,
+            measure="absolute"),
+        Row("dissipation of sliding over the work of F_x", "energy, steady state", 1.0, spent, way / steps,
+            "of the first order in the increment, half of it over a, which is 0.5 mm"),
+        Row("dissipation rolled over slid", "rolling does not slip", 0.1,
+            float(rolled.dissipation[-1] / slid.dissipation[-1]), 0.0, "creep and beginning included",
+            measure="at most"),
+    ]  # fmt: skip
+    return [replace(row, what=f"{row.what}, {name}") for row in rows]
+
+
+def _draw(figure: Any, data: dict[str, list[float]], bent: tuple[list[float], list[float]], ends: list[float]) -> None:
+    left, right = figure.subplots(1, 2)
+    creeps = sorted(set(data["creep_R_over_mu_a"]))
+    for creep in creeps:
+        own = [k for k, c in enumerate(data["creep_R_over_mu_a"]) if c == creep]
+        ratio = [data["Q_over_mu_P"][k] for k in own]
+        left.plot([data["way_over_a"][k] for k in own], ratio, lw=1.2, label=f"k R/(mu a) = {creep:g}")
+    left.plot(*bent, "k--", lw=1.0, label="0, nu = 0.3")
+    left.set(xlabel="way / a", ylabel="Q / (mu P)", ylim=(None, 1.05))
+    left.legend(fontsize=8, ncols=2, loc="upper left", bbox_to_anchor=(0.0, -0.14))
+    fine = np.linspace(0.0, 1.2, 61)
+    right.plot(fine, [carter(float(c)) for c in fine], "k-", lw=0.8, label="Carter")
+    right.plot(creeps, ends, "o", label="found, last tenth of the way")
+    right.set(xlabel="k R / (mu a)", ylabel="Q / (mu P), steady", ylim=(-0.05, 1.1))
+    right.legend(fontsize=8, loc="lower right")
+    for axes in (left, right):
+        axes.grid(alpha=0.3)

@@ -1,0 +1,135 @@
+"""Does a finger in a slot press on its walls, and does an undercut touch where it is?
+
+A block fills a slot but for 1e-5 mm and is pressed without friction: the strain is uniaxial, the pressure on the
+contact face M eps with M = E (1 - nu) / ((1 + nu)(1 - 2 nu)), that on the walls nu / (1 - nu) times it (Hooke's law).
+Then a slot whose mouth is narrower than its cavity slides against the pressed block: the lip at the mouth touches the
+wall, and nothing touches in the cavity above it.  The wall enters the sharp edges of the lip, between the contact
+points, by less on a finer mesh.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from finger3d.analyses.study_rows import Result, Row
+from finger3d.contact.friction import OPEN, Coulomb
+from finger3d.fem.material import Isotropic
+from finger3d.fem.simplex import FREE_FACES
+from finger3d.geometry.registry import designs
+from finger3d.geometry.surface import Triangles
+from finger3d.mechanics.build import build
+from finger3d.mechanics.coverage import check_surface
+from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.solve import march
+from finger3d.objects import MeshObject
+
+E, NU = 1.0, 0.3
+HALF, HEIGHT, WIDTH = 4.0, 6.0, 4.0
+LIP = (0.5, 1.5)
+"""Height of the slot's lip above its mouth (mm): from its lower to its upper edge; the mouth is at 0."""
+
+WALLS = FREE_FACES.index("walls")
+
+
+def slot(mouth: float, cavity: float, deep: float, lip: float = 0.0) -> Triangles:
+    """A block with a slot along z below, `mouth` wide up to a height `lip`, and `cavity` wide above, `deep` in all."""
+    from build123d import Align, Box, Pos
+    from trimesh import Trimesh
+
+    above = (Align.CENTER, Align.MIN, Align.CENTER)
+    solid = Box(cavity + 6.0, deep + 3.0, 40.0, align=above) - Box(mouth, deep, 40.0, align=above)
+    if cavity > mouth:
+        solid -= Pos(0.0, lip, 0.0) * Box(cavity, deep - lip, 40.0, align=above)
+    points, faces = solid.tessellate(1e-3)
+    joined = Trimesh([tuple(p) for p in points], faces)  # merges the points of neighbouring faces
+    return Triangles(np.array(joined.vertices, dtype=float), np.array(joined.faces))
+
+
+def model(surface: Triangles, size: float, legs: tuple[Leg, ...], mu: float) -> Model:
+    """A block in a slot, plane strain."""
+    block = designs()["block"](half_length_mm=HALF, height_mm=HEIGHT, width_mm=WIDTH)
+    return Model(
+        block, Isotropic(E, NU), MeshOptions(size, size, "swept"), legs, object=MeshObject(surface=surface),
+        friction=Coulomb(mu), domain="plane-strain", symmetry=(),
+    )  # fmt: skip
+
+
+def confined(size: float) -> tuple[float, float, float]:
+    """Strain, and mean pressures (MPa) on the contact face and in the middle of a wall."""
+    depth, strip = 0.3, 0.02
+    problem = build(model(slot(2.0 * HALF + 2e-5, 2.0 * HALF + 2e-5, HEIGHT - depth - strip), size,
+                          (Leg(depth, steps=1),), 0.0))  # fmt: skip
+    *_, last = march(problem)
+    assert last.outcome.ok, last.outcome
+    pressure, face = last.state.force[:, 0] / problem.points.area, problem.points.face
+    middle = (face == WALLS) & (np.abs(problem.points.points[:, 1] - 0.6 * HEIGHT) < 0.2 * HEIGHT)
+    return depth / HEIGHT, float(pressure[face == 0].mean()), float(pressure[middle].mean())
+
+
+def slid(size: float) -> dict[str, Any]:
+    """The block under a slot with an undercut that slides by 0.8 mm; clearances 0.3 mm at the lip, 1.5 mm above it."""
+    depth = 0.5
+    legs = (Leg(depth, steps=1), Leg(depth, slide_x_mm=0.8, steps=4))
+    problem = build(model(slot(2.0 * HALF + 0.6, 2.0 * HALF + 3.0, 4.0, LIP[1]), size, legs, 0.2))
+    steps = list(march(problem))
+    assert all(step.outcome.ok for step in steps), [str(step.outcome) for step in steps]
+    last = steps[-1]
+    force, at = problem.world_force(last.part), problem.points.points
+    touching = (last.state.status != OPEN) & (problem.points.face == WALLS)
+    mouth = problem.system.first_contact_mm - depth
+    return {
+        "wall_N": float(force[problem.points.face == WALLS, 0].sum()),
+        "face_N": float(force[problem.points.face == 0, 0].sum()),
+        "lowest": float(at[touching, 1].min() - mouth),
+        "highest": float(at[touching, 1].max() - mouth),
+        "penetration_mm": check_surface(problem, [last])[0].penetration_mm,
+        "wall_before_N": float(np.abs(problem.world_force(steps[0].part)[problem.points.face == WALLS]).sum()),
+        "pressure": (at[problem.points.face == WALLS], last.state.force[problem.points.face == WALLS, 0]
+                     / problem.points.area[problem.points.face == WALLS]),
+        "mouth": mouth,
+    }  # fmt: skip
+
+
+def run(quick: bool) -> Result:
+    """A confined block, and an undercut on three meshes."""
+    sizes = (0.5, 0.25) if quick else (0.5, 0.25, 0.125)
+    strain, top, side = confined(0.5)
+    stiff = E * (1.0 - NU) / ((1.0 + NU) * (1.0 - 2.0 * NU))
+    found = [slid(size) for size in sizes]
+    end = found[-1]
+    at = f"edges of {sizes[-1]:g} mm"
+    rows = [
+        Row("pressure on the contact face over M eps", "Hooke", 1.0, top / (stiff * strain), 0.005,
+            "the slot is open over the lowest 0.02 mm"),
+        Row("pressure on a wall over that on the contact face", "nu / (1 - nu)", NU / (1.0 - NU), side / top, 0.005,
+            "as before, in the middle of the wall"),
+        Row("force on the walls before the slide, N", "no contact", 0.0, end["wall_before_N"], 0.0,
+            "the bulge is below the clearance", measure="absolute"),
+        Row(f"lowest touching point above the slot's mouth, mm, {at}", "the lip", 0.0, end["lowest"], 2.0 * sizes[-1],
+            "hats reach an edge length beyond the lip, and points move", measure="absolute"),
+        Row(f"highest touching point above the slot's mouth, mm, {at}", "the lip", LIP[1], end["highest"],
+            2.0 * sizes[-1], "the same", measure="absolute"),
+        Row(f"force of the lip on the wall, N, {at}", "it pushes along the slide", 0.1, end["wall_N"], 0.0,
+            "the sign of the slide", measure="at least"),
+        Row("penetration on the finest mesh over that on the coarsest", "the points see the lip better", 0.7,
+            end["penetration_mm"] / found[0]["penetration_mm"], 0.0, "between the points", measure="at most"),
+    ]  # fmt: skip
+    keys = ("wall_N", "face_N", "lowest", "highest", "penetration_mm")
+    table: dict[str, Any] = {"size_mm": list(sizes)} | {key: [f[key] for f in found] for key in keys}
+    return Result(tuple(rows), table, lambda figure: _draw(figure, sizes, found))
+
+
+def _draw(figure: Any, sizes: tuple[float, ...], found: list[dict[str, Any]]) -> None:
+    left, right = figure.subplots(1, 2)
+    for size, case in zip(sizes, found, strict=True):
+        at, pressure = case["pressure"]
+        own = at[:, 0] < 0.0
+        order = np.argsort(at[own, 1])
+        left.plot(pressure[own][order], at[own][order, 1], "o-", ms=3, label=f"edges of {size:g} mm")
+    left.axhspan(found[0]["mouth"], found[0]["mouth"] + LIP[1], color="0.9", label="lip of the slot")
+    left.set(xlabel="pressure on the wall (MPa)", ylabel="height on the wall (mm)")
+    right.plot(sizes, [f["penetration_mm"] for f in found], "o-")
+    right.set(xlabel="edge length (mm)", ylabel="largest penetration (mm)", xlim=(0.0, None), ylim=(0.0, None))
+    left.legend(fontsize=8)
