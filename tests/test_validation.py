@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -10,8 +11,15 @@ from finger3d.analyses.validate import Study, draw, kept_rows, studies, write_in
 
 STUDIES = studies()
 
+SLOW = ("error_bars", "calibration_z_scores", "ssnv503", "strain_to_friction", "paper_mesh")
+"""Studies that take more than ten seconds in their quick form."""
 
-@pytest.mark.parametrize("study", STUDIES.values(), ids=STUDIES.keys())
+
+def _cases() -> list[Any]:
+    return [pytest.param(s, id=name, marks=[pytest.mark.slow] * (name in SLOW)) for name, s in STUDIES.items()]
+
+
+@pytest.mark.parametrize("study", _cases())
 def test_study_quick(study: Study, tmp_path: Path) -> None:
     result = study.run(quick=True)
     assert result.rows

@@ -27,8 +27,8 @@ from finger3d.objects import MeshObject
 
 E, NU = 1.0, 0.3
 HALF, HEIGHT, WIDTH = 4.0, 6.0, 4.0
-LIP = (0.5, 1.5)
-"""Height of the slot's lip above its mouth (mm): from its lower to its upper edge; the mouth is at 0."""
+LIP = 1.5
+"""Height of the lip (mm), from the mouth of the slot up."""
 
 WALLS = FREE_FACES.index("walls")
 
@@ -72,7 +72,7 @@ def slid(size: float) -> dict[str, Any]:
     """The block under a slot with an undercut that slides by 0.8 mm; clearances 0.3 mm at the lip, 1.5 mm above it."""
     depth = 0.5
     legs = (Leg(depth, steps=1), Leg(depth, slide_x_mm=0.8, steps=4))
-    problem = build(model(slot(2.0 * HALF + 0.6, 2.0 * HALF + 3.0, 4.0, LIP[1]), size, legs, 0.2))
+    problem = build(model(slot(2.0 * HALF + 0.6, 2.0 * HALF + 3.0, 4.0, LIP), size, legs, 0.2))
     steps = list(march(problem))
     assert all(step.outcome.ok for step in steps), [str(step.outcome) for step in steps]
     last = steps[-1]
@@ -109,7 +109,7 @@ def run(quick: bool) -> Result:
             "the bulge is below the clearance", measure="absolute"),
         Row(f"lowest touching point above the slot's mouth, mm, {at}", "the lip", 0.0, end["lowest"], 2.0 * sizes[-1],
             "hats reach an edge length beyond the lip, and points move", measure="absolute"),
-        Row(f"highest touching point above the slot's mouth, mm, {at}", "the lip", LIP[1], end["highest"],
+        Row(f"highest touching point above the slot's mouth, mm, {at}", "the lip", LIP, end["highest"],
             2.0 * sizes[-1], "the same", measure="absolute"),
         Row(f"force of the lip on the wall, N, {at}", "it pushes along the slide", 0.1, end["wall_N"], 0.0,
             "the sign of the slide", measure="at least"),
@@ -128,7 +128,7 @@ def _draw(figure: Any, sizes: tuple[float, ...], found: list[dict[str, Any]]) ->
         own = at[:, 0] < 0.0
         order = np.argsort(at[own, 1])
         left.plot(pressure[own][order], at[own][order, 1], "o-", ms=3, label=f"edges of {size:g} mm")
-    left.axhspan(found[0]["mouth"], found[0]["mouth"] + LIP[1], color="0.9", label="lip of the slot")
+    left.axhspan(found[0]["mouth"], found[0]["mouth"] + LIP, color="0.9", label="lip of the slot")
     left.set(xlabel="pressure on the wall (MPa)", ylabel="height on the wall (mm)")
     right.plot(sizes, [f["penetration_mm"] for f in found], "o-")
     right.set(xlabel="edge length (mm)", ylabel="largest penetration (mm)", xlim=(0.0, None), ylim=(0.0, None))

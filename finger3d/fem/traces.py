@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -75,8 +76,12 @@ class BoundarySurface:
 
         Where a neighbour is not among the points, those that are share its weight.
         """
+        return np.asarray(self._interpolation @ values)
+
+    @cached_property
+    def _interpolation(self) -> sp.csr_matrix:
         total = np.asarray(self.hats.sum(axis=0)).ravel()
-        return np.asarray((self.hats.T @ values) / total[:, None])
+        return sp.csr_matrix(sp.diags_array(1.0 / total) @ self.hats.T)
 
 
 def surface(mesh: Mesh, label: str, thickness: float = 1.0) -> BoundarySurface:

@@ -11,8 +11,8 @@ from finger3d._ranges import Length, Zero
 from finger3d._types import Float
 from finger3d.objects.shapes import Axis, Detail, Prism
 
-_NEAREST_STARTS = 65
-"""Points of a wave, over one wavelength, from which the nearest point is searched."""
+_NEAREST_STARTS = 17, 65
+"""Points over one wavelength from which the nearest point is searched: of a wave with slopes up to 1, and of others."""
 
 _NEAREST_ITERATIONS = 60
 """Largest number of bisected Newton steps of that search."""
@@ -59,9 +59,11 @@ class Wave(Prism):
     def _nearest(self, r: Float, y: Float) -> Float:
         """Return where (n,) the curve is nearest to points: a root of f(s) = s - r + (h(s) - y) h'(s)."""
         k = 2.0 * math.pi / self.wavelength_mm
-        starts = r[:, None] + np.linspace(-0.5, 0.5, _NEAREST_STARTS) * self.wavelength_mm
+        steep = 2.0 * math.pi / self.wavelength_mm * self.amplitude_mm
+        count = _NEAREST_STARTS[bool(steep > 1.0)]
+        starts = r[:, None] + np.linspace(-0.5, 0.5, count) * self.wavelength_mm
         square = (starts - r[:, None]) ** 2 + (self.section_profile(starts) - y[:, None]) ** 2
-        best = np.clip(square.argmin(axis=1), 1, _NEAREST_STARTS - 2)
+        best = np.clip(square.argmin(axis=1), 1, count - 2)
         number = np.arange(len(r))
         low, high, s = (starts[number, best + i].copy() for i in (-1, 1, 0))
         for _ in range(_NEAREST_ITERATIONS):
