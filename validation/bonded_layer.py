@@ -31,7 +31,7 @@ from ._common import body, contact_axis, convergence, graded, halved, quarter_bl
 from ._layer import line, point
 
 Float = NDArray[np.float64]
-RADIUS = 1000.0  # of the indenter, in thicknesses: a circle is a parabola to 1e-6
+RADIUS = 1e5  # of the indenter, in thicknesses: the theory neglects slopes, which add some a / R to the force
 _LAYER = "Gladwell 1980; REFERENCES.md, 1.7"
 _ONE = (
     "second order in the point spacing; 0.08 % or less measured at 5 to 40 points to a, and coarse meshes must pass too"

@@ -121,7 +121,8 @@ def _theory_rows(ball: Problem, soft_ball: Problem) -> list[Row]:
     return [
         Row(
             f"ball without friction: force over Hertz's at equal a = {a:.2f} mm", LAYER,
-            layer * round_by_parabola((a / 8.0) ** 2), hard, 0.01, "the block's sides, 12 mm away, are neglected",
+            layer * round_by_parabola((a / 8.0) ** 2), hard, 0.01 + 0.1 * a / 8.0,
+            "the block's sides, 12 mm away, are neglected, and slopes, of the order (1 - 2 nu) a / R",
         ),
         Row(
             f"soft ball without friction: force over Hertz's at equal a = {b:.2f} mm", HERTZ,
