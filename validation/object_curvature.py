@@ -1,15 +1,14 @@
 """By how much does an object's curvature move the gauge strain, and so the friction coefficient read from it?
 
 No published reference: a sensitivity study, as the paper leaves non-flat objects to future work.  The Fig. 9 finger in
-plane strain (nu = 0.49, E = 1 MPa) is pressed to the same *force* on a plane and on bars of radius 400 to 50 mm; gauge
+plane strain (nu = 0.49, E = 1 MPa) is pressed to the same *force* on a plane and on bars of radius 400 to 30 mm; gauge
 g36 of geometries/fig9.toml is read.  The strain against mu on the plane is the calibration; the strain found on a
 curved object of mu = 0.25 is put into it, as a sensor that knows the force and not the shape would.
 
 Checked: a bar of radius 1e5 mm is the plane; the calibration is monotonic, since it is inverted; and what is read
 hardly changes when the edge length or the number of increments is halved.  On bars of 400 to 30 mm, 0.28 to 0.32 is
-read instead of 0.25: pressures along the bar's own normals push the sides of the finger apart, as friction does.  In
-3D, 20 mm wide, friction points mostly along the width: there the shape moves this gauge's strain more than friction
-does, so its calibration must be made on the object's own shape.
+read instead of 0.25.  In 3D, 20 mm wide, friction points mostly along the width: there the shape moves this gauge's
+strain more than friction does, so its calibration must be made on the object's own shape.
 """
 
 from __future__ import annotations
