@@ -11,8 +11,12 @@ from finger3d.analyses.validate import Study, draw, kept_rows, studies, write_in
 
 STUDIES = studies()
 
-SLOW = ("error_bars", "calibration_z_scores", "ssnv503", "strain_to_friction", "paper_mesh")
-"""Studies that take more than ten seconds in their quick form."""
+SLOW = (
+    "error_bars", "calibration_z_scores", "ssnv503", "strain_to_friction", "paper_mesh", "press_release",
+    "fig11_shear_mu", "fig07_strains_mu", "gallery", "triangulated_objects", "twisted_sphere", "increment_size",
+    "object_curvature", "turned_scene",
+)  # fmt: skip
+"""Studies that take about ten seconds or more in their quick form; `make test-all` runs them."""
 
 
 def _cases() -> list[Any]:

@@ -72,7 +72,8 @@ def on_flanks(angles: tuple[float, float], size: float) -> dict[str, list[float]
     for normal in normals_of(angles):
         own = (last.state.force[:, 0] > 0.0) & (np.abs(last.state.bases[:, 0] - normal).max(axis=1) < FACE)
         total = force[own].sum(axis=0)
-        arm = float(np.cross(at[own], force[own]).sum()) / float(np.linalg.norm(total))
+        moment = float((at[own, 0] * force[own, 1] - at[own, 1] * force[own, 0]).sum())
+        arm = moment / float(np.linalg.norm(total))
         along = at[own] @ [-normal[1], normal[0]]
         found["force_N"].append(float(total @ normal))
         found["half_width_mm"].append(0.5 * float(np.ptp(along)))
