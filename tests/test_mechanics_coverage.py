@@ -7,7 +7,7 @@ import math
 import pytest
 
 from finger3d.mechanics.build import build
-from finger3d.mechanics.coverage import beyond_candidates, contact_within_candidates, step_within_candidates
+from finger3d.mechanics.coverage import beyond_candidates, contact_within_candidates
 from finger3d.mechanics.model import Domain, Leg
 from finger3d.mechanics.solve import march
 from tests.models import fig9
@@ -19,7 +19,7 @@ def test_too_few_candidate_points_are_noticed(domain: Domain) -> None:
     narrow, usual, whole = (build(model, margin=margin) for margin in (-0.6, 0.3, math.inf))
     assert len(narrow.surface.nodes) < len(usual.surface.nodes) < len(whole.surface.nodes)
     steps = [list(march(problem)) for problem in (narrow, usual, whole)]
-    covered = [step_within_candidates(p, s[-1]) for p, s in zip((narrow, usual, whole), steps, strict=True)]
+    covered = [contact_within_candidates(p, s)[-1] for p, s in zip((narrow, usual, whole), steps, strict=True)]
     assert covered == [False, True, True]
     assert 0 not in beyond_candidates(whole).face
     assert 0 in beyond_candidates(usual).face

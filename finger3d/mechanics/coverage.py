@@ -68,11 +68,6 @@ def contact_within_candidates(problem: Problem, steps: Sequence[StepResult]) -> 
     return [_stays_out(problem, u, step.target, others) for u, step in zip(fields, steps, strict=True)]
 
 
-def step_within_candidates(problem: Problem, step: StepResult) -> bool:
-    """Return whether contact stayed within the candidates after one step."""
-    return contact_within_candidates(problem, [step])[0]
-
-
 def penetration_warnings(problem: Problem, checks: Sequence[SurfaceCheck]) -> list[str]:
     """Return warnings about penetration between the contact points during a press."""
     deepest = max(checks, key=lambda check: check.penetration_mm, default=None)

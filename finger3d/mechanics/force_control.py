@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -97,11 +96,9 @@ def forecast_depth(way: ContactPath, material: Isotropic, force: float, height: 
         half = 0.5 * float(np.ptp(inside)) if len(inside) else 0.0
         return modulus * float(overlap.sum()) * plan / max(min(height, half), 1e-3 * height)
 
-    low, high = 0.0, deepest(way.object, touch, height)
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if pressed(middle) > force else (middle, high)
-    return float(f"{high:.4g}") if math.isfinite(high) else height
+    most = deepest(way.object, touch, height)
+    depth = brentq(lambda depth: pressed(depth) - force, 0.0, most) if pressed(most) > force else most
+    return float(f"{depth:.4g}")
 
 
 def at_depth_reached(legs: tuple[Leg, ...], reached_mm: float) -> tuple[Leg, ...] | None:

@@ -27,7 +27,7 @@ class ContactPoints:
     Attributes
     ----------
     nodes : (m,) numbers in the whole mesh
-    face : (m,) number in `finger3d.fem.traces.FREE_FACES` of the face that each point belongs to
+    face : (m,) number in `finger3d.fem.simplex.FREE_FACES` of the face that each point belongs to
     points : (m, 3) mm at rest, z = 0 in a section
     area : (m,) mm2
     basis : (d, d), or (m, d, d) where each point has its own: normal into the finger, then tangents

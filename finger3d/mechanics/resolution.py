@@ -105,6 +105,8 @@ def unresolved_overlap(
     axes : symmetry planes of the meshed part
     """
     face, beside, d = contact_face(free), restrict(free, free.face != CONTACT), free.points.shape[1]
+    if not len(face.nodes):  # only walls may touch
+        face = beside
     tree, count = KDTree(_horizontal(face.points)), min(_NEAREST_POINTS[d], len(face.points))
     nearest = tree.query(_horizontal(face.samples), k=count)[1].reshape(-1, count)
     path = targets(tuple(replace(leg, steps=_STATIONS) for leg in model.legs))

@@ -45,22 +45,26 @@ class Wave(Prism):
     def clearance(self, points: Float) -> Float:
         """Return the vertical distance over that of the steepest slope: far quicker than the nearest point."""
         r = points[:, 2 if self.axis == "x" else 0]
-        steepest = 2.0 * math.pi / self.wavelength_mm * self.amplitude_mm
-        return np.asarray((self.section_profile(r) - points[:, 1]) / math.hypot(1.0, steepest))
+        return np.asarray((self.section_profile(r) - points[:, 1]) / math.hypot(1.0, self._steepest))
 
     def section_profile(self, r: Float) -> Float:
         """Return amplitude (1 - cos(2 pi r / wavelength))."""
-        return self.amplitude_mm * (1.0 - np.cos(2.0 * math.pi * r / self.wavelength_mm))
+        return self.amplitude_mm * (1.0 - np.cos(self._wavenumber * r))
+
+    @property
+    def _wavenumber(self) -> float:
+        return 2.0 * math.pi / self.wavelength_mm
+
+    @property
+    def _steepest(self) -> float:
+        return self.amplitude_mm * self._wavenumber
 
     def _slope(self, r: Float) -> Float:
-        k = 2.0 * math.pi / self.wavelength_mm
-        return self.amplitude_mm * k * np.sin(k * r)
+        return self._steepest * np.sin(self._wavenumber * r)
 
     def _nearest(self, r: Float, y: Float) -> Float:
         """Return where (n,) the curve is nearest to points: a root of f(s) = s - r + (h(s) - y) h'(s)."""
-        k = 2.0 * math.pi / self.wavelength_mm
-        steep = 2.0 * math.pi / self.wavelength_mm * self.amplitude_mm
-        count = _NEAREST_STARTS[bool(steep > 1.0)]
+        count = _NEAREST_STARTS[bool(self._steepest > 1.0)]
         starts = r[:, None] + np.linspace(-0.5, 0.5, count) * self.wavelength_mm
         square = (starts - r[:, None]) ** 2 + (self.section_profile(starts) - y[:, None]) ** 2
         best = np.clip(square.argmin(axis=1), 1, count - 2)
@@ -69,7 +73,7 @@ class Wave(Prism):
         for _ in range(_NEAREST_ITERATIONS):
             height, slope = self.section_profile(s), self._slope(s)
             f = s - r + (height - y) * slope
-            bend = 1.0 + slope**2 + (height - y) * self.amplitude_mm * k**2 * np.cos(k * s)
+            bend = 1.0 + slope**2 + (height - y) * self._steepest * self._wavenumber * np.cos(self._wavenumber * s)
             low, high = np.where(f < 0.0, s, low), np.where(f < 0.0, high, s)
             newton = s - f / np.where(bend > 0.0, bend, 1.0)
             inside = (bend > 0.0) & (newton > low) & (newton < high)

@@ -132,7 +132,7 @@ def skin_of(
     status : (c,) array
         Contact status.
     nodes, faces : (c,) arrays
-        Nodes of the contact points, and the numbers in `finger3d.fem.traces.FREE_FACES` of their faces.
+        Nodes of the contact points, and the numbers in `finger3d.fem.simplex.FREE_FACES` of their faces.
     thing : (t, 3, 3) array, mm
         Corners of the object's triangles, or None.
     """

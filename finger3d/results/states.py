@@ -36,7 +36,7 @@ class States:
     ----------
     points : (n, d) mm at rest, in the order of fields.vtu
     cells, facets : (e, k), (t, j) as in `finger3d.fem.simplex.Mesh`; facets of all labels together
-    facet_face : (t,) number in `finger3d.fem.traces.FREE_FACES` of the face of each facet, -1 for any other
+    facet_face : (t,) number in `finger3d.fem.simplex.FREE_FACES` of the face of each facet, -1 for any other
     nodes : (m,) numbers of the contact points among `points`, in the order of contact.csv
     face : (m,) number of the face that each contact point belongs to
     step : (s,) number of each increment, from 1
