@@ -68,6 +68,10 @@ class Outcome(Enum):
         "a cell was turned inside out; the steps before are good; try more steps, a coarser mesh at the contact's "
         "edge, or a shallower press"
     )
+    UNSTABLE = (
+        "the material law is not stable at the strains reached, its stress falls; change its constants in "
+        "[effects.large_deformation], or press less"
+    )
     NEWTON = "large deformation did not settle; the steps before are good; try more steps or a shallower press"
     INDEFINITE = "the compliance is not positive: the body is not held; fix its base, or check the mesh"
     UNRESOLVED = "the object passes between the contact points; try a smaller mesh.size_mm"

@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 
 from finger3d.contact.friction import OPEN, Coulomb
+from finger3d.effects.elastic_object import Effect as ElasticObject
+from finger3d.effects.embedded_gauge import Effect as EmbeddedGauge
 from finger3d.effects.large_deformation import Effect
+from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.errors import Outcome
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
@@ -52,7 +55,7 @@ def test_light_load_is_small_strain(nu: float) -> None:
     for depth in (0.08, 0.01):
         model = fig9(nu, legs=(Leg(depth, steps=2),), mesh=MeshOptions(0.2, 8.0))
         problem = build(model)
-        small = list(march(replace(problem, model=replace(model, formulation=SmallStrain()))))
+        small = list(march(replace(problem, model=replace(model, strain_measure=SmallStrain()))))
         large = list(march(problem))
         a, b = (measure(problem.points, f[-1]) for f in (small, large))
         ratios.append(abs(b["normal_force_N"] / a["normal_force_N"] - 1.0))
@@ -61,12 +64,17 @@ def test_light_load_is_small_strain(nu: float) -> None:
 
 
 @pytest.mark.parametrize("nu", [0.45, 0.5])
-def test_newton_converges_quadratically(nu: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    from finger3d.effects.large_deformation import _NewtonIncrement
+def test_newton_with_a_new_tangent_in_every_iteration_converges_quadratically(
+    nu: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from finger3d.mechanics import finite_increment
 
     errors: list[float] = []
-    residual = _NewtonIncrement.residual
-    monkeypatch.setattr(_NewtonIncrement, "residual", lambda *a: errors.append(residual(*a)) or errors[-1])
+    residual = finite_increment.FiniteIncrement._residual
+    monkeypatch.setattr(finite_increment, "_SLOW", 0.0)
+    monkeypatch.setattr(
+        finite_increment.FiniteIncrement, "_residual", lambda *a: errors.append(residual(*a)) or errors[-1]
+    )
     problem = build(fig9(nu, legs=(Leg(10.0, steps=5),)))
     workspace = problem.model.formulation.workspace()
     frames = list(march(problem, workspace=workspace))
@@ -156,3 +164,36 @@ def test_a_twist_is_that_of_small_strain_under_a_light_load(friction: float) -> 
     assert small["moment_y_Nmm"] > 0.1
     assert finite["moment_y_Nmm"] == pytest.approx(small["moment_y_Nmm"], rel=0.05)
     assert finite["normal_force_N"] == pytest.approx(small["normal_force_N"], rel=0.05)
+
+
+FOIL = EmbeddedGauge(E_MPa=3000.0, thickness_mm=0.02, width_mm=2.0)
+PAIRS = {
+    "embedded gauge": FOIL,
+    "viscosity": Viscosity(((0.3, 0.5),)),
+    "viscosity of the shear modulus": Viscosity(((0.3, 0.5),), bulk=False),
+    "elastic object": ElasticObject(2.0, 0.4),
+    "ogden": None,
+}
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_every_effect_beside_it_is_that_of_small_strain_under_a_light_load(name: str) -> None:
+    finger = designs()["half_cylinder"](radius_mm=5.0, width_mm=2.0)
+    foil = Gauge("g", 0.0, 3.0, length_mm=2.0)
+    differences = []
+    for depth in (0.16, 0.04):
+        model = Model(
+            finger, Isotropic(1.0, 0.45), MeshOptions(0.4 * depth**0.5, 1.0, "swept"),
+            (Leg(depth, steps=4, duration_s=1.0),),
+            friction=Coulomb(0.25), domain="plane-strain", gauges=(foil,),
+        )  # fmt: skip
+        effect = PAIRS[name]
+        plain = model if effect is None else effect.apply(model)
+        settings = Effect(law="ogden", terms=((0.7, 3.0), (0.3, -1.5))) if effect is None else Effect()
+        problems = build(plain), build(settings.apply(plain))
+        small, large = (measure(problem.points, list(march(problem))[-1]) for problem in problems)
+        force = large["normal_force_N"] / small["normal_force_N"] - 1.0
+        differences.append((abs(force), abs(large["gauges"]["g"] / small["gauges"]["g"] - 1.0)))
+    # strain and slope at the contact go with the root of the depth, their effect on force and gauge with the depth
+    assert max(differences[0]) < 0.05
+    assert all(after < 0.4 * before for before, after in zip(*differences, strict=True))

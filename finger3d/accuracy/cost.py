@@ -99,7 +99,9 @@ def _runs(model: Model, size: _Size, d: int) -> list[int]:
 def _added_cost(slot: str, model: Model, press: PressCost) -> AddedCost:
     """Cost of the effect in a slot; a friction law adds none."""
     match slot:
-        case "formulation":
+        case "strain_measure":
+            return model.strain_measure.added_cost(model, press)
+        case "relaxation" if not model.formulation.finite_strain:
             return model.formulation.added_cost(model, press)
         case "inclusions" if model.inclusions:
             return model.inclusions.added_cost(model, press)

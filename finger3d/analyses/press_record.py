@@ -106,7 +106,8 @@ class PressRecord:
         failed = next((step for step in self.steps if not step.outcome.ok), None)
         if failed is None:
             return str(self.history.outcome)
-        return f"at a depth of {failed.target.depth_mm:.4g} mm: {failed.outcome}"
+        detail = failed.detail and f" ({failed.detail})"
+        return f"at a depth of {failed.target.depth_mm:.4g} mm: {failed.outcome}{detail}"
 
     def summary(self, outcome: str) -> Tree:
         """Return the content of summary.json."""

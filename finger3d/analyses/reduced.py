@@ -67,7 +67,8 @@ class ReducedModel:
         """
         model = problem.model
         if not model.formulation.is_linear_elastic:
-            name = dict(model.filled).get("formulation", "its kinematics")
+            slots = dict(model.filled)
+            name = slots.get("strain_measure") or slots.get("relaxation", "its formulation")
             raise Finger3dError(
                 f"effects.{name}: a body with it has no reduced model, its compliance is not constant; "
                 "take the effect out, or press the scene itself"

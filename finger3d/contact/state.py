@@ -87,6 +87,8 @@ class ContactSolution:
         Number of systems of equations that were factored, in all attempts.
     method : str
         Attempt that succeeded: newton, damped or full steps, ramp, pivots, sweeps; or paper.
+    detail : str
+        What else is known of a failure.
     """
 
     state: ContactState
@@ -94,6 +96,7 @@ class ContactSolution:
     residual: float
     iterations: int
     method: str
+    detail: str = ""
 
 
 def pressure(force: Float, area: Float | None) -> Float:

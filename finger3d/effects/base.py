@@ -37,13 +37,7 @@ def fill(model: Model, slot: str, value: Any, effect: str) -> Model:
     if taken is not None:
         raise Finger3dError(f"effects: {taken} and {effect} both set the {slot}; keep one of them")
     filled = tuple(sorted((*model.filled, (slot, effect))))
-    made = replace(model, **{slot: value}, filled=filled)
-    for needed in ("inclusions", "object_compliance"):
-        if getattr(made, needed) is not None and needed not in made.formulation.supported_slots:
-            others = {needed, "formulation"} - {slot}
-            other = next((name for s, name in model.filled if s in others), "the model's own slots")
-            raise Finger3dError(f"effects: {other} and {effect} do not go together; keep one of them")
-    return made
+    return replace(model, **{slot: value}, filled=filled)
 
 
 def warn(model: Model, text: str) -> Model:

@@ -26,7 +26,7 @@ from finger3d.effects.base import fill
 from finger3d.errors import Finger3dError
 from finger3d.fem.kelvin import FoilPatches, InfiniteBody
 from finger3d.fem.simplex import Mesh, reflect_into_part
-from finger3d.fem.traces import displacement_row
+from finger3d.fem.traces import displacement_rows
 from finger3d.mechanics.cost import AddedCost, PressCost
 from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.model import EmbeddedBars, Model
@@ -81,17 +81,19 @@ class Strips:
         foils = [
             FoilPatches.of(g.middle, g.direction, g.length_mm, self.width_mm, *_PATCHES[mesh.dim]) for g in model.gauges
         ]
-        rows: dict[tuple[float, ...], sp.csr_matrix] = {}
-        numbers = np.concatenate([_insert(rows, foil, mesh, axes) for foil in foils])
+        bars: dict[tuple[float, ...], tuple[Float, sp.csr_matrix]] = {}
+        numbers = np.concatenate([_insert(bars, foil, mesh, axes) for foil in foils])
         stiff = self.E_MPa * self.thickness_mm * np.concatenate([foil.area for foil in foils])
-        bar_stiffness = np.bincount(numbers, stiff, len(rows)) / copies
+        bar_stiffness = np.bincount(numbers, stiff, len(bars)) / copies
         gauge = np.repeat(np.arange(len(foils)), [len(foil.area) for foil in foils])
-        gauge_weights = np.zeros((len(foils), len(rows)))
+        gauge_weights = np.zeros((len(foils), len(bars)))
         np.add.at(gauge_weights, (gauge, numbers), stiff / np.bincount(gauge, stiff)[gauge])
-        weights = np.zeros((len(rows), len(numbers)))
+        weights = np.zeros((len(bars), len(numbers)))
         weights[numbers, np.arange(len(numbers))] = stiff / (copies * bar_stiffness[numbers])
         self_compliance = copies * weights @ _infinite_body_compliance(model, foils) @ weights.T
-        return EmbeddedBars(sp.vstack(list(rows.values()), format="csr"), bar_stiffness, gauge_weights, self_compliance)
+        directions, relative = zip(*bars.values(), strict=True)
+        rows = sp.vstack(relative, format="csr")
+        return EmbeddedBars(np.array(directions), rows, bar_stiffness, gauge_weights, self_compliance)
 
 
 def _infinite_body_compliance(model: Model, foils: list[FoilPatches]) -> Float:
@@ -103,21 +105,28 @@ def _infinite_body_compliance(model: Model, foils: list[FoilPatches]) -> Float:
     return np.asarray(0.5 * (compliance + compliance.T))
 
 
-def _insert(rows: dict[tuple[float, ...], sp.csr_matrix], foil: FoilPatches, mesh: Mesh, axes: tuple[str, ...]) -> Int:
-    """Insert the rows of a foil's bars that are missing, and return the numbers (bars,) of all of its rows."""
+def _insert(
+    bars: dict[tuple[float, ...], tuple[Float, sp.csr_matrix]], foil: FoilPatches, mesh: Mesh, axes: tuple[str, ...]
+) -> Int:
+    """Insert the bars of a foil that are missing, each with its direction and the rows of its relative displacement.
+
+    Returns the numbers (bars,) of all of the foil's bars.
+    """
     ends, known, numbers = foil.centres, {}, []
-    order = {key: i for i, key in enumerate(rows)}
+    order = {key: i for i, key in enumerate(bars)}
 
     def displacement(point: Float) -> sp.csr_matrix:
         if tuple(point) not in known:
-            known[tuple(point)] = displacement_row(mesh, *reflect_into_part(point, foil.direction, axes, mesh.dim))
+            inside, signs = reflect_into_part(point, np.ones(3), axes, mesh.dim)
+            known[tuple(point)] = displacement_rows(mesh, inside, signs)
         return known[tuple(point)]
 
     for a, b in zip(ends[:-1].reshape(-1, 3), ends[1:].reshape(-1, 3), strict=True):
         key = _key(a, b, axes, mesh.dim)
-        if key not in rows:
-            order[key] = len(rows)
-            rows[key] = sp.csr_matrix((displacement(b) - displacement(a)) / np.linalg.norm(b - a))
+        if key not in bars:
+            order[key] = len(bars)
+            length = np.linalg.norm(b - a)
+            bars[key] = (b - a)[: mesh.dim] / length, sp.csr_matrix((displacement(b) - displacement(a)) / length)
         numbers.append(order[key])
     return np.array(numbers)
 

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from finger3d._types import Float
 from finger3d.fem.directions import bases_of
 from finger3d.fem.simplex import axis_numbers
-from finger3d.fem.traces import BoundarySurface
+from finger3d.fem.traces import BoundarySurface, outward_normals
 
 
 @dataclass(frozen=True)
@@ -60,6 +60,7 @@ def deformed_contact(
     gap: Float,
     normal: Float,
     axes: tuple[str, ...],
+    share: Float | None = None,
 ) -> DeformedContact:
     """Contact of a deformed face.
 
@@ -73,11 +74,19 @@ def deformed_contact(
         Unit normals into the body at the samples, along which the gap is measured.
     axes : tuple of str
         Normals of the symmetry planes, in which the normals of points on them lie.
+    share : (c,) array, optional
+        Share of an elastic object in the compliance of each point; the common normal turns from that of the object
+        towards that of the body by this share.
     """
     d = displacement.shape[1]
     area_ratio, d_area_ratio, d2_area_ratio = _area_ratio(face, points, displacement)
     area = face.average @ area_ratio
     mean_normal = (face.average @ (normal * area_ratio[:, None])) / area[:, None]
+    if share is not None:
+        own = outward_normals([slope @ (points + displacement) for slope in face.along])
+        own = (face.average @ (own * area_ratio[:, None])) / area[:, None]
+        own *= (np.linalg.norm(mean_normal, axis=1) / np.linalg.norm(own, axis=1))[:, None]
+        mean_normal = (1.0 - share[:, None]) * mean_normal - share[:, None] * own
     mean_gap = (face.average @ (gap * area_ratio)) / area
     for k in axis_numbers(axes):
         mean_normal[face.points[:, k] == 0.0, k] = 0.0
@@ -86,8 +95,9 @@ def deformed_contact(
     # d(mean gap) = mean of d(gap) and of (gap - mean gap) d(area)
     weight = sp.diags_array(1.0 / area) @ face.average
     deviation = weight @ sp.diags_array(gap) - sp.diags_array(mean_gap) @ weight
-    blocks = [weight @ sp.diags_array(area_ratio) @ d_gap + deviation @ d_area_ratio]
-    blocks += [_rows([sp.diags_array(bases[:, t, k]) @ face.trace for k in range(d)]) for t in range(1, d)]
+    blocks = [_rows([sp.diags_array(bases[:, t, k]) @ face.trace for k in range(d)]) for t in range(d)]
+    if share is None:
+        blocks[0] = weight @ sp.diags_array(area_ratio) @ d_gap + deviation @ d_area_ratio
     rows = sp.vstack(blocks, format="csr")[np.arange(len(mean_gap) * d).reshape(d, -1).T.ravel()]
     return DeformedContact(
         gap=mean_gap,

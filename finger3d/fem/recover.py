@@ -6,6 +6,7 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.fem.assembly import Stiffness
+from finger3d.fem.elements import quadrature
 from finger3d.fem.material import LinearElasticity, Material
 from finger3d.fem.simplex import Mesh
 
@@ -43,6 +44,24 @@ def nodal_gradient(mesh: Mesh, u: Float) -> Float:
         np.add.at(total, cells, slope * volume[:, :, None, None])
         np.add.at(weight, cells, volume)
     return total / weight[:, None, None]
+
+
+def extrapolated(mesh: Mesh, values: Float) -> Float:
+    """Values (n, ...) at the nodes of a field known at the quadrature points (e q, ...), q = d + 1 in a cell.
+
+    It is extrapolated linearly within each cell, and averaged over the cells at a node by volume.
+    """
+    n, d = mesh.points.shape
+    bary, _ = quadrature(d, 2)
+    to_nodes = mesh.element.nodes @ np.linalg.inv(bary)
+    local = np.einsum("kq,eq...->ek...", to_nodes, values.reshape(len(mesh.cells), d + 1, *values.shape[1:]))
+    corners = mesh.points[mesh.cells[:, : d + 1]]
+    volume = np.abs(np.linalg.det(np.diff(corners, axis=1)))
+    weights = np.broadcast_to(volume[:, None], mesh.cells.shape)
+    total, weight = np.zeros((n, *values.shape[1:])), np.zeros(n)
+    np.add.at(total, mesh.cells, local * weights.reshape(*weights.shape, *[1] * (values.ndim - 1)))
+    np.add.at(weight, mesh.cells, weights)
+    return total / weight.reshape(-1, *[1] * (values.ndim - 1))
 
 
 def nodal_strain(mesh: Mesh, u: Float) -> Float:

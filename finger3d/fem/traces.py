@@ -114,7 +114,7 @@ def surface(mesh: Mesh, label: str, thickness: float = 1.0) -> BoundarySurface:
     values, slopes = sampled(psi), element.gradient(bary)
     along = tuple(sampled(slopes[:, :, k]) for k in range(d - 1))
     trace = (average @ values).tocsr()
-    normals = np.asarray(average @ _outward([slope @ mesh.points for slope in along]))
+    normals = np.asarray(average @ outward_normals([slope @ mesh.points for slope in along]))
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     face = np.full(len(nodes), FREE_FACES.index(label) if label in FREE_FACES else -1, dtype=np.int8)
     return BoundarySurface(nodes, face, mesh.points[nodes], area, normals, trace, samples, average, values, hats, along)
@@ -146,7 +146,7 @@ def joined(surfaces: Sequence[BoundarySurface]) -> BoundarySurface:
     )
 
 
-def _outward(tangents: list[Float]) -> Float:
+def outward_normals(tangents: list[Float]) -> Float:
     """Outward unit normals (q, d) from d - 1 tangents (q, d) of a boundary."""
     first, *others = tangents
     normal = np.cross(first, others[0]) if others else np.stack([first[:, 1], -first[:, 0]], axis=1)
@@ -203,6 +203,15 @@ def displacement_row(mesh: Mesh, point: Float, direction: Float) -> sp.csr_matri
         values = mesh.element.shape(bary[None])[0]
         np.add.at(row, mesh.cells[cell], np.outer(values, direction) / len(found))
     return sp.csr_matrix(row.reshape(1, -1))
+
+
+def displacement_rows(mesh: Mesh, point: Float, signs: Float) -> sp.csr_matrix:
+    """Rows (d, n d) of the displacement at `point` (d,), each component multiplied by one of the signs (d,)."""
+    found = _holding(mesh, point)
+    row = np.zeros(len(mesh.points))
+    for cell, bary in found:
+        np.add.at(row, mesh.cells[cell], mesh.element.shape(bary[None])[0] / len(found))
+    return sp.kron(sp.csr_matrix(row), np.diag(signs), format="csr")
 
 
 def _holding(mesh: Mesh, point: Float) -> list[tuple[int, Float]]:

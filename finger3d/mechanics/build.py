@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from finger3d._types import Float
 from finger3d.fem.assembly import stiffness
@@ -131,7 +132,12 @@ def with_bars(problem: Problem, bars: EmbeddedBars) -> Problem:
         problem,
         body=replace(problem.part, condensed=replace(condensed, compliance=compliance)),
         system=replace(problem.system, delassus=delassus, gauge_rows=gauge_rows),
-        inclusions=AddedStiffness(bar_stiffness=bars.bar_stiffness, subgrid_compliance=subgrid),
+        inclusions=AddedStiffness(
+            bars=bars.at_finite_strain(subgrid[-count:, -count:]),
+            gauge_weights=bars.gauge_weights,
+            bar_stiffness=bars.bar_stiffness,
+            subgrid_compliance=subgrid,
+        ),
         without_inclusions=problem,
     )
 
@@ -145,6 +151,7 @@ def with_object_compliance(problem: Problem, response: ObjectResponse) -> Proble
             problem.system,
             delassus=problem.system.delassus + response.compliance,
             object_factorizations=response.factorizations,
+            object_compliance=response.compliance,
             object_share=object_share(problem.surface, problem.system.delassus, response.compliance),
         ),
         seconds=problem.seconds | response.seconds,
@@ -182,23 +189,34 @@ def contact_rows(rows: Float, active: NDArray[np.int64], face: BoundarySurface, 
 def candidate_points(model: Model, free: BoundarySurface, touch: float, margin: float) -> BoundarySurface:
     """Return the points of the free faces that the path brings near the object, the nearest first.
 
+    At finite strain points that do not face the object at rest may turn towards it: those near the others join.
+
     Parameters
     ----------
     touch : height of the object's lowest point at first touch, mm
     margin : rigid gap that the points reach to, in depths of the press
     """
     path = [ObjectPose(0.0), *targets(tuple(replace(leg, steps=_stations(leg)) for leg in model.legs))]
-    reach = margin * max(pose.depth_mm for pose in path)
+    reach = folding = margin * max(pose.depth_mm for pose in path)
     tracker, near = DistanceTracker(), reach + model.mesh.size_mm if math.isfinite(reach) else 0.0
 
-    def gap(pose: ObjectPose) -> Float:
+    def gaps(pose: ObjectPose) -> tuple[Float, Float]:
+        """Gaps of points that face the object at rest, and of those that may do so later; infinite for others."""
         placed = PlacedObject.of(model.object, touch, pose)
         geometry = contact_geometry(lambda points: tracker.distance(placed, points, near), free)
-        return np.where(may_touch(free, geometry.bases[:, 0]), geometry.gap, np.inf)
+        normal = geometry.bases[:, 0]
+        allowed = may_touch(free, normal), model.formulation.may_touch(free, normal)
+        first, second = (np.where(mask, geometry.gap, np.inf) for mask in allowed)
+        return first, second
 
-    nearest = np.min([gap(pose) for pose in path], axis=0)
+    nearest, later = np.min([gaps(pose) for pose in path], axis=0)
     reach += max(float(nearest.min()), 0.0)
     chosen, on_contact = nearest < reach, free.face == CONTACT
+    turning = np.flatnonzero((later < reach) & ~chosen)
+    if len(turning) and chosen.any():
+        apart = cKDTree(free.points[chosen]).query(free.points[turning])[0]
+        chosen[turning[apart <= folding + model.mesh.size_mm]] = True
+        nearest = np.minimum(nearest, later)
     if np.count_nonzero(chosen & on_contact) >= _WHOLE_FACE * np.count_nonzero(on_contact):
         chosen |= on_contact
     order = np.argsort(nearest, kind="stable")  # so that points which touch come before those which do not

@@ -12,7 +12,6 @@ from finger3d._types import Float
 from finger3d.fem.recover import displacement
 from finger3d.fem.simplex import CONTACT, FREE_FACES
 from finger3d.fem.traces import BoundarySurface, restrict
-from finger3d.mechanics.contact_geometry import may_touch
 from finger3d.mechanics.formulation import length_scale
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.problem import Problem, free_surface
@@ -98,6 +97,7 @@ def _surfaces(problem: Problem, steps: Sequence[StepResult]) -> tuple[BoundarySu
     others = beyond_candidates(problem, free)
     if problem.model.object.is_flat and steps:  # its normal is known everywhere
         normals = [problem.placed(step.target).distance(others.points)[1] for step in steps]
+        may_touch = problem.model.formulation.may_touch
         others = restrict(others, np.any([may_touch(others, normal) for normal in normals], axis=0))
     return free, others
 
@@ -113,7 +113,7 @@ def _stays_out(problem: Problem, u: Float, target: ObjectPose, others: BoundaryS
         return True
     gap, normal = problem.model.formulation.gap(problem, u, target, others)
     for on_contact, share in _TOUCHES.items():
-        points = may_touch(others, normal) & ((others.face == CONTACT) == on_contact)
+        points = problem.model.formulation.may_touch(others, normal) & ((others.face == CONTACT) == on_contact)
         if gap[points].min(initial=np.inf) <= -share * length_scale(problem, target, target):
             return False
     return True

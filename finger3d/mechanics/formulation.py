@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from finger3d.fem.traces import BoundarySurface
     from finger3d.mechanics.model import Model
     from finger3d.mechanics.problem import Problem
+    from finger3d.mechanics.relaxation import Relaxation
     from finger3d.objects import ObjectPose
 
 
@@ -49,8 +50,6 @@ class Formulation(Protocol):
         Whether strain is linear and the displacements follow from the present contact forces alone.
     refactorises : bool
         Whether increments factor the stiffness again; presses of such a body run one after another.
-    supported_slots : frozenset of str
-        Which of the model's slots ``inclusions`` and ``object_compliance`` the formulation accounts for.
     """
 
     @property
@@ -62,8 +61,9 @@ class Formulation(Protocol):
     @property
     def refactorises(self) -> bool: ...
 
-    @property
-    def supported_slots(self) -> frozenset[str]: ...
+    def relaxing(self, relaxation: Relaxation) -> Formulation:
+        """Return the formulation of a body whose moduli relax."""
+        ...
 
     def added_cost(self, model: Model, press: PressCost) -> AddedCost:
         """Return the cost that the formulation adds to that of small-strain elasticity."""
@@ -119,6 +119,10 @@ class Formulation(Protocol):
 
     def gap(self, problem: Problem, u: Float, target: ObjectPose, surface: BoundarySurface) -> tuple[Float, Float]:
         """Gap (c,) mm and normal (c, d) of any points of the surface, candidates or not, at nodal displacements."""
+        ...
+
+    def may_touch(self, surface: BoundarySurface, normal: Float) -> NDArray[np.bool_]:
+        """Which points (c,) of a surface can touch an object with normals (c, d) there."""
         ...
 
     def fields(self, problem: Problem, state: ContactState) -> tuple[Float, Float, Float]:

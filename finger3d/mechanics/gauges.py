@@ -81,7 +81,7 @@ class Gauge:
 
     def finite_strain(self, mesh: Mesh, u: Float, axes: tuple[str, ...]) -> float:
         """Return the relative elongation of the line; see `Reading.finite_strain`."""
-        from finger3d.fem.neo_hooke import stretch
+        from finger3d.fem.hyperelastic import stretch
 
         if self.is_point:
             return stretch(mesh, u, *reflect_into_part(self.middle, self.direction, axes, mesh.dim))

@@ -110,7 +110,8 @@ class StepResult:
 
     `part` is the state of the meshed part (c points), from which fields are recovered; `moment` (3,), N mm, is that of
     all contact forces on the finger about the middle of the base; `penetration_mm` is how deep the deepest contact
-    point is inside the object, or the deepest place of the free surface (`finger3d.mechanics.coverage`).
+    point is inside the object, or the deepest place of the free surface (`finger3d.mechanics.coverage`); `detail` is
+    what else is known of a failure.
     """
 
     target: ObjectPose
@@ -126,6 +127,7 @@ class StepResult:
     iterations: int
     method: str
     penetration_mm: float
+    detail: str = ""
 
 
 @dataclass(frozen=True, repr=False)

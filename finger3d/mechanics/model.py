@@ -13,12 +13,14 @@ from finger3d._arrays import freeze_arrays
 from finger3d._types import Float
 from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.contact.rules import RuleName
+from finger3d.fem.bars import Bars
 from finger3d.fem.material import Material
 from finger3d.fem.simplex import Mesh
 from finger3d.geometry.design import Design
 from finger3d.mechanics.cost import AddedCost, PressCost
 from finger3d.mechanics.formulation import Formulation
 from finger3d.mechanics.gauges import Gauge
+from finger3d.mechanics.relaxation import Relaxation
 from finger3d.mechanics.small_strain import SmallStrain
 from finger3d.objects import ContactPath, ObjectPose, Plane, RigidObject, between
 
@@ -85,8 +87,9 @@ class EmbeddedBars:
 
     Attributes
     ----------
-    rows : (s, n d) sparse
-        Strain of every bar from displacements.
+    directions : (s, d) unit vectors
+    relative : (s d, n d) sparse, 1/mm
+        Displacement of one end of every bar relative to the other, over its length.
     bar_stiffness : (s,) array, N mm
         Stiffness of the bars that belongs to the part.
     gauge_weights : (g, s) array
@@ -96,13 +99,25 @@ class EmbeddedBars:
         resolve a bar.
     """
 
-    rows: sp.csr_matrix
+    directions: Float
+    relative: sp.csr_matrix
     bar_stiffness: Float
     gauge_weights: Float
     self_compliance: Float
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
+
+    @property
+    def rows(self) -> sp.csr_matrix:
+        """Rows (s, n d) of the bars' strains from small displacements."""
+        count, d = self.directions.shape
+        along = sp.csr_matrix((self.directions.ravel(), np.arange(count * d), np.arange(count + 1) * d))
+        return sp.csr_matrix(along @ self.relative)
+
+    def at_finite_strain(self, yielding: Float) -> Bars:
+        """Return the bars at finite strain, in surroundings that yield by (s, s) beyond the mesh."""
+        return Bars(self.directions, self.relative, self.bar_stiffness, yielding)
 
     def subgrid_compliance(self, compliance: Float) -> Float:
         """Return the compliance (g + s, g + s) of gauges and bars that the mesh lacks, from its compliance (s, s)."""
@@ -174,6 +189,8 @@ class Model:
     ----------
     design : a frozen dataclass from geometries/
     domain : solid, or a 2D section; forces are always N, for the design's width
+    strain_measure : small strain, or finite strain with a hyperelastic law
+    relaxation : of the moduli; None without viscosity
     held_ends : both end faces held in z (plane strain realised in 3D; Python only)
     symmetry : symmetry planes that are used, "x" and "z"; None determines them
     filled : slots that an effect has set, as pairs (slot, effect)
@@ -186,7 +203,8 @@ class Model:
     legs: tuple[Leg, ...]
     object: RigidObject = field(default_factory=Plane)
     friction: FrictionLaw = field(default_factory=Coulomb)
-    formulation: Formulation = field(default_factory=SmallStrain)
+    strain_measure: Formulation = field(default_factory=SmallStrain)
+    relaxation: Relaxation | None = None
     gauges: tuple[Gauge, ...] = ()
     inclusions: Inclusions | None = None
     object_compliance: ObjectCompliance | None = None
@@ -196,6 +214,11 @@ class Model:
     symmetry: tuple[str, ...] | None = None
     filled: tuple[tuple[str, str], ...] = ()
     warnings: tuple[str, ...] = ()
+
+    @property
+    def formulation(self) -> Formulation:
+        """Strain measure and material response of the body."""
+        return self.strain_measure if self.relaxation is None else self.strain_measure.relaxing(self.relaxation)
 
     @property
     def largest_depth_mm(self) -> float:

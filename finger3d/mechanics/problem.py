@@ -14,6 +14,7 @@ from finger3d.contact.newton import uniqueness
 from finger3d.contact.state import ContactState
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import Stiffness
+from finger3d.fem.bars import Bars
 from finger3d.fem.condense import Condensation, spring_forces
 from finger3d.fem.material import LinearElasticity
 from finger3d.fem.simplex import FREE_FACES, Mesh
@@ -65,6 +66,7 @@ class ContactSystem:
     first_contact_mm : height of the object's lowest point at first touch
     place_mm : (x, z) of first touch, if the finger's surface is known
     object_factorizations : factorisations of an elastic object
+    object_compliance : (c, d, c, d) mm/N, the part of an elastic object in `delassus`; None if it is rigid
     object_share : (c,) share of an elastic object in the normal compliance of each point; None if it is rigid
     """
 
@@ -76,6 +78,7 @@ class ContactSystem:
     first_contact_mm: float
     place_mm: tuple[float, float] | None = None
     object_factorizations: int = 0
+    object_compliance: Float | None = None
     object_share: Float | None = None
 
     def __post_init__(self) -> None:
@@ -88,12 +91,16 @@ class AddedStiffness:
 
     Attributes
     ----------
+    bars : the inclusions at finite strain; None without
+    gauge_weights : (g, s) strain of each gauge from those of the bars
     bar_stiffness : (s,) N mm
         Stiffness that the inclusions add to each of the last s rows.
     subgrid_compliance : (g + s, g + s)
         Compliance of the last rows, gauges and inclusions, that the mesh does not resolve.
     """
 
+    bars: Bars | None = None
+    gauge_weights: Float = field(default_factory=lambda: np.zeros((0, 0)))
     bar_stiffness: Float = field(default_factory=lambda: np.zeros(0))
     subgrid_compliance: Float = field(default_factory=lambda: np.zeros((0, 0)))
 

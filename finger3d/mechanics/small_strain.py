@@ -7,18 +7,21 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger3d._types import Float
 from finger3d.contact.state import ContactSolution, ContactState
-from finger3d.mechanics.contact_geometry import contact_geometry
+from finger3d.mechanics.contact_geometry import contact_geometry, may_touch
 from finger3d.mechanics.cost import AddedCost, PressCost
 from finger3d.mechanics.formulation import Workspace, moment_of
 from finger3d.mechanics.linear_contact import LinearBody, LinearState, solve_increment
 
 if TYPE_CHECKING:
     from finger3d.fem.traces import BoundarySurface
+    from finger3d.mechanics.formulation import Formulation
     from finger3d.mechanics.model import Model
     from finger3d.mechanics.problem import Problem
+    from finger3d.mechanics.relaxation import Relaxation
     from finger3d.objects import ObjectPose
 
 
@@ -28,7 +31,10 @@ class SmallStrain:
 
     finite_strain: ClassVar[bool] = False
     is_linear_elastic: ClassVar[bool] = True
-    supported_slots: ClassVar[frozenset[str]] = frozenset({"inclusions", "object_compliance"})
+
+    def relaxing(self, relaxation: Relaxation) -> Formulation:
+        """Return the formulation of a relaxing body in small strain."""
+        return relaxation.small_strain()
 
     @property
     def refactorises(self) -> bool:
@@ -90,6 +96,10 @@ class SmallStrain:
         placed = problem.placed(target)
         geometry = contact_geometry(placed.distance, surface, surface.trace @ u, problem.axes)
         return geometry.gap, geometry.bases[:, 0]
+
+    def may_touch(self, surface: BoundarySurface, normal: Float) -> NDArray[np.bool_]:
+        """Return which points face the object at rest; see `finger3d.mechanics.contact_geometry.may_touch`."""
+        return may_touch(surface, normal)
 
     def fields(self, problem: Problem, state: ContactState) -> tuple[Float, Float, Float]:
         """Return displacement, linear strain and stress; in a section also the out-of-plane components."""

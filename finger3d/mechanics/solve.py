@@ -99,6 +99,7 @@ def march(
             iterations=found.iterations,
             method=found.method,
             penetration_mm=max(-float(state.gap.min(initial=0.0)), 0.0),
+            detail=found.detail,
         )
         if not (found.outcome.ok or found.outcome.is_cycle):
             return

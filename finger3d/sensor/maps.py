@@ -33,7 +33,7 @@ ANGLES = np.radians(np.arange(0.0, 180.0, 5.0))
 def check(model: Model) -> None:
     """Raise an error for a body whose gauges do not read the small strain of a displacement field."""
     if model.formulation.finite_strain:
-        name = dict(model.filled).get("formulation", "formulation")
+        name = dict(model.filled).get("strain_measure", "finite strain")
         raise Finger3dError(f"--map: not with effects.{name}; take the effect out, or the map")
 
 

@@ -276,7 +276,7 @@ def _curve_points(problem: Problem, settings: CalibrationSettings, report: Progr
         report.say(str(increments))
     problem = replace(problem, model=replace(problem.model, legs=increments.legs))
     if problem.model.formulation.finite_strain:
-        formulation = dict(problem.model.filled).get("formulation", "this body")
+        formulation = dict(problem.model.filled).get("strain_measure", "this body")
         report.say(
             f"{formulation}: its compliance changes during the press, so that every one of {len(mus)} mu is a full "
             "press, and so is every tolerance"

@@ -7,13 +7,38 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from scipy.special import exprel
 
+from finger3d._arrays import freeze_arrays
 from finger3d._types import Float
 
+if TYPE_CHECKING:
+    from finger3d.mechanics.formulation import Formulation
+
 Prony = tuple[tuple[float, float], ...]
+
+
+class Relaxation(Protocol):
+    """Relaxation of the moduli of a body.
+
+    Attributes
+    ----------
+    prony : relative modulus and time (s) of every branch
+    bulk : whether the bulk modulus relaxes too
+    """
+
+    @property
+    def prony(self) -> Prony: ...
+
+    @property
+    def bulk(self) -> bool: ...
+
+    def small_strain(self) -> Formulation:
+        """Return the formulation of a relaxing body in small strain."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -22,6 +47,14 @@ class InternalVariables:
 
     elastic: Float
     branches: Float
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
+
+    @classmethod
+    def at_rest(cls, prony: Prony, size: int) -> InternalVariables:
+        """Return the internal variables before any deformation."""
+        return cls(np.zeros(size), np.zeros((len(prony), size)))
 
 
 @dataclass(frozen=True)

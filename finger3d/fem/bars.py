@@ -1,0 +1,95 @@
+"""Bars embedded in a body at finite strain: axial forces and their tangent.
+
+A bar between two points of the body has the strain e = |t + r| - 1, with its direction t at rest and the displacement r
+of one end relative to the other over its length.  Beyond what the mesh resolves, the body around the bars yields by S T
+under their forces T, so that ``e = T / k + S T`` (with S relaxing, see `BarRelaxation`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from finger3d._arrays import freeze_arrays
+from finger3d._types import Float, Int
+
+
+@dataclass(frozen=True)
+class BarRelaxation:
+    """Relaxation over one increment of time: ``T = S^-1 (factor s - past)`` with the yielding s = S T (b,) at rest."""
+
+    factor: float
+    past: Float
+
+
+@dataclass(frozen=True)
+class Bars:
+    """Bars between points of a mesh with n nodes.
+
+    Attributes
+    ----------
+    directions : (b, d) unit vectors at rest
+    relative : (b d, n d) sparse, 1/mm
+        Displacement of one end relative to the other, over the bar's length.
+    stiffness : (b,) N mm, forces times length per strain
+    yielding : (b, b) strain of the bars' surroundings per force times length, which the mesh does not resolve
+    """
+
+    directions: Float
+    relative: sp.csr_matrix
+    stiffness: Float
+    yielding: Float
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
+
+    def _vectors(self, u: Float) -> tuple[Float, Float]:
+        """Deformed vectors (b, d) over the initial length, and their lengths (b,)."""
+        vectors = self.directions + (self.relative @ u.ravel()).reshape(self.directions.shape)
+        return vectors, np.linalg.norm(vectors, axis=1)
+
+    def _stiffness(self, relaxation: BarRelaxation | None) -> Float:
+        factor = 1.0 if relaxation is None else relaxation.factor
+        return np.asarray(np.linalg.inv(np.diag(1.0 / self.stiffness) + self.yielding / factor))
+
+    def tension(self, u: Float, relaxation: BarRelaxation | None = None) -> Float:
+        """Return the forces times lengths (b,) N mm at displacements u (n, d) mm."""
+        strain = self._vectors(u)[1] - 1.0
+        if relaxation is not None:
+            strain = strain - relaxation.past / relaxation.factor
+        return np.asarray(self._stiffness(relaxation) @ strain)
+
+    def strain(self, u: Float, yielded: Float) -> Float:
+        """Return the strain (b,) of the bars themselves, less that by which their surroundings have yielded (b,)."""
+        return np.asarray(self._vectors(u)[1] - 1.0 - yielded)
+
+    def yielded(self, u: Float, relaxation: BarRelaxation | None = None) -> Float:
+        """Return the strain (b,) by which the surroundings have yielded."""
+        return np.asarray(self._vectors(u)[1] - 1.0 - self.tension(u, relaxation) / self.stiffness)
+
+    def forces(self, u: Float, relaxation: BarRelaxation | None = None) -> Float:
+        """Return the nodal forces (n d,) N that the bars take from the body."""
+        vectors, length = self._vectors(u)
+        pull = (self.tension(u, relaxation) / length)[:, None] * vectors
+        return np.asarray(self.relative.T @ pull.ravel())
+
+    def tangent(self, u: Float, relaxation: BarRelaxation | None = None) -> sp.csr_matrix:
+        """Return the derivative (n d, n d) of the forces, N/mm."""
+        vectors, length = self._vectors(u)
+        unit, count = vectors / length[:, None], len(length)
+        d = unit.shape[1]
+        along = sp.csr_matrix((unit.ravel(), np.arange(count * d), np.arange(count + 1) * d)) @ self.relative
+        across = np.eye(d) - unit[:, :, None] * unit[:, None, :]
+        blocks = (self.tension(u, relaxation) / length)[:, None, None] * across
+        turning = sp.bsr_matrix((blocks, np.arange(count), np.arange(count + 1)))
+        stretching = along.T @ sp.csr_matrix(self._stiffness(relaxation)) @ along
+        return sp.csr_matrix(stretching + self.relative.T @ turning @ self.relative)
+
+    @property
+    def coupled_nodes(self) -> tuple[Int, Int]:
+        """All pairs of nodes that the bars couple, as two arrays."""
+        nodes = np.unique(self.relative.indices // self.directions.shape[1]).astype(np.int64)
+        first, second = np.meshgrid(nodes, nodes, indexing="ij")
+        return first.ravel(), second.ravel()

@@ -1,0 +1,316 @@
+"""Hyperelasticity at finite strain in the total Lagrangian form: internal forces, consistent tangent, Cauchy stress.
+
+``W = W_iso(J^(-1/3) F) + K/2 (J - 1)^2`` with the isochoric part of a law (`finger3d.fem.laws`).  Near-incompressible
+bodies take the mixed form ``W_iso + p (J - 1) - p^2 / (2 K)`` with linear p = K (J - 1).  Plane strain has F_33 = 1; in
+plane stress F_33 follows from P_33 = 0 at every quadrature point and is condensed out of the tangent.
+
+Where the stress relaxes (Simo 1987), an increment of time multiplies the two parts by factors and subtracts a second
+Piola-Kirchhoff stress that its start determines, see `Relaxing`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from finger3d._arrays import freeze_arrays
+from finger3d._types import Float
+from finger3d.fem.assembly import Pattern, Stiffness, cell_parts, pressure_scale
+from finger3d.fem.elements import quadrature
+from finger3d.fem.laws import IsochoricLaw
+from finger3d.fem.locate import cells_at
+from finger3d.fem.material import LEAST_COMPRESSIBILITY, MIXED_FROM
+from finger3d.fem.recover import displacement, nodal_gradient, nodal_pressure
+from finger3d.fem.simplex import Mesh
+from finger3d.fem.tensors import cofactor, determinant
+
+_THICKNESS_ITERATIONS = 30
+
+
+class InvertedError(ArithmeticError):
+    """A cell was inverted: the increment is too large for the mesh."""
+
+
+@dataclass(frozen=True)
+class Relaxing:
+    """Relaxation of the stress over one increment of time: ``a_iso S_iso + a_vol S_vol - S_past``.
+
+    Attributes
+    ----------
+    isochoric, volumetric : factors a of the elastic stress
+    past : (m, 3, 3) MPa, second Piola-Kirchhoff stress at the quadrature points
+    """
+
+    isochoric: float
+    volumetric: float
+    past: Float
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
+
+    def of_points(self, points: slice) -> Relaxing:
+        """Return the relaxation at some quadrature points."""
+        return Relaxing(self.isochoric, self.volumetric, self.past[points])
+
+
+@dataclass(frozen=True)
+class Hyperelastic:
+    """A hyperelastic material: isochoric law, bulk modulus (MPa), and which form is used."""
+
+    law: IsochoricLaw
+    bulk: float
+    mixed: bool
+    plane_stress: bool = False
+
+    @classmethod
+    def of(cls, law: IsochoricLaw, nu: float, plane_stress: bool = False) -> Hyperelastic:
+        """Return the material with a Poisson's ratio in the limit of small strain."""
+        compressibility = max(1.5 * (1.0 - 2.0 * nu) / (1.0 + nu), LEAST_COMPRESSIBILITY) / law.shear
+        return cls(law, 1.0 / compressibility, nu >= MIXED_FROM and not plane_stress, plane_stress)
+
+    def deformation(self, slope: Float, relaxing: Relaxing | None = None) -> Float:
+        """Return F (..., 3, 3) from displacement gradients (..., d, d), row the component.
+
+        Raises
+        ------
+        InvertedError
+            If a determinant is not positive.
+        """
+        d = slope.shape[-1]
+        f = np.zeros((*slope.shape[:-2], 3, 3))
+        f[..., :, :] = np.eye(3)
+        f[..., :d, :d] += slope
+        if not (determinant(f) > 0.0).all():
+            raise InvertedError
+        return self._with_thickness(f, relaxing) if self.plane_stress else f
+
+    def _with_thickness(self, f: Float, relaxing: Relaxing | None) -> Float:
+        """F (..., 3, 3) with F_33 such that P_33 = 0 (plane stress), by Newton from the isochoric value.
+
+        Solves ``area F_33 - 1 = - P_33 / (K area)`` with P_33 of all but the volumetric part; the area is the
+        determinant in the plane.  Well conditioned for any K.
+        """
+        f = f.copy()
+        a_iso, a_vol, past = _factors(relaxing)
+        area = f[..., 0, 0] * f[..., 1, 1] - f[..., 0, 1] * f[..., 1, 0]
+        f[..., 2, 2] = 1.0 / area
+        for _ in range(_THICKNESS_ITERATIONS):
+            stress, tangent = self.law.stress_and_tangent(f)
+            stretch, scale = f[..., 2, 2], 1.0 / (a_vol * self.bulk * area)
+            excess = a_iso * stress[..., 2, 2] - stretch * past[..., 2, 2]
+            slope = area + scale * (a_iso * tangent[..., 2, 2, 2, 2] - past[..., 2, 2])
+            step = (1.0 - area * stretch - scale * excess) / slope
+            f[..., 2, 2] = stretch + np.maximum(step, -0.5 * stretch)
+            if np.abs(step).max(initial=0.0) < 1e-14:
+                break
+        return f
+
+    def _spherical(self, f: Float, cof: Float, isochoric: Float, p: Float | None, relaxing: Relaxing | None) -> Float:
+        """Return the factor (...,) of cof F in the stress, MPa.
+
+        In plane stress it follows from P_33 = 0, which unlike K (J - 1) loses no digits where K is large.
+        """
+        a_iso, a_vol, past = _factors(relaxing)
+        if self.plane_stress:
+            return np.asarray(
+                (f[..., 2, 2] * past[..., 2, 2] - a_iso * isochoric[..., 2, 2]) / cof[..., 2, 2], dtype=np.float64
+            )
+        return np.asarray(a_vol * (self.bulk * (determinant(f) - 1.0) if p is None else p))
+
+    def stress(self, f: Float, p: Float | None, relaxing: Relaxing | None = None) -> Float:
+        """Return the first Piola-Kirchhoff stress (..., 3, 3) MPa.
+
+        Parameters
+        ----------
+        f : (..., 3, 3) from `deformation`
+        p : (...,) MPa, the pressure of the mixed form; None in the displacement form
+        """
+        isochoric, cof = self.law.stress(f), cofactor(f)
+        spherical = self._spherical(f, cof, isochoric, p, relaxing)[..., None, None]
+        if relaxing is None:
+            return np.asarray(isochoric + spherical * cof)
+        return np.asarray(relaxing.isochoric * isochoric + spherical * cof - f @ relaxing.past)
+
+    def stress_and_tangent(self, f: Float, p: Float | None, relaxing: Relaxing | None = None) -> tuple[Float, Float]:
+        """Return the first Piola-Kirchhoff stress (..., 3, 3) and its derivative (..., 3, 3, 3, 3) by F, MPa."""
+        a_iso, a_vol, past = _factors(relaxing)
+        isochoric, tangent = self.law.stress_and_tangent(f)
+        cof, j = cofactor(f), determinant(f)
+        spherical = self._spherical(f, cof, isochoric, p, relaxing)
+        rate = spherical / j  # d cof_iJ / d F_kL = (cof_iJ cof_kL - cof_iL cof_kJ) / J
+        both = cof[..., :, :, None, None] * cof[..., None, None, :, :]
+        along = rate + (a_vol * self.bulk if p is None else 0.0)
+        tangent = a_iso * tangent + along[..., None, None, None, None] * both
+        tangent -= rate[..., None, None, None, None] * np.swapaxes(both, -1, -3)
+        stress = a_iso * isochoric + spherical[..., None, None] * cof
+        if relaxing is not None:
+            stress = stress - f @ past
+            for i in range(3):
+                tangent[..., i, :, i, :] -= past
+        return stress, tangent
+
+    def in_plane(self, tangent: Float) -> Float:
+        """Return the tangent of plane stress, P_33 = 0 condensed out."""
+        column, row = tangent[..., :, :, 2, 2], tangent[..., 2, 2, :, :]
+        pivot = tangent[..., 2, 2, 2, 2][..., None, None, None, None]
+        return np.asarray(tangent - column[..., :, :, None, None] * row[..., None, None, :, :] / pivot)
+
+    def elastic_stress(self, f: Float, p: Float | None, relaxing: Relaxing | None, volumetric: bool) -> Float:
+        """Return the elastic second Piola-Kirchhoff stress (..., 3, 3) MPa, of the isochoric part or of the whole."""
+        isochoric, cof = self.law.stress(f), cofactor(f)
+        first = isochoric
+        if volumetric:
+            a_vol = _factors(relaxing)[1]
+            first = first + (self._spherical(f, cof, isochoric, p, relaxing) / a_vol)[..., None, None] * cof
+        return np.asarray(np.swapaxes(cof, -1, -2) @ first / determinant(f)[..., None, None])
+
+
+def _factors(relaxing: Relaxing | None) -> tuple[float, float, Float]:
+    return (
+        (1.0, 1.0, np.zeros((3, 3))) if relaxing is None else (relaxing.isochoric, relaxing.volumetric, relaxing.past)
+    )
+
+
+@dataclass(frozen=True)
+class TotalLagrangian:
+    """Discretisation of a hyperelastic body by quadratic simplices, with linear pressures in the mixed form.
+
+    Unknowns x (N,): displacements ``node * d + axis`` in mm, then scaled pressures at the vertices.
+
+    Attributes
+    ----------
+    thickness : mm, the width of a section, 1 for a solid
+    pattern : of the tangent; mixed as the material is
+    """
+
+    mesh: Mesh
+    material: Hyperelastic
+    thickness: float
+    pattern: Pattern
+
+    @cached_property
+    def _operators(self) -> tuple[sp.csr_matrix, Float, sp.csr_matrix | None]:
+        """Gradient (e q d, n) of nodal fields, weights (e, q), and values (e q, n) of fields linear in every cell."""
+        mesh, d = self.mesh, self.mesh.dim
+        bary, w = quadrature(d, 2)
+        cells, q = mesh.cells, len(bary)
+        e, k = cells.shape
+        data, weights = np.empty((e, q, d, k)), np.empty((e, q))
+        for part in cell_parts(mesh):
+            gradients, det = mesh.element.physical_gradients(mesh.points[cells[part]], bary)
+            data[part], weights[part] = np.swapaxes(gradients, 2, 3), det * (w * self.thickness)
+        indices = np.broadcast_to(cells[:, None, None, :], data.shape).ravel()
+        rows, n = e * q * d, len(mesh.points)
+        gradient = sp.csr_matrix((data.ravel(), indices, np.arange(rows + 1) * k), shape=(rows, n))
+        if not self.material.mixed:
+            return gradient, weights, None
+        values = np.broadcast_to(bary, (e, q, d + 1)).ravel()
+        corners = np.broadcast_to(cells[:, None, : d + 1], (e, q, d + 1)).ravel()
+        hats = sp.csr_matrix((values, corners, np.arange(e * q + 1) * (d + 1)), shape=(e * q, n))
+        return gradient, weights, hats
+
+    @cached_property
+    def pressure_scale(self) -> float:
+        """Unit of the pressure unknowns, MPa."""
+        return pressure_scale(self.mesh, self.material.law.shear)
+
+    def slopes(self, x: Float) -> Float:
+        """Return the displacement gradients (m, d, d) at the quadrature points, row the component."""
+        d = self.mesh.dim
+        found = self._operators[0] @ displacement(self.mesh, x)
+        return np.swapaxes(found.reshape(-1, d, d), 1, 2)
+
+    def pressures(self, x: Float) -> Float | None:
+        """Return the pressure (m,) MPa at the quadrature points in the mixed form."""
+        hats = self._operators[2]
+        if hats is None:
+            return None
+        nodal = np.zeros(len(self.mesh.points))
+        nodal[self.pattern.vertices] = self.pressure_scale * x[self.mesh.points.size :]
+        return np.asarray(hats @ nodal)
+
+    def deformation(self, x: Float, relaxing: Relaxing | None = None) -> Float:
+        """Return the deformation gradients (m, 3, 3) at the quadrature points; raises InvertedError."""
+        return self.material.deformation(self.slopes(x), relaxing)
+
+    def internal_forces(self, x: Float, relaxing: Relaxing | None = None) -> Float:
+        """Return the internal forces (N,), in the mixed form with the residual of p = K (J - 1).
+
+        Raises
+        ------
+        InvertedError
+            If a cell is inverted.
+        """
+        d, p = self.mesh.dim, self.pressures(x)
+        gradient, weights, hats = self._operators
+        f = self.deformation(x, relaxing)
+        stress = self.material.stress(f, p, relaxing)[:, :d, :d] * weights.reshape(-1, 1, 1)
+        force = gradient.T @ np.ascontiguousarray(np.swapaxes(stress, 1, 2)).reshape(-1, d)
+        if hats is None or p is None:
+            return np.asarray(force.ravel())
+        excess = (determinant(f) - 1.0 - p / self.material.bulk) * weights.ravel()
+        share = 1.0 if relaxing is None else relaxing.volumetric
+        volume = (share * self.pressure_scale * (hats.T @ excess))[self.pattern.vertices]
+        return np.concatenate([force.ravel(), volume])
+
+    def tangent(self, x: Float, relaxing: Relaxing | None = None) -> Stiffness:
+        """Return the tangent stiffness, the derivative of the internal forces; may raise InvertedError."""
+        mesh, d, material, p = self.mesh, self.mesh.dim, self.material, self.pressures(x)
+        gradient, weights, _ = self._operators
+        e, q = weights.shape
+        gradients = gradient.data.reshape(e, q, d, -1)
+        slopes = self.slopes(x).reshape(e, q, d, d)
+        hats, _ = quadrature(d, 2)
+        data = np.zeros(len(self.pattern.indices))
+        share = 1.0 if relaxing is None else relaxing.volumetric
+        scale = share * self.pressure_scale
+        mass = -scale * self.pressure_scale / material.bulk * np.einsum("qp,qr->qpr", hats, hats)
+        for part in cell_parts(mesh):
+            points = slice(part.start * q, part.stop * q)
+            own = relaxing.of_points(points) if relaxing else None
+            local, w = gradients[part], weights[part]
+            f = material.deformation(slopes[part].reshape(-1, d, d), own)
+            _, tangent = material.stress_and_tangent(f, None if p is None else p[points], own)
+            if material.plane_stress:
+                tangent = material.in_plane(tangent)
+            k = local.shape[3]
+            weighted = (tangent[:, :d, :d, :d, :d] * w.reshape(-1, 1, 1, 1, 1)).reshape(-1, q, d * d * d, d)
+            right = np.matmul(weighted, local).reshape(-1, q, d, d, d, k)  # i J k b
+            right = np.ascontiguousarray(right.transpose(0, 1, 3, 2, 4, 5)).reshape(-1, q * d, d * d * k)
+            left = np.ascontiguousarray(local.transpose(0, 3, 1, 2)).reshape(-1, k, q * d)
+            self.pattern.add(data, part, np.matmul(left, right).reshape(-1, k, d, d, k).transpose(0, 1, 2, 4, 3))
+            if p is not None:
+                flux = np.matmul(cofactor(f)[:, :d, :d].reshape(-1, q, d, d), local)  # (e, q, i, a)
+                flux = np.swapaxes(flux * (scale * w)[:, :, None, None], 2, 3).reshape(len(w), q, k * d)
+                coupling = np.matmul(hats.T, flux).reshape(-1, d + 1, k, d)
+                self.pattern.add_pressure(data, part, coupling, np.tensordot(w, mass, axes=1))
+        return Stiffness(self.pattern.matrix(data), self.pattern.vertices, self.pressure_scale)
+
+    def elastic_stress(self, x: Float, relaxing: Relaxing | None, volumetric: bool) -> Float:
+        """Return the elastic second Piola-Kirchhoff stress (m, 3, 3) MPa at the quadrature points."""
+        return self.material.elastic_stress(self.deformation(x, relaxing), self.pressures(x), relaxing, volumetric)
+
+
+def stretch(mesh: Mesh, u: Float, point: Float, direction: Float) -> float:
+    """Relative elongation |F d| - 1 at `point` (d,) along the unit `direction` (d,), mean over cells that hold it."""
+    found = []
+    for cell, bary in cells_at(mesh, point):
+        nodes = mesh.cells[cell]
+        slope = u[nodes].T @ mesh.element.physical_gradients(mesh.points[nodes][None], bary[None])[0][0, 0]
+        found.append(np.linalg.norm(direction + slope @ direction) - 1.0)
+    return float(np.mean(found))
+
+
+def nodal_fields(body: TotalLagrangian, x: Float) -> tuple[Float, Float, Float]:
+    """Return deformation gradient, Green-Lagrange strain and elastic Cauchy stress (n, 3, 3) at the nodes.
+
+    They follow from the volume-weighted mean of the displacement gradient at every node.
+    """
+    mesh, material, size = body.mesh, body.material, body.mesh.points.size
+    f = material.deformation(nodal_gradient(mesh, displacement(mesh, x)))
+    p = nodal_pressure(mesh, body.pressure_scale * x[size:]) if material.mixed else None
+    cauchy = material.stress(f, p) @ np.swapaxes(f, 1, 2) / determinant(f)[:, None, None]
+    return f, 0.5 * (np.swapaxes(f, 1, 2) @ f - np.eye(3)), cauchy

@@ -1,0 +1,173 @@
+"""Laws that depend on the isochoric invariants I1 = tr C, I2 = (I1^2 - tr C^2) / 2 of ``J^(-1/3) F``.
+
+With X1 = J^(-2/3) I1 and X2 = J^(-4/3) I2 the stress is ``W_1 dX1/dF + W_2 dX2/dF`` (Holzapfel 2000, secs. 6.4, 6.5).
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from finger3d._types import Float
+from finger3d.fem.laws.base import Derivatives
+from finger3d.fem.tensors import cofactor, determinant
+
+
+@dataclass(frozen=True)
+class InvariantLaw(ABC):
+    """Base class; a law gives its energy and its derivatives by the invariants.
+
+    Attributes
+    ----------
+    shear : shear modulus at zero strain, MPa
+    """
+
+    shear: float
+
+    def with_shear(self, shear: float) -> Self:
+        """Return the law with another shear modulus."""
+        return replace(self, shear=shear)
+
+    @property
+    @abstractmethod
+    def is_stable(self) -> bool:
+        """Whether the law is known to be stable at all strains."""
+
+    @abstractmethod
+    def of_invariants(self, x1: Float, x2: Float) -> Float:
+        """Return the energy (...,) MPa of isochoric invariants (...,)."""
+
+    @abstractmethod
+    def derivatives(self, x1: Float, x2: Float) -> Derivatives:
+        """Return the derivatives of the energy by the isochoric invariants (...,)."""
+
+    def energy(self, f: Float) -> Float:
+        """Return the energy (...,)."""
+        return self.of_invariants(*_invariants(f))
+
+    def stress(self, f: Float) -> Float:
+        """Return the first Piola-Kirchhoff stress (..., 3, 3)."""
+        x1, x2 = _invariants(f)
+        by = self.derivatives(x1, x2)
+        inverse = _inverse_transpose(f)
+        out = _wide(by.w1) * _gradient_1(f, inverse, x1)
+        return out if by.w2 is None else out + _wide(by.w2) * _gradient_2(f, inverse, x2)
+
+    def stress_and_tangent(self, f: Float) -> tuple[Float, Float]:
+        """Return the stress and its derivative (..., 3, 3, 3, 3)."""
+        x1, x2 = _invariants(f)
+        by, inverse = self.derivatives(x1, x2), _inverse_transpose(f)
+        g1 = _gradient_1(f, inverse, x1)
+        stress, tangent = _wide(by.w1) * g1, _wide4(by.w1) * _hessian_1(f, inverse, x1)
+        if by.w11 is not None:
+            tangent += _wide4(by.w11) * _outer(g1, g1)
+        if by.w2 is not None:
+            g2 = _gradient_2(f, inverse, x2)
+            stress, tangent = stress + _wide(by.w2) * g2, tangent + _wide4(by.w2) * _hessian_2(f, inverse, x2)
+            if by.w12 is not None:
+                tangent += _wide4(by.w12) * (_outer(g1, g2) + _outer(g2, g1))
+            if by.w22 is not None:
+                tangent += _wide4(by.w22) * _outer(g2, g2)
+        return stress, tangent
+
+    def principal_stress(self, stretches: Float) -> tuple[Float, Float]:
+        """Return principal Kirchhoff stresses and their derivative; X2 is the sum of 1/lambda^2 of isochoric ones."""
+        square = stretches**2
+        inverse = 1.0 / square
+        by = self.derivatives(square.sum(axis=-1), inverse.sum(axis=-1))
+        g1, g2, zero = 2.0 * square, -2.0 * inverse, np.zeros(stretches.shape[:-1])
+        w2, w11, w12, w22 = (zero if w is None else w for w in (by.w2, by.w11, by.w12, by.w22))
+        stress = _wide1(by.w1) * g1 + _wide1(w2) * g2
+        diagonal = _wide1(by.w1) * 2.0 * g1 - _wide1(w2) * 2.0 * g2
+        out = diagonal[..., None] * np.eye(3)
+        for w, a, b in ((w11, g1, g1), (w12, g1, g2), (w12, g2, g1), (w22, g2, g2)):
+            out = out + _wide(w) * a[..., :, None] * b[..., None, :]
+        return stress, out
+
+
+def _wide1(scalar: Float) -> Float:
+    return scalar[..., None]
+
+
+def _wide(scalar: Float) -> Float:
+    return scalar[..., None, None]
+
+
+def _wide4(scalar: Float) -> Float:
+    return scalar[..., None, None, None, None]
+
+
+def _outer(a: Float, b: Float) -> Float:
+    return np.asarray(a[..., :, :, None, None] * b[..., None, None, :, :])
+
+
+def _inverse_transpose(f: Float) -> Float:
+    return np.asarray(cofactor(f) / _wide(determinant(f)))
+
+
+def _right_cauchy_green(f: Float) -> Float:
+    return np.asarray(np.swapaxes(f, -1, -2) @ f)
+
+
+def _invariants(f: Float) -> tuple[Float, Float]:
+    """Isochoric invariants (...,) of deformation gradients (..., 3, 3)."""
+    j, c = determinant(f), _right_cauchy_green(f)
+    i1 = np.trace(c, axis1=-2, axis2=-1)
+    i2 = 0.5 * (i1**2 - (c**2).sum(axis=(-2, -1)))
+    return np.asarray(j ** (-2.0 / 3.0) * i1), np.asarray(j ** (-4.0 / 3.0) * i2)
+
+
+def _gradient_1(f: Float, inverse: Float, x1: Float) -> Float:
+    """Return dX1/dF = 2 J^(-2/3) F - 2/3 X1 F^-T."""
+    scale = determinant(f) ** (-2.0 / 3.0)
+    return np.asarray(2.0 * _wide(scale) * f - 2.0 / 3.0 * _wide(x1) * inverse)
+
+
+def _gradient_2(f: Float, inverse: Float, x2: Float) -> Float:
+    """Return dX2/dF = 2 J^(-4/3) (I1 F - F C) - 4/3 X2 F^-T."""
+    scale = determinant(f) ** (-4.0 / 3.0)
+    return np.asarray(2.0 * _wide(scale) * _cofactor_rate(f) - 4.0 / 3.0 * _wide(x2) * inverse)
+
+
+def _cofactor_rate(f: Float) -> Float:
+    """Return I1 F - F C, half the derivative of I2."""
+    c = _right_cauchy_green(f)
+    return np.asarray(_wide(np.trace(c, axis1=-2, axis2=-1)) * f - f @ c)
+
+
+def _scaled_hessian(power: float, x: Float, rate: Float, inverse: Float) -> Float:
+    """Second derivative of J^-power I by F, less that of I itself times J^-power.
+
+    `rate` (..., 3, 3) is J^-power dI/dF and x = J^-power I.
+    """
+    mixed = _outer(rate, inverse)
+    both = _outer(inverse, inverse)
+    out = -power * (mixed + np.moveaxis(mixed, (-4, -3, -2, -1), (-2, -1, -4, -3)))
+    return np.asarray(out + power * _wide4(x) * (power * both + np.swapaxes(both, -1, -3)))
+
+
+def _hessian_1(f: Float, inverse: Float, x1: Float) -> Float:
+    scale = determinant(f) ** (-2.0 / 3.0)
+    out = _scaled_hessian(2.0 / 3.0, x1, 2.0 * _wide(scale) * f, inverse)
+    for i in range(3):
+        for j in range(3):
+            out[..., i, j, i, j] += 2.0 * scale
+    return out
+
+
+def _hessian_2(f: Float, inverse: Float, x2: Float) -> Float:
+    scale, c = determinant(f) ** (-4.0 / 3.0), _right_cauchy_green(f)
+    out = _scaled_hessian(4.0 / 3.0, x2, 2.0 * _wide(scale) * _cofactor_rate(f), inverse)
+    # d(I1 F - F C)_iJ / dF_kL = 2 F_iJ F_kL + I1 d_ik d_JL - d_ik C_LJ - F_iL F_kJ - (F F^T)_ik d_JL
+    pair = _outer(f, f)
+    rate = 2.0 * pair - np.swapaxes(pair, -1, -3)
+    left, i1 = f @ np.swapaxes(f, -1, -2), np.trace(c, axis1=-2, axis2=-1)
+    for i in range(3):
+        rate[..., i, :, i, :] -= c
+        rate[..., :, i, :, i] -= left
+        for j in range(3):
+            rate[..., i, j, i, j] += i1
+    return np.asarray(out + 2.0 * _wide4(scale) * rate)

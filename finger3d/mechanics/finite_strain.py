@@ -1,0 +1,180 @@
+"""Finite strain: a hyperelastic body, and contact conditions on its deformed surface."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d._types import Float
+from finger3d.contact.state import ContactSolution, ContactState
+from finger3d.fem.hyperelastic import Hyperelastic, nodal_fields
+from finger3d.fem.laws import IsochoricLaw
+from finger3d.fem.recover import displacement, extrapolated
+from finger3d.fem.tensors import determinant
+from finger3d.fem.traces import BoundarySurface
+from finger3d.mechanics.cost import AddedCost, PressCost
+from finger3d.mechanics.finite_body import FiniteBody
+from finger3d.mechanics.finite_increment import DeformedState, FiniteIncrement, FiniteStrainWorkspace, contact_of
+from finger3d.mechanics.formulation import Workspace, moment_of
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.relaxation import InternalVariables, Relaxation, Step, relaxed
+from finger3d.objects import ObjectPose
+
+if TYPE_CHECKING:
+    from finger3d.mechanics.model import Model
+
+_FACTORISATIONS = 1.5
+"""Factorisations of the tangent in an increment, typical of the studies of large deformation."""
+
+_ITERATIONS = 8
+"""Iterations of an increment, likewise."""
+
+_NUMERIC_FACTORISATION = 0.8
+"""Time of a factorisation whose ordering is known, over that of a condensation."""
+
+_TANGENT_ASSEMBLY = 0.8
+"""Time to assemble the tangent over that of the linear stiffness."""
+
+_OTHER_S = {2: 0.008, 3: 0.12}
+"""Further seconds of an increment, by dimension."""
+
+
+@dataclass(frozen=True)
+class FiniteStrain:
+    """Finite strain of a hyperelastic body.
+
+    Attributes
+    ----------
+    law : isochoric part of the energy, with the shear modulus of the model's material in place of its own
+    relaxation : of the stresses (Simo 1987), if any
+    """
+
+    finite_strain: ClassVar[bool] = True
+    is_linear_elastic: ClassVar[bool] = False
+    refactorises: ClassVar[bool] = True
+
+    law: IsochoricLaw
+    relaxation: Relaxation | None = None
+
+    def relaxing(self, relaxation: Relaxation) -> FiniteStrain:
+        """Return the formulation with stresses that relax."""
+        return replace(self, relaxation=relaxation)
+
+    def added_cost(self, model: Model, press: PressCost) -> AddedCost:
+        """Return the cost of the factorisations in every increment."""
+        increment = _FACTORISATIONS * _NUMERIC_FACTORISATION * press.seconds["condensation"]
+        increment += (_FACTORISATIONS + 1) * _TANGENT_ASSEMBLY * press.seconds["assembly"] + _OTHER_S[press.dim]
+        return AddedCost(
+            seconds=press.increments * increment + (_ITERATIONS - 1) * press.seconds["contact"],
+            memory_mb=press.factor_mb,
+            reason=f"about {_FACTORISATIONS} factorisations in each of {press.increments} steps",
+        )
+
+    def state_size(self, press: PressCost) -> float:
+        """Return the number of unknowns, and of internal variables: 9 at 4 points of each of some dofs / 4.5 cells."""
+        branches = len(self.relaxation.prony) + 1 if self.relaxation else 0
+        return press.dofs * (1.0 + 8.0 * branches)
+
+    def workspace(self) -> FiniteStrainWorkspace:
+        """Return a workspace without body and factor."""
+        return FiniteStrainWorkspace()
+
+    def _body(self, problem: Problem, workspace: FiniteStrainWorkspace | None = None) -> FiniteBody:
+        has_inclusions = problem.inclusions.bars is not None
+        if workspace is not None and has_inclusions in workspace.bodies:
+            return workspace.bodies[has_inclusions]
+        linear = problem.model.material.isotropic("effects.large_deformation")
+        law = self.law.with_shear(linear.E_MPa / (2.0 * (1.0 + linear.nu)))
+        body = FiniteBody.of(problem, Hyperelastic.of(law, linear.nu, problem.model.domain == "plane-stress"))
+        if workspace is not None:
+            workspace.bodies[has_inclusions] = body
+        return body
+
+    def start(self, problem: Problem) -> DeformedState:
+        """State at rest."""
+        mesh, body = problem.mesh, self._body(problem)
+        x = np.zeros(mesh.points.size + len(body.solid.pattern.vertices))
+        contact = contact_of(problem, problem.surface, displacement(mesh, x), problem.origin)
+        memory = None
+        if self.relaxation is not None:
+            size = len(body.relaxing_variables(x, self.relaxation.bulk))
+            memory = InternalVariables.at_rest(self.relaxation.prony, size)
+        rest = ContactState.at_rest(contact.gap, problem.dim)
+        return DeformedState(**(vars(rest) | {"bases": contact.bases}), unknowns=x, memory=memory)
+
+    def increment(
+        self,
+        problem: Problem,
+        state: ContactState,
+        a: ObjectPose,
+        b: ObjectPose,
+        guess: Float | None,
+        workspace: Workspace,
+    ) -> ContactSolution:
+        """Iterate until equilibrium and contact conditions hold in the deformed configuration."""
+        assert isinstance(state, DeformedState)
+        assert isinstance(workspace, FiniteStrainWorkspace)
+        body, seconds = self._body(problem, workspace), b.time_s - a.time_s
+        if self.relaxation is not None and state.memory is not None:
+            body = body.over(self.relaxation, state.memory, seconds)
+        found = FiniteIncrement(problem, body, state, a, b, workspace).solve(guess)
+        after = found.state
+        if not found.outcome.ok or self.relaxation is None or state.memory is None:
+            return found
+        assert isinstance(after, DeformedState)
+        strained = body.relaxing_variables(after.unknowns, self.relaxation.bulk)
+        memory = Step(self.relaxation.prony, seconds).after(state.memory, strained)
+        return replace(found, state=replace(after, memory=memory))
+
+    def unknowns(self, problem: Problem, state: ContactState) -> Float:
+        """All unknowns (N,), which the state holds."""
+        assert isinstance(state, DeformedState)
+        return state.unknowns
+
+    def all_unknowns(self, problem: Problem, states: Sequence[ContactState]) -> Iterator[Float]:
+        """All unknowns (N,) of each state."""
+        return (self.unknowns(problem, state) for state in states)
+
+    def gauges(self, problem: Problem, state: ContactState) -> dict[str, float]:
+        """Relative elongation of a line along the gauge, or of the bars of its foil."""
+        mesh, axes = problem.mesh, problem.axes
+        u = displacement(mesh, self.unknowns(problem, state))
+        foils, bars = problem.inclusions, problem.inclusions.bars
+        if bars is None:
+            return {gauge.name: gauge.finite_strain(mesh, u, axes) for gauge in problem.model.gauges}
+        assert isinstance(state, DeformedState)
+        yielded = state.memory.elastic[-len(bars.stiffness) :] if state.memory else bars.yielded(u)
+        names = [gauge.name for gauge in problem.model.gauges]
+        return dict(zip(names, map(float, foils.gauge_weights @ bars.strain(u, yielded)), strict=True))
+
+    def moment(self, problem: Problem, state: ContactState, target: ObjectPose) -> Float:
+        """Return the moment about the middle of the base, of nodal forces at the displaced nodes."""
+        mesh = problem.mesh
+        u = displacement(mesh, self.unknowns(problem, state))
+        contact = contact_of(problem, problem.surface, u, target)
+        nodal = (contact.rows.T @ state.force.ravel()).reshape(u.shape)
+        return moment_of(mesh.points + u, nodal)
+
+    def gap(self, problem: Problem, u: Float, target: ObjectPose, surface: BoundarySurface) -> tuple[Float, Float]:
+        """Return gaps and normals in the deformed configuration."""
+        contact = contact_of(problem, surface, u, target)
+        return contact.gap, contact.bases[:, 0]
+
+    def may_touch(self, surface: BoundarySurface, normal: Float) -> NDArray[np.bool_]:
+        """Every point can: walls turn with the motion, and no place of the surface may be inside the object."""
+        return np.ones(len(surface.nodes), dtype=np.bool_)
+
+    def fields(self, problem: Problem, state: ContactState) -> tuple[Float, Float, Float]:
+        """Displacement, Green-Lagrange strain and Cauchy stress."""
+        x, body = self.unknowns(problem, state), self._body(problem)
+        f, strain, cauchy = nodal_fields(body.solid, x)
+        assert isinstance(state, DeformedState)
+        if self.relaxation is not None and state.memory is not None:
+            lost = relaxed(self.relaxation.prony, state.memory) - state.memory.elastic
+            nodal = extrapolated(problem.mesh, lost[: 9 * body.points].reshape(-1, 3, 3))
+            cauchy = cauchy + f @ nodal @ np.swapaxes(f, 1, 2) / determinant(f)[:, None, None]
+        return displacement(problem.mesh, x), strain, cauchy

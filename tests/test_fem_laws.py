@@ -1,0 +1,151 @@
+"""Hyperelastic laws: derivatives, closed forms (validation/REFERENCES.md, 5.7), small strain, stability."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from finger3d.errors import Finger3dError
+from finger3d.fem.laws import IsochoricLaw, MooneyRivlin, NeoHooke, Ogden, Yeoh
+from finger3d.fem.laws.stability import least_stiffness, unstable_from
+
+G = 0.7
+LAWS: dict[str, IsochoricLaw] = {
+    "neo-Hooke": NeoHooke(G),
+    "Mooney-Rivlin": MooneyRivlin(G, 0.2),
+    "Yeoh": Yeoh(G, -0.02, 2e-3),
+    # shares mu alpha / 2 G of Ogden's fit to Treloar's data (Ogden 1972): mu = 6.3, 0.012, -0.1; alpha = 1.3, 5, -2
+    "Ogden": Ogden(G, ((8.19 / 8.45, 1.3), (0.06 / 8.45, 5.0), (0.2 / 8.45, -2.0))),
+}
+
+
+@pytest.fixture(params=LAWS.values(), ids=LAWS.keys())
+def law(request: pytest.FixtureRequest) -> IsochoricLaw:
+    return request.param
+
+
+def gradients(count: int = 6) -> np.ndarray:
+    """Deformation gradients with stretches from 0.6 to 1.6, and some with equal or nearly equal stretches."""
+    rng = np.random.default_rng(0)
+    left, right = (np.linalg.qr(rng.normal(size=(count, 3, 3)))[0] for _ in range(2))
+    left, right = (q * np.linalg.det(q)[:, None, None] for q in (left, right))
+    stretches = rng.uniform(0.6, 1.6, size=(count, 3))
+    stretches[0], stretches[1], stretches[2] = (1.0, 1.0, 1.0), (1.3, 1.3, 0.7), (1.3, 1.3 * (1.0 + 1e-9), 0.7)
+    return left @ (stretches[:, :, None] * right)
+
+
+def incompressible(law: IsochoricLaw, stretches: tuple[float, float, float], free: int) -> float:
+    """Nominal stress along the first axis of an incompressible body whose axis `free` bears no stress."""
+    f = np.diag(stretches)
+    stress = law.stress(f)
+    return float(stress[0, 0] - stress[free, free] * f[free, free] / f[0, 0])
+
+
+def test_stress_is_the_derivative_of_the_energy_and_tangent_that_of_the_stress(law: IsochoricLaw) -> None:
+    f, step = gradients(), 1e-6
+    stress, tangent = law.stress_and_tangent(f)
+    assert np.abs(law.stress(f) - stress).max() < 1e-14
+    for i in range(3):
+        for j in range(3):
+            change = np.zeros((3, 3))
+            change[i, j] = step
+            by_energy = (law.energy(f + change) - law.energy(f - change)) / (2.0 * step)
+            by_stress = (law.stress(f + change) - law.stress(f - change)) / (2.0 * step)
+            assert np.abs(by_energy - stress[:, i, j]).max() < 1e-8 * G  # round-off 1e-16 / 1e-6, and step^2
+            assert np.abs(by_stress - tangent[:, :, :, i, j]).max() < 1e-7 * G
+
+
+def test_tangent_at_rest_is_the_linear_deviator(law: IsochoricLaw) -> None:
+    one = np.eye(3)
+    linear = np.einsum("ik,jl->ijkl", one, one) + np.einsum("il,jk->ijkl", one, one)
+    linear -= 2.0 / 3.0 * np.einsum("ij,kl->ijkl", one, one)
+    stress, tangent = law.stress_and_tangent(one)
+    assert np.abs(tangent - G * linear).max() < 1e-14
+    assert np.abs(stress).max() < 1e-15
+
+
+def test_objectivity_isotropy_and_volume(law: IsochoricLaw) -> None:
+    f = gradients()
+    turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+    turn *= np.linalg.det(turn)
+    assert np.abs(law.stress(turn @ f) - turn @ law.stress(f)).max() < 1e-14
+    assert np.abs(law.stress(f @ turn) - law.stress(f) @ turn).max() < 1e-14
+    assert np.abs(law.energy(1.7 * f) - law.energy(f)).max() < 1e-14
+    assert np.abs(np.einsum("nij,nij->n", law.stress(f), f)).max() < 1e-14  # no work on a change of volume
+
+
+@pytest.mark.parametrize("stretch", [0.6, 1.5, 2.5])
+def test_closed_forms(stretch: float) -> None:
+    c1, c2 = 0.5 * G * 0.8, 0.5 * G * 0.2
+    constants = [(2.0 * share * G / a, a) for share, a in LAWS["Ogden"].terms]
+
+    def yeoh(i1: float) -> float:
+        return 0.5 * G * (1.0 - 0.04 * (i1 - 3.0) + 6e-3 * (i1 - 3.0) ** 2)
+
+    i1 = {"uniaxial": stretch**2 + 2 / stretch, "equibiaxial": 2 * stretch**2 + stretch**-4}
+    i1["pure shear"] = stretch**2 + 1.0 + stretch**-2
+    modes = {
+        "uniaxial": ((stretch, stretch**-0.5, stretch**-0.5), stretch - stretch**-2, 1.0 / stretch, -0.5),
+        "equibiaxial": ((stretch, stretch, stretch**-2), stretch - stretch**-5, stretch**2, -2.0),
+        "pure shear": ((stretch, 1.0, 1.0 / stretch), stretch - stretch**-3, 1.0, -1.0),
+    }
+    for mode, (stretches, shape, second, power) in modes.items():
+        # Treloar 1975, ch. 4: P = 2 (W_1 + q W_2) (l - ...) with q = 1/l, l^2, 1; Ogden 1972: mu (l^(a-1) - l^(k a-1))
+        want = {
+            "neo-Hooke": G * shape,
+            "Mooney-Rivlin": 2.0 * (c1 + second * c2) * shape,
+            "Yeoh": 2.0 * yeoh(i1[mode]) * shape,
+            "Ogden": sum(mu * (stretch ** (a - 1.0) - stretch ** (power * a - 1.0)) for mu, a in constants),
+        }
+        for name, law in LAWS.items():
+            assert incompressible(law, stretches, free=2) == pytest.approx(want[name], rel=1e-12)
+
+
+def test_special_cases_of_ogdens_law() -> None:
+    f = gradients()
+    pairs = [(NeoHooke(G), Ogden(G, ((1.0, 2.0),))), (MooneyRivlin(G, 0.3), Ogden(G, ((0.7, 2.0), (0.3, -2.0))))]
+    for known, ogden in pairs:
+        for a, b in zip(known.stress_and_tangent(f), ogden.stress_and_tangent(f), strict=True):
+            assert np.abs(a - b).max() < 1e-13
+    with pytest.raises(Finger3dError, match="terms: the shares of the shear modulus sum to 0.9"):
+        Ogden(G, ((0.9, 2.0),))
+
+
+def test_principal_stress_is_that_of_the_tensor(law: IsochoricLaw) -> None:
+    stretches = np.array([1.4, 0.9, 1.0 / (1.4 * 0.9)])
+    f = np.diag(stretches)
+    principal, derivative = law.principal_stress(stretches)
+    kirchhoff = np.diagonal(law.stress(f) @ f.T)
+    assert np.abs(principal - principal.mean() - kirchhoff).max() < 1e-14
+    step = 1e-6
+    for b in range(3):
+        change = np.exp(step * np.eye(3)[b])
+        ahead, behind = (_tau(law, stretches * change), _tau(law, stretches / change))
+        slope = (ahead - behind) / (2.0 * step)
+        deviator = derivative[:, b] - derivative[:, b].mean()
+        mean = derivative.mean(axis=1) - derivative.mean()
+        assert np.abs(slope - (deviator - mean)).max() < 1e-8  # of an isochoric change, a third of each off all
+
+
+def _tau(law: IsochoricLaw, stretches: np.ndarray) -> np.ndarray:
+    f = np.diag(stretches)
+    return np.diagonal(law.stress(f) @ f.T)
+
+
+def test_stability() -> None:
+    rest = np.ones((1, 3))
+    for law in LAWS.values():
+        assert least_stiffness(law, rest)[0] == pytest.approx(1.0, abs=1e-14)
+    for name in ("neo-Hooke", "Mooney-Rivlin", "Ogden"):
+        assert LAWS[name].is_stable
+        assert unstable_from(LAWS[name]) == {}
+    falling = Yeoh(G, -0.05, 0.0)
+    assert not falling.is_stable
+    found = unstable_from(falling)
+    # uniaxial tension, strains (e, -e/2, -e/2): W = c1 (x + c x^2) of x = exp(2 e) + 2 exp(-e) - 3, c = -0.05; its
+    # second derivative along e vanishes first, since across it x is stationary and W' = 0 only later
+    e = np.log1p(found["uniaxial tension"])
+    x, slope = np.exp(2.0 * e) + 2.0 * np.exp(-e) - 3.0, 2.0 * (np.exp(2.0 * e) - np.exp(-e))
+    bend = 4.0 * np.exp(2.0 * e) + 2.0 * np.exp(-e)
+    assert (1.0 - 0.1 * x) * bend - 0.1 * slope**2 == pytest.approx(0.0, abs=1e-9)
+    assert found["uniaxial tension"] > 0.0 > found["uniaxial compression"]
