@@ -65,14 +65,17 @@ class Outcome(Enum):
         "use [contact] rule = 'projection'"
     )
     INVERTED = (
-        "a cell was turned inside out; the steps before are good; try more steps, a coarser mesh at the contact's "
-        "edge, or a shallower press"
+        "a cell was turned inside out; the steps before are good; try more steps or a shallower press, and a fillet or "
+        "a coarser mesh where a sharp edge of the finger folds over"
     )
     UNSTABLE = (
         "the material law is not stable at the strains reached, its stress falls; change its constants in "
         "[effects.large_deformation], or press less"
     )
-    NEWTON = "large deformation did not settle; the steps before are good; try more steps or a shallower press"
+    NEWTON = (
+        "large deformation did not settle; the steps before are good; try more steps or a shallower press, and a "
+        "fillet where a sharp edge of the finger folds over"
+    )
     INDEFINITE = "the compliance is not positive: the body is not held; fix its base, or check the mesh"
     UNRESOLVED = "the object passes between the contact points; try a smaller mesh.size_mm"
     NOT_FINITE = "the compliance or the gap contains NaN or infinity; check the mesh and the material"

@@ -60,7 +60,8 @@ def solve_increment(
         Initial guess, by default the forces of `previous`.  It changes the iterations, not the solution.
     weights : (c, d) array, N/mm, optional
         Augmentation parameters, by default from the diagonal of `compliance`.  If they are given, an indefinite
-        operator is accepted: at finite strain a body under contact forces may be stable by the contact alone.
+        operator is accepted: at finite strain a body under contact forces may be stable by the contact alone.  The
+        slowest attempts are left out, since another linearisation follows.
     area : (c,) array, mm2, optional
         Tributary areas of the points; only laws whose coefficient depends on the pressure need them.
 
@@ -75,9 +76,9 @@ def solve_increment(
     with threads_for(free.size):
         problem = ContactProblem.of(previous, free, compliance, law, length_scale, weights, area)
         start = previous.force if guess is None else guess
-        total = 0
+        sweeps, total = _SWEEPS if weights is None else _SWEEPS[:1], 0
         for _ in range(_FRICTION_UPDATES + len(free)):
-            method, found, error, spent = _solve_once(problem, start, path_turns=guess is None)
+            method, found, error, spent = _solve_once(problem, start, guess is None, sweeps)
             total += spent
             if found is None:
                 break
@@ -89,10 +90,12 @@ def solve_increment(
     return ContactSolution(previous, Outcome.NO_CONVERGENCE, error, total, method)
 
 
-def _solve_once(problem: ContactProblem, start: Float, path_turns: bool) -> tuple[str, NewtonResult | None, float, int]:
+def _solve_once(
+    problem: ContactProblem, start: Float, path_turns: bool, sweeps: tuple[int, ...]
+) -> tuple[str, NewtonResult | None, float, int]:
     """Return method, solution, residual and iterations; None and the least residual if all attempts fail."""
     spent, least = 0, np.inf
-    for method, attempt in _attempts(problem, start, path_turns):
+    for method, attempt in _attempts(problem, start, path_turns, sweeps):
         spent += attempt.iterations
         if not attempt.solved:
             continue
@@ -105,7 +108,9 @@ def _solve_once(problem: ContactProblem, start: Float, path_turns: bool) -> tupl
     return "none", None, least, spent
 
 
-def _attempts(problem: ContactProblem, start: Float, path_turns: bool) -> Iterator[tuple[str, NewtonResult]]:
+def _attempts(
+    problem: ContactProblem, start: Float, path_turns: bool, sweeps: tuple[int, ...]
+) -> Iterator[tuple[str, NewtonResult]]:
     """Yield attempts from the fastest to the most robust; each is made only if the one before failed.
 
     Where the path begins or turns, the start is far from the solution and full steps overshoot.
@@ -119,7 +124,7 @@ def _attempts(problem: ContactProblem, start: Float, path_turns: bool) -> Iterat
     yield "ramp", _friction_continuation(problem, start)
     yield "pivots", _lemke_start(problem, start)
     force = start
-    for count in _SWEEPS:
+    for count in sweeps:
         force = block_gauss_seidel(problem, force, count)
         attempt = newton(problem, force, 30, damped=True)
         yield "sweeps", replace(attempt, iterations=attempt.iterations + count)

@@ -38,18 +38,31 @@ class DeformedContact:
     gap_at_samples: Float
     d2_area_ratio: Callable[[Float], sp.csr_matrix]
 
-    def geometric_stiffness(self, face: BoundarySurface, force: Float) -> sp.csr_matrix:
-        """Second derivative (n d, n d) of the gaps under normal forces (c,) N; what the moving area takes from K.
+    def geometric_stiffness(self, face: BoundarySurface, force: Float, curvature: Float | None = None) -> sp.csr_matrix:
+        """Second derivative (n d, n d) of the gaps under normal forces (c,) N; what contact takes from K.
 
         The pressure acts on the deformed area, without which the surface's own pressure would push its middle nodes
         along it: from pressures of a few G on, K would lose its definiteness there.
+
+        Parameters
+        ----------
+        curvature : (q, d, d) array, 1/mm, optional
+            Second derivatives of the gap at the samples; zero unless given.
         """
         per_area = sp.diags_array(force / (face.average @ self.area_ratio))
         pressure = sp.diags_array(face.average.T @ per_area.diagonal())
         normal = self.rows[:: self.bases.shape[1]]
         half = self.d_gap.T @ pressure @ self.d_area_ratio - normal.T @ per_area @ face.average @ self.d_area_ratio
         uneven = self.gap_at_samples * pressure.diagonal() - face.average.T @ (per_area @ self.gap)
-        return sp.csr_matrix(half + half.T + self.d2_area_ratio(uneven))
+        total = half + half.T + self.d2_area_ratio(uneven)
+        if curvature is not None:
+            weighted = (pressure.diagonal() * self.area_ratio)[:, None, None] * curvature
+            values = face.interpolate
+            for i, j in np.ndindex(*curvature.shape[1:]):
+                unit = np.zeros(curvature.shape[1:])
+                unit[i, j] = 1.0
+                total = total + sp.kron(values.T @ sp.diags_array(weighted[:, i, j]) @ values, unit)
+        return sp.csr_matrix(total)
 
 
 def deformed_contact(

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -25,18 +25,24 @@ from finger3d.contact.conditions import TOLERANCE, augmentation_parameters, resi
 from finger3d.contact.state import ContactSolution, ContactState, next_state
 from finger3d.errors import Outcome
 from finger3d.fem.assembly import on_places
-from finger3d.fem.condense import Condensation, condense
-from finger3d.fem.finite_contact import DeformedContact, deformed_contact
+from finger3d.fem.condense import condense
+from finger3d.fem.finite_contact import DeformedContact
 from finger3d.fem.hyperelastic import InvertedError
 from finger3d.fem.laws.stability import least_stiffness, unstable_from
 from finger3d.fem.recover import displacement
-from finger3d.fem.traces import BoundarySurface
 from finger3d.mechanics.finite_body import FiniteBody
-from finger3d.mechanics.formulation import Workspace, length_scale, solve_contact
+from finger3d.mechanics.finite_state import (
+    DeformedState,
+    FiniteStrainWorkspace,
+    Linearisation,
+    contact_of,
+    curvature_of,
+    rotated,
+)
+from finger3d.mechanics.formulation import length_scale, solve_contact
 from finger3d.mechanics.linear_contact import carried_by_object, transported
 from finger3d.mechanics.path import stride_ratio
 from finger3d.mechanics.problem import Problem, scatter_to_points
-from finger3d.mechanics.relaxation import InternalVariables
 from finger3d.objects import ObjectPose, vertical_frame
 
 _ITERATIONS, _FACTORS = 60, 15
@@ -48,59 +54,21 @@ _TARGET_RESIDUAL = 1e-9
 _SLOW = 0.35
 """Ratio of successive residuals above which the tangent is factored again; a factor costs about five iterations."""
 
-_LARGEST_STEP = 10.0
-"""Displacement of one iteration, in depths of the press, beyond which it diverges."""
+_NEGLIGIBLE = 1e-6
+"""Force, over the shear modulus times the square of the depth, below which there is no contact to speak of."""
+
+_LARGEST_STEP, _LEAST_STEP = 2.0, 0.05
+"""Largest displacement in an iteration over that of the object, and the least over the depth that is always allowed."""
+
+_DAMPED_FACTORS = 40
+"""Largest number of damped iterations."""
+
+_FIRST_DAMPING, _MORE_DAMPING, _LEAST_DAMPING = 1.0, 10.0, 1e-4
+"""Linear stiffness added to the tangent at first, factor by which it grows where an iteration fails (and its largest
+change and value), and share below which none is added."""
 
 _STEP_LENGTHS = (1.0, 0.5, 0.25, 0.125)
 """Fractions of a step tried in the line search, until no cell is inverted."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class DeformedState(ContactState):
-    """Contact state of a body at finite strain.
-
-    Attributes
-    ----------
-    unknowns : (N,) of the meshed part
-    memory : internal variables of a body that relaxes
-    previous : pose and unknowns at the start of the increment that led here
-    """
-
-    unknowns: Float
-    memory: InternalVariables | None = None
-    previous: tuple[ObjectPose, Float] | None = None
-
-
-@dataclass(frozen=True)
-class Linearisation:
-    """Body linearised at one configuration: the factored tangent and the compliance of the contact points.
-
-    Attributes
-    ----------
-    condensation : of the tangent, to the contact rows
-    bases : (c, d, d) directions of the contact points
-    delassus : (c, d, c, d) mm/N, in these directions
-    """
-
-    condensation: Condensation
-    bases: Float
-    delassus: Float
-
-    def delassus_active(self, bases: Float) -> Float:
-        """Return the Delassus operator (c, d, c, d) in other directions (c, d, d)."""
-        turn = bases @ np.swapaxes(self.bases, 1, 2)
-        return rotated(self.delassus, turn)
-
-
-@dataclass
-class FiniteStrainWorkspace(Workspace):
-    """Discretisation and last linearisation of a body, with which its next increment begins.
-
-    Both have two entries: of the body with its inclusions (True) and without.
-    """
-
-    bodies: dict[bool, FiniteBody] = field(default_factory=dict)
-    linearisations: dict[bool, Linearisation] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -112,25 +80,8 @@ class _Configuration:
     contact: DeformedContact
 
 
-def rotated(delassus: Float, turn: Float) -> Float:
-    """Return a Delassus operator (c, d, c, d) in directions turned point by point by (c, d, d)."""
-    c, d = turn.shape[:2]
-    half = (turn @ delassus.reshape(c, d, c * d)).reshape(c * d, c, d)
-    return np.asarray((half.transpose(1, 0, 2) @ turn.transpose(0, 2, 1)).transpose(1, 0, 2).reshape(c, d, c, d))
-
-
-def contact_of(problem: Problem, face: BoundarySurface, u: Float, target: ObjectPose) -> DeformedContact:
-    """Return the contact of a face displaced by u (n, d) with the object in a pose."""
-    gap, normal = problem.placed(target).distance(face.samples + face.interpolate @ u)
-    return deformed_contact(
-        face,
-        points=problem.mesh.points,
-        displacement=u,
-        gap=gap,
-        normal=normal,
-        axes=problem.axes,
-        share=problem.system.object_share if face is problem.surface else None,
-    )
+def _converged(error: float, last_error: float) -> bool:
+    return error <= _TARGET_RESIDUAL or 0.3 * last_error < error <= TOLERANCE
 
 
 @dataclass(frozen=True)
@@ -146,42 +97,91 @@ class FiniteIncrement:
 
     def solve(self, guess: Float | None) -> ContactSolution:
         """Iterate until equilibrium and the contact conditions hold; the state is without internal variables."""
+        found = self._iterate(guess)
+        if found.outcome.ok or found.outcome is Outcome.UNSTABLE:
+            return found
+        damped = self._iterate_damped()
+        return replace(damped, iterations=found.iterations + damped.iterations)
+
+    def _iterate(self, guess: Float | None) -> ContactSolution:
+        """Iterate from the configuration extrapolated, with a new tangent where the residual falls slowly."""
         force = self.start.force if guess is None else guess
         now = self._first_configuration()
-        linearisation, factors = self.workspace.linearisations.get(self._has_inclusions), 0
-        outcome, spent = Outcome.NEWTON, 0
-        error, size = math.inf, math.inf
+        linearisation, factors, spent, error = self._last_linearisation(), 0, 0, math.inf
+        outcome = Outcome.NEWTON
         for _ in range(_ITERATIONS):
             if linearisation is None:
                 if factors == _FACTORS:
                     break
                 linearisation, factors = self._linearise(now, force), factors + 1
-            solution, step = self._step(now, force, linearisation)
+            solution, after = self._advance(now, force, linearisation)
             spent += solution.iterations
-            if not solution.outcome.ok:
-                if not factors:
-                    linearisation = None
-                    continue
-                return replace(solution, state=self.start, iterations=spent)
-            last_size, size = size, float(np.abs(step[: self.problem.mesh.points.size]).max()) / self._length_scale
-            if not size < max(_LARGEST_STEP, 1e3 * last_size):  # NaN too
-                break
-            try:
-                now = self._moved(now, step)
-            except InvertedError:
-                outcome = Outcome.INVERTED
-                break
-            force = solution.state.force
-            last_error, error = error, self._residual(now, solution.state)
-            if error <= _TARGET_RESIDUAL or 0.3 * last_error < error <= TOLERANCE:
-                if self._instability(now):
+            if after is None:
+                if factors:
+                    outcome = Outcome.INVERTED if solution.outcome.ok else solution.outcome
                     break
-                state = self._state(now, solution.state)
-                return replace(solution, state=state, residual=max(solution.residual, error), iterations=spent)
+                linearisation = None
+                continue
+            now, force = after, solution.state.force
+            last_error, error = error, self._residual(now, solution.state)
+            if _converged(error, last_error):
+                return self._finished(now, solution, error, spent)
             if error > _SLOW * last_error:
                 linearisation = None
+        return self._failed(now, outcome, error, spent)
+
+    def _iterate_damped(self) -> ContactSolution:
+        """Iterate from the first state with a multiple of the linear stiffness added to the tangent.
+
+        The multiple goes with the residual and ends at zero (pseudo-transient continuation, Kelley and Keyes 1998).
+        """
+        now, force = self._at(self.start.unknowns), self.start.force
+        damping, spent, error = _FIRST_DAMPING, 0, math.inf
+        for _ in range(_DAMPED_FACTORS):
+            solution, after = self._advance(now, force, self._linearise(now, force, damping))
+            spent += solution.iterations
+            if after is None:
+                damping = max(damping, _LEAST_DAMPING) * _MORE_DAMPING
+                continue
+            now, force = after, solution.state.force
+            last_error, error = error, self._residual(now, solution.state)
+            if _converged(error, last_error):
+                return self._finished(now, solution, error, spent)
+            change = error / last_error if math.isfinite(last_error) else 1.0
+            damping = min(damping * min(max(change, 1.0 / _MORE_DAMPING), 2.0), _MORE_DAMPING)
+            damping = damping if damping > _LEAST_DAMPING else 0.0
+        return self._failed(now, Outcome.NEWTON, error, spent)
+
+    def _advance(
+        self, now: _Configuration, force: Float, linearisation: Linearisation
+    ) -> tuple[ContactSolution, _Configuration | None]:
+        """Return the contact solution, and the next configuration; None if there is no solution, or a cell inverts."""
+        solution, step = self._step(now, force, linearisation)
+        if not solution.outcome.ok or not np.isfinite(step).all():
+            return solution, None
+        try:
+            return solution, self._moved(now, step)
+        except InvertedError:
+            return solution, None
+
+    def _finished(self, now: _Configuration, solution: ContactSolution, error: float, spent: int) -> ContactSolution:
+        """Return the solution with the state at the end, unless the material law is unstable there."""
+        if self._instability(now):
+            return self._failed(now, Outcome.UNSTABLE, error, spent)
+        state, error = self._state(now, solution.state), max(solution.residual, error)
+        return replace(solution, state=state, residual=error, iterations=spent)
+
+    def _failed(self, now: _Configuration, outcome: Outcome, error: float, spent: int) -> ContactSolution:
+        """Return the first state with what is known of the failure; later increments begin with a new tangent."""
+        last = self.workspace.linearisations.get(self._has_inclusions)
+        if last is not None:
+            self.workspace.linearisations[self._has_inclusions] = replace(last, reusable=False)
         detail = self._instability(now)
         return ContactSolution(self.start, Outcome.UNSTABLE if detail else outcome, error, spent, "none", detail)
+
+    def _last_linearisation(self) -> Linearisation | None:
+        last = self.workspace.linearisations.get(self._has_inclusions)
+        return last if last is not None and last.reusable else None
 
     @property
     def _has_inclusions(self) -> bool:
@@ -190,6 +190,22 @@ class FiniteIncrement:
     @cached_property
     def _length_scale(self) -> float:
         return length_scale(self.problem, self.a, self.b)
+
+    @cached_property
+    def _largest_step(self) -> float:
+        """Largest displacement (mm) of an iteration: a multiple of that of the object, or a share of the depth."""
+        problem = self.problem
+        at = problem.surface.trace @ displacement(problem.mesh, self.start.unknowns)
+        moved = float(np.abs(carried_by_object(problem, self.a, self.b, at)).max(initial=0.0))
+        return max(_LARGEST_STEP * moved, _LEAST_STEP * self._length_scale)
+
+    @cached_property
+    def _least_force(self) -> float:
+        """Force (N) that the residual is at least divided by; without contact only round-off is left."""
+        before = float(np.linalg.norm(self.start.force, axis=1).max())
+        shear, width = self.body.solid.material.law.shear, self.body.solid.thickness
+        area = self._length_scale * (width if self.problem.dim == 2 else self._length_scale)
+        return max(before, _NEGLIGIBLE * shear * area)
 
     @cached_property
     def _augmentation(self) -> Float:
@@ -226,35 +242,44 @@ class FiniteIncrement:
         InvertedError
             If even the shortest fraction inverts a cell.
         """
+        largest = float(np.abs(step[: self.problem.mesh.points.size]).max())
+        whole = min(1.0, self._largest_step / largest) if largest else 1.0
         for length in _STEP_LENGTHS:
             try:
-                return self._at(now.x + length * step)
+                return self._at(now.x + whole * length * step)
             except InvertedError:
                 continue
         raise InvertedError
 
-    def _linearise(self, now: _Configuration, force: Float) -> Linearisation:
-        """Factor the tangent under contact forces (c, d), and leave it to later increments."""
+    def _linearise(self, now: _Configuration, force: Float, damping: float = 0.0) -> Linearisation:
+        """Factor the tangent under contact forces (c, d), and leave it to later increments.
+
+        `damping` times the linear stiffness of the displacements is added.
+        """
         problem, pattern = self.problem, self.body.contact_rows
         active = problem.system.active_dofs
         entries = on_places(now.contact.rows[active], pattern)
         rows = sp.csr_matrix((entries, pattern.indices, pattern.indptr), pattern.shape)
-        tangent = self.body.tangent(now.x).less(now.contact.geometric_stiffness(problem.surface, force[:, 0]))
+        curvature = curvature_of(problem, problem.surface, displacement(problem.mesh, now.x), self.b)
+        moving = now.contact.geometric_stiffness(problem.surface, force[:, 0], curvature)
+        tangent = self.body.tangent(now.x).less(moving)
+        if damping:
+            n = problem.mesh.points.size
+            tangent = tangent.less(-damping * problem.part.stiffness.upper[:n, :n])
         last = self.workspace.linearisations.pop(self._has_inclusions, None)
         replaced = last.condensation if last else None
         condensed = condense(tangent, problem.part.fixed_dofs, rows, replaced=replaced)
         self.workspace.factorizations += condensed.factorizations
         delassus = scatter_to_points(condensed.compliance, active, *force.shape)
-        found = self.workspace.linearisations[self._has_inclusions] = Linearisation(
-            condensed, now.contact.bases, delassus
-        )
+        found = Linearisation(condensed, now.contact.bases, delassus, reusable=not damping)
+        self.workspace.linearisations[self._has_inclusions] = found
         return found
 
     def _step(self, now: _Configuration, force: Float, linearisation: Linearisation) -> tuple[ContactSolution, Float]:
         """Solve contact of the linearised body; returns the solution and the step (N,) of the unknowns."""
         problem, start = self.problem, transported(self.start, now.contact.bases)
         settled = linearisation.condensation.solve(-self._out_of_balance(now, force))
-        delassus = linearisation.delassus_active(now.contact.bases)
+        delassus = linearisation.delassus_along(now.contact.bases)
         compliance = self._object_compliance
         if compliance is not None:
             delassus = delassus + rotated(compliance, now.contact.bases @ vertical_frame(problem.dim).T)
@@ -312,8 +337,8 @@ class FiniteIncrement:
     def _residual(self, now: _Configuration, solution: ContactState) -> float:
         """Largest violation of contact conditions, equilibrium and p = K (J - 1), dimensionless.
 
-        Lengths are divided by the depth, forces by the largest nodal force, p by the shear modulus.  The friction
-        coefficients are those that the contact solution has used.
+        Lengths are divided by the depth, forces by the largest at a contact point, p by the shear modulus.  The
+        friction coefficients are those that the contact solution has used.
         """
         problem, force = self.problem, solution.force
         mesh, n = problem.mesh, problem.mesh.points.size
@@ -321,8 +346,9 @@ class FiniteIncrement:
         mu = tangential / np.where(normal > 0.0, normal, 1.0)
         unbalanced = self._out_of_balance(now, force)
         unbalanced[problem.part.fixed_dofs] = 0.0
-        largest = np.linalg.norm(force, axis=1).max() or np.abs(now.internal[:n]).max() or 1.0
-        equilibrium = float(np.abs(unbalanced[:n]).max() / largest)
+        equilibrium = float(np.abs(unbalanced[:n]).max()) / max(
+            float(np.linalg.norm(force, axis=1).max()), self._least_force
+        )
         volume = float(np.abs(np.linalg.det(np.diff(mesh.points[mesh.cells[:, : mesh.dim + 1]], axis=1))).mean())
         volume *= problem.part.thickness / math.factorial(mesh.dim) * self.body.solid.pressure_scale
         dilatation = float(np.abs(unbalanced[n:]).max(initial=0.0)) / volume

@@ -18,7 +18,8 @@ from finger3d.fem.tensors import determinant
 from finger3d.fem.traces import BoundarySurface
 from finger3d.mechanics.cost import AddedCost, PressCost
 from finger3d.mechanics.finite_body import FiniteBody
-from finger3d.mechanics.finite_increment import DeformedState, FiniteIncrement, FiniteStrainWorkspace, contact_of
+from finger3d.mechanics.finite_increment import FiniteIncrement
+from finger3d.mechanics.finite_state import DeformedState, FiniteStrainWorkspace, contact_of
 from finger3d.mechanics.formulation import Workspace, moment_of
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.relaxation import InternalVariables, Relaxation, Step, relaxed
