@@ -63,6 +63,9 @@ _LARGEST_STEP, _LEAST_STEP = 2.0, 0.05
 _DAMPED_FACTORS = 40
 """Largest number of damped iterations."""
 
+_FADING = 0.6
+"""Factor by which the damping at least falls where the residual does."""
+
 _FIRST_DAMPING, _MORE_DAMPING, _LEAST_DAMPING = 1.0, 10.0, 1e-4
 """Linear stiffness added to the tangent at first, factor by which it grows where an iteration fails (and its largest
 change and value), and share below which none is added."""
@@ -148,7 +151,8 @@ class FiniteIncrement:
             if _converged(error, last_error):
                 return self._finished(now, solution, error, spent)
             change = error / last_error if math.isfinite(last_error) else 1.0
-            damping = min(damping * min(max(change, 1.0 / _MORE_DAMPING), 2.0), _MORE_DAMPING)
+            damping *= max(change, 1.0 / _MORE_DAMPING) * _FADING if change < 1.0 else min(change, 2.0)
+            damping = min(damping, _MORE_DAMPING)
             damping = damping if damping > _LEAST_DAMPING else 0.0
         return self._failed(now, Outcome.NEWTON, error, spent)
 
