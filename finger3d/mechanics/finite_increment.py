@@ -218,7 +218,7 @@ class FiniteIncrement:
         return augmentation_parameters(delassus.reshape(c * d, c * d), d)
 
     def _first_configuration(self) -> _Configuration:
-        """Return the configuration extrapolated from the increment before, or that of the first state."""
+        """Return the configuration extrapolated from a similar press or the increment before, or the first state's."""
         for x in self._extrapolated():
             try:
                 return self._at(x)
@@ -227,6 +227,10 @@ class FiniteIncrement:
         return self._at(self.start.unknowns)
 
     def _extrapolated(self) -> Iterator[Float]:
+        if self.workspace.similar is not None:
+            before, after = self.workspace.similar
+            if isinstance(before, DeformedState) and isinstance(after, DeformedState):
+                yield self.start.unknowns + after.unknowns - before.unknowns
         if self.start.previous is not None:
             pose, x = self.start.previous
             ratio = stride_ratio(pose, self.a, self.b)
@@ -265,7 +269,7 @@ class FiniteIncrement:
         entries = on_places(now.contact.rows[active], pattern)
         rows = sp.csr_matrix((entries, pattern.indices, pattern.indptr), pattern.shape)
         curvature = curvature_of(problem, problem.surface, displacement(problem.mesh, now.x), self.b)
-        moving = now.contact.geometric_stiffness(problem.surface, force[:, 0], curvature)
+        moving = now.contact.geometric_stiffness(force[:, 0], curvature)
         tangent = self.body.tangent(now.x).less(moving)
         if damping:
             n = problem.mesh.points.size
@@ -288,19 +292,19 @@ class FiniteIncrement:
         if compliance is not None:
             delassus = delassus + rotated(compliance, now.contact.bases @ vertical_frame(problem.dim).T)
         free = self._relative_displacement(now, force)
-        free += self._active(now.contact.rows @ settled[: problem.mesh.points.size])
+        free += self._active(now.contact.displacements(displacement(problem.mesh, settled)).ravel())
         free -= (delassus.reshape(force.size, force.size) @ force.ravel()).reshape(force.shape)
         free[:, 1:] += start.tangential_displacement
         solution = solve_contact(problem, start, free, delassus, self._length_scale, force, self._augmentation)
-        change = self._active((solution.state.force - force).ravel()).ravel()
         load = np.zeros_like(settled)
-        load[: problem.mesh.points.size] = now.contact.rows.T @ change
+        change = self._active((solution.state.force - force).ravel())
+        load[: problem.mesh.points.size] = now.contact.nodal_forces(change).ravel()
         return solution, settled + linearisation.condensation.solve(load)
 
     def _out_of_balance(self, now: _Configuration, force: Float) -> Float:
         """Internal less contact forces (N,)."""
         out = now.internal.copy()
-        out[: self.problem.mesh.points.size] -= now.contact.rows.T @ self._active(force.ravel()).ravel()
+        out[: self.problem.mesh.points.size] -= now.contact.nodal_forces(self._active(force.ravel())).ravel()
         return out
 
     def _active(self, vector: Float) -> Float:

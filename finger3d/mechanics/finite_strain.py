@@ -157,8 +157,7 @@ class FiniteStrain:
         mesh = problem.mesh
         u = displacement(mesh, self.unknowns(problem, state))
         contact = contact_of(problem, problem.surface, u, target)
-        nodal = (contact.rows.T @ state.force.ravel()).reshape(u.shape)
-        return moment_of(mesh.points + u, nodal)
+        return moment_of(mesh.points + u, contact.nodal_forces(state.force))
 
     def gap(self, problem: Problem, u: Float, target: ObjectPose, surface: BoundarySurface) -> tuple[Float, Float]:
         """Return gaps and normals in the deformed configuration."""

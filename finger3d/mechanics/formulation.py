@@ -33,10 +33,12 @@ class Workspace:
     ----------
     factorizations : number of factorisations made with this workspace
     tracker : distances of the finger's surface from the object
+    similar : states of a similar press at both ends of the next increment, as its initial guess; None without
     """
 
     factorizations: int = 0
     tracker: DistanceTracker = field(default_factory=DistanceTracker)
+    similar: tuple[ContactState, ContactState] | None = None
 
 
 class Formulation(Protocol):

@@ -1,18 +1,21 @@
-"""Presses of one condensed body with several friction laws and paths, in parallel if that is faster."""
+"""Presses of one body with several friction laws and paths: in parallel, or increment by increment in turn."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from itertools import islice
 from threading import Event
 from typing import TypeVar
 
 from finger3d._machine import cores
+from finger3d._types import Float
 from finger3d.contact.acceleration import one_thread
 from finger3d.mechanics.formulation import Workspace
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.solve import march
 
 Variant = TypeVar("Variant")
 Result = TypeVar("Result")
@@ -71,3 +74,36 @@ def map_parallel(
         finally:
             cancel.set()
             pool.shutdown(cancel_futures=True)
+
+
+def march_together(
+    problems: Sequence[Problem], workspace: Workspace, cancel: Event
+) -> Iterator[tuple[int, StepResult]]:
+    """Press one body with several friction laws at once: every increment with all of them before the next.
+
+    All share the factor of an increment, and each begins with what the increment changed under the law before.
+
+    Yields
+    ------
+    Number of the problem, and the result of its next increment.
+    """
+    guesses: list[list[Float]] = [[] for _ in problems]
+    running = [march(problem, guess, workspace, cancel) for problem, guess in zip(problems, guesses, strict=True)]
+    states = [problem.model.formulation.start(problem) for problem in problems]
+    ended: set[int] = set()
+    while len(ended) < len(problems):
+        similar = None
+        for number, steps in enumerate(running):
+            if number in ended:
+                continue
+            before = states[number]
+            if similar is not None:
+                guesses[number].append(before.force + similar[1].force - similar[0].force)
+            workspace.similar = similar
+            step = next(steps, None)
+            workspace.similar = None
+            if step is None:
+                ended.add(number)
+                continue
+            states[number], similar = step.part, (before, step.part)
+            yield number, step

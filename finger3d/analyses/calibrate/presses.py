@@ -13,7 +13,7 @@ from threading import Event
 from finger3d._types import Float
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.history import StepResult
-from finger3d.mechanics.parallel import map_parallel
+from finger3d.mechanics.parallel import map_parallel, march_together
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
 
@@ -66,12 +66,27 @@ def press(
 
 def presses(problem: Problem, mus: Sequence[float], initial: PressesByMu | None = None) -> Iterator[Press]:
     """Yield a press for each of ascending values of mu, started from the press of `initial` with the same mu if any."""
+    if problem.model.formulation.finite_strain:
+        yield from _together(problem, mus)
+        return
     known = initial or {}
 
     def pressed(mu: float, before: Sequence[Press], workspace: Workspace, cancel: Event) -> Press:
         return press(problem, mu, [known[mu]] if mu in known else before, workspace, cancel)
 
-    return map_parallel(problem, pressed, mus)
+    yield from map_parallel(problem, pressed, mus)
+
+
+def _together(problem: Problem, mus: Sequence[float]) -> Iterator[Press]:
+    """Yield the presses with all values of mu, which share the factors of every increment."""
+    workspace, model = problem.model.formulation.workspace(), problem.model
+    problems = [replace(problem, model=replace(model, friction=model.friction.with_mu(mu))) for mu in mus]
+    steps: list[list[StepResult]] = [[] for _ in mus]
+    for number, step in march_together(problems, workspace, Event()):
+        steps[number].append(step)
+    for number, (mu, own) in enumerate(zip(mus, steps, strict=True)):
+        forces = tuple(step.part.force for step in own)
+        yield Press(mu, own[-1], forces, 0 if number else workspace.factorizations)
 
 
 def _start(problem: Problem, mu: float, near: Sequence[Press]) -> list[Float]:
