@@ -14,8 +14,10 @@ from finger3d.effects.large_deformation import Effect
 from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.errors import Outcome
 from finger3d.fem.material import Isotropic
+from finger3d.fem.simplex import FREE_FACES
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
+from finger3d.mechanics.coverage import check_surface
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.small_strain import SmallStrain
@@ -144,6 +146,42 @@ def test_slide_of_several_contact_lengths_reaches_mu_n() -> None:
     got = measure(problem.points, end)
     assert end.outcome.ok
     assert got["tangential_force_x_N"] == pytest.approx(0.3 * got["normal_force_N"], rel=1e-8)
+
+
+def test_a_cylinder_is_pressed_past_its_equator() -> None:
+    # the dent is 3.5 times as deep as the cylinder is wide at its equator, where its walls become vertical
+    body = designs()["block"](half_length_mm=10.0, height_mm=10.0, width_mm=1.0)
+    model = Model(
+        body, Isotropic(1.0, 0.3), MeshOptions(0.25, 2.0, "swept"), (Leg(3.5, steps=14),),
+        object=Cylinder(radius_mm=1.0), friction=Coulomb(0.2), domain="plane-strain",
+    )  # fmt: skip
+    problem = build(Effect().apply(model))
+    *_, end = march(problem)
+    assert end.outcome.ok
+    assert end.state.bases is not None
+    touching = end.state.force[:, 0] > 0.0
+    assert end.state.bases[touching, 0, 1].max() > -0.35  # normals up to 70 degrees from the vertical
+    (check,) = check_surface(problem, [end])
+    assert check.within_candidates
+    assert check.penetration_mm < 0.01 * 3.5
+
+
+def test_a_bonded_block_folds_over() -> None:
+    # walls roll onto the plane (validation/REFERENCES.md, 6.5); frictionless plates would let them bulge only
+    body = designs()["block"](half_length_mm=5.0, height_mm=10.0, width_mm=1.0)
+    model = Model(
+        body, Isotropic(1.0, 0.45), MeshOptions(0.5, 1.0, "swept"), (Leg(3.0, steps=8),),
+        friction=Coulomb(1.0), domain="plane-strain",
+    )  # fmt: skip
+    problem = build(Effect().apply(model), margin=np.inf)
+    frames = list(march(problem))
+    assert frames[-1].outcome.ok
+    walls = problem.points.face == FREE_FACES.index("walls")
+    touching = [np.count_nonzero(frame.state.force[walls, 0] > 0.0) for frame in frames]
+    assert touching[2] < touching[-1]
+    checks = check_surface(problem, frames)
+    assert all(check.within_candidates for check in checks)
+    assert max(check.penetration_mm for check in checks) < 0.03 * 3.0
 
 
 def test_a_press_too_deep_ends_in_an_outcome_with_all_earlier_steps_kept() -> None:

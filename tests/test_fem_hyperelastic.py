@@ -100,6 +100,45 @@ def test_a_relaxing_stress_is_that_of_its_parts() -> None:
     assert np.abs(elastic[:size]).max() > 1e-3
 
 
+@pytest.mark.parametrize(("dim", "nu"), [(2, 0.3), (2, 0.5), (3, 0.3), (3, 0.49)])
+def test_patch_at_finite_strain(dim: int, nu: float) -> None:
+    # on a distorted mesh of straight edges, a homogeneous deformation given at the boundary is found inside; from
+    # nu = 0.49 on one that keeps the volume
+    rng = np.random.default_rng(5)
+    mesh = quadratic(grid((3,) * dim, 0.2))
+    solid = body(mesh, nu)
+    f = np.eye(dim) + 0.15 * rng.normal(size=(dim, dim))
+    f *= (1.0 if nu >= 0.49 else 1.2) / abs(np.linalg.det(f)) ** (1.0 / dim)
+    exact = mesh.points @ (f - np.eye(dim)).T
+    boundary = np.unique(np.concatenate([facets.ravel() for facets in mesh.facets.values()]))
+    held = np.zeros(unknowns(solid), dtype=bool)
+    held[: mesh.points.size].reshape(-1, dim)[boundary] = True
+    free = np.flatnonzero(~held)
+    x = np.concatenate([exact.ravel(), np.zeros(unknowns(solid) - mesh.points.size)])
+    x[free[free < mesh.points.size]] += 0.005 * rng.normal(size=np.count_nonzero(free < mesh.points.size))
+    for _ in range(20):
+        step = splu(full(solid.tangent(x).upper)[free][:, free].tocsc()).solve(-solid.internal_forces(x)[free])
+        x[free] += step
+    assert np.abs(x[: mesh.points.size] - exact.ravel()).max() < 1e-10
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_internal_forces_turn_with_a_superposed_rotation(dim: int) -> None:
+    mesh = mapped(grid((2,) * dim, 0.1), lambda x: x)
+    rng, solid = np.random.default_rng(6), body(mesh, 0.49)
+    turn = np.linalg.qr(rng.normal(size=(dim, dim)))[0]
+    turn[0] *= np.linalg.det(turn)
+    x = 0.02 * rng.normal(size=unknowns(solid))
+    size = mesh.points.size
+    u = x[:size].reshape(-1, dim)
+    turned = x.copy()
+    turned[:size] = ((mesh.points + u) @ turn.T - mesh.points).ravel()
+    here, there = solid.internal_forces(x), solid.internal_forces(turned)
+    assert np.abs(there[:size].reshape(-1, dim) - here[:size].reshape(-1, dim) @ turn.T).max() < 1e-14
+    assert np.abs(there[size:] - here[size:]).max() < 1e-14
+    assert solid.energy(turned) == pytest.approx(solid.energy(x), rel=1e-12)
+
+
 def test_inverted_cells_are_an_error() -> None:
     mesh = quadratic(grid((1, 1, 1)))
     with pytest.raises(InvertedError):

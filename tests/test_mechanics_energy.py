@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from finger3d.contact.friction import Coulomb
+from finger3d.effects.large_deformation import Effect as LargeDeformation
+from finger3d.fem.material import Isotropic
 from finger3d.mechanics.build import build
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Leg
@@ -52,3 +54,22 @@ def test_dissipation_of_a_press_that_slips_everywhere_is_good_in_ten_increments(
     # the friction of the end of each increment instead of its mean would leave 15 % (1.5 / steps)
     assert few.dissipation_mJ == pytest.approx(many.dissipation_mJ, rel=0.01)
     assert few.external_work_mJ == pytest.approx(many.external_work_mJ, rel=2e-4)
+
+
+@pytest.mark.parametrize("nu", [0.3, 0.49])
+def test_work_at_large_deformation_is_the_energy_stored_and_dissipated(nu: float) -> None:
+    # trapezoids: second order in the increment, and 1e-3 of the work in a few
+    legs = (Leg(6.0), Leg(6.0, slide_x_mm=3.0))
+    model = LargeDeformation().apply(fig9(domain="plane-strain", legs=legs, material=Isotropic(1.0, nu)))
+    body = build(model)
+    excess = []
+    for steps in (5, 10, 20):
+        problem = replace(body, model=replace(model, legs=tuple(replace(leg, steps=steps) for leg in legs)))
+        workspace = problem.model.formulation.workspace()
+        end = list(march(problem, workspace=workspace))[-1]
+        assert end.outcome.ok
+        solid = workspace.bodies[False].solid
+        energy = 2 ** len(problem.axes) * solid.energy(problem.model.formulation.unknowns(problem, end.part))
+        excess.append(abs(end.external_work_mJ - energy - end.dissipation_mJ) / end.external_work_mJ)
+    assert excess[1] < 1e-3
+    assert excess[2] < 0.4 * excess[0]

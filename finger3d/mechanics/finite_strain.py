@@ -152,6 +152,17 @@ class FiniteStrain:
         names = [gauge.name for gauge in problem.model.gauges]
         return dict(zip(names, map(float, foils.gauge_weights @ bars.strain(u, yielded)), strict=True))
 
+    def work_on_body(
+        self, problem: Problem, before: ContactState, after: ContactState, a: ObjectPose, b: ObjectPose
+    ) -> float:
+        """Return the sum of the mean nodal forces times the displacements of the nodes."""
+        ends = []
+        for state, target in ((before, a), (after, b)):
+            u = displacement(problem.mesh, self.unknowns(problem, state))
+            ends.append((u, contact_of(problem, problem.surface, u, target).nodal_forces(state.force)))
+        (u, force), (u_after, force_after) = ends
+        return float(np.sum(0.5 * (force + force_after) * (u_after - u)))
+
     def moment(self, problem: Problem, state: ContactState, target: ObjectPose) -> Float:
         """Return the moment about the middle of the base, of nodal forces at the displaced nodes."""
         mesh = problem.mesh

@@ -115,6 +115,12 @@ class Formulation(Protocol):
         """Strain of every gauge by name."""
         ...
 
+    def work_on_body(
+        self, problem: Problem, before: ContactState, after: ContactState, a: ObjectPose, b: ObjectPose
+    ) -> float:
+        """Work (mJ) of the contact forces on the meshed part from one state to the next."""
+        ...
+
     def moment(self, problem: Problem, state: ContactState, target: ObjectPose) -> Float:
         """Moment (3,) N mm of the contact forces on the meshed part about the middle of the base."""
         ...

@@ -87,6 +87,15 @@ class SmallStrain:
         """Return the strains from the forces, by the rows of the gauges."""
         return problem.gauge_strains(problem.upright_force(state))
 
+    def work_on_body(
+        self, problem: Problem, before: ContactState, after: ContactState, a: ObjectPose, b: ObjectPose
+    ) -> float:
+        """Return the sum of the mean force of every point times its displacement."""
+        assert isinstance(before, LinearState)
+        assert isinstance(after, LinearState)
+        force = 0.5 * (before.scene_force + after.scene_force)
+        return float(np.sum(force * (after.displacement - before.displacement)))
+
     def moment(self, problem: Problem, state: ContactState, target: ObjectPose) -> Float:
         """Return the moment about the middle of the base, of forces at the centroids of their points at rest."""
         return moment_of(problem.surface.centroids, state.scene_force)
