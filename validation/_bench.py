@@ -31,6 +31,7 @@ from finger3d._machine import cores
 from finger3d.analyses.calibrate.presses import presses
 from finger3d.analyses.study_rows import Row
 from finger3d.contact.friction import Coulomb
+from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.files import read_surface
 from finger3d.geometry.registry import designs
@@ -248,6 +249,7 @@ def run(quick: bool) -> tuple[Row, ...]:
         what = f"pytetwild on a warm cache against a cold one ({made[0]:.1f} s)"
         rows.append(_row(what, 0.02, made[1] / made[0], load, "0: only reading the file is left"))
     rows += _objects(5.0 if quick else 2.5, load, repeats)
+    rows += _large_deformation(QUICK if quick else MIDDLE, load)
     rows += _beside_calculix(quick, load)
     for size, most in zip(sizes, (2.0,) if quick else (2.0, 5.0), strict=True):
         peak = max(r["peak_MB"] for r in runs[size]) / 1024.0
@@ -282,6 +284,34 @@ def _objects(size: float, load: float, repeats: int) -> list[Row]:
     surface.signed_distance(points)
     what = f"distances of 5000 points from {len(ball.faces)} triangles, s"
     return [*rows, _row(what, 0.5, time.perf_counter() - begin, load)]
+
+
+def _large_deformation(size: float, load: float) -> list[Row]:
+    """Return factorisations and time of a press at large deformation, of many presses over one, and of a section."""
+    model = LargeDeformation().apply(fig9(size))
+    problem = build(model)
+    workspace = model.formulation.workspace()
+    begin = time.perf_counter()
+    if not all(step.outcome.ok for step in march(problem, workspace=workspace)):
+        raise AssertionError("large deformation did not settle")
+    one = time.perf_counter() - begin
+    body = f"large deformation, {problem.part.stiffness.upper.shape[0]} unknowns, 10 increments"
+    rows = [
+        _row(f"{body}: factorisations", 15.0, workspace.factorizations, load),
+        _row(f"{body}: time over that of one condensation", 20.0, one / problem.part.condensed.seconds, load),
+    ]
+    mus = np.linspace(0.05, 1.25, 3 if size == QUICK else 25)
+    begin = time.perf_counter()
+    if not all(press.frame.outcome.ok for press in presses(problem, [float(mu) for mu in mus])):
+        raise AssertionError("not every mu converged")
+    rows.append(_row(f"{body}: {len(mus)} values of mu against one", 8.0, (time.perf_counter() - begin) / one, load))
+    section = build(LargeDeformation().apply(fig9(1.0, "plane-strain")))
+    begin = time.perf_counter()
+    if not all(step.outcome.ok for step in march(section)):
+        raise AssertionError("large deformation of the section did not settle")
+    seconds = time.perf_counter() - begin
+    what = f"large deformation of the section, {section.part.stiffness.upper.shape[0]} unknowns, 10 increments, s"
+    return [*rows, _row(what, 1.0, seconds, load)]
 
 
 def _beside_calculix(quick: bool, load: float) -> list[Row]:
