@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws import IsochoricLaw, MooneyRivlin, NeoHooke, Ogden, Yeoh
+from finger3d.fem.laws.base import Derivatives
+from finger3d.fem.laws.invariants import InvariantLaw
 from finger3d.fem.laws.stability import least_stiffness, unstable_from
 
 G = 0.7
@@ -19,7 +23,26 @@ LAWS: dict[str, IsochoricLaw] = {
 }
 
 
-@pytest.fixture(params=LAWS.values(), ids=LAWS.keys())
+@dataclass(frozen=True)
+class Polynomial(InvariantLaw):
+    """A law with all second derivatives by the invariants, which none of the package has."""
+
+    is_stable = True
+
+    def of_invariants(self, x1: np.ndarray, x2: np.ndarray) -> np.ndarray:
+        a, b = x1 - 3.0, x2 - 3.0
+        return self.shear * (0.3 * a + 0.2 * b + 0.02 * a**2 + 0.03 * a * b + 0.01 * b**2)
+
+    def derivatives(self, x1: np.ndarray, x2: np.ndarray) -> Derivatives:
+        a, b, one = x1 - 3.0, x2 - 3.0, np.full_like(x1, self.shear)
+        first = one * (0.3 + 0.04 * a + 0.03 * b)
+        return Derivatives(first, one * (0.2 + 0.03 * a + 0.02 * b), 0.04 * one, 0.03 * one, 0.02 * one)
+
+
+EACH = LAWS | {"polynomial": Polynomial(G)}
+
+
+@pytest.fixture(params=EACH.values(), ids=EACH.keys())
 def law(request: pytest.FixtureRequest) -> IsochoricLaw:
     return request.param
 

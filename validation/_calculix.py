@@ -61,10 +61,10 @@ def deck(mesh: Mesh, E: float, nu: float, mu: float, depths: list[float], finite
     return "\n".join(lines) + "\n"
 
 
-def faces(mesh: Mesh) -> list[str]:
-    """Lines `element, S<k>` of the facets labelled contact."""
+def faces(mesh: Mesh, labels: tuple[str, ...] = ("contact",)) -> list[str]:
+    """Lines `element, S<k>` of the facets with some labels."""
     d = mesh.dim
-    key = {tuple(sorted(f[:d])) for f in mesh.facets["contact"].tolist()}
+    key = {tuple(sorted(f[:d])) for label in labels for f in mesh.facets[label].tolist()}
     found = []
     for k, corners in enumerate(_FACES[d], start=1):
         faces = np.sort(mesh.cells[:, list(corners)], axis=1)

@@ -1,6 +1,6 @@
 """CalculiX input decks of finger3d meshes, one run, and the force, friction and time that it reports.
 
-Small strain, surface-to-surface penalty contact under a flat plate whose nodes are all moved.  Sources: CalculiX
+Surface-to-surface penalty contact under a flat plate whose nodes are all moved.  Sources: CalculiX
 CrunchiX user's manual 2.20, sec. 6.2 (elements), 6.7.8 (contact), 7 (cards).
 """
 
@@ -37,7 +37,11 @@ def version() -> str:
 
 @dataclass(frozen=True)
 class Pressed:
-    """A press: a quadratic mesh of the part, constants, depth (mm), and the planes that mirror it."""
+    """A press: a quadratic mesh of the part, constants, depth (mm), and the planes that mirror it.
+
+    `finite` is for finite strain and the neo-Hookean law with D1 = 2/K; `labels` are the faces that may touch the
+    plate, `penalty` and `stick` the stiffnesses of contact and friction, MPa/mm.
+    """
 
     mesh: Mesh
     E_MPa: float
@@ -47,6 +51,18 @@ class Pressed:
     steps: int
     thickness_mm: float
     axes: tuple[str, ...]
+    finite: bool = False
+    labels: tuple[str, ...] = ("contact",)
+    penalty: float = PENALTY
+    stick: float = STICK_SLOPE
+
+    @property
+    def law(self) -> list[str]:
+        """Cards of the material."""
+        if not self.finite:
+            return ["*ELASTIC", f"{self.E_MPa:g}, {self.nu:g}"]
+        shear, bulk = self.E_MPa / (2.0 * (1.0 + self.nu)), self.E_MPa / (3.0 * (1.0 - 2.0 * self.nu))
+        return ["*HYPERELASTIC, NEO HOOKE", f"{shear / 2.0:.12g}, {2.0 / bulk:.12g}"]
 
 
 @dataclass(frozen=True)
@@ -126,18 +142,19 @@ def deck(press: Pressed) -> str:
     ]
     section = [f"{press.thickness_mm:g}"] if d == 2 else []
     lines += [
-        "*MATERIAL, NAME=RUBBER", "*ELASTIC", f"{press.E_MPa:g}, {press.nu:g}",
+        "*MATERIAL, NAME=RUBBER", *press.law,
         "*MATERIAL, NAME=PLATE", "*ELASTIC", "1000., 0.",
         "*SOLID SECTION, ELSET=BODY, MATERIAL=RUBBER", *section,
         "*SOLID SECTION, ELSET=PLATE, MATERIAL=PLATE", *section,
-        "*SURFACE, NAME=FINGER, TYPE=ELEMENT", *faces(mesh),
+        "*SURFACE, NAME=FINGER, TYPE=ELEMENT", *faces(mesh, press.labels),
         "*SURFACE, NAME=UNDER, TYPE=ELEMENT", f"{e + 1}, S1",
         "*SURFACE INTERACTION, NAME=TOUCH",
-        "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", f"{PENALTY:g}",
-        "*FRICTION", f"{press.mu:g}, {STICK_SLOPE:g}",
+        "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", f"{press.penalty:g}",
+        *(["*FRICTION", f"{press.mu:g}, {press.stick:g}"] if press.mu else []),
         "*CONTACT PAIR, INTERACTION=TOUCH, TYPE=SURFACE TO SURFACE", "FINGER, UNDER",
         "*BOUNDARY", *_held(press, n, len(plate)),
-        f"*STEP, INC={10 * press.steps}", "*STATIC", f"{1.0 / press.steps:.12g}, 1., 1e-5, {1.0 / press.steps:.12g}",
+        f"*STEP, INC={10 * press.steps}" + ", NLGEOM" * press.finite,
+        "*STATIC", f"{1.0 / press.steps:.12g}, 1., 1e-5, {1.0 / press.steps:.12g}",
         "*BOUNDARY", f"NPLATE, 2, 2, {-press.depth_mm:g}",
         "*NODE PRINT, NSET=NPLATE, FREQUENCY=1, TOTALS=ONLY", "RF",
         "*END STEP",

@@ -20,7 +20,7 @@ from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.accuracy.richardson import ORDER, mesh_error
 from finger3d.errors import Finger3dError
 from finger3d.io import AREAS, MAIN
-from finger3d.mechanics.cost import FACTORISATIONS
+from finger3d.mechanics.cost import finite_strain_s
 from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.path import AUTO_START
 from finger3d.mechanics.problem import Problem
@@ -165,13 +165,11 @@ def _marching_cost(problem: Problem) -> float:
     """Return the modelled seconds of all increments, from their number, the contact points and the unknowns."""
     model = problem.model
     count = sum(leg.steps if isinstance(leg.steps, int) else AUTO_START for leg in model.legs)
-    factorisations = 0
-    if model.formulation.finite_strain:
-        factorisations = FACTORISATIONS * count
-    elif model.formulation.refactorises:
-        factorisations = len(model.legs)
+    condensation = condensation_s(_unknowns(problem), problem.dim)
     contact = count * contact_s(len(problem.surface.nodes), problem.dim)
-    return contact + factorisations * condensation_s(_unknowns(problem), problem.dim)
+    if model.formulation.finite_strain:
+        return contact + count * finite_strain_s(_unknowns(problem), condensation)
+    return contact + len(model.legs) * condensation * model.formulation.refactorises
 
 
 def _budget(problem: Problem) -> float:

@@ -48,7 +48,7 @@ from finger3d.objects import ObjectPose, vertical_frame
 _ITERATIONS, _FACTORS = 60, 15
 """Largest number of iterations and of new factors in an increment."""
 
-_TARGET_RESIDUAL = 1e-9
+_TARGET_RESIDUAL = 5e-9
 """Residual at which the iteration ends; where round-off prevents it, one up to `TOLERANCE` that no longer falls."""
 
 _SLOW = 0.35

@@ -16,7 +16,7 @@ from finger3d.fem.laws import IsochoricLaw
 from finger3d.fem.recover import displacement, extrapolated
 from finger3d.fem.tensors import determinant
 from finger3d.fem.traces import BoundarySurface
-from finger3d.mechanics.cost import AddedCost, PressCost
+from finger3d.mechanics.cost import AddedCost, PressCost, finite_strain_s
 from finger3d.mechanics.finite_body import FiniteBody
 from finger3d.mechanics.finite_increment import FiniteIncrement
 from finger3d.mechanics.finite_state import DeformedState, FiniteStrainWorkspace, contact_of
@@ -27,21 +27,6 @@ from finger3d.objects import ObjectPose
 
 if TYPE_CHECKING:
     from finger3d.mechanics.model import Model
-
-_FACTORISATIONS = 1.5
-"""Factorisations of the tangent in an increment, typical of the studies of large deformation."""
-
-_ITERATIONS = 8
-"""Iterations of an increment, likewise."""
-
-_NUMERIC_FACTORISATION = 0.8
-"""Time of a factorisation whose ordering is known, over that of a condensation."""
-
-_TANGENT_ASSEMBLY = 0.8
-"""Time to assemble the tangent over that of the linear stiffness."""
-
-_OTHER_S = {2: 0.008, 3: 0.12}
-"""Further seconds of an increment, by dimension."""
 
 
 @dataclass(frozen=True)
@@ -67,12 +52,11 @@ class FiniteStrain:
 
     def added_cost(self, model: Model, press: PressCost) -> AddedCost:
         """Return the cost of the factorisations in every increment."""
-        increment = _FACTORISATIONS * _NUMERIC_FACTORISATION * press.seconds["condensation"]
-        increment += (_FACTORISATIONS + 1) * _TANGENT_ASSEMBLY * press.seconds["assembly"] + _OTHER_S[press.dim]
+        increment = finite_strain_s(press.dofs, press.seconds["condensation"])
         return AddedCost(
-            seconds=press.increments * increment + (_ITERATIONS - 1) * press.seconds["contact"],
+            seconds=press.increments * increment,
             memory_mb=press.factor_mb,
-            reason=f"about {_FACTORISATIONS} factorisations in each of {press.increments} steps",
+            reason=f"about one factorisation and nine iterations in each of {press.increments} steps",
         )
 
     def state_size(self, press: PressCost) -> float:

@@ -91,12 +91,12 @@ def march_together(
     running = [march(problem, guess, workspace, cancel) for problem, guess in zip(problems, guesses, strict=True)]
     states = [problem.model.formulation.start(problem) for problem in problems]
     ended: set[int] = set()
+    order = list(range(len(problems)))
     while len(ended) < len(problems):
         similar = None
-        for number, steps in enumerate(running):
-            if number in ended:
-                continue
-            before = states[number]
+        order.reverse()  # an increment begins with the law whose factor is at hand
+        for number in (n for n in order if n not in ended):
+            before, steps = states[number], running[number]
             if similar is not None:
                 guesses[number].append(before.force + similar[1].force - similar[0].force)
             workspace.similar = similar

@@ -114,10 +114,9 @@ def _right_cauchy_green(f: Float) -> Float:
 
 def _invariants(f: Float) -> tuple[Float, Float]:
     """Isochoric invariants (...,) of deformation gradients (..., 3, 3)."""
-    j, c = determinant(f), _right_cauchy_green(f)
-    i1 = np.trace(c, axis1=-2, axis2=-1)
-    i2 = 0.5 * (i1**2 - (c**2).sum(axis=(-2, -1)))
-    return np.asarray(j ** (-2.0 / 3.0) * i1), np.asarray(j ** (-4.0 / 3.0) * i2)
+    scale = determinant(f) ** (-2.0 / 3.0)
+    i1, i2 = (np.einsum("...ij,...ij->...", x, x) for x in (f, cofactor(f)))  # I2 = tr(cof C)
+    return np.asarray(scale * i1), np.asarray(scale**2 * i2)
 
 
 def _gradient_1(f: Float, inverse: Float, x1: Float) -> Float:
