@@ -5,8 +5,8 @@ cylinder on a half-plane, Hertz' length under the force found (Johnson 1985, sec
 were not among the cases that the floor and the order were chosen by.  Two meshes are so coarse that their companion is
 the finer one; a ball on a block has a companion by pytetwild; of two soft balls, both are meshed anew, and the truth,
 by pytetwild too, has edges no less than half as long.  The share is judged for every number in each kind of mesh:
-sections in plane stress and plane strain, swept solids, and solids by pytetwild.  Increments are judged on sections
-drawn at random, against 1280.
+sections in plane stress and plane strain, swept solids, and solids by pytetwild; apart at large deformation.
+Increments are judged on sections drawn at random, against 1280.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.elastic_object import SoftObject
+from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.design import Design
 from finger3d.geometry.registry import designs
@@ -76,9 +77,10 @@ class Case:
     def meshes(self) -> str:
         """The kind of mesh, for each of which the share is judged."""
         domain, mesher = self.model.domain, self.model.mesh.mesher
+        large = ", large deformation" if self.model.formulation.finite_strain else ""
         if domain != "solid":
-            return f"section in {domain.replace('-', ' ')}"
-        return "solid swept" if mesher == "swept" else "solid pytetwild"
+            return f"section in {domain.replace('-', ' ')}{large}"
+        return ("solid swept" if mesher == "swept" else "solid pytetwild") + large
 
     def at(self, size: float) -> Model:
         """The model at an edge length."""
@@ -147,6 +149,15 @@ def cases(quick: bool) -> list[Case]:
         model = _model(fig9, nu, "solid", 10.0, far)
         wild = replace(model, mesh=replace(model.mesh, mesher="ftetwild"))
         out.append(Case(f"Fig. 9, solid pytetwild, nu = {nu:g}", wild, (4.0, 2.8), 1.1, 4.0))
+    for nu in (0.4, 0.49):
+        for plane in planes:
+            model = LargeDeformation().apply(_model(half, nu, plane, 1.0, near))
+            name = f"half cylinder, {plane}, large deformation, nu = {nu:g}"
+            out.append(Case(name, model, (0.56, 0.4, 0.28, 0.2), 0.07, 5.0))
+            model = LargeDeformation().apply(_model(fig9, nu, plane, 10.0, far))
+            out.append(Case(f"Fig. 9, {plane}, large deformation, nu = {nu:g}", model, (5.6, 4.0, 2.8, 2.0), 0.7, 4.0))
+    model = LargeDeformation().apply(_model(fig9, 0.4, "solid", 10.0, far))
+    out.append(Case("Fig. 9, solid swept, large deformation, nu = 0.4", model, (4.0, 2.8), 1.7, 4.0))
     under = (Gauge("a", 0.5, 7.5, angle=0.5), Gauge("b", 0.0, 7.0))
     block = designs()["block"](half_length_mm=8.0, height_mm=8.0, width_mm=16.0)
     model = _model(block, 0.4, "solid", 0.5, under, Sphere(radius_mm=10.0))
