@@ -192,7 +192,7 @@ def test_large_deformation_goes_the_long_way_and_says_so(tmp_path: Path) -> None
     coarse = {"size_mm": 5.0, "base_size_mm": 15.0, "mesher": "swept"}
     large = scene(effects={"large_deformation": {}}, mesh=coarse, press={"depth_mm": 3.0, "steps": 2})
     found = calibrate(large, "g36", tmp_path, FEW[:4], tolerances=NONE, report=Told())
-    assert found.about["factorizations"] > 4 * 2  # at least one an increment: four values of mu, two increments each
+    assert found.about["factorizations"] > 2  # one of the build, and those of the increments, which all mu share
     assert len(found.mu) == 4
     assert any("full press" in line for line in Told.lines)
     assert not (tmp_path / "reduced.npz").exists()
@@ -200,6 +200,7 @@ def test_large_deformation_goes_the_long_way_and_says_so(tmp_path: Path) -> None
         calibrate(large, "g36", maps=True)
 
 
+@pytest.mark.slow
 def test_steps_that_are_chosen_automatically() -> None:
     auto = scene(press={"depth_mm": 10.0, "steps": "auto"})
     found = calibrate(auto, "g36", mus=FEW[:4], tolerances=NONE)

@@ -107,6 +107,7 @@ def test_fields_open_in_pyvista_and_agree_with_the_contact_table(tmp_path: Path)
     assert (grid.points + grid["displacement"])[:, 1].max() <= 4.5 + 2 * 0.4**2 / (8 * 5.0)
 
 
+@pytest.mark.slow
 def test_advice_comes_with_numbers_and_goes_when_it_is_followed(tmp_path: Path) -> None:
     said = {}
     for name, keys in {

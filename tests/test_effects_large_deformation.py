@@ -184,6 +184,7 @@ def test_a_bonded_block_folds_over() -> None:
     assert max(check.penetration_mm for check in checks) < 0.03 * 3.0
 
 
+@pytest.mark.slow
 def test_a_press_too_deep_ends_in_an_outcome_with_all_earlier_steps_kept() -> None:
     problem = build(fig9(0.3, 8.0, legs=(Leg(48.0, steps=6),)))
     frames = list(march(problem))

@@ -56,11 +56,10 @@ def test_dissipation_of_a_press_that_slips_everywhere_is_good_in_ten_increments(
     assert few.external_work_mJ == pytest.approx(many.external_work_mJ, rel=2e-4)
 
 
-@pytest.mark.parametrize("nu", [0.3, 0.49])
-def test_work_at_large_deformation_is_the_energy_stored_and_dissipated(nu: float) -> None:
+def test_work_at_large_deformation_is_the_energy_stored_and_dissipated() -> None:
     # trapezoids: second order in the increment, and 1e-3 of the work in a few
     legs = (Leg(6.0), Leg(6.0, slide_x_mm=3.0))
-    model = LargeDeformation().apply(fig9(domain="plane-strain", legs=legs, material=Isotropic(1.0, nu)))
+    model = LargeDeformation().apply(fig9(domain="plane-strain", legs=legs, material=Isotropic(1.0, 0.49)))
     body = build(model)
     excess = []
     for steps in (5, 10, 20):
