@@ -53,6 +53,22 @@ def test_field_follows_from_the_same_factor(solver: str) -> None:
     assert np.all(u[fixed] == 0.0)
 
 
+@pytest.mark.parametrize("columns", [(), (3,)])
+@pytest.mark.parametrize("solver", ["superlu", *(["pardiso"] if available() else [])])
+def test_elimination_gives_the_rows_before_their_forces_are_known(solver: str, columns: tuple[int, ...]) -> None:
+    """Against one solution with loads and row forces together, with a modulus that scales the matrix."""
+    mesh, matrix, fixed, rows = setup(0.49)
+    found = condense(replace(matrix, upper=1e5 * matrix.upper), fixed, rows, solver)
+    random = np.random.default_rng(0)
+    load, force = (random.normal(size=(n, *columns)) for n in (matrix.upper.shape[0], rows.shape[0]))
+    padded = sp.csr_matrix((rows.data, rows.indices, rows.indptr), (rows.shape[0], len(load)))
+    eliminated, alone = found.eliminated(load), found.solve(load)
+    assert eliminated.displacement == pytest.approx(padded @ alone, rel=1e-9, abs=1e-12 * np.abs(alone).max())
+    want = found.solve(load + padded.T @ force)
+    assert eliminated.unknowns(force).shape == load.shape
+    assert np.abs(eliminated.unknowns(force) - want).max() < 1e-11 * np.abs(want).max()
+
+
 @pytest.mark.parametrize("solver", ["superlu", *(["pardiso"] if available() else [])])
 def test_a_body_never_solves_with_the_factor_of_a_later_one(solver: str) -> None:
     """Twice the stiffness halves the displacements; the overwritten body may refuse, never answer for the other."""

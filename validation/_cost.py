@@ -16,6 +16,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from finger3d.contact.friction import OPEN, STICK, Coulomb
+from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.assembly import Stiffness, stiffness
 from finger3d.fem.condense import condense
 from finger3d.fem.material import Elasticity, Isotropic
@@ -23,6 +24,7 @@ from finger3d.fem.simplex import Mesh
 from finger3d.fem.traces import BoundarySurface, local_rows
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import MARGIN, candidate_points, contact_rows
+from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.history import ContactPoints, StepResult, measure
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.problem import ContactSystem, Part, Problem, free_surface
@@ -38,6 +40,7 @@ Float = NDArray[np.float64]
 MU = 0.25
 QUANTITIES = ("force", "contact_length", "stick_length", "friction_sum", "gauge_strain")
 SECTION, SOLID, HALF = "section", "solid", "half cylinder"
+LARGE = {body: f"{body}, large deformation" for body in (SECTION, SOLID)}
 
 
 @dataclass(frozen=True)
@@ -46,8 +49,8 @@ class Case:
 
     Attributes
     ----------
-    body : SECTION and SOLID are the Fig. 9 finger at nu = .49 in plane strain and 20 mm wide, pressed 10 mm; HALF is
-        the paper's half cylinder of 5 mm in plane stress, nu = .3, pressed 1 mm
+    body : SECTION and SOLID are the Fig. 9 finger at nu = .49 in plane strain and 20 mm wide, pressed 10 mm, and LARGE
+        the same at large deformation; HALF is the paper's half cylinder of 5 mm in plane stress, nu = .3, pressed 1 mm
     size, base : edge lengths (mm) at the contact and far from it
     element : mixed, quadratic or linear
     counts : increments; the one condensed body is pressed once for each
@@ -80,8 +83,9 @@ def model_of(case: Case) -> Model:
         )
     design = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     gauge = Gauge("g", 36.0, 40.0, angle=math.pi / 6)
-    domain: Any = "solid" if case.body == SOLID else "plane-strain"
-    return Model(design, Isotropic(1.0, nu), mesh, (Leg(10.0),), friction=Coulomb(MU), gauges=(gauge,), domain=domain)
+    domain: Any = "solid" if case.body in (SOLID, LARGE[SOLID]) else "plane-strain"
+    model = Model(design, Isotropic(1.0, nu), mesh, (Leg(10.0),), friction=Coulomb(MU), gauges=(gauge,), domain=domain)
+    return LargeDeformation().apply(model) if case.body in LARGE.values() else model
 
 
 def straight(mesh: Mesh) -> Mesh:
@@ -172,10 +176,10 @@ def condensed(parts: Parts, solver: str | None = None) -> Problem:
     )
 
 
-def in_steps(problem: Problem, count: int) -> list[StepResult]:
+def in_steps(problem: Problem, count: int, workspace: Workspace | None = None) -> list[StepResult]:
     """Frames of a press in so many increments."""
     legs = tuple(replace(leg, steps=count) for leg in problem.model.legs)
-    frames = list(march(replace(problem, model=replace(problem.model, legs=legs))))
+    frames = list(march(replace(problem, model=replace(problem.model, legs=legs)), workspace=workspace))
     if not frames[-1].outcome.ok:
         raise ArithmeticError(f"{count} increments, {frames[-1].target}: {frames[-1].outcome}")
     return frames

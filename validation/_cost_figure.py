@@ -5,16 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ._cost import QUANTITIES, Case
+from ._cost import LARGE, QUANTITIES, Case
 from ._cost_truth import seconds
 
 STYLES = {
     "mixed": ("C0", "o", "-"), "quadratic": ("C1", "s", "-"), "linear": ("C3", "^", "-"), "pytetwild": ("C4", "D", "-"),
-    "grading": ("C2", "x", ":"), "SuperLU": ("C5", "+", "--"), "one factorisation an iteration": ("C6", "*", "--"),
+    "large deformation": ("C7", "v", "-"), "grading": ("C2", "x", ":"), "SuperLU": ("C5", "+", "--"),
+    "one factorisation an iteration": ("C6", "*", "--"),
 }  # fmt: skip
 LABELS = {
     "mixed": "mixed", "quadratic": "quadratic", "linear": "linear", "pytetwild": "mixed, pytetwild (mesh made anew)",
-    "grading": "base size 1-32 times the contact's", "SuperLU": "SuperLU",
+    "large deformation": "mixed, large deformation", "grading": "base size 1-32 times the contact's",
+    "SuperLU": "SuperLU",
     "one factorisation an iteration": "one factorisation an iteration", "steps": "increments 1-200, one mesh",
 }  # fmt: skip
 NAMES = {
@@ -32,9 +34,18 @@ def draw(
     steps: Mapping[str, Mapping[str, Mapping[int, float]]],
     known_to: Mapping[str, Mapping[str, float]],
 ) -> None:
-    """Meshes by their error under ten increments; increments by theirs on one mesh; grey: not resolved by the truth."""
+    """Meshes by their error under ten increments; increments by theirs on one mesh; grey: not resolved by the truth.
+
+    Runs at large deformation are in the panels of their body, with errors relative to their own truth.
+    """
     from matplotlib.ticker import FuncFormatter, LogLocator
 
+    large = {body: made[name]["mixed"] for body, name in LARGE.items() if name in made}
+    made = {
+        body: {**series, **({"large deformation": large[body]} if body in large else {})}
+        for body, series in made.items()
+        if body not in LARGE.values()
+    }
     figure.set_size_inches(19.0, 6.6 * len(made))
     panels = figure.subplots(2 * len(made), len(QUANTITIES), sharey="row", squeeze=False)
     for number, (body, series) in enumerate(made.items()):

@@ -10,9 +10,8 @@ import itertools
 import math
 import os
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -23,10 +22,24 @@ from finger3d._types import Float, Int
 from finger3d.fem.assembly import Stiffness
 
 if TYPE_CHECKING:
+    from scipy.sparse.linalg import SuperLU
+
     from finger3d.fem.pardiso import SchurFactor
 
 
 _SOLVE_CHUNK = 64
+
+
+class _Factor(Protocol):
+    """Factor of the stiffness K of the free unknowns, with rows R."""
+
+    def eliminated(self, load: Float) -> tuple[Float, Float]:
+        """Return ``R K^-1 load`` (r, m) of loads (n, m), after what `substituted` needs of it."""
+        ...
+
+    def substituted(self, eliminated: Float | None, force: Float) -> Float:
+        """Return ``K^-1 (load + R^T force)`` (n, m) for loads eliminated, if any, and forces (r, m)."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -48,8 +61,9 @@ class Condensation:
     solver: str
     _rows: sp.csr_matrix = field(repr=False)
     _free: Int = field(repr=False)
-    _solve: Callable[[Float], Float] = field(repr=False)
-    _factorization: _Factorization | None = field(default=None, repr=False)
+    _factor: _Factor = field(repr=False)
+    _scale: float = field(repr=False)  # of the stiffness, as it was factored
+    _row_scales: Float = field(repr=False)
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
@@ -59,13 +73,24 @@ class Condensation:
 
         Several forces in the columns of an array (r, k) cost less than one after another.
         """
-        return self.solve(self._rows.T @ force)
+        return self._substituted(None, force)
 
     def solve(self, load: Float) -> Float:
         """Return all unknowns (N, ...) under loads (N, ...); fixed unknowns are zero."""
-        whole = np.zeros(load.shape, order="F")  # one field after another
-        whole[self._free] = self._solve(load[self._free])
-        return whole
+        return self.eliminated(load).unknowns(np.zeros((self._rows.shape[0], *load.shape[1:])))
+
+    def eliminated(self, load: Float) -> Elimination:
+        """Eliminate the unknowns under loads (N, ...): the first half of a solution, which gives the rows."""
+        columns = load[self._free].reshape(len(self._free), -1)
+        eliminated, displacement = self._factor.eliminated(columns)
+        scaled = self._row_scales[:, None] * displacement / self._scale
+        return Elimination(scaled.reshape(-1, *load.shape[1:]), self, eliminated)
+
+    def _substituted(self, eliminated: Float | None, force: Float) -> Float:
+        columns = self._row_scales[:, None] * force.reshape(len(self._row_scales), -1)
+        whole = np.zeros((self._rows.shape[1], columns.shape[1]), order="F")  # one field after another
+        whole[self._free] = self._factor.substituted(eliminated, columns) / self._scale
+        return whole.reshape(-1, *force.shape[1:], order="A")
 
     def read(self, unknowns: Float) -> Float:
         """Return the row displacements (r,), mm, of all unknowns (N,)."""
@@ -75,6 +100,28 @@ class Condensation:
         """Condense another stiffness with the same fixed unknowns and rows; this takes one more factorisation."""
         fixed = np.setdiff1d(np.arange(self._rows.shape[1]), self._free)
         return condense(stiffness, fixed, self._rows, self.solver)
+
+
+@dataclass(frozen=True)
+class Elimination:
+    """A condensed body under loads whose row forces are not known yet.
+
+    Attributes
+    ----------
+    displacement : (r, ...) mm
+        Of the rows under the loads alone.
+    """
+
+    displacement: Float
+    _body: Condensation = field(repr=False)
+    _eliminated: Float = field(repr=False)
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
+
+    def unknowns(self, force: Float) -> Float:
+        """Return all unknowns (N, ...) under the loads and row forces (r, ...), N."""
+        return self._body._substituted(self._eliminated, force)
 
 
 def condense(
@@ -112,21 +159,17 @@ def condense(
     scaled = sp.csr_matrix((upper.data / unit, upper.indices, upper.indptr), shape=upper.shape)
     entries = padded.data / np.repeat(units, np.diff(padded.indptr))
     read = sp.csr_matrix((entries, padded.indices, padded.indptr), shape=padded.shape)
-    factorization: _Factorization | None = None
-    factor_solve: Callable[[Float], Float]
+    factor: _Factor
     if solver == "pardiso":
-        factorization = _Factorization.of(scaled, free, read, replaced._factorization if replaced else None)
-        compliance, perturbed = -factorization.factor.schur, factorization.factor.perturbed
-        factor_solve = factorization.solve
+        before = replaced._factor if replaced else None
+        factor = _Pardiso.of(scaled, free, read, before if isinstance(before, _Pardiso) else None)
+        compliance, perturbed = -factor.factor.schur, factor.factor.perturbed
     else:
-        compliance, perturbed, factor_solve = _superlu(scaled[free][:, free], read[:, free].tocsr())
+        factor = _SuperLU.of(scaled[free][:, free], read[:, free].tocsr())
+        compliance, perturbed = factor.compliance(), 0
     compliance = units[:, None] * (0.5 / unit * (compliance + compliance.T)) * units
-
-    def solve(load: Float) -> Float:
-        return factor_solve(load) / unit
-
     seconds = time.perf_counter() - start
-    return Condensation(compliance, perturbed, 1, seconds, solver, padded, free, solve, factorization)
+    return Condensation(compliance, perturbed, 1, seconds, solver, padded, free, factor, unit, units)
 
 
 def _power_of_two(values: Float) -> float:
@@ -200,7 +243,7 @@ class _Pattern:
 
 
 @dataclass(frozen=True)
-class _Factorization:
+class _Pardiso:
     """PARDISO's factor of one matrix; a later matrix of the same pattern may overwrite it.
 
     `number` counts the matrices that this factor has been computed for.
@@ -215,22 +258,21 @@ class _Factorization:
         """Whether the factor is still that of this matrix."""
         return self.number == self.factor.factorizations
 
-    def solve(self, load: Float) -> Float:
-        """Return the displacements ``K^-1 load``.
+    def eliminated(self, load: Float) -> tuple[Float, Float]:
+        """See `_Factor`."""
+        return self._current().eliminated(load)
 
-        Raises
-        ------
-        RuntimeError
-            If the factor has been overwritten.
-        """
+    def substituted(self, eliminated: Float | None, force: Float) -> Float:
+        """See `_Factor`."""
+        return self._current().substituted(eliminated, force)
+
+    def _current(self) -> SchurFactor:
         if not self.is_current:
             raise RuntimeError("the factor of this condensed body was overwritten by a later one; condense it again")
-        return self.factor.solve(load)
+        return self.factor
 
     @classmethod
-    def of(
-        cls, upper: sp.csr_matrix, free: Int, rows: sp.csr_matrix, replaced: _Factorization | None
-    ) -> _Factorization:
+    def of(cls, upper: sp.csr_matrix, free: Int, rows: sp.csr_matrix, replaced: _Pardiso | None) -> _Pardiso:
         """Factor the matrix of the free unknowns and the rows, reusing an earlier factor of the same pattern."""
         from finger3d.fem.pardiso import SchurFactor
 
@@ -268,13 +310,36 @@ def _augmented(upper: sp.csr_matrix, free: Int, rows: sp.csr_matrix) -> tuple[_P
     return pattern, sp.csr_matrix((pattern.values(upper, rows), indices, indptr), shape=(n + r, n + r))
 
 
-def _superlu(upper: sp.csr_matrix, rows: sp.csr_matrix) -> tuple[Float, int, Callable[[Float], Float]]:
-    from scipy.sparse.linalg import splu
+@dataclass(frozen=True)
+class _SuperLU:
+    """SuperLU's factor of a stiffness, and rows."""
 
-    full = (upper + sp.triu(upper, 1).T).tocsc()
-    factor = splu(full, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
-    compliance = np.empty((rows.shape[0], rows.shape[0]))
-    for start in range(0, rows.shape[0], _SOLVE_CHUNK):
-        part = slice(start, start + _SOLVE_CHUNK)
-        compliance[:, part] = rows @ factor.solve(rows[part].T.toarray())
-    return compliance, 0, factor.solve
+    factor: SuperLU
+    rows: sp.csr_matrix
+
+    @classmethod
+    def of(cls, upper: sp.csr_matrix, rows: sp.csr_matrix) -> _SuperLU:
+        from scipy.sparse.linalg import splu
+
+        full = (upper + sp.triu(upper, 1).T).tocsc()
+        return cls(splu(full, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}), rows)
+
+    def compliance(self) -> Float:
+        """Return ``R K^-1 R^T`` (r, r)."""
+        found = np.empty((self.rows.shape[0], self.rows.shape[0]))
+        for start in range(0, len(found), _SOLVE_CHUNK):
+            part = slice(start, start + _SOLVE_CHUNK)
+            found[:, part] = self.rows @ self.factor.solve(self.rows[part].T.toarray())
+        return found
+
+    def eliminated(self, load: Float) -> tuple[Float, Float]:
+        """See `_Factor`."""
+        found = self.factor.solve(load)
+        return found, self.rows @ found
+
+    def substituted(self, eliminated: Float | None, force: Float) -> Float:
+        """See `_Factor`."""
+        if eliminated is not None and not force.any():
+            return eliminated
+        found: Float = self.factor.solve(self.rows.T @ force)
+        return found if eliminated is None else eliminated + found

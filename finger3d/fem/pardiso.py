@@ -118,20 +118,25 @@ class SchurFactor:
     def _phase(self, phase: int, b: Float, x: Float, nrhs: int) -> None:
         _run(self._call, self._pt, phase, self._n, self._a, self._ia, self._ja, self._perm, nrhs, self._iparm, b, x)
 
-    def solve(self, load: Float) -> Float:
-        """Displacements ``K^-1 load`` (n, m) for loads (n, m): forward, diagonal, backward with the kept rows at 0."""
+    def eliminated(self, load: Float) -> tuple[Float, Float]:
+        """Forward substitution of loads (n, m): what `substituted` needs of it, and ``R K^-1 load`` (r, m)."""
         n = self._n - self._rows
-        columns = load.reshape(n, -1)
-        m = columns.shape[1]
-        b = np.zeros((self._n, m), order="F")
-        b[:n] = columns
+        b = np.zeros((self._n, load.shape[1]), order="F")
+        b[:n] = load
         x = np.zeros_like(b, order="F")
-        self._phase(331, b, x, m)
-        b[:n], b[n:] = x[:n], 0.0
-        self._phase(332, b, x, m)
-        b[:n], b[n:] = x[:n], 0.0
+        self._phase(331, b, x, b.shape[1])
+        return x, -x[n:]
+
+    def substituted(self, eliminated: Float | None, force: Float) -> Float:
+        """Backward substitution: ``K^-1 (load + R^T force)`` (n, m) for eliminated loads, if any, and forces (r, m)."""
+        n, m = self._n - self._rows, force.shape[1]
+        b, x = np.zeros((self._n, m), order="F"), np.zeros((self._n, m), order="F")
+        if eliminated is not None:
+            b[:n] = eliminated[:n]
+            self._phase(332, b, x, m)
+        b[:n], b[n:] = x[:n], -force
         self._phase(333, b, x, m)
-        return x[:n].reshape(load.shape)
+        return x[:n]
 
 
 def _run(

@@ -5,9 +5,9 @@ displacements u' solve ::
 
     u' = u + K^-1 (B^T f' - R),    contact conditions of f' and of the gaps and slips at u, moved by B (u' - u)
 
-The forces are total, not increments, so that f = 0 in an open point.  Iterations reuse the factor of an earlier
-tangent, also one of an earlier increment or press, while they converge (chord method, Ortega and Rheinboldt 1970, sec.
-7.1): the residual is that of the present configuration, so that the solution does not depend on it.
+The forces are total, not increments, so that f = 0 in an open point.  Iterations reuse K and B of an earlier
+configuration, also one of an earlier increment or press, while they converge (chord method, Ortega and Rheinboldt 1970,
+sec. 7.1): the residual is that of the present configuration, so that the solution does not depend on it.
 """
 
 from __future__ import annotations
@@ -60,8 +60,14 @@ _NEGLIGIBLE = 1e-6
 _LARGEST_STEP, _LEAST_STEP = 2.0, 0.05
 """Largest displacement in an iteration over that of the object, and the least over the depth that is always allowed."""
 
+_DIVERGED = 1.0
+"""Residual from which an iteration with a new tangent is given up."""
+
 _DAMPED_FACTORS = 40
 """Largest number of damped iterations."""
+
+_LARGEST_RISE = 3.0
+"""Largest ratio of successive residuals of damped iterations; beyond it the damping grows instead."""
 
 _FADING = 0.6
 """Factor by which the damping at least falls where the residual does."""
@@ -107,10 +113,12 @@ class FiniteIncrement:
         return replace(damped, iterations=found.iterations + damped.iterations)
 
     def _iterate(self, guess: Float | None) -> ContactSolution:
-        """Iterate from the configuration extrapolated, with a new tangent where the residual falls slowly."""
-        force = self.start.force if guess is None else guess
-        now = self._first_configuration()
-        linearisation, factors, spent, error = self._last_linearisation(), 0, 0, math.inf
+        """Iterate from the configuration extrapolated, with a new tangent where the residual falls slowly.
+
+        Where the tangent of an earlier increment leads nowhere, the iteration begins again with a new one.
+        """
+        first = now, force = self._initial(guess)
+        linearisation, factors, spent, error, largest = self._last_linearisation(), 0, 0, math.inf, 0.0
         outcome = Outcome.NEWTON
         for _ in range(_ITERATIONS):
             if linearisation is None:
@@ -123,14 +131,19 @@ class FiniteIncrement:
                 if factors:
                     outcome = Outcome.INVERTED if solution.outcome.ok else solution.outcome
                     break
-                linearisation = None
+                linearisation, (now, force), error = None, first, math.inf
                 continue
             now, force = after, solution.state.force
             last_error, error = error, self._residual(now, solution.state)
+            largest = max(largest, error)
             if _converged(error, last_error):
                 return self._finished(now, solution, error, spent)
+            if factors and error > _DIVERGED:
+                break
             if error > _SLOW * last_error:
                 linearisation = None
+                if not factors and error > _SLOW * largest:
+                    (now, force), error = first, math.inf
         return self._failed(now, outcome, error, spent)
 
     def _iterate_damped(self) -> ContactSolution:
@@ -143,11 +156,11 @@ class FiniteIncrement:
         for _ in range(_DAMPED_FACTORS):
             solution, after = self._advance(now, force, self._linearise(now, force, damping))
             spent += solution.iterations
-            if after is None:
+            found = math.inf if after is None else self._residual(after, solution.state)
+            if after is None or found > _LARGEST_RISE * error:
                 damping = max(damping, _LEAST_DAMPING) * _MORE_DAMPING
                 continue
-            now, force = after, solution.state.force
-            last_error, error = error, self._residual(now, solution.state)
+            now, force, last_error, error = after, solution.state.force, error, found
             if _converged(error, last_error):
                 return self._finished(now, solution, error, spent)
             change = error / last_error if math.isfinite(last_error) else 1.0
@@ -217,25 +230,28 @@ class FiniteIncrement:
         c, d = delassus.shape[:2]
         return augmentation_parameters(delassus.reshape(c * d, c * d), d)
 
-    def _first_configuration(self) -> _Configuration:
-        """Return the configuration extrapolated from a similar press or the increment before, or the first state's."""
-        for x in self._extrapolated():
+    def _initial(self, guess: Float | None) -> tuple[_Configuration, Float]:
+        """Return the configuration and the contact forces (c, d) where the iteration begins."""
+        for x, force in self._extrapolated(guess):
             try:
-                return self._at(x)
+                return self._at(x), force
             except InvertedError:
                 continue
-        return self._at(self.start.unknowns)
+        return self._at(self.start.unknowns), self.start.force if guess is None else guess
 
-    def _extrapolated(self) -> Iterator[Float]:
-        if self.workspace.similar is not None:
-            before, after = self.workspace.similar
-            if isinstance(before, DeformedState) and isinstance(after, DeformedState):
-                yield self.start.unknowns + after.unknowns - before.unknowns
-        if self.start.previous is not None:
-            pose, x = self.start.previous
+    def _extrapolated(self, guess: Float | None) -> Iterator[tuple[Float, Float]]:
+        """Yield expected unknowns (N,) and contact forces (c, d)."""
+        start, similar = self.start, self.workspace.similar
+        self.workspace.similar = ()  # not for the halves of an increment
+        pairs = [(a, b) for a, b in similar if isinstance(a, DeformedState) and isinstance(b, DeformedState)]
+        if pairs:
+            change = np.mean([b.unknowns - a.unknowns for a, b in pairs], axis=0)
+            yield start.unknowns + change, start.force + np.mean([b.force - a.force for a, b in pairs], axis=0)
+        if start.previous is not None:
+            pose, x = start.previous
             ratio = stride_ratio(pose, self.a, self.b)
             if ratio is not None:
-                yield self.start.unknowns + ratio * (self.start.unknowns - x)
+                yield start.unknowns + ratio * (start.unknowns - x), start.force if guess is None else guess
 
     def _at(self, x: Float) -> _Configuration:
         problem = self.problem
@@ -285,21 +301,22 @@ class FiniteIncrement:
 
     def _step(self, now: _Configuration, force: Float, linearisation: Linearisation) -> tuple[ContactSolution, Float]:
         """Solve contact of the linearised body; returns the solution and the step (N,) of the unknowns."""
-        problem, start = self.problem, transported(self.start, now.contact.bases)
-        settled = linearisation.condensation.solve(-self._out_of_balance(now, force))
-        delassus = linearisation.delassus_along(now.contact.bases)
-        compliance = self._object_compliance
+        problem, start, bases = self.problem, transported(self.start, now.contact.bases), now.contact.bases
+        active, rotation = problem.system.active_dofs, linearisation.rotation(bases)
+        eliminated = linearisation.condensation.eliminated(-self._out_of_balance(now, force))
+        delassus = rotated(linearisation.delassus, rotation)
+        compliance = problem.system.object_compliance
         if compliance is not None:
-            delassus = delassus + rotated(compliance, now.contact.bases @ vertical_frame(problem.dim).T)
+            delassus = delassus + rotated(compliance, bases @ vertical_frame(problem.dim).T)
+        moved = np.zeros(force.size)
+        moved[active] = eliminated.displacement
         free = self._relative_displacement(now, force)
-        free += self._active(now.contact.displacements(displacement(problem.mesh, settled)).ravel())
+        free += self._active(np.einsum("cij,cj->ci", rotation, moved.reshape(force.shape)).ravel())
         free -= (delassus.reshape(force.size, force.size) @ force.ravel()).reshape(force.shape)
         free[:, 1:] += start.tangential_displacement
         solution = solve_contact(problem, start, free, delassus, self._length_scale, force, self._augmentation)
-        load = np.zeros_like(settled)
-        change = self._active((solution.state.force - force).ravel())
-        load[: problem.mesh.points.size] = now.contact.nodal_forces(change).ravel()
-        return solution, settled + linearisation.condensation.solve(load)
+        change = np.einsum("cij,ci->cj", rotation, solution.state.force - force)
+        return solution, eliminated.unknowns(change.ravel()[active])
 
     def _out_of_balance(self, now: _Configuration, force: Float) -> Float:
         """Internal less contact forces (N,)."""
@@ -316,10 +333,6 @@ class FiniteIncrement:
         out[self.problem.system.active_dofs] = vector[self.problem.system.active_dofs]
         return out.reshape(-1, self.problem.dim)
 
-    @cached_property
-    def _object_compliance(self) -> Float | None:
-        return self.problem.system.object_compliance
-
     def _relative_displacement(self, now: _Configuration, force: Float) -> Float:
         """Gap and increment of tangential displacement (c, d) under forces (c, d), in the present directions."""
         problem, bases = self.problem, now.contact.bases
@@ -327,7 +340,7 @@ class FiniteIncrement:
         increment = at - before - carried_by_object(problem, self.a, self.b, at)
         out = np.empty_like(force)
         out[:, 0] = now.contact.gap
-        compliance = self._object_compliance
+        compliance = problem.system.object_compliance
         if compliance is not None:
             frame = vertical_frame(problem.dim)
             assert self.start.bases is not None

@@ -21,6 +21,9 @@ from finger3d.objects import ObjectPose
 _CURVATURE_STEP = 0.1
 """Step of the differences of the object's normals, over the edge length of the mesh."""
 
+_ROUND_OFF = 1e-13
+"""Round-off of directions."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class DeformedState(ContactState):
@@ -55,10 +58,9 @@ class Linearisation:
     delassus: Float
     reusable: bool = True
 
-    def delassus_along(self, bases: Float) -> Float:
-        """Return the Delassus operator (c, d, c, d) in other directions (c, d, d)."""
-        turn = bases @ np.swapaxes(self.bases, 1, 2)
-        return rotated(self.delassus, turn)
+    def rotation(self, bases: Float) -> Float:
+        """Return the rotation (c, d, d) from its directions to others (c, d, d)."""
+        return bases @ np.swapaxes(self.bases, 1, 2)
 
 
 @dataclass
@@ -75,6 +77,8 @@ class FiniteStrainWorkspace(Workspace):
 def rotated(delassus: Float, turn: Float) -> Float:
     """Return a Delassus operator (c, d, c, d) in directions turned point by point by (c, d, d)."""
     c, d = turn.shape[:2]
+    if np.allclose(turn, np.eye(d), rtol=0.0, atol=_ROUND_OFF):  # as on a plane
+        return delassus
     half = (turn @ delassus.reshape(c, d, c * d)).reshape(c * d, c, d)
     return np.asarray((half.transpose(1, 0, 2) @ turn.transpose(0, 2, 1)).transpose(1, 0, 2).reshape(c, d, c, d))
 

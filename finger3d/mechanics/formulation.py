@@ -33,12 +33,12 @@ class Workspace:
     ----------
     factorizations : number of factorisations made with this workspace
     tracker : distances of the finger's surface from the object
-    similar : states of a similar press at both ends of the next increment, as its initial guess; None without
+    similar : states of similar presses at both ends of the next increment, which begins with the mean of their changes
     """
 
     factorizations: int = 0
     tracker: DistanceTracker = field(default_factory=DistanceTracker)
-    similar: tuple[ContactState, ContactState] | None = None
+    similar: tuple[tuple[ContactState, ContactState], ...] = ()
 
 
 class Formulation(Protocol):
