@@ -25,7 +25,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from finger3d._api import estimate, export, optimise, plan, sweep
+    from finger3d._api import export, optimise, plan, sweep
     from finger3d.analyses.calibrate.run import calibrate
     from finger3d.analyses.compare.run import compare
     from finger3d.analyses.press import press
@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from finger3d.mold.options import MoldOptions
     from finger3d.objects import Cylinder, Plane, Sphere, Wave, Wedge
     from finger3d.scene import Scene, load, parse
+    from finger3d.sensor import estimate
 
     __version__: str
 
@@ -68,7 +69,7 @@ _HOME = {
     "calibrate": "analyses.calibrate.run",
     "compare": "analyses.compare.run",
     "designs": "geometry.registry",
-    "estimate": "_api",
+    "estimate": "sensor",
     "export": "_api",
     "load": "scene",
     "optimise": "_api",

@@ -5,20 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from finger3d.progress import Progress
 
 if TYPE_CHECKING:
     import pandas
-    from numpy.typing import ArrayLike
 
     from finger3d.analyses.optimise.run import OptimisationResult
     from finger3d.analyses.plan import Plan
     from finger3d.mold.export import Exported
     from finger3d.mold.options import MoldOptions
     from finger3d.scene import Scene
-    from finger3d.sensor import Calibration, Estimate
 
 Value = float | int | bool | str
 """A value of a key of a scene."""
@@ -154,35 +152,6 @@ def optimise(
         seed=seed,
     )
     return run(problem, out, report)
-
-
-def estimate(
-    calibration: Calibration | str | Path,
-    strain: ArrayLike,
-    std: ArrayLike | None = None,
-    curve: Literal["interpolation", "fit"] = "interpolation",
-    tolerances: bool = True,
-) -> list[Estimate]:
-    """Estimate the friction coefficient from strain readings.
-
-    Parameters
-    ----------
-    calibration : what `finger3d.calibrate` returned, or the path of its calibration.json
-    strain : one reading, or (m,) of them
-    std : standard deviation of each; None: the noise of the calibration
-    curve : whether to invert the monotone interpolation or the second-order fit
-    tolerances : whether the standard deviations of depth, modulus and so on count
-
-    Returns
-    -------
-    list
-        An Estimate for each reading, with ``mu``, ``std`` and ``status``.
-    """
-    from finger3d.sensor import estimate as run
-    from finger3d.sensor import load
-
-    known = load(calibration) if isinstance(calibration, str | Path) else calibration
-    return run(known, strain, std, curve, tolerances)
 
 
 def export(

@@ -46,14 +46,6 @@ Fraction = Annotated[float, Gt(0), Lt(1)]
 Count = Annotated[int, Ge(1), Le(10_000)]
 
 
-LARGEST_STRAIN, LARGEST_SD = 1e3, 1e6
-"""Largest magnitude of a strain (its standard deviation too), and of any other standard deviation of a calibration."""
-
-Strain = Annotated[float, Ge(-LARGEST_STRAIN), Le(LARGEST_STRAIN)]
-StrainSd = Annotated[float, Ge(0), Le(LARGEST_STRAIN)]
-Noise = Annotated[float, Ge(1e-12), Le(LARGEST_STRAIN)]  # standard deviation of a strain reading
-
-
 def one_line(text: str) -> bool:
     """Whether a text is one line of printable characters: no line breaks, no control characters."""
     return text.isprintable()

@@ -222,7 +222,7 @@ def test_damaged_files_are_one_line(tmp_path: Path) -> None:
     damaged = [
         with_array("parent", put(0, 10**6)), with_array("parent", put(0, -1)), with_array("share", lambda a: a[:-1]),
         with_array("face_mean_at", put(0, 10**6)), with_array("compliance", put(0, np.nan)),
-        with_array("gauge_rows", put(0, np.inf)), with_array("sign", lambda a: a[:, :1]),
+        with_array("reading_rows", put(0, np.inf)), with_array("sign", lambda a: a[:, :1]),
         with_array("face_area", lambda a: a.astype(object).astype(str)),
     ]  # fmt: skip
     for content in damaged:

@@ -142,10 +142,17 @@ def test_calibration_files_that_are_none(tmp_path: Path) -> None:
         "version 9, this finger3d reads version 2": json.dumps({**data, "version": 9}),
         "version 1, this finger3d reads version 2": json.dumps({**data, "version": 1}),
         "no calibration": json.dumps([1, 2]),
-        "curve: field required": json.dumps({k: v for k, v in data.items() if k != "curve"}),
-        "noise: input should be greater than or equal to 0.0": json.dumps({**data, "noise": 0.0}),
+        "curve: missing": json.dumps({k: v for k, v in data.items() if k != "curve"}),
+        "noise = 0.0: must be a number from 1e-12 to 1000": json.dumps({**data, "noise": 0.0}),
         "curve: mu must ascend": json.dumps(short),
-        "curve.mu.0: input should be": json.dumps({**data, "curve": {**data["curve"], "mu": ["a", 1.0, 2.0, 3.0]}}),
+        "gauge: must be a text": json.dumps({**data, "gauge": 3}),
+        "curve: must be a table": json.dumps({**data, "curve": [1.0]}),
+        "resolution_limit = True: must be a number": json.dumps({**data, "resolution_limit": True}),
+        "failed.mu: missing": json.dumps({**data, "failed": ["x"]}),
+        "curve.strain.0 = nan: must be": json.dumps(data | {"curve": data["curve"] | {"strain": [float("nan")] * 25}}),
+        "curve.mu.0 = 'a': must be a number from 0": json.dumps(
+            {**data, "curve": {**data["curve"], "mu": ["a", 1.0, 2.0, 3.0]}}
+        ),
     }
     for told, text in cases.items():
         path = tmp_path / "bad.json"

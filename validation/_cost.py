@@ -150,7 +150,7 @@ def assembled(model: Model, element: str) -> Parts:
 def condensed(parts: Parts, solver: str | None = None) -> Problem:
     """The problem, as `build` makes it."""
     small = condense(parts.stiffness, parts.fixed_dofs, sp.vstack([parts.rows, parts.gauges], format="csr"), solver)
-    delassus, gauge_rows = contact_rows(small.compliance, parts.active_dofs, parts.surface, len(parts.model.gauges))
+    delassus, reading_rows = contact_rows(small.compliance, parts.active_dofs, parts.surface, len(parts.model.gauges))
     mirrored, points = unfold_points(parts.model, parts.mesh, parts.surface, parts.axes)
     return Problem(
         model=parts.model,
@@ -168,7 +168,7 @@ def condensed(parts: Parts, solver: str | None = None) -> Problem:
             surface=parts.surface,
             points=points,
             delassus=delassus,
-            gauge_rows=gauge_rows,
+            reading_rows=reading_rows,
             active_dofs=parts.active_dofs,
             first_contact_mm=parts.first_contact_mm,
         ),

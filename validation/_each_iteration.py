@@ -60,7 +60,7 @@ class EachIteration:
             surface=parts.surface,
             points=points,
             delassus=np.zeros((0, 0, 0, 0)),
-            gauge_rows=np.zeros((0, 0)),
+            reading_rows=np.zeros((0, 0)),
             active_dofs=parts.active_dofs,
             first_contact_mm=parts.first_contact_mm,
         )

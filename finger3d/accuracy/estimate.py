@@ -21,7 +21,7 @@ from finger3d.accuracy.richardson import ORDER, mesh_error
 from finger3d.errors import Finger3dError
 from finger3d.io import AREAS, MAIN
 from finger3d.mechanics.cost import finite_strain_s
-from finger3d.mechanics.history import StepResult, measure
+from finger3d.mechanics.history import StepResult, flat_readings, measure
 from finger3d.mechanics.path import AUTO_START
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.step_halving import (
@@ -62,10 +62,9 @@ class ErrorEstimate(ErrorBars):
 
 
 def main_numbers(problem: Problem, frame: StepResult) -> dict[str, float]:
-    """Return forces, lengths and areas of contact and stick, and gauge strains, by name."""
+    """Return forces, lengths and areas of contact and stick, and readings, by name."""
     numbers = measure(problem.points, frame)
-    gauges = {f"gauge_{name}": strain for name, strain in numbers["gauges"].items()}
-    return {name: numbers[name] for name in (*MAIN, *AREAS)} | gauges
+    return {name: numbers[name] for name in (*MAIN, *AREAS)} | flat_readings(numbers)
 
 
 def press_numbers(problem: Problem, frame: StepResult) -> dict[str, float]:

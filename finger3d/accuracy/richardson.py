@@ -35,6 +35,8 @@ class Kind(Enum):
     PRESSURE = auto()
     ENERGY = auto()
     STRAIN = auto()
+    DISPLACEMENT = auto()
+    BASE_PRESSURE = auto()
     HALF_LENGTH = auto()
     LENGTH = auto()
     AREA = auto()
@@ -43,6 +45,11 @@ class Kind(Enum):
     def is_length(self) -> bool:
         """Return whether the number is a length of a zone of contact points."""
         return self in (Kind.LENGTH, Kind.HALF_LENGTH)
+
+    @property
+    def is_reading(self) -> bool:
+        """Return whether the number is read by a gauge, marker or taxel."""
+        return self in _READINGS.values()
 
 
 _KINDS = {
@@ -66,6 +73,8 @@ _KINDS = {
     "stick_area_mm2": Kind.AREA,
 }
 
+_READINGS = {"gauge": Kind.STRAIN, "marker": Kind.DISPLACEMENT, "taxel": Kind.BASE_PRESSURE}
+
 
 @dataclass(frozen=True)
 class Quantity:
@@ -76,13 +85,13 @@ class Quantity:
 
     @classmethod
     def of(cls, name: str) -> Quantity:
-        """Return the quantity of a name of a press or a comparison; ``gauge_<name>`` is a strain."""
-        return cls(name, Kind.STRAIN if name.startswith("gauge_") else _KINDS[name])
+        """Return the quantity of a name of a press or a comparison; readings begin with their kind and ``_``."""
+        return cls(name, _READINGS.get(name.partition("_")[0]) or _KINDS[name])
 
 
-def largest_strain(numbers: Mapping[str, float]) -> float:
-    """Return the largest magnitude of all gauge strains, 0 without gauges."""
-    return max((abs(v) for k, v in numbers.items() if Quantity.of(k).kind is Kind.STRAIN), default=0.0)
+def largest(numbers: Mapping[str, float], kind: Kind) -> float:
+    """Return the largest magnitude of all numbers of a kind, 0 without any."""
+    return max((abs(v) for k, v in numbers.items() if Quantity.of(k).kind is kind), default=0.0)
 
 
 def gain(ratio: float) -> float:
@@ -110,8 +119,7 @@ def mesh_error(
         Errors in the units of the numbers; names without a finite error are left out.
     """
     own, other = resolutions
-    strain = largest_strain(numbers)
-    normal_force = max((abs(v) for k, v in numbers.items() if Quantity.of(k).kind is Kind.NORMAL_FORCE), default=0.0)
+    normal_force = largest(numbers, Kind.NORMAL_FORCE)
     found = {}
     for name, value in numbers.items():
         kind, change, bound = Quantity.of(name).kind, abs(value - companion[name]), own.least.get(name, 0.0)
@@ -123,7 +131,7 @@ def mesh_error(
         elif kind is Kind.AREA:
             change = max(0.0, change - other.least.get(name, 0.0))
         else:
-            scale = strain if kind is Kind.STRAIN else abs(value)
+            scale = largest(numbers, kind) if kind.is_reading else abs(value)
             if own.alone and kind is Kind.FRICTION_SUM:
                 scale = max(scale, normal_force)
             power = 2 if kind is Kind.NORMAL_FORCE else 1

@@ -16,7 +16,15 @@ from finger3d._types import Array, Float, Tree, TreeView
 from finger3d.contact.friction import STICK
 from finger3d.fem.simplex import CONTACT, FREE_FACES, Mesh, axis_numbers, middles, unfold
 from finger3d.io import atomic, write_csv, write_json
-from finger3d.mechanics.history import ContactPoints, StepResult, contact_table, measure
+from finger3d.mechanics.history import (
+    ContactPoints,
+    StepResult,
+    contact_table,
+    flat_readings,
+    measure,
+    without_readings,
+)
+from finger3d.mechanics.marker_grid import marker_table
 from finger3d.results.states import object_drawing, states_of, write_states
 from finger3d.results.vtu import write_vtu
 
@@ -33,7 +41,7 @@ _WRITE_SHARE = 10.0
 _INCOMPLETE = "incomplete: the press was still running, or was interrupted; the steps written are valid"
 _FILES = (
     "summary.json", "history.csv", "contact.csv", "fields.vtu", "steps.npz", "report.html", "finger.png",
-    "contact.png", "force.png",
+    "contact.png", "force.png", "markers.csv", "markers.png",
 )  # fmt: skip
 
 
@@ -119,6 +127,8 @@ class ResultWriter:
         surface = _on_surface(mesh, record.problem.points, step)
         states = states_of(record.problem, good, mesh, fields.image_of, fields.mirror_sign, fields.displacement)
         write_states(self.folder / "steps.npz", states)
+        if markers := _markers(record):
+            write_csv(self.folder / "markers.csv", markers)
         write_vtu(
             self.folder / "fields.vtu",
             mesh,
@@ -131,7 +141,7 @@ class ResultWriter:
         )
 
     def pictures(self, record: PressRecord, fields: Fields) -> None:
-        """Draw finger.png, contact.png and force.png."""
+        """Draw finger.png, contact.png, force.png, and markers.png if there are markers."""
         from finger3d.plotting import figures
         from finger3d.plotting.gauges import marks_of
 
@@ -145,6 +155,10 @@ class ResultWriter:
         mu = problem.model.friction.coefficients(stuck, table["pressure_MPa"])
         figures.contact_figure(self.folder / "contact.png", table, mu, problem.points.band_mm, half_width)
         figures.force_figure(self.folder / "force.png", steps)
+        if markers := _markers(record):
+            from finger3d.plotting.markers import draw
+
+            draw(self.folder / "markers.png", markers)
         figures.finger_picture(
             self.folder / "finger.png",
             mesh,
@@ -157,10 +171,18 @@ class ResultWriter:
         )
 
 
+def _markers(record: PressRecord) -> Tree | None:
+    """Return the columns of markers.csv; None without markers."""
+    grid, good = record.scene.tables.marker_grid, record.converged_steps
+    if not good or not (record.problem.model.markers or grid):
+        return None
+    return marker_table(record.problem, good, grid.spacing_mm if grid else None)
+
+
 def history_table(steps: Sequence[TreeView]) -> dict[str, ArrayLike]:
     """Return the columns of history.csv from the entries of `steps` in summary.json."""
-    rows = [{**step, **{f"gauge_{name}": strain for name, strain in step["gauges"].items()}} for step in steps]
-    return {name: [row[name] for row in rows] for name in rows[0] if name != "gauges"}
+    rows = [without_readings(step) | flat_readings(step) for step in steps]
+    return {name: [row[name] for row in rows] for name in rows[0]}
 
 
 def _on_surface(mesh: Mesh, points: ContactPoints, step: StepResult) -> dict[str, Array]:

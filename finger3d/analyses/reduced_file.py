@@ -26,10 +26,11 @@ from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.history import ContactPoints
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.problem import ContactSystem, Problem
+from finger3d.mechanics.readings import Marker, Taxel
 from finger3d.mechanics.symmetry import Symmetry
 from finger3d.objects import OBJECTS, MeshObject, RigidObject, vertical_frame
 
-FORMAT, VERSION = "finger3d condensed body", 4
+FORMAT, VERSION = "finger3d condensed body", 5
 _SHAPES: dict[str, type[RigidObject]] = {r.__name__: r for r in OBJECTS.values()} | {"MeshObject": MeshObject}
 _MAX_STEPS = 1_000_000
 """Largest number of increments of a leg in a file."""
@@ -82,7 +83,7 @@ def read(path: str | Path) -> tuple[Problem, BoundarySurface, TreeView]:
     try:
         model = _model(header, arrays)
         axes = tuple(header["axes"])
-        _check_arrays(arrays, 2 if model.domain != "solid" else 3, len(model.gauges))
+        _check_arrays(arrays, 2 if model.domain != "solid" else 3, len(model.reading_names))
         problem = assembled(model, arrays, float(header["touch_mm"]), axes)
         return problem, _face("other", arrays, problem.dim), header["about"]
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError):
@@ -138,7 +139,7 @@ def arrays_of(problem: Problem) -> dict[str, Array]:
     c, d = problem.delassus.shape[:2]
     arrays: dict[str, Array] = {
         "compliance": problem.delassus.reshape(c * d, c * d),
-        "gauge_rows": problem.system.gauge_rows,
+        "reading_rows": problem.system.reading_rows,
         "parent": problem.symmetry.image_of,
         "sign": problem.symmetry.mirror_sign,
         "share": problem.symmetry.multiplicity,
@@ -155,7 +156,7 @@ def arrays_of(problem: Problem) -> dict[str, Array]:
     if problem.without_inclusions:
         arrays |= {
             "bare_compliance": problem.without_inclusions.delassus.reshape(c * d, c * d),
-            "bare_gauge_rows": problem.without_inclusions.system.gauge_rows,
+            "bare_reading_rows": problem.without_inclusions.system.reading_rows,
         }
     return arrays
 
@@ -178,7 +179,7 @@ def assembled(model: Model, arrays: TreeView, touch_mm: float, axes: tuple[str, 
             edges=arrays["edges"],
         ),
         delassus=arrays["compliance"].reshape(c, d, c, d),
-        gauge_rows=arrays["gauge_rows"].reshape(len(model.gauges), c * d),
+        reading_rows=arrays["reading_rows"].reshape(len(model.reading_names), c * d),
         active_dofs=np.zeros(0, dtype=np.int64),
         first_contact_mm=touch_mm,
         object_share=arrays.get("object_share"),
@@ -190,7 +191,7 @@ def assembled(model: Model, arrays: TreeView, touch_mm: float, axes: tuple[str, 
     without = replace(
         system,
         delassus=arrays["bare_compliance"].reshape(c, d, c, d),
-        gauge_rows=arrays["bare_gauge_rows"].reshape(len(model.gauges), c * d),
+        reading_rows=arrays["bare_reading_rows"].reshape(len(model.reading_names), c * d),
     )
     return replace(problem, without_inclusions=replace(problem, system=without))
 
@@ -207,6 +208,8 @@ def _header(problem: Problem) -> Tree:
         "object": {"kind": type(thing).__name__, **placed},
         "friction": {"kind": type(model.friction).__name__, **asdict(model.friction)},
         "gauges": [asdict(g) for g in model.gauges],
+        "markers": [asdict(m) for m in model.markers],
+        "taxels": [asdict(t) for t in model.taxels],
         "domain": model.domain,
         "rule": model.rule,
         "warnings": list(model.warnings),
@@ -245,6 +248,8 @@ def _model(header: TreeView, arrays: TreeView) -> Model:
         _dataclass(_SHAPES[kind], placed),
         law,
         gauges=tuple(_dataclass(Gauge, g) for g in header["gauges"]),
+        markers=tuple(_dataclass(Marker, m) for m in header["markers"]),
+        taxels=tuple(_dataclass(Taxel, t) for t in header["taxels"]),
         domain=header["domain"],
         rule=header["rule"],
         symmetry=tuple(header["axes"]),
@@ -298,12 +303,12 @@ def _dataclass(kind: Any, values: TreeView) -> Any:
     return result
 
 
-def _check_arrays(arrays: TreeView, d: int, gauges: int) -> None:
+def _check_arrays(arrays: TreeView, d: int, readings: int) -> None:
     """Raise ValueError or KeyError unless types and shapes of all arrays fit together, and numbers are finite."""
     c, p = len(arrays["face_nodes"]), len(arrays["nodes"])
     wanted: dict[str, tuple[int, ...]] = {
         "compliance": (c * d, c * d),
-        "gauge_rows": (gauges, c * d),
+        "reading_rows": (readings, c * d),
         "parent": (p,),
         "sign": (p, d),
         "share": (p,),
@@ -316,7 +321,7 @@ def _check_arrays(arrays: TreeView, d: int, gauges: int) -> None:
     if "object_share" in arrays:
         wanted["object_share"] = (c,)
     if "bare_compliance" in arrays:
-        wanted |= {"bare_compliance": (c * d, c * d), "bare_gauge_rows": (gauges, c * d)}
+        wanted |= {"bare_compliance": (c * d, c * d), "bare_reading_rows": (readings, c * d)}
     for face in ("face", "other"):
         m, samples, entries = (len(arrays[f"{face}_{name}"]) for name in ("nodes", "samples", "mean"))
         wanted |= {

@@ -23,7 +23,7 @@ from finger3d.contact.friction import FrictionLaw
 from finger3d.contact.rules import RuleName
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.mechanics.gauges import Gauge
-from finger3d.mechanics.history import StepResult, measure
+from finger3d.mechanics.history import StepResult, flat_readings, measure, without_readings
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.scene import Scene
 
@@ -300,6 +300,7 @@ class _Run:
                 return VariantResult(f"{at}: {frame.outcome}", residual, {}, {}, self.seconds)
         numbers = measure(self.problem.points, self.frames[-1])
         gauges = numbers.pop("gauges")
+        numbers = without_readings(numbers) | flat_readings(numbers | {"gauges": {}})
         for key in ("iterations", "residual", "method", "outcome"):
             numbers.pop(key)
         return VariantResult(str(Outcome.CONVERGED), residual, numbers, gauges, self.seconds)

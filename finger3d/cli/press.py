@@ -98,6 +98,11 @@ def _rows(summary: TreeView, out: Path) -> Iterator[tuple[str, str]]:
         yield "residual", f"{max(step['residual'] for step in steps):.1e}, the largest of all steps"
         for name, strain in last["gauges"].items():
             yield f"strain {name}", number(strain, f"gauge_{name}", 5)
+        for name, moved in last["markers"].items():
+            parts = [number(value, f"marker_{name}_{axis}_mm", 5) for axis, value in zip("xyz", moved, strict=True)]
+            yield f"marker {name}", ", ".join(parts) + " mm"
+        for name, pressure in last["taxels"].items():
+            yield f"taxel {name}", number(pressure, f"taxel_{name}_MPa", 5) + " MPa"
     if bars.discretisation:
         yield "+-", f"error of mesh and steps, not of the model; estimated in {bars.seconds:.1f} s; --no-error skips it"
     elif estimate:

@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from finger3d._types import Float
-from finger3d.fem.assembly import Stiffness, stiffness
+from finger3d.fem.assembly import Stiffness, stiffness, times
 from finger3d.fem.condense import Condensation
 from finger3d.fem.material import Elasticity
 from finger3d.fem.recover import displacement, nodal_strain, pressure, stress
@@ -82,6 +82,10 @@ class ViscoelasticBody(Protocol):
         """Nodal stress (n, 3, 3), or (n, 2, 2) and (n,) across the section."""
         ...
 
+    def nodal_forces(self, prony: Prony, memory: InternalVariables) -> Float:
+        """Nodal forces (n, d) of the relaxed stress."""
+        ...
+
 
 @dataclass(frozen=True)
 class ConstantPoissonRatio:
@@ -115,6 +119,12 @@ class ConstantPoissonRatio:
         strain = nodal_strain(problem.mesh, displacement(problem.mesh, unknowns))
         p = pressure(problem.mesh, problem.part.stiffness, unknowns) if problem.part.elastic.mixed else None
         return stress(strain, problem.part.elastic, p)
+
+    def nodal_forces(self, prony: Prony, memory: InternalVariables) -> Float:
+        """Return the nodal forces of the elastic body under the relaxed row forces."""
+        mesh = self.problem.mesh
+        forces = times(self.problem.part.stiffness.upper, self.unknowns(relaxed(prony, memory)))
+        return forces[: mesh.points.size].reshape(-1, mesh.dim)
 
 
 @dataclass(frozen=True)
@@ -189,10 +199,10 @@ class ConstantBulkModulus:
         """Return the loads (N,), K_s times a shape (N,)."""
         problem, n = self.problem, self.problem.mesh.points.size
         if not problem.part.elastic.mixed:
-            return _times(self._shear_part(workspace), shape)
+            return times(self._shear_part(workspace), shape)
         deviator = shape.copy()
         deviator[n:] *= -2.0 / 3.0 * self._elastic.shear / problem.part.stiffness.pressure_scale
-        load = _times(problem.part.stiffness.upper, deviator)
+        load = times(problem.part.stiffness.upper, deviator)
         load[n:] = 0.0
         return load
 
@@ -219,14 +229,16 @@ class ConstantBulkModulus:
         whole[:, :d, :d] = 2.0 * shear * strain
         return whole + spherical[:, None, None] * np.eye(3)
 
+    def nodal_forces(self, prony: Prony, memory: InternalVariables) -> Float:
+        """Return the instantaneous nodal forces, less the part of the shear stress that has relaxed."""
+        mesh, lost = self.problem.mesh, memory.elastic - relaxed(prony, memory)
+        forces = times(self.problem.part.stiffness.upper, self.unknowns(memory.elastic))
+        forces -= self._shear_force(lost[: self._own], RelaxationWorkspace())
+        return forces[: mesh.points.size].reshape(-1, mesh.dim)
+
     def _strain(self, shape: Float) -> tuple[Float, Float]:
         problem = self.problem
         strain = nodal_strain(problem.mesh, displacement(problem.mesh, shape))
         if not problem.part.elastic.mixed:
             return strain, np.trace(strain, axis1=1, axis2=2)
         return strain, pressure(problem.mesh, problem.part.stiffness, shape) / problem.part.stiffness.pressure_scale
-
-
-def _times(upper: sp.csr_matrix, vector: Float) -> Float:
-    """Return the product of a symmetric matrix, given by its upper triangle, and a vector."""
-    return np.asarray(upper @ vector + upper.T @ vector - upper.diagonal() * vector)

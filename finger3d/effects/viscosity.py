@@ -139,11 +139,16 @@ class Viscoelastic(SmallStrain):
         """Yield the unknowns of each state from its internal variables."""
         return (self._body(problem).unknowns(self._memory(state).elastic) for state in states)
 
-    def gauges(self, problem: Problem, state: ContactState) -> dict[str, float]:
-        """Return the strains from the internal variables by the rows of the gauges."""
-        first = len(problem.system.active_dofs)
-        rows = self._body(problem).read(self._memory(state).elastic)[first:]
-        return {g.name: float(strain) for g, strain in zip(problem.model.gauges, rows, strict=False)}
+    def readings(self, problem: Problem, state: ContactState) -> dict[str, float]:
+        """Return the readings from the internal variables by their rows; pressures are those of the relaxed stress."""
+        first, body, memory = len(problem.system.active_dofs), self._body(problem), self._memory(state)
+        rows = body.read(memory.elastic)[first:]
+        found = dict(zip(problem.model.reading_names, map(float, rows), strict=False))
+        if problem.model.taxels:
+            forces = body.nodal_forces(self.prony, memory)
+            meshed, u = problem.meshed_body, np.zeros((0, problem.dim))
+            found |= {t.name: float(t.at_finite_strain(meshed, u, forces)[0]) for t in problem.model.taxels}
+        return found
 
     def fields(self, problem: Problem, state: ContactState) -> tuple[Float, Float, Float]:
         """Return displacement, linear strain and relaxed stress."""

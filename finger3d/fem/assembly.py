@@ -240,3 +240,8 @@ def stiffness(mesh: Mesh, elastic: LinearElasticity, thickness: float = 1.0) -> 
 def pressure_scale(mesh: Mesh, shear: float) -> float:
     """Return the unit (MPa) of the pressure unknowns, so that their entries have the size of the others."""
     return float(shear * len(mesh.cells) ** (1.0 / mesh.dim) / np.ptp(mesh.points, axis=0).max())
+
+
+def times(upper: sp.csr_matrix, vector: Float) -> Float:
+    """Return the product of a symmetric matrix, given by its upper triangle, and a vector."""
+    return np.asarray(upper @ vector + upper.T @ vector - upper.diagonal() * vector)

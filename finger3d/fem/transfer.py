@@ -29,12 +29,17 @@ def facing_trace(surface: BoundarySurface, mesh: Mesh, label: str) -> sp.csr_mat
     return sp.csr_matrix(sp.diags_array(scale) @ surface.average @ values)
 
 
-def values_over(mesh: Mesh, label: str, places: Float) -> tuple[sp.csr_matrix, NDArray[np.bool_]]:
-    """Return rows (q, n) that interpolate a field on the lowest facets above points (q, d), and where there are any."""
+def values_over(mesh: Mesh, label: str, places: Float, lowest: bool = True) -> tuple[sp.csr_matrix, NDArray[np.bool_]]:
+    """Return rows (q, n) that interpolate a field on facets above points (q, d), and where there are any.
+
+    Of several facets above a point it is the lowest that faces down, or the highest that faces up.
+    """
     facets = mesh.facets[label]
     d = mesh.dim
     across = [0] if d == 2 else [0, 2]
-    face, bary = _edges_over(mesh.points[facets], places[:, 0]) if d == 2 else _triangles_over(mesh, facets, places)
+    face, bary = (
+        _edges_over(mesh.points[facets], places[:, 0]) if d == 2 else _triangles_over(mesh, facets, places, lowest)
+    )
     there = face >= 0
     nodes = mesh.points[facets[face[there]]][:, :, across]
     element = mesh.facet_element
@@ -44,8 +49,8 @@ def values_over(mesh: Mesh, label: str, places: Float) -> tuple[sp.csr_matrix, N
     return sp.csr_matrix((values.ravel(), (row, column)), shape=(len(places), len(mesh.points))), there
 
 
-def _triangles_over(mesh: Mesh, facets: Int, places: Float) -> tuple[Int, Float]:
-    return Triangles(mesh.points, facets[:, :3]).hits(places[:, 0], places[:, 2], lowest=True)
+def _triangles_over(mesh: Mesh, facets: Int, places: Float, lowest: bool) -> tuple[Int, Float]:
+    return Triangles(mesh.points, facets[:, :3]).hits(places[:, 0], places[:, 2], lowest=lowest)
 
 
 def _edges_over(coords: Float, x: Float) -> tuple[Int, Float]:

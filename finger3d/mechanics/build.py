@@ -29,6 +29,7 @@ from finger3d.mechanics.problem import (
     object_share,
     scatter_to_points,
 )
+from finger3d.mechanics.readings import MeshedBody
 from finger3d.mechanics.resolution import check
 from finger3d.mechanics.symmetry import active_dofs, held_dofs, symmetry, unfold_points
 from finger3d.meshing.generate import mesh_solid
@@ -48,7 +49,7 @@ _STATIONS = 4, 20
 _WHOLE_FACE = 0.95
 """Share of the contact face from which all its points are candidates: a few more rows cost less than the check."""
 
-_MANY_GAUGES = 100
+_MANY_READINGS = 100
 """Gauges whose placing is announced: each takes some milliseconds."""
 
 
@@ -81,15 +82,17 @@ def build(model: Model, say: Say = lambda text: None, margin: float = MARGIN) ->
     matrix = stiffness(mesh, elastic, thickness)
     candidates = candidate_points(model, free, contact.first_contact_mm, margin)
     active = active_dofs(candidates, axes)
-    check_rows(len(active), len(model.gauges))
+    count = len(model.reading_names)
+    check_rows(len(active), count)
     bars = model.inclusions.discretise(model, mesh, axes) if model.inclusions else None
-    rows = local_rows(candidates, vertical_frame(mesh.dim))[active]
-    rows = sp.vstack([rows, *_readings(model, mesh, axes, bars, say)], format="csr")
+    contact_part = local_rows(candidates, vertical_frame(mesh.dim))[active]
+    readings = _readings(model, MeshedBody(mesh, axes, matrix, thickness), bars, say)
+    rows = sp.vstack([_widened(part, matrix.upper.shape[0]) for part in (contact_part, *readings)], format="csr")
     assembly = time.perf_counter() - start
     say(f"condensing {matrix.upper.shape[0]} unknowns to {len(candidates.nodes)} contact points")
     fixed = held_dofs(mesh, axes, model.held_ends)
     condensed = condense(matrix, fixed, rows)
-    delassus, gauge_rows = contact_rows(condensed.compliance, active, candidates, len(model.gauges))
+    delassus, reading_rows = contact_rows(condensed.compliance, active, candidates, count)
     mirrored, points = unfold_points(model, mesh, candidates, axes)
     problem = Problem(
         model=model,
@@ -107,7 +110,7 @@ def build(model: Model, say: Say = lambda text: None, margin: float = MARGIN) ->
             surface=candidates,
             points=points,
             delassus=delassus,
-            gauge_rows=gauge_rows,
+            reading_rows=reading_rows,
             active_dofs=active,
             first_contact_mm=contact.first_contact_mm,
             place_mm=contact.place,
@@ -122,16 +125,18 @@ def build(model: Model, say: Say = lambda text: None, margin: float = MARGIN) ->
 def with_bars(problem: Problem, bars: EmbeddedBars) -> Problem:
     """Return the problem with the stiffness of its inclusions added to the condensed rows."""
     condensed, active, count = problem.part.condensed, problem.system.active_dofs, len(bars.bar_stiffness)
+    readings = len(condensed.compliance) - len(active) - count
     compliance = condensed.compliance.copy()
     subgrid = bars.subgrid_compliance(compliance[-count:, -count:])
-    compliance[len(active) :, len(active) :] += subgrid
-    delassus, gauge_rows = contact_rows(
-        stiffened(compliance, bars.bar_stiffness), active, problem.system.surface, len(bars.gauge_weights)
+    first = len(compliance) - len(subgrid)
+    compliance[first:, first:] += subgrid
+    delassus, reading_rows = contact_rows(
+        stiffened(compliance, bars.bar_stiffness), active, problem.system.surface, readings
     )
     return replace(
         problem,
         body=replace(problem.part, condensed=replace(condensed, compliance=compliance)),
-        system=replace(problem.system, delassus=delassus, gauge_rows=gauge_rows),
+        system=replace(problem.system, delassus=delassus, reading_rows=reading_rows),
         inclusions=AddedStiffness(
             bars=bars.at_finite_strain(subgrid[-count:, -count:]),
             gauge_weights=bars.gauge_weights,
@@ -167,23 +172,28 @@ def _mesh(
     return mesh_section(model.design, model.mesh, zone, axes)
 
 
-def _readings(
-    model: Model, mesh: Mesh, axes: tuple[str, ...], bars: EmbeddedBars | None, say: Say
-) -> list[sp.csr_matrix]:
-    """Rows of the gauges, and of the bars if there are any."""
-    if len(model.gauges) >= _MANY_GAUGES:
-        say(f"placing {len(model.gauges)} gauges")
-    if bars:
-        return [bars.gauge_weights @ bars.rows, bars.rows]
-    return [gauge.row(mesh, axes) for gauge in model.gauges]
+def _readings(model: Model, body: MeshedBody, bars: EmbeddedBars | None, say: Say) -> list[sp.csr_matrix]:
+    """Rows of the readings, and of the bars if there are any."""
+    if len(model.readings) >= _MANY_READINGS:
+        say(f"placing {len(model.readings)} gauges, markers and taxels")
+    if not bars:
+        return [reading.rows(body) for reading in model.readings]
+    others = model.readings[: len(model.readings) - len(model.gauges)]
+    return [*(reading.rows(body) for reading in others), bars.gauge_weights @ bars.rows, bars.rows]
 
 
-def contact_rows(rows: Float, active: NDArray[np.int64], face: BoundarySurface, gauges: int) -> tuple[Float, Float]:
-    """Return compliance of contact points and strain of gauges per contact force, from the compliance of rows."""
+def _widened(rows: sp.csr_matrix, size: int) -> sp.csr_matrix:
+    """Return rows (k, n d) on displacements as rows (k, N) on all unknowns."""
+    rows = sp.csr_matrix(rows)
+    return sp.csr_matrix((rows.data, rows.indices, rows.indptr), (rows.shape[0], size))
+
+
+def contact_rows(rows: Float, active: NDArray[np.int64], face: BoundarySurface, readings: int) -> tuple[Float, Float]:
+    """Return compliance of contact points, and readings per contact force, from the compliance of rows."""
     count, dim = face.points.shape
-    strain = np.zeros((gauges, count * dim))
-    strain[:, active] = rows[len(active) : len(active) + gauges, : len(active)]
-    return scatter_to_points(rows, active, count, dim), strain
+    found = np.zeros((readings, count * dim))
+    found[:, active] = rows[len(active) : len(active) + readings, : len(active)]
+    return scatter_to_points(rows, active, count, dim), found
 
 
 def candidate_points(model: Model, free: BoundarySurface, touch: float, margin: float) -> BoundarySurface:

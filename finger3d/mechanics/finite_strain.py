@@ -124,17 +124,33 @@ class FiniteStrain:
         """All unknowns (N,) of each state."""
         return (self.unknowns(problem, state) for state in states)
 
-    def gauges(self, problem: Problem, state: ContactState) -> dict[str, float]:
-        """Relative elongation of a line along the gauge, or of the bars of its foil."""
-        mesh, axes = problem.mesh, problem.axes
-        u = displacement(mesh, self.unknowns(problem, state))
-        foils, bars = problem.inclusions, problem.inclusions.bars
-        if bars is None:
-            return {gauge.name: gauge.finite_strain(mesh, u, axes) for gauge in problem.model.gauges}
+    def readings(self, problem: Problem, state: ContactState) -> dict[str, float]:
+        """Return the readings in the deformed configuration; foils read the strain of their bars."""
         assert isinstance(state, DeformedState)
-        yielded = state.memory.elastic[-len(bars.stiffness) :] if state.memory else bars.yielded(u)
-        names = [gauge.name for gauge in problem.model.gauges]
-        return dict(zip(names, map(float, foils.gauge_weights @ bars.strain(u, yielded)), strict=True))
+        model, body = problem.model, problem.meshed_body
+        u, forces = displacement(problem.mesh, state.unknowns), self._nodal_forces(problem, state)
+        found = {
+            name: float(number)
+            for reading in model.readings
+            for name, number in zip(
+                reading.columns(problem.dim), reading.at_finite_strain(body, u, forces), strict=True
+            )
+        }
+        bars = problem.inclusions.bars
+        if bars is not None:
+            yielded = state.memory.elastic[-len(bars.stiffness) :] if state.memory else bars.yielded(u)
+            strains = problem.inclusions.gauge_weights @ bars.strain(u, yielded)
+            found |= {gauge.name: float(strain) for gauge, strain in zip(model.gauges, strains, strict=True)}
+        return found
+
+    def _nodal_forces(self, problem: Problem, state: DeformedState) -> Float:
+        """Return the internal nodal forces (n, d) of the present stress; only taxels read them."""
+        if not problem.model.taxels:
+            return np.zeros((0, problem.dim))
+        body = self._body(problem)
+        if self.relaxation is not None and state.memory is not None:
+            body = body.over(self.relaxation, state.memory, 0.0)
+        return body.internal_forces(state.unknowns)[: problem.mesh.points.size].reshape(-1, problem.dim)
 
     def work_on_body(
         self, problem: Problem, before: ContactState, after: ContactState, a: ObjectPose, b: ObjectPose

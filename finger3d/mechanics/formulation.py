@@ -111,8 +111,8 @@ class Formulation(Protocol):
         """Yield the unknowns of each of several states, which may cost less than one after another."""
         ...
 
-    def gauges(self, problem: Problem, state: ContactState) -> dict[str, float]:
-        """Strain of every gauge by name."""
+    def readings(self, problem: Problem, state: ContactState) -> dict[str, float]:
+        """Every number that is read, by its name in `Model.reading_names`."""
         ...
 
     def work_on_body(

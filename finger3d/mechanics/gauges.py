@@ -1,39 +1,16 @@
-"""Gauges: strain readings of the finger, as rows that act on displacements and at finite strain."""
+"""Strain gauges of the finger."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
 
 from finger3d._types import Float
-from finger3d.fem.locate import cells_at
 from finger3d.fem.simplex import Mesh, reflect_into_part
 from finger3d.fem.traces import displacement_row, strain_row
-
-
-class Reading(Protocol):
-    """A number read from the displacements of the finger; linear in small strain."""
-
-    @property
-    def name(self) -> str:
-        """Name in the output."""
-        ...
-
-    def row(self, mesh: Mesh, axes: tuple[str, ...]) -> sp.csr_matrix:
-        """Return the row (1, n d) that gives the reading from small displacements of the meshed part.
-
-        Parameters
-        ----------
-        axes : symmetry planes; a reading in a mirror image is taken from the part
-        """
-        ...
-
-    def finite_strain(self, mesh: Mesh, u: Float, axes: tuple[str, ...]) -> float:
-        """Return the reading under finite displacements u (n, d) mm of the meshed part."""
-        ...
+from finger3d.mechanics.readings import MeshedBody, moved_place
 
 
 @dataclass(frozen=True)
@@ -71,8 +48,20 @@ class Gauge:
         half = 0.5 * self.length_mm * self.direction
         return self.middle - half, self.middle + half
 
+    def columns(self, dim: int) -> tuple[str, ...]:
+        """Return the name."""
+        return (self.name,)
+
+    def rows(self, body: MeshedBody) -> sp.csr_matrix:
+        """Return the row (1, n d) of the strain along the gauge."""
+        return self.row(body.mesh, body.axes)
+
+    def at_finite_strain(self, body: MeshedBody, u: Float, forces: Float) -> Float:
+        """Return the relative elongation of the line, (1,)."""
+        return np.array([self.finite_strain(body.mesh, u, body.axes)])
+
     def row(self, mesh: Mesh, axes: tuple[str, ...]) -> sp.csr_matrix:
-        """Return the row of the strain along the gauge; see `Reading.row`."""
+        """Return the row (1, n d) that gives the strain from small displacements of a meshed part."""
         along = self.direction
         if self.is_point:
             return strain_row(mesh, *reflect_into_part(self.middle, along, axes, mesh.dim))
@@ -80,18 +69,10 @@ class Gauge:
         return sp.csr_matrix((end - start) / self.length_mm)
 
     def finite_strain(self, mesh: Mesh, u: Float, axes: tuple[str, ...]) -> float:
-        """Return the relative elongation of the line; see `Reading.finite_strain`."""
+        """Return the relative elongation of the line under displacements u (n, d), mm, of a meshed part."""
         from finger3d.fem.hyperelastic import stretch
 
         if self.is_point:
             return stretch(mesh, u, *reflect_into_part(self.middle, self.direction, axes, mesh.dim))
-        start, end = (_moved(mesh, u, place, axes) for place in self.ends)
+        start, end = (moved_place(mesh, u, place, axes) for place in self.ends)
         return float(np.linalg.norm(end - start)) / self.length_mm - 1.0
-
-
-def _moved(mesh: Mesh, u: Float, place: Float, axes: tuple[str, ...]) -> Float:
-    """Return where a material point (3,) of the whole finger goes, (d,)."""
-    d = mesh.dim
-    inside, sign = reflect_into_part(place, np.ones(3), axes, d)
-    cell, barycentric = cells_at(mesh, inside)[0]
-    return np.asarray(place[:d] + sign * (mesh.element.shape(barycentric[None])[0] @ u[mesh.cells[cell]]))

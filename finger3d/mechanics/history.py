@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._arrays import freeze_arrays
-from finger3d._types import Float, Tree
+from finger3d._types import Float, Tree, TreeView
 from finger3d.contact.friction import OPEN, STATUS_NAMES, STICK
 from finger3d.contact.state import ContactState
 from finger3d.errors import Outcome
@@ -106,12 +106,13 @@ class ContactPoints:
 
 @dataclass(frozen=True)
 class StepResult:
-    """Result of an increment: contact state of the whole finger (m points), gauge strains, work and convergence.
+    """Result of an increment: contact state of the whole finger (m points), readings, work and convergence.
 
     `part` is the state of the meshed part (c points), from which fields are recovered; `moment` (3,), N mm, is that of
     all contact forces on the finger about the middle of the base; `penetration_mm` is how deep the deepest contact
     point is inside the object, or the deepest place of the free surface (`finger3d.mechanics.coverage`); `detail` is
-    what else is known of a failure.
+    what else is known of a failure.  `gauges` are strains, `markers` displacements (d,) in mm, `taxels`
+    pressures in MPa, all by name.
     """
 
     target: ObjectPose
@@ -128,6 +129,8 @@ class StepResult:
     method: str
     penetration_mm: float
     detail: str = ""
+    markers: dict[str, tuple[float, ...]] = field(default_factory=dict)
+    taxels: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, repr=False)
@@ -194,11 +197,32 @@ def measure(points: ContactPoints, step: StepResult) -> Tree:
         "external_work_mJ": step.external_work_mJ,
         "dissipation_mJ": step.dissipation_mJ,
         "gauges": dict(step.gauges),
+        "markers": {name: [*moved, *[0.0] * (3 - len(moved))] for name, moved in step.markers.items()},
+        "taxels": dict(step.taxels),
         "iterations": step.iterations,
         "residual": step.residual,
         "method": step.method,
         "outcome": str(step.outcome),
     }
+
+
+def flat_readings(entry: TreeView) -> dict[str, float]:
+    """Return the readings of an entry of `steps` by the names of columns.
+
+    These are ``gauge_<name>``, ``marker_<name>_x_mm``, ``_y_mm``, ``_z_mm`` and ``taxel_<name>_MPa``.
+    """
+    moved = {
+        f"marker_{name}_{axis}_mm": value
+        for name, displacement in entry["markers"].items()
+        for axis, value in zip("xyz", displacement, strict=True)
+    }
+    pressures = {f"taxel_{name}_MPa": pressure for name, pressure in entry["taxels"].items()}
+    return {f"gauge_{name}": strain for name, strain in entry["gauges"].items()} | moved | pressures
+
+
+def without_readings(entry: TreeView) -> Tree:
+    """Return an entry of `steps` without its readings."""
+    return {key: value for key, value in entry.items() if key not in ("gauges", "markers", "taxels")}
 
 
 def contact_table(points: ContactPoints, state: ContactState) -> Tree:

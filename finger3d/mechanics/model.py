@@ -20,6 +20,7 @@ from finger3d.geometry.design import Design
 from finger3d.mechanics.cost import AddedCost, PressCost
 from finger3d.mechanics.formulation import Formulation
 from finger3d.mechanics.gauges import Gauge
+from finger3d.mechanics.readings import Marker, Reading, Taxel
 from finger3d.mechanics.relaxation import Relaxation
 from finger3d.mechanics.small_strain import SmallStrain
 from finger3d.objects import ContactPath, ObjectPose, Plane, RigidObject, between
@@ -206,6 +207,8 @@ class Model:
     strain_measure: Formulation = field(default_factory=SmallStrain)
     relaxation: Relaxation | None = None
     gauges: tuple[Gauge, ...] = ()
+    markers: tuple[Marker, ...] = ()
+    taxels: tuple[Taxel, ...] = ()
     inclusions: Inclusions | None = None
     object_compliance: ObjectCompliance | None = None
     domain: Domain = "solid"
@@ -219,6 +222,17 @@ class Model:
     def formulation(self) -> Formulation:
         """Strain measure and material response of the body."""
         return self.strain_measure if self.relaxation is None else self.strain_measure.relaxing(self.relaxation)
+
+    @property
+    def readings(self) -> tuple[Reading, ...]:
+        """Markers, taxels and gauges, in the order of their rows; inclusions read the gauges, the last."""
+        return (*self.markers, *self.taxels, *self.gauges)
+
+    @property
+    def reading_names(self) -> tuple[str, ...]:
+        """Name of every number that is read."""
+        dim = 3 if self.domain == "solid" else 2
+        return tuple(name for reading in self.readings for name in reading.columns(dim))
 
     @property
     def largest_depth_mm(self) -> float:

@@ -22,6 +22,7 @@ from finger3d.fem.traces import BoundarySurface, joined, surface
 from finger3d.mechanics.contact_geometry import contact_geometry, may_touch
 from finger3d.mechanics.history import ContactPoints
 from finger3d.mechanics.model import Model
+from finger3d.mechanics.readings import MeshedBody
 from finger3d.mechanics.symmetry import Symmetry
 from finger3d.meshing.report import MeshReport
 from finger3d.objects import ObjectPose, PlacedObject, vertical_frame
@@ -31,7 +32,7 @@ _AT_ONCE = 8_000_000  # unknowns solved for at once: 64 MB, and a few times as m
 
 @dataclass(frozen=True, kw_only=True)
 class Part:
-    """Meshed part of the finger, assembled and condensed to its contact points, gauges and inclusions.
+    """Meshed part of the finger, assembled and condensed to its contact points, readings and inclusions.
 
     Attributes
     ----------
@@ -61,7 +62,7 @@ class ContactSystem:
     surface : the candidate points
     points : the contact points of the whole finger
     delassus : (c, d, c, d) mm/N, in the directions of an upright object
-    gauge_rows : (g, c d) strain per N, in the same directions
+    reading_rows : (g, c d) readings per N, in the same directions
     active_dofs : (r,) directions among c d that the condensed rows stand for
     first_contact_mm : height of the object's lowest point at first touch
     place_mm : (x, z) of first touch, if the finger's surface is known
@@ -73,7 +74,7 @@ class ContactSystem:
     surface: BoundarySurface
     points: ContactPoints
     delassus: Float
-    gauge_rows: Float
+    reading_rows: Float
     active_dofs: NDArray[np.int64]
     first_contact_mm: float
     place_mm: tuple[float, float] | None = None
@@ -217,13 +218,17 @@ class Problem:
         turned = contact_geometry(last.distance, self.surface, axes=self.axes).from_reference
         return uniqueness(np.full(c, self.model.friction.largest), turned @ own @ turned.transpose(0, 2, 1))
 
-    def gauge_strains(self, force: Float) -> dict[str, float]:
-        """Strain by gauge name under contact forces (c, d), through the condensed rows."""
-        names = [g.name for g in self.model.gauges]
-        return dict(zip(names, map(float, self.system.gauge_rows @ force.ravel()), strict=True))
+    def read(self, force: Float) -> dict[str, float]:
+        """Readings by name under contact forces (c, d), through the condensed rows."""
+        return dict(zip(self.model.reading_names, map(float, self.system.reading_rows @ force.ravel()), strict=True))
+
+    @property
+    def meshed_body(self) -> MeshedBody:
+        """The meshed part as readings see it."""
+        return MeshedBody(self.mesh, self.axes, self.part.stiffness, self.part.thickness)
 
     def row_forces(self, force: Float) -> Float:
-        """Forces on the condensed rows from contact forces (c, d); none on the rows of gauges and inclusions."""
+        """Forces on the condensed rows from contact forces (c, d); none on the rows of readings and inclusions."""
         rows = np.zeros(len(self.part.condensed.compliance))
         rows[: len(self.system.active_dofs)] = force.ravel()[self.system.active_dofs]
         return rows

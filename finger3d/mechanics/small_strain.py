@@ -83,9 +83,9 @@ class SmallStrain:
         """Yield the unknowns from the forces, by one back-substitution for many states."""
         return problem.unknowns_of([problem.upright_force(state) for state in states])
 
-    def gauges(self, problem: Problem, state: ContactState) -> dict[str, float]:
-        """Return the strains from the forces, by the rows of the gauges."""
-        return problem.gauge_strains(problem.upright_force(state))
+    def readings(self, problem: Problem, state: ContactState) -> dict[str, float]:
+        """Return the readings from the forces, by their rows."""
+        return problem.read(problem.upright_force(state))
 
     def work_on_body(
         self, problem: Problem, before: ContactState, after: ContactState, a: ObjectPose, b: ObjectPose

@@ -85,13 +85,16 @@ def march(
             dissipation += frictional_dissipation(problem, part.before, part.after)
         previous = at, state.force
         state, at = found.state, target
+        read = model.formulation.readings(problem, state)
         yield StepResult(
             target=target,
             state=problem.symmetry.unfold(state),
             part=state,
             lowest=problem.placed(target).lowest,
             moment=problem.symmetry.total_moment(model.formulation.moment(problem, state, target)),
-            gauges=model.formulation.gauges(problem, state) | _free_strain(problem, without_inclusions),
+            gauges={g.name: read[g.name] for g in model.gauges} | _free_strain(problem, without_inclusions),
+            markers={m.name: tuple(read[name] for name in m.columns(problem.dim)) for m in model.markers},
+            taxels={t.name: read[t.name] for t in model.taxels},
             external_work_mJ=work,
             dissipation_mJ=dissipation,
             outcome=found.outcome,

@@ -67,13 +67,13 @@ def rows_gb(rows: float) -> float:
     return 40e-9 * rows**2
 
 
-def check_rows(contact: int, gauges: int) -> None:
+def check_rows(contact: int, readings: int) -> None:
     """Raise a Finger3dError if the dense compliance of the condensed rows is estimated to need too much memory."""
-    need, have = rows_gb(contact + gauges), _machine_gb()
+    need, have = rows_gb(contact + readings), _machine_gb()
     if need > _MEMORY_SHARE * have:
-        cure = "fewer gauges" if gauges > contact else "a larger mesh.size_mm"
+        cure = "fewer gauges and markers" if readings > contact else "a larger mesh.size_mm"
         raise Finger3dError(
-            f"mesh.size_mm: {contact} rows of contact points and {gauges} of gauges are condensed to, forecast "
+            f"mesh.size_mm: {contact} rows of contact points and {readings} of readings are condensed to, forecast "
             f"{need:.2g} GB; allowed: at most {_MEMORY_SHARE * have:.1f} GB of {have:.1f} GB; choose {cure}"
         )
 

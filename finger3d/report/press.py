@@ -33,6 +33,7 @@ _HEADLINE = {
 _PICTURES = {
     "finger.png": "Deformed finger to scale: contact pressure, and stick and slip zones",
     "contact.png": "Traction on the finger along x, with the friction limit and the stick and slip zones",
+    "markers.png": "Displacements of the markers",
     "force.png": "Forces, and half lengths of contact and stick zone, against depth",
 }
 
@@ -144,10 +145,27 @@ def headline(step: PressStep, errors: Mapping[str, float]) -> list[HeadlineRow]:
             continue
         error = errors.get(key)
         rows.append(HeadlineRow(name, factor * value, unit, None if error is None else factor * error))
-    return rows + [
-        HeadlineRow(f"strain of gauge {name}", "unknown" if strain is None else strain, "", errors.get(f"gauge_{name}"))
-        for name, strain in step.gauges.items()
-    ]
+    return (
+        rows
+        + [
+            HeadlineRow(
+                f"strain of gauge {name}", "unknown" if strain is None else strain, "", errors.get(f"gauge_{name}")
+            )
+            for name, strain in step.gauges.items()
+        ]
+        + [
+            HeadlineRow(
+                f"displacement of marker {name} along {axis}", value, "mm", errors.get(f"marker_{name}_{axis}_mm")
+            )
+            for name, moved in step.markers.items()
+            for axis, value in zip("xyz", moved, strict=True)
+            if value
+        ]
+        + [
+            HeadlineRow(f"pressure of taxel {name}", pressure, "MPa", errors.get(f"taxel_{name}_MPa"))
+            for name, pressure in step.taxels.items()
+        ]
+    )
 
 
 def _error_bars(bars: ErrorBars) -> PageSection:
@@ -209,8 +227,13 @@ def _steps(good: Sequence[PressStep]) -> PageSection:
     # For instance the tangential force of a symmetric press, and slides of a path without them.
     shown = [k for k in _STEP_COLUMNS if k == "depth_mm" or max(abs(getattr(s, k)) for s in good) > _ROUND_OFF * scale]
     gauges = list(good[-1].gauges)
-    rows = [[*(getattr(s, k) for k in shown), *(s.gauges.get(g) for g in gauges)] for s in good]
-    table = Table([*(_STEP_COLUMNS[k] for k in shown), *(f"strain {g}" for g in gauges)], rows)
+    taxels = list(good[-1].taxels)
+    rows = [
+        [*(getattr(s, k) for k in shown), *(s.gauges.get(g) for g in gauges), *(s.taxels.get(t) for t in taxels)]
+        for s in good
+    ]
+    names = [*(f"strain {g}" for g in gauges), *(f"pressure {t} (MPa)" for t in taxels)]
+    table = Table([*(_STEP_COLUMNS[k] for k in shown), *names], rows)
     return PageSection(
         "Every step", ["The file history.csv has these numbers, and more, with all digits.", table], folded=True
     )

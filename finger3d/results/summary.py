@@ -5,8 +5,8 @@ from __future__ import annotations
 import csv
 import json
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from finger3d._types import Tree, TreeView
@@ -37,6 +37,8 @@ class PressStep:
     contact_half_length_end_mm : half the extent of the contact zone at z = width/2; None for a section
     external_work_mJ, dissipation_mJ : work done on the finger, and work lost to friction, since the start
     gauges : strain by the name of the gauge, dimensionless; None if it is unknown
+    markers : displacement along x, y and z by the name of the marker, mm
+    taxels : pressure by the name of the taxel, MPa
     iterations : of the contact solver
     residual : largest violation of the contact conditions, dimensionless; None if it is not finite
     method : the algorithm that solved the increment
@@ -75,6 +77,8 @@ class PressStep:
     method: str
     outcome: str
     contact_half_length_end_mm: float | None = None
+    markers: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    taxels: Mapping[str, float] = field(default_factory=dict)
 
 
 def steps_of(summary: TreeView) -> tuple[PressStep, ...]:

@@ -1,4 +1,4 @@
-"""Checks that involve several keys: depth and height of the finger, gauges and outline, edge lengths and both."""
+"""Checks that involve several keys: depth and height of the finger, readings and outline, edge lengths and both."""
 
 from __future__ import annotations
 
@@ -8,18 +8,20 @@ from collections import Counter
 import numpy as np
 
 from finger3d._ranges import LONGEST_SLIDE, at_least, at_most
-from finger3d._types import Tree
+from finger3d._types import Float, Tree
 from finger3d.geometry.design import Design
 from finger3d.mechanics.model import Domain, MeshOptions
 from finger3d.objects import RigidObject
 from finger3d.scene.messages import dotted, shown
-from finger3d.scene.tables import GaugeTable, LegTable, MeshTable, SceneTable
+from finger3d.scene.tables import GaugeTable, LegTable, MarkerTable, MeshTable, SceneTable, TaxelTable
 
 Box = tuple[float, float, float, float]
 
 SIZE_SHARE, BASE_SHARE = 1 / 25, 1 / 6.25
 """Default edge lengths in a solid as shares of the finger's height; sections take a quarter of them. They leave less
 than 1 % of the force in both, and .3 % of a gauge in a section (validation/cost_of_accuracy.py)."""
+
+_MOST_MARKERS = 20_000
 
 _ACROSS = 12.0  # elements across the overlap of a curved object, which is some 1.4 times as wide as the contact
 _FINEST = 0.2  # of the default: finer is left to those who ask for it
@@ -37,11 +39,30 @@ def check(tables: SceneTable, legs: tuple[LegTable, ...], design: Design) -> lis
             lines.append(f'mesh.mesher = "swept": {lacks}; must be "ftetwild"')
     lines += _legs(tables.press, legs, design, solid)
     lines += _sizes(tables.mesh, design, solid)
-    twice = [name for name, n in Counter(g.name for g in tables.gauge).items() if n > 1]
-    lines += [f"gauge.name = {shown(name)}: used more than once; every gauge needs its own name" for name in twice]
+    lines += _names(tables)
     for i, gauge in enumerate(tables.gauge):
-        lines += _gauge(i, gauge, design)
+        along = np.array([-0.5, 0.5]) * gauge.length_mm if gauge.length_mm else np.zeros(1)
+        lines += _place(("gauge", i), gauge, along, math.radians(gauge.angle_deg), design)
+    for i, marker in enumerate(tables.marker):
+        lines += _place(("marker", i), marker, np.zeros(1), 0.0, design)
+    if tables.marker_grid:
+        lines += _marker_grid(tables.marker_grid.spacing_mm, design, solid)
+    for i, taxel in enumerate(tables.taxel):
+        lines += _taxel(i, taxel, design, solid)
     return lines
+
+
+def _names(tables: SceneTable) -> list[str]:
+    """Return a line about every name of a gauge, marker or taxel that is used twice, also with a component added."""
+    kinds = [("gauge", g.name) for g in tables.gauge] + [("taxel", t.name) for t in tables.taxel]
+    kinds += [("marker", m.name) for m in tables.marker]
+    count = Counter(name for _, name in kinds)
+    count.update(f"{m.name}.{axis}" for m in tables.marker for axis in "xyz")
+    twice = {name: kind for kind, name in kinds if count[name] > 1}
+    return [
+        f"{kind}.name = {shown(name)}: used more than once; every gauge, marker and taxel needs its own name"
+        for name, kind in twice.items()
+    ]
 
 
 def _legs(press: Tree, legs: tuple[LegTable, ...], design: Design, solid: bool) -> list[str]:
@@ -146,39 +167,67 @@ def _rounded(value: float) -> float:
     return float(f"{value:.4g}")
 
 
-def _gauge(index: int, gauge: GaugeTable, design: Design) -> list[str]:
-    at = ("gauge", index)
+def _place(at: tuple[str, int], it: GaugeTable | MarkerTable, along: Float, angle: float, design: Design) -> list[str]:
+    """Check the place of a gauge or marker, and the ends of a gauge: distances `along` from its middle, mm."""
     half_length, height = design.half_length_mm, design.height_mm
-    half_width = design.width_mm / 2.0
+    half_width, what = design.width_mm / 2.0, f"{at[0]} {shown(it.name)}"
     for key, value, low, high in (
-        ("x_mm", gauge.x_mm, -half_length, half_length),
-        ("y_mm", gauge.y_mm, 0.0, height),
-        ("z_mm", gauge.z_mm, -half_width, half_width),
+        ("x_mm", it.x_mm, -half_length, half_length),
+        ("y_mm", it.y_mm, 0.0, height),
+        ("z_mm", it.z_mm, -half_width, half_width),
     ):
         if not low <= value <= high:
             return [
-                f"{dotted((*at, key))} = {shown(value)}: gauge {shown(gauge.name)} is outside the finger; "
+                f"{dotted((*at, key))} = {shown(value)}: {what} is outside the finger; "
                 f"must be a number from {at_least(low)} to {at_most(high)}"
             ]
-    along = np.array([-0.5, 0.5]) * gauge.length_mm if gauge.length_mm else np.zeros(1)
-    x = gauge.x_mm + along * math.cos(math.radians(gauge.angle_deg))
-    y = gauge.y_mm + along * math.sin(math.radians(gauge.angle_deg))
-    top = design.top(x, np.full_like(x, gauge.z_mm))
+    x, y = it.x_mm + along * math.cos(angle), it.y_mm + along * math.sin(angle)
+    top = design.top(x, np.full_like(x, it.z_mm))
     slack = 1e-9 * height
-    if not np.all((y >= -slack) & (y <= top + slack)):
-        here = float(design.top(np.array([gauge.x_mm]), np.array([gauge.z_mm]))[0])
-        if math.isnan(here):
-            return [
-                f"{dotted((*at, 'z_mm'))} = {shown(gauge.z_mm)}: gauge {shown(gauge.name)} is outside the finger; "
-                f"must be nearer to 0 at x_mm = {shown(gauge.x_mm)}"
-            ]
-        if gauge.length_mm and gauge.y_mm <= here + slack:
-            return [
-                f"{dotted((*at, 'length_mm'))} = {shown(gauge.length_mm)}: an end of gauge {shown(gauge.name)} "
-                "leaves the finger; must be shorter, or the gauge moved inward"
-            ]
+    if np.all((y >= -slack) & (y <= top + slack)):
+        return []
+    here = float(design.top(np.array([it.x_mm]), np.array([it.z_mm]))[0])
+    if math.isnan(here):
         return [
-            f"{dotted((*at, 'y_mm'))} = {shown(gauge.y_mm)}: gauge {shown(gauge.name)} is outside the finger; "
-            f"must be a number from 0 to {at_most(here)} at x_mm = {shown(gauge.x_mm)}"
+            f"{dotted((*at, 'z_mm'))} = {shown(it.z_mm)}: {what} is outside the finger; "
+            f"must be nearer to 0 at x_mm = {shown(it.x_mm)}"
+        ]
+    if isinstance(it, GaugeTable) and it.length_mm and it.y_mm <= here + slack:
+        return [
+            f"{dotted((*at, 'length_mm'))} = {shown(it.length_mm)}: an end of {what} "
+            "leaves the finger; must be shorter, or the gauge moved inward"
+        ]
+    return [
+        f"{dotted((*at, 'y_mm'))} = {shown(it.y_mm)}: {what} is outside the finger; "
+        f"must be a number from 0 to {at_most(here)} at x_mm = {shown(it.x_mm)}"
+    ]
+
+
+def _marker_grid(spacing_mm: float, design: Design, solid: bool) -> list[str]:
+    """Check that a grid has not too many markers for a file, and more than one."""
+    sides = (2.0 * design.half_length_mm, design.width_mm) if solid else (2.0 * design.half_length_mm,)
+    least = (math.prod(sides) / _MOST_MARKERS) ** (1.0 / len(sides))
+    if least <= spacing_mm <= max(sides):
+        return []
+    allowed = f"must be a number from {at_least(least)} to {at_most(max(sides))}"
+    return [f"marker_grid.spacing_mm = {shown(spacing_mm)}: {allowed}"]
+
+
+def _taxel(index: int, taxel: TaxelTable, design: Design, solid: bool) -> list[str]:
+    """Check that a taxel is on the base."""
+    halves = {"x_mm": (taxel.length_mm, design.half_length_mm), "z_mm": (taxel.width_mm, design.width_mm / 2.0)}
+    for key, (extent, half) in halves.items():
+        most, value = half - 0.5 * extent, getattr(taxel, key)
+        if abs(value) > most * (1.0 + 1e-9) and (solid or key == "x_mm"):
+            return [
+                f"{dotted(('taxel', index, key))} = {shown(value)}: taxel {shown(taxel.name)} leaves the base; "
+                + (f"must be from -{at_most(most)} to {at_most(most)}" if most > 0.0 else "must be smaller")
+            ]
+    corners = 0.5 * np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]]) * [taxel.length_mm, taxel.width_mm]
+    x, z = (1.0 - 1e-9) * (corners + [taxel.x_mm, taxel.z_mm]).T
+    if np.isnan(design.top(x, z if solid else np.zeros_like(z))).any():
+        return [
+            f"{dotted(('taxel', index, 'x_mm'))} = {shown(taxel.x_mm)}: taxel {shown(taxel.name)} leaves the base; "
+            "must be smaller, or nearer to the middle"
         ]
     return []

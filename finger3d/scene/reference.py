@@ -17,8 +17,11 @@ from finger3d.scene.tables import (
     FrictionTable,
     GaugeTable,
     LegTable,
+    MarkerGridTable,
+    MarkerTable,
     MaterialTable,
     MeshTable,
+    TaxelTable,
     TomlTable,
     table_of,
 )
@@ -55,6 +58,9 @@ def _tables() -> Iterator[tuple[str, list[_Row]]]:
     yield "[model]", _rows(DomainTable)
     yield "[mesh]", _rows(MeshTable)
     yield "[[gauge]]", _rows(GaugeTable)
+    yield "[[marker]]", _rows(MarkerTable)
+    yield "[marker_grid]", _rows(MarkerGridTable)
+    yield "[[taxel]]", _rows(TaxelTable)
     for name in effect_names():
         effect = effect_type(name)
         rows = _rows(table_of(effect), effect)

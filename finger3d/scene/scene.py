@@ -21,6 +21,7 @@ from finger3d.geometry.files import SUFFIXES
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model, contact_path
+from finger3d.mechanics.readings import Marker, Taxel
 from finger3d.objects import OBJECTS, RigidObject, initial_contact
 from finger3d.scene import checks, files, tree
 from finger3d.scene.legs import legs_of
@@ -81,9 +82,9 @@ class Scene:
         rows = [
             (name, ", ".join(f"{k} = {v}" for k, v in settings.items()) if isinstance(settings, Mapping) else "")
             for name, settings in self.as_dict().items()
-            if name not in ("title", "gauge", "effects")
+            if name not in ("title", "gauge", "marker", "taxel", "effects") and settings is not None
         ]
-        named = [(f"gauge {g['name']}", g) for g in self.as_dict()["gauge"]]
+        named = [(f"{kind} {g['name']}", g) for kind in ("gauge", "marker", "taxel") for g in self.as_dict()[kind]]
         named += [(f"effect {name}", settings) for name, settings in self.as_dict()["effects"].items()]
         rows += [(name, ", ".join(f"{k} = {v}" for k, v in given.items() if k != "name")) for name, given in named]
         return card(self.title, self.domain, rows)
@@ -117,6 +118,8 @@ class Scene:
             gauges=tuple(
                 Gauge(g.name, g.x_mm, g.y_mm, g.z_mm, math.radians(g.angle_deg), g.length_mm) for g in t.gauge
             ),
+            markers=tuple(Marker(m.name, m.x_mm, m.y_mm, m.z_mm) for m in t.marker),
+            taxels=tuple(Taxel(x.name, x.x_mm, x.z_mm, x.length_mm, x.width_mm) for x in t.taxel),
             domain=t.model.domain,
             rule=t.contact.rule,
         )

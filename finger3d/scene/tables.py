@@ -164,6 +164,49 @@ class GaugeTable(TomlTable):
     length_mm: Zero | Length = 0.0
 
 
+class MarkerTable(TomlTable):
+    """[[marker]]: the displacement of a material point, as a camera sees a dot; any number of them.
+
+    Attributes
+    ----------
+    name : by which results call it
+    x_mm, y_mm, z_mm : its place on the finger at rest
+    """
+
+    name: Name
+    x_mm: Place
+    y_mm: Place
+    z_mm: Place = 0.0
+
+
+class MarkerGridTable(TomlTable):
+    """[marker_grid]: markers all over the contact face.
+
+    Attributes
+    ----------
+    spacing_mm : of the markers along x and z
+    """
+
+    spacing_mm: Length
+
+
+class TaxelTable(TomlTable):
+    """[[taxel]]: the mean pressure on a rectangle of the base; any number of them.
+
+    Attributes
+    ----------
+    name : by which results call it
+    x_mm, z_mm : its middle on the base
+    length_mm, width_mm : along x and along z; a section has the length only
+    """
+
+    name: Name
+    x_mm: Place
+    z_mm: Place = 0.0
+    length_mm: Length
+    width_mm: Length
+
+
 class SceneTable(TomlTable):
     """The whole file. Tables whose keys depend on a name are checked afterwards, against that name's own table."""
 
@@ -177,6 +220,9 @@ class SceneTable(TomlTable):
     model: DomainTable = DomainTable()
     mesh: MeshTable = MeshTable()
     gauge: tuple[GaugeTable, ...] = ()
+    marker: tuple[MarkerTable, ...] = ()
+    marker_grid: MarkerGridTable | None = None
+    taxel: tuple[TaxelTable, ...] = ()
     effects: Tree = {}
 
 

@@ -9,10 +9,10 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import PchipInterpolator
 
 from finger3d._types import Float, TreeView
 from finger3d.errors import MissingError
+from finger3d.sensor.pchip import MonotoneCubic
 
 Shape = Literal["interpolation", "fit"]
 
@@ -21,6 +21,9 @@ NOISE = 1.5e-4
 
 RESOLUTION = 0.1
 """The paper's error of mu, and the limit beyond which a gauge is called blind here."""
+
+LARGEST_STRAIN, LARGEST_SD = 1e3, 1e6
+"""Largest magnitude of a strain (its standard deviation too), and of any other standard deviation."""
 
 FEWEST = 4  # points: three make the second-order fit, one more its residual
 
@@ -119,8 +122,8 @@ class Calibration:
         return Fit((float(c0), float(c1), float(c2)), float(np.sqrt(np.mean(left**2))), float(np.abs(left).max()))
 
     @cached_property
-    def _pchip(self) -> PchipInterpolator:
-        return PchipInterpolator(self.mu, self.strain)
+    def _pchip(self) -> MonotoneCubic:
+        return MonotoneCubic.of(self.mu, self.strain)
 
     def at(self, mu: ArrayLike, shape: Shape = "interpolation") -> Float:
         """Return the strain at mu in the calibrated range, by monotone cubic interpolation (PCHIP) or by the fit."""
@@ -154,7 +157,7 @@ class Calibration:
         for first in (1, 2):
             out = every[first:-1:2]
             kept = np.setdiff1d(every, out)
-            left = self.strain[out] - PchipInterpolator(self.mu[kept], self.strain[kept])(self.mu[out])
+            left = self.strain[out] - MonotoneCubic.of(self.mu[kept], self.strain[kept])(self.mu[out])
             found[out] = np.abs(left) / _SHARPER
         found[[0, -1]] = found[[1, -2]]
         # a kink between two of the points is seen from either of them, or from the next

@@ -4,58 +4,28 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import TypeVar
 
 import numpy as np
-from annotated_types import Ge, Gt, Le, MinLen
-from pydantic import BaseModel, ConfigDict, ValidationError
 
-from finger3d._ranges import LARGEST_SD, Friction, Noise, Strain, StrainSd
-from finger3d._types import Tree
+from finger3d._types import Float, Tree
 from finger3d.errors import Finger3dError
-from finger3d.io import write_csv, write_json
-from finger3d.sensor.curve import FEWEST, Calibration, Tolerance
+from finger3d.sensor.curve import FEWEST, LARGEST_SD, LARGEST_STRAIN, Calibration, Tolerance
 
 FORMAT, VERSION = "finger3d calibration", 2
 
 _STEEPEST = 1e12  # strain per unit of what is not known exactly
+_LARGEST_MU, _LEAST_NOISE, _LARGEST_LIMIT = 1e6, 1e-12, 1e6
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(strict=True, extra="ignore", allow_inf_nan=False)
-
-
-class _Curve(_Part):
-    mu: Annotated[list[Friction], MinLen(FEWEST)]
-    strain: Annotated[list[Strain], MinLen(FEWEST)]
-
-
-class _Tolerance(_Part):
-    unit: str
-    sd: Annotated[float, Ge(0.0), Le(LARGEST_SD)]
-    strain_per_unit: list[Annotated[float, Ge(-_STEEPEST), Le(_STEEPEST)]]
-    strain_sd: list[StrainSd]
-
-
-class _Failed(_Part):
-    mu: float
-    why: str
-
-
-class _File(_Part):
-    gauge: str
-    curve: _Curve
-    noise: Noise
-    resolution_limit: Annotated[float, Gt(0.0), Le(1e6)]
-    tolerances: dict[str, _Tolerance]
-    failed: list[_Failed]
-    scene: Tree
-    hash: str
-    about: Tree
+_TYPES: dict[type, str] = {dict: "table", list: "list", str: "text", object: "value"}
+Part = TypeVar("Part")
 
 
 def save(calibration: Calibration, path: str | Path) -> Path:
     """Write calibration.json."""
+    from finger3d.io import write_json
+
     write_json(path, as_dict(calibration))
     return Path(path)
 
@@ -101,6 +71,8 @@ def _mu_sd(c: Calibration, number: int) -> np.ndarray[tuple[int, ...], np.dtype[
 
 def write_table(calibration: Calibration, path: Path) -> None:
     """Write calibration.csv: every mu with its strain, slope, resolution and what each tolerance adds."""
+    from finger3d.io import write_csv
+
     c = calibration
     columns: Tree = {
         "mu": c.mu,
@@ -140,31 +112,67 @@ def load(path: str | Path) -> Calibration:
     if data.get("version") != VERSION:
         raise Finger3dError(f"{path}: version {data.get('version')}, this finger3d reads version {VERSION}; {again}")
     try:
-        found = _File.model_validate(data)
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        where = ".".join(str(p) for p in first["loc"])
-        raise Finger3dError(f"{path}: {where}: {first['msg'].lower()}; {again}") from None
-    mu, strain = np.array(found.curve.mu), np.array(found.curve.strain)
-    lengths = {
-        len(mu),
-        len(strain),
-        *(len(v) for t in found.tolerances.values() for v in (t.strain_per_unit, t.strain_sd)),
-    }
-    if len(lengths) > 1 or (np.diff(mu) <= 0.0).any() or mu[0] < 0.0:
-        raise Finger3dError(f"{path}: curve: mu must ascend from 0 up, with a strain and tolerances for each; {again}")
+        return _calibration(data)
+    except ValueError as error:
+        raise Finger3dError(f"{path}: {error}; {again}") from None
+
+
+def _calibration(data: Tree) -> Calibration:
+    """Return the calibration; a ValueError names the key of a part that is missing or wrong."""
+    curve, tolerances = _part(data, "curve", dict), _part(data, "tolerances", dict)
+    mu = _numbers(curve, "curve.mu", 0.0, _LARGEST_MU)
+    strain = _numbers(curve, "curve.strain", -LARGEST_STRAIN, LARGEST_STRAIN)
+    found = [_tolerance(name, _part(tolerances, f"tolerances.{name}", dict)) for name in tolerances]
+    lengths = {len(mu), len(strain), *(len(v) for t in found for v in (t.slope, t.spread))}
+    if len(lengths) > 1 or len(mu) < FEWEST or (np.diff(mu) <= 0.0).any():
+        raise ValueError(
+            f"curve: mu must ascend from 0 up, at least {FEWEST} values with a strain and tolerances for each"
+        )
+    failed = _part(data, "failed", list)
     return Calibration(
-        gauge=found.gauge,
+        gauge=_part(data, "gauge", str),
         mu=mu,
         strain=strain,
-        noise=found.noise,
-        limit=found.resolution_limit,
-        tolerances=tuple(
-            Tolerance(name=k, unit=t.unit, sd=t.sd, slope=np.array(t.strain_per_unit), spread=np.array(t.strain_sd))
-            for k, t in found.tolerances.items()
-        ),
-        failed=tuple((f.mu, f.why) for f in found.failed),
-        scene=found.scene,
-        hash=found.hash,
-        about=found.about,
+        noise=_number(data, "noise", _LEAST_NOISE, LARGEST_STRAIN),
+        limit=_number(data, "resolution_limit", 0.0, _LARGEST_LIMIT),
+        tolerances=tuple(found),
+        failed=tuple((_number(f, "failed.mu", 0.0, _LARGEST_MU), _part(f, "failed.why", str)) for f in failed),
+        scene=_part(data, "scene", dict),
+        hash=_part(data, "hash", str),
+        about=_part(data, "about", dict),
     )
+
+
+def _tolerance(name: str, data: Tree) -> Tolerance:
+    return Tolerance(
+        name=name,
+        unit=_part(data, f"tolerances.{name}.unit", str),
+        sd=_number(data, f"tolerances.{name}.sd", 0.0, LARGEST_SD),
+        slope=_numbers(data, f"tolerances.{name}.strain_per_unit", -_STEEPEST, _STEEPEST),
+        spread=_numbers(data, f"tolerances.{name}.strain_sd", 0.0, LARGEST_STRAIN),
+    )
+
+
+def _part(data: Tree, at: str, kind: type[Part]) -> Part:
+    """Return the entry of `data` that the last word of a key names; it must be of a type."""
+    key = at.rpartition(".")[2]
+    if not isinstance(data, dict) or key not in data:
+        raise ValueError(f"{at}: missing")
+    value = data[key]
+    if not isinstance(value, kind):
+        raise ValueError(f"{at}: must be a {_TYPES[kind]}")
+    return value
+
+
+def _number(data: Tree, at: str, low: float, high: float) -> float:
+    return _checked(_part(data, at, object), at, low, high)
+
+
+def _checked(value: object, at: str, low: float, high: float) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
+        raise ValueError(f"{at} = {value!r:.40}: must be a number from {low:g} to {high:g}")
+    return float(value)
+
+
+def _numbers(data: Tree, at: str, low: float, high: float) -> Float:
+    return np.array([_checked(value, f"{at}.{i}", low, high) for i, value in enumerate(_part(data, at, list))])

@@ -15,15 +15,16 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from finger3d._ranges import LARGEST_STRAIN
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
-from finger3d.sensor.curve import Calibration, Shape
+from finger3d.sensor.curve import LARGEST_STRAIN, Calibration, Shape
+from finger3d.sensor.files import load
 
 Status = Literal["ok", "coarse", "ambiguous", "above", "below", "outside", "blind"]
 
@@ -70,25 +71,26 @@ class Estimate:
 
 
 def estimate(
-    calibration: Calibration,
+    calibration: Calibration | str | Path,
     strain: ArrayLike,
     std: ArrayLike | None = None,
-    shape: Shape = "interpolation",
+    curve: Shape = "interpolation",
     tolerances: bool = True,
 ) -> list[Estimate]:
-    """Estimate mu from readings.
+    """Estimate the friction coefficient from strain readings; this needs no library but NumPy.
 
     Parameters
     ----------
-    strain : one reading or (m,) of them
-    std : standard deviation of each, 0 allowed; None: the calibration's noise
-    shape : invert the monotone interpolation, or the second-order fit
+    calibration : what `finger3d.calibrate` returned, or the path of its calibration.json
+    strain : one reading, or (m,) of them
+    std : standard deviation of each, 0 allowed; None: the noise of the calibration
+    curve : whether to invert the monotone interpolation or the second-order fit
     tolerances : whether what is not known exactly counts; not for a sensor whose own curve was measured
 
     Returns
     -------
     list
-        An Estimate for each reading.
+        An Estimate for each reading, with ``mu``, ``std`` and ``status``.
 
     Raises
     ------
@@ -96,6 +98,20 @@ def estimate(
         For a strain that is no finite number, or a std that is not from 0 up.
     """
     readings = np.atleast_1d(np.asarray(strain, dtype=float)).ravel()
+    _check("strain", readings, -LARGEST_STRAIN)
+    if isinstance(calibration, str | Path):
+        calibration = load(calibration)
+    noise = _noise(calibration, readings, std)
+    calibration = calibration if tolerances else replace(calibration, tolerances=())
+    found: list[Estimate] = []
+    for start in range(0, len(readings), _CHUNK):
+        part = slice(start, start + _CHUNK)
+        found += _estimates(calibration, readings[part], noise[part], curve)
+    return found
+
+
+def _noise(calibration: Calibration, readings: Float, std: ArrayLike | None) -> Float:
+    """Return the standard deviation of every reading (m,)."""
     given = np.asarray(calibration.noise if std is None else std, dtype=float)
     try:
         noise = np.broadcast_to(given, readings.shape)
@@ -103,14 +119,8 @@ def estimate(
         raise Finger3dError(
             f"std: {given.size} of them for {readings.size} strains; give one for all, or each"
         ) from None
-    _check("strain", readings, -LARGEST_STRAIN)
     _check("std", noise, 0.0)
-    calibration = calibration if tolerances else replace(calibration, tolerances=())
-    found: list[Estimate] = []
-    for start in range(0, len(readings), _CHUNK):
-        part = slice(start, start + _CHUNK)
-        found += _estimates(calibration, readings[part], noise[part], shape)
-    return found
+    return noise
 
 
 def _check(name: str, values: Float, least: float) -> None:

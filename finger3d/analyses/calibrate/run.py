@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._machine import versions
-from finger3d._ranges import LARGEST_STRAIN, number
+from finger3d._ranges import number
 from finger3d._types import Float
 from finger3d.analyses.calibrate.increments import Increments, choose_increments
 from finger3d.analyses.calibrate.presses import Press, presses
@@ -37,7 +37,7 @@ from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
 from finger3d.progress import Progress
 from finger3d.report.calibrate import calibrate_page
-from finger3d.sensor.curve import FEWEST, NOISE, RESOLUTION, Calibration, Tolerance
+from finger3d.sensor.curve import FEWEST, LARGEST_STRAIN, NOISE, RESOLUTION, Calibration, Tolerance
 from finger3d.sensor.files import save, write_table
 
 if TYPE_CHECKING:
@@ -348,15 +348,15 @@ def _write_points(folder: Path, curve: CurvePoints, gauge: str) -> None:
 
 
 def _write_body(folder: Path, model: Model, problem: Problem, report: Progress) -> None:
-    """Write the condensed body with the gauges of the scene, without the displaced ones, to reduced.npz."""
+    """Write the condensed body with the readings of the scene, without the displaced gauges, to reduced.npz."""
     if not model.formulation.is_linear_elastic:
         report.say("no reduced.npz: the compliance of the body changes during the press")
         return
-    rows = problem.system.gauge_rows[: len(model.gauges)]
+    rows = problem.system.reading_rows[: len(model.reading_names)]
     own = replace(
         problem,
         model=replace(problem.model, gauges=model.gauges),
-        system=replace(problem.system, gauge_rows=rows),
+        system=replace(problem.system, reading_rows=rows),
     )
     ReducedModel.of(own).save(folder / "reduced.npz")
 

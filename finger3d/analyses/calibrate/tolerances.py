@@ -18,7 +18,6 @@ from typing import Any, TypeAlias
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from finger3d._ranges import LARGEST_SD
 from finger3d._types import Float, Int
 from finger3d.accuracy.companions import built_like, companion
 from finger3d.accuracy.estimate import strain_error
@@ -35,7 +34,7 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.path import targets
 from finger3d.mechanics.problem import Problem, object_share, scatter_to_points
 from finger3d.objects import Plane
-from finger3d.sensor.curve import Tolerance
+from finger3d.sensor.curve import LARGEST_SD, Tolerance
 
 _LEAST_POINTS = {2: 150, 3: 500}
 """Contact points, by dimension, from which differences on the coarser mesh are good to a fifth of the largest."""
@@ -337,21 +336,23 @@ def _scaled_to_path(body: ReferenceBody, legs: tuple[Leg, ...]) -> PressesByMu:
 
 def with_modulus(problem: Problem, factor: float) -> Problem:
     """Return the problem with Young's modulus multiplied; in small strain the condensation is reused."""
-    if not problem.model.formulation.is_linear_elastic:
-        material = problem.model.material.isotropic("the tolerance of E_MPa")
+    model = problem.model
+    if not model.formulation.is_linear_elastic:
+        material = model.material.isotropic("the tolerance of E_MPa")
         return build(replace(problem.model, material=replace(material, E_MPa=material.E_MPa * factor)))
     c, d = problem.delassus.shape[:2]
 
     def scaled(one: Problem) -> Problem:
         own = stiffened(one.part.condensed.compliance, one.inclusions.bar_stiffness)
-        active, gauges = one.system.active_dofs, len(one.system.gauge_rows)
+        active, readings = one.system.active_dofs, len(one.system.reading_rows)
         of_object = one.delassus - scatter_to_points(own, active, c, d)
         changed = stiffened(one.part.condensed.compliance / factor, one.inclusions.bar_stiffness)
-        rows = np.zeros_like(one.system.gauge_rows)
-        rows[:, active] = changed[len(active) : len(active) + gauges, : len(active)]
+        rows = np.zeros_like(one.system.reading_rows)
+        rows[:, active] = changed[len(active) : len(active) + readings, : len(active)]
+        rows[len(rows) - len(model.gauges) - len(model.taxels) : len(rows) - len(model.gauges)] *= factor  # of forces
         finger = scatter_to_points(changed, active, c, d)
         share = None if one.system.object_share is None else object_share(one.surface, finger, of_object)
-        system = replace(one.system, delassus=finger + of_object, gauge_rows=rows, object_share=share)
+        system = replace(one.system, delassus=finger + of_object, reading_rows=rows, object_share=share)
         return replace(one, system=system)
 
     changed, bare = scaled(problem), problem.without_inclusions

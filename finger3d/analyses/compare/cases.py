@@ -13,7 +13,7 @@ from finger3d.accuracy.companions import FACTOR
 from finger3d.accuracy.estimate import estimate
 from finger3d.fem.simplex import CONTACT
 from finger3d.mechanics.build import build
-from finger3d.mechanics.history import ContactPoints, StepResult, contact_table, measure
+from finger3d.mechanics.history import ContactPoints, StepResult, contact_table, flat_readings, measure
 from finger3d.mechanics.model import Domain, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.step_halving import march_automatic
@@ -104,7 +104,7 @@ def quantities(points: ContactPoints, frame: StepResult) -> dict[str, float]:
         out["moment_y_Nmm_per_mm"] = numbers["moment_y_Nmm"] / width
     middle = lines_along_x(points, frame)["z = 0"]
     out["peak_pressure_MPa"] = float(np.max(middle["pressure_MPa"], initial=0.0))
-    return out | {f"gauge_{name}": float(strain) for name, strain in numbers["gauges"].items()}
+    return out | flat_readings(numbers)
 
 
 def lines_along_x(points: ContactPoints, frame: StepResult) -> dict[str, Tree]:

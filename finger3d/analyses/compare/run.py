@@ -140,10 +140,13 @@ def _check(model: Model, widths: Sequence[float]) -> None:
         )
     if any(leg.slide_z_mm for leg in model.legs):
         raise Finger3dError("compare: press.slide_z_mm must be 0.0; a section cannot slide along its width")
-    for gauge in model.gauges:
-        if beyond := [w for w in widths if 2.0 * abs(gauge.z_mm) > w]:
+    reach = [(f'gauge "{g.name}"', g.z_mm, 0.0) for g in model.gauges]
+    reach += [(f'marker "{m.name}"', m.z_mm, 0.0) for m in model.markers]
+    reach += [(f'taxel "{t.name}"', t.z_mm, t.width_mm) for t in model.taxels]
+    for name, z, across in reach:
+        if beyond := [w for w in widths if 2.0 * abs(z) + across > w * (1.0 + 1e-9)]:
             raise Finger3dError(
-                f'compare: gauge "{gauge.name}" at z_mm = {gauge.z_mm:g} is outside a finger {beyond[0]:g} mm wide; '
+                f"compare: {name} at z_mm = {z:g} is outside a finger {beyond[0]:g} mm wide; "
                 "give larger widths or another z_mm"
             )
 

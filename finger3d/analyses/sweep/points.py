@@ -79,18 +79,20 @@ def varied(texts: Iterable[str]) -> tuple[Vary, ...]:
 
 
 def numbered(key: str, given: TreeView, option: str) -> str:
-    """The key with a gauge's name replaced by its number: ``gauge.g36.x_mm`` is ``gauge.0.x_mm``."""
+    """The key with a reading's name replaced by its number: ``gauge.g36.x_mm`` is ``gauge.0.x_mm``."""
     parts = key.split(".")
-    gauges = given.get("gauge", ())
-    if parts[0] != "gauge" or len(parts) < 3 or parts[1].isdecimal() or not isinstance(gauges, tuple | list):
+    kind, tables = parts[0], given.get(parts[0], ())
+    if kind not in ("gauge", "marker", "taxel") or len(parts) < 3 or parts[1].isdecimal():
         return key
-    names = [str(g.get("name")) for g in gauges if isinstance(g, Mapping)]
+    if not isinstance(tables, tuple | list):
+        return key
+    names = [str(table.get("name")) for table in tables if isinstance(table, Mapping)]
     if parts[1] not in names:
         near = nearest(parts[1], names)
         hint = f'did you mean "{near}"? ' if near else ""
-        known = f"must be {listed(names)}, or its number from 0" if names else "the scene has no [[gauge]]"
-        raise Finger3dError(f"{option} {key}: no gauge {shown(parts[1])}; {hint}{known}")
-    return ".".join(["gauge", str(names.index(parts[1])), *parts[2:]])
+        known = f"must be {listed(names)}, or its number from 0" if names else f"the scene has no [[{kind}]]"
+        raise Finger3dError(f"{option} {key}: no {kind} {shown(parts[1])}; {hint}{known}")
+    return ".".join([kind, str(names.index(parts[1])), *parts[2:]])
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,137 @@
+"""Readings of the finger: what its sensors measure, as rows that act on the unknowns, and at finite strain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import scipy.sparse as sp
+
+from finger3d._types import Float
+from finger3d.errors import Finger3dError
+from finger3d.fem.assembly import Stiffness, times
+from finger3d.fem.locate import cells_at
+from finger3d.fem.simplex import Mesh, axis_numbers, reflect_into_part
+from finger3d.fem.traces import displacement_rows
+
+_PATCH_PLACES = 64
+"""Places along each side of a taxel that its mean is taken over."""
+
+
+@dataclass(frozen=True)
+class MeshedBody:
+    """The meshed part of the finger that readings are taken from.
+
+    Attributes
+    ----------
+    axes : symmetry planes; a reading in a mirror image is taken from the part
+    thickness : width of a section, 1 for a solid, mm
+    """
+
+    mesh: Mesh
+    axes: tuple[str, ...]
+    stiffness: Stiffness
+    thickness: float
+
+
+class Reading(Protocol):
+    """Numbers read from the finger; linear in small strain."""
+
+    @property
+    def name(self) -> str:
+        """Name in the output."""
+        ...
+
+    def columns(self, dim: int) -> tuple[str, ...]:
+        """Return the name of each number, in 2 or 3 dimensions."""
+        ...
+
+    def rows(self, body: MeshedBody) -> sp.csr_matrix:
+        """Return the rows (k, N) or (k, n d) that give the numbers from the unknowns of small strain."""
+        ...
+
+    def at_finite_strain(self, body: MeshedBody, u: Float, forces: Float) -> Float:
+        """Return the numbers (k,) under finite displacements u (n, d), mm, and internal forces (n, d), N."""
+        ...
+
+
+@dataclass(frozen=True)
+class Marker:
+    """Displacement of a material point in mm, as a camera sees a dot."""
+
+    name: str
+    x_mm: float
+    y_mm: float
+    z_mm: float = 0.0
+
+    @property
+    def place(self) -> Float:
+        """Place (3,) mm at rest."""
+        return np.array([self.x_mm, self.y_mm, self.z_mm])
+
+    def columns(self, dim: int) -> tuple[str, ...]:
+        """Return a name for each component of the displacement, as ``m1.x``."""
+        return tuple(f"{self.name}.{axis}" for axis in "xyz"[:dim])
+
+    def rows(self, body: MeshedBody) -> sp.csr_matrix:
+        """Return the rows (d, n d) of the displacement."""
+        inside, sign = reflect_into_part(self.place, np.ones(3), body.axes, body.mesh.dim)
+        return displacement_rows(body.mesh, inside, sign)
+
+    def at_finite_strain(self, body: MeshedBody, u: Float, forces: Float) -> Float:
+        """Return the displacement (d,)."""
+        return moved_place(body.mesh, u, self.place, body.axes) - self.place[: body.mesh.dim]
+
+
+@dataclass(frozen=True)
+class Taxel:
+    """Mean pressure in MPa on a rectangle of the base, per area at rest, as a pressure cell below the finger reads it.
+
+    A section has the length along x only.
+    """
+
+    name: str
+    x_mm: float
+    z_mm: float
+    length_mm: float
+    width_mm: float
+
+    def columns(self, dim: int) -> tuple[str, ...]:
+        """Return the name."""
+        return (self.name,)
+
+    def rows(self, body: MeshedBody) -> sp.csr_matrix:
+        """Return the row (1, N) of the pressure: nodal forces are the stiffness times the unknowns."""
+        upper, d = body.stiffness.upper, body.mesh.dim
+        on_forces = np.zeros(upper.shape[0])
+        on_forces[: body.mesh.points.size].reshape(-1, d)[:, 1] = self._weights(body)
+        return sp.csr_matrix(times(upper, on_forces))
+
+    def at_finite_strain(self, body: MeshedBody, u: Float, forces: Float) -> Float:
+        """Return the pressure (1,)."""
+        return np.array([self._weights(body) @ forces[:, 1]])
+
+    def _weights(self, body: MeshedBody) -> Float:
+        """Return the weights (n,) of the nodal forces along y."""
+        from finger3d.fem.reactions import mean_traction_weights
+
+        shares = (np.arange(_PATCH_PLACES) + 0.5) / _PATCH_PLACES - 0.5
+        x, z = self.x_mm + self.length_mm * shares, self.z_mm + self.width_mm * shares
+        z = z if body.mesh.dim == 3 else np.zeros(1)
+        places = np.stack([x.repeat(len(z)), np.zeros(len(x) * len(z)), np.tile(z, len(x))], axis=1)
+        places = places[:, : body.mesh.dim]
+        for k in axis_numbers(body.axes):
+            places[:, k] = np.abs(places[:, k])
+        try:
+            return mean_traction_weights(body.mesh, "base", places, body.thickness)
+        except Finger3dError as error:
+            raise Finger3dError(f"taxel {self.name}: {error}") from None
+
+
+def moved_place(mesh: Mesh, u: Float, place: Float, axes: tuple[str, ...]) -> Float:
+    """Return where a material point (3,) of the whole finger goes, (d,), under displacements u (n, d) of the part."""
+    d = mesh.dim
+    inside, sign = reflect_into_part(place, np.ones(3), axes, d)
+    cell, barycentric = cells_at(mesh, inside)[0]
+    return np.asarray(place[:d] + sign * (mesh.element.shape(barycentric[None])[0] @ u[mesh.cells[cell]]))

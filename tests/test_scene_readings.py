@@ -1,0 +1,89 @@
+"""Markers and taxels in a scene: what is refused, and what a press writes about them."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+from finger3d.cli import main
+from finger3d.errors import Finger3dError
+from finger3d.scene import parse
+
+SCENE = {
+    "finger": {"geometry": "block", "half_length_mm": 4.0, "height_mm": 3.0, "width_mm": 4.0},
+    "material": {"E_MPa": 1.0, "nu": 0.3},
+    "friction": {"mu": 0.3},
+    "object": {"shape": "sphere", "radius_mm": 4.0},
+    "press": {"depth_mm": 0.3, "steps": 2},
+    "mesh": {"size_mm": 0.8, "base_size_mm": 1.2, "mesher": "swept"},
+}
+MARKER = {"name": "m1", "x_mm": 1.0, "y_mm": 2.0}
+TAXEL = {"name": "t1", "x_mm": 0.0, "z_mm": 0.0, "length_mm": 2.0, "width_mm": 2.0}
+
+
+@pytest.mark.parametrize(
+    ("tables", "said"),
+    [
+        ({"marker": [{**MARKER, "y_mm": 3.5}]}, 'marker.0.y_mm = 3.5: marker "m1" is outside the finger'),
+        ({"marker": [{**MARKER, "z_mm": 2.5}]}, 'marker.0.z_mm = 2.5: marker "m1" is outside the finger'),
+        ({"marker": [{**MARKER, "angle_deg": 3.0}]}, "marker.0.angle_deg"),
+        ({"marker": [MARKER, MARKER]}, 'marker.name = "m1": used more than once'),
+        ({"marker": [MARKER], "taxel": [{**TAXEL, "name": "m1"}]}, '.name = "m1": used more than once'),
+        ({"marker": [MARKER], "taxel": [{**TAXEL, "name": "m1.x"}]}, 'taxel.name = "m1.x": used more than once'),
+        ({"taxel": [{**TAXEL, "x_mm": 3.5}]}, 'taxel.0.x_mm = 3.5: taxel "t1" leaves the base; must be from -3 to 3'),
+        ({"taxel": [{**TAXEL, "width_mm": 5.0}]}, 'taxel.0.z_mm = 0.0: taxel "t1" leaves the base; must be smaller'),
+        ({"taxel": [{**TAXEL, "length_mm": 0.0}]}, "taxel.0.length_mm = 0.0: must be"),
+        ({"marker_grid": {"spacing_mm": 1e-3}}, "marker_grid.spacing_mm = 0.001: must be a number from 0.04 to 8"),
+        ({"marker_grid": {}}, "marker_grid.spacing_mm is missing"),
+    ],
+)
+def test_a_mistake_is_named(tables: dict, said: str) -> None:
+    with pytest.raises(Finger3dError) as error:
+        parse(SCENE | tables)
+    assert said in str(error.value)
+
+
+def test_a_taxel_must_stay_on_a_round_base() -> None:
+    dome = SCENE | {"finger": {"geometry": "hemisphere", "radius_mm": 4.0}, "mesh": {"size_mm": 0.8}}
+    parse(dome | {"taxel": [TAXEL]})
+    with pytest.raises(Finger3dError, match="leaves the base; must be smaller, or nearer to the middle"):
+        parse(dome | {"taxel": [{**TAXEL, "x_mm": 2.9, "z_mm": 2.9}]})
+
+
+@pytest.mark.parametrize("domain", ["solid", "plane-strain"])
+def test_a_press_writes_every_reading(tmp_path: Path, domain: str) -> None:
+    given = SCENE | {
+        "marker": [MARKER],
+        "taxel": [TAXEL],
+        "marker_grid": {"spacing_mm": 2.0},
+        "model": {"domain": domain},
+    }
+    scene = tmp_path / "scene.toml"
+    scene.write_text(parse(given).to_toml(), encoding="utf-8")
+    assert main(["press", str(scene), "--out", str(tmp_path / "out")]) == 0
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    step = summary["steps"][-1]
+    assert len(step["markers"]["m1"]) == 3
+    assert step["taxels"]["t1"] > 0.0
+    names = {"marker_m1_x_mm", "marker_m1_y_mm", "taxel_t1_MPa"}
+    assert names <= set(summary["error_estimate"]["discretisation"])
+    with (tmp_path / "out" / "history.csv").open() as stream:
+        last = list(csv.DictReader(stream))[-1]
+    assert float(last["marker_m1_y_mm"]) == pytest.approx(step["markers"]["m1"][1], rel=1e-12)
+    assert float(last["taxel_t1_MPa"]) == pytest.approx(step["taxels"]["t1"], rel=1e-12)
+    with (tmp_path / "out" / "markers.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    # every 2 mm from -4 to 4 mm along x, and from -2 to 2 mm along z
+    assert len(rows) == 2 * (1 + 5 * (3 if domain == "solid" else 1))
+    assert float(rows[-1]["y_mm"]) == pytest.approx(3.0)
+    under = next(r for r in rows if r["step"] == "2" and r["marker"] != "m1" and abs(float(r["x_mm"])) < 1.0
+                 and abs(float(r["z_mm"])) < 1.0)  # fmt: skip
+    # the marker under the lowest point of the ball goes down with it, but for the ball's sag over an edge of 0.8 mm
+    assert float(under["displacement_y_mm"]) == pytest.approx(-0.3, abs=0.8**2 / (2.0 * 4.0))
+    assert (tmp_path / "out" / "markers.png").stat().st_size > 10_000
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "pressure of taxel t1" in page
+    assert "displacement of marker m1 along y" in page

@@ -1,0 +1,140 @@
+"""Estimates on a robot: with NumPy alone, as monotone as SciPy's, and from readings that are still being written."""
+
+from __future__ import annotations
+
+import csv
+import runpy
+import subprocess
+import sys
+import time
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.interpolate import PchipInterpolator
+
+from finger3d.sensor import save
+from finger3d.sensor.pchip import MonotoneCubic
+from tests.sensor_cases import curve, straight
+
+NUMPY_ONLY = """
+import importlib.abc, sys
+class Refuse(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, path, target=None):
+        top = name.partition(".")[0]
+        if top not in sys.stdlib_module_names and top not in ("numpy", "finger3d"):
+            raise ImportError(f"{name} is not on the robot")
+sys.meta_path.insert(0, Refuse())
+import finger3d
+print(finger3d.estimate(sys.argv[1], [float(sys.argv[2])])[0].mu)
+"""
+
+
+def test_the_interpolation_is_that_of_scipy() -> None:
+    random = np.random.default_rng(0)
+    for _ in range(300):
+        count = random.integers(2, 9)
+        x, y = np.cumsum(random.uniform(0.1, 2.0, count)), random.normal(size=count) * random.choice([0, 1, 1], count)
+        at = random.uniform(x[0], x[-1], 20)
+        found, wanted = MonotoneCubic.of(x, y), PchipInterpolator(x, y)
+        assert found(at) == pytest.approx(wanted(at), rel=1e-12, abs=1e-12)
+        assert found(at, 1) == pytest.approx(wanted(at, 1), rel=1e-9, abs=1e-9)
+
+
+def test_an_estimate_needs_no_library_but_numpy(tmp_path: Path) -> None:
+    kept = save(curve(straight), tmp_path / "calibration.json")
+    said = subprocess.run(
+        [sys.executable, "-c", NUMPY_ONLY, str(kept), repr(straight(0.3))], capture_output=True, text=True, check=True
+    )
+    assert float(said.stdout) == pytest.approx(0.3)
+
+
+def follow(*arguments: object, **options: object) -> subprocess.Popen:
+    command = [sys.executable, "-m", "finger3d", "estimate", *map(str, arguments)]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
+
+
+def test_readings_are_answered_as_they_are_written(tmp_path: Path) -> None:
+    kept, readings = save(curve(straight), tmp_path / "calibration.json"), tmp_path / "readings.csv"
+    readings.write_text("time,strain\n")
+    child = follow(kept, "--follow", readings)
+    try:
+        assert child.stdout.readline().startswith("strain,reading_std,mu,std")
+        for mu in (0.2, 0.4):
+            text = f"1,{straight(mu)!r}\n"
+            with readings.open("a") as stream:
+                stream.write(text[:7])
+                stream.flush()
+                time.sleep(0.1)  # half a line is no reading
+                stream.write(text[7:])
+            assert float(child.stdout.readline().split(",")[2]) == pytest.approx(mu)
+    finally:
+        child.send_signal(2)
+        assert child.wait(timeout=20) == 130
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("x\n1\n", "must have a column named strain"),
+        ("strain\nabc\n", "line 2: strain = 'abc': must be a number"),
+        ("strain\n0.01\nnan\n", "line 3: strain = nan: must be a finite number"),
+        ("strain,std\n0.01,-1\n", "line 2: std = -1.0: must be"),
+    ],
+)
+def test_a_reading_that_is_none_ends_the_stream_with_one_line(tmp_path: Path, text: str, said: str) -> None:
+    kept = save(curve(straight), tmp_path / "calibration.json")
+    child = follow(kept, "--follow", "-", stdin=subprocess.PIPE)
+    out, error = child.communicate(text)
+    assert child.returncode == 2
+    assert said in error
+    assert len(error.splitlines()) == 1
+    assert len(out.splitlines()) == text.count("\n") - 1  # names, and an answer to every reading before
+
+
+def test_standard_input_is_answered_until_it_ends(tmp_path: Path) -> None:
+    kept = save(curve(straight), tmp_path / "calibration.json")
+    child = follow(kept, "--follow", "-", stdin=subprocess.PIPE)
+    out, error = child.communicate(f"strain\n{straight(0.3)!r}\n0.2\n")
+    assert (child.returncode, error) == (0, "")
+    rows = list(csv.DictReader(out.splitlines()))
+    assert float(rows[0]["mu"]) == pytest.approx(0.3)
+    assert rows[1]["status"] == "outside"
+
+
+def test_the_ros_node_publishes_what_estimate_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """ROS is not installed here: a stand-in for it records what the node publishes and logs."""
+    published, logged = [], []
+
+    class Node:
+        def __init__(self, name: str) -> None:
+            self.name = name
+
+        def declare_parameter(self, name: str, default: str) -> SimpleNamespace:
+            return SimpleNamespace(value=str(tmp_path / default))
+
+        def create_publisher(self, kind: type, topic: str, depth: int) -> SimpleNamespace:
+            return SimpleNamespace(publish=lambda message: published.append(message.data))
+
+        def create_subscription(self, kind: type, topic: str, call: object, depth: int) -> None:
+            assert topic == "strain"
+
+        def get_logger(self) -> SimpleNamespace:
+            return SimpleNamespace(warning=logged.append)
+
+    messages = ModuleType("std_msgs.msg")
+    messages.Float64 = messages.Float64MultiArray = SimpleNamespace
+    node = ModuleType("rclpy.node")
+    node.Node = Node
+    for name, module in {"rclpy": ModuleType("rclpy"), "rclpy.node": node, "std_msgs": ModuleType("std_msgs"),
+                         "std_msgs.msg": messages}.items():  # fmt: skip
+        monkeypatch.setitem(sys.modules, name, module)
+    save(curve(straight), tmp_path / "calibration.json")
+    own = runpy.run_path(str(Path(__file__).parents[1] / "docs" / "friction_node.py"))["FrictionNode"]()
+    own.on_strain(SimpleNamespace(data=straight(0.3)))
+    own.on_strain(SimpleNamespace(data=0.2))
+    assert published[0][0] == pytest.approx(0.3)
+    assert published[0][2] < 0.3 < published[0][3]
+    assert len(published) == len(logged) == 1
+    assert "out of range" in logged[0]
