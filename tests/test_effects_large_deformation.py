@@ -14,6 +14,8 @@ from finger3d.effects.large_deformation import Effect
 from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.errors import Outcome
 from finger3d.fem.material import Isotropic
+from finger3d.fem.quality import curved_jacobians
+from finger3d.fem.recover import displacement
 from finger3d.fem.simplex import FREE_FACES
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
@@ -236,3 +238,21 @@ def test_every_effect_beside_it_is_that_of_small_strain_under_a_light_load(name:
     # strain and slope at the contact go with the root of the depth, their effect on force and gauge with the depth
     assert max(differences[0]) < 0.05
     assert all(after < 0.4 * before for before, after in zip(*differences, strict=True))
+
+
+def test_a_state_with_a_cell_folded_at_a_sharp_corner_is_refused_by_its_place() -> None:
+    """The strain at the bonded corner of the base grows without limit as the free surface folds over it."""
+    design = designs()["half_cylinder"](radius_mm=10.0, width_mm=10.0)
+    mesh, leg = MeshOptions(0.65, 1.3, "swept"), Leg(4.2, steps=6)
+    model = Model(design, Isotropic(1.0, 0.49), mesh, (leg,), friction=Coulomb(2.0), domain="plane-strain")
+    model = Effect().apply(model)
+    problem = build(model)
+    frames = list(march(problem))
+    assert frames[-1].outcome is Outcome.INVERTED
+    x, y = (float(part.split(" = ")[1]) for part in frames[-1].detail.removesuffix(" mm").split(" at ")[1].split(", "))
+    assert abs(x) > 9.0
+    assert y < 1.0
+    for frame in frames[:-1]:
+        assert frame.outcome.ok
+        u = displacement(problem.mesh, model.formulation.unknowns(problem, frame.part))
+        assert curved_jacobians(replace(problem.mesh, points=problem.mesh.points + u)).min() > 0.0

@@ -16,7 +16,7 @@ from finger3d._types import Float
 from finger3d.analyses.study_rows import Row
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect
-from finger3d.errors import Finger3dError
+from finger3d.errors import Finger3dError, Outcome
 from finger3d.fem.material import Isotropic
 from finger3d.fem.recover import displacement
 from finger3d.geometry.design import Design
@@ -43,7 +43,7 @@ class Found:
     Attributes
     ----------
     settled : whether all increments converged
-    is_block : whether the finger has sharp edges at its face
+    folds : whether a cell at a sharp corner was turned inside out, and the state refused
     says : outcome of the increment that failed
     increments, factorizations, iterations : in all
     penetration : deepest place of the surface inside the object, over the depth
@@ -52,7 +52,7 @@ class Found:
     """
 
     settled: bool
-    is_block: bool
+    folds: bool
     says: str
     increments: int
     factorizations: int
@@ -154,7 +154,7 @@ def _found(problem: Problem, steps: list[StepResult], checks: list[SurfaceCheck]
     model, good = problem.model, [step for step in steps if step.outcome.ok]
     return Found(
         settled=steps[-1].outcome.ok,
-        is_block=type(model.design).__name__ == "Block",
+        folds=steps[-1].outcome is Outcome.INVERTED,
         says=str(steps[-1].outcome),
         increments=sum(int(leg.steps) for leg in model.legs),
         factorizations=factorizations,
@@ -198,8 +198,8 @@ def rows(quick: bool) -> list[Row]:
     return [
         bound("share unsettled", 0.02, len(unsettled) / len(found), "sharp corners that fold without end"),
         bound("unsettled without advice", 0, sum("try" not in f.says for f in unsettled), "none"),
-        Row(f"{here}: unsettled that are no blocks with sharp corners", "goal of this project", 0.0,
-            float(sum(not f.is_block for f in unsettled)), 0.0, "none", "statement", "at most"),
+        Row(f"{here}: unsettled where no sharp corner folds", "goal of this project", 0.0,
+            float(sum(not f.folds for f in unsettled)), 0.0, "none", "statement", "at most"),
         bound("scenes with a point inside the object that is not in contact", 0, sum(not f.outside for f in found),
               "none"),
         bound("median of the deepest place inside the object, over the depth", 0.03,

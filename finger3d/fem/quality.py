@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from finger3d._types import Float, Int
@@ -37,6 +39,18 @@ def curved_jacobians(mesh: Mesh) -> Float:
     return np.asarray(
         _determinants(mesh, np.vstack([mesh.element.nodes, np.full((1, d + 1), 1.0 / (d + 1))])).min(axis=0)
     )
+
+
+def inverted_place(mesh: Mesh, u: Float) -> Float | None:
+    """Return the middle (d,) mm, at rest, of the most inverted cell under displacements u (n, d) mm, None if none is.
+
+    A cell counts as inverted if the Jacobian determinant at any of its nodes or at its centre is not positive.
+    """
+    determinants = curved_jacobians(replace(mesh, points=mesh.points + u))
+    worst = int(determinants.argmin())
+    if determinants[worst] > 0.0:
+        return None
+    return np.asarray(mesh.points[mesh.cells[worst, : mesh.dim + 1]].mean(axis=0))
 
 
 def cell_angles_deg(points: Float, cells: Int) -> Float:

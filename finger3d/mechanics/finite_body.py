@@ -11,6 +11,7 @@ from finger3d._types import Float
 from finger3d.fem.assembly import Pattern, Stiffness
 from finger3d.fem.bars import BarRelaxation, Bars
 from finger3d.fem.hyperelastic import Hyperelastic, Relaxing, TotalLagrangian
+from finger3d.fem.laws.stability import least_stiffness, unstable_from
 from finger3d.fem.recover import displacement
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.relaxation import InternalVariables, Relaxation, Step
@@ -85,3 +86,17 @@ class FiniteBody:
         if self.bars is None:
             return tangent
         return tangent.less(-self.bars.tangent(displacement(self.solid.mesh, x), self.bars_relaxing))
+
+    def instability(self, x: Float) -> str:
+        """Return where the material law is unstable, in words; empty if it is stable."""
+        law = self.solid.material.law
+        if law.is_stable:
+            return ""
+        f = self.solid.deformation(x, self.relaxing)
+        stretches = np.sqrt(np.linalg.eigvalsh(np.swapaxes(f, 1, 2) @ f))
+        stiffness = least_stiffness(law, stretches)
+        if (stiffness > 0.0).all():
+            return ""
+        reached = ", ".join(f"{stretch:.3g}" for stretch in stretches[stiffness.argmin()])
+        limits = (f"{strain:.3g} in {mode}" for mode, strain in unstable_from(law).items())
+        return f"principal stretches reach {reached}; the stress falls from nominal strains of {', '.join(limits)}"

@@ -28,7 +28,7 @@ from finger3d.fem.assembly import on_places
 from finger3d.fem.condense import condense
 from finger3d.fem.finite_contact import DeformedContact
 from finger3d.fem.hyperelastic import InvertedError
-from finger3d.fem.laws.stability import least_stiffness, unstable_from
+from finger3d.fem.quality import inverted_place
 from finger3d.fem.recover import displacement
 from finger3d.mechanics.finite_body import FiniteBody
 from finger3d.mechanics.finite_state import (
@@ -107,7 +107,7 @@ class FiniteIncrement:
     def solve(self, guess: Float | None) -> ContactSolution:
         """Iterate until equilibrium and the contact conditions hold; the state is without internal variables."""
         found = self._iterate(guess)
-        if found.outcome.ok or found.outcome is Outcome.UNSTABLE:
+        if found.outcome.ok or found.detail:
             return found
         damped = self._iterate_damped()
         return replace(damped, iterations=found.iterations + damped.iterations)
@@ -182,19 +182,27 @@ class FiniteIncrement:
             return solution, None
 
     def _finished(self, now: _Configuration, solution: ContactSolution, error: float, spent: int) -> ContactSolution:
-        """Return the solution with the state at the end, unless the material law is unstable there."""
-        if self._instability(now):
+        """Return the solution with the state at the end, unless a cell is inverted or the material law unstable."""
+        if self.body.instability(now.x):
             return self._failed(now, Outcome.UNSTABLE, error, spent)
+        mesh = self.problem.mesh
+        folded = inverted_place(mesh, displacement(mesh, now.x))
+        if folded is not None:
+            at = ", ".join(f"{axis} = {x:.3g}" for axis, x in zip("xyz", folded, strict=False))
+            return self._failed(now, Outcome.INVERTED, error, spent, f"the cell at {at} mm")
         state, error = self._state(now, solution.state), max(solution.residual, error)
         return replace(solution, state=state, residual=error, iterations=spent)
 
-    def _failed(self, now: _Configuration, outcome: Outcome, error: float, spent: int) -> ContactSolution:
+    def _failed(
+        self, now: _Configuration, outcome: Outcome, error: float, spent: int, detail: str = ""
+    ) -> ContactSolution:
         """Return the first state with what is known of the failure; later increments begin with a new tangent."""
         last = self.workspace.linearisations.get(self._has_inclusions)
         if last is not None:
             self.workspace.linearisations[self._has_inclusions] = replace(last, reusable=False)
-        detail = self._instability(now)
-        return ContactSolution(self.start, Outcome.UNSTABLE if detail else outcome, error, spent, "none", detail)
+        unstable = self.body.instability(now.x)
+        outcome = Outcome.UNSTABLE if unstable else outcome
+        return ContactSolution(self.start, outcome, error, spent, "none", unstable or detail)
 
     def _last_linearisation(self) -> Linearisation | None:
         last = self.workspace.linearisations.get(self._has_inclusions)
@@ -375,20 +383,6 @@ class FiniteIncrement:
         dilatation = float(np.abs(unbalanced[n:]).max(initial=0.0)) / volume
         moved = self._relative_displacement(now, force)
         return max(residual(force, moved, solution.status, mu, self._length_scale), equilibrium, dilatation)
-
-    def _instability(self, now: _Configuration) -> str:
-        """Return where the material law is unstable, in words; empty if it is stable."""
-        law = self.body.solid.material.law
-        if law.is_stable:
-            return ""
-        f = self.body.solid.deformation(now.x, self.body.relaxing)
-        stretches = np.sqrt(np.linalg.eigvalsh(np.swapaxes(f, 1, 2) @ f))
-        stiffness = least_stiffness(law, stretches)
-        if (stiffness > 0.0).all():
-            return ""
-        reached = ", ".join(f"{stretch:.3g}" for stretch in stretches[stiffness.argmin()])
-        limits = (f"{strain:.3g} in {mode}" for mode, strain in unstable_from(law).items())
-        return f"principal stretches reach {reached}; the stress falls from nominal strains of {', '.join(limits)}"
 
     def _state(self, now: _Configuration, solution: ContactState) -> DeformedState:
         """Return the state at the end of the increment."""
