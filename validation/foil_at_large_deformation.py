@@ -48,7 +48,7 @@ def readings(model: Model, mus: tuple[float, ...]) -> dict[str, np.ndarray]:
     """Free strain and that of the foil, and the normal force (N), for every mu."""
     problem = build(model)
     found: dict[str, list[float]] = {FREE: [], READ: [], "force": []}
-    for press in presses(problem, mus):
+    for press in sorted(presses(problem, mus), key=lambda press: press.mu):
         if not press.frame.outcome.ok:
             raise AssertionError(f"mu = {press.mu:g}: {press.frame.outcome}")
         found[READ].append(press.frame.gauges["g"])

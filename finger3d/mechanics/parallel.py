@@ -25,7 +25,7 @@ _ROWS_FOR_THREADS = 1000
 
 
 _STRIDES = (4, 2, 1)
-"""Distances between the friction laws with which an increment is solved one after another."""
+"""Distances between the friction laws that are pressed in one wave."""
 
 
 def map_parallel(
@@ -82,28 +82,39 @@ def map_parallel(
 
 def march_together(
     problems: Sequence[Problem], workspace: Workspace, cancel: Event
-) -> Iterator[tuple[int, StepResult]]:
-    """Press one body with several friction laws at once: every increment with all of them before the next.
+) -> Iterator[tuple[int, list[StepResult]]]:
+    """Press one body with several friction laws, in waves: every fourth law first, then those half way, then the rest.
 
-    All share the factors.  An increment is solved with every fourth law first; those between begin with the mean of
-    what it changed with their neighbours.
+    A wave solves every increment with all of its laws before the next, so that they share the factor.  The increments
+    of the later waves begin with the mean of what they changed with their neighbours of the waves before.
 
     Yields
     ------
-    Number of the problem, and the result of its next increment.
+    Number of the problem, and the results of its increments, in the order of the waves.
     """
-    running = {number: march(problem, (), workspace, cancel) for number, problem in enumerate(problems)}
-    states = [problem.model.formulation.start(problem) for problem in problems]
-    while running:
-        changes: dict[int, tuple[ContactState, ContactState]] = {}
-        for stride in _STRIDES:
-            for number in [n for n in running if n % stride == 0 and n not in changes]:
-                workspace.similar = tuple(changes[n] for n in (number - stride, number + stride) if n in changes)
-                step = next(running[number], None)
+    found: dict[int, list[StepResult]] = {}
+    rest = [problem.model.formulation.start(problem) for problem in problems]
+
+    def change(number: int, increment: int) -> tuple[ContactState, ContactState] | None:
+        """The states of a press at both ends of an increment; None if it did not get there."""
+        steps = found.get(number, [])
+        if increment >= len(steps):
+            return None
+        return (steps[increment - 1].part if increment else rest[number]), steps[increment].part
+
+    for stride in _STRIDES:
+        wave = [number for number in range(0, len(problems), stride) if number not in found]
+        running = {number: march(problems[number], (), workspace, cancel) for number in wave}
+        steps: dict[int, list[StepResult]] = {number: [] for number in wave}
+        while running:
+            for number, press in list(running.items()):
+                near = [change(n, len(steps[number])) for n in (number - stride, number + stride)]
+                workspace.similar = tuple(pair for pair in near if pair is not None)
+                step = next(press, None)
                 workspace.similar = ()
                 if step is None:
                     del running[number]
-                    continue
-                changes[number] = states[number], step.part
-                states[number] = step.part
-                yield number, step
+                else:
+                    steps[number].append(step)
+        found |= steps
+        yield from steps.items()

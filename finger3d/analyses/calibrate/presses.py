@@ -65,7 +65,10 @@ def press(
 
 
 def presses(problem: Problem, mus: Sequence[float], initial: PressesByMu | None = None) -> Iterator[Press]:
-    """Yield a press for each of ascending values of mu, started from the press of `initial` with the same mu if any."""
+    """Yield a press for each of ascending values of mu, started from the press of `initial` with the same mu if any.
+
+    At finite strain they come in another order than that of mu; see `march_together`.
+    """
     if problem.model.formulation.finite_strain:
         yield from _together(problem, mus)
         return
@@ -78,15 +81,12 @@ def presses(problem: Problem, mus: Sequence[float], initial: PressesByMu | None 
 
 
 def _together(problem: Problem, mus: Sequence[float]) -> Iterator[Press]:
-    """Yield the presses with all values of mu, which share the factors of every increment."""
-    workspace, model = problem.model.formulation.workspace(), problem.model
+    """Yield the presses with all values of mu, which share factors."""
+    workspace, model, counted = problem.model.formulation.workspace(), problem.model, 0
     problems = [replace(problem, model=replace(model, friction=model.friction.with_mu(mu))) for mu in mus]
-    steps: list[list[StepResult]] = [[] for _ in mus]
-    for number, step in march_together(problems, workspace, Event()):
-        steps[number].append(step)
-    for number, (mu, own) in enumerate(zip(mus, steps, strict=True)):
-        forces = tuple(step.part.force for step in own)
-        yield Press(mu, own[-1], forces, 0 if number else workspace.factorizations)
+    for number, steps in march_together(problems, workspace, Event()):
+        new, counted = workspace.factorizations - counted, workspace.factorizations
+        yield Press(mus[number], steps[-1], tuple(step.part.force for step in steps), new)
 
 
 def _start(problem: Problem, mu: float, near: Sequence[Press]) -> list[Float]:

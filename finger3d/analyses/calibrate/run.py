@@ -99,7 +99,7 @@ class CurvePoints:
     ----------
     problem : the condensed body; its gauges include the displaced ones, which give the tolerances of position
     mus, increments : all values of mu of the calibration, ascending; the increments of every press
-    presses : in the order of `mus`
+    presses : ascending in mu
     seconds : wall time of the build and of the presses
     factorizations_before : factorisations of an earlier attempt with too few candidate points
     """
@@ -285,7 +285,8 @@ def _curve_points(problem: Problem, settings: CalibrationSettings, report: Progr
     curve = CurvePoints(problem, mus, increments, (), {})
     for found in presses(problem, mus):
         seconds = {"presses": time.perf_counter() - start}
-        curve = replace(curve, presses=(*curve.presses, found), seconds=seconds)
+        known = sorted((*curve.presses, found), key=lambda press: press.mu)
+        curve = replace(curve, presses=tuple(known), seconds=seconds)
         report.step(len(curve.presses), len(mus), f"mu = {found.mu:.4g}: {curve.failed.get(found.mu, 'converged')}")
         yield curve
 

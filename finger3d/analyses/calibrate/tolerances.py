@@ -138,7 +138,7 @@ class ReferenceBody:
     @classmethod
     def of(cls, problem: Problem, gauge: Gauge, mu: Float) -> ReferenceBody:
         """Press a problem at mu (m,)."""
-        pressed = {p.mu: p for p in presses(problem, mu.tolist())}
+        pressed = {p.mu: p for p in sorted(presses(problem, mu.tolist()), key=lambda p: p.mu)}
         strain = np.array([_strain(p.frame, gauge.name) for p in pressed.values()])
         return cls(problem, gauge, mu, strain, pressed)
 
@@ -155,7 +155,7 @@ class ReferenceBody:
 
 def read(problem: Problem, names: tuple[str, ...], mu: Float, initial: PressesByMu | None = None) -> Float:
     """Return the strain (g, m) of gauges at mu (m,), NaN where a press failed."""
-    frames = [p.frame for p in presses(problem, mu.tolist(), initial)]
+    frames = [p.frame for p in sorted(presses(problem, mu.tolist(), initial), key=lambda p: p.mu)]
     return np.array([[_strain(f, n) for f in frames] for n in names])
 
 
