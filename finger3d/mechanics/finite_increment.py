@@ -60,8 +60,8 @@ _NEGLIGIBLE = 1e-6
 _LARGEST_STEP, _LEAST_STEP = 2.0, 0.05
 """Largest displacement in an iteration over that of the object, and the least over the depth that is always allowed."""
 
-_DIVERGED = 1.0
-"""Residual from which an iteration with a new tangent is given up."""
+_ASTRAY, _DIVERGED = 0.1, 1.0
+"""Residual from which an iteration begins again if its tangent is an earlier one, and is given up if that is new."""
 
 _DAMPED_FACTORS = 40
 """Largest number of damped iterations."""
@@ -118,7 +118,7 @@ class FiniteIncrement:
         Where the tangent of an earlier increment leads nowhere, the iteration begins again with a new one.
         """
         first = now, force = self._initial(guess)
-        linearisation, factors, spent, error, largest = self._last_linearisation(), 0, 0, math.inf, 0.0
+        linearisation, factors, spent, error = self._last_linearisation(), 0, 0, math.inf
         outcome = Outcome.NEWTON
         for _ in range(_ITERATIONS):
             if linearisation is None:
@@ -135,14 +135,13 @@ class FiniteIncrement:
                 continue
             now, force = after, solution.state.force
             last_error, error = error, self._residual(now, solution.state)
-            largest = max(largest, error)
             if _converged(error, last_error):
                 return self._finished(now, solution, error, spent)
             if factors and error > _DIVERGED:
                 break
             if error > _SLOW * last_error:
                 linearisation = None
-                if not factors and error > _SLOW * largest:
+                if not factors and error > _ASTRAY:
                     (now, force), error = first, math.inf
         return self._failed(now, outcome, error, spent)
 
