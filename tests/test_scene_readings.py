@@ -70,6 +70,7 @@ def test_a_press_writes_every_reading(tmp_path: Path, domain: str) -> None:
     assert step["taxels"]["t1"] > 0.0
     names = {"marker_m1_x_mm", "marker_m1_y_mm", "taxel_t1_MPa"}
     assert names <= set(summary["error_estimate"]["discretisation"])
+    assert ("marker_m1_z_mm" in summary["error_estimate"]["discretisation"]) == (domain == "solid")
     with (tmp_path / "out" / "history.csv").open() as stream:
         last = list(csv.DictReader(stream))[-1]
     assert float(last["marker_m1_y_mm"]) == pytest.approx(step["markers"]["m1"][1], rel=1e-12)

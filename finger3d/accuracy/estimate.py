@@ -64,7 +64,9 @@ class ErrorEstimate(ErrorBars):
 def main_numbers(problem: Problem, frame: StepResult) -> dict[str, float]:
     """Return forces, lengths and areas of contact and stick, and readings, by name."""
     numbers = measure(problem.points, frame)
-    return {name: numbers[name] for name in (*MAIN, *AREAS)} | flat_readings(numbers)
+    across = {f"marker_{name}_z_mm" for name in frame.markers} if problem.dim == 2 else set()  # zero, without an error
+    readings = {name: value for name, value in flat_readings(numbers).items() if name not in across}
+    return {name: numbers[name] for name in (*MAIN, *AREAS)} | readings
 
 
 def press_numbers(problem: Problem, frame: StepResult) -> dict[str, float]:
