@@ -31,6 +31,8 @@ STEP = {
     "stick_area_mm2": 130.0,
     "residual": 3e-11,
     "gauges": {"g36": -0.0123},
+    "markers": {"m1": [0.5, -2.0, 0.0]},
+    "taxels": {"t1": 0.125},
     "outcome": "converged",
 }
 
@@ -126,7 +128,17 @@ def test_press_prints_the_closing_table(scene, tmp_path, fake_press, capsys) -> 
     assert fake_press.figures is True
     assert fake_press.scene.model().friction.mu == 0.5
     assert fake_press.scene.legs[0].steps == 2
-    for text in ("converged", "304.5 N", "72 mm", "17 mm", "3.0e-11", "-0.0123", "summary.json", "Fig. 9 finger"):
+    for text in (
+        "converged",
+        "304.5 N",
+        "72 mm",
+        "17 mm",
+        "3.0e-11",
+        "-0.0123",
+        "0.125 MPa",
+        "summary.json",
+        "Fig. 9 finger",
+    ):
         assert text in out
     for text in ("meshing", "mesh taken from the cache", "step 2 of 2: remark 1"):
         assert text in out

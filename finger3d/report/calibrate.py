@@ -45,6 +45,7 @@ def calibrate_page(folder: str | Path) -> Path:
     )
     use = f"finger3d estimate {folder}/calibration.json --strain {strain[len(strain) // 2]:.4g}"
     failed = [f"mu = {f['mu']:g}: {f['why']}" for f in data["failed"]]
+    note = data["about"].get("mesh", {}).get("note")
     return write_page(
         folder,
         f"{title_of(data['scene'])}: gauge {data['gauge']} against friction",
@@ -62,6 +63,6 @@ def calibrate_page(folder: str | Path) -> Path:
         command="calibrate",
         outcome="converged" if not failed else f"{len(failed)} values of mu gave no numbers",
         good=not failed,
-        notes=failed,
+        notes=[*failed, *([note] if note else [])],
         versions=data["about"].get("versions"),
     )

@@ -294,6 +294,9 @@ def summary(calibration: Calibration) -> list[tuple[str, str]]:
         steps = ", ".join(str(n) for n in c.about.get("increments", {}).get("steps", ()))
         said = f"leave an error of up to {left.spread.max():.2g} in the strain"
         rows.insert(1, (f"increments {steps}".strip(), said))
+    if mesh := c.about.get("mesh"):
+        note = f"; {mesh['note']}" if mesh["note"] else ""
+        rows.insert(1, ("mesh", f"edges of {mesh['size_mm']:.3g} and {mesh['base_size_mm']:.3g} mm{note}"))
     if c.failed:
         rows.append(("failed", ", ".join(f"mu = {mu:.4g}" for mu, _ in c.failed)))
     return rows

@@ -18,6 +18,8 @@ from finger3d._machine import versions
 from finger3d._ranges import number
 from finger3d._types import Float
 from finger3d.analyses.calibrate.increments import Increments, choose_increments
+from finger3d.analyses.calibrate.mesh_choice import choose_mesh
+from finger3d.analyses.calibrate.output import write_body, write_curve, write_map, write_points, write_scene
 from finger3d.analyses.calibrate.presses import Press, presses
 from finger3d.analyses.calibrate.tolerances import (
     ReferenceReadings,
@@ -26,9 +28,8 @@ from finger3d.analyses.calibrate.tolerances import (
     read,
     with_defaults,
 )
-from finger3d.analyses.reduced import ReducedModel
 from finger3d.errors import Finger3dError
-from finger3d.io import atomic, claimed, write_csv
+from finger3d.io import claimed
 from finger3d.mechanics.build import MARGIN, build
 from finger3d.mechanics.coverage import contact_within_candidates
 from finger3d.mechanics.gauges import Gauge
@@ -36,9 +37,7 @@ from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
 from finger3d.progress import Progress
-from finger3d.report.calibrate import calibrate_page
 from finger3d.sensor.curve import FEWEST, LARGEST_STRAIN, NOISE, RESOLUTION, Calibration, Tolerance
-from finger3d.sensor.files import save, write_table
 
 if TYPE_CHECKING:
     from finger3d.scene import Scene
@@ -50,6 +49,9 @@ MUS = tuple(float(mu) for mu in np.linspace(0.02, 1.2, 25).round(10))
 """Values of mu that are pressed unless others are given."""
 
 _FILES = ("calibration.json", "calibration.csv", "calibration.png", "reduced.npz", "map.png", "map.csv", "report.html")
+
+_SIZES = {"size_mm", "base_size_mm", "tolerance"}
+"""Keys of [mesh] with which a scene chooses its own mesh."""
 
 _SLOPES = {True: 7, False: 3}  # values of mu at which tolerances are tried: in small strain, and beyond
 
@@ -189,18 +191,28 @@ def _calibrate_scene(
     start = time.perf_counter()
     if folder:
         _prepare(folder, scene)
-    curve = _press_all(model, settings, report, folder)
-    calibration = _with_tolerances(curve, settings, report)
+
+    def calibrate_model(changed: Model) -> tuple[CurvePoints, Calibration]:
+        curve = _press_all(changed, settings, report, folder)
+        return curve, _with_tolerances(curve, settings, report)
+
+    automatic = not _SIZES & set(scene.given.get("mesh", {}))
+    chosen = choose_mesh(model, automatic, calibrate_model, report.say)
+    curve, calibration, used = chosen.curve, chosen.calibration, chosen.curve.problem.model.mesh
+    if used != model.mesh:
+        scene = scene.with_mesh(used)
+        if folder:
+            write_scene(folder, scene)
     seconds = {**calibration.about["seconds"], "total": time.perf_counter() - start}
-    about = {**_about(scene, curve), "seconds": seconds}
+    about = {**_about(scene, curve), "seconds": seconds, "mesh": {**used.as_table(), "note": chosen.note}}
     digest = hashlib.sha256(scene.to_toml().encode()).hexdigest()[:16]
     calibration = replace(calibration, scene=scene.as_dict(), hash=digest, about=about)
     if folder:
         report.stage("writing")
-        _write_body(folder, model, curve.problem, report)
+        write_body(folder, model, curve.problem, report)
         if settings.maps:
-            _write_map(folder, calibration, curve, settings.gauge)
-        _write_curve(folder, calibration)
+            write_map(folder, calibration, curve, settings.gauge)
+        write_curve(folder, calibration)
     return calibration
 
 
@@ -235,8 +247,7 @@ def _prepare(folder: Path, scene: Scene) -> None:
     """Remove the results of an earlier calibration, and write scene.toml."""
     for name in _FILES:
         (folder / name).unlink(missing_ok=True)
-    with atomic(folder / "scene.toml") as path:
-        path.write_text(scene.to_toml(), encoding="utf-8")
+    write_scene(folder, scene)
 
 
 def _press_all(
@@ -257,7 +268,7 @@ def _press_all(
         for curve in _curve_points(problem, settings, report):
             curve = replace(curve, seconds={**seconds, **curve.seconds}, factorizations_before=spent)
             if folder:
-                _write_points(folder, curve, settings.gauge.name)
+                write_points(folder, curve, settings.gauge.name)
         if all(contact_within_candidates(curve.problem, list(curve.frames.values()))):
             break
         spent = curve.factorizations
@@ -337,48 +348,6 @@ def _about(scene: Scene, curve: CurvePoints) -> dict[str, object]:
         "versions": versions(),
         "increments": curve.increments.as_dict(),
     }
-
-
-def _write_points(folder: Path, curve: CurvePoints, gauge: str) -> None:
-    """Write the values of mu that are finished to calibration.csv."""
-    frames, failed = curve.frames, curve.failed
-    mus = [p.mu for p in curve.presses]
-    strain = [frames[mu].gauges[gauge] if mu in frames else math.nan for mu in mus]
-    outcome = [failed.get(mu, "converged") for mu in mus]
-    write_csv(folder / "calibration.csv", {"mu": mus, "strain": strain, "outcome": outcome})
-
-
-def _write_body(folder: Path, model: Model, problem: Problem, report: Progress) -> None:
-    """Write the condensed body with the readings of the scene, without the displaced gauges, to reduced.npz."""
-    if not model.formulation.is_linear_elastic:
-        report.say("no reduced.npz: the compliance of the body changes during the press")
-        return
-    rows = problem.system.reading_rows[: len(model.reading_names)]
-    own = replace(
-        problem,
-        model=replace(problem.model, gauges=model.gauges),
-        system=replace(problem.system, reading_rows=rows),
-    )
-    ReducedModel.of(own).save(folder / "reduced.npz")
-
-
-def _write_map(folder: Path, calibration: Calibration, curve: CurvePoints, gauge: Gauge) -> None:
-    from finger3d.plotting.strain_map import draw_map
-    from finger3d.sensor.maps import StrainMap
-
-    found = StrainMap.of(curve.problem, curve.frames, z_mm=gauge.z_mm)
-    found.write(folder / "map.csv", gauge.angle, calibration.noise)
-    draw_map(folder / "map.png", found, gauge, calibration)
-
-
-def _write_curve(folder: Path, calibration: Calibration) -> None:
-    """Write the curve, its figure and its page."""
-    from finger3d.plotting.calibration import draw
-
-    write_table(calibration, folder / "calibration.csv")
-    save(calibration, folder / "calibration.json")
-    draw(folder / "calibration.png", calibration)
-    calibrate_page(folder)
 
 
 def parsed_mus(text: str) -> tuple[float, ...]:

@@ -1,0 +1,71 @@
+"""Files of a calibration in its folder."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from finger3d.analyses.reduced import ReducedModel
+from finger3d.io import atomic, write_csv
+from finger3d.mechanics.gauges import Gauge
+from finger3d.mechanics.model import Model
+from finger3d.mechanics.problem import Problem
+from finger3d.progress import Progress
+from finger3d.report.calibrate import calibrate_page
+from finger3d.sensor.curve import Calibration
+from finger3d.sensor.files import save, write_table
+
+if TYPE_CHECKING:
+    from finger3d.analyses.calibrate.run import CurvePoints
+    from finger3d.scene import Scene
+
+
+def write_scene(folder: Path, scene: Scene) -> None:
+    """Write scene.toml."""
+    with atomic(folder / "scene.toml") as path:
+        path.write_text(scene.to_toml(), encoding="utf-8")
+
+
+def write_points(folder: Path, curve: CurvePoints, gauge: str) -> None:
+    """Write the values of mu that are finished to calibration.csv."""
+    frames, failed = curve.frames, curve.failed
+    mus = [p.mu for p in curve.presses]
+    strain = [frames[mu].gauges[gauge] if mu in frames else math.nan for mu in mus]
+    outcome = [failed.get(mu, "converged") for mu in mus]
+    write_csv(folder / "calibration.csv", {"mu": mus, "strain": strain, "outcome": outcome})
+
+
+def write_body(folder: Path, model: Model, problem: Problem, report: Progress) -> None:
+    """Write the condensed body with the readings of the scene, without the displaced gauges, to reduced.npz."""
+    if not model.formulation.is_linear_elastic:
+        report.say("no reduced.npz: the compliance of the body changes during the press")
+        return
+    rows = problem.system.reading_rows[: len(model.reading_names)]
+    own = replace(
+        problem,
+        model=replace(problem.model, gauges=model.gauges),
+        system=replace(problem.system, reading_rows=rows),
+    )
+    ReducedModel.of(own).save(folder / "reduced.npz")
+
+
+def write_map(folder: Path, calibration: Calibration, curve: CurvePoints, gauge: Gauge) -> None:
+    """Map the sensitivity of strain to mu over the section to map.csv and map.png."""
+    from finger3d.plotting.strain_map import draw_map
+    from finger3d.sensor.maps import StrainMap
+
+    found = StrainMap.of(curve.problem, curve.frames, z_mm=gauge.z_mm)
+    found.write(folder / "map.csv", gauge.angle, calibration.noise)
+    draw_map(folder / "map.png", found, gauge, calibration)
+
+
+def write_curve(folder: Path, calibration: Calibration) -> None:
+    """Write the curve, its figure and its page."""
+    from finger3d.plotting.calibration import draw
+
+    write_table(calibration, folder / "calibration.csv")
+    save(calibration, folder / "calibration.json")
+    draw(folder / "calibration.png", calibration)
+    calibrate_page(folder)

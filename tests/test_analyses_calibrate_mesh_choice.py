@@ -1,0 +1,83 @@
+"""A calibration refines its mesh until that matters little, or says what it would cost."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from finger3d.accuracy.richardson import ORDER
+from finger3d.analyses.calibrate import mesh_choice
+from finger3d.analyses.calibrate.mesh_choice import SHARE, choose_mesh, mesh_share
+from finger3d.analyses.calibrate.run import calibrate
+from finger3d.errors import Finger3dError
+from finger3d.mechanics.model import Model
+from finger3d.scene import load
+from finger3d.sensor import Calibration, Tolerance
+from tests.models import fig9
+from tests.sensor_cases import FEW, NONE, SCENE, curve, scene, straight
+
+SECTION = replace(fig9(), domain="plane-strain")
+
+
+class Fake:
+    """Calibrates without a press: the mesh leaves an error of 1e-4 at edges of 1 mm, the noise is as large."""
+
+    def __init__(self, fails_below: float = 0.0) -> None:
+        self.sizes: list[float] = []
+        self.fails_below = fails_below
+
+    def __call__(self, model: Model) -> tuple[SimpleNamespace, Calibration]:
+        size = model.mesh.size_mm
+        if size < self.fails_below:
+            raise Finger3dError("too large for this machine")
+        self.sizes.append(size)
+        error = np.full(25, 1e-4 * size**ORDER)
+        found = curve(straight, noise=1e-4, tolerances=(Tolerance("mesh", "error bar", 1.0, error, error),))
+        return SimpleNamespace(model=model), found
+
+
+def test_the_mesh_is_refined_until_it_makes_less_than_a_tenth_of_the_variance() -> None:
+    fake, said = Fake(), []
+    found = choose_mesh(SECTION, True, fake, said.append)
+    assert mesh_share(found.calibration) <= SHARE
+    assert found.note == ""
+    assert fake.sizes[0] == SECTION.mesh.size_mm
+    assert 2 <= len(fake.sizes) <= 3  # the order of convergence tells how fine
+    assert len(said) == len(fake.sizes) - 1
+    assert "calibrating again" in said[0]
+
+
+@pytest.mark.parametrize("why", ["the scene gives the sizes", "it would take too long"])
+def test_a_finer_mesh_that_is_not_made_is_named_with_its_time(why: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    fake = Fake()
+    if why == "it would take too long":
+        monkeypatch.setattr(mesh_choice, "_LONGEST_S", 0.0)
+    found = choose_mesh(SECTION, why == "it would take too long", fake, pytest.fail)
+    assert fake.sizes == [SECTION.mesh.size_mm]
+    assert "the mesh makes up to 84 % of the variance of mu; mesh.size_mm = 0.6" in found.note
+    assert found.note.endswith(" s")
+
+
+def test_a_mesh_that_cannot_be_made_leaves_the_calibration_before() -> None:
+    fake = Fake(fails_below=1.0)
+    found = choose_mesh(SECTION, True, fake, lambda text: None)
+    assert fake.sizes == [SECTION.mesh.size_mm]
+    assert "that mesh was tried: too large for this machine" in found.note
+    with pytest.raises(Finger3dError, match="too large"):
+        choose_mesh(SECTION, True, Fake(fails_below=9.0), pytest.fail)
+
+
+def test_the_mesh_that_was_chosen_is_that_of_the_results(tmp_path: Path) -> None:
+    only = {**NONE, "mesh": 1.0}
+    chosen = calibrate(scene(mesh={"mesher": "swept"}), "g36", tmp_path / "own", FEW, tolerances=only)
+    assert chosen.about["mesh"]["note"] == ""
+    assert mesh_share(chosen) <= SHARE
+    assert load(tmp_path / "own" / "scene.toml").mesh.size_mm == chosen.about["mesh"]["size_mm"]
+    given = calibrate(scene(), "g36", tmp_path / "given", FEW, tolerances=only)
+    assert given.about["mesh"]["size_mm"] == SCENE["mesh"]["size_mm"]
+    assert "of the variance of mu" in given.about["mesh"]["note"]
+    assert given.about["mesh"]["note"] in (tmp_path / "given" / "report.html").read_text(encoding="utf-8")
