@@ -15,7 +15,7 @@ from dataclasses import asdict, dataclass, field, replace
 from finger3d._types import Tree
 from finger3d.accuracy.companions import FACTOR, companion
 from finger3d.accuracy.estimate import compared, main_numbers
-from finger3d.accuracy.richardson import ORDER, Kind, Quantity, largest
+from finger3d.accuracy.richardson import ORDER, Kind, Quantity, largest_readings
 from finger3d.errors import Finger3dError, UnresolvedError
 from finger3d.mechanics.build import build
 from finger3d.mechanics.model import MeshOptions, Model
@@ -157,13 +157,13 @@ def refine_mesh(
 
 def relative_errors(numbers: Mapping[str, float], errors: Mapping[str, float]) -> dict[str, float]:
     """Return relative errors; of lengths relative to that of the contact, of readings to the largest of their kind."""
-    found = {}
+    readings, found = largest_readings(numbers), {}
     for name, error in errors.items():
         kind = Quantity.of(name).kind
         if kind.is_length:
             scale = numbers["contact_half_length_mm"]
         else:
-            scale = largest(numbers, kind) if kind.is_reading else abs(numbers[name])
+            scale = readings.get(kind, abs(numbers[name]))
         found[name] = error / scale if scale > 0.0 else (math.inf if error > 0.0 else 0.0)
     return found
 

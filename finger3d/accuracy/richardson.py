@@ -46,11 +46,6 @@ class Kind(Enum):
         """Return whether the number is a length of a zone of contact points."""
         return self in (Kind.LENGTH, Kind.HALF_LENGTH)
 
-    @property
-    def is_reading(self) -> bool:
-        """Return whether the number is read by a gauge, marker or taxel."""
-        return self in _READINGS.values()
-
 
 _KINDS = {
     "normal_force_N": Kind.NORMAL_FORCE,
@@ -94,6 +89,11 @@ def largest(numbers: Mapping[str, float], kind: Kind) -> float:
     return max((abs(v) for k, v in numbers.items() if Quantity.of(k).kind is kind), default=0.0)
 
 
+def largest_readings(numbers: Mapping[str, float]) -> dict[Kind, float]:
+    """Return the largest magnitude of every kind of reading, to which errors of readings are relative."""
+    return {kind: largest(numbers, kind) for kind in _READINGS.values()}
+
+
 def gain(ratio: float) -> float:
     """Return the change of a number to the companion over its error; `ratio` of edge lengths, companion over mesh."""
     return abs(math.pow(ratio, ORDER) - 1.0)
@@ -119,7 +119,7 @@ def mesh_error(
         Errors in the units of the numbers; names without a finite error are left out.
     """
     own, other = resolutions
-    normal_force = largest(numbers, Kind.NORMAL_FORCE)
+    readings, normal_force = largest_readings(numbers), largest(numbers, Kind.NORMAL_FORCE)
     found = {}
     for name, value in numbers.items():
         kind, change, bound = Quantity.of(name).kind, abs(value - companion[name]), own.least.get(name, 0.0)
@@ -131,7 +131,7 @@ def mesh_error(
         elif kind is Kind.AREA:
             change = max(0.0, change - other.least.get(name, 0.0))
         else:
-            scale = largest(numbers, kind) if kind.is_reading else abs(value)
+            scale = readings.get(kind, abs(value))
             if own.alone and kind is Kind.FRICTION_SUM:
                 scale = max(scale, normal_force)
             power = 2 if kind is Kind.NORMAL_FORCE else 1
