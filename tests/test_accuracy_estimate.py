@@ -12,7 +12,7 @@ import pytest
 
 from finger3d.accuracy.companions import companion
 from finger3d.accuracy.error_bars import ErrorBars
-from finger3d.accuracy.estimate import estimate, main_numbers, strain_error
+from finger3d.accuracy.estimate import estimate, main_numbers, reading_error
 from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.accuracy.richardson import ORDER, mesh_error
 from finger3d.cli import main
@@ -122,7 +122,7 @@ def test_a_gauges_error_at_several_coefficients_is_that_of_several_gauges() -> N
     problem, frames = run(half_cylinder(0.4))
     beside = companion(problem)
     fine, coarse = np.array([0.03, 0.01]), np.array([0.02, 0.01])
-    found = strain_error(problem, frames[-1], beside, fine, coarse)
+    found = reading_error(problem, frames[-1], beside, fine, coarse)
     # the first from the change and the ratio of edges, the second from the floor, a share of the largest strain
     ratio = (problem.mesh.points.size / beside.mesh.points.size) ** 0.5
     assert found[0] == pytest.approx(0.01 / (ratio**ORDER - 1.0), rel=1e-12)

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finger3d.analyses.calibrate.increments import choose_increments, pairwise_error, strain_error_of_increments
+from finger3d.analyses.calibrate.increments import choose_increments, error_of_increments, pairwise_error
+from finger3d.analyses.calibrate.reference import read
 from finger3d.analyses.calibrate.run import calibrate, calibrated
-from finger3d.analyses.calibrate.tolerances import read
 from finger3d.analyses.optimise.run import optimise
 from finger3d.analyses.optimise.task import FreeKey
 from finger3d.analyses.optimise.task import OptimisationProblem as Search
@@ -58,16 +58,16 @@ def test_a_press_that_failed_tells_nothing() -> None:
 )
 def test_increments_are_doubled_until_the_error_is_a_tenth_of_the_noise(slope: float, expected: int) -> None:
     problem = build(steps("auto").model())
-    found = choose_increments(problem, lambda p: np.array([slope / p.model.legs[0].steps]), NOISE)
+    found = choose_increments(problem, lambda p: np.array([slope / p.model.legs[0].steps / NOISE]))
     assert found.chosen
     assert [leg.steps for leg in found.legs] == [expected]
-    assert found.error == pytest.approx(slope / expected)
+    assert found.error == pytest.approx(slope / expected / NOISE)
     assert found.comparison_legs[0].steps == 40
 
 
 def test_a_number_that_is_given_is_kept() -> None:
     model = steps(7).model()
-    found = choose_increments(build(model), lambda p: pytest.fail("nothing is to be pressed"), NOISE)
+    found = choose_increments(build(model), lambda p: pytest.fail("nothing is to be pressed"))
     assert not found.chosen
     assert found.legs == found.comparison_legs == model.legs
 
@@ -81,7 +81,7 @@ def test_the_error_of_given_increments_is_that_of_presses_of_many() -> None:
         return read(other, ("g36",), mu)[0]
 
     own = strain(problem)
-    told = strain_error_of_increments(problem, own, False, strain)
+    told = error_of_increments(problem, own, False, strain)
     true = np.abs(own - strain(build(steps(160).model())))
     assert true.max() > 10.0 * NOISE
     ratio = told[true > NOISE] / true[true > NOISE]
@@ -100,7 +100,7 @@ def test_what_increments_leave_is_a_tolerance_and_widens_mu(tmp_path: Path) -> N
     strain = float(read(build(steps(160).model()), ("g36",), np.array([0.6]))[0, 0])
     away = abs(strain - float(found.at(0.6)))
     assert away > 5.0 * found.noise
-    assert away < 2.0 * float(found.strain_sd([0.6])[0])
+    assert away < 2.0 * float(found.reading_sd([0.6])[0])
     (sure,), (honest,) = (estimate(load(tmp_path / "calibration.json"), strain, tolerances=t) for t in (False, True))
     assert abs(sure.mu - 0.6) > 5.0 * sure.std
     assert abs(honest.mu - 0.6) < 2.0 * honest.std
@@ -114,7 +114,7 @@ def test_chosen_increments_press_the_curve_and_fewer_the_differences() -> None:
     assert curve.increments.chosen
     assert curve.problem.model.legs[0].steps == 40
     same = calibrate(steps(40), "g36", mus=mus, tolerances={**NONE, "depth_mm": 0.1})
-    assert found.strain == pytest.approx(same.strain, rel=1e-9)
+    assert found.reading == pytest.approx(same.reading, rel=1e-9)
     assert found.tolerances[0].slope == pytest.approx(same.tolerances[0].slope, rel=1e-6)
     assert found.tolerances[1].name == "increments"
     assert found.tolerances[1].spread.max() <= 0.1 * found.noise

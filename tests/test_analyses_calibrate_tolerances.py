@@ -15,7 +15,8 @@ from finger3d.analyses.calibrate import presses as pressing
 from finger3d.analyses.calibrate import run as runs
 from finger3d.analyses.calibrate import tolerances as slopes
 from finger3d.analyses.calibrate.run import calibrate, calibrated
-from finger3d.analyses.calibrate.tolerances import TOLERANCES, with_modulus
+from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
+from finger3d.analyses.calibrate.tolerances import with_modulus
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.contact import acceleration
 from finger3d.contact.friction import Coulomb
@@ -34,7 +35,7 @@ def test_the_curve_is_what_presses_of_the_scene_give() -> None:
     found = calibrate(scene(), "g36", mus=FEW, tolerances=NONE)
     model = scene().model()
     *_, frame = march(build(replace(model, friction=Coulomb(0.4))))
-    assert found.strain[2] == pytest.approx(frame.gauges["g36"], abs=1e-13)
+    assert found.reading[2] == pytest.approx(frame.gauges["g36"], abs=1e-13)
     assert tuple(found.mu) == FEW
     assert found.tolerances == ()
 
@@ -118,7 +119,7 @@ def test_a_fine_body_leaves_its_differences_to_the_coarser_one_beside_it(monkeyp
     beside, _ = calibrated(companion(build(fine.model())).model, "g36", mus=FEW, tolerances=told)
     monkeypatch.setattr(slopes, "_LEAST_POINTS", {2: math.inf})
     own = calibrate(fine, "g36", mus=FEW, tolerances=told)
-    assert found.strain == pytest.approx(own.strain, abs=0.0)
+    assert found.reading == pytest.approx(own.reading, abs=0.0)
     for a, b, c in zip(found.tolerances, own.tolerances, beside.tolerances, strict=True):
         assert a.slope == pytest.approx(c.slope, rel=1e-6, abs=1e-9), a.name
         assert 0.0 < np.abs(a.slope - b.slope).max() < 0.2 * np.abs(b.slope).max(), a.name
@@ -146,7 +147,7 @@ def test_effects_the_scene_names_are_in_the_curve() -> None:
     found = calibrate(stiff, "long", mus=FEW, tolerances={**NONE, "gauge_x_mm": 0.3})
     *_, frame = march(build(replace(stiff, tables=stiff.tables).model()))
     free = calibrate(scene(gauge=[SCENE["gauge"][1]]), "long", mus=FEW, tolerances=NONE)
-    assert np.abs(found.strain).max() < 0.5 * np.abs(free.strain).max()  # a foil reads a part of the free strain
+    assert np.abs(found.reading).max() < 0.5 * np.abs(free.reading).max()  # a foil reads a part of the free strain
     assert found.tolerances[0].slope.any()
 
 
@@ -165,7 +166,7 @@ def test_a_fast_viscous_press_reads_the_instantaneous_body_and_a_slow_one_the_re
     relaxed = 0.45 if bulk else (3.0 * k - 2.0 * g) / (2.0 * (3.0 * k + g))
     # a share 1e-6 of the time constant moves the moduli by as much; contact edges may turn that into a little more
     for one, other in ((viscous(1e-6), elastic(0.45)), (viscous(1e6), elastic(relaxed))):
-        assert one.strain == pytest.approx(other.strain, rel=1e-4)
+        assert one.reading == pytest.approx(other.reading, rel=1e-4)
         for a, b in zip(one.tolerances, other.tolerances, strict=True):
             assert a.slope == pytest.approx(b.slope, rel=1e-3, abs=1e-6), a.name
 
@@ -176,8 +177,8 @@ def test_a_viscous_curve_is_read_after_the_hold_and_tells_mu() -> None:
     found = calibrate(scene(**changes), "g36", mus=FEW)
     assert {t.name for t in found.tolerances} == set(TOLERANCES)
     *_, before, frame = march(build(scene(**changes, friction={"mu": 0.4}).model()))
-    assert found.strain[2] == pytest.approx(frame.gauges["g36"], rel=1e-9)
-    assert abs(found.strain[2] - before.gauges["g36"]) > 1e-5  # it creeps
+    assert found.reading[2] == pytest.approx(frame.gauges["g36"], rel=1e-9)
+    assert abs(found.reading[2] - before.gauges["g36"]) > 1e-5  # it creeps
     (answer,) = estimate(found, frame.gauges["g36"], tolerances=False)
     assert answer.mu == pytest.approx(0.4, abs=1e-6)
 
@@ -205,4 +206,4 @@ def test_steps_that_are_chosen_automatically() -> None:
     auto = scene(press={"depth_mm": 10.0, "steps": "auto"})
     found = calibrate(auto, "g36", mus=FEW[:4], tolerances=NONE)
     fine = calibrate(scene(press={"depth_mm": 10.0, "steps": 80}), "g36", mus=FEW[:4], tolerances=NONE)
-    assert found.strain == pytest.approx(fine.strain, rel=0.03)
+    assert found.reading == pytest.approx(fine.reading, rel=0.03)

@@ -182,7 +182,7 @@ def test_a_plan_forecasts_size_time_and_memory(tmp_path: Path) -> None:
 
 def test_a_calibration_is_estimated_from(tmp_path: Path) -> None:
     calibration = finger3d.calibrate(_written(tmp_path), "<g>", tmp_path / "cal", mus=(0.05, 0.2, 0.4, 0.8), noise=1e-9)
-    strain = float(np.interp(0.2, calibration.mu, calibration.strain))
+    strain = float(np.interp(0.2, calibration.mu, calibration.reading))
     for source in (calibration, tmp_path / "cal" / "calibration.json"):
         (found,) = finger3d.estimate(source, strain, tolerances=False)
         assert found.strain == strain

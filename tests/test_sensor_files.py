@@ -14,8 +14,9 @@ import pytest
 
 from finger3d.analyses.calibrate import presses as pressing
 from finger3d.analyses.calibrate import run as runs
-from finger3d.analyses.calibrate.run import calibrate, parsed_mus
-from finger3d.analyses.calibrate.tolerances import TOLERANCES
+from finger3d.analyses.calibrate.run import calibrate
+from finger3d.analyses.calibrate.settings import parsed_mus
+from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.cli import main
 from finger3d.errors import Finger3dError, MissingError, Outcome
@@ -127,7 +128,7 @@ def test_a_calibration_comes_back_from_its_file_as_it_was(tmp_path: Path) -> Non
         failed=((0.3, "x"),),
     )
     after = load(save(before, tmp_path / "calibration.json"))
-    assert np.array_equal(after.strain, before.strain)
+    assert np.array_equal(after.reading, before.reading)
     assert np.array_equal(after.tolerances[0].slope, before.tolerances[0].slope)
     assert after.failed == before.failed
     assert estimate(after, 0.005)[0] == estimate(before, 0.005)[0]
@@ -144,7 +145,7 @@ def test_calibration_files_that_are_none(tmp_path: Path) -> None:
         "no calibration": json.dumps([1, 2]),
         "curve: missing": json.dumps({k: v for k, v in data.items() if k != "curve"}),
         "noise = 0.0: must be a number from 1e-12 to 1000": json.dumps({**data, "noise": 0.0}),
-        "curve: mu must ascend": json.dumps(short),
+        "curve: must have a reading and tolerances for each of the 5": json.dumps(short),
         "gauge: must be a text": json.dumps({**data, "gauge": 3}),
         "curve: must be a table": json.dumps({**data, "curve": [1.0]}),
         "resolution_limit = True: must be a number": json.dumps({**data, "resolution_limit": True}),

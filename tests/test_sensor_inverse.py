@@ -103,7 +103,7 @@ def test_the_standard_deviation_is_that_of_the_errors(function: Any) -> None:
     found = curve(function, tolerances=(grown,))
     random = np.random.default_rng(20261122)
     mu = random.uniform(0.02, 1.2, 2000)
-    answers = estimate(found, found.at(mu) + random.normal(0.0, 1.0, len(mu)) * found.strain_sd(mu))
+    answers = estimate(found, found.at(mu) + random.normal(0.0, 1.0, len(mu)) * found.reading_sd(mu))
     told = [i for i, a in enumerate(answers) if a.status in ("ok", "coarse")]
     z = np.array([(answers[i].mu - mu[i]) / answers[i].std for i in told])
     assert len(told) > 1000

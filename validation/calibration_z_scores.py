@@ -18,8 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.analyses.calibrate.increments import pairwise_error
+from finger3d.analyses.calibrate.reference import read
 from finger3d.analyses.calibrate.run import calibrated
-from finger3d.analyses.calibrate.tolerances import TOLERANCES, read
+from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.analyses.study_rows import Result, Row
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
@@ -129,8 +130,8 @@ def _judged(
         away = reading - float(c.at(mu))
         z_mu = (answer.mu - mu) / answer.std if answer.status in ("ok", "coarse") else math.nan
         inside = any(a.low <= mu <= a.high for a in answer.candidates)
-        z, z_without = (away / float(one.strain_sd([mu])[0]) for one in (known, without))
-        yield Reading(nu, steps, mesh, at, c.gauge, float(mu), z, z_without, z_mu, inside)
+        z, z_without = (away / float(one.reading_sd([mu])[0]) for one in (known, without))
+        yield Reading(nu, steps, mesh, at, c.name, float(mu), z, z_without, z_mu, inside)
 
 
 def _rows(found: list[Reading]) -> Iterator[Row]:

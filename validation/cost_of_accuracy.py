@@ -51,7 +51,7 @@ CLAIM = {
     SOLID: {"force": 0.01, "friction_sum": 0.10, "gauge_strain": 0.10, "contact_length": 1.5, "stick_length": 3.0},
     HALF: {"force": 0.01, "friction_sum": 0.05, "gauge_strain": 0.05, "contact_length": 1.0, "stick_length": 2.0},
 }
-CLAIM |= {LARGE[body]: CLAIM[body] for body in LARGE}
+CLAIM |= {LARGE[body]: CLAIM[body] | {"stick_length": 3.0} for body in LARGE}
 Runs = dict[Case, dict[str, Any]]
 Groups = dict[str, list[Case]]
 

@@ -19,8 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.calibrate.run import MUS, CurvePoints, calibrated
-from finger3d.analyses.calibrate.tolerances import TOLERANCES
+from finger3d.analyses.calibrate.run import CurvePoints, calibrated
+from finger3d.analyses.calibrate.settings import MUS
+from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.analyses.study_rows import Result, Row
 from finger3d.effects.embedded_gauge import Effect
@@ -76,7 +77,15 @@ def run(quick: bool) -> Result:
     lines: list[tuple[Any, ...]] = []
     for (domain, kind), c in found.items():
         spread = c.mu_sd(c.mu) if c.tolerances else np.full(len(c.mu), np.nan)
-        each = (c.mu, c.strain, c.at(c.mu, "fit"), c.slope(c.mu), c.resolution(c.mu), c.resolution(c.mu, "fit"), spread)
+        each = (
+            c.mu,
+            c.reading,
+            c.at(c.mu, "fit"),
+            c.slope(c.mu),
+            c.resolution(c.mu),
+            c.resolution(c.mu, "fit"),
+            spread,
+        )
         lines += [(domain, kind, *map(float, line)) for line in zip(*each, strict=True)]
     return Result(tuple(rows), columns(LINES, lines), lambda figure: _draw(figure, found, maps))
 
@@ -96,7 +105,7 @@ def _checks(domain: Domain, c: Calibration, points: CurvePoints) -> list[Row]:
     mu = random.uniform(first, last, count)
     quiet = replace(c, tolerances=())
     # what the set allows for, drawn whole
-    answers = estimate(quiet, c.at(mu) + random.normal(0.0, 1.0, count) * quiet.strain_sd(mu))
+    answers = estimate(quiet, c.at(mu) + random.normal(0.0, 1.0, count) * quiet.reading_sd(mu))
     hit = np.mean([any(a.low <= m <= a.high for a in e.candidates) for m, e in zip(mu, answers, strict=True)])
     share = math.erf(1.0 / math.sqrt(2.0))
     return [
@@ -105,7 +114,7 @@ def _checks(domain: Domain, c: Calibration, points: CurvePoints) -> list[Row]:
             float(near.along(TURN)[1, i, j]), 1e-9, "the same field, solved for and condensed",
         ),
         Row(
-            f"strain from the reduced model, mu = {last:g}, {here}", "press with the mesh", float(c.strain[-1]),
+            f"strain from the reduced model, mu = {last:g}, {here}", "press with the mesh", float(c.reading[-1]),
             reduced,
             1e-9, "from another start; both end at a residual of 1e-11",
         ),
@@ -118,7 +127,7 @@ def _checks(domain: Domain, c: Calibration, points: CurvePoints) -> list[Row]:
 
 def _statements(what: str, c: Calibration) -> list[Row]:
     """What Sec. IV says of the measured sensor."""
-    steps = np.diff(c.strain)
+    steps = np.diff(c.reading)
     usable = max((r.high for r in c.usable if r.low <= 0.3), default=0.0)
     return [
         said(
@@ -159,7 +168,7 @@ def _left(what: str, c: Calibration) -> list[Row]:
 
 def _widths(found: Found) -> list[Row]:
     """What the plane strain section promises, held against the finger 20 mm wide."""
-    moved = {k: float(np.ptp(c.strain)) for k, c in found.items()}
+    moved = {k: float(np.ptp(c.reading)) for k, c in found.items()}
     return [
         Row(
             f"change of the strain over all mu, 20 mm wide over plane strain, {kind}", "plane strain", 1.0,
@@ -183,7 +192,7 @@ def _draw(figure: Any, found: Found, maps: dict[Domain, StrainMap]) -> None:
         for domain, name in NAMES.items():
             c = found[domain, kind]
             axes.plot(c.grid, 1e3 * c.at(c.grid), color=colours[domain], lw=1.5, label=name)
-            axes.plot(c.mu, 1e3 * c.strain, "o", ms=3, color=colours[domain])
+            axes.plot(c.mu, 1e3 * c.reading, "o", ms=3, color=colours[domain])
             axes.plot(c.grid, 1e3 * c.at(c.grid, "fit"), "--", color=colours[domain], lw=1.0, label="its second order")
         axes.set(xlabel="mu", ylabel="strain, 1e-3", title=f"gauge at 30°: {kind}")
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))

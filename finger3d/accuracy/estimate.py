@@ -83,16 +83,19 @@ def compared(
     return mesh_error(numbers(problem, frame), numbers(beside, last), edge_ratio(problem, beside), resolutions)
 
 
-def strain_error(problem: Problem, frame: StepResult, beside: Problem, fine: Float, coarse: Float) -> Float:
-    """Return the discretisation error (m,) of a gauge's strain at several coefficients of friction.
+def reading_error(
+    problem: Problem, frame: StepResult, beside: Problem, fine: Float, coarse: Float, kind: str = "gauge"
+) -> Float:
+    """Return the discretisation error (m,) of a reading at several coefficients of friction.
 
     Parameters
     ----------
     frame : last increment at any of the coefficients, for the resolution of the contact points
-    fine, coarse : (m,) strains of the problem and of its companion
+    fine, coarse : (m,) readings of the problem and of its companion
+    kind : of the reading: gauge, marker or taxel
     """
-    names = [f"gauge_{k}" for k in range(len(fine))]
-    numbers, other = (dict(zip(names, map(float, strain), strict=True)) for strain in (fine, coarse))
+    names = [f"{kind}_{k}" for k in range(len(fine))]
+    numbers, other = (dict(zip(names, map(float, reading), strict=True)) for reading in (fine, coarse))
     found = mesh_error(numbers, other, edge_ratio(problem, beside), (PointResolution.of(problem, frame),) * 2)
     return np.array([found.get(name, math.nan) for name in names])
 

@@ -1,4 +1,4 @@
-"""Command ``calibrate``: the strain of a gauge as a function of mu."""
+"""Command ``calibrate``: readings as a function of mu."""
 
 from __future__ import annotations
 
@@ -28,14 +28,22 @@ def calibrate(
     scene: Path,
     /,
     *,
-    gauge: Annotated[str, Parameter(help="Name of a [[gauge]] of the scene.")],
+    gauge: Annotated[
+        str,
+        Parameter(
+            help="Name of a [[gauge]] of the scene; or several readings together, with commas: gauges, m1.x of a "
+            "[[marker]], taxels."
+        ),
+    ],
     out: Annotated[Path, Parameter(help="Folder for the results.")],
     mu: Annotated[
         str, Parameter(help="Values of mu: first:last:count, or numbers separated by commas.")
     ] = "0.02:1.2:25",
     noise: Noise = 1.5e-4,
+    marker_noise: Annotated[float, Parameter(help="Standard deviation of a reading of a marker, mm.")] = 0.02,
+    taxel_noise: Annotated[float, Parameter(help="Standard deviation of a reading of a taxel, MPa.")] = 1e-3,
     resolution: Annotated[
-        float, Parameter(help="Largest standard deviation of mu at which the gauge is usable.")
+        float, Parameter(help="Largest standard deviation of mu at which the sensor is usable.")
     ] = 0.1,
     tolerance: Tolerances = None,
     map_: Annotated[
@@ -46,6 +54,8 @@ def calibrate(
 ) -> None:
     """Calibrate a gauge: strain against mu, second-order fit, resolution, usable range, and effect of tolerances.
 
+    Several readings are calibrated together: what changes them all, such as the depth, is told apart from mu.
+
     Example: finger3d calibrate scene.toml --gauge g36 --out cal
 
     Parameters
@@ -55,18 +65,30 @@ def calibrate(
     """
     loaded = load(scene, set_, out)
     from finger3d.analyses.calibrate.run import calibrate as run
-    from finger3d.analyses.calibrate.run import parsed_mus
+    from finger3d.analyses.calibrate.settings import parsed_mus
     from finger3d.sensor.curve import summary
     from finger3d.sensor.files import as_dict
+    from finger3d.sensor.joint import JointCalibration, joint_summary
 
     with job(json_, lambda done: f"{done.steps_done} of {done.steps_total} values of mu are kept in {out}") as report:
         found = run(
-            loaded, gauge, out, parsed_mus(mu), noise, resolution, _tolerances(tolerance), report=report, maps=map_
+            loaded,
+            [name.strip() for name in gauge.split(",")],
+            out,
+            parsed_mus(mu),
+            noise,
+            resolution,
+            _tolerances(tolerance),
+            report=report,
+            maps=map_,
+            marker_noise_mm=marker_noise,
+            taxel_noise_MPa=taxel_noise,
         )
     if json_:
         print_json(as_dict(found))
     else:
-        print_rows(loaded.title, [*summary(found), ("results", str(out))])
+        rows = joint_summary(found) if isinstance(found, JointCalibration) else summary(found)
+        print_rows(loaded.title, [*rows, ("results", str(out))])
         print(found.verdict())
     if found.failed:
         mu_failed, why = found.failed[0]

@@ -1,12 +1,12 @@
-"""Command ``estimate``: the friction coefficient from strain readings."""
+"""Command ``estimate``: the friction coefficient from readings."""
 
 from __future__ import annotations
 
 import csv
 import sys
 import time
-from collections.abc import Iterator, Mapping
-from dataclasses import asdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -16,7 +16,10 @@ from finger3d.cli.common import Json, app, print_json
 from finger3d.errors import Finger3dError
 
 if TYPE_CHECKING:
-    from finger3d.sensor import Calibration, Estimate
+    from finger3d._types import Tree
+    from finger3d.sensor import Calibration, Estimate, JointCalibration, JointEstimate
+
+    AnyEstimate = Estimate | JointEstimate
 
 _POLL_S = 0.02
 """Time between two looks at a file that is followed."""
@@ -27,13 +30,30 @@ def estimate(
     calibration: Path,
     /,
     *,
-    strain: Annotated[float | None, Parameter(help="One strain reading.")] = None,
+    strain: Annotated[
+        list[str] | None,
+        Parameter(
+            negative=(),
+            allow_leading_hyphen=True,
+            help="One strain reading; or NAME=READING, repeated for each of several calibrated readings.",
+        ),
+    ] = None,
     std: Annotated[
-        float | None, Parameter(help="Standard deviation of the readings; default: the noise of the calibration.")
+        list[str] | None,
+        Parameter(
+            negative=(),
+            allow_leading_hyphen=True,
+            help="Standard deviation of the readings, or NAME=NUMBER for one of several; default: the noise of the "
+            "calibration.",
+        ),
     ] = None,
     csv_: Annotated[
         Path | None,
-        Parameter(name="--csv", help="CSV file of readings: a column strain and, optionally, a column std."),
+        Parameter(
+            name="--csv",
+            help="CSV file of readings: a column strain and, optionally, a column std; of several calibrated readings "
+            "a column for each, NAME, and optionally NAME_std.",
+        ),
     ] = None,
     follow: Annotated[
         str | None,
@@ -45,7 +65,7 @@ def estimate(
     json_: Json = False,
     curve: Annotated[
         Literal["interpolation", "fit"],
-        Parameter(help="Curve to invert: the monotone interpolation or the second-order fit."),
+        Parameter(help="Curve of a single gauge to invert: the monotone interpolation or the second-order fit."),
     ] = "interpolation",
     tolerances: Annotated[
         bool,
@@ -54,7 +74,7 @@ def estimate(
         ),
     ] = True,
 ) -> None:
-    """Estimate mu and its standard deviation from strain readings, or report why a reading does not determine mu.
+    """Estimate mu and its standard deviation from readings, or report why they do not determine mu.
 
     Example: finger3d estimate cal/calibration.json --strain 0.052
 
@@ -65,61 +85,145 @@ def estimate(
     calibration
         The calibration.json that `finger3d calibrate` wrote.
     """
-    from finger3d.sensor import estimate as run
     from finger3d.sensor import load as read
 
     if sum(given is not None for given in (strain, csv_, follow)) != 1:
         raise Finger3dError("estimate: give either --strain NUMBER, --csv FILE or --follow FILE")
     if out is not None and csv_ is None:
         raise Finger3dError("estimate: --out goes with --csv")
-    known = read(calibration)
+    job = _Job(read(calibration), std or (), curve, tolerances)
     if strain is not None:
-        found = run(known, strain, std, curve, tolerances)
+        (found,) = job.estimates(job.named("--strain", strain), job.stds)
         if json_:
-            print_json(asdict(found[0]))
+            print_json(asdict(found))
         else:
-            print(found[0].verdict)
+            print(found.verdict)
         return
     if follow is not None:
-        for line in _followed(known, follow, std, curve, tolerances):
+        for line in _followed(job, follow):
             print(line, flush=True)
         return
     assert csv_ is not None
-    strains, stds = _readings(csv_, std)
+    values, stds = _readings(job, csv_)
     try:
-        found = run(known, strains, stds, curve, tolerances)
+        every = job.estimates(values, stds)
     except Finger3dError as error:
         raise Finger3dError(f"{csv_}: {error}") from None
     if json_:
-        print_json([asdict(e) for e in found])
+        print_json([asdict(e) for e in every])
     elif out is None:
-        print("\n".join([",".join(_COLUMNS), *(",".join(map(_cell, _line(e))) for e in found)]))
+        print("\n".join([",".join(job.columns), *(",".join(map(_cell, job.line(e))) for e in every)]))
     else:
         from finger3d.io import write_csv
 
-        write_csv(out, {name: [getattr(e, name) for e in found] for name in _COLUMNS})
-        determined = sum(e.status in ("ok", "coarse") for e in found)
-        print(f"{determined} of {len(found)} readings determine mu; results: {out}")
+        lines = [job.line(e) for e in every]
+        columns: Tree = {name: [line[i] for line in lines] for i, name in enumerate(job.columns)}
+        write_csv(out, columns)
+        determined = sum(e.status in ("ok", "coarse") for e in every)
+        print(f"{determined} of {len(every)} readings determine mu; results: {out}")
 
 
-def _followed(
-    known: Calibration, source: str, std: float | None, curve: Literal["interpolation", "fit"], tolerances: bool
-) -> Iterator[str]:
+@dataclass(frozen=True)
+class _Job:
+    """A calibration and how readings are to be turned into mu; a single gauge is called ``strain``, as its column."""
+
+    calibration: Calibration | JointCalibration
+    given_stds: Sequence[str]
+    curve: Literal["interpolation", "fit"]
+    tolerances: bool
+
+    @property
+    def joint(self) -> bool:
+        from finger3d.sensor import JointCalibration
+
+        return isinstance(self.calibration, JointCalibration)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Columns of the readings."""
+        return self.calibration.names if self.joint else ("strain",)  # type: ignore[union-attr]
+
+    @property
+    def std_columns(self) -> tuple[str, ...]:
+        return tuple(f"{name}_std" for name in self.names) if self.joint else ("std",)
+
+    @property
+    def stds(self) -> dict[str, float]:
+        """Standard deviations of ``--std`` by name."""
+        return self.named("--std", self.given_stds, plain_for_all=True)
+
+    def named(self, option: str, texts: Sequence[str], plain_for_all: bool = False) -> dict[str, float]:
+        """Return the numbers of an option by name: of ``NAME=NUMBER``, or of the plain number for a single gauge."""
+        found: dict[str, float] = {}
+        for text in texts:
+            name, equals, value = text.rpartition("=")
+            try:
+                number = float(value)
+            except ValueError:
+                raise Finger3dError(f"{option} {text}: must be a number, or NAME=NUMBER") from None
+            for one in self._meant(option, text, name.strip() if equals else "", plain_for_all):
+                if one in found:
+                    raise Finger3dError(f"{option} {text}: {one} is given twice")
+                found[one] = number
+        return found
+
+    def _meant(self, option: str, text: str, name: str, plain_for_all: bool) -> tuple[str, ...]:
+        """Return the columns that a name stands for."""
+        if not self.joint:
+            own = self.calibration.name  # type: ignore[union-attr]
+            if name not in ("", own):
+                raise Finger3dError(f"{option} {text}: {name} is not calibrated; the gauge is {own}")
+            return ("strain",)
+        if name in self.names:
+            return (name,)
+        if name:
+            raise Finger3dError(f"{option} {text}: {name} is not calibrated; the readings are {', '.join(self.names)}")
+        if plain_for_all and len({c.kind for c in self.calibration.readings}) == 1:  # type: ignore[union-attr]
+            return self.names
+        raise Finger3dError(
+            f"{option} {text}: {', '.join(self.names)} are calibrated; give the name of the reading, for instance "
+            f"{option} {self.names[0]}={text}"
+        )
+
+    def estimates(
+        self, values: Mapping[str, Sequence[float] | float], stds: Mapping[str, Sequence[float] | float]
+    ) -> Sequence[AnyEstimate]:
+        """Return an estimate for each reading, or set of readings."""
+        from finger3d.sensor import estimate as run
+
+        if self.joint:
+            return run(self.calibration, values, stds, self.curve, self.tolerances)
+        return run(self.calibration, values["strain"], stds.get("strain"), self.curve, self.tolerances)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Columns of the estimates."""
+        if self.joint:
+            return (*self.names, "mu", "std", "low", "high", "status", "chi_square", "p_value", "verdict")
+        return ("strain", "reading_std", "mu", "std", "low", "high", "status", "verdict")
+
+    def line(self, found: AnyEstimate) -> list[object]:
+        """Return the cells of an estimate."""
+        readings = found.readings if self.joint else {}  # type: ignore[union-attr]
+        return [readings[name] if name in readings else getattr(found, name) for name in self.columns]
+
+
+def _followed(job: _Job, source: str) -> Iterator[str]:
     """Yield a line of names, and a line for each reading as soon as it is written."""
-    from finger3d.sensor import estimate as run
-
     rows = csv.DictReader(_written_lines(source))
-    yield ",".join(_COLUMNS)
+    yield ",".join(job.columns)
     for number, row in enumerate(rows, start=2):
-        if "strain" not in row:
-            raise Finger3dError(f"{source}: must have a column named strain; it has {', '.join(map(str, row))}")
-        reading = _number(source, number, "strain", row)
-        own = _number(source, number, "std", row) if "std" in row else std
+        _check_columns(job, source, row)
+        values = {name: _number(source, number, name, row) for name in job.names}
+        stds = dict(job.stds)
+        for name, column in zip(job.names, job.std_columns, strict=True):
+            if column in row:
+                stds[name] = _number(source, number, column, row)
         try:
-            (found,) = run(known, reading, own, curve, tolerances)
+            (found,) = job.estimates(values, stds)
         except Finger3dError as error:
             raise Finger3dError(f"{source}: line {number}: {error}") from None
-        yield ",".join(map(_cell, _line(found)))
+        yield ",".join(map(_cell, job.line(found)))
 
 
 def _written_lines(source: str) -> Iterator[str]:
@@ -142,13 +246,6 @@ def _written_lines(source: str) -> Iterator[str]:
                 time.sleep(_POLL_S)
 
 
-_COLUMNS = ("strain", "reading_std", "mu", "std", "low", "high", "status", "verdict")
-
-
-def _line(found: Estimate) -> list[object]:
-    return [getattr(found, name) for name in _COLUMNS]
-
-
 def _cell(value: object) -> str:
     if isinstance(value, float):
         return repr(value)
@@ -156,8 +253,8 @@ def _cell(value: object) -> str:
     return f'"{text}"' if "," in text else text
 
 
-def _readings(path: Path, std: float | None) -> tuple[list[float], list[float] | float | None]:
-    """Read strains and their standard deviations from a CSV file; `std` if it has no column std."""
+def _readings(job: _Job, path: Path) -> tuple[dict[str, list[float]], dict[str, list[float] | float]]:
+    """Read readings and their standard deviations by name from a CSV file; ``--std`` where it has no column for one."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as stream:
             rows = list(csv.DictReader(stream))
@@ -169,13 +266,23 @@ def _readings(path: Path, std: float | None) -> tuple[list[float], list[float] |
         raise Finger3dError(
             f"{path}: not a CSV file; it must have a line of names, then one line for each reading"
         ) from None
-    if not rows or "strain" not in rows[0]:
-        names = ", ".join(str(k) for k in rows[0]) if rows else "nothing"
-        raise Finger3dError(f"{path}: must have a column named strain and at least one reading; it has {names}")
-    strains = [_number(path, i, "strain", row) for i, row in enumerate(rows, start=2)]
-    if "std" not in rows[0]:
-        return strains, std
-    return strains, [_number(path, i, "std", row) for i, row in enumerate(rows, start=2)]
+    _check_columns(job, path, rows[0] if rows else {})
+    values = {name: [_number(path, i, name, row) for i, row in enumerate(rows, start=2)] for name in job.names}
+    stds: dict[str, list[float] | float] = dict(job.stds)
+    for name, column in zip(job.names, job.std_columns, strict=True):
+        if column in rows[0]:
+            stds[name] = [_number(path, i, column, row) for i, row in enumerate(rows, start=2)]
+    return values, stds
+
+
+def _check_columns(job: _Job, source: Path | str, row: Mapping[str, object]) -> None:
+    """Raise an error for a file without one of the columns."""
+    missing = [name for name in job.names if name not in row]
+    if missing:
+        raise Finger3dError(
+            f"{source}: must have a column named {' and one named '.join(missing)} and at least one reading; it has "
+            f"{', '.join(map(str, row)) or 'nothing'}"
+        )
 
 
 def _number(path: Path | str, line: int, name: str, row: Mapping[str, str | None]) -> float:

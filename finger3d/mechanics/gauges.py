@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
+from typing import ClassVar, Literal
 
 import numpy as np
 import scipy.sparse as sp
@@ -26,6 +28,7 @@ class Gauge:
     z_mm: float = 0.0
     angle: float = 0.0
     length_mm: float = 0.0
+    kind: ClassVar[Literal["gauge"]] = "gauge"
 
     @property
     def is_point(self) -> bool:
@@ -51,6 +54,10 @@ class Gauge:
     def columns(self, dim: int) -> tuple[str, ...]:
         """Return the name."""
         return (self.name,)
+
+    def mirrored(self, name: str) -> tuple[Gauge, tuple[float, ...]]:
+        """Return the gauge at the mirror image about x = 0."""
+        return replace(self, name=name, x_mm=-self.x_mm, angle=math.pi - self.angle), (1.0,)
 
     def rows(self, body: MeshedBody) -> sp.csr_matrix:
         """Return the row (1, n d) of the strain along the gauge."""

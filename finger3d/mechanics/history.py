@@ -132,6 +132,16 @@ class StepResult:
     markers: dict[str, tuple[float, ...]] = field(default_factory=dict)
     taxels: dict[str, float] = field(default_factory=dict)
 
+    @property
+    def readings(self) -> dict[str, float]:
+        """Every number that is read, by name; ``m1.x`` is the displacement of marker m1 along x."""
+        moved = {
+            f"{name}.{axis}": value
+            for name, displacement in self.markers.items()
+            for axis, value in zip("xyz", displacement, strict=False)
+        }
+        return {**moved, **self.taxels, **self.gauges}
+
 
 @dataclass(frozen=True, repr=False)
 class History:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, replace
+from typing import ClassVar, Literal, Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -43,8 +43,17 @@ class Reading(Protocol):
         """Name in the output."""
         ...
 
+    @property
+    def kind(self) -> Literal["gauge", "marker", "taxel"]:
+        """What kind of sensor it is."""
+        ...
+
     def columns(self, dim: int) -> tuple[str, ...]:
         """Return the name of each number, in 2 or 3 dimensions."""
+        ...
+
+    def mirrored(self, name: str) -> tuple[Reading, tuple[float, ...]]:
+        """Return the reading at the mirror image about x = 0, and the sign of each number there in a mirrored press."""
         ...
 
     def rows(self, body: MeshedBody) -> sp.csr_matrix:
@@ -64,6 +73,7 @@ class Marker:
     x_mm: float
     y_mm: float
     z_mm: float = 0.0
+    kind: ClassVar[Literal["marker"]] = "marker"
 
     @property
     def place(self) -> Float:
@@ -73,6 +83,10 @@ class Marker:
     def columns(self, dim: int) -> tuple[str, ...]:
         """Return a name for each component of the displacement, as ``m1.x``."""
         return tuple(f"{self.name}.{axis}" for axis in "xyz"[:dim])
+
+    def mirrored(self, name: str) -> tuple[Marker, tuple[float, ...]]:
+        """Return the marker at the mirror image about x = 0; its displacement along x changes its sign."""
+        return replace(self, name=name, x_mm=-self.x_mm), (-1.0, 1.0, 1.0)
 
     def rows(self, body: MeshedBody) -> sp.csr_matrix:
         """Return the rows (d, n d) of the displacement."""
@@ -96,10 +110,15 @@ class Taxel:
     z_mm: float
     length_mm: float
     width_mm: float
+    kind: ClassVar[Literal["taxel"]] = "taxel"
 
     def columns(self, dim: int) -> tuple[str, ...]:
         """Return the name."""
         return (self.name,)
+
+    def mirrored(self, name: str) -> tuple[Taxel, tuple[float, ...]]:
+        """Return the taxel at the mirror image about x = 0."""
+        return replace(self, name=name, x_mm=-self.x_mm), (1.0,)
 
     def rows(self, body: MeshedBody) -> sp.csr_matrix:
         """Return the row (1, N) of the pressure: nodal forces are the stiffness times the unknowns."""

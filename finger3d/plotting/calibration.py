@@ -33,7 +33,7 @@ _SHARE_COLOURS = (
 def draw(path: Path, calibration: Calibration) -> None:
     """Draw strain, resolution and variance contributions against mu, and write them as a PNG file."""
     domain = calibration.about.get("domain", "")
-    title = f"Gauge {calibration.gauge}" + (f", {domain}" if domain else "")
+    title = f"Gauge {calibration.name}" + (f", {domain}" if domain else "")
     made = sheet(1, 3, (5.4, 4.8), (0.8, 0.2, 1.2, 0.15), title)
     left, middle, right = made.axes
     curve_panel(left, calibration)
@@ -55,13 +55,13 @@ def _shade_ranges(axes: Axes, c: Calibration) -> None:
 
 def curve_panel(axes: Axes, c: Calibration) -> None:
     """Draw strain against mu: points, interpolation, second-order fit, and the standard deviation of a reading."""
-    mu, sd = c.grid, c.strain_sd(c.grid)
+    mu, sd = c.grid, c.reading_sd(c.grid)
     curve = c.at(mu)
     _shade_ranges(axes, c)
     axes.fill_between(mu, curve - sd, curve + sd, color="#2166ac", alpha=0.25, lw=0, label="±1 sd of a reading")
     axes.plot(mu, curve, color="#2166ac", lw=1.6, label="monotone interpolation")
     axes.plot(mu, c.at(mu, "fit"), "--", color="#b2182b", lw=1.3, label=f"second order, residual {c.fit.rms:.1e} rms")
-    axes.plot(c.mu, c.strain, "o", ms=4, color="#222222", label="pressed")
+    axes.plot(c.mu, c.reading, "o", ms=4, color="#222222", label="pressed")
     for i, (at, _) in enumerate(c.failed):
         axes.axvline(at, color="#888888", ls=":", lw=1.0, label="did not converge" if i == 0 else None)
     axes.set_ylabel("strain along the gauge")

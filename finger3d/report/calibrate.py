@@ -66,3 +66,66 @@ def calibrate_page(folder: str | Path) -> Path:
         notes=[*failed, *([note] if note else [])],
         versions=data["about"].get("versions"),
     )
+
+
+def joint_calibration_page(folder: str | Path) -> Path:
+    """Write report.html of a calibration of several readings from the files in its folder.
+
+    Raises
+    ------
+    Finger3dError
+        If calibration.json cannot be read or the page cannot be written.
+    """
+    folder = Path(folder)
+    data = read_json(folder / "calibration.json")
+    mu, sd, readings = data["mu"], data["mu_sd"], data["readings"]
+    known = [(i, s) for i, s in enumerate(sd) if s is not None]
+    best = min(known, key=lambda pair: pair[1], default=(0, None))[0]
+    trusted = ", ".join(f"{s['low']:.3g} to {s['high']:.3g}" for s in data["trusted"]) or "none"
+    headline = [
+        HeadlineRow(f"mu known within {data['resolution_limit']:g}, all tolerances", trusted),
+        HeadlineRow(f"mu \u00b1 at mu = {mu[best]:.3g}, all readings", f"{sd[best]:.2g}" if known else "unknown"),
+    ]
+    each = Table(
+        ("reading", "unit", "noise", f"at mu = {mu[0]:g}", f"at mu = {mu[-1]:g}", f"sd of mu at {mu[best]:.3g}, alone"),
+        [
+            (
+                name,
+                r["unit"],
+                r["noise"],
+                r["curve"][0],
+                r["curve"][-1],
+                "" if (own := r["mu_sd"][best]) is None else own,
+            )
+            for name, r in readings.items()
+        ],
+    )
+    causes = Table(
+        ("uncertain quantity", f"fall of the variance of mu at {mu[best]:.3g} if it were known exactly"),
+        [(name, f"{100.0 * share[best]:.1f} %") for name, share in data["variance_reductions"].items()],
+    )
+    given = " ".join(f"--strain {name}={r['curve'][len(mu) // 2]:.4g}" for name, r in readings.items())
+    failed = [f"mu = {f['mu']:g}: {f['why']}" for f in data["failed"]]
+    note = data["about"].get("mesh", {}).get("note")
+    return write_page(
+        folder,
+        f"{title_of(data['scene'])}: {len(readings)} readings against friction",
+        headline,
+        [
+            PageSection("Verdict", [data["verdict"]]),
+            PageSection("Readings", [each, causes]),
+            PageSection("Scene", how_modelled(data, folder)),
+            PageSection("Use it", [Code(f"finger3d estimate {folder}/calibration.json {given}")]),
+        ],
+        [Figure("calibration.png", "Readings, standard deviation of mu, and what would reduce its variance")],
+        command="calibrate",
+        outcome="converged" if not failed else f"{len(failed)} values of mu gave no numbers",
+        good=not failed,
+        notes=[*failed, *([note] if note else [])],
+        versions=data["about"].get("versions"),
+    )
+
+
+def _or_blank(value: float | None) -> float | str:
+    """Return a number, or nothing where it is not finite."""
+    return "" if value is None else value

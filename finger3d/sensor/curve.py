@@ -1,4 +1,4 @@
-"""Calibration of a gauge: strain against mu, resolution of mu, and effects of the tolerances."""
+"""Calibration of a reading: its curve against mu, resolution of mu, and effects of the tolerances."""
 
 from __future__ import annotations
 
@@ -16,14 +16,28 @@ from finger3d.sensor.pchip import MonotoneCubic
 
 Shape = Literal["interpolation", "fit"]
 
+Kind = Literal["gauge", "marker", "taxel"]
+
+QUANTITIES: dict[Kind, tuple[str, str]] = {
+    "gauge": ("strain", "1"),
+    "marker": ("displacement", "mm"),
+    "taxel": ("pressure", "MPa"),
+}
+"""What a reading of each kind is, and its unit."""
+
 NOISE = 1.5e-4
 """Largest standard deviation of a strain in Maeno 2004, Sec. IV."""
+
+MARKER_NOISE_MM, TAXEL_NOISE_MPA = 0.02, 1e-3
+"""Assumed standard deviations: of the place of a dot that a camera tracks, and of a pressure cell."""
+
+NOISES: dict[Kind, float] = {"gauge": NOISE, "marker": MARKER_NOISE_MM, "taxel": TAXEL_NOISE_MPA}
 
 RESOLUTION = 0.1
 """The paper's error of mu, and the limit beyond which a gauge is called blind here."""
 
 LARGEST_STRAIN, LARGEST_SD = 1e3, 1e6
-"""Largest magnitude of a strain (its standard deviation too), and of any other standard deviation."""
+"""Largest magnitude of a reading (its standard deviation too), and of any other standard deviation."""
 
 FEWEST = 4  # points: three make the second-order fit, one more its residual
 
@@ -55,13 +69,13 @@ class Range:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """Quantity with a tolerance: its standard deviation and its effect on the strain.
+    """Quantity with a tolerance: its standard deviation and its effect on a reading.
 
     Attributes
     ----------
     sd : in `unit`
-    slope : (n,) strain per unit at the calibration's mu
-    spread : (n,) strain error, the root mean square of the effects of plus and minus one standard deviation
+    slope : (n,) reading per unit at the calibration's mu
+    spread : (n,) error of the reading, the root mean square of the effects of plus and minus one standard deviation
     """
 
     name: str
@@ -73,20 +87,21 @@ class Tolerance:
 
 @dataclass(frozen=True, repr=False)
 class Calibration:
-    """Strain (n,) of a gauge at ascending mu (n,), of the points that converged.
+    """Reading (n,) of a gauge, marker or taxel at ascending mu (n,), of the points that converged.
 
     Attributes
     ----------
-    noise : standard deviation of a strain reading
+    name : of the gauge, or as ``m1.x`` of a marker
+    noise : standard deviation of a reading
     limit : resolution of mu beyond which the gauge is called blind
     failed : (mu, why) of the points that did not converge
     scene, hash : what was pressed, and 16 digits that tell it from another scene
     about : domain, effects, dofs, seconds, versions
     """
 
-    gauge: str
+    name: str
     mu: Float
-    strain: Float
+    reading: Float
     noise: float
     limit: float
     tolerances: tuple[Tolerance, ...] = ()
@@ -94,6 +109,7 @@ class Calibration:
     scene: TreeView = field(default_factory=dict)
     hash: str = ""
     about: TreeView = field(default_factory=dict)
+    kind: Kind = "gauge"
 
     def __post_init__(self) -> None:
         """Raise an error if there are too few points."""
@@ -105,42 +121,44 @@ class Calibration:
 
     def __repr__(self) -> str:
         """Return one line: gauge, range of mu, number of points."""
-        return f"<Calibration of gauge {self.gauge}: {len(self.mu)} values of mu, {self.mu[0]:g} to {self.mu[-1]:g}>"
+        return (
+            f"<Calibration of {self.kind} {self.name}: {len(self.mu)} values of mu, {self.mu[0]:g} to {self.mu[-1]:g}>"
+        )
 
     def _repr_html_(self) -> str:
         from finger3d._notebook import card
         from finger3d.sensor.curve import summary
 
         rows = [(name.strip(), str(said)) for name, said in summary(self)]
-        return card(f"Gauge {self.gauge}", f"{len(self.mu)} values of mu", rows, [self.verdict()])
+        return card(f"Gauge {self.name}", f"{len(self.mu)} values of mu", rows, [self.verdict()])
 
     @cached_property
     def fit(self) -> Fit:
         """Least squares of second order."""
-        c2, c1, c0 = np.polyfit(self.mu, self.strain, 2)
-        left = self.strain - np.polyval([c2, c1, c0], self.mu)
+        c2, c1, c0 = np.polyfit(self.mu, self.reading, 2)
+        left = self.reading - np.polyval([c2, c1, c0], self.mu)
         return Fit((float(c0), float(c1), float(c2)), float(np.sqrt(np.mean(left**2))), float(np.abs(left).max()))
 
     @cached_property
     def _pchip(self) -> MonotoneCubic:
-        return MonotoneCubic.of(self.mu, self.strain)
+        return MonotoneCubic.of(self.mu, self.reading)
 
     def at(self, mu: ArrayLike, shape: Shape = "interpolation") -> Float:
-        """Return the strain at mu in the calibrated range, by monotone cubic interpolation (PCHIP) or by the fit."""
+        """Return the reading at mu in the calibrated range, by monotone cubic interpolation (PCHIP) or by the fit."""
         if shape == "fit":
             c0, c1, c2 = self.fit.coefficients
             return np.asarray(c0 + c1 * np.asarray(mu) + c2 * np.asarray(mu) ** 2)
         return np.asarray(self._pchip(mu))
 
     def slope(self, mu: ArrayLike, shape: Shape = "interpolation") -> Float:
-        """Return d strain / d mu."""
+        """Return d reading / d mu."""
         if shape == "fit":
             _, c1, c2 = self.fit.coefficients
             return np.asarray(c1 + 2.0 * c2 * np.asarray(mu))
         return np.asarray(self._pchip(mu, 1))
 
     def resolution(self, mu: ArrayLike, shape: Shape = "interpolation") -> Float:
-        """Return the standard deviation of mu due to the noise alone, noise / |d strain / d mu|."""
+        """Return the standard deviation of mu due to the noise alone, noise / |d reading / d mu|."""
         with np.errstate(divide="ignore"):
             return np.asarray(self.noise / np.abs(self.slope(mu, shape)))
 
@@ -157,14 +175,14 @@ class Calibration:
         for first in (1, 2):
             out = every[first:-1:2]
             kept = np.setdiff1d(every, out)
-            left = self.strain[out] - MonotoneCubic.of(self.mu[kept], self.strain[kept])(self.mu[out])
+            left = self.reading[out] - MonotoneCubic.of(self.mu[kept], self.reading[kept])(self.mu[out])
             found[out] = np.abs(left) / _SHARPER
         found[[0, -1]] = found[[1, -2]]
         # a kink between two of the points is seen from either of them, or from the next
         return np.asarray(np.max([found, np.append(found[1:], 0.0), np.append(0.0, found[:-1])], axis=0))
 
     def curve_error(self, mu: ArrayLike, shape: Shape = "interpolation") -> Float:
-        """Return the error (m,) of the strain of the curve at mu (m,).
+        """Return the error (m,) of the curve at mu (m,).
 
         For the fit it is the rms residual; for the interpolation a quarter of the change at points that are left out,
         every second one.
@@ -180,18 +198,18 @@ class Calibration:
         return np.append(inner.ravel(), self.mu[-1])
 
     def tolerance_sd(self, mu: ArrayLike) -> Float:
-        """Return the strain error (k, m) of every tolerance at mu (m,)."""
+        """Return the error (k, m) of the reading due to every tolerance at mu (m,)."""
         at = np.atleast_1d(np.asarray(mu, dtype=float))
         rows = [np.interp(at, self.mu, t.spread) for t in self.tolerances]
         return np.array(rows).reshape(len(rows), len(at))
 
-    def mu_sd(self, mu: ArrayLike, strain_sd: ArrayLike | None = None) -> Float:
-        """Return the standard deviation of mu at mu (m,), from that of the strain; infinite where the curve is flat."""
-        whole = self.strain_sd(mu) if strain_sd is None else np.asarray(strain_sd)
+    def mu_sd(self, mu: ArrayLike, reading_sd: ArrayLike | None = None) -> Float:
+        """Return the standard deviation of mu at mu (m,), from that of the reading; infinite on a flat curve."""
+        whole = self.reading_sd(mu) if reading_sd is None else np.asarray(reading_sd)
         slope = np.abs(self.slope(mu))
         return np.where(slope > 0.0, whole / np.where(slope > 0.0, slope, 1.0), np.inf)
 
-    def strain_sd(self, mu: ArrayLike, std: ArrayLike | None = None, shape: Shape = "interpolation") -> Float:
+    def reading_sd(self, mu: ArrayLike, std: ArrayLike | None = None, shape: Shape = "interpolation") -> Float:
         """Return the standard deviation of a reading: noise (or `std`), error of the curve, and tolerances."""
         noise = np.asarray(self.noise if std is None else std, dtype=float)
         squares = noise**2 + self.curve_error(mu, shape) ** 2 + np.sum(self.tolerance_sd(mu) ** 2, axis=0)
@@ -212,11 +230,11 @@ class Calibration:
     @cached_property
     def trusted(self) -> tuple[Range, ...]:
         """The same with all tolerances: stretches where mu is found within the limit."""
-        return self._stretches(self.strain_sd(self.grid))
+        return self._stretches(self.reading_sd(self.grid))
 
-    def _stretches(self, strain_sd: Float) -> tuple[Range, ...]:
+    def _stretches(self, reading_sd: Float) -> tuple[Range, ...]:
         slope = self.slope(self.grid)
-        seen = np.where(np.abs(slope) * self.limit >= strain_sd, np.sign(slope), 0.0)
+        seen = np.where(np.abs(slope) * self.limit >= reading_sd, np.sign(slope), 0.0)
         cuts = np.flatnonzero(np.diff(seen)) + 1
         found = []
         for first, last in zip([0, *cuts], [*cuts, len(seen)], strict=True):
@@ -239,13 +257,13 @@ class Calibration:
         ends = f"{self.mu[0]:g} to {self.mu[-1]:g}"
         if not self.usable:
             return (
-                f"gauge {self.gauge}: no usable range: nowhere from mu = {ends} does a strain noise of {self.noise:g} "
+                f"gauge {self.name}: no usable range: nowhere from mu = {ends} does a strain noise of {self.noise:g} "
                 f"leave a resolution of {self.limit:g} or better; best {self.resolution(self.grid).min():.3g}"
             )
         best = self.usable[0]
         sign = "rises" if self.slope(0.5 * (best.low + best.high)) > 0.0 else "falls"
         text = (
-            f"gauge {self.gauge}: usable from mu = {best.low:.3g} to {best.high:.3g}: there the strain {sign} with mu "
+            f"gauge {self.name}: usable from mu = {best.low:.3g} to {best.high:.3g}: there the strain {sign} with mu "
             f"and a noise of {self.noise:g} leaves a resolution of {self.limit:g} or better"
         )
         if best.elsewhere:
@@ -268,8 +286,9 @@ class Calibration:
         )
 
 
-def _ranges(stretches: Sequence[Range]) -> str:
-    return ", ".join(f"mu = {r.low:.3g} to {r.high:.3g}" for r in stretches) or "nowhere"
+def ranges_text(intervals: Sequence[tuple[float, float]]) -> str:
+    """Return intervals of mu in words."""
+    return ", ".join(f"mu = {low:.3g} to {high:.3g}" for low, high in intervals) or "nowhere"
 
 
 def summary(calibration: Calibration) -> list[tuple[str, str]]:
@@ -279,10 +298,10 @@ def summary(calibration: Calibration) -> list[tuple[str, str]]:
     shares = sorted(c.shares(at).items(), key=lambda item: -item[1])
     sd = float(c.mu_sd([at])[0])
     rows = [
-        ("strain", f"{c.strain[0]:.4g} at mu = {c.mu[0]:g} to {c.strain[-1]:.4g} at mu = {c.mu[-1]:g}"),
+        ("strain", f"{c.reading[0]:.4g} at mu = {c.mu[0]:g} to {c.reading[-1]:.4g} at mu = {c.mu[-1]:g}"),
         (
             f"mu within {c.limit:g}",
-            f"{_ranges(c.trusted)}, with all tolerances; {_ranges(c.usable)} from strain noise alone",
+            f"{_ends(c.trusted)}, with all tolerances; {_ends(c.usable)} from strain noise alone",
         ),
         (f"resolution at mu = {at:.3g}", f"{float(c.resolution(at)):.2g} from a strain noise of {c.noise:g}"),
         ("second-order fit", f"residual {c.fit.rms:.2g} rms, {c.fit.largest:.2g} at most"),
@@ -300,3 +319,7 @@ def summary(calibration: Calibration) -> list[tuple[str, str]]:
     if c.failed:
         rows.append(("failed", ", ".join(f"mu = {mu:.4g}" for mu, _ in c.failed)))
     return rows
+
+
+def _ends(stretches: Sequence[Range]) -> str:
+    return ranges_text([(r.low, r.high) for r in stretches])

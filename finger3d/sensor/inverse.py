@@ -15,7 +15,6 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -24,7 +23,6 @@ from numpy.typing import ArrayLike
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.sensor.curve import LARGEST_STRAIN, Calibration, Shape
-from finger3d.sensor.files import load
 
 Status = Literal["ok", "coarse", "ambiguous", "above", "below", "outside", "blind"]
 
@@ -70,37 +68,16 @@ class Estimate:
     candidates: tuple[Candidate, ...]
 
 
-def estimate(
-    calibration: Calibration | str | Path,
-    strain: ArrayLike,
+def gauge_estimates(
+    calibration: Calibration,
+    strain: ArrayLike | None,
     std: ArrayLike | None = None,
     curve: Shape = "interpolation",
     tolerances: bool = True,
 ) -> list[Estimate]:
-    """Estimate the friction coefficient from strain readings; this needs no library but NumPy.
-
-    Parameters
-    ----------
-    calibration : what `finger3d.calibrate` returned, or the path of its calibration.json
-    strain : one reading, or (m,) of them
-    std : standard deviation of each, 0 allowed; None: the noise of the calibration
-    curve : whether to invert the monotone interpolation or the second-order fit
-    tolerances : whether what is not known exactly counts; not for a sensor whose own curve was measured
-
-    Returns
-    -------
-    list
-        An Estimate for each reading, with ``mu``, ``std`` and ``status``.
-
-    Raises
-    ------
-    Finger3dError
-        For a strain that is no finite number, or a std that is not from 0 up.
-    """
+    """Return an estimate for each strain reading of a gauge; see `finger3d.sensor.estimate`."""
     readings = np.atleast_1d(np.asarray(strain, dtype=float)).ravel()
     _check("strain", readings, -LARGEST_STRAIN)
-    if isinstance(calibration, str | Path):
-        calibration = load(calibration)
     noise = _noise(calibration, readings, std)
     calibration = calibration if tolerances else replace(calibration, tolerances=())
     found: list[Estimate] = []
@@ -135,7 +112,7 @@ def _check(name: str, values: Float, least: float) -> None:
 
 def _estimates(calibration: Calibration, strain: Float, noise: Float, shape: Shape) -> list[Estimate]:
     grid, curve = calibration.grid, calibration.at(calibration.grid, shape)
-    spread = calibration.strain_sd(grid, 0.0, shape)
+    spread = calibration.reading_sd(grid, 0.0, shape)
     sd = np.hypot(noise[:, None], spread)
     residual = strain[:, None] - curve
     low, high = _consistent_parts(residual, sd)

@@ -1,6 +1,6 @@
-"""Number of increments of a calibration, and the error that they leave in the strain of its gauge.
+"""Number of increments of a calibration, and the error that they leave in its readings.
 
-The error of N equal increments decreases about as 1/N, but the strains of N and 2N increments, or of N and 4N, often
+The error of N equal increments decreases about as 1/N, but the readings of N and 2N increments, or of N and 4N, often
 agree by chance.  The error is therefore estimated from several pairs of runs, each scaled to N, and the largest counts.
 Extrapolation in 1/N would leave 0.4 to 1.9 of the error (``validation/calibration_z_scores.py``) and is not used.
 """
@@ -21,7 +21,7 @@ from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.step_halving import with_steps
 
 NOISE_SHARE = 0.1
-"""Error of the increments, relative to the strain noise, at which no more increments are added."""
+"""Error of the increments, relative to the noise of a reading, at which no more increments are added."""
 
 _LARGEST = {"solid": 160, "plane-strain": 320, "plane-stress": 320}
 """Largest number of increments of a leg; an increment of a solid takes ten times as long."""
@@ -38,8 +38,8 @@ _FEW = 40
 _LEAST_PAIRS = 2
 """Least number of pairs of runs before an estimate is accepted."""
 
-Strain = Callable[[Problem], Float]
-"""Strain (m,) of a gauge at some values of mu for a problem; NaN where a press failed."""
+Read = Callable[[Problem], Float]
+"""Readings (m,) of a problem, of one sensor or several at some values of mu; NaN where a press failed."""
 
 
 @dataclass(frozen=True)
@@ -51,66 +51,64 @@ class Increments:
     legs : path with the number of increments of each leg
     comparison_legs : path of presses that are only compared with each other; it has fewer increments if they were
         chosen
-    chosen : whether the number was chosen by the error of the strain
-    error : error of the strain, the largest over the values of mu that were tried; NaN if none was
-    tolerance : error at which no more increments are added
+    chosen : whether the number was chosen by the error of the readings
+    error : error of the readings relative to their noise, the largest over the values of mu that were tried; NaN if
+        none was
     """
 
     legs: tuple[Leg, ...]
     comparison_legs: tuple[Leg, ...]
     chosen: bool
     error: float
-    tolerance: float
 
     def as_dict(self) -> dict[str, object]:
         """Return the entry of calibration.json."""
         return {"steps": [leg.steps for leg in self.legs], "chosen": self.chosen}
 
     def __str__(self) -> str:
-        """Return the number of increments and the error of the strain."""
+        """Return the number of increments and the error of the readings."""
         steps = ", ".join(str(leg.steps) for leg in self.legs)
-        met = self.error <= self.tolerance
-        limit = "as asked" if met else f"{self.tolerance:.1e} was asked; more are not affordable"
-        return f"{steps} increments leave an error of about {self.error:.1e} in the strain; {limit}"
+        limit = "as asked" if self.error <= NOISE_SHARE else f"{NOISE_SHARE:g} was asked; more are not affordable"
+        return f"{steps} increments leave an error of about {self.error:.2g} of the noise in the readings; {limit}"
 
 
-def pairwise_error(strains: Mapping[float, Float], count: float) -> Float:
-    """Return the estimated error (m,) of the strain in `count` increments, the largest over pairs of runs.
+def pairwise_error(readings: Mapping[float, Float], count: float) -> Float:
+    """Return the estimated error (m,) of readings in `count` increments, the largest over pairs of runs.
 
     Parameters
     ----------
-    strains : number of increments -> strain (m,), NaN where a press failed
+    readings : number of increments -> readings (m,), NaN where a press failed
         A pair counts if its smaller number is at most `count`.  The result is NaN where there is no pair.
     count : number of increments
     """
-    pairs = [(a, b) for a, b in combinations(sorted(strains), 2) if a <= count]
-    estimates = [np.abs(strains[a] - strains[b]) / (count / a - count / b) for a, b in pairs]
-    return np.asarray(np.fmax.reduce([np.full_like(next(iter(strains.values())), math.nan), *estimates]))
+    pairs = [(a, b) for a, b in combinations(sorted(readings), 2) if a <= count]
+    estimates = [np.abs(readings[a] - readings[b]) / (count / a - count / b) for a, b in pairs]
+    return np.asarray(np.fmax.reduce([np.full_like(next(iter(readings.values())), math.nan), *estimates]))
 
 
-def choose_increments(problem: Problem, strain: Strain, noise: float) -> Increments:
+def choose_increments(problem: Problem, read: Read) -> Increments:
     """Return the increments that a path gives, or double them until their error is small relative to the noise.
 
     Parameters
     ----------
     problem : Problem
-    strain : callable
-    noise : standard deviation of a strain reading
+    read : callable
+        Returns readings over the standard deviation of their noise.
     """
-    model, tolerance = problem.model, NOISE_SHARE * noise
+    model = problem.model
     if all(isinstance(leg.steps, int) for leg in model.legs):
-        return Increments(model.legs, model.legs, False, math.nan, tolerance)
+        return Increments(model.legs, model.legs, False, math.nan)
     largest, steps = _LARGEST_IF_FACTORED if model.formulation.finite_strain else _LARGEST[model.domain], AUTO_START
-    strains: dict[float, Float] = {}
+    readings: dict[float, Float] = {}
     while True:
         trial = with_steps(problem, steps)
-        strains[steps] = strain(trial)
-        error = pairwise_error(strains, steps)
-        met = len(strains) > _LEAST_PAIRS and bool((error <= tolerance).all())
+        readings[steps] = read(trial)
+        error = pairwise_error(readings, steps)
+        met = len(readings) > _LEAST_PAIRS and bool((error <= NOISE_SHARE).all())
         if met or 2 * steps > largest:
             comparison = with_steps(problem, min(steps, _COMPARISON)).model.legs
-            return Increments(trial.model.legs, comparison, True, float(error.max()), tolerance)
-        strains = {n: s for n, s in strains.items() if 2 * n >= steps}
+            return Increments(trial.model.legs, comparison, True, float(error.max()))
+        readings = {n: s for n, s in readings.items() if 2 * n >= steps}
         steps *= 2
 
 
@@ -131,21 +129,21 @@ def scale_increments(problem: Problem, ratio: float) -> tuple[float, Problem]:
     return actual, replace(problem, model=replace(problem.model, legs=scaled))
 
 
-def strain_error_of_increments(problem: Problem, own: Float, chosen: bool, strain: Strain) -> Float:
-    """Return the error (m,) of a strain due to the increments, from presses with more or fewer of them.
+def error_of_increments(problem: Problem, own: Float, chosen: bool, read: Read) -> Float:
+    """Return the error (m,) of readings due to the increments, from presses with more or fewer of them.
 
     Parameters
     ----------
     problem : Problem
     own : (m,) array
-        Strain in the increments of the problem.
+        Readings in the increments of the problem.
     chosen : bool
         Whether `choose_increments` chose their number.
-    strain : callable
+    read : callable
     """
     found = {1.0: own}
     for ratio in _ratios(problem, chosen):
         actual, other = scale_increments(problem, ratio)
         if actual != 1.0:
-            found[actual] = strain(other)
+            found[actual] = read(other)
     return pairwise_error(found, 1.0)

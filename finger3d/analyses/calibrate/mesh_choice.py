@@ -7,11 +7,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from finger3d.accuracy.cost import forecast
 from finger3d.accuracy.richardson import ORDER
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Model
 from finger3d.sensor.curve import Calibration
+from finger3d.sensor.joint import JointCalibration
 
 if TYPE_CHECKING:
     from finger3d.analyses.calibrate.run import CurvePoints
@@ -31,19 +34,21 @@ class CalibratedMesh:
     """A calibration, its presses, and what its mesh leaves to be wished for, in words; empty if nothing."""
 
     curve: CurvePoints
-    calibration: Calibration
+    calibration: Calibration | JointCalibration
     note: str
 
 
-def mesh_share(calibration: Calibration) -> float:
+def mesh_share(calibration: Calibration | JointCalibration) -> float:
     """Return the largest share of the mesh in the variance of mu, over all calibrated mu."""
+    if isinstance(calibration, JointCalibration):
+        return float(np.max(calibration.reductions(calibration.mu).get("mesh", 0.0)))
     return max(calibration.shares(float(mu)).get("mesh", 0.0) for mu in calibration.mu)
 
 
 def choose_mesh(
     model: Model,
     automatic: bool,
-    calibrated: Callable[[Model], tuple[CurvePoints, Calibration]],
+    calibrated: Callable[[Model], tuple[CurvePoints, Calibration | JointCalibration]],
     say: Callable[[str], None],
 ) -> CalibratedMesh:
     """Calibrate on finer and finer meshes, until the mesh matters little or the next one would take too long.

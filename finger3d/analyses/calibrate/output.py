@@ -7,18 +7,21 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from finger3d._types import Tree
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.io import atomic, write_csv
 from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
 from finger3d.progress import Progress
-from finger3d.report.calibrate import calibrate_page
+from finger3d.report.calibrate import calibrate_page, joint_calibration_page
 from finger3d.sensor.curve import Calibration
 from finger3d.sensor.files import save, write_table
+from finger3d.sensor.joint import JointCalibration
 
 if TYPE_CHECKING:
     from finger3d.analyses.calibrate.run import CurvePoints
+    from finger3d.analyses.calibrate.settings import CalibrationSettings
     from finger3d.scene import Scene
 
 
@@ -28,13 +31,15 @@ def write_scene(folder: Path, scene: Scene) -> None:
         path.write_text(scene.to_toml(), encoding="utf-8")
 
 
-def write_points(folder: Path, curve: CurvePoints, gauge: str) -> None:
+def write_points(folder: Path, curve: CurvePoints, settings: CalibrationSettings) -> None:
     """Write the values of mu that are finished to calibration.csv."""
     frames, failed = curve.frames, curve.failed
     mus = [p.mu for p in curve.presses]
-    strain = [frames[mu].gauges[gauge] if mu in frames else math.nan for mu in mus]
-    outcome = [failed.get(mu, "converged") for mu in mus]
-    write_csv(folder / "calibration.csv", {"mu": mus, "strain": strain, "outcome": outcome})
+    columns: Tree = {"mu": mus}
+    for name in settings.names:
+        column = "strain" if settings.only_gauge else name
+        columns[column] = [frames[mu].readings[name] if mu in frames else math.nan for mu in mus]
+    write_csv(folder / "calibration.csv", columns | {"outcome": [failed.get(mu, "converged") for mu in mus]})
 
 
 def write_body(folder: Path, model: Model, problem: Problem, report: Progress) -> None:
@@ -61,11 +66,17 @@ def write_map(folder: Path, calibration: Calibration, curve: CurvePoints, gauge:
     draw_map(folder / "map.png", found, gauge, calibration)
 
 
-def write_curve(folder: Path, calibration: Calibration) -> None:
+def write_curve(folder: Path, calibration: Calibration | JointCalibration) -> None:
     """Write the curve, its figure and its page."""
-    from finger3d.plotting.calibration import draw
-
     write_table(calibration, folder / "calibration.csv")
     save(calibration, folder / "calibration.json")
-    draw(folder / "calibration.png", calibration)
-    calibrate_page(folder)
+    if isinstance(calibration, JointCalibration):
+        from finger3d.plotting.joint_calibration import draw_joint
+
+        draw_joint(folder / "calibration.png", calibration)
+        joint_calibration_page(folder)
+    else:
+        from finger3d.plotting.calibration import draw
+
+        draw(folder / "calibration.png", calibration)
+        calibrate_page(folder)

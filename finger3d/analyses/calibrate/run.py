@@ -1,4 +1,4 @@
-"""Calibration of one gauge of a scene: one condensation, a press for every mu, and the effect of the tolerances."""
+"""Calibration of readings of a scene: one condensation, a press for every mu, and the effect of the tolerances."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import math
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,38 +14,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._machine import versions
-from finger3d._ranges import number
 from finger3d._types import Float
 from finger3d.analyses.calibrate.increments import Increments, choose_increments
 from finger3d.analyses.calibrate.mesh_choice import choose_mesh
 from finger3d.analyses.calibrate.output import write_body, write_curve, write_map, write_points, write_scene
 from finger3d.analyses.calibrate.presses import Press, presses
-from finger3d.analyses.calibrate.tolerances import (
-    ReferenceReadings,
-    displaced_gauges,
-    evaluate_tolerances,
-    read,
-    with_defaults,
-)
+from finger3d.analyses.calibrate.reference import ReferenceReadings, read
+from finger3d.analyses.calibrate.settings import MUS, CalibrationSettings, found_readings
+from finger3d.analyses.calibrate.tolerances import displaced_gauges, evaluate_tolerances, with_defaults
 from finger3d.errors import Finger3dError
 from finger3d.io import claimed
 from finger3d.mechanics.build import MARGIN, build
 from finger3d.mechanics.coverage import contact_within_candidates
-from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
 from finger3d.progress import Progress
-from finger3d.sensor.curve import FEWEST, LARGEST_STRAIN, NOISE, RESOLUTION, Calibration, Tolerance
+from finger3d.sensor.curve import (
+    MARKER_NOISE_MM,
+    NOISE,
+    NOISES,
+    RESOLUTION,
+    TAXEL_NOISE_MPA,
+    Calibration,
+    Kind,
+    Tolerance,
+)
+from finger3d.sensor.joint import JointCalibration
 
 if TYPE_CHECKING:
     from finger3d.scene import Scene
-
-_LARGEST_MU = 1e6
-
-
-MUS = tuple(float(mu) for mu in np.linspace(0.02, 1.2, 25).round(10))
-"""Values of mu that are pressed unless others are given."""
 
 _FILES = ("calibration.json", "calibration.csv", "calibration.png", "reduced.npz", "map.png", "map.csv", "report.html")
 
@@ -54,43 +51,6 @@ _SIZES = {"size_mm", "base_size_mm", "tolerance"}
 """Keys of [mesh] with which a scene chooses its own mesh."""
 
 _SLOPES = {True: 7, False: 3}  # values of mu at which tolerances are tried: in small strain, and beyond
-
-
-@dataclass(frozen=True)
-class CalibrationSettings:
-    """Gauge, values of mu, and uncertainties of a calibration.
-
-    Attributes
-    ----------
-    mus : coefficients of friction, ascending
-    noise : standard deviation of a strain reading
-    limit : largest standard deviation of mu at which the gauge is usable
-    tolerances : standard deviation of every uncertain quantity, all above zero
-    maps : whether the sensitivity of strain to mu is mapped over the section
-    """
-
-    gauge: Gauge
-    mus: tuple[float, ...]
-    noise: float
-    limit: float
-    tolerances: Mapping[str, float]
-    maps: bool = False
-
-    def __post_init__(self) -> None:
-        """Check the numbers; mu is sorted, and equal values count once."""
-        for mu in self.mus:
-            if not 0.0 <= mu <= _LARGEST_MU:
-                raise Finger3dError(f"--mu: {mu:g}: must be finite numbers from 0 up to 1e6, for instance 0.02:1.2:25")
-        object.__setattr__(self, "mus", tuple(sorted({float(mu) for mu in self.mus})))
-        count = len(self.mus)
-        if count < FEWEST:
-            raise Finger3dError(
-                f"--mu: {count} different value{'s' if count != 1 else ''}; a calibration needs at least "
-                f"{FEWEST}, for instance 0.02:1.2:25"
-            )
-        for name, value, high in (("--noise", self.noise, LARGEST_STRAIN), ("--resolution", self.limit, 1e6)):
-            if not 1e-12 <= value <= high:
-                raise Finger3dError(f"{name} {value:g}: must be a finite number from 1e-12 to {number(high)}")
 
 
 @dataclass(frozen=True)
@@ -132,14 +92,14 @@ class CurvePoints:
         """Factorisations of the body, in its build and in the presses."""
         return self.factorizations_before + self.problem.factorizations + sum(p.factorizations for p in self.presses)
 
-    def strain(self, gauge: str) -> Float:
-        """Return the strain (n,) of a gauge in the presses that converged."""
-        return np.array([frame.gauges[gauge] for frame in self.frames.values()])
+    def reading(self, name: str) -> Float:
+        """Return a reading (n,) in the presses that converged."""
+        return np.array([frame.readings[name] for frame in self.frames.values()])
 
 
 def calibrate(
     scene: Scene | str | Path,
-    gauge: str,
+    gauge: str | Sequence[str],
     out: str | Path | None = None,
     mus: Sequence[float] = MUS,
     noise: float = NOISE,
@@ -147,24 +107,32 @@ def calibrate(
     tolerances: Mapping[str, float] | None = None,
     report: Progress | None = None,
     maps: bool = False,
-) -> Calibration:
-    """Calibrate a gauge: its strain at the end of the scene's path, for every mu.
+    marker_noise_mm: float = MARKER_NOISE_MM,
+    taxel_noise_MPa: float = TAXEL_NOISE_MPA,
+) -> Calibration | JointCalibration:
+    """Calibrate a gauge, or several readings together: their values at the end of the scene's path, for every mu.
 
     Parameters
     ----------
     scene : a loaded scene, or the path of a TOML file; its own friction.mu does not matter
-    gauge : name of a [[gauge]]
+    gauge : name of a [[gauge]]; or names of several readings: gauges, ``m1.x`` of a [[marker]], and taxels
     out : folder for calibration.json, .csv, .png, reduced.npz (and map.png, map.csv); None writes nothing
     mus : coefficients of friction, from 0 up
-    noise, limit : standard deviation of a strain reading, and largest one of mu at which the gauge is usable
+    noise, limit : standard deviation of a strain reading, and largest one of mu at which the sensor is usable
     tolerances : standard deviations by name, in place of the defaults of `TOLERANCES`; 0 omits one
     report : receives the progress
     maps : also map the sensitivity of strain to mu over the section
+    marker_noise_mm, taxel_noise_MPa : standard deviation of a reading of a marker, and of a taxel
+
+    Returns
+    -------
+    Calibration
+        Of a single gauge; otherwise a JointCalibration.
 
     Raises
     ------
     Finger3dError
-        For an unknown gauge, a scene without one, or numbers out of range.
+        For an unknown reading, a scene without one, or numbers out of range.
     MissingError
         If fewer than four values of mu converge; the others are in calibration.csv.
     """
@@ -173,10 +141,14 @@ def calibrate(
     report = report or Progress()
     scene = load(scene) if isinstance(scene, str | Path) else scene
     model = scene.model()
-    settings = CalibrationSettings(found_gauge(model, gauge), tuple(mus), noise, limit, with_defaults(tolerances), maps)
+    noises: dict[Kind, float] = {"gauge": noise, "marker": marker_noise_mm, "taxel": taxel_noise_MPa}
+    readings = found_readings(model, [gauge] if isinstance(gauge, str) else gauge, noises)
+    settings = CalibrationSettings(readings, tuple(mus), limit, with_defaults(tolerances), maps)
     if maps:
         from finger3d.sensor.maps import check
 
+        if not settings.only_gauge:
+            raise Finger3dError("--map: maps the strain of one gauge; give a single --gauge")
         check(model)
     if out is None:
         return _calibrate_scene(scene, model, settings, None, report)
@@ -186,13 +158,13 @@ def calibrate(
 
 def _calibrate_scene(
     scene: Scene, model: Model, settings: CalibrationSettings, folder: Path | None, report: Progress
-) -> Calibration:
+) -> Calibration | JointCalibration:
     """Press every mu, apply the tolerances, and write the results."""
     start = time.perf_counter()
     if folder:
         _prepare(folder, scene)
 
-    def calibrate_model(changed: Model) -> tuple[CurvePoints, Calibration]:
+    def calibrate_model(changed: Model) -> tuple[CurvePoints, Calibration | JointCalibration]:
         curve = _press_all(changed, settings, report, folder)
         return curve, _with_tolerances(curve, settings, report)
 
@@ -210,8 +182,9 @@ def _calibrate_scene(
     if folder:
         report.stage("writing")
         write_body(folder, model, curve.problem, report)
-        if settings.maps:
-            write_map(folder, calibration, curve, settings.gauge)
+        if settings.maps and isinstance(calibration, Calibration):
+            gauge = next(g for g in model.gauges if g.name == calibration.name)
+            write_map(folder, calibration, curve, gauge)
         write_curve(folder, calibration)
     return calibration
 
@@ -226,21 +199,24 @@ def calibrated(
     report: Progress | None = None,
 ) -> tuple[Calibration, CurvePoints]:
     """Return the calibration of a gauge of a model made in Python, and its presses; write nothing."""
+    joint, curve = calibrated_together(model, [gauge], mus, {"gauge": noise}, limit, tolerances, report)
+    return joint.readings[0], curve
+
+
+def calibrated_together(
+    model: Model,
+    names: Sequence[str],
+    mus: Sequence[float] = MUS,
+    noises: Mapping[Kind, float] = NOISES,
+    limit: float = RESOLUTION,
+    tolerances: Mapping[str, float] | None = None,
+    report: Progress | None = None,
+) -> tuple[JointCalibration, CurvePoints]:
+    """Return the joint calibration of readings of a model made in Python, and its presses; write nothing."""
     report = report or Progress()
-    settings = CalibrationSettings(found_gauge(model, gauge), tuple(mus), noise, limit, with_defaults(tolerances))
+    settings = CalibrationSettings(found_readings(model, names, noises), tuple(mus), limit, with_defaults(tolerances))
     curve = _press_all(model, settings, report)
-    return _with_tolerances(curve, settings, report), curve
-
-
-def found_gauge(model: Model, name: str) -> Gauge:
-    """Return the gauge of this name; an unknown name is refused with the nearest one."""
-    names = [g.name for g in model.gauges]
-    if not names:
-        raise Finger3dError(f'--gauge {name}: the scene has no [[gauge]]; add one with name = "{name}", x_mm and y_mm')
-    if name not in names:
-        near = get_close_matches(name, names, n=1, cutoff=0.0)[0]
-        raise Finger3dError(f'--gauge {name}: no such gauge; did you mean "{near}"? the scene has {", ".join(names)}')
-    return model.gauges[names.index(name)]
+    return _joint(curve, settings, report), curve
 
 
 def _prepare(folder: Path, scene: Scene) -> None:
@@ -257,8 +233,9 @@ def _press_all(
 
     Every mu that is finished is written to calibration.csv, so that a failure or an interruption keeps it.
     """
-    extra = () if model.inclusions else displaced_gauges(model, settings.gauge, settings.tolerances)
-    model = replace(model, gauges=(*model.gauges, *(m.gauge for m in extra)))
+    chosen = [] if model.inclusions else [g for g in model.gauges if g.name in settings.names]
+    extra = [d.gauge for gauge in chosen for d in displaced_gauges(model, gauge, settings.tolerances)]
+    model = replace(model, gauges=(*model.gauges, *extra))
     spent = 0
     for margin in (MARGIN, math.inf):
         start = time.perf_counter()
@@ -268,7 +245,7 @@ def _press_all(
         for curve in _curve_points(problem, settings, report):
             curve = replace(curve, seconds={**seconds, **curve.seconds}, factorizations_before=spent)
             if folder:
-                write_points(folder, curve, settings.gauge.name)
+                write_points(folder, curve, settings)
         if all(contact_within_candidates(curve.problem, list(curve.frames.values()))):
             break
         spent = curve.factorizations
@@ -279,10 +256,10 @@ def _press_all(
 def _curve_points(problem: Problem, settings: CalibrationSettings, report: Progress) -> Iterator[CurvePoints]:
     """Choose the increments, press the body with every mu, and yield the points after each."""
     start = time.perf_counter()
-    mus, name = settings.mus, settings.gauge.name
+    mus = settings.mus
     three = np.array(mus)[[0, len(mus) // 2, -1]]
     report.stage("increments")
-    increments = choose_increments(problem, lambda p: read(p, (name,), three)[0], settings.noise)
+    increments = choose_increments(problem, lambda p: (read(p, settings.names, three) / settings.noise).ravel())
     if increments.chosen:
         report.say(str(increments))
     problem = replace(problem, model=replace(problem.model, legs=increments.legs))
@@ -302,32 +279,48 @@ def _curve_points(problem: Problem, settings: CalibrationSettings, report: Progr
         yield curve
 
 
-def _with_tolerances(curve: CurvePoints, settings: CalibrationSettings, report: Progress) -> Calibration:
-    """Return the calibration with the effect of every tolerance; too few points are an error."""
+def _with_tolerances(
+    curve: CurvePoints, settings: CalibrationSettings, report: Progress
+) -> Calibration | JointCalibration:
+    """Return the calibration of a single gauge, or of several readings."""
+    joint = _joint(curve, settings, report)
+    return replace(joint.readings[0], about=joint.about) if settings.only_gauge else joint
+
+
+def _joint(curve: CurvePoints, settings: CalibrationSettings, report: Progress) -> JointCalibration:
+    """Return the calibration of all readings with the effect of every tolerance; too few points are an error."""
     start = time.perf_counter()
-    mu, gauge = np.array(list(curve.frames)), settings.gauge
-    calibration = Calibration(
-        gauge=gauge.name,
-        mu=mu,
-        strain=curve.strain(gauge.name),
-        noise=settings.noise,
-        limit=settings.limit,
-        failed=tuple(sorted(curve.failed.items())),
+    mu = np.array(list(curve.frames))
+    bare = tuple(
+        Calibration(
+            name=reading.name,
+            mu=mu,
+            reading=curve.reading(reading.name),
+            noise=reading.noise,
+            limit=settings.limit,
+            failed=tuple(sorted(curve.failed.items())),
+            kind=reading.kind,
+        )
+        for reading in settings.readings
     )
-    found: tuple[Tolerance, ...] = ()
+    found: dict[str, list[Tolerance]] = {name: [] for name in settings.names}
     if settings.tolerances:
+        frames = list(curve.frames.values())
         base = ReferenceReadings(
             mu=mu,
-            strain={g.name: curve.strain(g.name) for g in curve.problem.model.gauges},
+            readings={name: curve.reading(name) for name in frames[0].readings},
             sample=_sample(curve.problem, len(mu)),
-            frame=curve.frames[float(mu[-1])],
+            frame=frames[-1],
             pressed={p.mu: p for p in curve.presses if p.frame.outcome.ok},
         )
-        found = tuple(
-            evaluate_tolerances(curve.problem, gauge, settings.tolerances, base, curve.increments, report.stage)
+        every = evaluate_tolerances(
+            curve.problem, settings.readings, settings.tolerances, base, curve.increments, report.stage
         )
+        for name, tolerance in every:
+            found[name].append(tolerance)
+    readings = tuple(replace(one, tolerances=tuple(found[one.name])) for one in bare)
     seconds = {**curve.seconds, "tolerances": time.perf_counter() - start}
-    return replace(calibration, tolerances=found, about={"seconds": seconds})
+    return JointCalibration(readings, settings.limit, about={"seconds": seconds})
 
 
 def _sample(problem: Problem, count: int) -> NDArray[np.int64]:
@@ -348,23 +341,3 @@ def _about(scene: Scene, curve: CurvePoints) -> dict[str, object]:
         "versions": versions(),
         "increments": curve.increments.as_dict(),
     }
-
-
-def parsed_mus(text: str) -> tuple[float, ...]:
-    """Values of mu from ``first:last:count`` or a list with commas."""
-    try:
-        if ":" in text:
-            first, last, count = text.split(":")
-            return tuple(float(mu) for mu in np.linspace(float(first), float(last), _count(count)).round(10))
-        return tuple(float(part) for part in text.split(","))
-    except ValueError:
-        raise Finger3dError(
-            f"--mu {text}: must be first:last:count, for instance 0.02:1.2:25, or numbers with commas"
-        ) from None
-
-
-def _count(text: str) -> int:
-    count = int(text)
-    if not 1 <= count <= 10_000:
-        raise ValueError(text)
-    return count

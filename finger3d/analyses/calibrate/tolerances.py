@@ -1,4 +1,4 @@
-"""Effect of tolerances on the strain of a gauge: depth, material, tilt, place of the gauge, mesh and increments.
+"""Effect of tolerances on readings: depth, material, tilt, places of gauges, mesh and increments.
 
 Each effect is a finite difference over one standard deviation.  A displaced gauge is read in the same presses as the
 nominal one.  Other quantities are varied in a further series of presses at some values of mu, on the coarser mesh
@@ -10,7 +10,7 @@ values of mu the effect is interpolated.  The error of the increments follows fr
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, TypeAlias
@@ -18,11 +18,13 @@ from typing import Any, TypeAlias
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from finger3d._types import Float, Int
-from finger3d.accuracy.companions import built_like, companion
-from finger3d.accuracy.estimate import strain_error
-from finger3d.analyses.calibrate.increments import Increments, strain_error_of_increments
-from finger3d.analyses.calibrate.presses import PressesByMu, presses
+from finger3d._types import Float
+from finger3d.accuracy.companions import companion
+from finger3d.accuracy.estimate import reading_error
+from finger3d.analyses.calibrate.increments import Increments, error_of_increments
+from finger3d.analyses.calibrate.presses import PressesByMu
+from finger3d.analyses.calibrate.reference import ReferenceBody, ReferenceReadings, read, reading_only
+from finger3d.analyses.calibrate.settings import CalibratedReading
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.errors import Finger3dError
 from finger3d.fem.condense import stiffened
@@ -45,7 +47,7 @@ _TILTED_POINTS = {2: 100, 3: 500}
 _GAUGE_PLACES = ("gauge_x_mm", "gauge_y_mm", "gauge_angle_deg")
 
 Effect: TypeAlias = tuple[float, Float]
-"""Step of a quantity in its unit, and the change (m,) of the strain that it causes."""
+"""Step of a quantity in its unit, and the changes (k, m) of readings at several mu that it causes."""
 
 
 def with_defaults(given: Mapping[str, float] | None) -> dict[str, float]:
@@ -104,95 +106,37 @@ def _is_inside(model: Model, gauge: Gauge) -> bool:
     return bool(np.isfinite(top).all() and (at[:, 1] > 0.0).all() and (at[:, 1] < top - 1e-6).all())
 
 
-@dataclass(frozen=True)
-class ReferenceReadings:
-    """Readings of the nominal body.
-
-    Attributes
-    ----------
-    mu : (n,) array
-    strain : strain (n,) by gauge
-    sample : (m,) array
-        Indices of the values of mu at which other bodies and paths are pressed.
-    frame : the last increment of any press
-    pressed : presses by mu
-    """
-
-    mu: Float
-    strain: Mapping[str, Float]
-    sample: Int
-    frame: StepResult
-    pressed: PressesByMu
-
-
-@dataclass(frozen=True)
-class ReferenceBody:
-    """Body that others are compared with: strain (m,) of the gauge at mu (m,), and its presses by mu."""
-
-    problem: Problem
-    gauge: Gauge
-    mu: Float
-    strain: Float
-    pressed: PressesByMu
-
-    @classmethod
-    def of(cls, problem: Problem, gauge: Gauge, mu: Float) -> ReferenceBody:
-        """Press a problem at mu (m,)."""
-        pressed = {p.mu: p for p in sorted(presses(problem, mu.tolist()), key=lambda p: p.mu)}
-        strain = np.array([_strain(p.frame, gauge.name) for p in pressed.values()])
-        return cls(problem, gauge, mu, strain, pressed)
-
-    def change(self, problem: Problem, initial: PressesByMu | None = None) -> Float:
-        """Return the change (m,) of the strain in another body or path; `initial` has the initial guesses."""
-        return np.asarray(read(problem, (self.gauge.name,), self.mu, initial or self.pressed)[0] - self.strain)
-
-    def rebuilt(self, **changes: Any) -> Problem:
-        """Return the body with a changed model, and without the other gauges unless they stiffen it."""
-        model = self.problem.model
-        alone = model if model.inclusions else replace(model, gauges=(self.gauge,))
-        return built_like(self.problem, replace(alone, **changes))
-
-
-def read(problem: Problem, names: tuple[str, ...], mu: Float, initial: PressesByMu | None = None) -> Float:
-    """Return the strain (g, m) of gauges at mu (m,), NaN where a press failed."""
-    frames = [p.frame for p in sorted(presses(problem, mu.tolist(), initial), key=lambda p: p.mu)]
-    return np.array([[_strain(f, n) for f in frames] for n in names])
-
-
-def _strain(frame: StepResult, name: str) -> float:
-    return frame.gauges[name] if frame.outcome.ok else math.nan
-
-
 def evaluate_tolerances(
     problem: Problem,
-    gauge: Gauge,
+    readings: Sequence[CalibratedReading],
     tolerances: Mapping[str, float],
     base: ReferenceReadings,
     increments: Increments,
     say: Callable[[str], None],
-) -> Iterator[Tolerance]:
-    """Yield every tolerance with its effect at all values of mu of `base`.
+) -> Iterator[tuple[str, Tolerance]]:
+    """Yield the name of a reading and a tolerance, with its effect at all values of mu of `base`.
 
     Parameters
     ----------
     problem : the condensed body
-    gauge : Gauge
+    readings : the calibrated ones
     tolerances : standard deviations by name
-    base : readings of its gauges; without inclusions the displaced gauges are among them
+    base : their values; without inclusions those of displaced gauges are among them
     increments : of its path
     say : receives a line about each tolerance
 
     Notes
     -----
-    A tolerance is left out if a press that it needs fails.
+    A tolerance is left out if the presses that it needs fail.
     """
+    names = tuple(r.name for r in readings)
     mu = base.mu[base.sample]
-    own = base.strain[gauge.name][base.sample]
-    body = ReferenceBody(problem, gauge, mu, own, base.pressed)
+    own = np.array([base.readings[name][base.sample] for name in names])
+    body = ReferenceBody(problem, names, mu, own, base.pressed)
     others = set(tolerances) - {*_GAUGE_PLACES, "increments"}
     if others and increments.comparison_legs != problem.model.legs:
         legs = increments.comparison_legs
-        body = ReferenceBody.of(replace(problem, model=replace(problem.model, legs=legs)), gauge, mu)
+        body = ReferenceBody.of(replace(problem, model=replace(problem.model, legs=legs)), names, mu)
     coarse_suffices = len(problem.points.nodes) >= 2 ** (problem.dim - 1) * _LEAST_POINTS[problem.dim]
     coarse = None
     if "mesh" in tolerances or (coarse_suffices and others):
@@ -201,20 +145,28 @@ def evaluate_tolerances(
     varied = coarse if coarse and coarse_suffices else body
     for name, sd in tolerances.items():
         say(f"tolerance {name}")
-        effects = _effects_of_displaced_gauge(problem.model, gauge, name, sd, base)
-        known = base.mu if effects else mu
+        known = mu
         if name == "mesh":
-            effects = [(sd, sd * _mesh_error(body, coarse, base.frame))] if coarse else []
+            effects = [(sd, sd * _mesh_errors(body, coarse, base.frame, readings))] if coarse else []
         elif name == "increments":
-            error = strain_error_of_increments(
-                problem, own, increments.chosen, lambda other: read(other, (gauge.name,), mu)[0]
-            )
-            effects = [(sd, sd * error)]
-        elif not effects:
-            effects = list(_VARIATIONS[name](varied, sd))
-        effects = [(step, _interpolated(base.mu, known, change)) for step, change in effects]
-        if effects and all(np.isfinite(change).all() for _, change in effects):
-            yield _tolerance(name, sd, effects)
+            effects = [(sd, sd * _increment_errors(problem, names, own, increments, mu))]
+        elif name in _GAUGE_PLACES and not problem.model.inclusions:
+            known = base.mu
+            effects = _effects_of_displaced_gauges(problem.model, readings, name, sd, base)
+        else:
+            effects = list(_VARIATIONS[name](varied, readings, sd))
+        yield from _tolerances(readings, name, sd, effects, known, base.mu)
+
+
+def _tolerances(
+    readings: Sequence[CalibratedReading], name: str, sd: float, effects: list[Effect], known: Float, mu: Float
+) -> Iterator[tuple[str, Tolerance]]:
+    """Yield the tolerance of every reading that has one, from changes (k, m) at mu (m,), interpolated to mu (n,)."""
+    for i, reading in enumerate(readings):
+        found = [(step, _interpolated(mu, known, change[i])) for step, change in effects]
+        own = [(step, change) for step, change in found if np.isfinite(change).all()]
+        if own:
+            yield reading.name, _tolerance(name, sd, own)
 
 
 def _tolerance(name: str, sd: float, effects: list[Effect]) -> Tolerance:
@@ -239,17 +191,28 @@ def _interpolated(mu: Float, known: Float, values: Float) -> Float:
     return np.asarray(PchipInterpolator(known, values)(np.clip(mu, known[0], known[-1])))
 
 
-def _effects_of_displaced_gauge(
-    model: Model, gauge: Gauge, name: str, sd: float, base: ReferenceReadings
+def _effects_of_displaced_gauges(
+    model: Model, readings: Sequence[CalibratedReading], name: str, sd: float, base: ReferenceReadings
 ) -> list[Effect]:
-    """Return the effects of a displaced gauge, read in the presses of the nominal one; none if it stiffens the body."""
-    if model.inclusions:
-        return []
-    displaced = [d for d in displaced_gauges(model, gauge, {name: sd}) if d.gauge.name in base.strain]
-    return [(d.step, base.strain[d.gauge.name] - base.strain[gauge.name]) for d in displaced]
+    """Return the effects of displaced gauges, read in the presses of the nominal ones; NaN where one leaves the body.
+
+    Only gauges have a tolerance of place: a camera sees where a marker is at rest.
+    """
+    found: dict[float, Float] = {}
+    for i, gauge in _gauges(model, readings):
+        for d in displaced_gauges(model, gauge, {name: sd}):
+            change = found.setdefault(d.step, np.full((len(readings), len(base.mu)), math.nan))
+            change[i] = base.readings[d.gauge.name] - base.readings[gauge.name]
+    return list(found.items())
 
 
-def _vary_depth(body: ReferenceBody, sd: float) -> Iterator[Effect]:
+def _gauges(model: Model, readings: Sequence[CalibratedReading]) -> list[tuple[int, Gauge]]:
+    """Return the gauges among the readings, with their numbers."""
+    known = {g.name: g for g in model.gauges}
+    return [(i, known[r.name]) for i, r in enumerate(readings) if r.name in known]
+
+
+def _vary_depth(body: ReferenceBody, readings: Sequence[CalibratedReading], sd: float) -> Iterator[Effect]:
     """Press deeper, and less deep by at most half the depth of the shallowest leg."""
     problem, model = body.problem, body.problem.model
     shallowest = min(leg.depth_mm for leg in model.legs if leg.depth_mm > 0.0)
@@ -258,14 +221,17 @@ def _vary_depth(body: ReferenceBody, sd: float) -> Iterator[Effect]:
         yield step, body.change(replace(problem, model=replace(model, legs=legs)), _scaled_to_path(body, legs))
 
 
-def _vary_modulus(body: ReferenceBody, sd: float) -> Iterator[Effect]:
-    """Raise Young's modulus; strains depend on it only if something else in the scene has a stiffness."""
+def _vary_modulus(body: ReferenceBody, readings: Sequence[CalibratedReading], sd: float) -> Iterator[Effect]:
+    """Raise Young's modulus; if nothing else in the scene has a stiffness, pressures alone depend on it."""
     model = body.problem.model
-    alone = model.inclusions is None and model.object_compliance is None
-    yield sd, np.zeros(len(body.mu)) if alone else body.change(with_modulus(body.problem, 1.0 + 0.01 * sd))
+    if model.inclusions is None and model.object_compliance is None:
+        is_pressure = np.array([r.kind == "taxel" for r in readings])
+        yield sd, 0.01 * sd * np.where(is_pressure[:, None], body.readings, 0.0)
+    else:
+        yield sd, body.change(with_modulus(body.problem, 1.0 + 0.01 * sd))
 
 
-def _vary_poisson(body: ReferenceBody, sd: float) -> Iterator[Effect]:
+def _vary_poisson(body: ReferenceBody, readings: Sequence[CalibratedReading], sd: float) -> Iterator[Effect]:
     """Lower Poisson's ratio, or raise it if lowering leaves its range or changes the element."""
     material = body.problem.model.material.isotropic("the tolerance of nu")
     nu = material.nu
@@ -274,26 +240,27 @@ def _vary_poisson(body: ReferenceBody, sd: float) -> Iterator[Effect]:
     yield step, body.change(body.rebuilt(material=replace(material, nu=nu + step)))
 
 
-def _vary_tilt(body: ReferenceBody, sd: float) -> Iterator[Effect]:
-    """Tilt a plane by plus and minus `sd`; of a symmetric scene the mirrored gauge gives the second reading.
+def _vary_tilt(body: ReferenceBody, readings: Sequence[CalibratedReading], sd: float) -> Iterator[Effect]:
+    """Tilt a plane by plus and minus `sd`; of a symmetric scene mirrored sensors give the second reading.
 
     The mesh is another one, without symmetry, so that the two tilted bodies are compared with each other.
     """
-    problem, gauge, model = body.problem, body.gauge, body.problem.model
+    problem, model = body.problem, body.problem.model
     if not isinstance(model.object, Plane):
         return
     plane, step, mesh = model.object, math.radians(sd), _coarser(problem)
     if "x" in problem.axes and not model.inclusions:
-        image = replace(gauge, name=f"{gauge.name} mirrored", x_mm=-gauge.x_mm, angle=math.pi - gauge.angle)
-        tilted = body.rebuilt(mesh=mesh, object=replace(plane, tilt=step), gauges=(gauge, image), symmetry=None)
-        plus, minus = read(tilted, (gauge.name, image.name), body.mu)
+        images, names, signs = _mirrored(reading_only(model, body.names), body.names)
+        tilted = body.rebuilt(mesh=mesh, object=replace(plane, tilt=step), symmetry=None, **images)
+        both = read(tilted, (*body.names, *names), body.mu)
+        plus, minus = both[: len(names)], signs[:, None] * both[len(names) :]
     else:
         plus, minus = (
             read(
                 body.rebuilt(mesh=mesh, object=replace(plane, tilt=plane.tilt + sign * step), symmetry=None),
-                (gauge.name,),
+                body.names,
                 body.mu,
-            )[0]
+            )
             for sign in (1.0, -1.0)
         )
     half = 0.5 * (plus - minus)
@@ -301,16 +268,35 @@ def _vary_tilt(body: ReferenceBody, sd: float) -> Iterator[Effect]:
     yield -sd, -half
 
 
-def _vary_stiff_gauge(name: str, body: ReferenceBody, sd: float) -> Iterator[Effect]:
-    """Displace a gauge that stiffens the body, as far as it stays inside."""
+def _mirrored(model: Model, names: Sequence[str]) -> tuple[dict[str, tuple[Any, ...]], tuple[str, ...], Float]:
+    """Return the sensors of a model and their mirror images, the names of mirrored readings, and their signs."""
+    dim = 3 if model.domain == "solid" else 2
+    image_of: dict[str, tuple[str, float]] = {}
+    sensors: dict[str, tuple[Any, ...]] = {}
+    for kind in ("gauges", "markers", "taxels"):
+        own = getattr(model, kind)
+        images = [sensor.mirrored(f"{sensor.name} mirrored") for sensor in own]
+        sensors[kind] = (*own, *(image for image, _ in images))
+        for sensor, (image, signs) in zip(own, images, strict=True):
+            image_of |= zip(sensor.columns(dim), zip(image.columns(dim), signs, strict=False), strict=True)
+    return sensors, tuple(image_of[n][0] for n in names), np.array([image_of[n][1] for n in names])
+
+
+def _vary_stiff_gauge(
+    name: str, body: ReferenceBody, readings: Sequence[CalibratedReading], sd: float
+) -> Iterator[Effect]:
+    """Displace every gauge that stiffens the body, as far as it stays inside; each changes its own reading."""
     model = body.problem.model
-    displaced = _displaced(body.gauge, name, sd)
-    if model.inclusions and _is_inside(model, displaced):
-        gauges = tuple(displaced if g.name == body.gauge.name else g for g in model.gauges)
-        yield sd, body.change(body.rebuilt(gauges=gauges))
+    change = np.full((len(readings), len(body.mu)), math.nan)
+    for i, gauge in _gauges(model, readings):
+        displaced = _displaced(gauge, name, sd)
+        if _is_inside(model, displaced):
+            gauges = tuple(displaced if g.name == gauge.name else g for g in model.gauges)
+            change[i] = body.change(body.rebuilt(gauges=gauges))[i]
+    yield sd, change
 
 
-_VARIATIONS: dict[str, Callable[[ReferenceBody, float], Iterator[Effect]]] = {
+_VARIATIONS: dict[str, Callable[[ReferenceBody, Sequence[CalibratedReading], float], Iterator[Effect]]] = {
     "depth_mm": _vary_depth,
     "E_percent": _vary_modulus,
     "nu": _vary_poisson,
@@ -362,20 +348,31 @@ def with_modulus(problem: Problem, factor: float) -> Problem:
 def _on_coarser_mesh(body: ReferenceBody, say: Callable[[str], None]) -> ReferenceBody | None:
     """Return the body on the coarser mesh that the error bar comes from; None if there is no coarser mesh."""
     try:
-        return ReferenceBody.of(companion(body.problem, say), body.gauge, body.mu)
+        return ReferenceBody.of(companion(body.problem, say), body.names, body.mu)
     except Finger3dError:
         return None
 
 
-def _mesh_error(body: ReferenceBody, coarse: ReferenceBody, frame: StepResult) -> Float:
-    """Return the error bar (m,) of the strain due to the mesh, nowhere below its root mean square.
+def _mesh_errors(
+    body: ReferenceBody, coarse: ReferenceBody, frame: StepResult, readings: Sequence[CalibratedReading]
+) -> Float:
+    """Return the error bars (k, m) of readings due to the mesh, nowhere below their root mean square over mu.
 
-    The error depends little on mu, and where the strains of the two meshes cross they agree by chance.  `frame` is the
+    The error depends little on mu, and where the readings of the two meshes cross they agree by chance.  `frame` is the
     last increment at any mu.
     """
-    found = strain_error(body.problem, frame, coarse.problem, body.strain, coarse.strain)
-    known = found[np.isfinite(found)]
-    return np.maximum(found, math.sqrt(float(np.mean(known**2)))) if len(known) else found
+    found = []
+    for own, other, reading in zip(body.readings, coarse.readings, readings, strict=True):
+        error = reading_error(body.problem, frame, coarse.problem, own, other, reading.kind)
+        known = error[np.isfinite(error)]
+        found.append(np.maximum(error, math.sqrt(float(np.mean(known**2)))) if len(known) else error)
+    return np.array(found)
+
+
+def _increment_errors(problem: Problem, names: tuple[str, ...], own: Float, increments: Increments, mu: Float) -> Float:
+    """Return the errors (k, m) of readings due to the increments, from presses with more or fewer of them."""
+    error = error_of_increments(problem, own.ravel(), increments.chosen, lambda other: read(other, names, mu).ravel())
+    return error.reshape(own.shape)
 
 
 def _coarser(problem: Problem) -> MeshOptions:

@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from finger3d._types import Float, Tree
-from finger3d.analyses.calibrate.increments import choose_increments, strain_error_of_increments
+from finger3d.analyses.calibrate.increments import choose_increments, error_of_increments
 from finger3d.analyses.optimise.evaluation import Evaluation, evaluation_of, row_check
 from finger3d.analyses.optimise.task import (
     METHODS,
@@ -178,7 +178,7 @@ class _Search:
             return model.legs
         if self.chosen is None:
             mus, noise = _first_middle_last(self.problem.mus), self.problem.noise
-            found = choose_increments(body.shared.problem, lambda p: body.strain(gauge, mus, p.model.legs), noise)
+            found = choose_increments(body.shared.problem, lambda p: body.strain(gauge, mus, p.model.legs) / noise)
             self.report.say(str(found))
             self.chosen = tuple(leg.steps for leg in found.legs)
         return tuple(replace(leg, steps=n) for leg, n in zip(model.legs, self.chosen, strict=True))
@@ -205,7 +205,7 @@ class _Search:
         def strain(other: Any) -> Float:
             return body.strain(gauge, mus, other.model.legs)
 
-        left = strain_error_of_increments(problem, strain(problem), legs != model.legs, strain)
+        left = error_of_increments(problem, strain(problem), legs != model.legs, strain)
         return {"steps": [leg.steps for leg in legs], "chosen": legs != model.legs, "strain_error": float(left.max())}
 
     def _record(self, found: Evaluation) -> None:

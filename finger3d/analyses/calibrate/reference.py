@@ -1,0 +1,85 @@
+"""Bodies that a calibration presses: readings at several coefficients of friction, and how they change."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from finger3d._types import Float, Int
+from finger3d.accuracy.companions import built_like
+from finger3d.analyses.calibrate.presses import PressesByMu, presses
+from finger3d.mechanics.history import StepResult
+from finger3d.mechanics.model import Model
+from finger3d.mechanics.problem import Problem
+
+
+@dataclass(frozen=True)
+class ReferenceReadings:
+    """Readings of the nominal body.
+
+    Attributes
+    ----------
+    mu : (n,) array
+    readings : (n,) by name
+    sample : (m,) array
+        Indices of the values of mu at which other bodies and paths are pressed.
+    frame : the last increment of any press
+    pressed : presses by mu
+    """
+
+    mu: Float
+    readings: Mapping[str, Float]
+    sample: Int
+    frame: StepResult
+    pressed: PressesByMu
+
+
+@dataclass(frozen=True)
+class ReferenceBody:
+    """Body that others are compared with: readings (k, m) by names (k) at mu (m,), and its presses by mu."""
+
+    problem: Problem
+    names: tuple[str, ...]
+    mu: Float
+    readings: Float
+    pressed: PressesByMu
+
+    @classmethod
+    def of(cls, problem: Problem, names: tuple[str, ...], mu: Float) -> ReferenceBody:
+        """Press a problem at mu (m,)."""
+        pressed = {p.mu: p for p in sorted(presses(problem, mu.tolist()), key=lambda p: p.mu)}
+        return cls(problem, names, mu, _readings([p.frame for p in pressed.values()], names), pressed)
+
+    def change(self, problem: Problem, initial: PressesByMu | None = None) -> Float:
+        """Return the changes (k, m) of the readings in another body or path; `initial` has the initial guesses."""
+        return np.asarray(read(problem, self.names, self.mu, initial or self.pressed) - self.readings)
+
+    def rebuilt(self, **changes: Any) -> Problem:
+        """Return the body with a changed model, and without other readings, but for gauges that stiffen it."""
+        return built_like(self.problem, replace(reading_only(self.problem.model, self.names), **changes))
+
+
+def reading_only(model: Model, names: Sequence[str]) -> Model:
+    """Return the model without readings of other names; gauges that stiffen the body are kept."""
+    dim = 3 if model.domain == "solid" else 2
+    wanted = set(names)
+    return replace(
+        model,
+        gauges=model.gauges if model.inclusions else tuple(g for g in model.gauges if g.name in wanted),
+        markers=tuple(m for m in model.markers if wanted & {*m.columns(dim)}),
+        taxels=tuple(t for t in model.taxels if t.name in wanted),
+    )
+
+
+def read(problem: Problem, names: Sequence[str], mu: Float, initial: PressesByMu | None = None) -> Float:
+    """Return readings (k, m) by names (k) at mu (m,), NaN where a press failed."""
+    return _readings([p.frame for p in sorted(presses(problem, mu.tolist(), initial), key=lambda p: p.mu)], names)
+
+
+def _readings(frames: Sequence[StepResult], names: Sequence[str]) -> Float:
+    every = [frame.readings if frame.outcome.ok else {} for frame in frames]
+    return np.array([[one.get(name, math.nan) for one in every] for name in names])

@@ -1,0 +1,261 @@
+"""Friction coefficient from several readings: the likelihood of mu, and a test whether the readings agree.
+
+With the residual ``d(mu) = r - e(mu)`` of the readings r and their covariance C(mu), the likelihood of mu is ``exp(-d^T
+C^-1 d / 2) / sqrt(det C)``.  Normalised over the calibrated range it gives the mean of mu, its standard deviation, and
+the smallest set that holds 90 % (a credible set for a mu that may lie anywhere in the range).  Where the likelihood
+has several peaks, that set is several intervals, and all are named.
+
+The smallest ``d^T C^-1 d`` follows a chi-square distribution with one degree of freedom less than there are readings,
+if these are of one press; readings with a p-value below 0.001 are said to contradict each other.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+
+from finger3d._types import Float
+from finger3d.sensor.curve import ranges_text
+from finger3d.sensor.joint import JointCalibration
+
+JointStatus = Literal["ok", "coarse", "ambiguous", "above", "below", "outside", "blind", "contradiction"]
+
+CREDIBLE = 0.9
+"""Share of the likelihood in the set that is told."""
+
+LEAST_P = 1e-3
+"""Probability of so large a chi-square below which readings are said to contradict each other."""
+
+_NEGLIGIBLE = 30.0  # below the largest logarithm of the likelihood: beyond it nothing is integrated
+_NODES = 400  # of the integrals over mu
+
+
+@dataclass(frozen=True)
+class JointEstimate:
+    """Estimate of mu from several readings.
+
+    Attributes
+    ----------
+    readings, stds : by name; the standard deviations of their noise
+    mu, std : mean and standard deviation; nan unless the status is "ok" or "coarse"
+    low, high : ends of the 90 % set; 0 or infinite where it reaches an end of the calibrated range
+    intervals : of the 90 % set, ascending
+    status : ok; coarse: worse than the calibration's limit; ambiguous: several intervals; above, below: beyond the end
+        of what can be told apart; blind: nothing can; outside: no mu has these readings; contradiction: they are not of
+        one press
+    chi_square, p_value : of the test that the readings agree; the p-value of one reading tests whether it is in range
+    verdict : the same in words
+    """
+
+    readings: Mapping[str, float]
+    stds: Mapping[str, float]
+    mu: float
+    std: float
+    low: float
+    high: float
+    intervals: tuple[tuple[float, float], ...]
+    status: JointStatus
+    chi_square: float
+    p_value: float
+    verdict: str
+
+
+@dataclass(frozen=True)
+class _Likelihood:
+    """Likelihood on ascending mu (m,): its density, normalised, and chi-square."""
+
+    mu: Float
+    density: Float
+    chi_square: Float
+
+    @property
+    def weight(self) -> Float:
+        """Share (m,) of the likelihood that belongs to every mu, by the trapezoidal rule."""
+        step = np.diff(self.mu)
+        width = 0.5 * (np.append(step, 0.0) + np.append(0.0, step))
+        weight = self.density * width
+        return np.asarray(weight / weight.sum())
+
+    @property
+    def mean(self) -> float:
+        return float(self.weight @ self.mu)
+
+    @property
+    def std(self) -> float:
+        return math.sqrt(max(float(self.weight @ (self.mu - self.mean) ** 2), 0.0))
+
+    def credible_set(self) -> tuple[tuple[float, float], ...]:
+        """Return the intervals of the smallest set that holds `CREDIBLE` of the likelihood."""
+        weight, order = self.weight, np.argsort(-self.density)
+        count = int(np.searchsorted(np.cumsum(weight[order]), CREDIBLE)) + 1
+        inside = np.zeros(len(weight) + 2, dtype=int)
+        inside[1 + order[:count]] = 1
+        ends = np.flatnonzero(np.diff(inside)).reshape(-1, 2)
+        return tuple((float(self.mu[a]), float(self.mu[b - 1])) for a, b in ends)
+
+
+@dataclass(frozen=True)
+class JointEstimator:
+    """What all estimates from the same readings share: curves, inverse covariance and its determinant on the grid.
+
+    Attributes
+    ----------
+    at : (m, k) readings
+    precision : (m, k, k) inverse covariance
+    log_determinant : (m,) of the covariance
+    """
+
+    calibration: JointCalibration
+    noise: Float
+    at: Float
+    precision: Float
+    log_determinant: Float
+
+    @classmethod
+    def of(cls, calibration: JointCalibration, noise: Float, tolerances: bool = True) -> JointEstimator:
+        """Prepare estimates from readings with noise (k,)."""
+        covariance = calibration.covariance(calibration.grid, noise, tolerances)
+        scale = calibration.noise
+        scaled = covariance / np.outer(scale, scale)
+        precision = np.linalg.inv(scaled) / np.outer(scale, scale)
+        return cls(calibration, noise, calibration.at(calibration.grid), precision, np.linalg.slogdet(scaled).logabsdet)
+
+    def estimate(self, reading: Float) -> JointEstimate:
+        """Return the estimate from readings (k,)."""
+        found = self._likelihood(reading)
+        chi_square = float(found.chi_square.min())
+        freedom = max(1, len(reading) - 1)
+        p_value = chi_square_tail(chi_square, freedom)
+        status, intervals = self._status(found, p_value), found.credible_set()
+        c = self.calibration
+        first, last = float(c.mu[0]), float(c.mu[-1])
+        known = status in ("ok", "coarse")
+        none = status in ("outside", "contradiction")
+        return JointEstimate(
+            readings=dict(zip(c.names, map(float, reading), strict=True)),
+            stds=dict(zip(c.names, map(float, self.noise), strict=True)),
+            mu=found.mean if known else math.nan,
+            std=found.std if known else math.nan,
+            low=math.nan if none else 0.0 if intervals[0][0] <= first else intervals[0][0],
+            high=math.nan if none else math.inf if intervals[-1][1] >= last else intervals[-1][1],
+            intervals=() if none else intervals,
+            status=status,
+            chi_square=chi_square,
+            p_value=p_value,
+            verdict=self._verdict(status, found, intervals, reading, p_value),
+        )
+
+    def _likelihood(self, reading: Float) -> _Likelihood:
+        """Return the likelihood where it is not negligible, between the points of the grid by interpolation."""
+        grid = self.calibration.grid
+        residual = reading - self.at
+        coarse = np.einsum("mi,mij,mj->m", residual, self.precision, residual)
+        log = -0.5 * (coarse + self.log_determinant)
+        good = np.flatnonzero(log >= log.max() - _NEGLIGIBLE)
+        low, high = grid[max(good[0] - 1, 0)], grid[min(good[-1] + 1, len(grid) - 1)]
+        mu = np.union1d(np.linspace(low, high, _NODES), grid[(grid > low) & (grid < high)])
+        cell = np.clip(np.searchsorted(grid, mu, side="right") - 1, 0, len(grid) - 2)
+        share = ((mu - grid[cell]) / (grid[cell + 1] - grid[cell]))[:, None]
+        residual = residual[cell] * (1.0 - share) + residual[cell + 1] * share
+        precision = self.precision[cell] * (1.0 - share[:, :, None]) + self.precision[cell + 1] * share[:, :, None]
+        chi_square = np.einsum("mi,mij,mj->m", residual, precision, residual)
+        log = -0.5 * (chi_square + np.interp(mu, grid, self.log_determinant))
+        return _Likelihood(mu, np.exp(log - log.max()), chi_square)
+
+    def _status(self, found: _Likelihood, p_value: float) -> JointStatus:
+        c = self.calibration
+        if p_value < LEAST_P:
+            nearest = found.mu[np.argmin(found.chi_square)]
+            return "outside" if nearest in (c.mu[0], c.mu[-1]) or len(c.names) == 1 else "contradiction"
+        intervals = found.credible_set()
+        below, above = intervals[0][0] <= c.mu[0], intervals[-1][1] >= c.mu[-1]
+        if len(intervals) > 1:
+            return "ambiguous"
+        if below and above:
+            return "blind"
+        if above:
+            return "above"
+        if below:
+            return "below"
+        return "coarse" if found.std > c.limit else "ok"
+
+    def _verdict(
+        self,
+        status: JointStatus,
+        found: _Likelihood,
+        intervals: tuple[tuple[float, float], ...],
+        reading: Float,
+        p_value: float,
+    ) -> str:
+        c = self.calibration
+        first, last, low, high = c.mu[0], c.mu[-1], intervals[0][0], intervals[-1][1]
+        if status == "contradiction":
+            return self._contradiction(found, reading, p_value)
+        if status == "outside":
+            which = "this reading" if len(reading) == 1 else "these readings"
+            return (
+                f"out of range: no mu from {first:g} to {last:g} has {which}; chi-square {found.chi_square.min():.3g} "
+                f"at mu = {found.mu[np.argmin(found.chi_square)]:.3g} (p = {p_value:.1g})"
+            )
+        if status == "ambiguous":
+            return f"ambiguous: {ranges_text(intervals)} hold {100.0 * CREDIBLE:.0f} % of the likelihood"
+        if status == "blind":
+            return f"out of range: no mu from {first:g} to {last:g} can be told apart by these readings"
+        if status == "above":
+            return f"out of range: mu > {low:.3g}, and the calibration ends at {last:g}"
+        if status == "below":
+            return f"out of range: mu < {high:.3g}, and the calibration begins at {first:g}"
+        text = f"mu = {found.mean:.3g} +- {found.std:.2g} (90 % interval {low:.3g} to {high:.3g})"
+        return text if status == "ok" else f"{text}: coarser than the limit of {c.limit:g}"
+
+    def _contradiction(self, found: _Likelihood, reading: Float, p_value: float) -> str:
+        """Say that readings contradict each other, and without which one the others agree."""
+        c, text = self.calibration, ""
+        for i, name in enumerate(c.names if len(c.names) > 2 else ()):
+            others = [j for j in range(len(reading)) if j != i]
+            # the inverse of a block of the covariance, by the Schur complement of the precision
+            row = self.precision[:, others, i]
+            precision = self.precision[np.ix_(range(len(self.at)), others, others)] - (
+                row[:, :, None] * row[:, None, :] / self.precision[:, i, i, None, None]
+            )
+            part = JointEstimator(
+                c.of([c.names[j] for j in others]),
+                self.noise[others],
+                self.at[:, others],
+                precision,
+                -np.linalg.slogdet(precision).logabsdet,
+            )
+            left = float(part._likelihood(reading[others]).chi_square.min())
+            if chi_square_tail(left, len(others) - 1) >= LEAST_P:
+                text += f"; without {name}: {part.estimate(reading[others]).verdict}"
+        return (
+            f"these readings contradict each other: chi-square {found.chi_square.min():.3g} with {len(reading) - 1} "
+            f"degree{'s' if len(reading) > 2 else ''} of freedom (p = {p_value:.1g}){text}"
+        )
+
+
+@lru_cache(maxsize=8)
+def estimator(calibration: JointCalibration, noise: tuple[float, ...], tolerances: bool) -> JointEstimator:
+    """Return the estimator for readings with noise (k,); a few are kept, so that readings one by one are quick."""
+    return JointEstimator.of(calibration, np.array(noise), tolerances)
+
+
+def chi_square_tail(value: float, freedom: int) -> float:
+    """Return the probability that chi-square exceeds a value (Abramowitz and Stegun 1964, Eqs. 26.4.4 and 26.4.5)."""
+    half = 0.5 * value
+    if freedom % 2 == 0:
+        term = total = 1.0
+        for i in range(1, freedom // 2):
+            term *= half / i
+            total += term
+        return math.exp(-half) * total
+    term, total = math.sqrt(half) * 2.0 / math.sqrt(math.pi), 0.0
+    for i in range(1, (freedom + 1) // 2):
+        total += term
+        term *= half / (i + 0.5)
+    return math.erfc(math.sqrt(half)) + math.exp(-half) * total
