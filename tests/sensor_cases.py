@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.scene import parse
-from finger3d.sensor import Calibration
+from finger3d.sensor import Calibration, JointCalibration, Tolerance
 
 SCENE: dict[str, Any] = {
     "finger": {
@@ -52,3 +53,20 @@ def kinked(mu: Any) -> Any:
 
 def turning(mu: Any) -> Any:
     return 0.01 * (mu - 0.6) ** 2
+
+
+def line(slope: float) -> Any:
+    """Straight, through 0.05 at mu = 0."""
+    return lambda mu: 0.05 + slope * mu
+
+
+def tolerance(name: str, sd: float, slope: float, spread: float | None = None) -> Tolerance:
+    """A tolerance that has the same effect at every mu."""
+    size = abs(slope) * sd if spread is None else spread
+    return Tolerance(name, "1", sd, np.full(25, slope), np.full(25, size))
+
+
+def together(*curves: Calibration) -> JointCalibration:
+    """Curves as readings a, b, c and so on of one sensor."""
+    named = tuple(replace(one, name=letter) for one, letter in zip(curves, "abcdef", strict=False))
+    return JointCalibration(named, 0.1)

@@ -16,7 +16,7 @@ from scipy.interpolate import PchipInterpolator
 
 from finger3d.sensor import save
 from finger3d.sensor.pchip import MonotoneCubic
-from tests.sensor_cases import curve, straight
+from tests.sensor_cases import curve, line, straight, together
 
 NUMPY_ONLY = """
 import importlib.abc, sys
@@ -48,6 +48,17 @@ def test_an_estimate_needs_no_library_but_numpy(tmp_path: Path) -> None:
         [sys.executable, "-c", NUMPY_ONLY, str(kept), repr(straight(0.3))], capture_output=True, text=True, check=True
     )
     assert float(said.stdout) == pytest.approx(0.3)
+
+
+def test_several_readings_need_no_library_but_numpy(tmp_path: Path) -> None:
+    joint = together(curve(straight), curve(line(0.01)))
+    kept = save(joint, tmp_path / "calibration.json")
+    code = NUMPY_ONLY.replace("[float(sys.argv[2])]", "dict(zip('ab', map(float, sys.argv[2:])))")
+    readings = [repr(float(v)) for v in joint.at([0.3])[0]]
+    said = subprocess.run(
+        [sys.executable, "-c", code, str(kept), *readings], capture_output=True, text=True, check=True
+    )
+    assert float(said.stdout) == pytest.approx(0.3, abs=1e-3)
 
 
 def follow(*arguments: object, **options: object) -> subprocess.Popen:

@@ -23,7 +23,7 @@ def draw_joint(path: Path, calibration: JointCalibration) -> None:
     """Draw readings, standard deviation of mu, and reductions of its variance against mu; write a PNG file."""
     domain = calibration.about.get("domain", "")
     title = f"{len(calibration.readings)} readings together" + (f", {domain}" if domain else "")
-    made = sheet(1, 3, (5.4, 4.8), (0.8, 0.2, 1.2, 0.15), title)
+    made = sheet(1, 3, (5.8, 5.2), (0.8, 0.2, 1.6, 0.15), title)
     left, middle, right = made.axes
     _curves(left, calibration)
     _mu_sd(middle, calibration)
@@ -31,10 +31,10 @@ def draw_joint(path: Path, calibration: JointCalibration) -> None:
     made.save(path)
 
 
-def _finish(axes: Axes, columns: int = 2) -> None:
+def _finish(axes: Axes) -> None:
     style(axes)
     axes.set_xlabel("friction coefficient mu")
-    axes.legend(frameon=False, fontsize=9, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=columns)
+    axes.legend(frameon=False, fontsize=9, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=3, columnspacing=1.0)
 
 
 def _label(calibration: Calibration, number: int) -> str | None:
@@ -49,7 +49,7 @@ def _curves(axes: Axes, c: JointCalibration) -> None:
         (line,) = axes.plot(c.grid, (one.at(c.grid) - begin) / sd, lw=1.5, label=_label(one, i))
         axes.plot(one.mu, (one.reading - begin) / sd, "o", ms=3, color=line.get_color())
     axes.set_ylabel("change of a reading over its standard deviation")
-    _finish(axes, 3)
+    _finish(axes)
 
 
 def _mu_sd(axes: Axes, c: JointCalibration) -> None:

@@ -107,17 +107,18 @@ def _joint_estimates(
         )
     names = tuple(n for n in calibration.names if n in readings)
     chosen = calibration if set(readings) == set(calibration.names) else calibration.of(list(readings)).of(names)
-    values = np.stack([_row(name, readings[name], -LARGEST_STRAIN) for name in names], axis=-1)
-    noise = np.stack([_row(f"std of {c.name}", _std(c, chosen, std), 0.0) for c in chosen.readings], axis=-1)
-    try:
-        noise = np.broadcast_to(noise, values.shape)
-    except ValueError:
-        raise Finger3dError(
-            f"std: {len(noise)} of them for {len(values)} readings; give one for all, or each"
-        ) from None
+    rows = [_row(name, readings[name], -LARGEST_STRAIN) for name in names]
+    stds = [_row(f"std of {c.name}", _std(c, chosen, std), 0.0) for c in chosen.readings]
+    count = len(rows[0])
+    for name, row, own in zip(names, rows, stds, strict=True):
+        if len(row) != count:
+            raise Finger3dError(f"{name}: {len(row)} readings, but {count} of {names[0]}; a set has one of each")
+        if len(own) not in (1, count):
+            raise Finger3dError(f"std of {name}: {len(own)} for {count} readings; give one for all, or each")
+    noises = [tuple(float(own[min(i, len(own) - 1)]) for own in stds) for i in range(count)]
     return [
-        estimator(chosen, tuple(own), tolerances).estimate(reading)
-        for reading, own in zip(values, noise.tolist(), strict=True)
+        estimator(chosen, noise, tolerances).estimate(np.array(reading))
+        for reading, noise in zip(zip(*rows, strict=True), noises, strict=True)
     ]
 
 

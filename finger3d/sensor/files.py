@@ -181,7 +181,7 @@ def _joint_calibration(data: Tree) -> JointCalibration:
     found = []
     for name in readings:
         at = f"readings.{name}"
-        one = _part({"reading": readings[name]}, "reading", dict)
+        one = readings[name]
         kind = _part(one, f"{at}.kind", str)
         if kind not in QUANTITIES:
             raise ValueError(f"{at}.kind = {kind!r:.40}: must be {', '.join(QUANTITIES)}")

@@ -22,7 +22,7 @@ from finger3d.sensor.curve import QUANTITIES, Calibration, ranges_text
 SHARED = ("depth_mm", "E_percent", "nu", "tilt_deg")
 """Tolerances that change all readings together."""
 
-_LEAST_NOISE = 1e-9  # relative to the noise of a calibration: an exact reading leaves the covariance regular
+_LEAST_NOISE = 1e-3  # relative to the noise of a calibration: an exact reading leaves the covariance regular
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -135,7 +135,8 @@ class JointCalibration:
     def mu_sd(self, mu: ArrayLike, without: str = "", tolerances: bool = True) -> Float:
         """Return the standard deviation (m,) of mu, ``1 / sqrt(s^T C^-1 s)`` with the slopes s of the readings."""
         slope = np.atleast_2d(self.slope(np.atleast_1d(mu)))
-        covariance = self.covariance(mu, without=without, tolerances=tolerances)
+        slope = slope / self.noise
+        covariance = self.covariance(mu, without=without, tolerances=tolerances) / np.outer(self.noise, self.noise)
         information = np.einsum("mi,mi->m", slope, np.linalg.solve(covariance, slope[:, :, None])[:, :, 0])
         with np.errstate(divide="ignore"):
             return np.asarray(1.0 / np.sqrt(np.maximum(information, 0.0)))

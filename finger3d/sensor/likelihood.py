@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Literal
 
 import numpy as np
@@ -31,8 +31,9 @@ CREDIBLE = 0.9
 LEAST_P = 1e-3
 """Probability of so large a chi-square below which readings are said to contradict each other."""
 
-_NEGLIGIBLE = 30.0  # below the largest logarithm of the likelihood: beyond it nothing is integrated
-_NODES = 400  # of the integrals over mu
+_PLAUSIBLE = math.exp(-0.5 * 2.706)  # of the largest likelihood: the 90 % limit of a likelihood ratio
+_NEGLIGIBLE = 1e-12  # of the largest likelihood
+_NODES, _ENOUGH, _ZOOMS = 400, 50, 6  # of a finer grid; where the likelihood is not negligible; grids that are tried
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,14 @@ class _Likelihood:
     density: Float
     chi_square: Float
 
-    @property
+    @classmethod
+    def of(cls, mu: Float, residual: Float, precision: Float, log_determinant: Float) -> _Likelihood:
+        """Return the likelihood of residuals (m, k) with inverse covariances (m, k, k)."""
+        chi_square = np.einsum("mi,mi->m", residual, (precision @ residual[:, :, None])[:, :, 0])
+        log = -0.5 * (chi_square + log_determinant)
+        return cls(mu, np.exp(log - log.max()), chi_square)
+
+    @cached_property
     def weight(self) -> Float:
         """Share (m,) of the likelihood that belongs to every mu, by the trapezoidal rule."""
         step = np.diff(self.mu)
@@ -88,6 +96,11 @@ class _Likelihood:
     @property
     def std(self) -> float:
         return math.sqrt(max(float(self.weight @ (self.mu - self.mean) ** 2), 0.0))
+
+    def reaches_ends(self, mu: Float) -> tuple[bool, bool]:
+        """Return whether the first and the last calibrated mu are plausible: beyond them mu may lie as well."""
+        first, last = self.mu[0] == mu[0], self.mu[-1] == mu[-1]
+        return bool(first and self.density[0] >= _PLAUSIBLE), bool(last and self.density[-1] >= _PLAUSIBLE)
 
     def credible_set(self) -> tuple[tuple[float, float], ...]:
         """Return the intervals of the smallest set that holds `CREDIBLE` of the likelihood."""
@@ -131,9 +144,10 @@ class JointEstimator:
         chi_square = float(found.chi_square.min())
         freedom = max(1, len(reading) - 1)
         p_value = chi_square_tail(chi_square, freedom)
-        status, intervals = self._status(found, p_value), found.credible_set()
+        intervals = found.credible_set()
+        status = self._status(found, p_value, len(intervals))
         c = self.calibration
-        first, last = float(c.mu[0]), float(c.mu[-1])
+        below, above = found.reaches_ends(c.mu)
         known = status in ("ok", "coarse")
         none = status in ("outside", "contradiction")
         return JointEstimate(
@@ -141,8 +155,8 @@ class JointEstimator:
             stds=dict(zip(c.names, map(float, self.noise), strict=True)),
             mu=found.mean if known else math.nan,
             std=found.std if known else math.nan,
-            low=math.nan if none else 0.0 if intervals[0][0] <= first else intervals[0][0],
-            high=math.nan if none else math.inf if intervals[-1][1] >= last else intervals[-1][1],
+            low=math.nan if none else 0.0 if below else intervals[0][0],
+            high=math.nan if none else math.inf if above else intervals[-1][1],
             intervals=() if none else intervals,
             status=status,
             chi_square=chi_square,
@@ -151,30 +165,34 @@ class JointEstimator:
         )
 
     def _likelihood(self, reading: Float) -> _Likelihood:
-        """Return the likelihood where it is not negligible, between the points of the grid by interpolation."""
+        """Return the likelihood on the grid, or on a finer one around a peak that the grid does not resolve."""
+        mu = self.calibration.grid
+        for _ in range(_ZOOMS):
+            found = self._on(mu, reading)
+            good = np.flatnonzero(found.density >= _NEGLIGIBLE)
+            if len(good) >= _ENOUGH:
+                break
+            mu = np.linspace(mu[max(good[0] - 1, 0)], mu[min(good[-1] + 1, len(mu) - 1)], _NODES)
+        return found
+
+    def _on(self, mu: Float, reading: Float) -> _Likelihood:
+        """Return the likelihood at mu (m,); between points of the grid, readings and precision are interpolated."""
         grid = self.calibration.grid
-        residual = reading - self.at
-        coarse = np.einsum("mi,mij,mj->m", residual, self.precision, residual)
-        log = -0.5 * (coarse + self.log_determinant)
-        good = np.flatnonzero(log >= log.max() - _NEGLIGIBLE)
-        low, high = grid[max(good[0] - 1, 0)], grid[min(good[-1] + 1, len(grid) - 1)]
-        mu = np.union1d(np.linspace(low, high, _NODES), grid[(grid > low) & (grid < high)])
+        if mu is grid:
+            return _Likelihood.of(mu, reading - self.at, self.precision, self.log_determinant)
         cell = np.clip(np.searchsorted(grid, mu, side="right") - 1, 0, len(grid) - 2)
         share = ((mu - grid[cell]) / (grid[cell + 1] - grid[cell]))[:, None]
-        residual = residual[cell] * (1.0 - share) + residual[cell + 1] * share
+        residual = reading - self.at[cell] * (1.0 - share) - self.at[cell + 1] * share
         precision = self.precision[cell] * (1.0 - share[:, :, None]) + self.precision[cell + 1] * share[:, :, None]
-        chi_square = np.einsum("mi,mij,mj->m", residual, precision, residual)
-        log = -0.5 * (chi_square + np.interp(mu, grid, self.log_determinant))
-        return _Likelihood(mu, np.exp(log - log.max()), chi_square)
+        return _Likelihood.of(mu, residual, precision, np.interp(mu, grid, self.log_determinant))
 
-    def _status(self, found: _Likelihood, p_value: float) -> JointStatus:
+    def _status(self, found: _Likelihood, p_value: float, intervals: int) -> JointStatus:
         c = self.calibration
         if p_value < LEAST_P:
             nearest = found.mu[np.argmin(found.chi_square)]
             return "outside" if nearest in (c.mu[0], c.mu[-1]) or len(c.names) == 1 else "contradiction"
-        intervals = found.credible_set()
-        below, above = intervals[0][0] <= c.mu[0], intervals[-1][1] >= c.mu[-1]
-        if len(intervals) > 1:
+        below, above = found.reaches_ends(c.mu)
+        if intervals > 1:
             return "ambiguous"
         if below and above:
             return "blind"
@@ -197,7 +215,7 @@ class JointEstimator:
         if status == "contradiction":
             return self._contradiction(found, reading, p_value)
         if status == "outside":
-            which = "this reading" if len(reading) == 1 else "these readings"
+            which = "this reading" if len(reading) == 1 else "these readings, or they contradict each other"
             return (
                 f"out of range: no mu from {first:g} to {last:g} has {which}; chi-square {found.chi_square.min():.3g} "
                 f"at mu = {found.mu[np.argmin(found.chi_square)]:.3g} (p = {p_value:.1g})"

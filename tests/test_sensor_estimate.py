@@ -1,0 +1,146 @@
+"""Readings by name: what an estimate takes, refuses, and reads from files."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from finger3d.cli import main
+from finger3d.errors import Finger3dError
+from finger3d.sensor import JointCalibration, estimate, load, save
+from tests.sensor_cases import curve, line, straight, together, tolerance
+
+
+@pytest.fixture
+def joint() -> JointCalibration:
+    depth = tolerance("depth_mm", 0.1, 0.02)
+    return together(curve(line(0.01), tolerances=(depth,)), curve(line(-0.006), tolerances=(depth,)))
+
+
+def run(*arguments: object) -> int:
+    return main([str(a) for a in arguments])
+
+
+def test_a_single_gauge_may_be_named() -> None:
+    one = curve(straight)
+    assert estimate(one, {"g": straight(0.3)}, {"g": 1e-3}) == estimate(one, straight(0.3), 1e-3)
+    with pytest.raises(Finger3dError, match="h: not calibrated; the gauge is g"):
+        estimate(one, {"h": 0.1})
+
+
+def test_readings_may_be_many(joint: JointCalibration) -> None:
+    mu = np.array([0.2, 0.5, 0.8])
+    found = estimate(joint, dict(zip("ab", joint.at(mu).T, strict=True)), {"a": [1e-4, 2e-4, 3e-4]})
+    assert [f.mu for f in found] == pytest.approx(list(mu), abs=0.02)
+    assert [f.stds["a"] for f in found] == [1e-4, 2e-4, 3e-4]
+    assert [f.stds["b"] for f in found] == [1.5e-4] * 3
+
+
+@pytest.mark.parametrize(
+    ("readings", "std", "told"),
+    [
+        (0.05, None, "a reading without a name: a, b are calibrated"),
+        ({}, None, "a reading without a name"),
+        ({"a": 0.05, "x": 0.1}, None, "x: not calibrated; the readings are a, b"),
+        ({"a": float("nan"), "b": 0.05}, None, "a = nan: must be a finite number"),
+        ({"a": [0.05, float("inf")], "b": [0.05, 0.05]}, None, r"a = inf \(reading 2 of 2\)"),
+        ({"a": [0.05, 0.05], "b": 0.05}, None, "b: 1 readings, but 2 of a"),
+        ({"a": 0.05, "b": 0.05}, {"a": -1e-4}, "std of a = -0.0001: must be a finite number from 0"),
+        ({"a": 0.05, "b": 0.05}, {"c": 1e-4}, "std of c: no such reading; there are a, b"),
+        ({"a": [0.05, 0.05], "b": [0.05, 0.05]}, {"a": [1e-4] * 3}, "std of a: 3 for 2 readings"),
+    ],
+)
+def test_readings_that_are_refused(joint: JointCalibration, readings: Any, std: Any, told: str) -> None:
+    with pytest.raises(Finger3dError, match=told) as found:
+        estimate(joint, readings, std)
+    assert "\n" not in str(found.value)
+
+
+def test_one_deviation_for_readings_of_several_units_is_refused() -> None:
+    mixed = together(curve(line(0.01)), curve(line(1.0), kind="marker", noise=0.02))
+    with pytest.raises(Finger3dError, match="several units .*b in mm"):
+        estimate(mixed, {"a": 0.05, "b": 0.5}, 1e-4)
+    assert estimate(mixed, {"a": 0.055, "b": 0.55}, {"a": 1e-4, "b": 0.01})[0].mu == pytest.approx(0.5, abs=0.02)
+
+
+def test_a_joint_calibration_is_read_as_it_was_written(tmp_path: Path, joint: JointCalibration) -> None:
+    after = load(save(joint, tmp_path / "calibration.json"))
+    assert isinstance(after, JointCalibration)
+    assert after.names == joint.names
+    assert np.array_equal(after.covariance([0.4]), joint.covariance([0.4]))
+    readings = {"a": 0.055, "b": 0.047}
+    assert estimate(tmp_path / "calibration.json", readings) == estimate(joint, readings)
+
+
+def test_joint_calibrations_that_are_refused(tmp_path: Path, joint: JointCalibration) -> None:
+    path = save(joint, tmp_path / "calibration.json")
+    data = json.loads(path.read_text())
+    a = data["readings"]["a"]
+    cases = {
+        "version 7, this finger3d reads version 1": {"version": 7},
+        "readings: there are none": {"readings": {}},
+        "readings.a.kind: missing": {"readings": {"a": 3}},
+        "readings.a.kind = 'x': must be gauge": {"readings": {"a": a | {"kind": "x"}}},
+        "readings.a: must have a reading and tolerances": {"readings": {"a": a | {"curve": a["curve"][:7]}}},
+        "readings.a.noise = 0.0: must be a number": {"readings": {"a": a | {"noise": 0.0}}},
+        "mu: must be at least 4 values that ascend": {"mu": data["mu"][::-1]},
+    }
+    for told, change in cases.items():
+        path.write_text(json.dumps(data | change))
+        with pytest.raises(Finger3dError, match=told):
+            load(path)
+
+
+def test_the_command_takes_readings_by_name(tmp_path: Path, joint: JointCalibration, capsys: Any) -> None:
+    kept = save(joint, tmp_path / "calibration.json")
+    a, b = (repr(float(v)) for v in joint.at([0.4])[0])
+    assert run("estimate", kept, "--strain", f"a={a}", "--strain", f"b={b}", "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["mu"] == pytest.approx(0.4, abs=0.01)
+    assert found["readings"] == {"a": float(a), "b": float(b)}
+    assert run("estimate", kept, "--strain", f"a={a}", "--strain", f"b={b}", "--std", "1e-3", "--std", "b=1e-3") == 2
+    assert "b is given twice" in capsys.readouterr().err
+    assert run("estimate", kept, "--strain", f"a={a}", "--strain", f"b={float(b) + 0.03}") == 0
+    assert "no mu from 0.02 to 1.2 has these readings, or they contradict" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (("--strain", "0.05"), "a, b are calibrated; give the name of the reading, for instance --strain a=0.05"),
+        (("--strain", "c=0.05"), "c is not calibrated; the readings are a, b"),
+        (("--strain", "a=much"), "must be a number, or NAME=NUMBER"),
+        (("--strain", "a=0.05", "--strain", "a=0.06"), "a is given twice"),
+        (("--strain", "a=nan", "--strain", "b=0.05"), "a = nan: must be a finite number"),
+        (("--strain", "a=0.05", "--std", "b=-1"), "std"),
+    ],
+)
+def test_commands_that_are_refused(
+    tmp_path: Path, joint: JointCalibration, capsys: Any, options: tuple[str, ...], told: str
+) -> None:
+    kept = save(joint, tmp_path / "calibration.json")
+    assert run("estimate", kept, *options) == 2
+    said = capsys.readouterr().err.strip()
+    assert told in said
+    assert "\n" not in said
+
+
+def test_a_file_has_a_column_for_every_reading(tmp_path: Path, joint: JointCalibration, capsys: Any) -> None:
+    kept, readings = save(joint, tmp_path / "calibration.json"), tmp_path / "readings.csv"
+    rows = joint.at([0.3, 0.7])
+    readings.write_text("time,b,a,a_std\n" + "".join(f"0,{b!r},{a!r},1e-4\n" for a, b in rows.tolist()))
+    assert run("estimate", kept, "--csv", readings) == 0
+    found = list(csv.DictReader(io.StringIO(capsys.readouterr().out)))
+    assert [float(row["mu"]) for row in found] == pytest.approx([0.3, 0.7], abs=0.01)
+    assert [float(row["a"]) for row in found] == list(rows[:, 0])
+    assert run("estimate", kept, "--csv", readings, "--out", tmp_path / "mu.csv") == 0
+    assert "2 of 2 readings determine mu" in capsys.readouterr().out
+    readings.write_text("time,b\n0,0.05\n")
+    assert run("estimate", kept, "--csv", readings) == 2
+    assert "must have a column named a" in capsys.readouterr().err

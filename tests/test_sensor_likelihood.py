@@ -1,0 +1,133 @@
+"""Mu from several readings: the likelihood, its 90 % set, and readings that contradict each other."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from finger3d.sensor import JointCalibration, estimate
+from finger3d.sensor.likelihood import chi_square_tail
+from tests.sensor_cases import curve, line, saturating, straight, together, tolerance, turning
+
+NOISE = 1.5e-4
+
+
+def read(joint: JointCalibration, values: Any, **options: Any) -> Any:
+    return estimate(joint, dict(zip(joint.names, values, strict=True)), **options)[0]
+
+
+def drawn(joint: JointCalibration, mu: float, random: np.random.Generator) -> Any:
+    return random.multivariate_normal(joint.at([mu])[0], joint.covariance([mu])[0])
+
+
+def joint_of_three() -> JointCalibration:
+    depth = tolerance("depth_mm", 0.1, 0.02)
+    return together(
+        curve(line(0.01), tolerances=(depth,)),
+        curve(line(-0.006), tolerances=(depth,)),
+        curve(saturating, noise=4e-4, tolerances=(tolerance("depth_mm", 0.1, -0.01), tolerance("nu", 0.003, 0.05))),
+    )
+
+
+def test_straight_curves_give_the_mean_and_deviation_of_least_squares() -> None:
+    joint = together(curve(line(0.02)), curve(line(0.01), noise=3e-4))
+    readings = joint.at([0.5])[0] + [1e-4, -2e-4]
+    weight = np.array([0.02 / NOISE, 0.01 / 3e-4])
+    shift = weight @ (np.array([1e-4, -2e-4]) / [NOISE, 3e-4]) / (weight @ weight)
+    found = read(joint, readings)
+    assert found.mu == pytest.approx(0.5 + shift, abs=1e-5)
+    sd = 1.0 / np.linalg.norm(weight)
+    assert found.std == pytest.approx(sd, rel=1e-2)
+    # the 90 % interval of a normal distribution: 1.645 standard deviations, to a node of the quadrature
+    assert (found.high - found.low) / 2.0 == pytest.approx(1.645 * sd, rel=0.05)
+    assert found.status == "ok"
+
+
+def test_deviations_and_intervals_are_kept() -> None:
+    joint, random = joint_of_three(), np.random.default_rng(1)
+    z, inside, told = [], [], 0
+    for mu in random.uniform(0.1, 1.1, 600):
+        found = read(joint, drawn(joint, mu, random))
+        if found.status in ("ok", "coarse"):
+            told += 1
+            z.append((found.mu - mu) / found.std)
+            inside.append(found.low <= mu <= found.high)
+    assert told > 500
+    assert 0.9 < math.sqrt(np.mean(np.square(z))) < 1.1
+    assert 0.87 < np.mean(inside) < 0.93  # 0.9, give or take two standard deviations of a share of 550
+
+
+def test_the_p_value_of_readings_that_agree_is_uniform() -> None:
+    joint, random = joint_of_three(), np.random.default_rng(2)
+    found = [read(joint, drawn(joint, mu, random)) for mu in random.uniform(0.2, 1.0, 500)]
+    p = np.array([f.p_value for f in found])
+    assert stats.kstest(p, "uniform").pvalue > 1e-3
+    assert sum(f.status == "contradiction" for f in found) <= 4  # 1 in 1000 is expected
+
+
+def test_readings_of_two_presses_contradict_each_other() -> None:
+    joint = together(curve(line(0.01)), curve(line(-0.006)), curve(line(0.02)))
+    readings = joint.at([0.4])[0]
+    readings[1] = joint.at([0.8])[0][1]
+    found = read(joint, readings)
+    assert found.status == "contradiction"
+    assert math.isnan(found.mu)
+    assert found.p_value < 1e-3
+    assert "without b: mu = 0.4 " in found.verdict
+    assert "without a" not in found.verdict
+
+
+def test_a_second_reading_settles_which_side_of_a_turn_it_is() -> None:
+    two_sided, slow = curve(turning), curve(line(0.002))
+    joint = together(two_sided, slow)
+    reading = joint.at([0.9])[0]
+    alone = read(joint.of(["a"]), reading[:1])
+    assert alone.status == "ambiguous"
+    assert len(alone.intervals) == 2
+    assert alone.intervals[0][0] < 0.3 < alone.intervals[0][1]
+    both = read(joint, reading)
+    assert both.status == "ok"
+    assert both.mu == pytest.approx(0.9, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("mu", "slope", "status"), [(1.19, 0.001, "above"), (0.03, 0.001, "below"), (0.6, 1e-5, "blind")]
+)
+def test_readings_beyond_the_ends(mu: float, slope: float, status: str) -> None:
+    joint = together(curve(line(slope)), curve(line(2.0 * slope)))
+    found = read(joint, joint.at([mu])[0])
+    assert found.status == status
+    assert math.isnan(found.mu)
+    assert found.verdict.startswith("out of range")
+
+
+def test_readings_that_no_mu_has_are_out_of_range() -> None:
+    joint = together(curve(line(0.01)), curve(line(0.02)))
+    found = read(joint, joint.at([1.2])[0] + [0.01, 0.02])
+    assert found.status == "outside"
+    assert "out of range" in found.verdict
+
+
+def test_an_exact_reading_finds_mu_by_the_curve_alone() -> None:
+    joint = together(curve(straight), curve(line(0.01)))
+    found = read(joint, joint.at([0.437])[0], std=0.0)
+    assert found.mu == pytest.approx(0.437, abs=1e-4)
+
+
+def test_broken_sensors_are_left_out() -> None:
+    joint = joint_of_three()
+    readings = dict(zip(joint.names, joint.at([0.5])[0], strict=True))
+    readings.pop("b")
+    found = estimate(joint, readings)[0]
+    assert set(found.readings) == {"a", "c"}
+    assert found.mu == pytest.approx(0.5, abs=found.std)
+
+
+@pytest.mark.parametrize("freedom", range(1, 9))
+def test_the_tail_of_chi_square(freedom: int) -> None:
+    for value in (0.0, 0.1, 2.0, 9.0, 40.0):
+        assert chi_square_tail(value, freedom) == pytest.approx(stats.chi2.sf(value, freedom), rel=1e-9)
