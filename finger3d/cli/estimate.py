@@ -98,17 +98,20 @@ def estimate(
             print_json(asdict(found))
         else:
             print(found.verdict)
-        return
-    if follow is not None:
+    elif follow is not None:
         for line in _followed(job, follow):
             print(line, flush=True)
-        return
-    assert csv_ is not None
-    values, stds = _readings(job, csv_)
+    elif csv_ is not None:
+        _estimate_file(job, csv_, out, json_)
+
+
+def _estimate_file(job: _Job, path: Path, out: Path | None, json_: bool) -> None:
+    """Write or print an estimate for each line of a CSV file."""
+    values, stds = _readings(job, path)
     try:
         every = job.estimates(values, stds)
     except Finger3dError as error:
-        raise Finger3dError(f"{csv_}: {error}") from None
+        raise Finger3dError(f"{path}: {error}") from None
     if json_:
         print_json([asdict(e) for e in every])
     elif out is None:
