@@ -1,7 +1,7 @@
 """Frictional contact of an elastic, finger-shaped tactile sensor in 3D.
 
-Every command is a function: `press`, `compare`, `calibrate`, `estimate`, `sweep`, `optimise`, `export`, `plan` and
-`validate`. Names are loaded when they are first used, so that ``import finger3d`` is quick.
+Every command is a function: `press`, `compare`, `calibrate`, `estimate`, `identify`, `sweep`, `optimise`, `export`,
+`plan` and `validate`. Names are loaded when they are first used, so that ``import finger3d`` is quick.
 
 >>> import finger3d
 >>> result = finger3d.press("scene.toml")
@@ -25,7 +25,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from finger3d._api import export, optimise, plan, sweep
+    from finger3d._api import export, identify, optimise, plan, sweep
     from finger3d.analyses.calibrate.run import calibrate
     from finger3d.analyses.compare.run import compare
     from finger3d.analyses.press import press
@@ -71,6 +71,7 @@ _HOME = {
     "designs": "geometry.registry",
     "estimate": "sensor",
     "export": "_api",
+    "identify": "_api",
     "load": "scene",
     "optimise": "_api",
     "parse": "scene",
@@ -107,6 +108,7 @@ __all__ = [
     "designs",
     "estimate",
     "export",
+    "identify",
     "load",
     "optimise",
     "parse",

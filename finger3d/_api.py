@@ -12,6 +12,7 @@ from finger3d.progress import Progress
 if TYPE_CHECKING:
     import pandas
 
+    from finger3d.analyses.identify.run import Identification
     from finger3d.analyses.optimise.run import OptimisationResult
     from finger3d.analyses.plan import Plan
     from finger3d.mold.export import Exported
@@ -152,6 +153,39 @@ def optimise(
         seed=seed,
     )
     return run(problem, out, report)
+
+
+def identify(
+    scene: str | Path,
+    measured: str | Path,
+    free: Mapping[str, tuple[float, float]],
+    out: str | Path,
+    overrides: Sequence[str] = (),
+    report: Progress | None = None,
+) -> Identification:
+    """Find the values of free keys with which a scene reproduces a measured press.
+
+    Parameters
+    ----------
+    scene : path of a TOML file
+    measured : CSV file with columns named as in history.csv, and optionally their standard deviations, ``..._std``
+    free : key -> lower and upper bound, for instance ``{"material.E_MPa": (0.05, 5.0)}``
+    out : folder for identify.json, identify.csv, identified.toml, identify.png and report.html
+    overrides : other keys to set, such as ``"mesh.size_mm=1.0"``
+    report : told about every iteration
+
+    Returns
+    -------
+    Identification
+        With the values, their standard deviations and correlation, and what the data cannot tell.
+    """
+    from finger3d.analyses.identify.run import identify as run
+    from finger3d.analyses.optimise.task import FreeKey
+    from finger3d.scene import tree
+
+    given = tree.override(tree.read(Path(scene)), overrides)
+    keys = [FreeKey.of(f"{key}={low!r}:{high!r}") for key, (low, high) in free.items()]
+    return run(given, measured, keys, out, Path(scene), report)
 
 
 def export(

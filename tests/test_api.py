@@ -147,7 +147,7 @@ def test_without_a_folder_the_files_go_with_the_result(tmp_path: Path, monkeypat
     assert sorted(p.name for p in tmp_path.iterdir()) == ["scene.toml"]
 
 
-COMMANDS = ("press", "compare", "calibrate", "estimate", "sweep", "optimise", "export", "plan", "validate")
+COMMANDS = ("press", "compare", "calibrate", "estimate", "identify", "sweep", "optimise", "export", "plan", "validate")
 
 
 @pytest.mark.parametrize("name", COMMANDS)

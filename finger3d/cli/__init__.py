@@ -13,6 +13,7 @@ from finger3d.cli import (  # noqa: F401
     completion,
     estimate,
     export,
+    identify,
     info,
     new,
     optimise,

@@ -77,6 +77,17 @@ def override(tree: Tree, overrides: Iterable[str], option: str = "--set") -> Tre
     return frozen(changed)
 
 
+def value_at(tree: TreeView, key: str) -> object:
+    """Return the value of a dotted key, None if the tree has none; tables in arrays are numbered from 0."""
+    value: object = tree
+    for part in key.split("."):
+        if isinstance(value, tuple | list):
+            value = value[int(part)] if part.isdecimal() and int(part) < len(value) else None
+        else:
+            value = value.get(part) if isinstance(value, Mapping) else None
+    return value
+
+
 def parsed(text: str) -> Any:
     """Return the TOML value of a text, or the text itself if it is no TOML."""
     try:

@@ -8,7 +8,6 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -183,11 +182,9 @@ def checked_start(problem: OptimisationProblem) -> tuple[float, ...]:
         raise Finger3dError(f"--gauge {problem.gauge}: no such gauge; the scene has {', '.join(names) or 'none'}")
     values = []
     for key, free in zip(keys, problem.free, strict=True):
-        own: Any = problem.given
-        for part in key.split("."):
-            own = own[int(part)] if isinstance(own, tuple | list) else (own or {}).get(part)
-        inside = isinstance(own, int | float) and free.low <= own <= free.high
-        values.append(float(own) if inside else 0.5 * (free.low + free.high))
+        own = tree.value_at(problem.given, key)
+        middle = 0.5 * (free.low + free.high)
+        values.append(float(own) if isinstance(own, int | float) and free.low <= own <= free.high else middle)
     # a key that no scene has is refused now, a design that cannot be built is a line of the table
     probe = tree.override(dict(problem.given), [f"{k}={v!r}" for k, v in zip(keys, values, strict=True)], "--free")
     try:

@@ -1,0 +1,1 @@
+"""Values of scene keys from a measured press."""

@@ -1,0 +1,194 @@
+"""Weighted least squares, and what the data can tell of each value.
+
+Values are fitted as shares of their range, on a logarithmic scale where the bounds differ by more than a decade.  With
+the Jacobian J of the residuals over their standard deviations, ``J^T J`` is the Fisher matrix and its inverse the
+covariance of the values (Bard 1974, Ch. 7).  An eigenvector of the Fisher matrix along which the standard deviation is
+a quarter of the range or more is a combination of values that the data cannot tell.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import optimize
+
+from finger3d._types import Float
+from finger3d.analyses.optimise.task import FreeKey
+from finger3d.errors import Finger3dError
+
+_STEP = 0.01
+"""Difference of shares that the Jacobian is taken over: contact changes point by point, smaller ones see the mesh."""
+
+_SHARE_CHANGE, _COST_CHANGE, _MOST = 1e-4, 1e-5, 40
+"""Changes of the shares and of the sum of squares, relative, at which the fit ends, and the most trials."""
+
+_INSIDE = 1e-6
+"""Distance of the first shares from their bounds, which the trust region method asks for."""
+
+_UNTOLD = 0.25
+"""Standard deviation of a combination, over the range, from which the data cannot tell it."""
+
+_STRONG = 0.95  # correlation that is named
+_AT_BOUND = 1e-3  # distance of a share from 0 or 1
+_PART = 0.3  # component of an eigenvector that is named
+_FAILED = 1e3  # standard deviations that every row of a failed press is off
+_MISFIT = 2.0  # residuals over their stated standard deviation beyond which the scene does not explain the data
+_DECADE = 10.0
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Values of a free key as shares of its range, from 0 to 1."""
+
+    key: str
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, free: FreeKey) -> Scale:
+        """Return the scale of a free key."""
+        return cls(free.key, free.low, free.high)
+
+    @property
+    def is_logarithmic(self) -> bool:
+        """Whether the bounds are positive and differ by more than a decade."""
+        return self.low > 0.0 and self.high / self.low > _DECADE
+
+    def value(self, share: float) -> float:
+        """Return the value at a share."""
+        if self.is_logarithmic:
+            return self.low * math.pow(self.high / self.low, share)
+        return self.low + (self.high - self.low) * share
+
+    def share(self, value: float) -> float:
+        """Return the share of a value."""
+        if self.is_logarithmic:
+            return math.log(value / self.low) / math.log(self.high / self.low)
+        return (value - self.low) / (self.high - self.low)
+
+    def slope(self, share: float) -> float:
+        """Return d value / d share."""
+        return self.value(share) * math.log(self.high / self.low) if self.is_logarithmic else self.high - self.low
+
+
+@dataclass(frozen=True)
+class FittedValues:
+    """Values of k free keys.
+
+    Attributes
+    ----------
+    values, stds : (k,) arrays
+    correlation : (k, k)
+    shares : (k,) of the ranges
+    untold : what the data cannot tell, in words; empty if they tell everything
+    """
+
+    values: Float
+    stds: Float
+    correlation: Float
+    shares: Float
+    untold: tuple[str, ...]
+
+
+Residuals = Callable[[Float], Float]
+"""Residuals (n,) over their standard deviations for values (k,); raises Finger3dError if a press fails."""
+
+
+def fit(scales: Sequence[Scale], start: Float, residuals: Residuals, say: Callable[[Float], None]) -> Float:
+    """Return the shares (k,) with the least sum of squared residuals, from those of `start`.
+
+    `say` is called with the values of each iteration.
+    """
+    count = len(residuals(values_at(scales, start)))
+
+    def cost(shares: Float) -> Float:
+        try:
+            return residuals(values_at(scales, shares))
+        except Finger3dError:
+            return np.full(count, _FAILED)
+
+    def slope(shares: Float) -> Float:
+        say(values_at(scales, shares))
+        return jacobian(scales, shares, residuals)
+
+    inside = np.clip(start, _INSIDE, 1.0 - _INSIDE)
+    found = optimize.least_squares(
+        cost, inside, slope, bounds=(0.0, 1.0), xtol=_SHARE_CHANGE, ftol=_COST_CHANGE, gtol=None, max_nfev=_MOST
+    )
+    return np.asarray(found.x)
+
+
+def values_at(scales: Sequence[Scale], shares: Float) -> Float:
+    """Return values (k,) at shares (k,)."""
+    return np.array([scale.value(float(share)) for scale, share in zip(scales, shares, strict=True)])
+
+
+def jacobian(scales: Sequence[Scale], shares: Float, residuals: Residuals) -> Float:
+    """Return the derivatives (n, k) of residuals by shares, central differences within the bounds."""
+    columns = []
+    for i in range(len(scales)):
+        ends = [float(np.clip(shares[i] + step, 0.0, 1.0)) for step in (-_STEP, _STEP)]
+        low, high = (residuals(values_at(scales, np.where(np.arange(len(scales)) == i, end, shares))) for end in ends)
+        columns.append((high - low) / (ends[1] - ends[0]))
+    return np.array(columns).T
+
+
+def uncertainty(scales: Sequence[Scale], shares: Float, derivative: Float) -> FittedValues:
+    """Return the values with their covariance from the Jacobian (n, k) by shares."""
+    fisher = derivative.T @ derivative
+    eigenvalues, vectors = np.linalg.eigh(fisher)
+    # nothing is known less well than its range says
+    covariance = (vectors / (np.maximum(eigenvalues, 0.0) + 12.0)) @ vectors.T
+    sd = np.sqrt(np.diag(covariance))
+    slopes = np.array([scale.slope(float(share)) for scale, share in zip(scales, shares, strict=True)])
+    correlation = covariance / np.outer(sd, sd)
+    told = [
+        *_untold(scales, eigenvalues, vectors),
+        *_correlated(scales, correlation, eigenvalues),
+        *_bound(scales, shares),
+    ]
+    return FittedValues(values_at(scales, shares), sd * slopes, correlation, shares, tuple(told))
+
+
+def _untold(scales: Sequence[Scale], eigenvalues: Float, vectors: Float) -> list[str]:
+    """Say which values, or combinations of them, the data cannot tell."""
+    found = []
+    for value, vector in zip(eigenvalues, vectors.T, strict=True):
+        if value * _UNTOLD**2 < 1.0:
+            parts = [i for i in np.argsort(-np.abs(vector)) if abs(vector[i]) >= _PART]
+            names = [scales[i].key for i in parts]
+            if len(names) == 1:
+                found.append(f"the data cannot tell {names[0]} within its bounds")
+            else:
+                same = np.sign(vector[parts]) == np.sign(vector[parts[0]])
+                how = "rise together" if same.all() else "change against each other"
+                found.append(f"the data cannot tell {' and '.join(names)} apart: they may {how} and fit as well")
+    return found
+
+
+def _correlated(scales: Sequence[Scale], correlation: Float, eigenvalues: Float) -> list[str]:
+    """Name pairs of values that are known much better together than each alone."""
+    if eigenvalues.min() * _UNTOLD**2 < 1.0:
+        return []
+    pairs = [(i, j) for i in range(len(scales)) for j in range(i) if abs(correlation[i, j]) > _STRONG]
+    return [
+        f"{scales[j].key} and {scales[i].key} are correlated by {correlation[i, j]:.3f}: fix one, and the other is "
+        "known better"
+        for i, j in pairs
+    ]
+
+
+def _bound(scales: Sequence[Scale], shares: Float) -> list[str]:
+    ends = [(scale, share) for scale, share in zip(scales, shares, strict=True) if min(share, 1.0 - share) < _AT_BOUND]
+    return [f"{scale.key} is at its {'lower' if share < 0.5 else 'upper'} bound: widen it" for scale, share in ends]
+
+
+def misfit_text(reduced: float) -> str:
+    """Say whether residuals are larger than their standard deviations, from the reduced chi-square."""
+    ratio = math.sqrt(reduced)
+    if ratio <= _MISFIT:
+        return ""
+    return f"the residuals are {ratio:.2g} times their standard deviations: the scene does not explain the data"

@@ -1,0 +1,255 @@
+"""Identification: the values of free keys with which a scene reproduces a measured press."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from finger3d._types import Float, Tree, TreeView
+from finger3d.analyses.identify.fit import FittedValues, Scale, fit, jacobian, misfit_text, uncertainty, values_at
+from finger3d.analyses.identify.measured import MeasuredPress, read_measured
+from finger3d.analyses.identify.simulated import MODULUS, OFFSET, Curve, Simulation, largest, names_of, row_mistake
+from finger3d.analyses.optimise.task import FreeKey
+from finger3d.analyses.sweep.points import numbered
+from finger3d.errors import Finger3dError
+from finger3d.io import atomic, claimed, write_csv, write_json
+from finger3d.plotting.identify import draw
+from finger3d.progress import Progress
+from finger3d.report.identify import identify_page
+from finger3d.results.journal import opened
+from finger3d.scene import Scene, parse, tree
+
+_SHARE = 0.02  # standard deviation of the first fit, over the largest magnitude of a column that has none
+_LEAST_SHARE = 1e-4  # the same, that its residuals leave at least
+_MODULI = 41  # values of Young's modulus that are tried at the start
+_FROM_BOUND = 0.05  # of the first shares: the method is slow near a bound
+_SHARPEST = 1e-9  # of values that are the same at every row
+
+
+@dataclass(frozen=True)
+class Identification:
+    """Result of an identification.
+
+    Attributes
+    ----------
+    scene : with the values that were found
+    keys : the free keys (k)
+    fitted : their values, standard deviations and correlation
+    measured : the data
+    simulated : values by column at the measured rows
+    stds : standard deviations by column (n,): those of the file, or those that the residuals have
+    curve : the simulated press
+    reduced_chi_square : of the columns with standard deviations of their own; NaN without any
+    notes : what the data cannot tell, and what does not fit, in words
+    presses : number of presses that were solved
+    """
+
+    scene: Scene
+    keys: tuple[str, ...]
+    fitted: FittedValues
+    measured: MeasuredPress
+    simulated: Mapping[str, Float]
+    stds: Mapping[str, Float]
+    curve: Curve
+    reduced_chi_square: float
+    notes: tuple[str, ...]
+    presses: int
+
+    def as_dict(self) -> Tree:
+        """Return the content of identify.json."""
+        fitted = self.fitted
+        return {
+            "scene": self.scene.as_dict(),
+            "measured": str(self.measured.path),
+            "index": self.measured.index,
+            "values": {
+                key: {"value": float(fitted.values[i]), "std": float(fitted.stds[i])} for i, key in enumerate(self.keys)
+            },
+            "correlation": {
+                key: dict(zip(self.keys, map(float, fitted.correlation[i]), strict=True))
+                for i, key in enumerate(self.keys)
+            },
+            "reduced_chi_square": self.reduced_chi_square,
+            "residual_rms": {
+                name: float(np.sqrt(np.mean((values - self.simulated[name]) ** 2)))
+                for name, values in self.measured.columns.items()
+            },
+            "std_of_columns": {
+                name: {"from": "file" if name in self.measured.stds else "residuals", "rms": _rms(std)}
+                for name, std in self.stds.items()
+            },
+            "notes": list(self.notes),
+            "presses": self.presses,
+        }
+
+
+def identify(
+    given: TreeView,
+    measured: str | Path,
+    free: Sequence[FreeKey],
+    out: str | Path,
+    path: Path | None = None,
+    report: Progress | None = None,
+) -> Identification:
+    """Find the values of free keys with which a scene reproduces a measured press, by weighted least squares.
+
+    Parameters
+    ----------
+    given : the scene as written, overrides included
+    measured : CSV file; its columns are named as those of history.csv, with optional ``..._std``
+    free : keys and bounds; ``depth_offset_mm`` is added to the measured depths
+    out : folder for presses.jsonl (every press once it is solved), identify.json, identify.csv, identified.toml,
+        identify.png and report.html; the same identification is continued there
+    path : of the scene file
+
+    Raises
+    ------
+    Finger3dError
+        For a mistake in the file or in the free keys, or if the press fails at the start.
+    """
+    report = report or Progress()
+    start = _checked_start(given, free, path)
+    model = parse(given, path).model()
+    data = read_measured(Path(measured), names_of(model))
+    if OFFSET in (f.key for f in free) and data.index != "depth_mm":
+        raise Finger3dError(f"--free {OFFSET}: the rows of {data.path} are ordered by {data.index}, not by depth_mm")
+    if data.count <= len(free):
+        raise Finger3dError(f"{data.path}: {data.count} measured values for {len(free)} free keys; give more rows")
+    task = {
+        "scene": tree.plain(given),
+        "free": [[f.key, f.low, f.high] for f in free],
+        "measured": hashlib.sha256(data.path.read_bytes()).hexdigest()[:16],
+    }
+    with (
+        claimed(out, "identify") as folder,
+        opened(folder / "presses.jsonl", folder / "task.json", task, row_mistake(free)) as journal,
+    ):
+        simulation = Simulation(given, path, tuple(free), journal)
+        found = _fitted(simulation, data, start, report)
+        _write(folder, found)
+        return found
+
+
+def _checked_start(given: TreeView, free: Sequence[FreeKey], path: Path | None) -> Float:
+    """Return the values of the scene (k,), or the middle of the bounds where they lie outside."""
+    if not free:
+        raise Finger3dError("identify: nothing is free; give at least one --free, such as material.E_MPa=0.05:5")
+    keys = [numbered(f.key, given, "--free") for f in free]
+    if len(set(keys)) < len(keys):
+        raise Finger3dError(f"--free {next(k for i, k in enumerate(keys) if k in keys[:i])}: given twice")
+    values = []
+    for key, one in zip(keys, free, strict=True):
+        own: object = 0.0 if key == OFFSET else tree.value_at(given, key)
+        middle = 0.5 * (one.low + one.high)
+        values.append(float(own) if isinstance(own, int | float) and one.low <= own <= one.high else middle)
+    scene_keys = [(k, v) for k, v in zip(keys, values, strict=True) if k != OFFSET]
+    probe = tree.override(dict(given), [f"{k}={v!r}" for k, v in scene_keys], "--free")
+    parse(probe, path, dict.fromkeys((k for k, _ in scene_keys), "--free"))
+    return np.array(values)
+
+
+def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: Progress) -> Identification:
+    """Fit, weight columns without standard deviations by their residuals, and fit again."""
+    report.stage("first presses")
+    scales = [Scale.of(f) for f in simulation.free]
+    begin = np.array([scale.share(v) for scale, v in zip(scales, start, strict=True)])
+    starts = [begin, np.zeros(len(scales)), np.ones(len(scales))]
+    curves = [simulation.at(values_at(scales, shares), data) for shares in starts]
+    magnitudes = [largest(curve) for curve in curves]
+    data.check_units(
+        {n: min(m[n] for m in magnitudes) for n in data.columns},
+        {n: max(m[n] for m in magnitudes) for n in data.columns},
+    )
+    stds = {n: data.stds.get(n, np.full(len(data.at), _SHARE * float(np.abs(v).max()) or _SHARPEST))
+            for n, v in data.columns.items()}  # fmt: skip
+
+    def residuals(values: Float) -> Float:
+        simulated = simulation.at(values, data)
+        return np.concatenate([(simulated[n] - v) / stds[n] for n, v in data.columns.items()])
+
+    def say(values: Float) -> None:
+        named = ", ".join(f"{f.key} = {v:.5g}" for f, v in zip(simulation.free, values, strict=True))
+        report.stage(f"fitting, {simulation.solved} presses: {named}")
+
+    tried = [trial for shares in starts for trial in _with_modulus(simulation, shares)]
+    costs = [float(np.sum(residuals(values_at(scales, shares)) ** 2)) for shares in tried]
+    shares = np.clip(tried[int(np.argmin(costs))], _FROM_BOUND, 1.0 - _FROM_BOUND)
+    shares = fit(scales, shares, residuals, say)
+    weighted = _by_residuals(data, simulation.at(values_at(scales, shares), data), len(scales))
+    if weighted:
+        stds |= weighted
+        shares = fit(scales, shares, residuals, say)
+        stds |= _by_residuals(data, simulation.at(values_at(scales, shares), data), len(scales))
+    values = values_at(scales, shares)
+    fitted = uncertainty(scales, shares, jacobian(scales, shares, residuals))
+    simulated = simulation.at(values, data)
+    reduced = _reduced_chi_square(data, simulated, len(scales))
+    notes = [*fitted.untold, *([text] if reduced == reduced and (text := misfit_text(reduced)) else [])]
+    return Identification(
+        scene=simulation.scene(values),
+        keys=tuple(f.key for f in simulation.free),
+        fitted=fitted,
+        measured=data,
+        simulated=simulated,
+        stds=stds,
+        curve=simulation.curve(values),
+        reduced_chi_square=reduced,
+        notes=tuple(notes),
+        presses=simulation.solved,
+    )
+
+
+def _with_modulus(simulation: Simulation, shares: Float) -> list[Float]:
+    """Return the shares, with several of Young's modulus if that needs no other solution."""
+    keys = [f.key for f in simulation.free]
+    if MODULUS not in keys or not simulation.scales_with_modulus:
+        return [shares]
+    own = np.arange(len(keys)) == keys.index(MODULUS)
+    return [np.where(own, share, shares) for share in (shares[own][0], *np.linspace(0.0, 1.0, _MODULI))]
+
+
+def _by_residuals(data: MeasuredPress, simulated: Mapping[str, Float], keys: int) -> dict[str, Float]:
+    """Return the standard deviations (n,) of columns that have none in the file, from their residuals."""
+    left = 1.0 - min(keys / data.count, 0.5)  # share of the degrees of freedom that the fit leaves
+    found = {}
+    for name, values in data.columns.items():
+        if name not in data.stds:
+            least = _LEAST_SHARE * float(np.abs(values).max()) or _SHARPEST
+            found[name] = np.full(len(values), max(_rms(values - simulated[name]) / math.sqrt(left), least))
+    return found
+
+
+def _reduced_chi_square(data: MeasuredPress, simulated: Mapping[str, Float], keys: int) -> float:
+    """Return chi-square over its degrees of freedom, of the columns with standard deviations of their own."""
+    squares = [((simulated[n] - data.columns[n]) / std) ** 2 for n, std in data.stds.items()]
+    if not squares:
+        return math.nan
+    every = np.concatenate(squares)
+    return float(every.sum() / max(len(every) - keys, 1))
+
+
+def _rms(values: Float) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def _write(folder: Path, found: Identification) -> None:
+    """Write the results, the figure and the page."""
+    data = found.measured
+    columns: Tree = {data.index: data.at}
+    for name, values in data.columns.items():
+        columns |= {
+            name: values,
+            f"{name}_std": found.stds[name],
+            f"{name}_simulated": found.simulated[name],
+        }
+    write_csv(folder / "identify.csv", columns)
+    with atomic(folder / "identified.toml") as temporary:
+        temporary.write_text(found.scene.to_toml(), encoding="utf-8")
+    draw(folder / "identify.png", found)
+    write_json(folder / "identify.json", found.as_dict())
+    identify_page(folder)

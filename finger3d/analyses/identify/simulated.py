@@ -1,0 +1,202 @@
+"""Simulated presses for values of the free keys; where all forces scale with Young's modulus it needs no solution."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from finger3d._types import Float, Tree, TreeView
+from finger3d.analyses.identify.measured import MeasuredPress
+from finger3d.analyses.optimise.task import FreeKey
+from finger3d.analyses.shared_body import SharedBody, Variant, body_key
+from finger3d.analyses.sweep.points import numbered
+from finger3d.errors import Finger3dError
+from finger3d.mechanics.history import flat_readings, measure, without_readings
+from finger3d.mechanics.model import Model
+from finger3d.results.journal import Journal
+from finger3d.results.summary import PressStep
+from finger3d.scene import Scene, parse, tree
+
+MODULUS, OFFSET = "material.E_MPa", "depth_offset_mm"
+"""Keys without a solution of their own: forces scale with one; the other is added to the measured depth."""
+
+_SCALED = ("_N", "_MPa", "_mJ", "_Nmm")
+"""Endings of the names of numbers that are proportional to Young's modulus."""
+
+_UNITS = ("N", "mm", "mm2", "mJ", "Nmm", "s", "deg")
+"""Last parts of the names of numbers of an increment."""
+
+_MAX_STORED = 4  # bodies
+
+Curve = Mapping[str, Float]
+"""Columns of history.csv, a value for each increment."""
+
+
+def names_of(model: Model) -> tuple[str, ...]:
+    """Return the names of the numbers of an increment, readings included."""
+    own = [name for name in PressStep.__dataclass_fields__ if name.split("_")[-1] in _UNITS]
+    readings = {
+        "gauges": {g.name: 0.0 for g in model.gauges},
+        "markers": {m.name: (0.0, 0.0, 0.0) for m in model.markers},
+        "taxels": {t.name: 0.0 for t in model.taxels},
+    }
+    return (*own, *flat_readings(readings))
+
+
+@dataclass
+class Simulation:
+    """Presses of a scene with several values of its free keys; each solution is stored at once.
+
+    Attributes
+    ----------
+    given : the scene as written, overrides included
+    free : keys and bounds
+    journal : the solutions that are known
+    """
+
+    given: TreeView
+    path: Path | None
+    free: tuple[FreeKey, ...]
+    journal: Journal
+    _known: dict[tuple[float, ...], Curve | str] = field(default_factory=dict)
+    _bodies: dict[str, SharedBody] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Take over the solutions of an earlier run."""
+        for row in self.journal.rows:
+            self._keep(row)
+
+    @property
+    def solved(self) -> int:
+        """Number of presses that were solved."""
+        return len(self._known)
+
+    @property
+    def scales_with_modulus(self) -> bool:
+        """Whether all forces are proportional to Young's modulus, and nothing else depends on it."""
+        model = self.scene([self._middle(f) for f in self.free]).model()
+        forced = any(leg.force_N is not None for leg in model.legs)
+        return model.inclusions is None and model.object_compliance is None and not forced
+
+    @staticmethod
+    def _middle(free: FreeKey) -> float:
+        return 0.5 * (free.low + free.high)
+
+    def scene(self, values: Sequence[float] | Float) -> Scene:
+        """Return the scene with values of the free keys; the offset of the depth is none of its keys."""
+        pairs = [(f.key, float(v)) for f, v in zip(self.free, values, strict=True) if f.key != OFFSET]
+        keys = [numbered(key, self.given, "--free") for key, _ in pairs]
+        changes = [f"{key}={value!r}" for key, (_, value) in zip(keys, pairs, strict=True)]
+        changed = tree.override(dict(self.given), changes, "--free")
+        return parse(changed, path=self.path, set_keys=dict.fromkeys(keys, "--free"))
+
+    def curve(self, values: Sequence[float] | Float) -> Curve:
+        """Return the simulated curve, which begins at first touch, where everything is zero.
+
+        Raises
+        ------
+        Finger3dError
+            If the press fails.
+        """
+        wanted, factor = [float(v) for v in values], 1.0
+        for i, free in enumerate(self.free):
+            if free.key == OFFSET:
+                wanted[i] = 0.0
+            if free.key == MODULUS and self.scales_with_modulus:
+                factor, wanted[i] = wanted[i] / self._middle(free), self._middle(free)
+        point = tuple(wanted)
+        if point not in self._known:
+            row = self._solve(point)
+            self.journal.append(row)
+            self._keep(row)
+        found = self._known[point]
+        if isinstance(found, str):
+            raise Finger3dError(found)
+        return {name: factor * v if name.endswith(_SCALED) else v for name, v in found.items()}
+
+    def at(self, values: Sequence[float] | Float, measured: MeasuredPress) -> dict[str, Float]:
+        """Return the simulated values of every measured column at its rows, by monotone cubic interpolation."""
+        curve = self.curve(values)
+        at = curve[measured.index]
+        if (np.diff(at) <= 0.0).any():
+            raise Finger3dError(
+                f"{measured.path}: {measured.index} does not rise throughout the path of the scene; measure time_s or "
+                "step instead"
+            )
+        offset = dict(zip((f.key for f in self.free), values, strict=True)).get(OFFSET, 0.0)
+        where = measured.at + (float(offset) if measured.index == "depth_mm" else 0.0)
+        if where[-1] > at[-1] * (1.0 + 1e-9):
+            raise Finger3dError(
+                f"{measured.path}: line {len(where) + 1}: {measured.index} = {where[-1]:g}: the path of the scene ends "
+                f"at {at[-1]:g}"
+            )
+        where = np.clip(where, 0.0, at[-1])
+        return {name: np.asarray(PchipInterpolator(at, curve[name])(where)) for name in measured.columns}
+
+    def _solve(self, point: tuple[float, ...]) -> Tree:
+        try:
+            scene = self.scene(point)
+            model = scene.model()
+            body = self._body(scene, model)
+            (frames,) = body.frames([Variant.of(model)])
+        except Finger3dError as error:
+            return {"values": list(point), "outcome": " ".join(str(error).split()), "curve": {}}
+        bad = next((f for f in frames if not f.outcome.ok), None)
+        if bad is not None:
+            outcome = f"at depth {bad.target.depth_mm:.4g} mm: {bad.outcome}"
+            return {"values": list(point), "outcome": outcome, "curve": {}}
+        rows = []
+        for number, frame in enumerate(frames, start=1):
+            entry = measure(body.problem.points, frame)
+            entry["gauges"] = body.strains(Variant.of(model), entry["gauges"])
+            rows.append({"step": float(number)} | without_readings(entry) | flat_readings(entry))
+        columns = {n: [0.0, *(r[n] for r in rows)] for n in rows[0] if isinstance(rows[0][n], int | float)}
+        return {"values": list(point), "outcome": "converged", "curve": columns}
+
+    def _body(self, scene: Scene, model: Model) -> SharedBody:
+        """Return the condensed body of a scene; the last ones are kept."""
+        key = json.dumps([body_key(scene), scene.as_dict()["press"], repr(model.gauges)])
+        if key not in self._bodies:
+            while len(self._bodies) >= _MAX_STORED:
+                self._bodies.pop(next(iter(self._bodies)))
+            self._bodies[key] = SharedBody(model, [Variant.of(model)])
+        return self._bodies[key]
+
+    def _keep(self, row: Mapping[str, Any]) -> None:
+        """Keep the solution of a row of the journal."""
+        point = tuple(float(v) for v in row["values"])
+        if row["outcome"] == "converged":
+            self._known[point] = {name: np.array(v, dtype=float) for name, v in row["curve"].items()}
+        else:
+            self._known[point] = f"the press fails with {self._named(point)}: {row['outcome']}"
+
+    def _named(self, point: tuple[float, ...]) -> str:
+        return ", ".join(f"{f.key} = {v:.5g}" for f, v in zip(self.free, point, strict=True))
+
+
+def row_mistake(free: Sequence[FreeKey]) -> Callable[[object], str]:
+    """Return a function that describes the mistake in a stored solution, or returns an empty string."""
+
+    def found(row: object) -> str:
+        if not isinstance(row, dict):
+            return "is no JSON object"
+        values, curve = row.get("values"), row.get("curve")
+        if not isinstance(values, list) or len(values) != len(free) or not all(isinstance(v, float) for v in values):
+            return f"values must be {len(free)} numbers"
+        if not isinstance(row.get("outcome"), str) or not isinstance(curve, dict):
+            return "outcome must be text, and curve a table"
+        lengths = {len(v) if isinstance(v, list) else -1 for v in curve.values()}
+        return "" if len(lengths) <= 1 and -1 not in lengths else "the columns of the curve must be lists of one length"
+
+    return found
+
+
+def largest(curve: Mapping[str, Float]) -> dict[str, float]:
+    """Return the largest magnitude of every column."""
+    return {name: float(np.abs(v).max(initial=0.0)) for name, v in curve.items()}

@@ -1,0 +1,70 @@
+"""Command ``identify``: values of free keys of a scene from a measured press."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from finger3d.cli.common import Json, Set, app, check_writable, job, print_json, print_rows
+
+
+@app.command
+def identify(
+    scene: Path,
+    /,
+    *,
+    measured: Annotated[
+        Path,
+        Parameter(
+            help="CSV file: depth_mm, time_s or step, and columns named as in history.csv, such as normal_force_N; "
+            "optionally their standard deviations, such as normal_force_N_std."
+        ),
+    ],
+    free: Annotated[
+        list[str],
+        Parameter(
+            negative=(),
+            help="A free key and its bounds, for instance material.E_MPa=0.05:5; or depth_offset_mm=-1:1, which is "
+            "added to the measured depth; may be repeated.",
+        ),
+    ],
+    out: Annotated[Path, Parameter(help="Folder for the results; an interrupted identification continues there.")],
+    set_: Set = None,
+    json_: Json = False,
+) -> None:
+    """Find the values of free keys with which the scene reproduces a measured press, with standard deviations.
+
+    Example: finger3d identify scene.toml --measured bench.csv --free material.E_MPa=0.05:5 --free friction.mu=0.1:1
+    --out fit
+
+    Parameters
+    ----------
+    scene
+        The scene file (TOML).
+    """
+    from finger3d.analyses.identify.run import identify as run
+    from finger3d.analyses.optimise.task import FreeKey
+    from finger3d.scene import tree
+
+    given = tree.override(tree.read(scene), set_ or [])
+    keys = [FreeKey.of(text) for text in free]
+    check_writable(out, scene)
+    kept = f"every press is kept in {out}; the same command continues"
+    with job(json_, lambda _: kept) as report:
+        found = run(given, measured, keys, out, scene, report)
+    if json_:
+        print_json(found.as_dict())
+        return
+    fitted = zip(found.keys, found.fitted.values, found.fitted.stds, strict=True)
+    print_rows(
+        found.scene.title,
+        [
+            *((key, f"{value:.4g} +- {std:.2g}") for key, value, std in fitted),
+            *(("note", note) for note in found.notes),
+            ("presses", f"{found.presses} solved"),
+            ("results", str(out / "identified.toml")),
+            ("", str(out / "report.html")),
+        ],
+    )

@@ -1,0 +1,56 @@
+"""Page of an identification."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from finger3d.report.build import Code, Figure, HeadlineRow, PageSection, Table, write_page
+from finger3d.report.scene import how_modelled
+from finger3d.results.summary import read_json, title_of
+
+
+def identify_page(folder: str | Path) -> Path:
+    """Write report.html of an identification from the files in its folder.
+
+    Raises
+    ------
+    Finger3dError
+        If identify.json or task.json cannot be read or the page cannot be written.
+    """
+    folder = Path(folder)
+    data, task = read_json(folder / "identify.json"), read_json(folder / "task.json")
+    values, bounds = data["values"], {key: (low, high) for key, low, high in task["free"]}
+    headline = [
+        *(HeadlineRow(key, f"{v['value']:.4g} \u00b1 {v['std']:.2g}") for key, v in values.items()),
+        HeadlineRow("presses solved", str(data["presses"])),
+    ]
+    found = Table(
+        ("key", "from", "to", "value", "standard deviation"),
+        [(key, *bounds[key], v["value"], v["std"]) for key, v in values.items()],
+    )
+    correlation = Table(
+        ("correlation", *values),
+        [(key, *(f"{r:.3f}" for r in row.values())) for key, row in data["correlation"].items()],
+    )
+    columns = Table(
+        ("measured column", "residual, rms", "standard deviation, rms", "from"),
+        [(n, rms, data["std_of_columns"][n]["rms"], data["std_of_columns"][n]["from"])
+         for n, rms in data["residual_rms"].items()],
+    )  # fmt: skip
+    scene = folder / "identified.toml"
+    return write_page(
+        folder,
+        f"{title_of(data['scene'])}: values from {Path(data['measured']).name}",
+        headline,
+        [
+            PageSection("Values", [*data["notes"], found, *([correlation] if len(values) > 1 else [])]),
+            PageSection("Fit", [columns]),
+            PageSection("Scene", how_modelled(data, folder)),
+            PageSection("Use it", [Code(f"finger3d press {scene} --out {folder / 'pressed'}")]),
+        ],
+        [Figure("identify.png", "Measured points over the simulated press, and residuals")],
+        command="identify",
+        outcome="converged",
+        good=True,
+        notes=list(data["notes"]),
+    )

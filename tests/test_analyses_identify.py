@@ -1,0 +1,200 @@
+"""Identification: values that are known are found again, with deviations that hold; bad files are refused by line."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import finger3d
+from finger3d.analyses.identify.fit import Scale, uncertainty
+from finger3d.analyses.identify.measured import read_measured
+from finger3d.cli import main
+from finger3d.errors import Finger3dError
+from finger3d.results.journal import Journal
+from finger3d.scene import parse
+from tests.sensor_cases import scene
+
+NOISE = {"normal_force_N": 0.5, "gauge_g36": 3e-4}
+TRUE = {"material.E_MPa": 0.37, "friction.mu": 0.6}
+FREE = {"material.E_MPa": (0.05, 5.0), "friction.mu": (0.05, 1.0)}
+
+
+@pytest.fixture
+def scene_file(tmp_path: Path) -> Path:
+    path = tmp_path / "scene.toml"
+    path.write_text(scene(press={"depth_mm": 10.0, "steps": 8}).to_toml(), encoding="utf-8")
+    return path
+
+
+def bench(path: Path, seed: int = 0, stds: bool = False, offset: float = 0.0, **changes: Any) -> Path:
+    """A measured press of the scene with the true values, with noise."""
+    tables: dict[str, Any] = {"press": {"depth_mm": 10.0, "steps": 8}, **changes}
+    material = {"nu": 0.45, "E_MPa": TRUE["material.E_MPa"]}
+    true = parse(scene(**tables, material=material, friction={"mu": TRUE["friction.mu"]}).as_dict())
+    random, rows = np.random.default_rng(seed), []
+    for step in finger3d.press(true).steps:
+        found = {"normal_force_N": step.normal_force_N, "gauge_g36": step.gauges["g36"]}
+        noisy = {name: value + NOISE[name] * random.normal() for name, value in found.items()}
+        extra = {f"{name}_std": NOISE[name] for name in found} if stds else {}
+        rows.append({"depth_mm": step.depth_mm + offset, **noisy, **extra})
+    with path.open("w", newline="") as stream:
+        writer = csv.DictWriter(stream, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+    return path
+
+
+def test_known_values_are_found_again(tmp_path: Path, scene_file: Path) -> None:
+    found = finger3d.identify(scene_file, bench(tmp_path / "bench.csv"), FREE, tmp_path / "out")
+    for value, std, true in zip(found.fitted.values, found.fitted.stds, TRUE.values(), strict=True):
+        assert value == pytest.approx(true, abs=4.0 * std)
+        assert std < 0.15 * true
+    assert found.notes == ()
+    data = json.loads((tmp_path / "out" / "identify.json").read_text())
+    assert data["values"]["friction.mu"]["value"] == found.fitted.values[1]
+    again = finger3d.load(tmp_path / "out" / "identified.toml")
+    assert again.model().material.E_MPa == pytest.approx(found.fitted.values[0])
+    assert {"identify.png", "identify.csv", "report.html", "presses.jsonl"} <= {
+        p.name for p in (tmp_path / "out").iterdir()
+    }
+
+
+@pytest.mark.slow
+def test_deviations_hold_over_many_benches(tmp_path: Path, scene_file: Path) -> None:
+    z = []
+    for seed in range(30):
+        measured = bench(tmp_path / f"bench{seed}.csv", seed, stds=True)
+        fitted = finger3d.identify(scene_file, measured, FREE, tmp_path / f"out{seed}").fitted
+        z += [(v - t) / s for v, t, s in zip(fitted.values, TRUE.values(), fitted.stds, strict=True)]
+    # of 60 standard normal numbers the root mean square is 1 with a standard deviation of 1 / sqrt(120)
+    assert math.sqrt(np.mean(np.square(z))) == pytest.approx(1.0, abs=0.3)
+
+
+def test_the_modulus_alone_needs_one_press(tmp_path: Path, scene_file: Path) -> None:
+    measured = bench(tmp_path / "bench.csv")
+    found = finger3d.identify(
+        scene_file, measured, {"material.E_MPa": (0.05, 5.0)}, tmp_path / "out", ["friction.mu=0.6"]
+    )
+    assert found.presses == 1
+    assert found.fitted.values[0] == pytest.approx(0.37, abs=4.0 * found.fitted.stds[0])
+
+
+def test_an_offset_of_the_depth_is_found(tmp_path: Path, scene_file: Path) -> None:
+    measured = bench(tmp_path / "bench.csv", offset=0.3)
+    free = {"material.E_MPa": (0.05, 5.0), "depth_offset_mm": (-1.0, 0.0)}
+    found = finger3d.identify(scene_file, measured, free, tmp_path / "out", ["friction.mu=0.6", "press.depth_mm=10.5"])
+    assert found.fitted.values[1] == pytest.approx(-0.3, abs=0.05)
+
+
+def test_what_the_data_cannot_tell_is_said(tmp_path: Path, scene_file: Path) -> None:
+    """A force at one small depth tells E nu together, and nothing of friction."""
+    rows = list(csv.DictReader(bench(tmp_path / "all.csv").open()))
+    measured = tmp_path / "bench.csv"
+    lines = [f"{r['depth_mm']},{r['normal_force_N']},1.0" for r in rows]
+    measured.write_text("depth_mm,normal_force_N,normal_force_N_std\n" + "\n".join(lines) + "\n")
+    free = {"material.E_MPa": (0.05, 5.0), "friction.mu": (0.5, 0.7)}
+    found = finger3d.identify(scene_file, measured, free, tmp_path / "out")
+    assert "the data cannot tell friction.mu within its bounds" in found.notes
+
+
+def test_a_scene_that_does_not_fit_is_said(tmp_path: Path, scene_file: Path) -> None:
+    measured = bench(tmp_path / "bench.csv", stds=True)
+    found = finger3d.identify(
+        scene_file, measured, {"material.E_MPa": (0.05, 5.0)}, tmp_path / "out", ["friction.mu=0.05"]
+    )
+    assert found.reduced_chi_square > 10.0
+    assert any("does not explain the data" in note for note in found.notes)
+
+
+def test_an_interrupted_identification_continues(tmp_path: Path, scene_file: Path, monkeypatch: Any) -> None:
+    measured, out = bench(tmp_path / "bench.csv"), tmp_path / "out"
+    whole, count = Journal.append, 0
+
+    def some(journal: Journal, row: Any) -> None:
+        nonlocal count
+        count += 1
+        if count > 5:
+            raise KeyboardInterrupt
+        whole(journal, row)
+
+    monkeypatch.setattr(Journal, "append", some)
+    with pytest.raises(KeyboardInterrupt):
+        finger3d.identify(scene_file, measured, FREE, out)
+    assert len((out / "presses.jsonl").read_text().splitlines()) == 5
+    monkeypatch.setattr(Journal, "append", whole)
+    solved: list[Any] = []
+    monkeypatch.setattr(Journal, "append", lambda journal, row: (solved.append(row), whole(journal, row))[1])
+    found = finger3d.identify(scene_file, measured, FREE, out)
+    assert len(solved) == found.presses - 5
+
+
+def test_dependent_and_independent_values() -> None:
+    scales = [Scale("a", 0.0, 1.0), Scale("b", 1.0, 100.0)]
+    assert scales[1].is_logarithmic
+    assert scales[1].share(scales[1].value(0.3)) == pytest.approx(0.3)
+    only_sum = np.array([[100.0, 100.0], [50.0, 50.0]])
+    told = uncertainty(scales, np.array([0.5, 0.5]), only_sum)
+    assert told.untold == ("the data cannot tell a and b apart: they may change against each other and fit as well",)
+    good = uncertainty(scales, np.array([0.5, 0.5]), np.diag([100.0, 200.0]))
+    assert good.untold == ()
+    # 1 / 100 of the range, and 1 / 200 of the logarithmic range times the value 10
+    assert good.stds == pytest.approx([0.01, 0.005 * 10.0 * math.log(100.0)], rel=1e-2)
+
+
+KNOWN = ("normal_force_N", "gauge_a")
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("normal_force_N\n1\n", "must have a column"),
+        ("depth_mm\n1\n2\n", "has no measured column"),
+        ("depth_mm,normal_force\n1,2\n2,3\n", 'column "normal_force" is unknown; did you mean "normal_force_N"'),
+        ("depth_mm,gauge_a_std\n1,2\n2,3\n", 'column "gauge_a_std" has no column "gauge_a"'),
+        ("depth_mm,gauge_a,gauge_a\n1,2,3\n2,3,4\n", 'two columns are called "gauge_a"'),
+        ("depth_mm,gauge_a\n1,2\n2,\n", "line 3: gauge_a is empty"),
+        ("depth_mm,gauge_a\n1,2\n2,much\n", "line 3: gauge_a = 'much': must be a finite number"),
+        ("depth_mm,gauge_a\n1,nan\n2,3\n", "line 2: gauge_a = 'nan': must be a finite number"),
+        ("depth_mm,gauge_a\n1,2,3\n2,3\n", "line 2: has 3 cells, and there are 2 columns"),
+        ("depth_mm,gauge_a\n1,2\n3,3\n2,4\n", "line 4: depth_mm = 2: must be larger than before"),
+        ("depth_mm,gauge_a\n1,2\n", "has 1 rows; at least 2"),
+        ("depth_mm,gauge_a,gauge_a_std\n1,2,0.1\n2,3,0\n", "line 3: gauge_a_std = 0: must be above 0"),
+        ("", "must have a column"),
+    ],
+)
+def test_files_that_are_refused(tmp_path: Path, text: str, told: str) -> None:
+    path = tmp_path / "bench.csv"
+    path.write_text(text)
+    with pytest.raises(Finger3dError) as found:
+        read_measured(path, KNOWN)
+    assert told in str(found.value)
+    assert "\n" not in str(found.value)
+
+
+@pytest.mark.parametrize(
+    ("factor", "free", "told"),
+    [
+        (1000.0, FREE, "line 9: gauge_g36 ="),
+        (1.0, {"material.E_MP": (0.05, 5.0)}, "E_MP"),
+        (1.0, {"press.depth_mm": (5.0, 6.0)}, "the path of the scene ends at 5"),
+        (1.0, {"gauge.x.x_mm": (1.0, 2.0)}, 'no gauge "x"'),
+    ],
+)
+def test_commands_that_are_refused(
+    tmp_path: Path, scene_file: Path, capsys: Any, factor: float, free: Any, told: str
+) -> None:
+    rows = list(csv.DictReader(bench(tmp_path / "all.csv").open()))
+    measured = tmp_path / "bench.csv"
+    lines = [f"{r['depth_mm']},{r['normal_force_N']},{factor * float(r['gauge_g36'])}" for r in rows]
+    measured.write_text("depth_mm,normal_force_N,gauge_g36\n" + "\n".join(lines) + "\n")
+    options = [text for key, (low, high) in free.items() for text in ("--free", f"{key}={low}:{high}")]
+    command = ["identify", str(scene_file), "--measured", str(measured), "--out", str(tmp_path / "out"), *options]
+    assert main(command) == 2
+    said = capsys.readouterr().err.strip().splitlines()[-1]
+    assert told in said
