@@ -83,7 +83,7 @@ def model_of(case: Case) -> Model:
         )
     design = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     # at large deformation the strain of the section along 30 degrees is near zero there, a twentieth of that along 60
-    gauge = Gauge("g", 36.0, 40.0, angle=math.pi / 3 if case.body in LARGE.values() else math.pi / 6)
+    gauge = Gauge("g", 36.0, 40.0, angle=math.pi / 3 if case.body == LARGE[SECTION] else math.pi / 6)
     domain: Any = "solid" if case.body in (SOLID, LARGE[SOLID]) else "plane-strain"
     model = Model(design, Isotropic(1.0, nu), mesh, (Leg(10.0),), friction=Coulomb(MU), gauges=(gauge,), domain=domain)
     return LargeDeformation().apply(model) if case.body in LARGE.values() else model
