@@ -25,7 +25,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from finger3d._api import export, identify, optimise, plan, sweep
+    from finger3d._api import export, identify, optimise, place_gauges, plan, sweep
     from finger3d.analyses.calibrate.run import calibrate
     from finger3d.analyses.compare.run import compare
     from finger3d.analyses.press import press
@@ -75,6 +75,7 @@ _HOME = {
     "load": "scene",
     "optimise": "_api",
     "parse": "scene",
+    "place_gauges": "_api",
     "plan": "_api",
     "press": "analyses.press",
     "sweep": "_api",
@@ -112,6 +113,7 @@ __all__ = [
     "load",
     "optimise",
     "parse",
+    "place_gauges",
     "plan",
     "press",
     "sweep",

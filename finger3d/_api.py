@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     import pandas
 
     from finger3d.analyses.identify.run import Identification
+    from finger3d.analyses.optimise.gauge_run import GaugePlaces
     from finger3d.analyses.optimise.run import OptimisationResult
     from finger3d.analyses.plan import Plan
     from finger3d.mold.export import Exported
@@ -153,6 +154,45 @@ def optimise(
         seed=seed,
     )
     return run(problem, out, report)
+
+
+def place_gauges(
+    scene: str | Path,
+    count: int,
+    out: str | Path,
+    free: Mapping[str, tuple[float, float]] | None = None,
+    mus: Sequence[float] | None = None,
+    noise: float = 1.5e-4,
+    tolerances: Mapping[str, float] | None = None,
+    overrides: Sequence[str] = (),
+    report: Progress | None = None,
+) -> GaugePlaces:
+    """Find the places and directions of gauges that together tell mu best, as ``finger3d optimise --gauges``.
+
+    Parameters
+    ----------
+    scene : path of a TOML file
+    count : number of gauges
+    out : folder for gauges.json, best.toml, map.csv, map.png and report.html
+    free : bounds of "gauge.x_mm", "gauge.y_mm", "gauge.z_mm" and "gauge.angle_deg"; None: the whole body at z = 0
+    mus : friction coefficients at which the gauges are judged, ascending; None: nine from 0.05 to 1
+    noise : standard deviation of a strain reading
+    tolerances : standard deviations by name, in place of the defaults of `calibrate`; 0 omits one
+    overrides : other keys to set, such as ``"mesh.size_mm=1.0"``
+    report : told about stages
+
+    Returns
+    -------
+    GaugePlaces
+        With the scene that has these gauges, and the standard deviation of mu.
+    """
+    from finger3d.analyses.optimise.gauge_run import place_gauges as run
+    from finger3d.analyses.optimise.task import MUS, FreeKey
+    from finger3d.scene import tree
+
+    given = tree.override(tree.read(Path(scene)), overrides)
+    keys = [FreeKey.of(f"{key}={low!r}:{high!r}") for key, (low, high) in (free or {}).items()]
+    return run(given, count, out, keys, MUS if mus is None else mus, noise, tolerances, Path(scene), report)
 
 
 def identify(

@@ -2,25 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
-from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.cli.common import Json, Noise, Set, app, job, load, print_json, print_rows
-from finger3d.errors import Finger3dError, MissingError
-
-Tolerances = Annotated[
-    list[str] | None,
-    Parameter(
-        name="--tolerance",
-        negative=(),
-        help="Standard deviation of an uncertain quantity, for instance depth_mm=0.05; 0: exact; may be repeated. "
-        f"Quantities: {', '.join(TOLERANCES)}.",
-    ),
-]
+from finger3d.cli.tolerances import Tolerances, parsed_tolerances
+from finger3d.errors import MissingError
 
 
 @app.command
@@ -78,7 +67,7 @@ def calibrate(
             parsed_mus(mu),
             noise,
             resolution,
-            _tolerances(tolerance),
+            parsed_tolerances(tolerance),
             report=report,
             maps=map_,
             marker_noise_mm=marker_noise,
@@ -96,14 +85,3 @@ def calibrate(
             f"{scene}: {len(found.failed)} of {report.steps_total} values of mu gave no strain, the first mu = "
             f"{mu_failed:.4g} {why}"
         )
-
-
-def _tolerances(texts: Sequence[str] | None) -> dict[str, float]:
-    found = {}
-    for text in texts or ():
-        name, _, value = text.partition("=")
-        try:
-            found[name.strip()] = float(value)
-        except ValueError:
-            raise Finger3dError(f"--tolerance {text}: must be NAME=NUMBER, for instance depth_mm=0.05") from None
-    return found

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from finger3d.cli.common import Json, Noise, Set, app, check_writable, job, print_json, print_rows
+from finger3d.cli.tolerances import Tolerances, parsed_tolerances
 from finger3d.errors import Finger3dError
+
+if TYPE_CHECKING:
+    from finger3d.analyses.optimise.run import OptimisationResult
+    from finger3d.analyses.optimise.task import OptimisationProblem
 
 
 @app.command
@@ -17,12 +22,20 @@ def optimise(
     /,
     *,
     free: Annotated[
-        list[str],
+        list[str] | None,
         Parameter(
             negative=(), help="A free key and its bounds, for instance finger.radius_mm=60:200; may be repeated."
         ),
-    ],
+    ] = None,
     out: Annotated[Path, Parameter(help="Folder for the results; an interrupted search continues there.")],
+    gauges: Annotated[
+        int | None,
+        Parameter(
+            help="Find the places and directions of so many gauges that together tell mu best, with all tolerances of "
+            "a calibration; --free bounds gauge.x_mm, gauge.y_mm, gauge.z_mm and gauge.angle_deg."
+        ),
+    ] = None,
+    tolerance: Tolerances = None,
     objective: Annotated[
         str, Parameter(help="sensitivity, or a Python file with objective(table) -> number; the largest is best.")
     ] = "sensitivity",
@@ -41,7 +54,7 @@ def optimise(
     set_: Set = None,
     json_: Json = False,
 ) -> None:
-    """Search for the design with the largest objective, starting from the scene.
+    """Search for the design with the largest objective, starting from the scene; or for the places of several gauges.
 
     If only keys of gauges are free, all designs share one condensed body.
 
@@ -52,14 +65,16 @@ def optimise(
     scene
         The scene file (TOML).
     """
+    if gauges is not None:
+        _place_gauges(scene, gauges, free or [], out, mu, noise, tolerance, set_, json_)
+        return
     from finger3d.analyses.optimise.run import optimise
     from finger3d.analyses.optimise.task import MUS, FreeKey, OptimisationProblem
-    from finger3d.results.summary import read_json
     from finger3d.scene import tree
 
     problem = OptimisationProblem(
         given=tree.override(tree.read(scene), set_ or []),
-        free=tuple(FreeKey.of(text) for text in free),
+        free=tuple(FreeKey.of(text) for text in free or ()),
         objective=objective,
         path=scene,
         gauge=gauge,
@@ -73,6 +88,13 @@ def optimise(
     kept = f"every evaluated design is kept in {out}; the same command continues"
     with job(json_, lambda _: kept) as report:
         found = optimise(problem, out, report)
+    _print_design(problem, found, out, json_)
+
+
+def _print_design(problem: OptimisationProblem, found: OptimisationResult, out: Path, json_: bool) -> None:
+    """Print the best design."""
+    from finger3d.results.summary import read_json
+
     if json_:
         print_json(read_json(out / "design.json"))
         return
@@ -85,6 +107,51 @@ def optimise(
             ("evaluated", f"{found.distinct_designs} designs, {found.bodies} bodies condensed"),
             ("results", str(out / "best.toml")),
             ("", str(out / "evaluations.csv")),
+            ("", str(out / "report.html")),
+        ],
+    )
+
+
+def _place_gauges(
+    scene: Path,
+    count: int,
+    free: list[str],
+    out: Path,
+    mu: str | None,
+    noise: float,
+    tolerance: list[str] | None,
+    set_: list[str] | None,
+    json_: bool,
+) -> None:
+    """Find the places of several gauges, and print them."""
+    from finger3d.analyses.optimise.gauge_run import place_gauges
+    from finger3d.analyses.optimise.task import MUS, FreeKey
+    from finger3d.scene import tree
+
+    given = tree.override(tree.read(scene), set_ or [])
+    keys = [FreeKey.of(text) for text in free]
+    check_writable(out, scene)
+    with job(json_, lambda _: "nothing was written") as report:
+        mus, known = _mus(mu) if mu else MUS, parsed_tolerances(tolerance)
+        found = place_gauges(given, count, out, keys, mus, noise, known, scene, report)
+    data = found.as_dict()
+    if json_:
+        print_json(data)
+        return
+    rows = [
+        (
+            g["name"],
+            f"x {g['x_mm']:.1f}, y {g['y_mm']:.1f}, z {g['z_mm']:.1f} mm, {g['angle_deg']:.1f} degrees: mu +- "
+            f"{g['mean_mu_sd_with_those_before']:.3g} with those before, {g['mean_mu_sd_alone']:.3g} alone",
+        )
+        for g in data["gauges"]
+    ]
+    print_rows(
+        found.scene.title,
+        [
+            *rows,
+            ("together", f"mu +- {data['mean_mu_sd']:.3g}, mean over mu = {found.mus[0]:g} to {found.mus[-1]:g}"),
+            ("results", str(out / "best.toml")),
             ("", str(out / "report.html")),
         ],
     )

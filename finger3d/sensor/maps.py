@@ -71,10 +71,24 @@ class Reader:
 
     def strain(self, u: Float) -> Float:
         """Return the in-plane strain (p, 3), components xx, yy, xy, of displacements (n, d); NaN outside the body."""
-        slope = np.einsum("ekj,eki->eji", u[self.mesh.cells[self.cells]], self.gradients)
-        slope = slope * self.turn[:, :, None] * self.turn[:, None, :]
+        return self._in_plane(self._gradient(u))
+
+    def green_lagrange(self, u: Float) -> Float:
+        """Return the in-plane Green-Lagrange strain (p, 3), components xx, yy, xy; NaN outside the body."""
+        gradient = self._gradient(u)
+        return self._in_plane(gradient + 0.5 * gradient.transpose(0, 2, 1) @ gradient)
+
+    def _gradient(self, u: Float) -> Float:
+        """Return the displacement gradient (m, d, d), du_i / dX_j, at the points inside."""
+        gradient = np.einsum("eki,ekj->eij", u[self.mesh.cells[self.cells]], self.gradients)
+        return np.asarray(gradient * self.turn[:, :, None] * self.turn[:, None, :])
+
+    def _in_plane(self, tensor: Float) -> Float:
+        """Return the components xx, yy and the mean of xy and yx of tensors (m, d, d) at all points (p, 3)."""
         out = np.full((len(self.inside), 3), np.nan)
-        out[self.inside] = np.stack([slope[:, 0, 0], slope[:, 1, 1], 0.5 * (slope[:, 0, 1] + slope[:, 1, 0])], axis=1)
+        out[self.inside] = np.stack(
+            [tensor[:, 0, 0], tensor[:, 1, 1], 0.5 * (tensor[:, 0, 1] + tensor[:, 1, 0])], axis=1
+        )
         return out
 
 

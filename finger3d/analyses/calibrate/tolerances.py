@@ -248,7 +248,7 @@ def _vary_tilt(body: ReferenceBody, readings: Sequence[CalibratedReading], sd: f
     problem, model = body.problem, body.problem.model
     if not isinstance(model.object, Plane):
         return
-    plane, step, mesh = model.object, math.radians(sd), _coarser(problem)
+    plane, step, mesh = model.object, math.radians(sd), tilted_mesh(problem)
     if "x" in problem.axes and not model.inclusions:
         images, names, signs = _mirrored(reading_only(model, body.names), body.names)
         tilted = body.rebuilt(mesh=mesh, object=replace(plane, tilt=step), symmetry=None, **images)
@@ -375,7 +375,7 @@ def _increment_errors(problem: Problem, names: tuple[str, ...], own: Float, incr
     return error.reshape(own.shape)
 
 
-def _coarser(problem: Problem) -> MeshOptions:
+def tilted_mesh(problem: Problem) -> MeshOptions:
     """Return the mesh options of a tilted body: longer edges, and a structured mesh where the design allows one."""
     options, left = problem.model.mesh, len(problem.points.nodes) / _TILTED_POINTS[problem.dim]
     factor = min(2.0, max(1.0, left)) if problem.dim == 2 else min(1.5, max(1.25, math.sqrt(left)))

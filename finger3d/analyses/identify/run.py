@@ -18,7 +18,7 @@ from finger3d.analyses.optimise.task import FreeKey
 from finger3d.analyses.sweep.points import numbered
 from finger3d.errors import Finger3dError
 from finger3d.io import atomic, claimed, write_csv, write_json
-from finger3d.plotting.identify import draw
+from finger3d.plotting.identify import Panel, draw
 from finger3d.progress import Progress
 from finger3d.report.identify import identify_page
 from finger3d.results.journal import opened
@@ -250,6 +250,8 @@ def _write(folder: Path, found: Identification) -> None:
     write_csv(folder / "identify.csv", columns)
     with atomic(folder / "identified.toml") as temporary:
         temporary.write_text(found.scene.to_toml(), encoding="utf-8")
-    draw(folder / "identify.png", found)
+    offset = dict(zip(found.keys, found.fitted.values, strict=True)).get(OFFSET, 0.0)
+    panels = [Panel(n, values, found.stds[n], found.simulated[n], found.curve[n]) for n, values in data.columns.items()]
+    draw(folder / "identify.png", data.index, data.at + float(offset), found.curve[data.index], panels)
     write_json(folder / "identify.json", found.as_dict())
     identify_page(folder)

@@ -1,0 +1,187 @@
+"""Optimisation of the places of several gauges: presses, search, and the files of the result."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from finger3d._types import Float, Tree, TreeView
+from finger3d.analyses.calibrate.tolerances import with_defaults
+from finger3d.analyses.optimise.gauge_fields import GaugeFields
+from finger3d.analyses.optimise.gauge_search import Candidates, GaugeSet, Region, objectives, search
+from finger3d.analyses.optimise.task import MUS, FreeKey
+from finger3d.errors import Finger3dError
+from finger3d.io import atomic, claimed, write_csv, write_json
+from finger3d.mechanics.model import Model
+from finger3d.plotting.gauge_places import GaugeMap, draw
+from finger3d.progress import Progress
+from finger3d.report.gauge_places import gauge_places_page
+from finger3d.scene import Scene, parse, tree
+from finger3d.sensor.curve import LARGEST_STRAIN
+
+MOST = 8
+"""Gauges that are placed together at most."""
+
+_BOUNDS = {"gauge.x_mm": "x", "gauge.y_mm": "y", "gauge.z_mm": "z", "gauge.angle_deg": "angle"}
+"""Free keys that bound the region, and the bounds of `Region` that they set."""
+
+
+@dataclass(frozen=True)
+class GaugePlaces:
+    """Gauges that together tell mu best.
+
+    Attributes
+    ----------
+    mus : (m,) coefficients of friction at which they are judged
+    found : the gauges and their Fisher matrices
+    maps : (places (c, 3), mean standard deviation (c,) of mu with the best direction there) for each gauge in the
+        place of which another is tried beside the others
+    scene : with these gauges instead of its own
+    """
+
+    mus: tuple[float, ...]
+    found: GaugeSet
+    maps: tuple[tuple[Float, Float], ...]
+    scene: Scene
+
+    def as_dict(self) -> Tree:
+        """Return the content of gauges.json."""
+        sd, each = self.found.mu_sd, self.found.alone
+        gauges, before = self.found.gauges, self.found.prior
+        first = [GaugeSet(gauges[: i + 1], before).objective for i in range(len(gauges))]
+        return {
+            "scene": self.scene.as_dict(),
+            "mu": list(self.mus),
+            "mu_sd": sd,
+            "mean_mu_sd": self.found.objective,
+            "gauges": [
+                {
+                    "name": f"g{i + 1}",
+                    "x_mm": float(g.place[0]),
+                    "y_mm": float(g.place[1]),
+                    "z_mm": float(g.place[2]),
+                    "angle_deg": math.degrees(g.angle),
+                    "mean_mu_sd_alone": float(own.mean()),
+                    "mean_mu_sd_with_those_before": first[i],
+                    "mu_sd_alone": own,
+                }
+                for i, (g, own) in enumerate(zip(self.found.gauges, each, strict=True))
+            ],
+        }
+
+
+def place_gauges(
+    given: TreeView,
+    count: int,
+    out: str | Path,
+    free: Sequence[FreeKey] = (),
+    mus: Sequence[float] = MUS,
+    noise: float = 1.5e-4,
+    tolerances: Mapping[str, float] | None = None,
+    path: Path | None = None,
+    report: Progress | None = None,
+) -> GaugePlaces:
+    """Find the places and directions of gauges that together tell mu best.
+
+    Parameters
+    ----------
+    given : the scene as written, overrides included
+    count : number of gauges
+    out : folder for gauges.json, best.toml, map.csv, map.png and report.html
+    free : bounds of ``gauge.x_mm``, ``gauge.y_mm``, ``gauge.z_mm`` and ``gauge.angle_deg``; without them the whole body
+        at z = 0, in all directions
+    mus : coefficients of friction at which the gauges are judged, ascending
+    noise : standard deviation of a strain reading
+    tolerances : standard deviations by name, in place of those of a calibration; 0 omits one
+    path : of the scene file
+
+    Raises
+    ------
+    Finger3dError
+        For a mistake in the scene or the numbers, or if a press fails.
+    """
+    report = report or Progress()
+    _check(count, mus, noise)
+    model = parse(given, path).model()
+    if model.inclusions is not None:
+        raise Finger3dError(
+            "optimise --gauges: not with effects.embedded_gauge, whose foils change the body wherever they lie; "
+            "find the places without it, or optimise one gauge with --free gauge.NAME.x_mm"
+        )
+    region = _region(model, free)
+    with claimed(out, "optimise") as folder:
+        fields = GaugeFields.of(model, mus, noise, with_defaults(tolerances), report.stage)
+        found, everywhere = search(fields, region, count, report.stage)
+        maps = tuple(_map(found, i, everywhere) for i in range(count))
+        result = GaugePlaces(tuple(mus), found, maps, _with_gauges(given, path, found))
+        report.stage("writing")
+        _write(folder, result, model)
+    return result
+
+
+def _check(count: int, mus: Sequence[float], noise: float) -> None:
+    if not 1 <= count <= MOST:
+        raise Finger3dError(f"--gauges {count}: must be from 1 to {MOST}")
+    if len(mus) < 3 or any(b <= a for a, b in zip(mus, mus[1:], strict=False)):
+        raise Finger3dError("--mu: must be at least three numbers, ascending")
+    if not 1e-12 <= noise <= LARGEST_STRAIN:
+        raise Finger3dError(f"--noise {noise}: must be above 0")
+
+
+def _region(model: Model, free: Sequence[FreeKey]) -> Region:
+    """Return the region with the bounds of the free keys."""
+    bounds = {}
+    for key in free:
+        if key.key not in _BOUNDS:
+            raise Finger3dError(
+                f"--free {key.key}: with --gauges only {', '.join(_BOUNDS)} may be bounded, for instance "
+                "--free gauge.y_mm=5:40"
+            )
+        ends = (key.low, key.high)
+        bounds[_BOUNDS[key.key]] = ends if key.key != "gauge.angle_deg" else tuple(map(math.radians, ends))
+    whole = Region.of(model)
+    return Region(*(bounds.get(name, getattr(whole, name)) for name in ("x", "y", "z", "angle")))
+
+
+def _map(found: GaugeSet, number: int, everywhere: Candidates) -> tuple[Float, Float]:
+    """Return places (c, 3), and the mean standard deviation of mu with the best direction of a gauge there."""
+    values = objectives(found.fisher(without=number), everywhere)
+    places, which = np.unique(everywhere.places, axis=0, return_inverse=True)
+    best = np.full(len(places), np.inf)
+    np.minimum.at(best, which.ravel(), values)
+    return places, best
+
+
+def _with_gauges(given: TreeView, path: Path | None, found: GaugeSet) -> Scene:
+    """Return the scene with the gauges that were found instead of its own."""
+    gauges = [
+        {
+            "name": f"g{i + 1}",
+            "x_mm": round(float(g.place[0]), 3),
+            "y_mm": round(float(g.place[1]), 3),
+            "z_mm": round(float(g.place[2]), 3),
+            "angle_deg": round(math.degrees(g.angle), 2),
+        }
+        for i, g in enumerate(found.gauges)
+    ]
+    return parse(tree.frozen(tree.plain(given) | {"gauge": gauges}), path)
+
+
+def _write(folder: Path, result: GaugePlaces, model: Model) -> None:
+    with atomic(folder / "best.toml") as temporary:
+        temporary.write_text(result.scene.to_toml(defaults=False), encoding="utf-8")
+    places = result.maps[0][0]
+    columns: Tree = {f"{axis}_mm": places[:, i] for i, axis in enumerate("xyz")}
+    columns |= {f"mean_mu_sd_g{i + 1}_here": values for i, (_, values) in enumerate(result.maps)}
+    write_csv(folder / "map.csv", columns)
+    shown = [
+        GaugeMap(float(g.place[0]), float(g.place[1]), g.angle, own, *one)
+        for g, own, one in zip(result.found.gauges, result.found.alone, result.maps, strict=True)
+    ]
+    draw(folder / "map.png", result.mus, result.found.mu_sd, shown, model.design)
+    write_json(folder / "gauges.json", result.as_dict())
+    gauge_places_page(folder)
