@@ -1,0 +1,185 @@
+"""Can a finger of finite width tell friction, and with which readings?
+
+Source of the claim: Maeno 2004, Sec. IV: one gauge of 30 degrees resolves mu = 0.5 to 0.1 in a section.  The finger of
+Fig. 9 (nu = 0.49) is pressed 10 mm as a section in plane strain and as a solid 20 mm wide, in small strain and at large
+deformation.  It is read by the paper's gauge (at x = 36, y = 40 mm, which the paper does not tell), by the one, two and
+three gauges that `finger3d optimise --gauges` places, and by the displacements along x of seven markers on the contact
+face, each 0.02 mm.  The gauges read the free strain, and the strain of foils of 4 mm, 0.02 x 3 mm and 3000 MPa.  The
+standard deviation of mu is that of generalised least squares with the default tolerances of a calibration, but for mesh
+and increments, which computing removes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.analyses.calibrate.run import calibrated_together
+from finger3d.analyses.calibrate.tolerances import with_defaults
+from finger3d.analyses.optimise.gauge_fields import GaugeFields
+from finger3d.analyses.optimise.gauge_search import Region, search
+from finger3d.analyses.study_rows import Result, Row
+from finger3d.effects.embedded_gauge import Effect as EmbeddedGauge
+from finger3d.effects.large_deformation import Effect as LargeDeformation
+from finger3d.fem.material import Isotropic
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.readings import Marker
+from finger3d.sensor import JointCalibration
+
+from ._paper import columns
+
+Float = NDArray[np.float64]
+Domain = Literal["solid", "plane-strain"]
+
+NOISE, LIMIT = 1.5e-4, 0.1
+MUS = tuple(float(mu) for mu in np.linspace(0.05, 1.0, 14).round(4))
+SIZES: dict[Domain, tuple[float, float]] = {"plane-strain": (1.0, 4.0), "solid": (2.5, 7.5)}
+QUICK: dict[Domain, tuple[float, float]] = {"plane-strain": (3.0, 10.0)}
+SMALL, LARGE = "small strain", "large deformation"
+NAMES = {"plane-strain": "section", "solid": "20 mm wide"}
+FOIL = EmbeddedGauge(3000.0, 0.02, 3.0)
+IDEAL = {"mesh": 0.0, "increments": 0.0}
+PAPER, MARKERS = "paper's gauge", "7 markers"
+FREE, READ = "free", "foil"
+MOST = 3
+
+Spread = dict[tuple[Domain, str, str, str], Float]
+"""Standard deviation of mu by domain, strain measure, readings, and free or foil."""
+
+
+def model(domain: Domain, sizes: tuple[float, float], large: bool, steps: int) -> Model:
+    """Return the finger without readings."""
+    design = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
+    found = Model(
+        design, Isotropic(1.0, 0.49), MeshOptions(*sizes, "swept"), (Leg(10.0, steps=steps),), domain=domain
+    )  # fmt: skip
+    return LargeDeformation().apply(found) if large else found
+
+
+def run(quick: bool) -> Result:
+    """Quick: the section in small strain, with one and two gauges."""
+    spread: Spread = {}
+    placed: list[tuple[Any, ...]] = []
+    for domain, sizes in (QUICK if quick else SIZES).items():
+        for measure in (SMALL,) if quick else (SMALL, LARGE):
+            large = measure == LARGE
+            body = model(domain, sizes, large, 4 if quick else 10 if large else 20)
+            sets = _gauge_sets(body, 2 if quick else MOST)
+            placed += [
+                (domain, measure, name, g.x_mm, g.y_mm, math.degrees(g.angle)) for name, s in sets.items() for g in s
+            ]
+            for name, sd in _free(body, sets, quick).items():
+                spread[domain, measure, name, FREE] = sd
+            if not quick:
+                for name, sd in _with_foils(body, sets).items():
+                    spread[domain, measure, name, READ] = sd
+    lines = [(*key, mu, sd) for key, sds in spread.items() for mu, sd in zip(MUS, sds, strict=True)]
+    lines += [(domain, measure, name, "place", x, y) for domain, measure, name, x, y, _ in placed]
+    names = "domain strain_measure readings read mu_or_x_mm mu_sd_or_y_mm"
+    return Result(tuple(_rows(spread)), columns(names, lines), lambda figure: _draw(figure, spread))
+
+
+def _gauge_sets(body: Model, most: int) -> dict[str, tuple[Gauge, ...]]:
+    """Return the paper's gauge, and the best one, two and so on."""
+    tolerances = with_defaults({"increments": 0.0})
+    fields = GaugeFields.of(body, MUS[::2], NOISE, tolerances, lambda text: None)
+    found = {PAPER: (Gauge("p", 36.0, 40.0, angle=math.radians(30.0)),)}
+    for count in range(1, most + 1):
+        chosen, _ = search(fields, Region.of(body), count, lambda text: None)
+        found[f"{count} best gauge{'s' if count > 1 else ''}"] = tuple(
+            Gauge(f"g{count}{i}", float(g.place[0]), float(g.place[1]), float(g.place[2]), g.angle)
+            for i, g in enumerate(chosen.gauges)
+        )
+    return found
+
+
+def _markers(body: Model) -> tuple[Marker, ...]:
+    """Return seven markers on the contact face at z = 0."""
+    x = np.linspace(-36.0, 36.0, 7)
+    top = body.design.top(x, np.zeros_like(x))
+    return tuple(Marker(f"m{i}", float(a), float(b) - 0.5) for i, (a, b) in enumerate(zip(x, top, strict=True)))
+
+
+def _free(body: Model, sets: Mapping[str, Sequence[Gauge]], quick: bool) -> dict[str, Float]:
+    """Return the standard deviation of mu by every set of gauges, and by the markers, all in the same presses."""
+    markers = _markers(body)
+    gauges = tuple(g for chosen in sets.values() for g in chosen)
+    names = {name: [g.name for g in chosen] for name, chosen in sets.items()}
+    names[MARKERS] = [f"{m.name}.x" for m in markers]
+    whole = replace(body, gauges=gauges, markers=markers)
+    off = {**IDEAL, "tilt_deg": 0.0} if quick else IDEAL
+    joint, _ = calibrated_together(whole, [n for some in names.values() for n in some], MUS, tolerances=off)
+    return {name: _sd(joint.of(some)) for name, some in names.items()}
+
+
+def _with_foils(body: Model, sets: Mapping[str, Sequence[Gauge]]) -> dict[str, Float]:
+    """Return the standard deviation of mu by the paper's gauge and by the largest set, where the gauges are foils."""
+    found = {}
+    for name in (PAPER, list(sets)[-1]):
+        gauges = tuple(_inside(body, replace(g, length_mm=4.0)) for g in sets[name])
+        foils = FOIL.apply(replace(body, gauges=gauges))
+        joint, _ = calibrated_together(foils, [g.name for g in gauges], MUS, tolerances=IDEAL)
+        found[name] = _sd(joint)
+    return found
+
+
+def _inside(body: Model, gauge: Gauge) -> Gauge:
+    """Return the gauge, lowered until both ends of its foil and what displaces them are in the body."""
+    while True:
+        ends = np.array(gauge.ends)
+        top = body.design.top(ends[:, 0], ends[:, 2])
+        if np.isfinite(top).all() and (ends[:, 1] < top - 1.0).all():
+            return gauge
+        gauge = replace(gauge, x_mm=0.98 * gauge.x_mm, y_mm=gauge.y_mm - 0.5)
+
+
+def _sd(joint: JointCalibration) -> Float:
+    return joint.mu_sd(np.array(MUS))
+
+
+def _rows(spread: Spread) -> list[Row]:
+    rows = []
+    for (domain, measure, name, read), sd in spread.items():
+        at = float(np.interp(0.5, MUS, sd))
+        what = f"standard deviation of mu = 0.5: {NAMES[domain]}, {measure}, {name}, {read}"
+        rows.append(Row(what, "Maeno 2004, Sec. IV: 0.1", LIMIT, at, 0.0, "the paper's claim", "statement", "at most"))
+        share = float(np.mean(sd <= LIMIT))
+        what = f"share of mu = 0.05 to 1 that is found within 0.1: {NAMES[domain]}, {measure}, {name}, {read}"
+        rows.append(Row(what, "no reference", 0.5, share, 0.0, "half of the range", "statement", "at least"))
+    for domain, measure in dict.fromkeys((key[0], key[1]) for key in spread):
+        mean = [float(np.minimum(sd, 0.3).mean()) for key, sd in spread.items()
+                if key[:2] == (domain, measure) and "best" in key[2] and key[3] == FREE]  # fmt: skip
+        worst = max(b / a for a, b in zip(mean, mean[1:], strict=False))
+        what = f"mean standard deviation of mu with a gauge more, over that before: {NAMES[domain]}, {measure}"
+        rows.append(Row(what, "more readings tell more", 1.05, worst, 0.0, "judged on another grid of mu than placed",
+                        "sensitivity", "at most"))  # fmt: skip
+    return rows
+
+
+def _draw(figure: Any, spread: Spread) -> None:
+    cases = list(dict.fromkeys((key[0], key[1]) for key in spread))
+    figure.set_size_inches(5.2 * len(cases), 5.0)
+    figure.set_layout_engine("constrained")
+    panels = np.atleast_1d(figure.subplots(1, len(cases), sharey=True))
+    colours = {PAPER: "#b2182b", MARKERS: "#1b7837"}
+    blues = dict(zip((n for n in dict.fromkeys(key[2] for key in spread) if "best" in n),
+                     ("#92c5de", "#4393c3", "#053061"), strict=False))  # fmt: skip
+    for (domain, measure), axes in zip(cases, panels, strict=True):
+        for key, sd in spread.items():
+            if key[:2] == (domain, measure):
+                style = "--" if key[3] == READ else "-"
+                label = f"{key[2]}, as foils" if key[3] == READ else key[2]
+                axes.semilogy(MUS, np.minimum(sd, 10.0), style, color=(colours | blues)[key[2]], lw=1.8, label=label)
+        axes.axhline(LIMIT, color="#222222", lw=0.8)
+        axes.text(0.06, LIMIT * 1.08, "the paper's 0.1", fontsize=8)
+        axes.set(xlabel="friction coefficient mu", title=f"{NAMES[domain]}, {measure}", ylim=(3e-3, 3.0))
+        axes.grid(alpha=0.3)
+    panels[0].set_ylabel("standard deviation of mu")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False, fontsize=9)

@@ -1,0 +1,179 @@
+"""Do the standard deviation and the 90 % interval of mu hold for readings of sensors within their tolerances?
+
+No source; the readings are presses of the same finger on a mesh four times finer and with more increments than those
+of the calibration.  Coefficient of friction, depth and Young's modulus are drawn, the last two with the standard
+deviations that the calibration was given, and noise is added.  The finger of Fig. 9 is pressed 10 mm in plane strain
+and as a solid 20 mm wide; it has two gauges and a taxel, of which one gauge, or all three, are read; the calibrations
+have 10 to 80 increments.  z is (estimated - true) / stated standard deviation of mu, where an estimate is given.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.analyses.calibrate.run import calibrated_together
+from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
+from finger3d.analyses.study_rows import Result, Row
+from finger3d.fem.material import Isotropic
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.build import build
+from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.readings import Taxel
+from finger3d.mechanics.solve import march
+from finger3d.sensor import JointCalibration, JointEstimate, estimate
+
+from ._paper import columns
+
+Float = NDArray[np.float64]
+Domain = Literal["solid", "plane-strain"]
+
+DEPTH_MM, MU = 10.0, (0.05, 1.0)
+ON = {**dict.fromkeys(TOLERANCES, 0.0), "depth_mm": 0.1, "E_percent": 5.0, "mesh": 1.0, "increments": 1.0}
+ONE, THREE = ("a",), ("a", "b", "t")
+SIZES: dict[Domain, float] = {"plane-strain": 0.5, "solid": 3.0}
+FINER = 4.0
+READ_STEPS: dict[Domain, int] = {"plane-strain": 160, "solid": 120}
+COUNTS = (10, 20, 40, 80)
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A set of readings, and what was made of it."""
+
+    domain: str
+    steps: int
+    readings: str
+    mu: float
+    depth_mm: float
+    modulus: float
+    status: str
+    estimated: float
+    std: float
+    z: float
+    inside: bool
+
+
+def model(domain: Domain, size: float, steps: int) -> Model:
+    """Return the finger with two gauges and a taxel."""
+    design = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
+    return Model(
+        design,
+        Isotropic(1.0, 0.45),
+        MeshOptions(size, 4.0 * size, "swept"),
+        (Leg(DEPTH_MM, steps=steps),),
+        gauges=(Gauge("a", 36.0, 38.0, angle=math.radians(30.0)), Gauge("b", 20.0, 30.0, angle=math.radians(90.0))),
+        taxels=(Taxel("t", 25.0, 0.0, 6.0, 6.0),),
+        domain=domain,
+    )
+
+
+def run(quick: bool) -> Result:
+    """Quick: the section on a coarse mesh, one number of increments."""
+    random = np.random.default_rng(20261124)
+    found: list[Judged] = []
+    for domain, draws in (("plane-strain", 8),) if quick else (("plane-strain", 40), ("solid", 24)):
+        found += _judged(domain, draws, COUNTS[:1] if quick else COUNTS, 2.0 if quick else SIZES[domain], random)  # type: ignore[arg-type]
+    lines = [tuple(vars(one).values()) for one in found]
+    names = "domain steps readings mu depth_mm modulus status estimated std z in_90_percent_set"
+    return Result(tuple(_rows(found)), columns(names, lines), lambda figure: _draw(figure, found))
+
+
+def _judged(
+    domain: Domain, draws: int, counts: tuple[int, ...], size: float, random: np.random.Generator
+) -> Iterator[Judged]:
+    """Calibrate with several numbers of increments, and judge readings of drawn presses by each."""
+    curve = np.linspace(*MU, 25)
+    calibrations = {n: calibrated_together(model(domain, size, n), THREE, curve, tolerances=ON)[0] for n in counts}
+    body = build(model(domain, size / FINER, READ_STEPS[domain]), margin=math.inf)
+    for _ in range(draws):
+        mu, depth = float(random.uniform(*MU)), DEPTH_MM + ON["depth_mm"] * float(random.normal())
+        modulus = 1.0 + 0.01 * ON["E_percent"] * float(random.normal())
+        legs = tuple(replace(leg, depth_mm=depth) for leg in body.model.legs)
+        *_, last = march(replace(body, model=replace(body.model, legs=legs, friction=body.model.friction.with_mu(mu))))
+        assert last.outcome.ok, str(last.outcome)
+        true = dict(last.readings)
+        true["t"] *= modulus  # strains under a prescribed depth do not depend on the modulus
+        for steps, joint in calibrations.items():
+            noisy = {c.name: true[c.name] + c.noise * float(random.normal()) for c in joint.readings}
+            for names in (ONE, THREE):
+                answer = _estimate(joint, {name: noisy[name] for name in names})
+                yield _judgement(domain, steps, names, mu, depth, modulus, answer)
+
+
+def _estimate(joint: JointCalibration, readings: dict[str, float]) -> JointEstimate:
+    return estimate(joint, readings)[0]
+
+
+def _judgement(
+    domain: str, steps: int, names: tuple[str, ...], mu: float, depth: float, modulus: float, answer: JointEstimate
+) -> Judged:
+    told = answer.status in ("ok", "coarse")
+    ends = [] if not answer.intervals else [[*answer.intervals[0]], [*answer.intervals[-1]]]
+    inside = any(low <= mu <= high for low, high in answer.intervals)
+    if ends:
+        inside = inside or (answer.low == 0.0 and mu <= ends[0][1]) or (answer.high == math.inf and mu >= ends[-1][0])
+    return Judged(
+        domain, steps, f"{len(names)}", mu, depth, modulus, answer.status, answer.mu, answer.std,
+        (answer.mu - mu) / answer.std if told else math.nan, inside,
+    )  # fmt: skip
+
+
+def _rows(found: list[Judged]) -> Iterator[Row]:
+    yield from _honest("all", found)
+    for domain in dict.fromkeys(one.domain for one in found):
+        for readings in dict.fromkeys(one.readings for one in found):
+            some = [one for one in found if (one.domain, one.readings) == (domain, readings)]
+            name = f"{domain}, {readings} reading{'s' if readings != '1' else ''}"
+            yield from _honest(name, some)
+            share = float(np.mean([one.status in ("ok", "coarse") for one in some]))
+            yield Row(
+                f"share of readings that determine mu: {name}", "no reference", 1.0, share, 0.0,
+                "the others say above, below, blind or ambiguous", "statement", "at most",
+            )  # fmt: skip
+            wrong = float(np.mean([one.status in ("outside", "contradiction") for one in some]))
+            yield Row(
+                f"share of readings called out of range or contradictory: {name}", "p = 0.001", 0.02, wrong, 0.0,
+                "all are presses of a sensor within its tolerances", "verification", "at most",
+            )  # fmt: skip
+
+
+def _honest(name: str, some: list[Judged]) -> Iterator[Row]:
+    z = np.array([one.z for one in some if math.isfinite(one.z)])
+    inside = float(np.mean([one.inside for one in some]))
+    rms = float(np.sqrt(np.mean(z**2)))
+    count = f"{name}, {len(z)} of {len(some)} with an estimate"
+    why = "goal of this project; readings of one press share its error"
+    yield Row(f"rms of z of mu, not above: {count}", "1 if stated rightly", 1.2, rms, 0.0, why, "statement", "at most")
+    yield Row(f"rms of z of mu, not below: {count}", "1 if stated rightly", 0.8, rms, 0.0, why, "statement", "at least")
+    what = f"share of 90 % sets that contain mu: {name}, {len(some)} readings"
+    yield Row(f"{what}, not below", "0.9 if stated rightly", 0.85, inside, 0.0, why, "verification", "at least")
+    yield Row(f"{what}, not above", "0.9 if stated rightly", 0.95, inside, 0.0, why, "statement", "at most")
+
+
+def _draw(figure: Any, found: list[Judged]) -> None:
+    figure.set_size_inches(12.0, 4.8)
+    figure.set_layout_engine("constrained")
+    left, right = figure.subplots(1, 2)
+    colours = {("plane-strain", "1"): "#92c5de", ("plane-strain", "3"): "#2166ac", ("solid", "1"): "#f4a582",
+               ("solid", "3"): "#b2182b"}  # fmt: skip
+    for case, colour in colours.items():
+        some = [one for one in found if (one.domain, one.readings) == case and math.isfinite(one.z)]
+        if some:
+            label = f"{case[0]}, {case[1]} reading{'s' if case[1] != '1' else ''}"
+            left.plot([one.mu for one in some], [one.z for one in some], ".", ms=5, color=colour, label=label)
+            z = np.sort([one.z for one in some])
+            right.plot(z, (np.arange(len(z)) + 0.5) / len(z), color=colour, lw=1.5, label=label)
+    at = np.linspace(-3.5, 3.5, 200)
+    right.plot(at, [0.5 * (1.0 + math.erf(v / math.sqrt(2.0))) for v in at], "--", color="#222222", lw=1.0,
+               label="normal distribution")  # fmt: skip
+    left.axhspan(-1.0, 1.0, color="#dddddd", lw=0, zorder=0, label="one standard deviation")
+    left.set(xlabel="true mu", ylabel="z of mu", ylim=(-4.0, 4.0), title="Error of mu over its standard deviation")
+    right.set(xlabel="z of mu", ylabel="share of readings below", xlim=(-3.5, 3.5), title="Distribution of z")
+    for axes in (left, right):
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3, fontsize=8, frameon=False)
