@@ -181,7 +181,7 @@ def joint_summary(calibration: JointCalibration) -> list[tuple[str, str]]:
         (f"mu within {c.limit:g}", f"{ranges_text(c.trusted)}, with all tolerances"),
         (f"mu +- at mu = {at:.3g}", f"{float(c.mu_sd([at])[0]):.2g} by all readings together"),
         *(
-            (f"  {one.name} alone", f"{float(one.mu_sd([at])[0]):.2g}; noise {one.noise:g} {_unit(one)}".rstrip())
+            (f"  {one.name} alone", f"{_alone(one, at)}; noise {one.noise:g} {_unit(one)}".rstrip())
             for one in c.readings
         ),
         ("variance of mu", "would fall by so much if one of these were known exactly"),
@@ -193,6 +193,12 @@ def joint_summary(calibration: JointCalibration) -> list[tuple[str, str]]:
     if c.failed:
         rows.append(("failed", ", ".join(f"mu = {mu:.4g}" for mu, _ in c.failed)))
     return rows
+
+
+def _alone(calibration: Calibration, mu: float) -> str:
+    """Return the standard deviation of mu by one reading, in words where it tells nothing."""
+    sd = float(calibration.mu_sd([mu])[0])
+    return f"{sd:.2g}" if np.isfinite(sd) else "tells nothing there"
 
 
 def _unit(calibration: Calibration) -> str:
