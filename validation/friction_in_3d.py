@@ -6,7 +6,7 @@ deformation.  It is read by the paper's gauge (at x = 36, y = 40 mm, which the p
 three gauges that `finger3d optimise --gauges` places, and by the displacements along x of seven markers on the contact
 face, each 0.02 mm.  The gauges read the free strain, and the strain of foils of 4 mm, 0.02 x 3 mm and 3000 MPa.  The
 standard deviation of mu is that of generalised least squares with the default tolerances of a calibration, but for mesh
-and increments, which computing removes.
+and increments, which computing removes; mu is known to lie between 0.05 and 1, a standard deviation of 0.27.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ Float = NDArray[np.float64]
 Domain = Literal["solid", "plane-strain"]
 
 NOISE, LIMIT = 1.5e-4, 0.1
-MUS = tuple(float(mu) for mu in np.linspace(0.05, 1.0, 14).round(4))
-SIZES: dict[Domain, tuple[float, float]] = {"plane-strain": (1.0, 4.0), "solid": (2.5, 7.5)}
+MUS = tuple(float(mu) for mu in np.linspace(0.05, 1.0, 11).round(4))
+SIZES: dict[Domain, tuple[float, float]] = {"plane-strain": (1.0, 4.0), "solid": (3.0, 9.0)}
 QUICK: dict[Domain, tuple[float, float]] = {"plane-strain": (3.0, 10.0)}
 SMALL, LARGE = "small strain", "large deformation"
 NAMES = {"plane-strain": "section", "solid": "20 mm wide"}
@@ -119,14 +119,12 @@ def _free(body: Model, sets: Mapping[str, Sequence[Gauge]], quick: bool) -> dict
 
 
 def _with_foils(body: Model, sets: Mapping[str, Sequence[Gauge]]) -> dict[str, Float]:
-    """Return the standard deviation of mu by the paper's gauge and by the largest set, where the gauges are foils."""
-    found = {}
-    for name in (PAPER, list(sets)[-1]):
-        gauges = tuple(_inside(body, replace(g, length_mm=4.0)) for g in sets[name])
-        foils = FOIL.apply(replace(body, gauges=gauges))
-        joint, _ = calibrated_together(foils, [g.name for g in gauges], MUS, tolerances=IDEAL)
-        found[name] = _sd(joint)
-    return found
+    """Return the standard deviation of mu by the largest set, where the gauges are foils."""
+    name = list(sets)[-1]
+    gauges = tuple(_inside(body, replace(g, length_mm=4.0)) for g in sets[name])
+    foils = FOIL.apply(replace(body, gauges=gauges))
+    joint, _ = calibrated_together(foils, [g.name for g in gauges], MUS, tolerances=IDEAL)
+    return {name: _sd(joint)}
 
 
 def _inside(body: Model, gauge: Gauge) -> Gauge:
@@ -140,7 +138,8 @@ def _inside(body: Model, gauge: Gauge) -> Gauge:
 
 
 def _sd(joint: JointCalibration) -> Float:
-    return joint.mu_sd(np.array(MUS))
+    """Return the standard deviation of mu, at most that of a mu that may lie anywhere from 0.05 to 1."""
+    return np.asarray(1.0 / np.sqrt(joint.mu_sd(np.array(MUS)) ** -2 + 12.0 / (MUS[-1] - MUS[0]) ** 2))
 
 
 def _rows(spread: Spread) -> list[Row]:
@@ -153,12 +152,12 @@ def _rows(spread: Spread) -> list[Row]:
         what = f"share of mu = 0.05 to 1 that is found within 0.1: {NAMES[domain]}, {measure}, {name}, {read}"
         rows.append(Row(what, "no reference", 0.5, share, 0.0, "half of the range", "statement", "at least"))
     for domain, measure in dict.fromkeys((key[0], key[1]) for key in spread):
-        mean = [float(np.minimum(sd, 0.3).mean()) for key, sd in spread.items()
+        mean = [float(sd.mean()) for key, sd in spread.items()
                 if key[:2] == (domain, measure) and "best" in key[2] and key[3] == FREE]  # fmt: skip
         worst = max(b / a for a, b in zip(mean, mean[1:], strict=False))
         what = f"mean standard deviation of mu with a gauge more, over that before: {NAMES[domain]}, {measure}"
-        rows.append(Row(what, "more readings tell more", 1.05, worst, 0.0, "judged on another grid of mu than placed",
-                        "sensitivity", "at most"))  # fmt: skip
+        rows.append(Row(what, "more readings tell more", 1.05, worst, 0.0, "placed with the error of the mesh, judged "
+                        "without", "sensitivity", "at most"))  # fmt: skip
     return rows
 
 
@@ -175,10 +174,10 @@ def _draw(figure: Any, spread: Spread) -> None:
             if key[:2] == (domain, measure):
                 style = "--" if key[3] == READ else "-"
                 label = f"{key[2]}, as foils" if key[3] == READ else key[2]
-                axes.semilogy(MUS, np.minimum(sd, 10.0), style, color=(colours | blues)[key[2]], lw=1.8, label=label)
+                axes.semilogy(MUS, sd, style, color=(colours | blues)[key[2]], lw=1.8, label=label)
         axes.axhline(LIMIT, color="#222222", lw=0.8)
         axes.text(0.06, LIMIT * 1.08, "the paper's 0.1", fontsize=8)
-        axes.set(xlabel="friction coefficient mu", title=f"{NAMES[domain]}, {measure}", ylim=(3e-3, 3.0))
+        axes.set(xlabel="friction coefficient mu", title=f"{NAMES[domain]}, {measure}", ylim=(2e-3, 0.4))
         axes.grid(alpha=0.3)
     panels[0].set_ylabel("standard deviation of mu")
     handles, labels = panels[0].get_legend_handles_labels()
