@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 import shlex
 import shutil
@@ -17,6 +18,7 @@ COARSE = {
     "compare": "mesh.mesher=swept mesh.size_mm=8.0 mesh.base_size_mm=20.0 press.steps=5",
     "calibrate": "mesh.size_mm=2.0 mesh.base_size_mm=8.0 press.steps=10",
     "sweep": "model.domain=plane-strain mesh.size_mm=3.0 mesh.base_size_mm=12.0",
+    "identify": "model.domain=plane-strain mesh.size_mm=4.0 mesh.base_size_mm=12.0 press.steps=5",
     "optimise": "model.domain=plane-strain mesh.size_mm=3.0 mesh.base_size_mm=12.0 press.steps=10",
 }
 """What a test adds to a command, so that it takes seconds; the commands are the README's otherwise."""
@@ -52,11 +54,17 @@ def folder(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_every_command_is_run(root: Path, folder: Path, capsys: pytest.CaptureFixture) -> None:
     shown = commands(root)
-    assert {c.split()[1] for c in shown} >= set("new plan press compare calibrate estimate sweep export show".split())
+    assert {c.split()[1] for c in shown} >= set(
+        "new plan press compare calibrate estimate identify optimise sweep export show".split()
+    )
     for command in shown:
         words = shlex.split(command)[1:]
         for key in COARSE["gear" if "gear" in command else words[0]].split() if words[0] in COARSE else ():
             words += ["--set", key]
+        if words[0] == "identify":
+            rows = list(csv.DictReader(Path("out/mine/history.csv").open()))
+            lines = [f"{row['depth_mm']},{row['normal_force_N']}" for row in rows]
+            Path("bench.csv").write_text("\n".join(["depth_mm,normal_force_N", *lines]) + "\n")
         assert main(words) == 0, f"{command}: {capsys.readouterr().err}"
 
 
