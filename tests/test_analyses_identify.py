@@ -92,6 +92,18 @@ def test_an_offset_of_the_depth_is_found(tmp_path: Path, scene_file: Path) -> No
     assert found.fitted.values[1] == pytest.approx(-0.3, abs=0.05)
 
 
+def test_the_depth_is_fitted_under_a_prescribed_force(tmp_path: Path, scene_file: Path) -> None:
+    force = {"press": {"force_N": 60.0, "steps": 5}}
+    true = parse(scene(**force, material={"nu": 0.45, "E_MPa": 0.8}).as_dict() | {"press": force["press"]})
+    rows = [f"{i},{step.depth_mm!r}" for i, step in enumerate(finger3d.press(true).steps, start=1)]
+    measured = tmp_path / "bench.csv"
+    measured.write_text("step,depth_mm\n" + "\n".join(rows) + "\n")
+    scene_file.write_text(parse(scene(**force).as_dict() | {"press": force["press"]}).to_toml(defaults=False))
+    found = finger3d.identify(scene_file, measured, {"material.E_MPa": (0.3, 2.0)}, tmp_path / "out")
+    assert found.presses > 3  # under a force everything depends on the modulus
+    assert found.fitted.values[0] == pytest.approx(0.8, rel=5e-3)
+
+
 def test_what_the_data_cannot_tell_is_said(tmp_path: Path, scene_file: Path) -> None:
     """A force at one small depth tells E nu together, and nothing of friction."""
     rows = list(csv.DictReader(bench(tmp_path / "all.csv").open()))

@@ -17,6 +17,9 @@ from finger3d.scene.messages import listed, nearest
 INDEX = ("step", "time_s", "depth_mm")
 """Columns that say when a row was measured; the first of them that a file has counts."""
 
+_CLOCKS = ("step", "time_s")
+"""Columns that are never fitted; under a prescribed force the depth is."""
+
 STD = "_std"
 
 _FEWEST = 2
@@ -86,7 +89,7 @@ def read_measured(path: Path, known: Sequence[str]) -> MeasuredPress:
     index = next((name for name in INDEX if name in names), None)
     if index is None:
         raise Finger3dError(f"{path}: must have a column {listed(INDEX)}, which says when a row was measured")
-    columns = [n for n in names if n not in INDEX and not n.endswith(STD)]
+    columns = [n for n in names if n not in (index, *_CLOCKS) and not n.endswith(STD)]
     for name in names:
         base = name.removesuffix(STD)
         if base not in known and base not in INDEX:
