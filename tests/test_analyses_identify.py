@@ -66,14 +66,14 @@ def test_known_values_are_found_again(tmp_path: Path, scene_file: Path) -> None:
 
 
 @pytest.mark.slow
-def test_deviations_hold_over_many_benches(tmp_path: Path, scene_file: Path) -> None:
-    z = []
+def test_intervals_hold_over_many_benches(tmp_path: Path, scene_file: Path) -> None:
+    inside = []
     for seed in range(30):
         measured = bench(tmp_path / f"bench{seed}.csv", seed, stds=True)
         fitted = finger3d.identify(scene_file, measured, FREE, tmp_path / f"out{seed}").fitted
-        z += [(v - t) / s for v, t, s in zip(fitted.values, TRUE.values(), fitted.stds, strict=True)]
-    # of 60 standard normal numbers the root mean square is 1 with a standard deviation of 1 / sqrt(120)
-    assert math.sqrt(np.mean(np.square(z))) == pytest.approx(1.0, abs=0.3)
+        inside += [low <= t <= high for low, high, t in zip(fitted.low, fitted.high, TRUE.values(), strict=True)]
+    # a share of 60 has a standard deviation of 0.06
+    assert np.mean(inside) == pytest.approx(0.683, abs=0.15)
 
 
 def test_the_modulus_alone_needs_one_press(tmp_path: Path, scene_file: Path) -> None:
@@ -146,14 +146,29 @@ def test_an_interrupted_identification_continues(tmp_path: Path, scene_file: Pat
     assert len(solved) == found.presses - 5
 
 
+def test_an_interval_follows_a_response_that_saturates() -> None:
+    """Steep below 0.5, flat above: the sum of squares rises by one at 0.49 and at the upper bound."""
+    scales = [Scale("a", 0.0, 1.0)]
+    steep = np.array([[100.0]])
+    found = uncertainty(
+        scales, np.array([0.5]), steep, lambda values: np.array([100.0 * min(float(values[0]) - 0.5, 0.0)])
+    )
+    assert found.low[0] == pytest.approx(0.49, abs=1e-3)
+    assert found.high[0] == 1.0
+
+
 def test_dependent_and_independent_values() -> None:
     scales = [Scale("a", 0.0, 1.0), Scale("b", 1.0, 100.0)]
     assert scales[1].is_logarithmic
     assert scales[1].share(scales[1].value(0.3)) == pytest.approx(0.3)
     only_sum = np.array([[100.0, 100.0], [50.0, 50.0]])
-    told = uncertainty(scales, np.array([0.5, 0.5]), only_sum)
+
+    def linear(slope: Any) -> Any:
+        return lambda values: slope @ np.array([s.share(v) - 0.5 for s, v in zip(scales, values, strict=True)])
+
+    told = uncertainty(scales, np.array([0.5, 0.5]), only_sum, linear(only_sum))
     assert told.untold == ("the data cannot tell a and b apart: they may change against each other and fit as well",)
-    good = uncertainty(scales, np.array([0.5, 0.5]), np.diag([100.0, 200.0]))
+    good = uncertainty(scales, np.array([0.5, 0.5]), np.diag([100.0, 200.0]), linear(np.diag([100.0, 200.0])))
     assert good.untold == ()
     # 1 / 100 of the range, and 1 / 200 of the logarithmic range times the value 10
     assert good.stds == pytest.approx([0.01, 0.005 * 10.0 * math.log(100.0)], rel=1e-2)

@@ -57,11 +57,15 @@ def identify(
     if json_:
         print_json(found.as_dict())
         return
-    fitted = zip(found.keys, found.fitted.values, found.fitted.stds, strict=True)
+    f = found.fitted
+    fitted = zip(found.keys, f.values, f.stds, f.low, f.high, strict=True)
     print_rows(
         found.scene.title,
         [
-            *((key, f"{value:.4g} +- {std:.2g}") for key, value, std in fitted),
+            *(
+                (key, f"{value:.4g} +- {std:.2g} (68 % interval {low:.4g} to {high:.4g})")
+                for key, value, std, low, high in fitted
+            ),
             *(("note", note) for note in found.notes),
             ("presses", f"{found.presses} solved"),
             ("results", str(out / "identified.toml")),

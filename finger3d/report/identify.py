@@ -25,8 +25,8 @@ def identify_page(folder: str | Path) -> Path:
         HeadlineRow("presses solved", str(data["presses"])),
     ]
     found = Table(
-        ("key", "from", "to", "value", "standard deviation"),
-        [(key, *bounds[key], v["value"], v["std"]) for key, v in values.items()],
+        ("key", "from", "to", "value", "standard deviation", "68 % interval"),
+        [(key, *bounds[key], v["value"], v["std"], f"{v['low']:.4g} to {v['high']:.4g}") for key, v in values.items()],
     )
     correlation = Table(
         ("correlation", *values),

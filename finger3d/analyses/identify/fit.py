@@ -4,6 +4,10 @@ Values are fitted as shares of their range, on a logarithmic scale where the bou
 the Jacobian J of the residuals over their standard deviations, ``J^T J`` is the Fisher matrix and its inverse the
 covariance of the values (Bard 1974, Ch. 7).  An eigenvector of the Fisher matrix along which the standard deviation is
 a quarter of the range or more is a combination of values that the data cannot tell.
+
+The response to friction saturates, so that the curvature at the solution may say little a standard deviation away.
+Each value is therefore moved, the others with it by their covariance, until the sum of squares has risen by one: these
+are the ends of its 68 % interval, and their root mean square distance is the standard deviation that is told.
 """
 
 from __future__ import annotations
@@ -30,6 +34,9 @@ _INSIDE = 1e-6
 
 _UNTOLD = 0.25
 """Standard deviation of a combination, over the range, from which the data cannot tell it."""
+
+_TRIALS, _RISE_TOLERANCE, _LARGEST_STEP = 6, 0.1, 3.0
+"""Trials for an end of an interval, tolerance of the rise of the sum of squares, and largest change of a step."""
 
 _STRONG = 0.95  # correlation that is named
 _AT_BOUND = 1e-3  # distance of a share from 0 or 1
@@ -81,6 +88,7 @@ class FittedValues:
     Attributes
     ----------
     values, stds : (k,) arrays
+    low, high : (k,) ends of the 68 % intervals, within the bounds
     correlation : (k, k)
     shares : (k,) of the ranges
     untold : what the data cannot tell, in words; empty if they tell everything
@@ -88,6 +96,8 @@ class FittedValues:
 
     values: Float
     stds: Float
+    low: Float
+    high: Float
     correlation: Float
     shares: Float
     untold: tuple[str, ...]
@@ -136,21 +146,47 @@ def jacobian(scales: Sequence[Scale], shares: Float, residuals: Residuals) -> Fl
     return np.array(columns).T
 
 
-def uncertainty(scales: Sequence[Scale], shares: Float, derivative: Float) -> FittedValues:
-    """Return the values with their covariance from the Jacobian (n, k) by shares."""
+def uncertainty(scales: Sequence[Scale], shares: Float, derivative: Float, residuals: Residuals) -> FittedValues:
+    """Return the values with their uncertainty, from the Jacobian (n, k) by shares and from the residuals around."""
     fisher = derivative.T @ derivative
     eigenvalues, vectors = np.linalg.eigh(fisher)
     # nothing is known less well than its range says
     covariance = (vectors / (np.maximum(eigenvalues, 0.0) + 12.0)) @ vectors.T
     sd = np.sqrt(np.diag(covariance))
-    slopes = np.array([scale.slope(float(share)) for scale, share in zip(scales, shares, strict=True)])
     correlation = covariance / np.outer(sd, sd)
+    values = values_at(scales, shares)
+    ends = np.array([_interval(i, scales, shares, covariance[i] / sd[i], residuals) for i in range(len(scales))])
     told = [
         *_untold(scales, eigenvalues, vectors),
         *_correlated(scales, correlation, eigenvalues),
         *_bound(scales, shares),
     ]
-    return FittedValues(values_at(scales, shares), sd * slopes, correlation, shares, tuple(told))
+    stds = np.sqrt(np.mean((ends - values[:, None]) ** 2, axis=1))
+    return FittedValues(values, stds, ends[:, 0], ends[:, 1], correlation, shares, tuple(told))
+
+
+def _interval(
+    number: int, scales: Sequence[Scale], shares: Float, direction: Float, residuals: Residuals
+) -> tuple[float, float]:
+    """Return the ends of the interval of a value in which the sum of squares rises by less than one.
+
+    `direction` (k,) is the change of the shares for one standard deviation of the value, by the covariance.
+    """
+    least = float(np.sum(residuals(values_at(scales, shares)) ** 2))
+    ends = []
+    for sign in (-1.0, 1.0):
+        step = 1.0
+        for _ in range(_TRIALS):
+            moved = np.clip(shares + sign * step * direction, 0.0, 1.0)
+            try:
+                rise = float(np.sum(residuals(values_at(scales, moved)) ** 2)) - least
+            except Finger3dError:
+                rise = math.inf
+            if abs(rise - 1.0) < _RISE_TOLERANCE or (rise < 1.0 and moved[number] in (0.0, 1.0)):
+                break
+            step *= min(max(1.0 / math.sqrt(max(rise, 1e-12)), 1.0 / _LARGEST_STEP), _LARGEST_STEP)
+        ends.append(scales[number].value(float(moved[number])))
+    return ends[0], ends[1]
 
 
 def _untold(scales: Sequence[Scale], eigenvalues: Float, vectors: Float) -> list[str]:

@@ -68,7 +68,13 @@ class Identification:
             "measured": str(self.measured.path),
             "index": self.measured.index,
             "values": {
-                key: {"value": float(fitted.values[i]), "std": float(fitted.stds[i])} for i, key in enumerate(self.keys)
+                key: {
+                    "value": float(fitted.values[i]),
+                    "std": float(fitted.stds[i]),
+                    "low": float(fitted.low[i]),
+                    "high": float(fitted.high[i]),
+                }
+                for i, key in enumerate(self.keys)
             },
             "correlation": {
                 key: dict(zip(self.keys, map(float, fitted.correlation[i]), strict=True))
@@ -186,7 +192,7 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
         shares = fit(scales, shares, residuals, say)
         stds |= _by_residuals(data, simulation.at(values_at(scales, shares), data), len(scales))
     values = values_at(scales, shares)
-    fitted = uncertainty(scales, shares, jacobian(scales, shares, residuals))
+    fitted = uncertainty(scales, shares, jacobian(scales, shares, residuals), residuals)
     simulated = simulation.at(values, data)
     reduced = _reduced_chi_square(data, simulated, len(scales))
     notes = [*fitted.untold, *([text] if reduced == reduced and (text := misfit_text(reduced)) else [])]
