@@ -43,8 +43,8 @@ GAUGES: dict[Domain, tuple[tuple[float, float, float], ...]] = {
     "solid": ((31.0, 39.2, 19.2), (20.0, 30.0, 90.0)),
 }
 FINER = 4.0
-DRAWS: dict[Domain, int] = {"plane-strain": 48, "solid": 24}
-JUDGES: dict[Domain, int] = {"plane-strain": 3, "solid": 5}
+DRAWS: dict[Domain, int] = {"plane-strain": 48, "solid": 12}
+JUDGES: dict[Domain, int] = {"plane-strain": 3, "solid": 10}
 FEWEST = 10
 READ_STEPS: dict[Domain, int] = {"plane-strain": 160, "solid": 120}
 COUNTS = (10, 20, 40, 80)
