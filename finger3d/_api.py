@@ -137,8 +137,9 @@ def optimise(
     OptimisationResult
         With the best design as a scene that can be pressed.
     """
+    from finger3d.analyses.free_keys import FreeKey
     from finger3d.analyses.optimise.run import optimise as run
-    from finger3d.analyses.optimise.task import MUS, FreeKey, OptimisationProblem
+    from finger3d.analyses.optimise.task import MUS, OptimisationProblem
     from finger3d.scene import tree
 
     problem = OptimisationProblem(
@@ -186,8 +187,9 @@ def place_gauges(
     GaugePlaces
         With the scene that has these gauges, and the standard deviation of mu.
     """
+    from finger3d.analyses.free_keys import FreeKey
     from finger3d.analyses.optimise.gauge_run import place_gauges as run
-    from finger3d.analyses.optimise.task import MUS, FreeKey
+    from finger3d.analyses.optimise.task import MUS
     from finger3d.scene import tree
 
     given = tree.override(tree.read(Path(scene)), overrides)
@@ -219,8 +221,8 @@ def identify(
     Identification
         With the values, their standard deviations and correlation, and what the data cannot tell.
     """
+    from finger3d.analyses.free_keys import FreeKey
     from finger3d.analyses.identify.run import identify as run
-    from finger3d.analyses.optimise.task import FreeKey
     from finger3d.scene import tree
 
     given = tree.override(tree.read(Path(scene)), overrides)

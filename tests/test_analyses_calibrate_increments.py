@@ -13,8 +13,8 @@ import pytest
 from finger3d.analyses.calibrate.increments import choose_increments, error_of_increments, pairwise_error
 from finger3d.analyses.calibrate.reference import read
 from finger3d.analyses.calibrate.run import calibrate, calibrated
+from finger3d.analyses.free_keys import FreeKey
 from finger3d.analyses.optimise.run import optimise
-from finger3d.analyses.optimise.task import FreeKey
 from finger3d.analyses.optimise.task import OptimisationProblem as Search
 from finger3d.mechanics.build import build
 from finger3d.sensor import estimate, load

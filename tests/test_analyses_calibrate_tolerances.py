@@ -16,7 +16,7 @@ from finger3d.analyses.calibrate import run as runs
 from finger3d.analyses.calibrate import tolerances as slopes
 from finger3d.analyses.calibrate.run import calibrate, calibrated
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
-from finger3d.analyses.calibrate.tolerances import with_modulus
+from finger3d.analyses.calibrate.variations import with_modulus
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.contact import acceleration
 from finger3d.contact.friction import Coulomb

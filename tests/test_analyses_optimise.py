@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from finger3d.analyses.free_keys import FreeKey
 from finger3d.analyses.optimise.run import optimise
-from finger3d.analyses.optimise.task import FreeKey, ObjectiveTable, OptimisationProblem, sensitivity
+from finger3d.analyses.optimise.task import ObjectiveTable, OptimisationProblem, sensitivity
 from finger3d.cli import main
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.build import build

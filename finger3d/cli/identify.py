@@ -44,8 +44,8 @@ def identify(
     scene
         The scene file (TOML).
     """
+    from finger3d.analyses.free_keys import FreeKey
     from finger3d.analyses.identify.run import identify as run
-    from finger3d.analyses.optimise.task import FreeKey
     from finger3d.scene import tree
 
     given = tree.override(tree.read(scene), set_ or [])

@@ -68,8 +68,9 @@ def optimise(
     if gauges is not None:
         _place_gauges(scene, gauges, free or [], out, mu, noise, tolerance, set_, json_)
         return
+    from finger3d.analyses.free_keys import FreeKey
     from finger3d.analyses.optimise.run import optimise
-    from finger3d.analyses.optimise.task import MUS, FreeKey, OptimisationProblem
+    from finger3d.analyses.optimise.task import MUS, OptimisationProblem
     from finger3d.scene import tree
 
     problem = OptimisationProblem(
@@ -124,8 +125,9 @@ def _place_gauges(
     json_: bool,
 ) -> None:
     """Find the places of several gauges, and print them."""
+    from finger3d.analyses.free_keys import FreeKey
     from finger3d.analyses.optimise.gauge_run import place_gauges
-    from finger3d.analyses.optimise.task import MUS, FreeKey
+    from finger3d.analyses.optimise.task import MUS
     from finger3d.scene import tree
 
     given = tree.override(tree.read(scene), set_ or [])

@@ -235,6 +235,12 @@ class Model:
         return tuple(name for reading in self.readings for name in reading.columns(dim))
 
     @property
+    def forces_scale_with_modulus(self) -> bool:
+        """Whether all forces are proportional to Young's modulus, and no displacement depends on it."""
+        forced = any(leg.force_N is not None for leg in self.legs)
+        return self.inclusions is None and self.object_compliance is None and not forced
+
+    @property
     def largest_depth_mm(self) -> float:
         """Depth of the deepest leg."""
         return max(leg.depth_mm for leg in self.legs)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
+from finger3d._types import Tree
 from finger3d.report.build import Code, Figure, HeadlineRow, PageSection, Table, write_page
 from finger3d.report.scene import how_modelled
 from finger3d.results.summary import read_json, title_of
@@ -44,10 +46,9 @@ def calibrate_page(folder: str | Path) -> Path:
         [(name, t["sd"], t["unit"], t["mu_sd"][best[0]] if best else "") for name, t in data["tolerances"].items()],
     )
     use = f"finger3d estimate {folder}/calibration.json --strain {strain[len(strain) // 2]:.4g}"
-    failed = [f"mu = {f['mu']:g}: {f['why']}" for f in data["failed"]]
-    note = data["about"].get("mesh", {}).get("note")
-    return write_page(
+    return _write(
         folder,
+        data,
         f"{title_of(data['scene'])}: gauge {data['gauge']} against friction",
         headline,
         [
@@ -60,11 +61,6 @@ def calibrate_page(folder: str | Path) -> Path:
             Figure("calibration.png", "Strain and fit, resolution, and contributions to the variance of mu"),
             Figure("map.png", "Sensitivity of strain to friction over the section"),
         ],
-        command="calibrate",
-        outcome="converged" if not failed else f"{len(failed)} values of mu gave no numbers",
-        good=not failed,
-        notes=[*failed, *([note] if note else [])],
-        versions=data["about"].get("versions"),
     )
 
 
@@ -105,10 +101,9 @@ def joint_calibration_page(folder: str | Path) -> Path:
         [(name, f"{100.0 * share[best]:.1f} %") for name, share in data["variance_reductions"].items()],
     )
     given = " ".join(f"--strain {name}={r['curve'][len(mu) // 2]:.4g}" for name, r in readings.items())
-    failed = [f"mu = {f['mu']:g}: {f['why']}" for f in data["failed"]]
-    note = data["about"].get("mesh", {}).get("note")
-    return write_page(
+    return _write(
         folder,
+        data,
         f"{title_of(data['scene'])}: {len(readings)} readings against friction",
         headline,
         [
@@ -118,14 +113,34 @@ def joint_calibration_page(folder: str | Path) -> Path:
             PageSection("Use it", [Code(f"finger3d estimate {folder}/calibration.json {given}")]),
         ],
         [Figure("calibration.png", "Readings, standard deviation of mu, and what would reduce its variance")],
-        command="calibrate",
-        outcome="converged" if not failed else f"{len(failed)} values of mu gave no numbers",
-        good=not failed,
-        notes=[*failed, *([note] if note else [])],
-        versions=data["about"].get("versions"),
     )
 
 
 def _or_blank(value: float | None) -> float | str:
     """Return a number, or nothing where it is not finite."""
     return "" if value is None else value
+
+
+def _write(
+    folder: Path,
+    data: Tree,
+    title: str,
+    headline: Sequence[HeadlineRow],
+    sections: Sequence[PageSection],
+    figures: Sequence[Figure],
+) -> Path:
+    """Write the page of a calibration, with the values of mu that failed and the note on its mesh."""
+    failed = [f"mu = {f['mu']:g}: {f['why']}" for f in data["failed"]]
+    note = data["about"].get("mesh", {}).get("note")
+    return write_page(
+        folder,
+        title,
+        headline,
+        sections,
+        figures,
+        command="calibrate",
+        outcome="converged" if not failed else f"{len(failed)} values of mu gave no numbers",
+        good=not failed,
+        notes=[*failed, *([note] if note else [])],
+        versions=data["about"].get("versions"),
+    )

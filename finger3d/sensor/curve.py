@@ -294,7 +294,7 @@ def ranges_text(intervals: Sequence[tuple[float, float]]) -> str:
 def summary(calibration: Calibration) -> list[tuple[str, str]]:
     """Return the table that concludes a calibration."""
     c = calibration
-    at = float(c.mu[np.argmin(np.abs(c.mu - 0.5))]) if c.mu[0] <= 0.5 <= c.mu[-1] else float(c.mu[len(c.mu) // 2])
+    at = typical(c.mu)
     shares = sorted(c.shares(at).items(), key=lambda item: -item[1])
     sd = float(c.mu_sd([at])[0])
     rows = [
@@ -313,13 +313,27 @@ def summary(calibration: Calibration) -> list[tuple[str, str]]:
         steps = ", ".join(str(n) for n in c.about.get("increments", {}).get("steps", ()))
         said = f"leave an error of up to {left.spread.max():.2g} in the strain"
         rows.insert(1, (f"increments {steps}".strip(), said))
-    if mesh := c.about.get("mesh"):
-        note = f"; {mesh['note']}" if mesh["note"] else ""
-        rows.insert(1, ("mesh", f"edges of {mesh['size_mm']:.3g} and {mesh['base_size_mm']:.3g} mm{note}"))
-    if c.failed:
-        rows.append(("failed", ", ".join(f"mu = {mu:.4g}" for mu, _ in c.failed)))
-    return rows
+    rows[1:1] = mesh_rows(c.about)
+    return rows + failed_rows(c.failed)
 
 
 def _ends(stretches: Sequence[Range]) -> str:
     return ranges_text([(r.low, r.high) for r in stretches])
+
+
+def typical(mu: Float) -> float:
+    """Return the calibrated mu nearest to 0.5, or the middle one where 0.5 is not calibrated."""
+    return float(mu[np.argmin(np.abs(mu - 0.5))] if mu[0] <= 0.5 <= mu[-1] else mu[len(mu) // 2])
+
+
+def mesh_rows(about: TreeView) -> list[tuple[str, str]]:
+    """Return the row of the mesh for the table that concludes a calibration, if the mesh is known."""
+    if not (mesh := about.get("mesh")):
+        return []
+    note = f"; {mesh['note']}" if mesh["note"] else ""
+    return [("mesh", f"edges of {mesh['size_mm']:.3g} and {mesh['base_size_mm']:.3g} mm{note}")]
+
+
+def failed_rows(failed: Sequence[tuple[float, str]]) -> list[tuple[str, str]]:
+    """Return the row of the values of mu that failed, if any did."""
+    return [("failed", ", ".join(f"mu = {mu:.4g}" for mu, _ in failed))] if failed else []

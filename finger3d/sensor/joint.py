@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from finger3d._types import Float, TreeView
 from finger3d.errors import Finger3dError
-from finger3d.sensor.curve import QUANTITIES, Calibration, ranges_text
+from finger3d.sensor.curve import QUANTITIES, Calibration, failed_rows, mesh_rows, ranges_text, typical
 
 SHARED = ("depth_mm", "E_percent", "nu", "tilt_deg")
 """Tolerances that change all readings together."""
@@ -175,7 +175,7 @@ class JointCalibration:
 def joint_summary(calibration: JointCalibration) -> list[tuple[str, str]]:
     """Return the table that concludes a calibration of several readings."""
     c = calibration
-    at = float(c.mu[np.argmin(np.abs(c.mu - 0.5))]) if c.mu[0] <= 0.5 <= c.mu[-1] else float(c.mu[len(c.mu) // 2])
+    at = typical(c.mu)
     shares = sorted(c.reductions([at]).items(), key=lambda item: -float(item[1][0]))
     rows = [
         (f"mu within {c.limit:g}", f"{ranges_text(c.trusted)}, with all tolerances"),
@@ -187,12 +187,8 @@ def joint_summary(calibration: JointCalibration) -> list[tuple[str, str]]:
         ("variance of mu", "would fall by so much if one of these were known exactly"),
         *((f"  {name}", f"{100.0 * float(share[0]):.1f} %") for name, share in shares),
     ]
-    if mesh := c.about.get("mesh"):
-        note = f"; {mesh['note']}" if mesh["note"] else ""
-        rows.insert(1, ("mesh", f"edges of {mesh['size_mm']:.3g} and {mesh['base_size_mm']:.3g} mm{note}"))
-    if c.failed:
-        rows.append(("failed", ", ".join(f"mu = {mu:.4g}" for mu, _ in c.failed)))
-    return rows
+    rows[1:1] = mesh_rows(c.about)
+    return rows + failed_rows(c.failed)
 
 
 def _alone(calibration: Calibration, mu: float) -> str:

@@ -26,23 +26,18 @@ from finger3d.analyses.calibrate.presses import PressesByMu
 from finger3d.analyses.calibrate.reference import ReferenceBody, ReferenceReadings, read, reading_only
 from finger3d.analyses.calibrate.settings import CalibratedReading
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
+from finger3d.analyses.calibrate.variations import deeper, poisson_step, tilted_mesh, with_modulus
 from finger3d.errors import Finger3dError
-from finger3d.fem.condense import stiffened
-from finger3d.fem.material import MIXED_FROM
-from finger3d.mechanics.build import build
 from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.history import StepResult
-from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.path import targets
-from finger3d.mechanics.problem import Problem, object_share, scatter_to_points
+from finger3d.mechanics.problem import Problem
 from finger3d.objects import Plane
 from finger3d.sensor.curve import LARGEST_SD, Tolerance
 
 _LEAST_POINTS = {2: 150, 3: 500}
 """Contact points, by dimension, from which differences on the coarser mesh are good to a fifth of the largest."""
-
-_TILTED_POINTS = {2: 100, 3: 500}
-"""Contact points, by dimension, that the mesh of a tilted body has about."""
 
 _GAUGE_PLACES = ("gauge_x_mm", "gauge_y_mm", "gauge_angle_deg")
 
@@ -217,14 +212,13 @@ def _vary_depth(body: ReferenceBody, readings: Sequence[CalibratedReading], sd: 
     problem, model = body.problem, body.problem.model
     shallowest = min(leg.depth_mm for leg in model.legs if leg.depth_mm > 0.0)
     for step in (sd, -min(sd, 0.5 * shallowest)):
-        legs = tuple(replace(leg, depth_mm=leg.depth_mm + step * (leg.depth_mm > 0.0)) for leg in model.legs)
+        legs = deeper(model.legs, step)
         yield step, body.change(replace(problem, model=replace(model, legs=legs)), _scaled_to_path(body, legs))
 
 
 def _vary_modulus(body: ReferenceBody, readings: Sequence[CalibratedReading], sd: float) -> Iterator[Effect]:
-    """Raise Young's modulus; if nothing else in the scene has a stiffness, pressures alone depend on it."""
-    model = body.problem.model
-    if model.inclusions is None and model.object_compliance is None:
+    """Raise Young's modulus; where all forces are proportional to it, pressures alone depend on it."""
+    if body.problem.model.forces_scale_with_modulus:
         is_pressure = np.array([r.kind == "taxel" for r in readings])
         yield sd, 0.01 * sd * np.where(is_pressure[:, None], body.readings, 0.0)
     else:
@@ -234,10 +228,8 @@ def _vary_modulus(body: ReferenceBody, readings: Sequence[CalibratedReading], sd
 def _vary_poisson(body: ReferenceBody, readings: Sequence[CalibratedReading], sd: float) -> Iterator[Effect]:
     """Lower Poisson's ratio, or raise it if lowering leaves its range or changes the element."""
     material = body.problem.model.material.isotropic("the tolerance of nu")
-    nu = material.nu
-    changes_element = nu - sd < MIXED_FROM <= nu
-    step = sd if nu - sd < 0.0 or (changes_element and nu + sd <= 0.5) else -sd
-    yield step, body.change(body.rebuilt(material=replace(material, nu=nu + step)))
+    step = poisson_step(material.nu, sd)
+    yield step, body.change(body.rebuilt(material=replace(material, nu=material.nu + step)))
 
 
 def _vary_tilt(body: ReferenceBody, readings: Sequence[CalibratedReading], sd: float) -> Iterator[Effect]:
@@ -320,31 +312,6 @@ def _scaled_to_path(body: ReferenceBody, legs: tuple[Leg, ...]) -> PressesByMu:
     return {mu: replace(press, forces=extrapolated(press.forces)) for mu, press in body.pressed.items()}
 
 
-def with_modulus(problem: Problem, factor: float) -> Problem:
-    """Return the problem with Young's modulus multiplied; in small strain the condensation is reused."""
-    model = problem.model
-    if not model.formulation.is_linear_elastic:
-        material = model.material.isotropic("the tolerance of E_MPa")
-        return build(replace(problem.model, material=replace(material, E_MPa=material.E_MPa * factor)))
-    c, d = problem.delassus.shape[:2]
-
-    def scaled(one: Problem) -> Problem:
-        own = stiffened(one.part.condensed.compliance, one.inclusions.bar_stiffness)
-        active, readings = one.system.active_dofs, len(one.system.reading_rows)
-        of_object = one.delassus - scatter_to_points(own, active, c, d)
-        changed = stiffened(one.part.condensed.compliance / factor, one.inclusions.bar_stiffness)
-        rows = np.zeros_like(one.system.reading_rows)
-        rows[:, active] = changed[len(active) : len(active) + readings, : len(active)]
-        rows[len(rows) - len(model.gauges) - len(model.taxels) : len(rows) - len(model.gauges)] *= factor  # of forces
-        finger = scatter_to_points(changed, active, c, d)
-        share = None if one.system.object_share is None else object_share(one.surface, finger, of_object)
-        system = replace(one.system, delassus=finger + of_object, reading_rows=rows, object_share=share)
-        return replace(one, system=system)
-
-    changed, bare = scaled(problem), problem.without_inclusions
-    return replace(changed, without_inclusions=scaled(bare)) if bare else changed
-
-
 def _on_coarser_mesh(body: ReferenceBody, say: Callable[[str], None]) -> ReferenceBody | None:
     """Return the body on the coarser mesh that the error bar comes from; None if there is no coarser mesh."""
     try:
@@ -373,11 +340,3 @@ def _increment_errors(problem: Problem, names: tuple[str, ...], own: Float, incr
     """Return the errors (k, m) of readings due to the increments, from presses with more or fewer of them."""
     error = error_of_increments(problem, own.ravel(), increments.chosen, lambda other: read(other, names, mu).ravel())
     return error.reshape(own.shape)
-
-
-def tilted_mesh(problem: Problem) -> MeshOptions:
-    """Return the mesh options of a tilted body: longer edges, and a structured mesh where the design allows one."""
-    options, left = problem.model.mesh, len(problem.points.nodes) / _TILTED_POINTS[problem.dim]
-    factor = min(2.0, max(1.0, left)) if problem.dim == 2 else min(1.5, max(1.25, math.sqrt(left)))
-    mesher: Any = "swept" if problem.model.design.section() is not None else options.mesher
-    return replace(options, size_mm=factor * options.size_mm, base_size_mm=factor * options.base_size_mm, mesher=mesher)

@@ -20,7 +20,7 @@ import numpy as np
 from scipy import optimize
 
 from finger3d._types import Float
-from finger3d.analyses.optimise.task import FreeKey
+from finger3d.analyses.free_keys import FreeKey
 from finger3d.errors import Finger3dError
 
 _STEP = 0.01

@@ -11,11 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from finger3d._types import Float, Tree, TreeView
+from finger3d.analyses.free_keys import FreeKey, check_distinct, scene_with
 from finger3d.analyses.identify.fit import FittedValues, Scale, fit, jacobian, misfit_text, uncertainty, values_at
 from finger3d.analyses.identify.measured import MeasuredPress, read_measured
 from finger3d.analyses.identify.simulated import MODULUS, OFFSET, Curve, Simulation, largest, names_of, row_mistake
-from finger3d.analyses.optimise.task import FreeKey
-from finger3d.analyses.sweep.points import numbered
 from finger3d.errors import Finger3dError
 from finger3d.io import atomic, claimed, write_csv, write_json
 from finger3d.plotting.identify import Panel, draw
@@ -145,17 +144,10 @@ def _checked_start(given: TreeView, free: Sequence[FreeKey], path: Path | None) 
     """Return the values of the scene (k,), or the middle of the bounds where they lie outside."""
     if not free:
         raise Finger3dError("identify: nothing is free; give at least one --free, such as material.E_MPa=0.05:5")
-    keys = [numbered(f.key, given, "--free") for f in free]
-    if len(set(keys)) < len(keys):
-        raise Finger3dError(f"--free {next(k for i, k in enumerate(keys) if k in keys[:i])}: given twice")
-    values = []
-    for key, one in zip(keys, free, strict=True):
-        own: object = 0.0 if key == OFFSET else tree.value_at(given, key)
-        middle = 0.5 * (one.low + one.high)
-        values.append(float(own) if isinstance(own, int | float) and one.low <= own <= one.high else middle)
-    scene_keys = [(k, v) for k, v in zip(keys, values, strict=True) if k != OFFSET]
-    probe = tree.override(dict(given), [f"{k}={v!r}" for k, v in scene_keys], "--free")
-    parse(probe, path, dict.fromkeys((k for k, _ in scene_keys), "--free"))
+    check_distinct([f.numbered(given) for f in free])
+    values = [0.0 if f.key == OFFSET and f.low <= 0.0 <= f.high else f.start(given) for f in free]
+    scene_keys = [(f.numbered(given), v) for f, v in zip(free, values, strict=True) if f.key != OFFSET]
+    scene_with(given, [key for key, _ in scene_keys], [value for _, value in scene_keys], path)
     return np.array(values)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -12,16 +13,15 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from finger3d._types import Float, Tree, TreeView
+from finger3d.analyses.free_keys import FreeKey, scene_with
 from finger3d.analyses.identify.measured import MeasuredPress
-from finger3d.analyses.optimise.task import FreeKey
 from finger3d.analyses.shared_body import SharedBody, Variant, body_key
-from finger3d.analyses.sweep.points import numbered
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.history import flat_readings, measure, without_readings
 from finger3d.mechanics.model import Model
 from finger3d.results.journal import Journal
 from finger3d.results.summary import PressStep
-from finger3d.scene import Scene, parse, tree
+from finger3d.scene import Scene
 
 MODULUS, OFFSET = "material.E_MPa", "depth_offset_mm"
 """Keys without a solution of their own: forces scale with one; the other is added to the measured depth."""
@@ -77,24 +77,15 @@ class Simulation:
         """Number of presses that were solved."""
         return len(self._known)
 
-    @property
+    @cached_property
     def scales_with_modulus(self) -> bool:
         """Whether all forces are proportional to Young's modulus, and nothing else depends on it."""
-        model = self.scene([self._middle(f) for f in self.free]).model()
-        forced = any(leg.force_N is not None for leg in model.legs)
-        return model.inclusions is None and model.object_compliance is None and not forced
-
-    @staticmethod
-    def _middle(free: FreeKey) -> float:
-        return 0.5 * (free.low + free.high)
+        return self.scene([f.middle for f in self.free]).model().forces_scale_with_modulus
 
     def scene(self, values: Sequence[float] | Float) -> Scene:
         """Return the scene with values of the free keys; the offset of the depth is none of its keys."""
-        pairs = [(f.key, float(v)) for f, v in zip(self.free, values, strict=True) if f.key != OFFSET]
-        keys = [numbered(key, self.given, "--free") for key, _ in pairs]
-        changes = [f"{key}={value!r}" for key, (_, value) in zip(keys, pairs, strict=True)]
-        changed = tree.override(dict(self.given), changes, "--free")
-        return parse(changed, path=self.path, set_keys=dict.fromkeys(keys, "--free"))
+        pairs = [(f.numbered(self.given), v) for f, v in zip(self.free, values, strict=True) if f.key != OFFSET]
+        return scene_with(self.given, [key for key, _ in pairs], [value for _, value in pairs], self.path)
 
     def curve(self, values: Sequence[float] | Float) -> Curve:
         """Return the simulated curve, which begins at first touch, where everything is zero.
@@ -109,7 +100,7 @@ class Simulation:
             if free.key == OFFSET:
                 wanted[i] = 0.0
             if free.key == MODULUS and self.scales_with_modulus:
-                factor, wanted[i] = wanted[i] / self._middle(free), self._middle(free)
+                factor, wanted[i] = wanted[i] / free.middle, free.middle
         point = tuple(wanted)
         if point not in self._known:
             row = self._solve(point)

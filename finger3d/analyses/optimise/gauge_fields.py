@@ -16,7 +16,7 @@ from finger3d._types import Float
 from finger3d.accuracy.companions import built_like, companion, edge_ratio
 from finger3d.accuracy.richardson import gain
 from finger3d.analyses.calibrate.presses import presses
-from finger3d.analyses.calibrate.tolerances import tilted_mesh
+from finger3d.analyses.calibrate.variations import deeper, poisson_step, tilted_mesh, with_modulus
 from finger3d.errors import Finger3dError
 from finger3d.fem.recover import displacement
 from finger3d.mechanics.build import MARGIN, build
@@ -33,9 +33,6 @@ Say = Callable[[str], None]
 
 _STEPS = 20
 """Increments of a leg whose number is automatic: places are compared with each other, not read."""
-
-SHARED = ("depth_mm", "nu", "tilt_deg")
-"""Tolerances that change all gauges together; Young's modulus changes no strain under a prescribed depth."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +81,7 @@ class GaugeFields:
     mus : (m,) ascending
     noise : standard deviation of a strain reading
     tolerances : standard deviation by name
-    shared : by tolerance of `SHARED`, a function that returns its effect (p, a, m) at points and angles
+    shared : for each tolerance that changes all gauges together, its effect (p, a, m) at given points and angles
     coarse, gain : field on the companion mesh, and its change over the error of the mesh
     """
 
@@ -105,7 +102,7 @@ class GaugeFields:
         say("pressing the body")
         nominal = _nominal(model, mus, say)
         problem, shared = nominal.problem, {}
-        for name, make in (("depth_mm", _depth), ("nu", _nu), ("tilt_deg", _tilt)):
+        for name, make in (("depth_mm", _depth), ("E_percent", _modulus), ("nu", _nu), ("tilt_deg", _tilt)):
             if name in tolerances:
                 say(f"tolerance {name}")
                 found = make(nominal, mus, tolerances[name])
@@ -180,15 +177,23 @@ Effect = Callable[[Float, Float], Float]
 def _depth(nominal: StrainField, mus: Sequence[float], sd: float) -> Effect:
     """Press deeper by one standard deviation."""
     problem = nominal.problem
-    legs = tuple(replace(leg, depth_mm=leg.depth_mm + sd * (leg.depth_mm > 0.0)) for leg in problem.model.legs)
-    deeper = StrainField.of(replace(problem, model=replace(problem.model, legs=legs)), mus)
-    return lambda points, angles: deeper.strain(points, angles) - nominal.strain(points, angles)
+    legs = deeper(problem.model.legs, sd)
+    other = StrainField.of(replace(problem, model=replace(problem.model, legs=legs)), mus)
+    return lambda points, angles: other.strain(points, angles) - nominal.strain(points, angles)
+
+
+def _modulus(nominal: StrainField, mus: Sequence[float], sd: float) -> Effect | None:
+    """Raise Young's modulus; where all forces are proportional to it no strain changes."""
+    if nominal.problem.model.forces_scale_with_modulus:
+        return None
+    other = StrainField.of(with_modulus(nominal.problem, 1.0 + 0.01 * sd), mus)
+    return lambda points, angles: other.strain(points, angles) - nominal.strain(points, angles)
 
 
 def _nu(nominal: StrainField, mus: Sequence[float], sd: float) -> Effect:
-    """Return the effect of raising Poisson's ratio, from lowering it unless that leaves its range."""
+    """Return the effect of raising Poisson's ratio."""
     material = nominal.problem.model.material.isotropic("the tolerance of nu")
-    step = -sd if material.nu >= sd else sd
+    step = poisson_step(material.nu, sd)
     model = replace(nominal.problem.model, material=replace(material, nu=material.nu + step))
     other = StrainField.of(built_like(nominal.problem, model), mus)
     sign = math.copysign(1.0, step)

@@ -11,9 +11,10 @@ import numpy as np
 
 from finger3d._types import Float, Tree, TreeView
 from finger3d.analyses.calibrate.tolerances import with_defaults
+from finger3d.analyses.free_keys import FreeKey
 from finger3d.analyses.optimise.gauge_fields import GaugeFields
 from finger3d.analyses.optimise.gauge_search import Candidates, GaugeSet, Region, objectives, search
-from finger3d.analyses.optimise.task import MUS, FreeKey
+from finger3d.analyses.optimise.task import MUS
 from finger3d.errors import Finger3dError
 from finger3d.io import atomic, claimed, write_csv, write_json
 from finger3d.mechanics.model import Model

@@ -13,10 +13,10 @@ import numpy as np
 
 from finger3d._types import Float, Tree
 from finger3d.analyses.calibrate.increments import choose_increments, error_of_increments
+from finger3d.analyses.free_keys import FreeKey
 from finger3d.analyses.optimise.evaluation import Evaluation, evaluation_of, row_check
 from finger3d.analyses.optimise.task import (
     METHODS,
-    FreeKey,
     Objective,
     ObjectiveTable,
     OptimisationProblem,

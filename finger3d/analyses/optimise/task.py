@@ -12,39 +12,15 @@ from pathlib import Path
 import numpy as np
 
 from finger3d._types import Float, Tree, TreeView
-from finger3d.analyses.sweep.points import numbered
+from finger3d.analyses.free_keys import FreeKey, check_distinct, scene_with
 from finger3d.errors import Finger3dError
 from finger3d.scene import Scene, parse, tree
-from finger3d.scene.messages import shown
 
 Objective = Callable[["ObjectiveTable"], float]
 
 MUS = tuple(float(v) for v in np.round(np.linspace(0.05, 1.0, 9), 5))
 METHODS = ("differential-evolution", "dual-annealing", "nelder-mead")
 _OBJECTIVE_ERRORS = (ArithmeticError, AttributeError, LookupError, NameError, TypeError, ValueError)
-
-
-@dataclass(frozen=True)
-class FreeKey:
-    """Free key of the scene and its bounds."""
-
-    key: str
-    low: float
-    high: float
-
-    @classmethod
-    def of(cls, text: str) -> FreeKey:
-        """From ``KEY=LOW:HIGH``."""
-        key, equals, bounds = text.partition("=")
-        try:
-            low, high = (float(part) for part in bounds.split(":"))
-        except ValueError:
-            low = high = math.nan
-        if not equals or not key.strip() or not (math.isfinite(low) and math.isfinite(high) and low < high):
-            raise Finger3dError(
-                f"--free {shown(text)}: must be KEY=LOW:HIGH with LOW below HIGH, for instance finger.radius_mm=60:200"
-            )
-        return cls(key.strip(), low, high)
 
 
 @dataclass(frozen=True)
@@ -135,14 +111,11 @@ class OptimisationProblem:
 
     def keys(self) -> tuple[str, ...]:
         """Return the keys as they are set, with the numbers of gauges."""
-        return tuple(numbered(f.key, self.given, "--free") for f in self.free)
+        return tuple(f.numbered(self.given) for f in self.free)
 
     def scene(self, values: Sequence[float]) -> Scene:
         """Return the scene with these values of the free keys."""
-        keys = self.keys()
-        changes = [f"{key}={value!r}" for key, value in zip(keys, values, strict=True)]
-        changed = tree.override(dict(self.given), changes, "--free")
-        return parse(changed, path=self.path, set_keys=dict.fromkeys(keys, "--free"))
+        return scene_with(self.given, self.keys(), values, self.path)
 
     def identity(self) -> Tree:
         """Return what two runs must have in common to continue each other's evaluations; the budget may differ."""
@@ -169,8 +142,7 @@ def checked_start(problem: OptimisationProblem) -> tuple[float, ...]:
     keys = problem.keys()
     if not keys:
         raise Finger3dError("optimise: nothing is free; give at least one --free, such as finger.radius_mm=60:200")
-    if len(set(keys)) < len(keys):
-        raise Finger3dError(f"--free {next(k for i, k in enumerate(keys) if k in keys[:i])}: given twice")
+    check_distinct(keys)
     if len(problem.mus) < 2 or any(b <= a for a, b in zip(problem.mus, problem.mus[1:], strict=False)):
         raise Finger3dError("--mu: must be at least two numbers, ascending")
     if not (math.isfinite(problem.noise) and problem.noise > 0.0):
@@ -180,15 +152,10 @@ def checked_start(problem: OptimisationProblem) -> tuple[float, ...]:
         raise Finger3dError("optimise: the objective reads a gauge, and the scene has no [[gauge]]; add one")
     if problem.gauge is not None and problem.gauge not in names:
         raise Finger3dError(f"--gauge {problem.gauge}: no such gauge; the scene has {', '.join(names) or 'none'}")
-    values = []
-    for key, free in zip(keys, problem.free, strict=True):
-        own = tree.value_at(problem.given, key)
-        middle = 0.5 * (free.low + free.high)
-        values.append(float(own) if isinstance(own, int | float) and free.low <= own <= free.high else middle)
+    values = [free.start(problem.given) for free in problem.free]
     # a key that no scene has is refused now, a design that cannot be built is a line of the table
-    probe = tree.override(dict(problem.given), [f"{k}={v!r}" for k, v in zip(keys, values, strict=True)], "--free")
     try:
-        parse(probe, problem.path, dict.fromkeys(keys, "--free"))
+        problem.scene(values)
     except Finger3dError as error:
         if "no such key" in str(error) or "must be a " in str(error):
             raise

@@ -1,0 +1,62 @@
+"""Bodies and paths that differ by a tolerance from those of a problem."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from finger3d.fem.condense import stiffened
+from finger3d.fem.material import MIXED_FROM
+from finger3d.mechanics.build import build
+from finger3d.mechanics.model import Leg, MeshOptions
+from finger3d.mechanics.problem import Problem, object_share, scatter_to_points
+
+_TILTED_POINTS = {2: 100, 3: 500}
+"""Contact points, by dimension, that the mesh of a tilted body has about."""
+
+
+def deeper(legs: tuple[Leg, ...], step: float) -> tuple[Leg, ...]:
+    """Return the legs with a step (mm) added to every depth but that of first touch."""
+    return tuple(replace(leg, depth_mm=leg.depth_mm + step * (leg.depth_mm > 0.0)) for leg in legs)
+
+
+def poisson_step(nu: float, sd: float) -> float:
+    """Return -sd, or sd if a lower Poisson's ratio leaves its range or changes the element."""
+    changes_element = nu - sd < MIXED_FROM <= nu
+    return sd if nu - sd < 0.0 or (changes_element and nu + sd <= 0.5) else -sd
+
+
+def with_modulus(problem: Problem, factor: float) -> Problem:
+    """Return the problem with Young's modulus multiplied; in small strain the condensation is reused."""
+    model = problem.model
+    if not model.formulation.is_linear_elastic:
+        material = model.material.isotropic("the tolerance of E_MPa")
+        return build(replace(problem.model, material=replace(material, E_MPa=material.E_MPa * factor)))
+    c, d = problem.delassus.shape[:2]
+
+    def scaled(one: Problem) -> Problem:
+        own = stiffened(one.part.condensed.compliance, one.inclusions.bar_stiffness)
+        active, readings = one.system.active_dofs, len(one.system.reading_rows)
+        of_object = one.delassus - scatter_to_points(own, active, c, d)
+        changed = stiffened(one.part.condensed.compliance / factor, one.inclusions.bar_stiffness)
+        rows = np.zeros_like(one.system.reading_rows)
+        rows[:, active] = changed[len(active) : len(active) + readings, : len(active)]
+        rows[len(rows) - len(model.gauges) - len(model.taxels) : len(rows) - len(model.gauges)] *= factor  # of forces
+        finger = scatter_to_points(changed, active, c, d)
+        share = None if one.system.object_share is None else object_share(one.surface, finger, of_object)
+        system = replace(one.system, delassus=finger + of_object, reading_rows=rows, object_share=share)
+        return replace(one, system=system)
+
+    changed, bare = scaled(problem), problem.without_inclusions
+    return replace(changed, without_inclusions=scaled(bare)) if bare else changed
+
+
+def tilted_mesh(problem: Problem) -> MeshOptions:
+    """Return the mesh options of a tilted body: longer edges, and a structured mesh where the design allows one."""
+    options, left = problem.model.mesh, len(problem.points.nodes) / _TILTED_POINTS[problem.dim]
+    factor = min(2.0, max(1.0, left)) if problem.dim == 2 else min(1.5, max(1.25, math.sqrt(left)))
+    mesher: Any = "swept" if problem.model.design.section() is not None else options.mesher
+    return replace(options, size_mm=factor * options.size_mm, base_size_mm=factor * options.base_size_mm, mesher=mesher)

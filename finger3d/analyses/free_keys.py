@@ -1,0 +1,65 @@
+"""Free keys of a scene and their bounds, for searches and fits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from finger3d._types import Float, TreeView
+from finger3d.analyses.sweep.points import numbered
+from finger3d.errors import Finger3dError
+from finger3d.scene import Scene, parse, tree
+from finger3d.scene.messages import shown
+
+
+@dataclass(frozen=True)
+class FreeKey:
+    """Free key of the scene and its bounds."""
+
+    key: str
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, text: str) -> FreeKey:
+        """From ``KEY=LOW:HIGH``."""
+        key, equals, bounds = text.partition("=")
+        try:
+            low, high = (float(part) for part in bounds.split(":"))
+        except ValueError:
+            low = high = math.nan
+        if not equals or not key.strip() or not (math.isfinite(low) and math.isfinite(high) and low < high):
+            raise Finger3dError(
+                f"--free {shown(text)}: must be KEY=LOW:HIGH with LOW below HIGH, for instance finger.radius_mm=60:200"
+            )
+        return cls(key.strip(), low, high)
+
+    def numbered(self, given: TreeView) -> str:
+        """Return the key as it is set, with the number of a gauge in place of its name."""
+        return numbered(self.key, given, "--free")
+
+    def start(self, given: TreeView) -> float:
+        """Return the value of the scene as written, or the middle of the bounds where it lies outside."""
+        own = tree.value_at(given, self.numbered(given))
+        return float(own) if isinstance(own, int | float) and self.low <= own <= self.high else self.middle
+
+    @property
+    def middle(self) -> float:
+        """Middle of the bounds."""
+        return 0.5 * (self.low + self.high)
+
+
+def check_distinct(keys: Sequence[str]) -> None:
+    """Raise an error for a key that is free twice."""
+    twice = next((k for i, k in enumerate(keys) if k in keys[:i]), None)
+    if twice is not None:
+        raise Finger3dError(f"--free {twice}: given twice")
+
+
+def scene_with(given: TreeView, keys: Sequence[str], values: Sequence[float] | Float, path: Path | None) -> Scene:
+    """Return the scene with values of keys, which are named in the message if one cannot be."""
+    changes = [f"{key}={float(value)!r}" for key, value in zip(keys, values, strict=True)]
+    changed = tree.override(dict(given), changes, "--free")
+    return parse(changed, path=path, set_keys=dict.fromkeys(keys, "--free"))
