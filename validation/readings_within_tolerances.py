@@ -45,7 +45,7 @@ GAUGES: dict[Domain, tuple[tuple[float, float, float], ...]] = {
 FINER = 4.0
 DRAWS: dict[Domain, int] = {"plane-strain": 48, "solid": 12}
 JUDGES: dict[Domain, int] = {"plane-strain": 3, "solid": 10}
-FEWEST = 10
+FEWEST, PLATEAU = 10, 0.8
 READ_STEPS: dict[Domain, int] = {"plane-strain": 160, "solid": 120}
 COUNTS = (10, 20, 40, 80)
 
@@ -145,6 +145,16 @@ def _rows(found: list[Judged]) -> Iterator[Row]:
             some = [one for one in found if (one.domain, one.readings) == (domain, readings)]
             name = f"{domain}, {readings} reading{'s' if readings != '1' else ''}"
             yield from _honest(name, some, "statement")
+            for part, chosen, kind in (
+                (f"mu up to {PLATEAU:g}", [one for one in some if one.mu <= PLATEAU], "verification"),
+                (f"mu above {PLATEAU:g}", [one for one in some if one.mu > PLATEAU], "statement"),
+            ):
+                inside = float(np.mean([one.inside for one in chosen]))
+                yield Row(
+                    f"share of 90 % sets that contain mu: {name}, {part}, {len(chosen)} readings",
+                    "0.9 if stated rightly", 0.85, inside, 0.0,
+                    "where the sensor saturates, the error of few increments looks like a smaller mu", kind, "at least",
+                )  # fmt: skip
             share = float(np.mean([one.status in ("ok", "coarse") for one in some]))
             yield Row(
                 f"share of readings that determine mu: {name}", "no reference", 1.0, share, 0.0,
