@@ -140,10 +140,11 @@ def _refine_mesh(scene: Scene, report: Progress) -> Refinement | None:
     mesh = scene.tables.mesh
     if mesh.tolerance is None:
         return None
-    from finger3d.accuracy.refine import refine_mesh
+    from finger3d.accuracy.refine import GOAL, refine_mesh
 
-    report.stage(f"refining to an error of {mesh.tolerance:g}")
-    return refine_mesh(scene.model(), mesh.tolerance, mesh.max_seconds, report.say)
+    goal = mesh.goal or GOAL
+    report.stage(f"refining to an error of {mesh.tolerance:g} in {goal}")
+    return refine_mesh(scene.model(), mesh.tolerance, mesh.max_seconds, report.say, goal)
 
 
 def _march(record: PressRecord, writer: ResultWriter, report: Progress) -> None:
