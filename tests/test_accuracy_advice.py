@@ -105,13 +105,17 @@ def test_no_change_is_told_where_none_can_be_estimated(monkeypatch: pytest.Monke
     problem, step = _ended(half_cylinder(COARSE, 2))
     filled = replace(problem, model=KineticFriction(ratio=0.5).apply(problem.model))
     papers = replace(problem, model=replace(problem.model, rule="paper"))
+    legs = tuple(replace(leg, force_N=1.0) for leg in problem.model.legs)
+    forced = replace(problem, model=replace(problem.model, legs=legs))
     whole, end = _ended(replace(half_cylinder(COARSE, 2), mesh=MeshOptions(5.0, 5.0, "swept")))
     for found, why in (
         (large_deformation(filled, step, 2), "kinetic_friction"),
         (large_deformation(papers, step, 2), "number of increments"),
         (large_deformation(whole, end, 2), "too coarse"),
-        (more_increments(filled, step, 2), "effects"),
-        (more_increments(papers, step, 2), "no limit"),
+        (large_deformation(forced, step, 2), "to a force"),
+        (more_increments(filled, step, 2), "kinetic_friction"),
+        (more_increments(papers, step, 2), "number of increments"),
+        (more_increments(forced, step, 2), "to a force"),
         (more_increments(problem, step, 10**6), "would take more than"),
     ):
         assert found.changes == {}

@@ -7,7 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from finger3d._types import Tree
+from finger3d.contact.rules import STEP_DEPENDENT_RULES
+from finger3d.errors import Finger3dError
 from finger3d.mechanics.history import StepResult, measure
+from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.step_halving import condensation_s, contact_s
 
@@ -106,6 +109,23 @@ def judged(values: Mapping[str, float], changes: Mapping[str, float], errors: Ma
             significant = error <= _SURE * abs(change) and abs(change) >= _LEAST_CHANGE * scale > 0.0
             out[name] = Change(value, change, error, significant)
     return out
+
+
+def check_kind(model: Model) -> None:
+    """Raise for a kind of press that the estimates were not compared with the truth of.
+
+    Raises
+    ------
+    Finger3dError
+        For a model with an effect or a prescribed force, and where the result depends on the number of increments.
+    """
+    if model.filled:
+        names = ", ".join(name for _, name in model.filled)
+        raise Finger3dError(f"it was not compared with presses under {names}")
+    if any(leg.force_N is not None for leg in model.legs):
+        raise Finger3dError("it was not compared with presses to a force")
+    if model.rule in STEP_DEPENDENT_RULES or model.friction.depends_on_steps:
+        raise Finger3dError("the result depends on the number of increments")
 
 
 def budget_s(problem: Problem, increments: int) -> float:

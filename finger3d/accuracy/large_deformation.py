@@ -18,10 +18,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from finger3d.accuracy.changes import ChangeEstimate, budget_s, changing_numbers, judged
+from finger3d.accuracy.changes import ChangeEstimate, budget_s, changing_numbers, check_kind, judged
 from finger3d.accuracy.companions import LEAST_RATIO, built_like, coarser, edge_ratio
 from finger3d.accuracy.cost import forecast
-from finger3d.contact.rules import STEP_DEPENDENT_RULES
 from finger3d.effects.base import fill
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.history import StepResult
@@ -64,16 +63,11 @@ def large_deformation(problem: Problem, last: StepResult, increments: int) -> Ch
 
 
 def _estimated(problem: Problem, last: StepResult, increments: int) -> ChangeEstimate:
-    model = problem.model
-    if model.filled:
-        names = ", ".join(name for _, name in model.filled)
-        raise Finger3dError(f"it was not compared with presses under {names}")
-    if model.rule in STEP_DEPENDENT_RULES or model.friction.depends_on_steps:
-        raise Finger3dError("the result depends on the number of increments")
+    check_kind(problem.model)
     factor = _affordable_factor(problem, increments)
     change, other = _changes_on_both_meshes(problem, factor)
     errors = {name: max(_SAFETY * abs(d - other[name]), _LEAST_ERROR * abs(d)) for name, d in change.items()}
-    mesh = coarser(model, factor).mesh
+    mesh = coarser(problem.model, factor).mesh
     return ChangeEstimate(
         changes=judged(changing_numbers(problem, last), change, errors),
         method=f"presses with and without it, with {mesh.size_mm:.4g} and {mesh.base_size_mm:.4g} mm in {_STEPS[0]} "

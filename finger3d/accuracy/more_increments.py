@@ -18,8 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from finger3d.accuracy.changes import ChangeEstimate, budget_s, changing_numbers, judged
-from finger3d.contact.rules import STEP_DEPENDENT_RULES
+from finger3d.accuracy.changes import ChangeEstimate, budget_s, changing_numbers, check_kind, judged
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.problem import Problem
@@ -69,12 +68,8 @@ def more_increments(problem: Problem, last: StepResult, increments: int) -> Chan
 
 
 def _estimated(problem: Problem, last: StepResult, increments: int) -> ChangeEstimate:
-    model = problem.model
-    if model.filled or model.formulation.refactorises:
-        raise Finger3dError("it was not compared with presses under effects")
-    if model.rule in STEP_DEPENDENT_RULES or model.friction.depends_on_steps:
-        raise Finger3dError("the result has no limit for many increments")
-    if any(leg.steps == "auto" for leg in model.legs):
+    check_kind(problem.model)
+    if any(leg.steps == "auto" for leg in problem.model.legs):
         raise Finger3dError("the increments were chosen by their error")
     budget = budget_s(problem, increments)
     if sum(_COUNTS) * increments * contact_s(len(problem.surface.nodes), problem.dim) > budget:
