@@ -76,7 +76,10 @@ def _estimated(problem: Problem, last: StepResult, increments: int) -> ChangeEst
 
 
 def _affordable_factor(problem: Problem, increments: int) -> float:
-    """Return the edge lengths of the coarse mesh over those of the press."""
+    """Return the edge lengths of the coarse mesh over those of the press.
+
+    What is modelled is the press at large deformation on this mesh, which takes half of the estimate or more.
+    """
     budget = budget_s(problem, increments)
     for factor in _FACTORS:
         cost = forecast(_at_large_deformation(_coarse(problem.model, factor, _STEPS[0])))
