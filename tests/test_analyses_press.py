@@ -120,10 +120,11 @@ def test_advice_comes_with_numbers_and_goes_when_it_is_followed(tmp_path: Path) 
         settings = [word for key in keys for word in ("--set", key)]
         assert main(["press", str(written(tmp_path)), "--out", str(out), "--no-figures", *settings]) == 0
         said[name] = " ".join(json.loads((out / "summary.json").read_text(encoding="utf-8"))["advice"])
-    assert "[effects.large_deformation]" in said["small"]
+    assert "large deformation would change the normal force by +" in said["small"]
+    assert "more increments would change the friction sum by" in said["small"]
     assert "[effects.large_deformation]" in said["viscous"]
     assert "large_deformation" not in said["large"]
-    assert "increments" not in said["small"] + said["large"]
+    assert "would change" not in said["viscous"] + said["large"] + said["auto"]
     assert "finger3d compare" in said["large"]
 
 
