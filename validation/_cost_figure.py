@@ -1,88 +1,114 @@
-"""The work-precision diagrams: error over seconds and over memory, a column a quantity, two rows a body."""
+"""Work-precision diagrams of the table of cost_of_accuracy: one question a panel."""
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
-from ._cost import LARGE, QUANTITIES, Case
-from ._cost_truth import seconds
+from ._cost import LARGE, SECTION, SOLID
 
-STYLES = {
-    "mixed": ("C0", "o", "-"), "quadratic": ("C1", "s", "-"), "linear": ("C3", "^", "-"), "pytetwild": ("C4", "D", "-"),
-    "large deformation": ("C7", "v", "-"), "grading": ("C2", "x", ":"), "SuperLU": ("C5", "+", "--"),
-    "one factorisation an iteration": ("C6", "*", "--"),
-}  # fmt: skip
-LABELS = {
-    "mixed": "mixed", "quadratic": "quadratic", "linear": "linear", "pytetwild": "mixed, pytetwild (mesh made anew)",
-    "large deformation": "mixed, large deformation", "grading": "base size 1-32 times the contact's",
-    "SuperLU": "SuperLU",
-    "one factorisation an iteration": "one factorisation an iteration", "steps": "increments 1-200, one mesh",
-}  # fmt: skip
+GRADED = Path(__file__).with_name("results") / "graded_meshes_table.csv"
+
+Line = Mapping[str, Any]
+
+COLOURS = {SECTION: "#2c5d8f", SOLID: "#c0392b"}
 NAMES = {
-    "force": "force", "contact_length": "contact length", "stick_length": "stick length",
-    "friction_sum": "friction sum", "gauge_strain": "gauge strain",
+    "force": "normal force", "friction_sum": "friction sum", "gauge_strain": "gauge strain",
+    "contact_length": "contact length", "stick_length": "stick length",
 }  # fmt: skip
-_FLOOR = 1e-6
+_FLOOR = 1e-5
+"""Relative error below which the truth is not known."""
 
 
-def draw(
-    figure: Any,
-    made: Mapping[str, Mapping[str, Sequence[Case]]],
-    runs: Mapping[Case, dict[str, Any]],
-    errors: Mapping[Case, Mapping[str, float]],
-    steps: Mapping[str, Mapping[str, Mapping[int, float]]],
-    known_to: Mapping[str, Mapping[str, float]],
-) -> None:
-    """Meshes by their error under ten increments; increments by theirs on one mesh; grey: not resolved by the truth.
+def draw(figure: Any, lines: Sequence[Line]) -> None:
+    """Draw six panels from the lines of the study's table."""
+    figure.set_size_inches(15.0, 8.8)
+    figure.set_layout_engine("constrained")
+    panels = figure.subplots(2, 3).ravel()
+    runs = [line for line in lines if line["kind"] == "run"]
+    for axes, panel in zip(panels, (_elements, _numbers, _grading, _memory, _condensation, _large), strict=True):
+        panel(axes, runs)
+        axes.grid(True, which="major", lw=0.4, alpha=0.6)
+        axes.legend(fontsize=8, framealpha=0.9)
 
-    Runs at large deformation are in the panels of their body, with errors relative to their own truth.
-    """
-    from matplotlib.ticker import FuncFormatter, LogLocator
 
-    large = {body: made[name]["mixed"] for body, name in LARGE.items() if name in made}
-    made = {
-        body: {**series, **({"large deformation": large[body]} if body in large else {})}
-        for body, series in made.items()
-        if body not in LARGE.values()
-    }
-    figure.set_size_inches(19.0, 6.6 * len(made))
-    panels = figure.subplots(2 * len(made), len(QUANTITIES), sharey="row", squeeze=False)
-    for number, (body, series) in enumerate(made.items()):
-        for column, quantity in enumerate(QUANTITIES):
-            over_time, over_memory = panels[2 * number][column], panels[2 * number + 1][column]
-            for name, cases in series.items():
-                if name == "steps":
-                    continue
-                colour, mark, line = STYLES[name]
-                known = [c for c in cases if errors[c].get(quantity, 0.0) > _FLOOR]
-                error = [errors[c][quantity] for c in known]
-                style: dict[str, Any] = {"color": colour, "marker": mark, "ls": line, "ms": 4.5, "lw": 1.2}
-                over_time.loglog([seconds(runs[c]) for c in known], error, label=LABELS[name], **style)
-                over_memory.loglog([runs[c]["peak_MB"] for c in known], error, **style)
-            ladder = series["steps"][0]
-            by_steps = steps[body][quantity]
-            counts = [n for n in by_steps if by_steps[n] > _FLOOR]
-            over_time.loglog(
-                [seconds(runs[ladder], n) for n in counts], [by_steps[n] for n in counts], "k.-", lw=0.8,
-                label=LABELS["steps"],
-            )  # fmt: skip
-            over_time.set_title(f"{NAMES[quantity]}, {body}", fontsize=11)
-            over_time.set_xlabel("seconds, meshing to last increment")
-            over_memory.set_xlabel("peak memory (MB)")
-            for axes in (over_time, over_memory):
-                for level in (0.05, 0.01, 0.001):
-                    axes.axhline(level, color="#999999", lw=0.6, ls="--")
-                axes.axhspan(1e-9, known_to[body][quantity], color="#888888", alpha=0.15, lw=0.0)
-                axes.set_ylim(_FLOOR, 2.0)
-                axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-                axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-                axes.minorticks_off()
-                axes.tick_params(axis="x", labelsize=7)
-                axes.grid(alpha=0.25)
-        for row in (2 * number, 2 * number + 1):
-            panels[row][0].set_ylabel("relative error")
-    handles: dict[str, Any] = {}
-    for axes in panels.ravel():
-        handles |= dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
-    figure.legend(handles.values(), handles.keys(), loc="outside upper center", ncols=4, fontsize=10, frameon=False)
+def _series(
+    runs: Sequence[Line], body: str, element: str = "mixed", mesher: str = "swept", solver: str = "pardiso",
+    way: str = "condensed",
+) -> list[Line]:  # fmt: skip
+    """Return runs on meshes of equal grading, coarse to fine, each once."""
+    found = {}
+    for line in runs:
+        given = (line["body"], line["element"], line["mesher"], line["solver"], line["way"])
+        ratio = float(line["base_size_mm"]) / float(line["size_mm"])
+        if given == (body, element, mesher, solver, way) and abs(ratio - 4.0) < 1e-9:
+            found.setdefault(float(line["size_mm"]), line)
+    return [found[size] for size in sorted(found, reverse=True)]
+
+
+def _plot(axes: Any, some: Sequence[Line], x: str, y: str, label: str, mark: str, **style: Any) -> None:
+    known = [line for line in some if not y.startswith("error") or float(line[y] or 0.0) > _FLOOR]
+    scale = 100.0 if y.startswith("error") else 1.0
+    axes.loglog(
+        [float(line[x]) for line in known], [scale * float(line[y]) for line in known], mark, label=label, ms=5, **style
+    )
+
+
+def _elements(axes: Any, runs: Sequence[Line]) -> None:
+    for element, colour, mark in (("mixed", "C0", "o-"), ("quadratic", "C1", "s-"), ("linear", "C3", "^-")):
+        _plot(axes, _series(runs, SOLID, element), "seconds", "error_force", element, mark, color=colour)
+    wild = _series(runs, SOLID, mesher="ftetwild")
+    _plot(axes, wild, "seconds", "error_force", "mixed, fTetWild, mesh made anew", "D:", color="C4")
+    axes.set(title="Which element?  Solid, normal force", xlabel="s, mesh to last increment", ylabel="error, %")
+
+
+def _numbers(axes: Any, runs: Sequence[Line]) -> None:
+    for (quantity, name), mark in zip(NAMES.items(), ("o-", "s-", "^-", "D-", "v-"), strict=True):
+        _plot(axes, _series(runs, SOLID), "seconds", f"error_{quantity}", name, mark)
+    axes.set(title="Which number is dear?  Solid, mixed elements", xlabel="s, mesh to last increment")
+    axes.set(ylabel="error, %")
+
+
+def _grading(axes: Any, runs: Sequence[Line]) -> None:
+    if GRADED.exists():
+        with GRADED.open(encoding="utf-8") as file:
+            graded = [line for line in csv.DictReader(file) if line["goal"] == "normal_force_N"]
+        for domain, body in (("plane-strain", SECTION), ("solid", SOLID)):
+            for way, mark in (("equal grading", "o-"), ("graded", "s--")):
+                some = [line for line in graded if (line["domain"], line["way"]) == (domain, way)]
+                known = [line for line in some if float(line["true_error"]) > _FLOOR]
+                axes.loglog(
+                    [float(line["dofs"]) for line in known], [100.0 * float(line["true_error"]) for line in known],
+                    mark, color=COLOURS[body], ms=5, label=f"{body}, {'towards it' if way == 'graded' else way}",
+                )  # fmt: skip
+    axes.set(title="What does grading towards the force save?", xlabel="unknowns", ylabel="error, %")
+
+
+def _memory(axes: Any, runs: Sequence[Line]) -> None:
+    for body in (SECTION, SOLID):
+        _plot(axes, _series(runs, body), "peak_MB", "error_force", body, "o-", color=COLOURS[body])
+    axes.set(title="How much memory?  Normal force, mixed elements", xlabel="peak memory, MB", ylabel="error, %")
+
+
+def _condensation(axes: Any, runs: Sequence[Line]) -> None:
+    for body in (SECTION, SOLID):
+        ways: tuple[tuple[str, str, str, str], ...] = (
+            ("one condensation", "pardiso", "condensed", "o-"),
+            ("SuperLU", "superlu", "condensed", "+--"),
+            ("a factorisation an iteration", "pardiso", "each iteration", "*:"),
+        )
+        for name, solver, way, mark in ways:
+            some = _series(runs, body, solver=solver, way=way)
+            _plot(axes, some, "dofs", "seconds", f"{body}, {name}", mark, color=COLOURS[body])
+    axes.set(title="What does one condensation save?", xlabel="unknowns", ylabel="s, mesh to last increment")
+
+
+def _large(axes: Any, runs: Sequence[Line]) -> None:
+    for body in (SECTION, SOLID):
+        _plot(axes, _series(runs, body), "seconds", "error_force", f"{body}, small strain", "o-", color=COLOURS[body])
+        large = _series(runs, LARGE[body])
+        _plot(axes, large, "seconds", "error_force", f"{body}, large deformation", "v--", color=COLOURS[body])
+    axes.set(title="What does large deformation cost?  Normal force", xlabel="s, mesh to last increment")
+    axes.set(ylabel="error, %")

@@ -152,11 +152,9 @@ def _judged(made: Mapping[str, Groups], runs: Runs, plain: Runs, floats: Runs, q
     errors: dict[Case, dict[str, float]] = {}
     steps: dict[str, dict[str, dict[int, float]]] = {}
     advices: dict[str, list[Advice]] = {}
-    known_to: dict[str, dict[str, float]] = {}
     for body, series in made.items():
         best = series[BEST[body]]
         truths = {q: truth(best, runs, q) for q in QUANTITIES}
-        known_to[body] = {q: t.uncertainty for q, t in truths.items()}
         ladder = series["steps"][0]
         counts = ladder.counts
         own = [c for c in runs if c.body == body]
@@ -179,7 +177,7 @@ def _judged(made: Mapping[str, Groups], runs: Runs, plain: Runs, floats: Runs, q
     lines += [_plain_line(c, p, runs[c]) for c, p in plain.items()] + [_float_line(c, f) for c, f in floats.items()]
     names = list(dict.fromkeys(k for line in lines for k in line))
     table = {name: [line.get(name, "") for line in lines] for name in names}
-    return Result(tuple(rows), table, lambda figure: draw(figure, made, runs, errors, steps, known_to))
+    return Result(tuple(rows), table, lambda figure: draw(figure, [dict.fromkeys(names, "") | line for line in lines]))
 
 
 def _truth_rows(body: str, truths: Mapping[str, Truth], quick: bool) -> list[Row]:

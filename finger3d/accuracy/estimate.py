@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from finger3d._types import Float
+from finger3d._types import Float, Tree
 from finger3d.accuracy.adjoint_bars import adjoint_bars, applies
 from finger3d.accuracy.companions import Say, companion, edge_ratio, is_unstructured
 from finger3d.accuracy.error_bars import ErrorBars
@@ -67,6 +67,10 @@ class ErrorEstimate(ErrorBars):
     companion_numbers: dict[str, float] = field(default_factory=dict)
     ratio: float = math.nan
     body: BodyErrors | None = None
+
+    def as_dict(self) -> Tree:
+        """Return the entries of summary.json, with the signed errors of the body's mesh where they are known."""
+        return super().as_dict() | ({"signed": dict(self.body.signed)} if self.body else {})
 
 
 def main_numbers(problem: Problem, frame: StepResult) -> dict[str, float]:

@@ -84,6 +84,7 @@ def run_press(
     summary = writer.summary(record, record.outcome())
     if error:
         _estimate_errors(record, report)
+        writer.error_shares(record)
         _estimate_changes(record, report)
         summary = writer.summary(record, record.outcome())
     if figures:
@@ -226,7 +227,7 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fie
 
 
 def _estimate_errors(record: PressRecord, report: Progress) -> None:
-    """Estimate the errors by mesh and increments, from a run on another mesh."""
+    """Estimate the errors by mesh and increments."""
     from finger3d.accuracy.estimate import estimate, press_numbers
 
     report.stage("estimating the error")

@@ -40,8 +40,8 @@ _WRITE_SHARE = 10.0
 
 _INCOMPLETE = "incomplete: the press was still running, or was interrupted; the steps written are valid"
 _FILES = (
-    "summary.json", "history.csv", "contact.csv", "fields.vtu", "steps.npz", "report.html", "finger.png",
-    "contact.png", "force.png", "markers.csv", "markers.png",
+    "summary.json", "history.csv", "contact.csv", "fields.vtu", "error_shares.vtu", "steps.npz", "report.html",
+    "finger.png", "contact.png", "force.png", "markers.csv", "markers.png",
 )  # fmt: skip
 
 
@@ -119,6 +119,14 @@ class ResultWriter:
         write_json(self.folder / "summary.json", content)
         record.seconds["output"] += time.perf_counter() - begin
         return content
+
+    def error_shares(self, record: PressRecord) -> None:
+        """Write error_shares.vtu, the shares of the cells of the meshed part in the error of each number, if known."""
+        estimate = record.error_estimate
+        if estimate and estimate.body:
+            mesh = record.problem.mesh
+            at_rest = {"displacement": np.zeros_like(mesh.points)}
+            write_vtu(self.folder / "error_shares.vtu", mesh, at_rest, dict(estimate.body.shares))
 
     def fields(self, record: PressRecord, fields: Fields) -> None:
         """Write fields.vtu, the fields after the last converged increment, and steps.npz, displacements of them all."""
