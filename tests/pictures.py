@@ -87,3 +87,22 @@ STEPS = [
     }
     for d in range(1, 11)
 ]
+
+
+def orange(image: np.ndarray) -> float:
+    """Share of the right half, above the keys, in slip's colour, whatever the light."""
+    high, wide = image.shape[:2]
+    panel = image[: int(0.75 * high), wide // 2 :]
+    return float(((panel[..., 0] - panel[..., 2] > 90) & (panel[..., 0] > panel[..., 1] + 30)).mean())
+
+
+def marked(image: np.ndarray) -> int:
+    """Pixels in the colour of gauges, or in that colour seen through the object."""
+    return int((np.abs(image - np.array([0xB0, 0x00, 0x6A])).max(axis=2) < 40).sum())
+
+
+def rgb(path: Path) -> np.ndarray:
+    """The picture as (h, w, 3) in 0 .. 255."""
+    from PIL import Image
+
+    return np.asarray(Image.open(path).convert("RGB"), dtype=float)

@@ -9,53 +9,25 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from scenes import FIG9
 
-import finger3d.analyses.compare.run as compare_module
 from finger3d.accuracy.companions import FACTOR
 from finger3d.accuracy.estimate import estimate
 from finger3d.analyses.compare import cases
 from finger3d.analyses.compare.cases import press_with_errors, resized, widened
 from finger3d.analyses.compare.run import compare
 from finger3d.analyses.compare.verdict import Deviation, crossing_width, deviation, force_deviation, rounded, verdict
-from finger3d.cli import main
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.mechanics.build import build
 from finger3d.mechanics.solve import march
 from finger3d.results.comparison import FORCE, Case
 from finger3d.scene import load
-
-SCENE = (
-    """
-title = "coarse finger"
-"""
-    + FIG9
-    + """
-[material]
-E_MPa = 1.0
-nu = 0.49
-[friction]
-mu = 0.25
-[press]
-depth_mm = 10.0
-steps = 4
-[mesh]
-size_mm = 5.0
-base_size_mm = 12.0
-mesher = "swept"
-[[gauge]]
-name = "g36"
-x_mm = 36.0
-y_mm = 38.0
-angle_deg = 30.0
-"""
-)
+from tests.scenes import SWEPT_FINGER
 
 
 @pytest.fixture
 def scene(tmp_path) -> Path:
     path = tmp_path / "scene.toml"
-    path.write_text(SCENE)
+    path.write_text(SWEPT_FINGER)
     return path
 
 
@@ -63,7 +35,7 @@ def scene(tmp_path) -> Path:
 def compared(tmp_path_factory):
     folder = tmp_path_factory.mktemp("compare")
     path = folder / "scene.toml"
-    path.write_text(SCENE)
+    path.write_text(SWEPT_FINGER)
     return compare(path, folder / "out", widths=[5.0, 200.0, 1200.0])
 
 
@@ -263,7 +235,7 @@ def test_what_a_section_cannot_stand_for_is_refused(scene, tmp_path, overrides, 
 
 def test_a_ball_has_no_section(scene, tmp_path) -> None:
     ball = '[finger]\ngeometry = "hemisphere"\nradius_mm = 50.0\n[material]'
-    text = re.sub(r"\[finger\].*?\[material\]", ball, SCENE, flags=re.S)
+    text = re.sub(r"\[finger\].*?\[material\]", ball, SWEPT_FINGER, flags=re.S)
     scene.write_text(text.replace('mesher = "swept"\n', "").replace("y_mm = 38.0", "y_mm = 20.0"))
     with pytest.raises(Finger3dError, match="no constant section"):
         compare(scene, tmp_path / "out")
@@ -278,48 +250,3 @@ def test_the_scenes_own_domain_does_not_matter(scene, tmp_path) -> None:
     as_strain = compare(load(scene, ["model.domain=plane-strain"]), tmp_path / "a", ())
     as_solid = compare(load(scene), tmp_path / "b", ())
     assert [c.numbers for c in as_strain.cases] == [c.numbers for c in as_solid.cases]
-
-
-def test_the_command_prints_the_verdict(scene, tmp_path, capsys) -> None:
-    assert main(["compare", str(scene), "--out", str(tmp_path / "out"), "--widths", "50"]) == 0
-    out = capsys.readouterr().out
-    assert "step 7 of 7" in out
-    assert "plane strain overstates the force by" in out
-
-
-@pytest.mark.parametrize("widths", ["5,abc", "5,,20", "-5", "inf"])
-def test_widths_that_are_none_are_refused_in_one_line(scene, tmp_path, capsys, widths) -> None:
-    assert main(["compare", str(scene), "--out", str(tmp_path / "out"), f"--widths={widths}"]) == 2
-    err = capsys.readouterr().err
-    assert err.startswith("finger3d: --widths")
-    assert err.count("\n") == 1
-
-
-def test_a_case_that_fails_is_named_and_the_others_are_kept(scene, tmp_path, monkeypatch, capsys) -> None:
-    def failing(name, model):
-        if name == "solid":
-            return Case(name, model.design.width_mm, model.mesh.size_mm, "swept", Outcome.NO_CONVERGENCE)
-        return press_with_errors(name, model)
-
-    monkeypatch.setattr(compare_module, "press_with_errors", failing)
-    assert main(["compare", str(scene), "--out", str(tmp_path / "out"), "--widths", "50"]) == 3
-    captured = capsys.readouterr()
-    assert "2 of 7 cases gave no numbers" in captured.err
-    assert "solid, 20 mm wide, has no result" in captured.out
-    told = json.loads((tmp_path / "out" / "compare.json").read_text())
-    assert told["outcome"] == str(Outcome.NO_CONVERGENCE)
-    assert sum(bool(c["numbers"]) for c in told["cases"]) == 5
-
-
-def test_an_interrupted_comparison_keeps_its_cases(scene, tmp_path, monkeypatch, capsys) -> None:
-    def interrupted(name, model):
-        if name == "solid":
-            raise KeyboardInterrupt
-        return press_with_errors(name, model)
-
-    monkeypatch.setattr(compare_module, "press_with_errors", interrupted)
-    assert main(["compare", str(scene), "--out", str(tmp_path / "out")]) == 130
-    assert "2 of 16 cases are kept" in capsys.readouterr().err
-    told = json.loads((tmp_path / "out" / "compare.json").read_text())
-    assert told["outcome"].startswith("incomplete")
-    assert [c["model"] for c in told["cases"]] == ["plane strain", "plane stress"]

@@ -14,39 +14,17 @@ import pytest
 import finger3d
 from finger3d.analyses.identify.fit import Scale, uncertainty
 from finger3d.analyses.identify.measured import read_measured
-from finger3d.cli import main
 from finger3d.errors import Finger3dError
 from finger3d.results.journal import Journal
 from finger3d.scene import parse
+from tests.identify_cases import FREE, TRUE, bench
 from tests.sensor_cases import scene
-
-NOISE = {"normal_force_N": 0.5, "gauge_g36": 3e-4}
-TRUE = {"material.E_MPa": 0.37, "friction.mu": 0.6}
-FREE = {"material.E_MPa": (0.05, 5.0), "friction.mu": (0.05, 1.0)}
 
 
 @pytest.fixture
 def scene_file(tmp_path: Path) -> Path:
     path = tmp_path / "scene.toml"
     path.write_text(scene(press={"depth_mm": 10.0, "steps": 8}).to_toml(), encoding="utf-8")
-    return path
-
-
-def bench(path: Path, seed: int = 0, stds: bool = False, offset: float = 0.0, **changes: Any) -> Path:
-    """A measured press of the scene with the true values, with noise."""
-    tables: dict[str, Any] = {"press": {"depth_mm": 10.0, "steps": 8}, **changes}
-    material = {"nu": 0.45, "E_MPa": TRUE["material.E_MPa"]}
-    true = parse(scene(**tables, material=material, friction={"mu": TRUE["friction.mu"]}).as_dict())
-    random, rows = np.random.default_rng(seed), []
-    for step in finger3d.press(true).steps:
-        found = {"normal_force_N": step.normal_force_N, "gauge_g36": step.gauges["g36"]}
-        noisy = {name: value + NOISE[name] * random.normal() for name, value in found.items()}
-        extra = {f"{name}_std": NOISE[name] for name in found} if stds else {}
-        rows.append({"depth_mm": step.depth_mm + offset, **noisy, **extra})
-    with path.open("w", newline="") as stream:
-        writer = csv.DictWriter(stream, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
     return path
 
 
@@ -202,26 +180,3 @@ def test_files_that_are_refused(tmp_path: Path, text: str, told: str) -> None:
         read_measured(path, KNOWN)
     assert told in str(found.value)
     assert "\n" not in str(found.value)
-
-
-@pytest.mark.parametrize(
-    ("factor", "free", "told"),
-    [
-        (1000.0, FREE, "line 9: gauge_g36 ="),
-        (1.0, {"material.E_MP": (0.05, 5.0)}, "E_MP"),
-        (1.0, {"press.depth_mm": (5.0, 6.0)}, "the path of the scene ends at 5"),
-        (1.0, {"gauge.x.x_mm": (1.0, 2.0)}, 'no gauge "x"'),
-    ],
-)
-def test_commands_that_are_refused(
-    tmp_path: Path, scene_file: Path, capsys: Any, factor: float, free: Any, told: str
-) -> None:
-    rows = list(csv.DictReader(bench(tmp_path / "all.csv").open()))
-    measured = tmp_path / "bench.csv"
-    lines = [f"{r['depth_mm']},{r['normal_force_N']},{factor * float(r['gauge_g36'])}" for r in rows]
-    measured.write_text("depth_mm,normal_force_N,gauge_g36\n" + "\n".join(lines) + "\n")
-    options = [text for key, (low, high) in free.items() for text in ("--free", f"{key}={low}:{high}")]
-    command = ["identify", str(scene_file), "--measured", str(measured), "--out", str(tmp_path / "out"), *options]
-    assert main(command) == 2
-    said = capsys.readouterr().err.strip().splitlines()[-1]
-    assert told in said

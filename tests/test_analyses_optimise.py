@@ -13,7 +13,6 @@ import pytest
 from finger3d.analyses.free_keys import FreeKey
 from finger3d.analyses.optimise.run import optimise
 from finger3d.analyses.optimise.task import ObjectiveTable, OptimisationProblem, sensitivity
-from finger3d.cli import main
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.build import build
 from finger3d.mechanics.solve import march
@@ -21,7 +20,6 @@ from finger3d.scene import load, tree
 from tests.scenes import words
 
 SETS = ["model.domain=plane-strain", "mesh.size_mm=4", "mesh.base_size_mm=16", "press.steps=10"]
-COARSE = [option for text in SETS for option in ("--set", text)]
 ANGLE = FreeKey("gauge.g36.angle_deg", 0.0, 90.0)
 MUS = (0.1, 0.5, 1.0)
 
@@ -113,46 +111,3 @@ def test_other_optimisers_stay_within_bounds_and_budget(method, problem, tmp_pat
     found = optimise(replace(problem, method=method), tmp_path)
     assert len(found.evaluations) <= problem.budget + 1
     assert all(ANGLE.low <= e.values[0] <= ANGLE.high for e in found.evaluations)
-
-
-def test_an_objective_from_a_file_on_the_command_line(root, tmp_path, capsys) -> None:
-    judge = tmp_path / "judge.py"
-    judge.write_text("def objective(table):\n    return -abs(table.scene.tables.gauge[0].angle_deg - 40.0)\n")
-    scene, out = root / "geometries" / "fig9.toml", tmp_path / "out"
-    arguments = ["optimise", str(scene), *COARSE, "--free", "gauge.g36.angle_deg=0:90", "--out", str(out)]
-    assert main([*arguments, "--objective", str(judge), "--budget", "40", "--mu", "0.1,0.5"]) == 0
-    told = capsys.readouterr().out
-    assert "best.toml" in told
-    judged = (out / "evaluations.csv").read_text().splitlines()[1:]
-    assert f" {len(judged)} designs, " in told
-    assert load(out / "best.toml").tables.gauge[0].angle_deg == pytest.approx(40.0, abs=2.0)
-    judge.write_text("def objective(table):\n    return table.strains\n")
-    assert main([*arguments[:-1], str(tmp_path / "other"), "--objective", str(judge)]) == 2
-    err = capsys.readouterr().err
-    assert len(err.splitlines()) == 1
-    assert "AttributeError" in err
-
-
-@pytest.mark.parametrize(
-    ("options", "expected"),
-    [
-        (["--free", "finger.radius_mm"], "must be KEY=LOW:HIGH"),
-        (["--free", "finger.radius_mm=200:60"], "with LOW below HIGH"),
-        (["--free", "finger.radius_mm=60:inf"], "must be KEY=LOW:HIGH"),
-        (["--free", "finger.radus_mm=60:200"], 'did you mean "radius_mm"?'),
-        (["--free", "gauge.g9.x_mm=1:2"], 'no gauge "g9"'),
-        (["--free", "gauge.g36.x_mm=1:2", "--free", "gauge.0.x_mm=1:3"], "given twice"),
-        (["--free", "gauge.g36.x_mm=1:2", "--gauge", "g9"], "no such gauge"),
-        (["--free", "gauge.g36.x_mm=1:2", "--objective", "best"], "must be sensitivity, or a Python file"),
-        (["--free", "gauge.g36.x_mm=1:2", "--method", "luck"], "--method luck: must be one of"),
-        (["--free", "gauge.g36.x_mm=1:2", "--budget", "0"], "must be at least 1"),
-        (["--free", "gauge.g36.x_mm=1:2", "--mu", "0.5,0.1"], "ascending"),
-        (["--free", "gauge.g36.x_mm=1:2", "--noise", "0"], "must be above 0"),
-    ],
-)
-def test_bad_input_is_one_line(options, expected, root, tmp_path, capsys) -> None:
-    scene = root / "geometries" / "fig9.toml"
-    assert main(["optimise", str(scene), *COARSE, *options, "--out", str(tmp_path / "out")]) == 2
-    err = capsys.readouterr().err
-    assert len(err.splitlines()) == 1
-    assert expected in err

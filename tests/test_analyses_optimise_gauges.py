@@ -16,7 +16,6 @@ from finger3d.analyses.calibrate.presses import presses
 from finger3d.analyses.calibrate.run import calibrated_together
 from finger3d.analyses.optimise.gauge_fields import GaugeFields, StrainField
 from finger3d.analyses.optimise.gauge_search import Candidates, Region, objectives
-from finger3d.cli import main
 from finger3d.mechanics.build import build
 from finger3d.mechanics.gauges import Gauge
 from finger3d.sensor.information import prior
@@ -98,29 +97,3 @@ def test_bounds_of_the_region_are_kept(tmp_path: Path) -> None:
     assert 5.0 <= gauge.x_mm <= 20.0
     assert 8.0 <= gauge.y_mm <= 25.0
     assert 20.0 - 1e-6 <= math.degrees(gauge.angle) <= 60.0 + 1e-6
-
-
-@pytest.mark.parametrize(
-    ("options", "told"),
-    [
-        (("--gauges", "0"), "--gauges 0: must be from 1 to 8"),
-        (("--gauges", "2", "--free", "finger.radius_mm=60:200"), "with --gauges only gauge.x_mm"),
-        (("--gauges", "2", "--tolerance", "depht_mm=1"), 'did you mean "depth_mm"'),
-        (("--gauges", "2", "--mu", "0.1,0.2"), "at least three"),
-    ],
-)
-def test_what_is_refused(tmp_path: Path, capsys: Any, options: tuple[str, ...], told: str) -> None:
-    path = tmp_path / "scene.toml"
-    path.write_text(scene().to_toml())
-    assert main(["optimise", str(path), "--out", str(tmp_path / "out"), *options]) == 2
-    said = capsys.readouterr().err.strip()
-    assert told in said
-    assert "\n" not in said
-
-
-def test_foils_are_refused(tmp_path: Path, capsys: Any) -> None:
-    path = tmp_path / "scene.toml"
-    effects = {"embedded_gauge": {"E_MPa": 3000.0, "thickness_mm": 0.05, "width_mm": 2.0}}
-    path.write_text(scene(effects=effects, gauge=[scene().as_dict()["gauge"][1]]).to_toml())
-    assert main(["optimise", str(path), "--out", str(tmp_path / "out"), "--gauges", "2"]) == 2
-    assert "not with effects.embedded_gauge" in capsys.readouterr().err

@@ -7,34 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from finger3d import cli
 from finger3d.analyses import validate as study
-from finger3d.analyses.validate import Row, Study, chosen, kept_rows, run_studies, studies
+from finger3d.analyses.validate import Row, chosen, kept_rows, run_studies, studies
 from finger3d.errors import Finger3dError, MissingError
-
-GOOD = '''"""Is one and a half what it was?
-
-Source: none.
-"""
-from finger3d.analyses.study_rows import Result, Row
-
-from ._shared import VALUE
-
-def run(quick):
-    rows = (Row("value | mm", "a page", 1.5, VALUE + (0.001 if quick else 0.0), 0.01, "so", "sensitivity"),)
-    return Result(rows, {"x": [1, 2], "y": [0.1, 1 / 3]}, lambda figure: figure.subplots().plot([1, 2]))
-'''
-BAD = '''"""Does it fail?"""
-from finger3d.analyses.study_rows import Result, Row
-
-def run(quick):
-    return Result((Row("bound", "a page", 1e-8, 2e-8, 0.0, "so", measure="at most"),))
-'''
-STOPS = '''"""Is it interrupted?"""
-
-def run(quick):
-    raise KeyboardInterrupt
-'''
+from tests.study_cases import BAD, GOOD, STOPS
 
 
 @pytest.fixture
@@ -209,36 +185,3 @@ def test_an_unknown_name_is_answered_with_the_nearest(folder: Path) -> None:
 def test_a_folder_without_studies_is_missing(tmp_path: Path) -> None:
     with pytest.raises(MissingError, match="from a checkout"):
         studies(tmp_path)
-
-
-@pytest.fixture
-def own_studies(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setattr(study, "studies", lambda: {n: Study(n, folder / f"{n}.py") for n in ("bad", "good", "stops")})
-    (folder / "stops.py").write_text(STOPS)
-    return folder
-
-
-def test_the_command_tells_verdicts_by_its_exit_code(
-    own_studies: Path, tmp_path: Path, capsys: pytest.CaptureFixture
-) -> None:
-    assert cli.main(["validate", "good"]) == 0
-    assert "pass" in capsys.readouterr().out
-    assert cli.main(["validate", "good", "bad", "--out", str(tmp_path / "out")]) == 3
-    assert capsys.readouterr().err == "finger3d: validate: outside the tolerance: bad (see the rows marked FAIL)\n"
-    assert (tmp_path / "out" / "results" / "bad.csv").is_file()
-    assert cli.main(["validate", "goood"]) == 2
-    assert "did you mean 'good'" in capsys.readouterr().err
-
-
-def test_quick_results_never_replace_full_ones(own_studies: Path, capsys: pytest.CaptureFixture) -> None:
-    assert cli.main(["validate", "good"]) == 0
-    before = (own_studies / "results" / "good.csv").read_bytes()
-    assert cli.main(["validate", "good", "--quick"]) == 0
-    assert "1.501" in capsys.readouterr().out
-    assert cli.main(["validate", "good", "--quick", "--out", str(own_studies)]) == 2
-    assert (own_studies / "results" / "good.csv").read_bytes() == before
-
-
-def test_an_interrupted_command_says_what_is_kept(own_studies: Path, capsys: pytest.CaptureFixture) -> None:
-    assert cli.main(["validate", "good", "stops"]) == 130
-    assert capsys.readouterr().err == f"finger3d: interrupted; 1 of 2 studies are kept in {own_studies}\n"

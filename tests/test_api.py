@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 import finger3d
+import finger3d.analyses.press
 from finger3d.analyses.result import PressResult
 from finger3d.errors import Finger3dError
 from finger3d.results.vtu import grid
@@ -228,3 +229,14 @@ def test_a_study_is_validated(tmp_path: Path) -> None:
 def _written(folder: Path) -> Path:
     (folder / "scene.toml").write_text(SECTION, encoding="utf-8")
     return folder / "scene.toml"
+
+
+def test_every_public_name_is_there() -> None:
+    for name in finger3d.__all__:
+        assert getattr(finger3d, name) is not None
+    assert set(finger3d.__all__) <= set(dir(finger3d))
+
+
+def test_an_unknown_public_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="has no attribute 'pres'"):
+        _ = finger3d.pres

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bodies import ball, box, channel, write_stl
 
 from finger3d.cli import main
 from finger3d.geometry.surface import Triangles
+from tests.bodies import ball, box, channel, write_stl
 
 LIMIT_S = 20.0
 """Own processor time of one refusal, CAD's import included: on an idle machine it takes 2 s at most."""

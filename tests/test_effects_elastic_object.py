@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bodies import ball
 
 from finger3d.contact.friction import Coulomb
 from finger3d.effects import elastic_object
@@ -25,6 +24,7 @@ from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.swept import mesh_section
 from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
 from finger3d.scene import parse
+from tests.bodies import ball
 from tests.models import last, run
 
 DESIGNS = designs()

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bodies import ball, box, channel, step_of, write_stl
 
 from finger3d.cli import main
 from finger3d.errors import Finger3dError
@@ -27,6 +26,7 @@ from finger3d.meshing import cache
 from finger3d.meshing.generate import mesh_solid
 from finger3d.objects import MeshObject
 from finger3d.scene import load, parse
+from tests.bodies import ball, box, channel, step_of, write_stl
 
 SMALL = designs()["clipped_cylinder"](20.0, 10.0, 5.0, 8.0)
 BOTH = ("x", "z")

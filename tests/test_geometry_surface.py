@@ -7,10 +7,10 @@ import time
 
 import numpy as np
 import pytest
-from bodies import ball, box, channel
 
 from finger3d.geometry.surface import Triangles
 from finger3d.geometry.surface_checks import crossings, mistake
+from tests.bodies import ball, box, channel
 
 
 @pytest.fixture(scope="module")

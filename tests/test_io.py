@@ -14,7 +14,7 @@ import pytest
 
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.fem.simplex import Mesh, quadratic
-from finger3d.io import atomic, write_csv, write_json
+from finger3d.io import atomic, claimed, write_csv, write_json
 from finger3d.results.vtu import write_vtu
 
 
@@ -143,3 +143,18 @@ def test_a_folder_that_cannot_be_written_is_a_users_mistake(tmp_path: Path) -> N
     with pytest.raises(Finger3dError, match=r"cannot write .*file/s\.json: .*; choose another place") as caught:
         write_json(tmp_path / "file" / "s.json", {})
     assert "\n" not in str(caught.value)
+
+
+def test_a_folder_into_which_nothing_was_written_goes_with_those_made_for_it(tmp_path: Path) -> None:
+    mine = tmp_path / "mine"
+    mine.mkdir()
+    with claimed(mine / "a" / "b") as folder:
+        assert folder.is_dir()
+    assert list(mine.iterdir()) == []
+    # one that was there stays, and so does one that holds something
+    with claimed(mine):
+        pass
+    with claimed(mine / "c") as folder:
+        (folder / "result").touch()
+    assert mine.is_dir()
+    assert (mine / "c" / "result").exists()

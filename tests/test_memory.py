@@ -7,11 +7,11 @@ import sys
 from pathlib import Path
 
 import pytest
-from scenes import FIG9
 
 from finger3d import cli
 from finger3d.errors import OUT_OF_MEMORY, out_of_memory
 from finger3d.fem import pardiso
+from tests.scenes import FIG9
 
 SCENE = (
     FIG9

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 import trimesh
 
-from finger3d.cli import main
 from finger3d.errors import Finger3dError
 from finger3d.geometry.imported import imported
 from finger3d.geometry.registry import designs
@@ -22,7 +21,7 @@ from finger3d.mold.output import as_printed, plate
 from finger3d.mold.parts import THIN, Mold, foils, mold, overlaps
 from finger3d.mold.sheet import oversize
 from finger3d.mold.shell import shell
-from finger3d.scene import load, parse
+from finger3d.scene import parse
 
 FIG9 = {"geometry": "clipped_cylinder", "radius_mm": 100.0, "half_length_mm": 50.0, "edge_height_mm": 36.6}
 BODIES = {
@@ -348,55 +347,3 @@ def test_a_part_larger_than_the_bed_is_told(made) -> None:
 
 
 # --- the command ------------------------------------------------------------------------------------------------------
-
-
-@pytest.fixture
-def scene_file(tmp_path) -> Path:
-    path = tmp_path / "scene.toml"
-    assert main(["new", str(path)]) == 0
-    return path
-
-
-def test_the_command_writes_a_mold(scene_file, tmp_path, capsys, monkeypatch) -> None:
-    monkeypatch.setenv("FINGER3D_RENDERER", "matplotlib")
-    out = tmp_path / "Gießform, neu"
-    assert main(["export", str(scene_file), "--out", str(out), "--mold", "--shrinkage=0.002", "--bed=100x100x100"]) == 0
-    printed, err = capsys.readouterr()
-    assert err == ""
-    names = {"finger.step", "finger.stl", "mold.3mf", "mold.step", "mold.png", "sheet.txt"}
-    names |= {f"mold_{part}.stl" for part in ("half_a", "half_b", "lid")}
-    assert {f.name for f in out.glob("[!.]*")} == names
-    text = (out / "sheet.txt").read_text(encoding="utf-8")
-    volume = load(scene_file).design.volume_mm3 / 0.998**3 / 1e3
-    assert f"cavity              {volume:.2f} ml" in text
-    assert "too large for 100 x 100 x 100 mm" in text
-    assert "g36" in text
-    assert "remark: mold_half_a: 116" in printed
-    assert max(len(line) for line in text.splitlines()) <= 120
-    from matplotlib.image import imread
-
-    assert imread(out / "mold.png")[..., :3].std() > 0.05
-
-
-@pytest.mark.parametrize(
-    ("arguments", "told"),
-    [
-        (["--wall-mm", "20"], "--mold"),
-        (["--tolerance-mm", "0"], "--tolerance-mm 0.0: must be from 0.0001"),
-        (["--tolerance-mm", "nan"], "--tolerance-mm nan"),
-        (["--mold", "--split", "y"], "y"),
-        (["--mold", "--wall-mm", "4"], "--wall-mm 4.0: must be at least 6.8"),
-        (["--mold", "--set", "gauge=[]", "--split-mm", "11"], "the split plane misses the finger"),
-    ],
-)
-def test_the_command_refuses_in_one_line(arguments, told, scene_file, tmp_path, capsys) -> None:
-    assert main(["export", str(scene_file), "--out", str(tmp_path / "out"), *arguments]) == 2
-    err = capsys.readouterr().err
-    assert len(err.splitlines()) == 1
-    assert told in err
-    assert not list((tmp_path / "out").glob("*"))
-
-
-def test_a_folder_that_cannot_be_written(scene_file, capsys) -> None:
-    assert main(["export", str(scene_file), "--out", str(scene_file)]) == 2
-    assert "is a file; name a folder" in capsys.readouterr().err

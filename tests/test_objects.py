@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bodies import ball, box, channel
 
 from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.errors import Finger3dError
@@ -32,6 +31,7 @@ from finger3d.objects import (
     first_contact_height,
     initial_contact,
 )
+from tests.bodies import ball, box, channel
 
 FIG9 = designs()["clipped_cylinder"](100.0, 50.0, 36.6, 20.0)
 TOP = 36.6 + 100.0 - math.sqrt(100.0**2 - 50.0**2)

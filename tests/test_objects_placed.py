@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bodies import ball, box
 from scipy.spatial import KDTree
 
 from finger3d.objects import (
@@ -20,6 +19,7 @@ from finger3d.objects import (
     Wedge,
     between,
 )
+from tests.bodies import ball, box
 
 SHAPES = [
     Plane(),

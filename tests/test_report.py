@@ -21,17 +21,7 @@ from finger3d.report.compare import compare_page
 from finger3d.report.press import press_page
 from finger3d.report.view3d import view_of
 from finger3d.results.states import chosen, load_states
-from tests.scenes import SECTION, SOLID, pressed, words
-
-
-@pytest.fixture(scope="module")
-def section(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return pressed(tmp_path_factory.mktemp("section"), SECTION)
-
-
-@pytest.fixture(scope="module")
-def solid(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return pressed(tmp_path_factory.mktemp("solid"), SOLID)
+from tests.scenes import SECTION, pressed, words
 
 
 def copied(source: Path, target: Path, **changes: object) -> Path:

@@ -1,0 +1,25 @@
+"""Command ``plan``: effects, size and cost, without a solution."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.commands import run
+
+
+@pytest.fixture
+def scene(tmp_path) -> Path:
+    path = tmp_path / "scene.toml"
+    assert run("new", path) == 0
+    return path
+
+
+def test_plan_tells_effects_and_forecast_and_solves_nothing(scene, fake_press, capsys) -> None:
+    assert run("plan", scene, "--set", "title=planned [b]") == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    for text in ("planned [b]", "dofs", "symmetry", "x and z", "memory MB", "no [effects.kinetic_friction]"):
+        assert text in out
+    assert fake_press.scene is None
