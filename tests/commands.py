@@ -23,3 +23,17 @@ STEP = {
 def run(*arguments: object) -> int:
     """Exit code of one command."""
     return main([str(a) for a in arguments])
+
+
+def refused(capsys, *arguments: str) -> str:
+    """Run the command line; it must end with 2 and one line."""
+    code = main([str(a) for a in arguments])
+    out, err = capsys.readouterr()
+    assert code == 2
+    assert out == ""
+    assert err.endswith("\n")
+    assert len(err.splitlines()) == 1, err
+    assert "Traceback" not in err
+    assert err.rstrip("\n").isprintable()
+    assert "pydantic" not in err.lower()
+    return err

@@ -7,9 +7,15 @@ import os
 import signal
 from pathlib import Path
 from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from hypothesis import settings
+
+if TYPE_CHECKING:
+    from finger3d.fem.simplex import Mesh
+    from finger3d.geometry.design import Design
+    from finger3d.mold.parts import Mold
 
 # Before numpy or MKL is loaded: several test processes share few cores, and one thread is reproducible.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -79,3 +85,54 @@ def solid(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from tests.scenes import SOLID, pressed
 
     return pressed(tmp_path_factory.mktemp("solid"), SOLID)
+
+
+@pytest.fixture(scope="session")
+def real() -> tuple[Mesh, Any, list[str]]:
+    """The quarter of the Fig. 9 finger by pytetwild, its report, and what was said."""
+    from finger3d.meshing.generate import mesh_solid
+    from tests.designs import FIG9, OPTIONS, ZONE
+
+    said: list[str] = []
+    mesh, report = mesh_solid(FIG9, OPTIONS, ZONE, ("x", "z"), said.append)
+    return mesh, report, said
+
+
+@pytest.fixture(scope="session")
+def paper_finger() -> Design:
+    """The Fig. 9 finger."""
+    from tests.designs import FIG9
+
+    return FIG9
+
+
+@pytest.fixture(scope="session")
+def paper_mold(paper_finger: Design) -> Mold:
+    """The mold of the Fig. 9 finger with slots for `GAUGES`."""
+    from finger3d.mold.options import MoldOptions
+    from finger3d.mold.parts import foils, mold
+    from tests.mold_cases import GAUGES
+
+    options = MoldOptions(shrinkage=0.01)
+    return mold(paper_finger.solid(), foils(GAUGES, options, None), options)
+
+
+@pytest.fixture(scope="session")
+def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of files: one finger as STEP, in inches too, and STL, drawn away from the origin; other things."""
+    from build123d import Axis, Box, Compound, Face, Pos, Sphere, Unit, export_stl, fillet
+
+    from tests.bodies import step_of
+    from tests.designs import SMALL
+
+    folder = tmp_path_factory.mktemp("drawn")
+    finger = Pos(12.0, -7.0, 33.0) * SMALL.solid()
+    step_of(folder / "finger.step", finger)
+    step_of(folder / "inches.step", finger, unit=Unit.IN)
+    export_stl(finger, folder / "finger.stl", tolerance=1e-4, angular_tolerance=0.05)
+    step_of(folder / "two.step", Compound([Box(5, 5, 5), Pos(10, 0, 0) * Box(5, 5, 5)]))
+    step_of(folder / "face.step", Face.make_rect(5, 5))
+    step_of(folder / "ball.step", Sphere(10.0))
+    pad = Pos(0.0, 2.5, 0.0) * Box(12.0, 5.0, 8.0)
+    step_of(folder / "rounded.step", fillet(pad.faces().sort_by(Axis.Y)[-1].edges(), 1.5))
+    return folder

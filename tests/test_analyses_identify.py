@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import math
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +11,6 @@ import numpy as np
 import pytest
 
 import finger3d
-from finger3d.analyses.identify.fit import Scale, uncertainty
-from finger3d.analyses.identify.measured import read_measured
-from finger3d.errors import Finger3dError
 from finger3d.results.journal import Journal
 from finger3d.scene import parse
 from tests.identify_cases import FREE, TRUE, bench
@@ -122,61 +118,3 @@ def test_an_interrupted_identification_continues(tmp_path: Path, scene_file: Pat
     monkeypatch.setattr(Journal, "append", lambda journal, row: (solved.append(row), whole(journal, row))[1])
     found = finger3d.identify(scene_file, measured, FREE, out)
     assert len(solved) == found.presses - 5
-
-
-def test_an_interval_follows_a_response_that_saturates() -> None:
-    """Steep below 0.5, flat above: the sum of squares rises by one at 0.49 and at the upper bound."""
-    scales = [Scale("a", 0.0, 1.0)]
-    steep = np.array([[100.0]])
-    found = uncertainty(
-        scales, np.array([0.5]), steep, lambda values: np.array([100.0 * min(float(values[0]) - 0.5, 0.0)])
-    )
-    assert found.low[0] == pytest.approx(0.49, abs=1e-3)
-    assert found.high[0] == 1.0
-
-
-def test_dependent_and_independent_values() -> None:
-    scales = [Scale("a", 0.0, 1.0), Scale("b", 1.0, 100.0)]
-    assert scales[1].is_logarithmic
-    assert scales[1].share(scales[1].value(0.3)) == pytest.approx(0.3)
-    only_sum = np.array([[100.0, 100.0], [50.0, 50.0]])
-
-    def linear(slope: Any) -> Any:
-        return lambda values: slope @ np.array([s.share(v) - 0.5 for s, v in zip(scales, values, strict=True)])
-
-    told = uncertainty(scales, np.array([0.5, 0.5]), only_sum, linear(only_sum))
-    assert told.untold == ("the data cannot tell a and b apart: they may change against each other and fit as well",)
-    good = uncertainty(scales, np.array([0.5, 0.5]), np.diag([100.0, 200.0]), linear(np.diag([100.0, 200.0])))
-    assert good.untold == ()
-    # 1 / 100 of the range, and 1 / 200 of the logarithmic range times the value 10
-    assert good.stds == pytest.approx([0.01, 0.005 * 10.0 * math.log(100.0)], rel=1e-2)
-
-
-KNOWN = ("normal_force_N", "gauge_a")
-
-
-@pytest.mark.parametrize(
-    ("text", "told"),
-    [
-        ("normal_force_N\n1\n", "must have a column"),
-        ("depth_mm\n1\n2\n", "has no measured column"),
-        ("depth_mm,normal_force\n1,2\n2,3\n", 'column "normal_force" is unknown; did you mean "normal_force_N"'),
-        ("depth_mm,gauge_a_std\n1,2\n2,3\n", 'column "gauge_a_std" has no column "gauge_a"'),
-        ("depth_mm,gauge_a,gauge_a\n1,2,3\n2,3,4\n", 'two columns are called "gauge_a"'),
-        ("depth_mm,gauge_a\n1,2\n2,\n", "line 3: gauge_a is empty"),
-        ("depth_mm,gauge_a\n1,2\n2,much\n", "line 3: gauge_a = 'much': must be a finite number"),
-        ("depth_mm,gauge_a\n1,nan\n2,3\n", "line 2: gauge_a = 'nan': must be a finite number"),
-        ("depth_mm,gauge_a\n1,2,3\n2,3\n", "line 2: has 3 cells, and there are 2 columns"),
-        ("depth_mm,gauge_a\n1,2\n3,3\n2,4\n", "line 4: depth_mm = 2: must be larger than before"),
-        ("depth_mm,gauge_a\n1,2\n", "has 1 rows; at least 2"),
-        ("depth_mm,gauge_a,gauge_a_std\n1,2,0.1\n2,3,0\n", "line 3: gauge_a_std = 0: must be above 0"),
-        ("", "must have a column"),
-    ],
-)
-def test_files_that_are_refused(tmp_path: Path, text: str, told: str) -> None:
-    path = tmp_path / "bench.csv"
-    path.write_text(text)
-    with pytest.raises(Finger3dError) as found:
-        read_measured(path, KNOWN)
-    assert told in str(found.value)
-    assert "\n" not in str(found.value)

@@ -16,6 +16,8 @@ from finger3d.cli import app
 from tests.commands import run
 
 HEAVY = ("OCP", "build123d", "vtk", "vtkmodules", "pyvista", "pytetwild", "trimesh", "scipy", "numpy", "pydantic")
+COMMANDS = [name for name in app if not name.startswith("-")]
+COLOUR = re.compile(r"\x1b\[(?:[\d;]*;)?(?:3[0-8]|4[0-8]|9\d|10[0-7])(?:;[\d;]*)?m")
 
 
 @pytest.fixture
@@ -90,8 +92,6 @@ def test_plan_info_and_validate_as_json(scene, tmp_path, capsys) -> None:
 
 # --- help, completion, colours ----------------------------------------------------------------------------------------
 
-COMMANDS = [name for name in app if not name.startswith("-")]
-
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_has_an_example_and_a_text_for_every_option(command, capsys) -> None:
@@ -126,9 +126,6 @@ def on_a_terminal(arguments: list[str], **environment: str) -> str:
     os.close(main_end)
     assert process.wait() == 0
     return b"".join(pieces).decode()
-
-
-COLOUR = re.compile(r"\x1b\[(?:[\d;]*;)?(?:3[0-8]|4[0-8]|9\d|10[0-7])(?:;[\d;]*)?m")
 
 
 def test_colours_only_on_a_terminal_that_wants_them() -> None:

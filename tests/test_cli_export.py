@@ -1,4 +1,4 @@
-"""TODO cli_export"""
+"""Command ``export``: files of the finger, and the mold with its table."""
 
 from __future__ import annotations
 

@@ -8,12 +8,9 @@ import sys
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
-import numpy as np
 import pytest
-from scipy.interpolate import PchipInterpolator
 
 from finger3d.sensor import save
-from finger3d.sensor.pchip import MonotoneCubic
 from tests.sensor_cases import curve, line, straight, together
 
 NUMPY_ONLY = """
@@ -27,17 +24,6 @@ sys.meta_path.insert(0, Refuse())
 import finger3d
 print(finger3d.estimate(sys.argv[1], [float(sys.argv[2])])[0].mu)
 """
-
-
-def test_the_interpolation_is_that_of_scipy() -> None:
-    random = np.random.default_rng(0)
-    for _ in range(300):
-        count = random.integers(2, 9)
-        x, y = np.cumsum(random.uniform(0.1, 2.0, count)), random.normal(size=count) * random.choice([0, 1, 1], count)
-        at = random.uniform(x[0], x[-1], 20)
-        found, wanted = MonotoneCubic.of(x, y), PchipInterpolator(x, y)
-        assert found(at) == pytest.approx(wanted(at), rel=1e-12, abs=1e-12)
-        assert found(at, 1) == pytest.approx(wanted(at, 1), rel=1e-9, abs=1e-9)
 
 
 def test_an_estimate_needs_no_library_but_numpy(tmp_path: Path) -> None:

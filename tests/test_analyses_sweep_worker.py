@@ -1,0 +1,32 @@
+"""Rows that a worker returns."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from finger3d.errors import Finger3dError
+from tests.sweep_cases import points_of, pressed_here
+
+
+@pytest.fixture
+def scene(root: Path) -> Path:
+    return root / "geometries" / "fig9.toml"
+
+
+def test_a_body_that_cannot_be_built_and_a_point_that_fails_are_rows(scene, monkeypatch) -> None:
+    sweep = points_of(scene, "friction.mu=0.06,1")
+    monkeypatch.setattr(
+        "finger3d.analyses.sweep.worker._build", lambda *a: (_ for _ in ()).throw(Finger3dError("no mesh"))
+    )
+    assert [row["outcome"] for row in pressed_here(sweep)] == ["no mesh", "no mesh"]
+
+    class Weak:
+        seconds = 0.0
+
+        def presses(self, variants: list, most: int | None) -> list:
+            return [MemoryError() for _ in variants]
+
+    monkeypatch.setattr("finger3d.analyses.sweep.worker._build", lambda *a: Weak())
+    assert [row["outcome"] for row in pressed_here(sweep)] == ["MemoryError: no further information"] * 2
