@@ -176,7 +176,7 @@ def test_shapes_beside_the_finger(table: str, text: str, tmp_path: Path, capsys:
     assert re.search(text, refused(capsys, tmp_path, PAD, table))
 
 
-# what crashes or hangs pytetwild, as far as a scene can ask for it; the rest, as arrays, is in test_design_tetwild.py
+# what crashes or hangs pytetwild, as far as a scene can ask for it; the rest, as arrays, is in test_meshing_tetwild.py
 @pytest.mark.parametrize(
     ("size", "text"),
     [(100.0, "larger than the finger"), (0.02, "tetrahedra"), (0.0, "from 0.0001"), (-1.0, "from 0.0001")],
