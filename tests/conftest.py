@@ -136,3 +136,19 @@ def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
     pad = Pos(0.0, 2.5, 0.0) * Box(12.0, 5.0, 8.0)
     step_of(folder / "rounded.step", fillet(pad.faces().sort_by(Axis.Y)[-1].edges(), 1.5))
     return folder
+
+
+@pytest.fixture
+def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """The figures that are saved; solids are drawn by matplotlib."""
+    from matplotlib.figure import Figure
+
+    seen, save = [], Figure.savefig
+
+    def kept(figure: Any, *arguments: Any, **options: Any) -> None:
+        seen.append(figure)
+        save(figure, *arguments, **options)
+
+    monkeypatch.setattr(Figure, "savefig", kept)
+    monkeypatch.setenv("FINGER3D_RENDERER", "matplotlib")
+    return seen
