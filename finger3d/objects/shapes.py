@@ -15,14 +15,13 @@ from dataclasses import dataclass, field
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
-from annotated_types import Ge, Gt, Le, Lt
+from annotated_types import Gt, Lt
 
-from finger3d._ranges import Length, Place, Radians, Zero
+from finger3d._ranges import Length, Place, Radians, Turn, Zero
 from finger3d._types import Float
 from finger3d.geometry.surface import Triangles
 
 Axis = Literal["x", "z"]
-Turn = Annotated[float, Radians(Ge(-360), Le(360))]
 
 
 _DRAWN = 201
