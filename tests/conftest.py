@@ -152,3 +152,12 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     monkeypatch.setattr(Figure, "savefig", kept)
     monkeypatch.setenv("FINGER3D_RENDERER", "matplotlib")
     return seen
+
+
+@pytest.fixture
+def fresh_renderer(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No renderer is forced, and no crash of another test is remembered."""
+    from finger3d.plotting import renderer
+
+    monkeypatch.delenv("FINGER3D_RENDERER", raising=False)
+    monkeypatch.setattr(renderer, "FAILURES", [])

@@ -13,6 +13,7 @@ from finger3d.analyses.sweep.points import combinations
 from finger3d.analyses.sweep.store import ResultStore
 from finger3d.cli import main
 from finger3d.errors import Finger3dError, MissingError
+from finger3d.results.journal import Journal, Row
 from tests.sweep_cases import COARSE, SETS, lines, points_of, pressed_here
 
 EDITS = [
@@ -142,16 +143,11 @@ def test_a_full_disk_is_one_line_that_says_what_is_kept(name, scene, tmp_path, m
             monkeypatch.setattr(os, "replace", full)
             act = kept.write
         else:
-            real_stream = kept._journal._file
 
-            class Full:
-                def write(self, line: bytes) -> int:
-                    # what a disk does that is nearly full: it takes a part
-                    return real_stream.write(line[:20])
+            def append(journal: Journal, row: Row) -> None:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-                close = real_stream.close
-
-            kept._journal._file = Full()
+            monkeypatch.setattr(Journal, "append", append)
             act = lambda: kept.add(rows[1])  # noqa: E731
         with pytest.raises(MissingError, match=r"No space left on device; 1 of 2 points are kept") as told:
             act()

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from finger3d.analyses.sweep import worker
 from finger3d.errors import Finger3dError
 from tests.sweep_cases import points_of, pressed_here
 
@@ -17,9 +18,11 @@ def scene(root: Path) -> Path:
 
 def test_a_body_that_cannot_be_built_and_a_point_that_fails_are_rows(scene, monkeypatch) -> None:
     sweep = points_of(scene, "friction.mu=0.06,1")
-    monkeypatch.setattr(
-        "finger3d.analyses.sweep.worker._build", lambda *a: (_ for _ in ()).throw(Finger3dError("no mesh"))
-    )
+
+    def fails(*arguments: object) -> None:
+        raise Finger3dError("no mesh")
+
+    monkeypatch.setattr(worker, "SharedBody", fails)
     assert [row["outcome"] for row in pressed_here(sweep)] == ["no mesh", "no mesh"]
 
     class Weak:
@@ -28,5 +31,5 @@ def test_a_body_that_cannot_be_built_and_a_point_that_fails_are_rows(scene, monk
         def presses(self, variants: list, most: int | None) -> list:
             return [MemoryError() for _ in variants]
 
-    monkeypatch.setattr("finger3d.analyses.sweep.worker._build", lambda *a: Weak())
+    monkeypatch.setattr(worker, "SharedBody", lambda *a: Weak())
     assert [row["outcome"] for row in pressed_here(sweep)] == ["MemoryError: no further information"] * 2

@@ -42,7 +42,7 @@ def test_a_solid_with_and_without_opengl(
     renderer: str, solid: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("FINGER3D_RENDERER", renderer)
-    monkeypatch.setattr(opengl, "_failure", [])
+    monkeypatch.setattr(opengl, "FAILURES", [])
     assert main(["show", str(solid), "--png", str(tmp_path / "a.png"), "--step", "2"]) == 0
     image = rgb(tmp_path / "a.png")
     assert orange(image) > 1e-3

@@ -29,8 +29,10 @@ def test_forces_on_the_whole_finger_are_those_of_the_part_and_its_images() -> No
     force = problem.upright_force(state)
     (row,) = (gauge.rows(problem.meshed_body) for gauge in problem.model.gauges)
     assert problem.read(force)["g"] == pytest.approx((row @ problem.unknowns(force)[: row.shape[1]]).item(), rel=1e-9)
-    first, second = problem.unknowns_of([force, 2.0 * force])
-    assert second == pytest.approx(2.0 * first, rel=1e-12, abs=1e-15)
+    together = list(problem.unknowns_of([force, 2.0 * force, 0.0 * force]))
+    assert together[1] == pytest.approx(2.0 * together[0], rel=1e-12, abs=1e-15)
+    for one, other in zip(together, problem.unknowns_of([force, 2.0 * force, 0.0 * force], block=1), strict=True):
+        assert other == pytest.approx(one, rel=1e-12, abs=1e-15)
 
 
 def test_a_reduced_problem_has_no_mesh() -> None:

@@ -96,7 +96,7 @@ def test_a_damaged_file_is_meshed_again(stored: tuple[Path, Mesh], monkeypatch: 
     path = cache.folder() / f"{cache.key(FIG9, OPTIONS, rounded_zone(FIG9, OPTIONS, ZONE), BOTH)}.npz"
     path.parent.mkdir(parents=True)
     path.write_bytes(stored[0].read_bytes()[:-500])
-    monkeypatch.setattr(tetwild, "_new_mesh", lambda *_: (stored[1], 1000.0, 0.0))
+    monkeypatch.setattr(tetwild, "new_mesh", lambda *_: (stored[1], 1000.0, 0.0))
     report = mesh_solid(FIG9, OPTIONS, ZONE, BOTH)[1]
     assert not report.from_cache
     assert report.cache_path == str(path)
@@ -107,7 +107,7 @@ def test_a_cache_that_cannot_be_written_is_said_and_does_not_stop_the_work(
     stored: tuple[Path, Mesh], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("FINGER3D_CACHE", str(stored[0]))  # a file where a folder should be
-    monkeypatch.setattr(tetwild, "_new_mesh", lambda *_: (stored[1], 1000.0, 0.0))
+    monkeypatch.setattr(tetwild, "new_mesh", lambda *_: (stored[1], 1000.0, 0.0))
     said: list[str] = []
     report = mesh_solid(FIG9, OPTIONS, ZONE, BOTH, said.append)[1]
     assert report.cache_path is None

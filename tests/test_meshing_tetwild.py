@@ -114,7 +114,7 @@ def test_three_attempts_and_then_one_line(monkeypatch: pytest.MonkeyPatch, tmp_p
         calls.append(1)
         raise UnusableMeshError("pytetwild crashed (return code -11): no message")
 
-    monkeypatch.setattr(tetwild, "_child", crash)
+    monkeypatch.setattr(tetwild, "run_child", crash)
     said: list[str] = []
     with pytest.raises(Finger3dError, match="3 attempts .*return code -11.*mesher = 'swept'") as failed:
         mesh_solid(FIG9, OPTIONS, ZONE, BOTH, said.append)

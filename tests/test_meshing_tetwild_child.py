@@ -30,7 +30,7 @@ low, high = np.array([-5.0, 0, -5]), np.array([5.0, 10, 5])
 options = SimpleNamespace(size_mm=0.3, base_size_mm=0.3)
 field = sizing(designs()["block"](5.0, 10.0, 10.0), options, (-5, 5, -5, 5), low, high)
 print("meshing", flush=True)
-tetwild._child(CUBE, SIDES, field, 1e-3, 60.0)
+tetwild.run_child(CUBE, SIDES, field, 1e-3, 60.0)
 """
 
 
@@ -43,12 +43,12 @@ def fine() -> Any:
 def test_a_crash_of_the_child_is_told_by_its_return_code() -> None:
     # A body without volume was seen to end pytetwild with a segmentation fault.
     with pytest.raises(UnusableMeshError, match="crashed .return code -11"):
-        tetwild._child(CUBE * [1.0, 0.0, 1.0] + [0.0, 5.0, 0.0], SIDES, fine(), 1e-3, 60.0)
+        tetwild.run_child(CUBE * [1.0, 0.0, 1.0] + [0.0, 5.0, 0.0], SIDES, fine(), 1e-3, 60.0)
 
 
 def test_a_child_that_takes_too_long_is_ended() -> None:
     with pytest.raises(UnusableMeshError, match="did not finish within 0 s"):
-        tetwild._child(CUBE, SIDES, fine(), 1e-3, 0.05)
+        tetwild.run_child(CUBE, SIDES, fine(), 1e-3, 0.05)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="relies on prctl and /proc")

@@ -12,17 +12,11 @@ import pytest
 
 from finger3d.contact.friction import OPEN, SLIP, STICK
 from finger3d.fem.simplex import Mesh
-from finger3d.plotting import renderer
 from finger3d.plotting import solid as render
 from finger3d.plotting.figures import contact_figure, finger_picture, force_figure, zones
 from tests.pictures import MU, STEPS, finger, pixels, pressed, share
 
-
-@pytest.fixture(autouse=True)
-def _fresh_renderer(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No renderer is forced, and no crash of another test is remembered."""
-    monkeypatch.delenv("FINGER3D_RENDERER", raising=False)
-    monkeypatch.setattr(renderer, "_failure", [])
+pytestmark = pytest.mark.usefixtures("fresh_renderer")
 
 
 @pytest.fixture(scope="module")

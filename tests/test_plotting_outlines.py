@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from finger3d.fem.simplex import Mesh, quadratic
-from finger3d.plotting import outlines
 from finger3d.plotting.outlines import edges_of, outline_of
 from tests.meshes import grid
 
@@ -36,6 +35,6 @@ def test_the_outline_encloses_the_area_of_the_moved_section(order: int) -> None:
     assert len(path.vertices) == order * 12 + 1
 
 
-def test_edges_of_a_very_fine_mesh_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(outlines, "_MOST_CELLS", 10)
-    assert len(edges_of(square(1), square(1).points).vertices) == 0
+def test_edges_that_would_merge_into_an_area_are_left_out() -> None:
+    assert len(edges_of(square(1, 100), square(1, 100).points).vertices) == 0
+    assert len(edges_of(square(1, 20), square(1, 20).points).vertices) > 0

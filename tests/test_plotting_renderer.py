@@ -14,12 +14,7 @@ from finger3d.plotting import renderer
 from finger3d.plotting.figures import finger_picture
 from tests.pictures import OBJECT, assert_shows_the_zones, finger, pressed
 
-
-@pytest.fixture(autouse=True)
-def _fresh_renderer(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No renderer is forced, and no crash of another test is remembered."""
-    monkeypatch.delenv("FINGER3D_RENDERER", raising=False)
-    monkeypatch.setattr(renderer, "_failure", [])
+pytestmark = pytest.mark.usefixtures("fresh_renderer")
 
 
 @pytest.fixture(scope="module")
