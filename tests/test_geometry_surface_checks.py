@@ -15,10 +15,10 @@ from tests.bodies import ball, box
 @pytest.mark.parametrize(
     ("spoilt", "text"),
     [
-        (lambda p, f: (p, f[1:]), "is not closed: 3 edges border a hole or a missing triangle, the first at"),
+        (lambda p, f: (p, f[1:]), "not closed: 3 edges"),
         (
             lambda p, f: (p, np.vstack([f[:1, ::-1], f[1:]])),
-            "has flipped triangles: neighbours face opposite ways along 3",
+            "flipped triangles",
         ),
         (lambda p, f: (p, f[:, ::-1]), "is inside out"),
         (lambda p, f: (p * [1, 0, 1], f), "has no volume: it is flat"),
@@ -27,7 +27,7 @@ from tests.bodies import ball, box
         (lambda p, f: (np.where(np.arange(8)[:, None] == 3, np.inf, p), f), "has a point that is not a number"),
         (lambda p, f: (np.vstack([p, p + 9]), np.vstack([f, f + 8])), "is in 2 pieces"),
         (lambda p, f: (np.vstack([p, 0.5 * p]), np.vstack([f, f[:, ::-1] + 8])), "is in 2 pieces .or hollow."),
-        (lambda p, f: (p, np.vstack([f, f[:2]])), "more than two triangles meet in 5 edges"),
+        (lambda p, f: (p, np.vstack([f, f[:2]])), "meet in 5 edges"),
         (lambda p, f: (p, f[:3]), "has 3 triangles"),
     ],
     ids=["hole", "flipped", "inward", "flat", "a point", "nan", "inf", "two", "hollow", "twice", "three"],

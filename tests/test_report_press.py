@@ -36,7 +36,7 @@ def test_a_press_tells_its_numbers_proof_cost_versions_and_how_to_cite(section: 
     assert CITE in text
     assert all(advice in text for advice in summary["advice"])
     assert (section / "report.html").read_text(encoding="utf-8").count('src="data:image/png;base64,') == 3
-    assert "Deformed finger to scale: contact pressure, and stick and slip zones" in text
+    assert "stick and slip zones" in text
 
 
 def test_a_users_text_is_never_markup(section: Path) -> None:

@@ -27,7 +27,7 @@ def scene_with(path: Path, **table: Any) -> dict[str, Any]:
     [
         (box(2, 2, 2), {"x_mm": 50.0}, "never touches"),
         (channel(12.0, 4.9), {}, "touches the base first"),
-        (box(2e3, 2e3, 2e3), {}, "200 times as large as the finger of 10 mm; is its unit right"),
+        (box(2e3, 2e3, 2e3), {}, "200 times as large as the finger of 10 mm"),
         (box(2e-3, 2e-3, 2e-3), {}, r"times smaller than the finger of 10 mm; .* 1000 if it was drawn in metres"),
         (box(2, 2, 2), {"scale": 0.0}, "object.scale = 0.0: must be a number from 1e-6 to 1e6"),
         (box(2, 2, 2), {"scael": 2.0}, 'did you mean "scale"'),
