@@ -42,6 +42,22 @@ def root() -> Path:
     return Path(__file__).resolve().parent.parent
 
 
+@pytest.fixture(scope="session")
+def paper_scene(root: Path) -> Path:
+    """The scene file of the Fig. 9 finger."""
+    return root / "geometries" / "fig9.toml"
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    """The example scene, as ``finger3d new`` writes it."""
+    from tests.commands import run
+
+    path = tmp_path / "scene.toml"
+    assert run("new", path) == 0
+    return path
+
+
 @pytest.fixture
 def fake_press(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
     """A press that writes two steps of `STEP` and ends with `end`; the arguments of the call are kept."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import socket
 import time
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import pytest
 
@@ -15,12 +14,7 @@ from finger3d.errors import MissingError
 from tests.sweep_cases import points_of
 
 
-@pytest.fixture
-def scene(root: Path) -> Path:
-    return root / "geometries" / "fig9.toml"
-
-
-def test_a_scheduler_that_does_not_answer_is_left_after_the_time_limit(scene, tmp_path, monkeypatch) -> None:
+def test_a_scheduler_that_does_not_answer_is_left_after_the_time_limit(paper_scene, tmp_path, monkeypatch) -> None:
     monkeypatch.setattr("finger3d.analyses.sweep.cluster.CONNECT_S", 1.0)
     with socket.socket() as deaf:
         deaf.bind(("127.0.0.1", 0))
@@ -28,12 +22,12 @@ def test_a_scheduler_that_does_not_answer_is_left_after_the_time_limit(scene, tm
         address = f"tcp://127.0.0.1:{deaf.getsockname()[1]}"
         start = time.monotonic()
         with pytest.raises(MissingError, match="no Dask scheduler answered"):
-            running.sweep(points_of(scene, "friction.mu=0.1"), tmp_path, scheduler=address)
+            running.sweep(points_of(paper_scene, "friction.mu=0.1"), tmp_path, scheduler=address)
         assert time.monotonic() - start < 10.0
 
 
 @pytest.mark.parametrize("threads", [1, None], ids=["a worker", "here"])
-def test_workers_gain_no_threads(threads, scene, monkeypatch) -> None:
+def test_workers_gain_no_threads(threads, paper_scene, monkeypatch) -> None:
     """Two workers on two cores are as many as there is room for; a body pressed by this process takes them all."""
     pools = []
 
@@ -45,7 +39,7 @@ def test_workers_gain_no_threads(threads, scene, monkeypatch) -> None:
     monkeypatch.setattr("finger3d.mechanics.parallel.ThreadPoolExecutor", Pool)
     monkeypatch.setattr("finger3d.mechanics.parallel._ROWS_FOR_THREADS", 1)
     monkeypatch.setattr("finger3d.mechanics.parallel.cores", lambda: 2)
-    sweep = points_of(scene, "friction.mu=0.06,0.3,1")
+    sweep = points_of(paper_scene, "friction.mu=0.06,0.3,1")
     (body,) = sweep.bodies.values()
     rows = worker.batch(body, sweep.points, 3) if threads else list(worker.rows(body, sweep.points))
     assert [row["point"] for row in rows] == [0, 1, 2]

@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 from finger3d.analyses.sweep.points import Vary
 from tests.sweep_cases import points_of
 
 
-@pytest.fixture
-def scene(root: Path) -> Path:
-    return root / "geometries" / "fig9.toml"
-
-
-def test_every_combination_is_a_point_and_only_the_material_makes_bodies(scene) -> None:
-    sweep = points_of(scene, "friction.mu=0.06,0.25", "material.nu=0.45,0.49", "gauge.g36.angle_deg=10,20")
+def test_every_combination_is_a_point_and_only_the_material_makes_bodies(paper_scene) -> None:
+    sweep = points_of(paper_scene, "friction.mu=0.06,0.25", "material.nu=0.45,0.49", "gauge.g36.angle_deg=10,20")
     assert [p.number for p in sweep.points] == list(range(8))
     assert sweep.points[1].values == {"friction.mu": 0.06, "material.nu": 0.45, "gauge.g36.angle_deg": 20}
     assert len(sweep.bodies) == 2

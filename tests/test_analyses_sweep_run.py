@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
@@ -17,13 +16,8 @@ from finger3d.scene import load
 from tests.sweep_cases import COARSE, SETS, lines, points_of, pressed_here, table
 
 
-@pytest.fixture
-def scene(root: Path) -> Path:
-    return root / "geometries" / "fig9.toml"
-
-
-def test_rows_become_a_table_in_the_scenes_own_names(scene, tmp_path) -> None:
-    sweep = points_of(scene, "friction.mu=0.06,1", "contact.rule=projection,paper")
+def test_rows_become_a_table_in_the_scenes_own_names(paper_scene, tmp_path) -> None:
+    sweep = points_of(paper_scene, "friction.mu=0.06,1", "contact.rule=projection,paper")
     rows = pressed_here(sweep)
     with ResultStore(sweep, tmp_path).open() as kept:
         for row in rows[:3]:
@@ -43,23 +37,23 @@ def test_rows_become_a_table_in_the_scenes_own_names(scene, tmp_path) -> None:
     assert float(table(tmp_path)[0]["normal_force_N"]) == rows[0]["normal_force_N"]
 
 
-def test_a_folder_in_use_is_refused(scene, tmp_path) -> None:
-    sweep = points_of(scene, "friction.mu=0.06")
+def test_a_folder_in_use_is_refused(paper_scene, tmp_path) -> None:
+    sweep = points_of(paper_scene, "friction.mu=0.06")
     with ResultStore(sweep, tmp_path).open(), pytest.raises(Finger3dError, match="another finger3d is writing there"):
         with ResultStore(sweep, tmp_path).open():
             pass
 
 
-def test_a_sweep_of_one_body_needs_neither_dask_nor_matplotlib(scene, tmp_path) -> None:
+def test_a_sweep_of_one_body_needs_neither_dask_nor_matplotlib(paper_scene, tmp_path) -> None:
     code = "import sys; from finger3d.cli import main; main(sys.argv[1:]); "
     code += "sys.exit(repr({'matplotlib', 'distributed'} & set(sys.modules)))"
-    words = ["sweep", str(scene), *COARSE, "--vary", "friction.mu=0.1,0.2", "--out", str(tmp_path)]
+    words = ["sweep", str(paper_scene), *COARSE, "--vary", "friction.mu=0.1,0.2", "--out", str(tmp_path)]
     done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, timeout=120)
     assert done.stderr.splitlines()[-1] == "set()"
     assert 'class="chart"' in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
-def test_a_point_whose_row_is_written_at_an_interruption_is_counted(scene, tmp_path, monkeypatch, capsys) -> None:
+def test_a_point_whose_row_is_written_at_an_interruption_is_counted(paper_scene, tmp_path, monkeypatch, capsys) -> None:
     append = Journal.append
 
     def interrupted(journal: Journal, row: Row) -> None:
@@ -68,11 +62,11 @@ def test_a_point_whose_row_is_written_at_an_interruption_is_counted(scene, tmp_p
             raise KeyboardInterrupt
 
     monkeypatch.setattr(Journal, "append", interrupted)
-    words = ["sweep", str(scene), *COARSE, "--vary", "friction.mu=0.1,0.2,0.3", "--out", str(tmp_path)]
+    words = ["sweep", str(paper_scene), *COARSE, "--vary", "friction.mu=0.1,0.2,0.3", "--out", str(tmp_path)]
     assert main(words) == 130
     assert "2 of 3 points are kept" in capsys.readouterr().err
     assert len(lines(tmp_path)) == len(table(tmp_path)) == 2
 
 
-def test_the_scene_of_these_tests_is_small(scene) -> None:
-    assert load(scene, SETS).mesh.size_mm == 4.0
+def test_the_scene_of_these_tests_is_small(paper_scene) -> None:
+    assert load(paper_scene, SETS).mesh.size_mm == 4.0

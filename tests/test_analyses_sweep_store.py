@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import json
 import os
-from pathlib import Path
 
 import pytest
 
@@ -23,13 +22,8 @@ EDITS = [
 ] + [{"gauge_g36": "5"}, {"a b": []}]  # fmt: skip
 
 
-@pytest.fixture
-def scene(root: Path) -> Path:
-    return root / "geometries" / "fig9.toml"
-
-
-def test_a_torn_line_is_dropped_and_its_point_done_again(scene, tmp_path) -> None:
-    sweep = points_of(scene, "friction.mu=0.06,1")
+def test_a_torn_line_is_dropped_and_its_point_done_again(paper_scene, tmp_path) -> None:
+    sweep = points_of(paper_scene, "friction.mu=0.06,1")
     rows = pressed_here(sweep)
     with ResultStore(sweep, tmp_path).open() as kept:
         kept.add(rows[0])
@@ -46,14 +40,14 @@ def edited(row: dict, **changes: object) -> str:
     return json.dumps({k: v for k, v in {**row, **changes}.items() if v != "missing"})
 
 
-def test_a_journal_edited_by_hand_is_one_line(scene, tmp_path, capsys) -> None:
-    sweep = points_of(scene, "friction.mu=0.06,1")
+def test_a_journal_edited_by_hand_is_one_line(paper_scene, tmp_path, capsys) -> None:
+    sweep = points_of(paper_scene, "friction.mu=0.06,1")
     rows = pressed_here(sweep)
     with ResultStore(sweep, tmp_path).open() as kept:
         for row in rows:
             kept.add(row)
     journal, before = tmp_path / "points.jsonl", (tmp_path / "points.jsonl").read_text()
-    command = ["sweep", str(scene), *COARSE, "--vary", "friction.mu=0.06,1", "--out", str(tmp_path)]
+    command = ["sweep", str(paper_scene), *COARSE, "--vary", "friction.mu=0.06,1", "--out", str(tmp_path)]
     for line in ["[]", "5", "null", '"a"', "[" * 100_000, *(edited(rows[1], **change) for change in EDITS)]:
         journal.write_text(before.splitlines()[0] + "\n" + line + "\n")
         assert main(command) == 2, line
@@ -68,8 +62,8 @@ def test_a_journal_edited_by_hand_is_one_line(scene, tmp_path, capsys) -> None:
     assert str(journal) in capsys.readouterr().err
 
 
-def test_a_damaged_sweep_json_is_one_line(scene, tmp_path, capsys) -> None:
-    with ResultStore(points_of(scene, "friction.mu=0.06,1"), tmp_path).open():
+def test_a_damaged_sweep_json_is_one_line(paper_scene, tmp_path, capsys) -> None:
+    with ResultStore(points_of(paper_scene, "friction.mu=0.06,1"), tmp_path).open():
         pass
     path = tmp_path / "sweep.json"
     whole = json.loads(path.read_text())
@@ -78,7 +72,7 @@ def test_a_damaged_sweep_json_is_one_line(scene, tmp_path, capsys) -> None:
     for data in [*(text.encode() for text in texts), b'{"vary": "\xe9"}']:
         path.write_bytes(data)
         for command in (
-            ["sweep", str(scene), *COARSE, "--vary", "friction.mu=0.06,1", "--out", str(tmp_path)],
+            ["sweep", str(paper_scene), *COARSE, "--vary", "friction.mu=0.06,1", "--out", str(tmp_path)],
             ["show", str(tmp_path), "--png", str(tmp_path / "a.png")],
         ):
             assert main(command) == 2, data
@@ -98,10 +92,10 @@ def test_a_damaged_table_is_one_line(data, tmp_path, capsys) -> None:
     assert str(tmp_path / "results.csv") in err
 
 
-def test_a_folder_of_another_sweep_is_refused(scene, tmp_path, capsys) -> None:
-    with ResultStore(points_of(scene, "friction.mu=0.06,1"), tmp_path).open():
+def test_a_folder_of_another_sweep_is_refused(paper_scene, tmp_path, capsys) -> None:
+    with ResultStore(points_of(paper_scene, "friction.mu=0.06,1"), tmp_path).open():
         pass
-    arguments = ["sweep", str(scene), *COARSE, "--vary", "friction.mu=0.06,2", "--out", str(tmp_path)]
+    arguments = ["sweep", str(paper_scene), *COARSE, "--vary", "friction.mu=0.06,2", "--out", str(tmp_path)]
     assert main(arguments) == 2
     err = capsys.readouterr().err
     assert len(err.splitlines()) == 1
@@ -115,19 +109,19 @@ def test_a_folder_of_another_sweep_is_refused(scene, tmp_path, capsys) -> None:
         (["material.nu=0.4"], "its friction.mu is"),
     ],
 )
-def test_what_makes_it_another_sweep_is_named(vary, expected, scene, tmp_path) -> None:
-    with ResultStore(points_of(scene, "friction.mu=0.06,1"), tmp_path).open():
+def test_what_makes_it_another_sweep_is_named(vary, expected, paper_scene, tmp_path) -> None:
+    with ResultStore(points_of(paper_scene, "friction.mu=0.06,1"), tmp_path).open():
         pass
-    with pytest.raises(Finger3dError, match=expected), ResultStore(points_of(scene, *vary), tmp_path).open():
+    with pytest.raises(Finger3dError, match=expected), ResultStore(points_of(paper_scene, *vary), tmp_path).open():
         pass
-    other = combinations(scene, [*SETS, "press.steps=3"], ["friction.mu=0.06,1"])
+    other = combinations(paper_scene, [*SETS, "press.steps=3"], ["friction.mu=0.06,1"])
     with pytest.raises(Finger3dError, match="of another scene"), ResultStore(other, tmp_path).open():
         pass
 
 
 @pytest.mark.parametrize("name", ["points.jsonl", "results.parquet"])
-def test_a_full_disk_is_one_line_that_says_what_is_kept(name, scene, tmp_path, monkeypatch) -> None:
-    sweep = points_of(scene, "friction.mu=0.06,1")
+def test_a_full_disk_is_one_line_that_says_what_is_kept(name, paper_scene, tmp_path, monkeypatch) -> None:
+    sweep = points_of(paper_scene, "friction.mu=0.06,1")
     rows = pressed_here(sweep)
     kept = ResultStore(sweep, tmp_path)
     with kept.open():

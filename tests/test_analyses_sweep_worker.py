@@ -2,22 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-import pytest
-
 from finger3d.analyses.sweep import worker
 from finger3d.errors import Finger3dError
 from tests.sweep_cases import points_of, pressed_here
 
 
-@pytest.fixture
-def scene(root: Path) -> Path:
-    return root / "geometries" / "fig9.toml"
-
-
-def test_a_body_that_cannot_be_built_and_a_point_that_fails_are_rows(scene, monkeypatch) -> None:
-    sweep = points_of(scene, "friction.mu=0.06,1")
+def test_a_body_that_cannot_be_built_and_a_point_that_fails_are_rows(paper_scene, monkeypatch) -> None:
+    sweep = points_of(paper_scene, "friction.mu=0.06,1")
 
     def fails(*arguments: object) -> None:
         raise Finger3dError("no mesh")

@@ -6,7 +6,6 @@ import json
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -18,13 +17,6 @@ from tests.commands import run
 HEAVY = ("OCP", "build123d", "vtk", "vtkmodules", "pyvista", "pytetwild", "trimesh", "scipy", "numpy", "pydantic")
 COMMANDS = [name for name in app if not name.startswith("-")]
 COLOUR = re.compile(r"\x1b\[(?:[\d;]*;)?(?:3[0-8]|4[0-8]|9\d|10[0-7])(?:;[\d;]*)?m")
-
-
-@pytest.fixture
-def scene(tmp_path) -> Path:
-    path = tmp_path / "scene.toml"
-    assert run("new", path) == 0
-    return path
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -12,13 +11,6 @@ import finger3d
 import finger3d.analyses.press
 from finger3d.errors import Outcome
 from tests.commands import run
-
-
-@pytest.fixture
-def scene(tmp_path) -> Path:
-    path = tmp_path / "scene.toml"
-    assert run("new", path) == 0
-    return path
 
 
 def test_what_a_job_prints_does_not_spoil_the_json(scene, tmp_path, monkeypatch, capsys) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import pytest
 
@@ -12,13 +11,6 @@ from finger3d.scene import load
 from finger3d.scene.reference import reference
 from finger3d.scene.registry import effect_names
 from tests.commands import run
-
-
-@pytest.fixture
-def scene(tmp_path) -> Path:
-    path = tmp_path / "scene.toml"
-    assert run("new", path) == 0
-    return path
 
 
 def test_new_says_what_to_do_next(tmp_path, capsys) -> None:

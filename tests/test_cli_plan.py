@@ -2,18 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-import pytest
-
 from tests.commands import run
-
-
-@pytest.fixture
-def scene(tmp_path) -> Path:
-    path = tmp_path / "scene.toml"
-    assert run("new", path) == 0
-    return path
 
 
 def test_plan_tells_effects_and_forecast_and_solves_nothing(scene, fake_press, capsys) -> None:

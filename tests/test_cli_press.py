@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import pytest
 
@@ -11,13 +10,6 @@ import finger3d
 import finger3d.analyses.press
 from finger3d.errors import MissingError, Outcome
 from tests.commands import run
-
-
-@pytest.fixture
-def scene(tmp_path) -> Path:
-    path = tmp_path / "scene.toml"
-    assert run("new", path) == 0
-    return path
 
 
 def test_press_prints_the_closing_table(scene, tmp_path, fake_press, capsys) -> None:

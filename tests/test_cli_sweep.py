@@ -2,25 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 import json
-from pathlib import Path
 
 import pytest
 
 from finger3d.cli import main
-
-COARSE = ["--set", "model.domain=plane-strain", "--set", "mesh.size_mm=4", "--set", "mesh.base_size_mm=16"]
-
-
-@pytest.fixture
-def scene(root: Path) -> Path:
-    return root / "geometries" / "fig9.toml"
-
-
-def table(out: Path) -> list[dict]:
-    with (out / "results.csv").open(newline="") as file:
-        return list(csv.DictReader(file))
+from tests.sweep_cases import COARSE, table
 
 
 @pytest.mark.parametrize(
@@ -45,9 +32,9 @@ def table(out: Path) -> list[dict]:
         ([f"friction.mu={','.join(map(str, range(400)))}", f"material.nu={','.join(map(str, range(400)))}"], "160000"),
     ],
 )
-def test_bad_values_are_refused_before_the_first_run(vary, expected, scene, tmp_path, capsys) -> None:
+def test_bad_values_are_refused_before_the_first_run(vary, expected, paper_scene, tmp_path, capsys) -> None:
     options = [option for text in vary for option in ("--vary", text)]
-    assert main(["sweep", str(scene), *COARSE, *options, "--out", str(tmp_path / "out")]) == 2
+    assert main(["sweep", str(paper_scene), *COARSE, *options, "--out", str(tmp_path / "out")]) == 2
     err = capsys.readouterr().err
     assert len(err.splitlines()) == 1
     assert expected in err
@@ -64,20 +51,29 @@ def test_bad_values_are_refused_before_the_first_run(vary, expected, scene, tmp_
     ],
 )
 def test_a_cluster_that_cannot_be_used_is_told_in_one_line(
-    options, code, expected, scene, tmp_path, capsys, monkeypatch
+    options, code, expected, paper_scene, tmp_path, capsys, monkeypatch
 ) -> None:
     monkeypatch.setattr("finger3d.analyses.sweep.cluster.CONNECT_S", 1.0)
-    arguments = ["sweep", str(scene), *COARSE, "--vary", "friction.mu=0.1", "--out", str(tmp_path / "out"), *options]
+    arguments = [
+        "sweep",
+        str(paper_scene),
+        *COARSE,
+        "--vary",
+        "friction.mu=0.1",
+        "--out",
+        str(tmp_path / "out"),
+        *options,
+    ]
     assert main(arguments) == code
     err = capsys.readouterr().err
     assert len(err.splitlines()) == 1
     assert expected in err
 
 
-def test_one_body_is_swept_without_workers_and_its_points_are_shown(scene, tmp_path, capsys, monkeypatch) -> None:
+def test_one_body_is_swept_without_workers_and_its_points_are_shown(paper_scene, tmp_path, capsys, monkeypatch) -> None:
     monkeypatch.setattr("finger3d.analyses.sweep.cluster.local", lambda *a: pytest.fail("workers were started"))
     vary = ["--vary", "friction.mu=0.1,0.2,0.3,0.4,0.5,0.6", "--vary", "gauge.g36.angle_deg=15,30"]
-    assert main(["sweep", str(scene), *COARSE, *vary, "--out", str(tmp_path)]) == 0
+    assert main(["sweep", str(paper_scene), *COARSE, *vary, "--out", str(tmp_path)]) == 0
     told = capsys.readouterr().out
     found = table(tmp_path)
     assert len(found) == 12
@@ -93,7 +89,7 @@ def test_one_body_is_swept_without_workers_and_its_points_are_shown(scene, tmp_p
     assert f"open {tmp_path / 'report.html'}, or give --png alone" in capsys.readouterr().err
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
     capsys.readouterr()
-    assert main(["sweep", str(scene), *COARSE, *vary, "--out", str(tmp_path), "--json"]) == 0
+    assert main(["sweep", str(paper_scene), *COARSE, *vary, "--out", str(tmp_path), "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
     assert (data["points"], data["kept"], data["failed"], data["bodies"]) == (12, 12, 0, 1)
     assert [row["gauge_g36"] for row in data["rows"]] == [float(row["gauge_g36"]) for row in found]
