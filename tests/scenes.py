@@ -126,7 +126,8 @@ def words(page: Path) -> str:
     return " ".join(unescape(re.sub(r"<[^>]*>", " ", text)).split())
 
 
-def written(tmp_path: Path, text: str = SECTION, name: str = "scene.toml") -> Path:
-    path = tmp_path / name
+def written(folder: Path, text: str, name: str = "scene.toml") -> Path:
+    """Write a scene file, and return its path."""
+    path = folder / name
     path.write_text(text, encoding="utf-8")
     return path

@@ -1,16 +1,89 @@
-"""Advice after a press."""
+"""Advice: changes by large deformation and by more increments, told where they are known, beside the same press."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
+import finger3d
+from finger3d.accuracy import large_deformation as module
+from finger3d.accuracy.advice import advise, largest_principal_strain
+from finger3d.accuracy.changes import Change, ChangeEstimate
 from finger3d.cli import main
-from tests.scenes import HALF_CYLINDER, changed, written
+from finger3d.effects.large_deformation import Effect as LargeDeformation
+from finger3d.report.press import press_page
+from tests.models import half_cylinder
+from tests.scenes import HALF_CYLINDER, changed, words, written
 
-SECTION = changed(HALF_CYLINDER, steps=5, size_mm=0.2)
+COARSE = 0.3
+SHALLOW = changed(HALF_CYLINDER, steps=5, size_mm=0.2)
+DEEP = changed(HALF_CYLINDER, depth_mm=1.0, size_mm=0.2)
+"""Principal strains of about 0.2."""
+
+
+def test_a_line_of_advice_tells_changes_with_their_intervals() -> None:
+    changes = {
+        "normal_force_N": Change(10.0, 1.9, 0.2, significant=True),
+        "friction_sum_N": Change(4.0, 1.0, 0.9, significant=False),
+        "gauge_a": Change(-0.02, 0.0058, 0.0004, significant=True),  # its magnitude falls
+        "gauge_b": Change(0.001, 0.01, 0.001, significant=True),
+        "gauge_c": Change(0.01, 0.001, 0.0001, significant=True),
+        "gauge_d": Change(0.01, 0.002, 0.0001, significant=True),
+    }
+    model = half_cylinder(COARSE)
+    large = advise(model, 0.2, ChangeEstimate(changes=changes))[0]
+    assert large == (
+        "large deformation would change the normal force by +19 % (+17 to +21 %), gauge_b by +0.01 (+0.009 to +0.011), "
+        "gauge_a by -29 % (-31 to -27 %) and gauge_d by +20 % (+19 to +21 %): "
+        "[effects.large_deformation] accounts for it"
+    )
+    one = ChangeEstimate(changes={"friction_sum_N": Change(4.0, -0.2, 0.04, significant=True)})
+    more = advise(model, 0.02, increments=one)[0]
+    assert more.startswith("more increments would change the friction sum by -5 % (-6 to -4 %): press.steps")
+
+
+def test_without_a_known_change_no_number_is_told() -> None:
+    model, unknown = half_cylinder(COARSE), {"normal_force_N": Change(10.0, 1.9, 2.0, significant=False)}
+    for estimate in (None, ChangeEstimate(method="no estimate: why"), ChangeEstimate(changes=unknown)):
+        line, *_ = advise(model, 0.2, estimate, estimate)
+        assert line.startswith("principal strains reach 0.2, large for linear elasticity: [effects.large_deformation]")
+        assert not any("would change" in line for line in advise(model, 0.06, estimate, estimate))
+    assert not any("large_deformation" in line for line in advise(LargeDeformation().apply(model), 0.2))
+
+
+def test_the_singular_corners_do_not_count_as_strain() -> None:
+    strain = np.zeros((1000, 3, 3))
+    strain[:, 0, 0] = -0.07
+    strain[:5] *= 100.0
+    assert largest_principal_strain(strain) == pytest.approx(0.07, rel=1e-12)
+
+
+def test_a_press_tells_what_large_deformation_would_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(DEEP, encoding="utf-8")
+    told = finger3d.press(scene, tmp_path / "told", figures=False).summary()
+    found = json.loads((tmp_path / "told" / "summary.json").read_text(encoding="utf-8"))["large_deformation_estimate"]
+    force = found["changes"]["normal_force_N"]
+    assert set(force) == {"value", "change", "error"}
+    assert force["value"] == told["steps"][-1]["normal_force_N"]
+    line = next(text for text in told["advice"] if "[effects.large_deformation]" in text)
+    assert f"normal force by {float(format(100.0 * force['change'] / force['value'], '.2g')):+g} % (" in line
+    page = words(press_page(tmp_path / "told"))
+    assert "What large deformation would change" in page
+    assert f"normal_force_N {force['value']:.5g} {force['change']:.5g} {force['error']:.5g}" in page
+
+    def forbidden(*_: Any) -> Any:
+        raise AssertionError("estimated under --no-error")
+
+    monkeypatch.setattr(module, "large_deformation", forbidden)
+    alone = finger3d.press(scene, tmp_path / "alone", error=False).summary()
+    assert alone["steps"] == told["steps"]  # to the last digit
+    assert alone["large_deformation_estimate"] is None
+    assert any(text.startswith("principal strains reach") for text in alone["advice"])
 
 
 @pytest.mark.slow
@@ -24,10 +97,11 @@ def test_advice_comes_with_numbers_and_goes_when_it_is_followed(tmp_path: Path) 
     }.items():
         out = tmp_path / name
         settings = [word for key in keys for word in ("--set", key)]
-        assert main(["press", str(written(tmp_path)), "--out", str(out), "--no-figures", *settings]) == 0
+        assert main(["press", str(written(tmp_path, SHALLOW)), "--out", str(out), "--no-figures", *settings]) == 0
         said[name] = " ".join(json.loads((out / "summary.json").read_text(encoding="utf-8"))["advice"])
-    assert "[effects.large_deformation]" in said["small"]
+    assert "large deformation would change the normal force by +" in said["small"]
+    assert "more increments would change the friction sum by" in said["small"]
     assert "[effects.large_deformation]" in said["viscous"]
     assert "large_deformation" not in said["large"]
-    assert "increments" not in said["small"] + said["large"]
+    assert "would change" not in said["viscous"] + said["large"] + said["auto"]
     assert "finger3d compare" in said["large"]

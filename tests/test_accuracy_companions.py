@@ -11,7 +11,7 @@ import pytest
 
 from finger3d.accuracy import companions
 from finger3d.accuracy.companions import coarser, companion
-from finger3d.accuracy.estimate import estimate, main_numbers
+from finger3d.accuracy.estimate import compared, estimate, main_numbers
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.elastic_object import SoftObject
 from finger3d.fem.material import Isotropic
@@ -20,6 +20,7 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.step_halving import last_step
 from finger3d.meshing import tetwild
 from finger3d.meshing.swept import mesh_swept
 from finger3d.objects import Sphere
@@ -84,19 +85,18 @@ def test_a_cached_mesh_without_its_companion_gets_one_and_pays_once(made: list[s
     problem, frames = run(unstructured())
     assert problem.part.report.from_cache
     assert made == ["lump"]
-    found = estimate(problem, frames)
-    assert "(ftetwild, 0.8 and 2 mm) beside, order" in found.method
-    assert found.discretisation["normal_force_N"] > 0.0
+    found = companion(problem)
+    assert (found.model.mesh.size_mm, found.model.mesh.base_size_mm) == (0.8, 2.0)
+    assert compared(problem, frames[-1], found, last_step(found))["normal_force_N"] > 0.0
     assert made == ["lump", "lump"]
-    again = estimate(problem, frames)
-    assert again.discretisation == found.discretisation
+    assert (companion(problem).mesh.points == found.mesh.points).all()
     assert made == ["lump", "lump"]
 
 
 def test_a_small_unstructured_mesh_is_judged_by_a_finer_one(made: list[str]) -> None:
-    problem, frames = run(unstructured())
-    found = estimate(problem, frames)
-    assert "(ftetwild, 0.2 and 0.5 mm) beside, finer, order" in found.method
+    problem, _ = run(unstructured())
+    found = companion(problem).model.mesh
+    assert (found.size_mm, found.base_size_mm) == (0.2, 0.5)
     assert made == ["lump", "lump"]
 
 

@@ -8,20 +8,18 @@ import pytest
 
 from finger3d.accuracy.estimate import estimate, main_numbers
 from finger3d.accuracy.point_resolution import PointResolution
-from finger3d.accuracy.refine import controlled_quantities
 from finger3d.accuracy.richardson import mesh_error
 from finger3d.contact.friction import STICK, Coulomb
-from finger3d.mechanics.build import build
 from finger3d.mechanics.model import Leg, MeshOptions
-from finger3d.mechanics.solve import march
 from tests.models import half_cylinder, run, swept_fig9
 
 
-def test_a_length_is_never_better_than_half_the_distance_of_points() -> None:
-    same = {"contact_half_length_mm": 3.0}
-    assert mesh_error(same, same, 2.0, (PointResolution(0.2, 0.1), PointResolution(0.4, 0.2))) == {
-        "contact_half_length_mm": 0.1
-    }
+def test_a_length_is_never_better_than_its_ends_are_resolved() -> None:
+    same, name = {"contact_half_length_mm": 3.0}, "contact_half_length_mm"
+    own, other = (PointResolution(h, h / 2.0, least={name: 0.2 * h}) for h in (0.2, 0.4))
+    assert mesh_error(same, same, 2.0, (own, other)) == {name: pytest.approx(0.04)}
+    # what the companion's points leave open is no change
+    assert mesh_error(same, {name: 3.08}, 2.0, (own, other)) == {name: pytest.approx(0.04)}
 
 
 @pytest.mark.parametrize(("mu", "least"), [(0.25, 0.1), (0.0, 0.0)])
@@ -31,7 +29,7 @@ def test_one_point_that_touches_tells_nothing_of_friction(mu: float, least: floa
     problem, frames = run(replace(model, friction=Coulomb(mu)))
     told, found = main_numbers(problem, frames[-1]), estimate(problem, frames)
     assert told["friction_sum_N"] == pytest.approx(0.0, abs=1e-12)
-    # a tenth of the force, the floor of a contact no longer than the distance of its points
+    # a tenth of the force, the bound for a contact no longer than the distance of its points
     assert found.discretisation["friction_sum_N"] == pytest.approx(least * told["normal_force_N"], abs=1e-12)
 
 
@@ -44,15 +42,8 @@ def test_a_stick_zone_one_row_wide_is_not_resolved() -> None:
     assert (points.points[sticks, 2] == 0.0).all()
     assert abs(2.0 * told["stick_half_length_mm"] - 62.1) <= 2.0 * 2.0 * found["stick_half_length_mm"]
     assert abs(told["stick_area_mm2"] - 171.5) <= 2.0 * found["stick_area_mm2"]
-    # nothing is known of a zone that thin: two bars reach from none to twice as much
-    assert found["stick_half_length_mm"] == pytest.approx(0.5 * told["stick_half_length_mm"])
-    assert found["stick_area_mm2"] >= 0.5 * told["stick_area_mm2"]
-    # contact is eleven rows wide and resolved: known to half the spacing of 1.96 mm
-    assert found["contact_half_length_mm"] < 1.5
-
-
-def test_in_solids_a_tolerance_leaves_out_the_stick_zone() -> None:
-    section = build(half_cylinder(0.4))
-    names = list(main_numbers(section, list(march(section))[-1]))
-    assert "stick_half_length_mm" in controlled_quantities(section, names)
-    assert not {"stick_half_length_mm", "stick_area_mm2"} & set(controlled_quantities(build(swept_fig9(8.0)), names))
+    # little is known of a zone that thin, and of its length less than of its points
+    assert found["stick_half_length_mm"] >= 0.4 * told["stick_half_length_mm"]
+    assert found["stick_area_mm2"] >= 0.3 * told["stick_area_mm2"]
+    # contact is eleven rows wide and resolved: known to less than half the spacing of 1.96 mm
+    assert found["contact_half_length_mm"] < 0.5 * 1.96

@@ -41,7 +41,7 @@ def test_uniqueness_is_reported_and_warned_of(tmp_path: Path) -> None:
 )
 def test_a_scene_beyond_what_can_be_trusted_is_warned_of(tmp_path: Path, key: str, text: str) -> None:
     out = tmp_path / "out"
-    assert main(["press", str(written(tmp_path)), "--out", str(out), "--no-figures", "--set", key]) == 0
+    assert main(["press", str(written(tmp_path, SECTION)), "--out", str(out), "--no-figures", "--set", key]) == 0
     assert any(text in w for w in json.loads((out / "summary.json").read_text(encoding="utf-8"))["warnings"])
 
 

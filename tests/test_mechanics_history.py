@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -56,24 +58,26 @@ def test_a_zone_is_resolved_where_it_is_three_points_wide(rows: int, resolved: i
     assert points.rim(zone).sum() == 9 * min(rows, 2)
 
 
-@pytest.mark.parametrize("symmetry", [None, ()])
-def test_a_length_does_not_depend_on_the_half_that_is_meshed(symmetry: tuple[str, ...] | None) -> None:
+def test_a_length_does_not_depend_on_the_half_that_is_meshed() -> None:
     block = designs()["block"](half_length_mm=4.0, height_mm=3.0, width_mm=8.0)
     model = Model(
         block, Isotropic(1.0, 0.4), MeshOptions(0.8, 2.0, "swept"), (Leg(0.3, steps=2),),
-        object=Sphere(radius_mm=6.0), friction=Coulomb(0.25), symmetry=symmetry,
+        object=Sphere(radius_mm=6.0), friction=Coulomb(0.25),
     )  # fmt: skip
-    problem = build(model)
-    frame = list(march(problem))[-1]
-    status, at = frame.state.status, problem.points.points
-    numbers = measure(problem.points, frame)
-    for name, zone in (("contact", status != OPEN), ("stick", status == STICK)):
-        on = at[zone & (at[:, 2] == 0.0), 0]
-        assert numbers[f"{name}_half_length_mm"] == pytest.approx(0.5 * np.ptp(on), rel=1e-12)
+    lengths = []
+    for symmetry in (None, ()):
+        problem = build(replace(model, symmetry=symmetry))
+        frame = list(march(problem))[-1]
+        numbers, at = measure(problem.points, frame), problem.points.points
+        line = np.unique(at[at[:, 2] == 0.0, 0])
+        last = at[(frame.state.status != OPEN) & (at[:, 2] == 0.0), 0].max()
+        assert last < numbers["contact_half_length_mm"] < line[line > last].min()
+        lengths.append([numbers["contact_half_length_mm"], numbers["stick_half_length_mm"]])
+    assert lengths[0] == pytest.approx(lengths[1], rel=1e-9)
 
 
-def test_an_area_is_uncertain_by_half_a_spacing_all_round() -> None:
-    # a circle of radius 8 known to half the spacing of 1 mm: its area is known to pi 8
+def test_an_area_is_uncertain_by_three_eighths_of_a_spacing_all_round() -> None:
+    # a circle of radius 8 known to 3/8 of the spacing of 1 mm: its area is known to 6 pi
     points = grid(31, 31, shift=-15.0)
     touching = np.hypot(points.points[:, 0] - 15.0, points.points[:, 2]) <= 8.0
     state = ContactState(
@@ -84,7 +88,7 @@ def test_an_area_is_uncertain_by_half_a_spacing_all_round() -> None:
         ObjectPose(1.0), state, state, (15.0, 0.0), np.zeros(3), {}, 0.0, 0.0, Outcome.CONVERGED, 0.0, 1, "newton", 0.0
     )
     bars = least_bars(points, frame, 1.0)
-    assert bars["contact_area_mm2"] == bars["stick_area_mm2"] == pytest.approx(8.0 * np.pi, rel=0.15)
-    # the zone is three points wide along all of the line but its two tips
-    # both of its ends lie up to one spacing before the next point of the line
-    assert bars["contact_half_length_mm"] == pytest.approx(0.5, rel=1e-12)
+    assert bars["contact_area_mm2"] == bars["stick_area_mm2"] == pytest.approx(6.0 * np.pi, rel=0.15)
+    # both ends lie one spacing before the next point of the line
+    assert bars["contact_half_length_mm"] == pytest.approx(0.2, rel=1e-12)
+    assert bars["stick_half_length_mm"] == pytest.approx(0.3, rel=1e-12)

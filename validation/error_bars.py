@@ -18,8 +18,9 @@ from typing import Any
 
 import numpy as np
 
+from finger3d.accuracy.adjoint_bars import applies
 from finger3d.accuracy.companions import companion
-from finger3d.accuracy.estimate import compared, main_numbers, press_numbers
+from finger3d.accuracy.estimate import compared, discretisation, press_numbers
 from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
@@ -33,6 +34,7 @@ from finger3d.mechanics.build import build
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.readings import Marker, Taxel
 from finger3d.mechanics.solve import march
 from finger3d.mechanics.step_halving import (
     DISSIPATION_TOLERANCE,
@@ -50,7 +52,8 @@ MUS, DEPTHS = (0.125, 0.5), (1.0, 0.6)
 SWEPT_MUS = (0.1, 0.125, 0.25, 0.5, 1.0)
 """Of swept solids: where stick ends along the width, and with it the error of friction, depends on it."""
 
-KINDS = (*MAIN, *AREAS, "gauge")
+ENERGIES, READINGS = ("external_work_mJ", "dissipation_mJ"), ("gauge", "marker", "taxel")
+KINDS = (*MAIN, *AREAS, *ENERGIES, *READINGS)
 CLAIM = "claim of finger3d for its error bars"
 COLUMNS = "scene part dofs mu depth_mm number value estimate true_error"
 ROUND = 1e-4  # of a number: a point that changes its state only in the truth
@@ -106,17 +109,21 @@ class Judged:
 
     @property
     def kind(self) -> str:
-        """Number's kind: all gauges are one."""
-        return "gauge" if self.number.startswith("gauge") else self.number
+        """Number's kind: all gauges are one, and so are markers and taxels."""
+        first = self.number.partition("_")[0]
+        return first if first in READINGS else self.number
 
 
 def _model(
     design: Design, nu: float, domain: Domain, depth: float, gauges: tuple[Gauge, ...], rigid: Any = None,
     mesher: Any = "swept",
 ) -> Model:  # fmt: skip
+    high, wide = design.height_mm, design.width_mm
+    markers = (Marker("m", 0.3 * high, 0.8 * high), Marker("n", 0.0, 0.5 * high)) if gauges else ()
+    taxels = (Taxel("t", 0.0, 0.0, 0.2 * high, 0.5 * wide), Taxel("s", 0.4 * high, 0.0, 0.2 * high, 0.5 * wide))
     return Model(
         design, Isotropic(1.0, nu), MeshOptions(1.0, 1.0, mesher), (Leg(depth, steps=10),),
-        object=rigid or Plane(), gauges=gauges, domain=domain,
+        object=rigid or Plane(), gauges=gauges, markers=markers, taxels=taxels if gauges else (), domain=domain,
     )  # fmt: skip
 
 
@@ -142,6 +149,8 @@ def cases(quick: bool) -> list[Case]:
             )
             model = _model(fig9, nu, plane, 10.0, far)
             out.append(Case(f"Fig. 9, {plane}, nu = {nu:g}", model, (5.6, 4.0, 2.8, 2.0, 1.4, 1.0), 0.3, 4.0))
+    model = _model(half, 0.45, "plane-strain", 1.0, near)
+    out.append(Case("half cylinder, plane-strain, nu = 0.45", model, (0.4, 0.2, 0.1), 0.025, 5.0))
     for nu in (0.3, 0.4, 0.49):
         model = _model(fig9, nu, "solid", 10.0, far)
         out.append(Case(f"Fig. 9, solid swept, nu = {nu:g}", model, (4.0, 2.8, 2.0), 1.0, 4.0, SWEPT_MUS))
@@ -203,20 +212,38 @@ def _end(problem: Problem) -> StepResult:
 
 
 def _by_mesh(case: Case) -> list[Judged]:
-    truth = [main_numbers(p, _end(p)) for _, _, p in _runs(build(case.at(case.truth)), case.mus)]
+    truth = [press_numbers(p, _end(p)) for _, _, p in _runs(build(case.at(case.truth)), case.mus)]
     found = []
     for size in case.sizes:
         problem = build(case.at(size))
-        beside = companion(problem)
-        runs = zip(_runs(problem, case.mus), _runs(beside, case.mus), truth, strict=True)
-        for (mu, depth, p), (_, _, coarse), exact in runs:
-            frame, dofs = _end(p), problem.part.stiffness.upper.shape[0]
-            told, bars = main_numbers(p, frame), compared(p, frame, coarse, _end(coarse))
+        dofs = problem.part.stiffness.upper.shape[0]
+        for (mu, depth, told, bars), exact in zip(_estimated(problem, case.mus), truth, strict=True):
             right = {**exact, **_hertz(case, exact)}
             found += [
                 Judged(case.name, "mesh", dofs, mu, depth, k, told[k], bars[k], abs(told[k] - right[k])) for k in told
             ]
     return found
+
+
+def _estimated(
+    problem: Problem, mus: tuple[float, ...]
+) -> Iterator[tuple[float, float, dict[str, float], Mapping[str, float]]]:
+    """Yield mu, depth, the numbers and their estimated discretisation errors; a companion mesh serves all presses."""
+    if applies(problem.model):
+        for mu, depth, press in _runs(problem, mus):
+            frames = list(march(press))
+            yield (
+                mu,
+                depth,
+                press_numbers(press, frames[-1]),
+                discretisation(press, frames, numbers=press_numbers)[0].discretisation,
+            )
+        return
+    beside = companion(problem)
+    for (mu, depth, press), (_, _, coarse) in zip(_runs(problem, mus), _runs(beside, mus), strict=True):
+        frame = _end(press)
+        bars = compared(press, frame, coarse, _end(coarse), press_numbers)
+        yield mu, depth, press_numbers(press, frame), bars
 
 
 def _hertz(case: Case, exact: dict[str, float]) -> dict[str, float]:

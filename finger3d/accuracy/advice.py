@@ -1,34 +1,73 @@
-"""Advice: effects that a press has left out although they may matter, estimated from its own result."""
+"""Advice: effects and increments that a press has left out although they matter, each with what it would change."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from finger3d._types import Float
+from finger3d.accuracy.changes import Change, ChangeEstimate
 from finger3d.mechanics.model import Model
 
-_STRAIN = 0.1
+LEAST_STRAIN = 0.05
+"""Principal strain from which it is estimated what large deformation would change."""
+
+_LARGE_STRAIN = 0.1
+"""Principal strain from which large deformation is advised without an estimate."""
+
 _QUANTILE = 0.99  # the clamped corners are singular, their strain says nothing
 
+_MOST_GAUGES = 3
+"""Gauges that a line of advice names, those that change most."""
 
-def advise(model: Model, strain: Float) -> list[str]:
-    """Advice for a finished press, from its nodal strains (n, 3, 3)."""
-    found = [] if model.formulation.finite_strain else _strain(strain)
-    return found + _width(model)
+_NAMES = {"normal_force_N": "the normal force", "friction_sum_N": "the friction sum"}
 
 
-def _strain(strain: Float) -> list[str]:
-    """Advise that strain is large, without a number: its effect depends on the scene.
+def largest_principal_strain(strain: Float) -> float:
+    """Return the largest principal strain of nodal strains (n, 3, 3), without the singular corners."""
+    return float(np.quantile(np.abs(np.linalg.eigvalsh(strain)).max(axis=1), _QUANTILE))
 
-    In 21 sections with strains of 0.15 to 0.47 large deformation raised the force by 10 to 54 %, at a strain of 0.32 by
-    14 % in one and by 54 % in another.
+
+def advise(
+    model: Model, strain: float, large: ChangeEstimate | None = None, increments: ChangeEstimate | None = None
+) -> list[str]:
+    """Return lines of advice for a finished press.
+
+    Parameters
+    ----------
+    strain : largest principal strain
+    large, increments : what large deformation and more increments would change, if it was estimated
     """
-    level = float(np.quantile(np.abs(np.linalg.eigvalsh(strain)).max(axis=1), _QUANTILE))
-    if level < _STRAIN:
-        return []
-    return [
-        f"principal strains reach {level:.2g}, large for linear elasticity: [effects.large_deformation] accounts for it"
-    ]
+    out = []
+    if not model.formulation.finite_strain:
+        if large and large.significant:
+            said = _changes(large.significant)
+            out.append(f"large deformation would change {said}: [effects.large_deformation] accounts for it")
+        elif strain >= _LARGE_STRAIN:
+            out.append(
+                f"principal strains reach {strain:.2g}, large for linear elasticity: [effects.large_deformation] "
+                "accounts for it"
+            )
+    if increments and increments.significant:
+        said = _changes(increments.significant)
+        out.append(f'more increments would change {said}: press.steps = "auto" chooses as many as are needed')
+    return out + _width(model)
+
+
+def _changes(changes: dict[str, Change]) -> str:
+    """Return forces and the gauges that change most, each with its change and the interval of the change."""
+    forces = [name for name in changes if name in _NAMES]
+    gauges = sorted((name for name in changes if name not in forces), key=lambda name: -abs(changes[name].change))
+    said = [f"{_NAMES.get(name, name)} by {_change(changes[name])}" for name in forces + gauges[:_MOST_GAUGES]]
+    return " and ".join(part for part in (", ".join(said[:-1]), said[-1]) if part)
+
+
+def _change(change: Change) -> str:
+    """Return a change and its interval: relative to the number, or absolute where it is larger than the number."""
+    if abs(change.change) > abs(change.value):
+        return f"{change.change:+.2g} ({change.low:+.2g} to {change.high:+.2g})"
+    ends = sorted((change.low / change.value, change.high / change.value))
+    middle, low, high = (f"{float(f'{100.0 * x:.2g}'):+g}" for x in (change.change / change.value, *ends))
+    return f"{middle} % ({low} to {high} %)"
 
 
 def _width(model: Model) -> list[str]:

@@ -42,7 +42,7 @@ _FINITE_STRAIN_FACTOR = 2.5
 """Edge length of the companion of a section at finite strain, where every increment factorises the tangent: at `FACTOR`
 the companion would take half the time of the press."""
 
-_LEAST_RATIO = 1.25
+LEAST_RATIO = 1.25
 """Smallest ratio of edge lengths from which an error is estimated."""
 
 
@@ -71,7 +71,7 @@ def companion(problem: Problem, say: Say = lambda text: None) -> Problem:
         Where neither mesh can be made, or none differs enough for an estimate.
     """
     coarse, fine = companions(problem.model, problem.mesh.points.size)
-    for chosen, enough in ((coarse, lambda r: r >= _LEAST_RATIO), (fine, lambda r: r <= 1.0 / _LEAST_RATIO)):
+    for chosen, enough in ((coarse, lambda r: r >= LEAST_RATIO), (fine, lambda r: r <= 1.0 / LEAST_RATIO)):
         for options in chosen:
             if beside := _built_if(problem, replace(problem.model, mesh=options), enough, say):
                 return beside

@@ -1,4 +1,8 @@
-"""Error estimate of a press: the discretisation error from a companion mesh, that of the increments from other counts.
+"""Error estimate of a press: the discretisation error, and that of the increments from other counts.
+
+In small strain the discretisation error follows from the condensed body itself (`finger3d.accuracy.adjoint_bars`); at
+large deformation, with viscosity, inclusions or an elastic object, and under a prescribed force it is taken from a
+companion mesh (`finger3d.accuracy.companions`).
 
 Which counts of increments are solved, and on which mesh, follows from the numbers of increments, unknowns and contact
 points.  Two identical presses hence have identical error bars, whatever the load of the machine.
@@ -14,10 +18,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from finger3d._types import Float
+from finger3d.accuracy.adjoint_bars import adjoint_bars, applies
 from finger3d.accuracy.companions import Say, companion, edge_ratio, is_unstructured
 from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.accuracy.richardson import ORDER, mesh_error
+from finger3d.accuracy.weighted_residuals import BodyErrors
 from finger3d.errors import Finger3dError
 from finger3d.io import AREAS, MAIN
 from finger3d.mechanics.cost import finite_strain_s
@@ -53,12 +59,14 @@ class ErrorEstimate(ErrorBars):
 
     Attributes
     ----------
-    companion_numbers : numbers of the companion by name
+    companion_numbers : numbers of the companion by name; empty without a companion mesh
     ratio : edge length of the companion over that of the mesh; below 1 for a finer companion
+    body : signed errors that the body's mesh causes, with the shares of its cells; None with a companion mesh
     """
 
     companion_numbers: dict[str, float] = field(default_factory=dict)
     ratio: float = math.nan
+    body: BodyErrors | None = None
 
 
 def main_numbers(problem: Problem, frame: StepResult) -> dict[str, float]:
@@ -107,7 +115,7 @@ def estimate(
     numbers: Measure = main_numbers,
     levels: Sequence[tuple[int, StepResult]] = (),
 ) -> ErrorEstimate:
-    """Estimate the errors of the last increment from a companion mesh and from other counts of increments.
+    """Estimate the errors of the last increment from the mesh and from other counts of increments.
 
     Parameters
     ----------
@@ -141,28 +149,53 @@ def _estimated(
     automatic = len(levels) > 1 and all(leg.steps == "auto" for leg in problem.model.legs)
     # from here on, automatic increments are numbers
     own = replace(problem, model=replace(problem.model, legs=with_increments_of(problem.model.legs, len(frames))))
-    beside = companion(own, say)
-    last = last_step(beside)
-    mesh = compared(own, frames[-1], beside, last, numbers)
-    ratio = edge_ratio(own, beside)
-    kind = "coarse" if ratio > 1.0 else "finer"
+    found, beside, where = discretisation(own, frames, say, numbers)
     if automatic:
         used = levels[-4:]
         steps = errors_from_counts({count: numbers(own, frame) for count, frame in used}, used[-1][0])
         by = ", ".join(str(count) for count, _ in used)
     else:
         on_own_mesh, way = choose_counts(_marching_cost(own), _marching_cost(beside), _budget(own))
-        where = (own, frames[-1]) if on_own_mesh else (beside, last)
-        steps = step_error(where[0], numbers(*where), numbers, way)
+        judged = own if on_own_mesh else beside
+        last = frames[-1] if on_own_mesh else last_step(beside)
+        steps = step_error(judged, numbers(judged, last), numbers, way)
         by = " and ".join({0.25: "a quarter", 0.5: "half", 2: "twice", 4: "four times"}[t] for t in COUNT_RATIOS[way])
-        by += " as many" + ("" if on_own_mesh else f" on the {kind} mesh")
-    return ErrorEstimate(
-        discretisation=mesh,
-        steps=steps,
-        method=f"{_on_mesh(beside, kind)}; steps: {by}, order 1",
+        by += " as many" + ("" if on_own_mesh else f" {where}")
+    steps = {name: error for name, error in steps.items() if name in found.discretisation}
+    return replace(found, steps=steps, method=f"{found.method}; steps: {by}, order 1")
+
+
+def discretisation(
+    own: Problem, frames: Sequence[StepResult], say: Say = lambda text: None, numbers: Measure = main_numbers
+) -> tuple[ErrorEstimate, Problem, str]:
+    """Estimate the discretisation errors of the last increment.
+
+    Returns
+    -------
+    estimate : without errors of the increments
+    beside : a press that costs less than this one
+    where : what that press differs in, in words
+    """
+    if applies(own.model) and numbers in (main_numbers, press_numbers):
+        bars = adjoint_bars(own, frames)
+        named = {name: bars.bars[name] for name in numbers(own, frames[-1])}
+        method = "mesh: dual-weighted residuals, and every second multiplier"
+        return (
+            ErrorEstimate(discretisation=named, method=method, body=bars.body),
+            bars.coarse,
+            "with every second multiplier",
+        )
+    beside = companion(own, say)
+    last = last_step(beside)
+    ratio = edge_ratio(own, beside)
+    kind = "coarse" if ratio > 1.0 else "finer"
+    found = ErrorEstimate(
+        discretisation=compared(own, frames[-1], beside, last, numbers),
+        method=_on_mesh(beside, kind),
         companion_numbers=numbers(beside, last),
         ratio=ratio,
     )
+    return found, beside, f"on the {kind} mesh"
 
 
 def _marching_cost(problem: Problem) -> float:

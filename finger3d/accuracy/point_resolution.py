@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.contact.friction import OPEN, STICK
+from finger3d.io import AREAS, MAIN
 from finger3d.mechanics.history import ContactPoints, StepResult, measure
 from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.zones import ERROR_AT_ENDS
 
 _ALONG_Z = 0.5
 """Friction along z has a relative error of about this times (h/b)^2, h the spacing of points along z, b the half extent
@@ -21,12 +23,16 @@ _IN_SECTIONS = 0.25
 contact, even where its companion agrees by chance: in plane stress 93 % of validation/error_bars.py then lie within two
 bars, and 89 % with 0.1."""
 
+_AREA_SHARE = 0.375
+"""Error of an area over that of the points along its border: twice of it holds in 98 % of validation/error_bars.py."""
+
 
 @dataclass(frozen=True)
 class PointResolution:
     """Resolution of the contact points: their distance (mm) along x, and the larger of that over the half-length of
     the contact and of their distance along z over the half width.
 
+    `along`: the distance of points along x over the half-length of contact.
     `alone`: contact with friction has no length, so that it tells nothing of the friction.
     `least`: by name, lower bounds of the error bars of lengths, areas and friction; see `least_bars`.
     """
@@ -35,6 +41,12 @@ class PointResolution:
     share: float
     alone: bool = False
     least: Mapping[str, float] = field(default_factory=dict)
+    along: float = 1.0
+
+    @property
+    def zone_bars(self) -> dict[str, float]:
+        """Error bars of lengths and areas of contact and stick by name."""
+        return {name: self.least[name] for name in (*MAIN, *AREAS) if not name.endswith("_N")}
 
     @classmethod
     def of(cls, problem: Problem, frame: StepResult) -> PointResolution:
@@ -45,7 +57,8 @@ class PointResolution:
         if points.dim == 3 and problem.model.mesh.mesher != "swept":
             step = float(np.sqrt(np.median(points.area)))
             along_z = _edge_length(points, frame.state.status != OPEN)
-            return cls(step, _share(step, reach, step, half_width), alone, least_bars(points, frame, along_z))
+            least = least_bars(points, frame, along_z)
+            return cls(step, _share(step, reach, step, half_width), alone, least, _along(step, reach))
         at = np.round(points.points, 9)
         line = np.unique(at[at[:, 2] == 0.0, 0])
         near = line[np.abs(line - frame.lowest[0]) <= 1.2 * reach]
@@ -61,11 +74,15 @@ class PointResolution:
             )
             least["friction_sum_N"] = _IN_SECTIONS * share * friction
             least["friction_sum_N_per_mm"] = least["friction_sum_N"] / (2.0 * half_width)
-        return cls(step, share, alone, least)
+        return cls(step, share, alone, least, _along(step, reach))
+
+
+def _along(along: float, reach: float) -> float:
+    return along / max(reach, along)
 
 
 def _share(along: float, reach: float, across: float, half_width: float) -> float:
-    return min(1.0, max(along / max(reach, along), across / half_width))
+    return min(1.0, max(_along(along, reach), across / half_width))
 
 
 def _edge_length(points: ContactPoints, touching: NDArray[np.bool_]) -> float:
@@ -79,10 +96,10 @@ def _edge_length(points: ContactPoints, touching: NDArray[np.bool_]) -> float:
 def least_bars(points: ContactPoints, frame: StepResult, along_z_mm: float) -> dict[str, float]:
     """Lower bounds of error bars that follow from the size of the zones in points, by name (mm, mm2, N, N/mm).
 
-    An area is uncertain by half the area of the points along the border of its zone, the mean of those on either side
-    of it and of one point at least.  In a solid, a half-length is uncertain by half of its part along which the zone is
-    less than three points wide, since a zone that thin may be absent or longer, and by half the mean distance from its
-    ends to the next points of the line z = 0.  Friction along z is uncertain by the spacing of the points along z.
+    An area is uncertain by a share of the area of the points along the border of its zone, the mean of those on either
+    side of it and of one point at least.  A half-length is uncertain by a share of the mean distance from its ends to
+    the next points of the line z = 0; in a solid by half of itself where the zone is nowhere three points wide, since a
+    zone that thin may be absent or longer.  Friction along z is uncertain by the spacing of the points along z.
 
     Parameters
     ----------
@@ -95,13 +112,16 @@ def least_bars(points: ContactPoints, frame: StepResult, along_z_mm: float) -> d
     found: dict[str, float] = {}
     for name, zone in (("contact", touching), ("stick", frame.state.status == STICK)):
         border = [float(points.area[points.rim(side)].sum()) for side in (zone, ~zone)]
-        found[f"{name}_area_mm2"] = 0.5 * max(0.5 * sum(border), one)
+        found[f"{name}_area_mm2"] = _AREA_SHARE * max(0.5 * sum(border), one)
         on = zone[nearest]
+        ends = ERROR_AT_ENDS[name] * _to_next_points(line, on)
         if points.dim == 3 and on.any():
             half = 0.5 * float(np.ptp(line[on]))
-            thin = 1.0 - float(np.mean(points.resolved(zone)[nearest[on]]))
-            found[f"{name}_half_length_mm"] = max(0.5 * thin * max(half, reach - half), _at_the_ends(line, on))
-            found[f"{name}_length_mm"] = 2.0 * found[f"{name}_half_length_mm"]
+            resolved = points.resolved(zone)[nearest[on]].any()
+            ends = ends if resolved else max(0.5 * max(half, reach - half), ends)
+        found[f"{name}_half_length_mm"] = ends
+        found[f"{name}_length_mm"] = 2.0 * ends
+    found["contact_length_end_mm"] = found["contact_length_mm"]
     if points.dim == 3 and touching.any():
         extent = max(0.5 * float(np.ptp(points.points[touching, 2])), along_z_mm)
         friction = float(np.abs(points.with_basis_of(frame.state).friction(frame.state.force)[:, 2]).sum())
@@ -112,10 +132,16 @@ def least_bars(points: ContactPoints, frame: StepResult, along_z_mm: float) -> d
     return found
 
 
-def _at_the_ends(line: NDArray[np.float64], on: NDArray[np.bool_]) -> float:
-    """Return half the mean distance (mm) from the ends of a zone to the next points of its line."""
+def _to_next_points(line: NDArray[np.float64], on: NDArray[np.bool_]) -> float:
+    """Return the mean distance (mm) from the ends of a zone to the next points of its line.
+
+    For an empty zone it is the median distance of the points, which may hide a zone between them.
+    """
+    if not on.any():
+        steps = np.diff(np.unique(line))
+        return float(np.median(steps)) if len(steps) else 0.0
     left, right = line[on].min(), line[on].max()
     below, above = line[line < left], line[line > right]
     before = float(left - below.max()) if below.size else 0.0
     after = float(above.min() - right) if above.size else 0.0
-    return 0.25 * (before + after)
+    return 0.5 * (before + after)

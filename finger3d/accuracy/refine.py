@@ -1,21 +1,24 @@
-"""Mesh refinement until the estimated error of every main quantity is below a tolerance.
+"""Mesh refinement until the estimated error of one number, the goal, is below a tolerance.
 
-Two lengths are free, that of the contact (its edge, the border of stick and slip, what a gauge below it reads) and that
-of the body far from it (the corners of the base).  A second coarse run, coarse at the contact only, tells which of them
-the error comes from.
+In small strain the mesh is graded towards the goal by the shares of the cells in its error
+(`finger3d.accuracy.graded`).  Where the error is estimated from a companion mesh, two lengths are free, that of the
+contact and that of the body far from it (the corners of the base).  A second coarse run, coarse at the contact only,
+tells which of them the error comes from.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 
 from finger3d._types import Tree
+from finger3d.accuracy.adjoint_bars import adjoint_bars, applies, short_press
 from finger3d.accuracy.companions import FACTOR, companion
-from finger3d.accuracy.estimate import compared, main_numbers
-from finger3d.accuracy.richardson import ORDER, Kind, Quantity, largest_readings
+from finger3d.accuracy.estimate import compared, press_numbers
+from finger3d.accuracy.graded import graded_sizes
+from finger3d.accuracy.richardson import ORDER, Quantity, largest_readings
 from finger3d.errors import Finger3dError, UnresolvedError
 from finger3d.mechanics.build import build
 from finger3d.mechanics.model import MeshOptions, Model
@@ -23,6 +26,9 @@ from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.step_halving import last_step
 
 MAX_ROUNDS = 8
+GOAL = "normal_force_N"
+"""Number that a mesh is refined for unless a scene names another."""
+
 _MIN_SHARE = 0.3  # of the difference to the companion: an edge length that causes less is kept
 _FACTOR_RANGE = (0.4, 0.85)  # a round changes an edge length at least and at most by these factors
 _SAFETY = 0.9  # of the tolerance, so that the last round does not just miss it
@@ -36,7 +42,7 @@ class Round:
 
     Attributes
     ----------
-    error, number : largest estimated error, relative (see `relative_errors`), and the number that has it
+    error, number : estimated error of the goal, relative (see `relative_error`), and its name
     seconds : of this round, estimate included
     """
 
@@ -107,28 +113,31 @@ def refine_mesh(
     tolerance: float,
     max_seconds: float | None = None,
     say: Callable[[str], None] = lambda text: None,
+    goal: str = GOAL,
 ) -> Refinement:
-    """Refine the mesh of a model until its estimated errors are below a tolerance.
+    """Refine the mesh of a model until the estimated error of the goal is below a tolerance.
 
     Parameters
     ----------
     model : with the edge lengths of the first round
-    tolerance : relative, see `relative_errors`
+    tolerance : relative, see `relative_error`
     max_seconds : no round is begun that is forecast to end later, output included
     say : receives a line for each round
+    goal : name of a number of the press, as in `finger3d.accuracy.estimate.main_numbers`
 
     Raises
     ------
     Finger3dError
         If even the first mesh cannot be generated or pressed.
     """
-    start, rounds = time.perf_counter(), list[Round]()
+    start, rounds, meshes = time.perf_counter(), list[Round](), list[MeshOptions]()
     options, problem = model.mesh, None
+    run = _graded_round if applies(model) else _run_round
     stopped = f"{MAX_ROUNDS} rounds"
     while len(rounds) < MAX_ROUNDS:
         problem = None  # two factors at once would halve the mesh that memory allows
         try:
-            problem, done, wanted = _run_round(replace(model, mesh=options), tolerance)
+            problem, done, wanted = run(replace(model, mesh=options), tolerance, goal)
         except UnresolvedError as error:
             if error.size_mm is None or error.size_mm >= options.size_mm:
                 raise
@@ -140,6 +149,7 @@ def refine_mesh(
             stopped = f"no finer mesh: {error or 'out of memory'}"
             break
         rounds.append(done)
+        meshes.append(options)
         say(done.line(len(rounds)))
         if done.error <= tolerance:
             stopped = "met"
@@ -151,57 +161,52 @@ def refine_mesh(
             break
         options = found
     best = min(rounds, key=lambda r: r.error)
-    mesh = replace(model.mesh, size_mm=best.size_mm, base_size_mm=best.base_size_mm)
-    return Refinement(tolerance, mesh, tuple(rounds), stopped, problem if best is rounds[-1] else None)
+    kept = meshes[rounds.index(best)]
+    return Refinement(tolerance, kept, tuple(rounds), stopped, problem if best is rounds[-1] else None)
 
 
-def relative_errors(numbers: Mapping[str, float], errors: Mapping[str, float]) -> dict[str, float]:
-    """Return relative errors; of lengths relative to that of the contact, of readings to the largest of their kind."""
-    readings, found = largest_readings(numbers), {}
-    for name, error in errors.items():
-        kind = Quantity.of(name).kind
-        if kind.is_length:
-            scale = numbers["contact_half_length_mm"]
-        else:
-            scale = readings.get(kind, abs(numbers[name]))
-        found[name] = error / scale if scale > 0.0 else (math.inf if error > 0.0 else 0.0)
-    return found
+def relative_error(numbers: Mapping[str, float], name: str, error: float) -> float:
+    """Return the relative error; of a length relative to that of contact, of a reading to the largest of its kind."""
+    kind = Quantity.of(name).kind
+    if kind.is_length:
+        scale = numbers["contact_half_length_mm"]
+    else:
+        scale = largest_readings(numbers).get(kind, abs(numbers[name]))
+    return error / scale if scale > 0.0 else (math.inf if error > 0.0 else 0.0)
 
 
-def largest_error(numbers: Mapping[str, float], errors: Mapping[str, float]) -> tuple[str, float]:
-    """Return the number with the largest relative error, and that error."""
-    relative = relative_errors(numbers, errors)
-    name = max(relative, key=lambda k: relative[k])
-    return name, relative[name]
+def _graded_round(model: Model, tolerance: float, goal: str) -> tuple[Problem, Round, MeshOptions]:
+    """Press on one mesh; return its problem, its round, and the mesh graded towards the goal to try next."""
+    start = time.perf_counter()
+    problem = build(model)
+    short, steps = short_press(problem)
+    if not steps[-1].outcome.ok:
+        raise Finger3dError(f"the press did not converge on this mesh: {steps[-1].outcome}")
+    bars, numbers = adjoint_bars(short, steps), press_numbers(short, steps[-1])
+    error = relative_error(numbers, goal, bars.bars[goal])
+    scale = bars.bars[goal] / error if error > 0.0 else 0.0
+    sizes = graded_sizes(short, bars, goal, _SAFETY * tolerance * scale) if error > tolerance else model.mesh
+    dofs = int(problem.part.stiffness.upper.shape[0])
+    seconds = time.perf_counter() - start
+    return problem, Round(model.mesh.size_mm, model.mesh.base_size_mm, dofs, error, goal, seconds), sizes
 
 
-def controlled_quantities(problem: Problem, names: Iterable[str]) -> list[str]:
-    """Return the quantities that a tolerance applies to: forces, strains, and lengths but the stick length of a solid.
-
-    The stick zone of a solid is often less than three points wide on any affordable mesh, and then of unknown length.
-    Areas have bars of the same kind as lengths.
-    """
-    left_out = {"stick_half_length_mm"} if problem.dim == 3 else set()
-    return [name for name in names if name not in left_out and Quantity.of(name).kind is not Kind.AREA]
-
-
-def _run_round(model: Model, tolerance: float) -> tuple[Problem, Round, MeshOptions]:
+def _run_round(model: Model, tolerance: float, goal: str) -> tuple[Problem, Round, MeshOptions]:
     """Press on one mesh; return its problem, its round, and the edge lengths to try next."""
     start = time.perf_counter()
     problem = build(model)
     frame = last_step(problem)
-    numbers = main_numbers(problem, frame)
+    numbers = press_numbers(problem, frame)
     other = companion(problem)
     last = last_step(other)
-    errors = compared(problem, frame, other, last)
-    number, error = largest_error(numbers, {name: errors[name] for name in controlled_quantities(problem, errors)})
+    error = relative_error(numbers, goal, compared(problem, frame, other, last, press_numbers)[goal])
     # a finer companion changes both lengths, so that their effects cannot be separated
-    coarse = main_numbers(other, last) if other.model.mesh.base_size_mm >= model.mesh.base_size_mm else None
-    sizes = _next_sizes(problem, number, error, tolerance, numbers, coarse)
+    coarse = press_numbers(other, last) if other.model.mesh.base_size_mm >= model.mesh.base_size_mm else None
+    sizes = _next_sizes(problem, goal, error, tolerance, numbers, coarse)
     seconds = time.perf_counter() - start
     options = model.mesh
     dofs = int(problem.part.stiffness.upper.shape[0])
-    return problem, Round(options.size_mm, options.base_size_mm, dofs, error, number, seconds), sizes
+    return problem, Round(options.size_mm, options.base_size_mm, dofs, error, goal, seconds), sizes
 
 
 def _next_sizes(
@@ -212,7 +217,7 @@ def _next_sizes(
     fine: Mapping[str, float],
     coarse: Mapping[str, float] | None,
 ) -> MeshOptions:
-    """Return smaller edge lengths of contact, base or both, according to the quantity with the largest error."""
+    """Return smaller edge lengths of contact, base or both, according to the error of the goal."""
     options = problem.model.mesh
     if error <= tolerance:
         return options
@@ -234,7 +239,7 @@ def _error_shares(
     if coarse is None or size < 1.1 * options.size_mm:
         return 1.0, 1.0
     third = build(replace(problem.model, mesh=replace(_with_swept_mesher(problem, options), size_mm=size)))
-    middle = main_numbers(third, last_step(third))[number]
+    middle = press_numbers(third, last_step(third))[number]
     contact, base = abs(fine[number] - middle), abs(middle - coarse[number])
     total = contact + base
     return (contact / total, base / total) if total > 0.0 else (1.0, 0.0)

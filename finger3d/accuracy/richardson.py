@@ -33,7 +33,8 @@ class Kind(Enum):
     FRICTION_SUM = auto()
     FORCE = auto()
     PRESSURE = auto()
-    ENERGY = auto()
+    WORK = auto()
+    DISSIPATION = auto()
     STRAIN = auto()
     DISPLACEMENT = auto()
     BASE_PRESSURE = auto()
@@ -57,8 +58,8 @@ _KINDS = {
     "outward_friction_x_N_per_mm": Kind.FORCE,
     "moment_y_Nmm_per_mm": Kind.FORCE,
     "peak_pressure_MPa": Kind.PRESSURE,
-    "external_work_mJ": Kind.ENERGY,
-    "dissipation_mJ": Kind.ENERGY,
+    "external_work_mJ": Kind.WORK,
+    "dissipation_mJ": Kind.DISSIPATION,
     "contact_half_length_mm": Kind.HALF_LENGTH,
     "stick_half_length_mm": Kind.HALF_LENGTH,
     "contact_length_mm": Kind.LENGTH,
@@ -123,12 +124,8 @@ def mesh_error(
     found = {}
     for name, value in numbers.items():
         kind, change, bound = Quantity.of(name).kind, abs(value - companion[name]), own.least.get(name, 0.0)
-        if kind.is_length:
-            ends = 0.5 if kind is Kind.HALF_LENGTH else 1.0
-            # the distance of points in the companion is not a change of the length
-            change = max(0.0, change - ends * other.spacing_mm)
-            bound = max(bound, ends * own.spacing_mm)
-        elif kind is Kind.AREA:
+        if kind.is_length or kind is Kind.AREA:
+            # what the companion's points leave open is no change
             change = max(0.0, change - other.least.get(name, 0.0))
         else:
             scale = readings.get(kind, abs(value))

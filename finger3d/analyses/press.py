@@ -84,6 +84,7 @@ def run_press(
     summary = writer.summary(record, record.outcome())
     if error:
         _estimate_errors(record, report)
+        _estimate_changes(record, report)
         summary = writer.summary(record, record.outcome())
     if figures:
         from finger3d.report.press import press_page
@@ -140,10 +141,11 @@ def _refine_mesh(scene: Scene, report: Progress) -> Refinement | None:
     mesh = scene.tables.mesh
     if mesh.tolerance is None:
         return None
-    from finger3d.accuracy.refine import refine_mesh
+    from finger3d.accuracy.refine import GOAL, refine_mesh
 
-    report.stage(f"refining to an error of {mesh.tolerance:g}")
-    return refine_mesh(scene.model(), mesh.tolerance, mesh.max_seconds, report.say)
+    goal = mesh.goal or GOAL
+    report.stage(f"refining to an error of {mesh.tolerance:g} in {goal}")
+    return refine_mesh(scene.model(), mesh.tolerance, mesh.max_seconds, report.say, goal)
 
 
 def _march(record: PressRecord, writer: ResultWriter, report: Progress) -> None:
@@ -204,7 +206,7 @@ def _remark(problem: Problem, step: StepResult) -> str:
 
 def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fields | None:
     """Recover and write the fields after the last converged increment, and judge from them; None without increments."""
-    from finger3d.accuracy.advice import advise
+    from finger3d.accuracy.advice import largest_principal_strain
     from finger3d.mechanics import resolution
     from finger3d.mechanics.coverage import penetration_warnings
 
@@ -214,9 +216,8 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fie
     if good:
         u, strain, stress = problem.model.formulation.fields(problem, good[-1].part)
         record.warnings += penetration_warnings(problem, record.surface_checks)
-        record.advice = advise(problem.model, strain)
-        if record.step_estimate and record.step_estimate.advice:
-            record.advice.append(record.step_estimate.advice)
+        record.largest_strain = largest_principal_strain(strain)
+        _advise(record)
         fields = Fields.of(record, u, strain, stress)
         writer.fields(record, fields)
     record.warnings += point_count_warning(record) + resolution.increments_without_contact(problem, record.steps)
@@ -232,3 +233,34 @@ def _estimate_errors(record: PressRecord, report: Progress) -> None:
     runs = record.step_estimate.levels if record.step_estimate else ()
     levels = [(count, ends[-1]) for count, ends in runs]
     record.error_estimate = estimate(record.problem, record.steps, report.say, press_numbers, levels)
+
+
+def _estimate_changes(record: PressRecord, report: Progress) -> None:
+    """Estimate what large deformation and more increments would change where they may matter, and advise of it."""
+    from finger3d.accuracy.advice import LEAST_STRAIN
+    from finger3d.accuracy.changes import changing_numbers
+    from finger3d.accuracy.large_deformation import large_deformation
+    from finger3d.accuracy.more_increments import may_matter, more_increments
+
+    problem, steps = record.problem, record.steps
+    if problem.model.formulation.finite_strain or not steps or not steps[-1].outcome.ok:
+        return
+    if record.largest_strain >= LEAST_STRAIN:
+        report.stage("estimating what large deformation would change")
+        record.large_deformation = large_deformation(problem, steps[-1], len(steps))
+    errors = record.error_estimate.steps if record.error_estimate else {}
+    if record.step_estimate is None and may_matter(changing_numbers(problem, steps[-1]), errors):
+        report.stage("estimating what more increments would change")
+        record.more_increments = more_increments(problem, steps[-1], len(steps))
+    _advise(record)
+
+
+def _advise(record: PressRecord) -> None:
+    """Enter the lines of advice that follow from what is known so far."""
+    from finger3d.accuracy.advice import advise
+
+    record.advice = advise(
+        record.problem.model, record.largest_strain, record.large_deformation, record.more_increments
+    )
+    if record.step_estimate and record.step_estimate.advice:
+        record.advice.append(record.step_estimate.advice)

@@ -15,6 +15,7 @@ from finger3d.contact.friction import OPEN
 from finger3d.mechanics.history import History, StepResult, measure
 
 if TYPE_CHECKING:
+    from finger3d.accuracy.changes import ChangeEstimate
     from finger3d.accuracy.estimate import ErrorEstimate
     from finger3d.accuracy.refine import Refinement
     from finger3d.mechanics.coverage import SurfaceCheck
@@ -45,6 +46,8 @@ class PressRecord:
     surface_checks : the finger's free surface after each converged increment, once all are solved
     step_estimate : how automatic increments were chosen
     error_estimate : errors by mesh and increments
+    largest_strain : principal strain at the end, without singular corners
+    large_deformation, more_increments : what these would change, where it may matter
     warnings, advice : lines for the user
     seconds : time by stage, s
     workspace : factors that increments leave for the next, those of the error estimate not among them
@@ -59,6 +62,9 @@ class PressRecord:
     surface_checks: list[SurfaceCheck] = field(default_factory=list)
     step_estimate: StepEstimate | None = None
     error_estimate: ErrorEstimate | None = None
+    largest_strain: float = 0.0
+    large_deformation: ChangeEstimate | None = None
+    more_increments: ChangeEstimate | None = None
     warnings: list[str] = field(default_factory=list)
     advice: list[str] = field(default_factory=list)
     seconds: dict[str, float] = field(default_factory=dict)
@@ -120,6 +126,8 @@ class PressRecord:
             "steps": [measure(self.problem.points, step) for step in self.steps],
             "step_estimate": self.step_estimate.as_dict() if self.step_estimate else None,
             "error_estimate": self.error_estimate.as_dict() if self.error_estimate else None,
+            "large_deformation_estimate": self.large_deformation.as_dict() if self.large_deformation else None,
+            "more_increments_estimate": self.more_increments.as_dict() if self.more_increments else None,
             "refinement": self.refinement.as_dict() if self.refinement else None,
             "uniqueness": {"largest_coupling": self.coupling},
             "mesh": _mesh(self.problem),

@@ -184,26 +184,38 @@ class ActiveSet:
             return rows
         return np.concatenate([rows, self.turning * np.sum(self.tangent * w[self.slip_points, 1:], axis=1)])
 
+    def force_matrix(self) -> Any:
+        """Return P (c d, k), sparse: the forces of unknowns."""
+        m, s = len(self.active_dofs), len(self.slip_points)
+        normal, across = np.arange(m - s, m), np.arange(m, m + s)  # places among the unknowns
+        entries = [(self.active_dofs, np.arange(m), np.ones(m))]
+        for i, dofs in enumerate(self.slip_dofs):
+            entries.append((dofs, normal, self.slip_force_direction[:, i]))
+            if self.is_3d:
+                entries.append((dofs, across, self.tangent[:, i]))
+        return _sparse(entries, (self.shape[0] * self.shape[1], self.size))
+
+    def weight_matrix(self, augmentation: Float) -> Any:
+        """Return D (k, c d), sparse: the rows of the equations from displacements, with rho (c, d) N/mm."""
+        m, s, rho = len(self.active_dofs), len(self.slip_points), augmentation.ravel()
+        entries = [(np.arange(m), self.active_dofs, rho[self.active_dofs])]
+        if self.is_3d:
+            across = np.arange(m, m + s)
+            entries += [
+                (across, dofs, self.turning * self.tangent[:, i] * rho[dofs]) for i, dofs in enumerate(self.slip_dofs)
+            ]
+        return _sparse(entries, (self.size, self.shape[0] * self.shape[1]))
+
 
 Assembly: TypeAlias = Callable[[ContactProblem, ActiveSet, Precision], Array]
 
 
 def assemble(problem: ContactProblem, active: ActiveSet, precision: Precision) -> Array:
     """Return the matrix A = D W P + diag(0, 0, 1 - a) (k, k) of the equations of an active set."""
-    m, s, cd = len(active.active_dofs), len(active.slip_points), problem.free_motion.size
-    all_active, normal, across = np.arange(m), np.arange(m - s, m), np.arange(m, m + s)  # places among the unknowns
-    rho = problem.augmentation.ravel()
-    columns = [(active.active_dofs, all_active, np.ones(m))]
-    rows = [(all_active, active.active_dofs, rho[active.active_dofs])]
-    for i, dofs in enumerate(active.slip_dofs):
-        columns.append((dofs, normal, active.slip_force_direction[:, i]))
-        if active.is_3d:
-            columns.append((dofs, across, active.tangent[:, i]))
-            rows.append((across, dofs, active.turning * active.tangent[:, i] * rho[dofs]))
-    forces = _sparse(columns, (cd, active.size))  # P
-    weights = _sparse(rows, (active.size, cd))  # D
+    forces, weights = active.force_matrix(), active.weight_matrix(problem.augmentation)
     matrix: Array = weights @ (problem.delassus @ forces)
     if active.is_3d:
+        across = np.arange(len(active.active_dofs), active.size)
         matrix[across, across] += 1.0 - active.turning
     return matrix.astype(precision, copy=False)
 

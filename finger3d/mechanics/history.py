@@ -14,6 +14,7 @@ from finger3d.contact.friction import OPEN, STATUS_NAMES, STICK
 from finger3d.contact.state import ContactState
 from finger3d.errors import Outcome
 from finger3d.fem.simplex import CONTACT, FREE_FACES
+from finger3d.mechanics.zones import half_extents
 from finger3d.objects import ObjectPose
 
 _ON_LINE = 1e-9
@@ -160,16 +161,12 @@ class History:
         return next((f.outcome for f in self.steps if not f.outcome.ok), Outcome.CONVERGED)
 
 
-def _half_extent(x: Float) -> float:
-    return float(np.ptp(x) / 2.0) if len(x) else 0.0
-
-
 def measure(points: ContactPoints, step: StepResult) -> Tree:
     """Entry of `steps` in summary.json for one increment.
 
-    ``contact_half_length_mm`` and ``stick_half_length_mm`` are half the distance along x between the first and the last
-    point of the line z = 0 that touch or stick.  The line has the vertices of the surface mesh on it and the
-    intersections of its edges with it, each with the state of the nearer end of the edge.
+    ``contact_half_length_mm`` and ``stick_half_length_mm`` are half the extents of contact and stick on the line z = 0
+    (`finger3d.mechanics.zones`).  The line has the vertices of the surface mesh on it and the intersections of edges
+    with it, each with the state of the nearer end of its edge.
     """
     state, target = step.state, step.target
     points = points.with_basis_of(state)
@@ -177,7 +174,7 @@ def measure(points: ContactPoints, step: StepResult) -> Tree:
     friction = points.friction(state.force)
     touching, sticking = state.status != OPEN, state.status == STICK
     x, z = points.points[:, 0], points.points[:, 2]
-    line, nearest = points.middle_line()
+    contact, stick = half_extents(*points.middle_line(), state, points.area)
     outward_x = friction[:, 0] * np.sign(x - step.lowest[0])
     outward_z = friction[:, 2] * np.sign(z - step.lowest[1])
     numbers: Tree = {
@@ -196,12 +193,12 @@ def measure(points: ContactPoints, step: StepResult) -> Tree:
         "outward_friction_z_N": float(outward_z.sum()),
         "contact_area_mm2": float(points.area[touching].sum()),
         "stick_area_mm2": float(points.area[sticking].sum()),
-        "contact_half_length_mm": _half_extent(line[touching[nearest]]),
-        "stick_half_length_mm": _half_extent(line[sticking[nearest]]),
+        "contact_half_length_mm": contact,
+        "stick_half_length_mm": stick,
     }
     if points.dim == 3:
         end = (np.abs(z - points.half_width_mm) <= 1e-6 * points.half_width_mm) & (points.face == CONTACT)
-        numbers["contact_half_length_end_mm"] = _half_extent(x[touching & end])
+        numbers["contact_half_length_end_mm"] = half_extents(x[end], np.flatnonzero(end), state, points.area)[0]
     return numbers | {
         "largest_penetration_mm": step.penetration_mm,
         "external_work_mJ": step.external_work_mJ,

@@ -23,6 +23,7 @@ from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.readings import Marker, Reading, Taxel
 from finger3d.mechanics.relaxation import Relaxation
 from finger3d.mechanics.small_strain import SmallStrain
+from finger3d.meshing.grading import Grading
 from finger3d.objects import ContactPath, ObjectPose, Plane, RigidObject, between
 
 if TYPE_CHECKING:
@@ -69,13 +70,14 @@ class MeshOptions:
     """Edge lengths at the contact and far from it (mm), and the mesher (solids only; sections are structured).
 
     `layers` is the least number of layers of a swept mesh over half the width; one layer cannot follow the bulge of a
-    free end.
+    free end.  `grading` prescribes edge lengths inside the body, as a refinement towards a goal finds them.
     """
 
     size_mm: float
     base_size_mm: float
     mesher: Literal["ftetwild", "swept"] = "ftetwild"
     layers: int = 2
+    grading: Grading | None = None
 
     def as_table(self) -> dict[str, float | str]:
         """The keys of ``[mesh]`` in a scene."""

@@ -122,10 +122,16 @@ class Taxel:
 
     def rows(self, body: MeshedBody) -> sp.csr_matrix:
         """Return the row (1, N) of the pressure: nodal forces are the stiffness times the unknowns."""
-        upper, d = body.stiffness.upper, body.mesh.dim
+        upper = body.stiffness.upper
         on_forces = np.zeros(upper.shape[0])
-        on_forces[: body.mesh.points.size].reshape(-1, d)[:, 1] = self._weights(body)
+        on_forces[: body.mesh.points.size] = self.base_displacement(body)
         return sp.csr_matrix(times(upper, on_forces))
+
+    def base_displacement(self, body: MeshedBody) -> Float:
+        """Return the nodal displacements (n d,) whose work with the nodal forces is the pressure, per mm2."""
+        displacement = np.zeros(body.mesh.points.shape)
+        displacement[:, 1] = self._weights(body)
+        return displacement.ravel()
 
     def at_finite_strain(self, body: MeshedBody, u: Float, forces: Float) -> Float:
         """Return the pressure (1,)."""

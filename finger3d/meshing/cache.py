@@ -43,6 +43,7 @@ def key(design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...
             **design.cache_fields,
             "code": code,
             "sizes": [repr(float(options.size_mm)), repr(float(options.base_size_mm))],
+            **({"grading": options.grading.key} if options.grading else {}),
             "zone": [repr(float(z)) for z in zone],
             "symmetry": sorted(symmetry),
             "versions": {name: _version(name) for name in _PACKAGES},

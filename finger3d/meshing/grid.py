@@ -6,33 +6,42 @@ the origin. Their number and the points on them follow the size field, so triang
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from finger3d._types import Float, Int
 from finger3d.geometry.section import Section
+from finger3d.meshing.grading import Grading
 
 RATE = 0.25
 """Growth of the edge length per length away from the contact zone."""
 
 _ASPECT = 3.0  # quadratic elements bear 5:1; zipping rows of different counts costs the rest
 _LOW_WALL = 0.3  # below this share of the height, columns at the wall would be squashed
+_PLACES, _STATIONS = 80, 400  # along the outline and in depth, where prescribed edge lengths are looked up
 _STEEP = np.radians(60.0)  # a curve that ends steeper than this would be lowered along itself
 
 
 @dataclass(frozen=True)
 class Sizes:
-    """Edge lengths (mm) in the contact zone `low` <= x <= `high`, and far from it."""
+    """Edge lengths (mm) in the contact zone `low` <= x <= `high`, and far from it.
+
+    `grading` prescribes lengths inside the section, if there are any.
+    """
 
     size_mm: float
     base_mm: float
     low: float
     high: float
+    grading: Grading | None = None
 
-    def steps(self, length: float) -> Float:
-        """Depths (n + 1,), mm, of rows from 0 to `length` below the zone."""
+    def steps(self, length: float, longest: Callable[[Float], Float] | None = None) -> Float:
+        """Depths (n + 1,), mm, of rows from 0 to `length` below the zone.
+
+        `longest` returns the largest distance of rows at depths; without it, it follows from the edge lengths alone.
+        """
         grow = max(0.0, (self.base_mm - self.size_mm) / RATE)  # depth at which the base size is reached
 
         def count(depth: Float) -> Float:
@@ -42,6 +51,9 @@ class Sizes:
         sample = np.concatenate([np.linspace(0.0, length, 4001), np.geomspace(1e-6 * length, length, 2000)])
         sample = np.unique(sample)
         total = count(sample)
+        if longest is not None:
+            density = np.maximum(np.gradient(total, sample), 1.0 / longest(sample))
+            total = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(sample))])
         n = max(2, int(round(total[-1])))
         depth: Float = np.interp(np.linspace(0.0, total[-1], n + 1), total, sample)
         depth[-1] = length
@@ -51,7 +63,8 @@ class Sizes:
         """Edge length (n,) at points (n, 2): the contact size, growing with the distance from the zone."""
         x = np.clip(points[:, 0], self.low, self.high)
         reach = np.hypot(points[:, 0] - x, points[:, 1] - section.contact.height(x))
-        return np.minimum(self.base_mm, self.size_mm + RATE * reach)
+        size: Float = np.minimum(self.base_mm, self.size_mm + RATE * reach)
+        return size if self.grading is None else np.minimum(size, self.grading.at(points, RATE))
 
 
 @dataclass(frozen=True)
@@ -129,7 +142,7 @@ def rows(section: Section, sizes: Sizes) -> Rows:
         middle = np.array([x, float(section.contact.height(np.array(x)))])
     travel = outline[:, 1] if columns else np.hypot(outline[:, 0], outline[:, 1])
     length = middle[1] if columns else float(np.hypot(*middle))
-    depth = sizes.steps(length)
+    depth = sizes.steps(length, _longest(sizes, outline, columns, length) if sizes.grading else None)
     scales = 1.0 - depth / length
     scales[-1] = 0.0
     gaps = np.diff(depth)
@@ -150,6 +163,20 @@ def rows(section: Section, sizes: Sizes) -> Rows:
                 continue
         params.append(_spread(u, points, size, 2 if k == 0 else 1))
     return Rows(scales, params, columns)
+
+
+def _longest(sizes: Sizes, outline: Float, columns: bool, length: float) -> Callable[[Float], Float]:
+    """Return a function of depths (n,) mm: the largest distance of rows (n,) mm that prescribed edge lengths allow."""
+    grading = sizes.grading
+    assert grading is not None
+    places = outline[np.linspace(0, len(outline) - 1, _PLACES).astype(int)]
+    travel = places[:, 1] if columns else np.hypot(places[:, 0], places[:, 1])
+    stations = np.linspace(0.0, length, _STATIONS)
+    shares = 1.0 - stations / length
+    at = places * np.stack([np.ones_like(shares) if columns else shares, shares], axis=1)[:, None]
+    size = grading.at(at.reshape(-1, 2), RATE).reshape(_STATIONS, _PLACES)
+    least = (size * length / np.maximum(travel, 1e-3 * length)).min(axis=1)
+    return lambda depth: np.interp(depth, stations, least)
 
 
 def _zip(upper: Int, lower: Int, at_upper: Float, at_lower: Float) -> Int:

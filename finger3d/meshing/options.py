@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Literal, Protocol
+from typing import TYPE_CHECKING, Literal, Protocol
+
+if TYPE_CHECKING:
+    from finger3d.meshing.grading import Grading
 
 Zone = tuple[float, float, float, float]
 """x_min, x_max, z_min, z_max in mm: where contact is predicted."""
@@ -26,3 +29,7 @@ class MeshSizes(Protocol):
     @property
     def layers(self) -> int:
         """Least number of layers of a swept mesh over half the width."""
+
+    @property
+    def grading(self) -> Grading | None:
+        """Edge lengths inside the body; None where they follow from those above."""

@@ -10,6 +10,7 @@ import numpy as np
 from finger3d._types import Float, Int
 from finger3d.errors import Finger3dError
 from finger3d.geometry.design import Design
+from finger3d.meshing.grading import Grading
 from finger3d.meshing.options import MeshSizes, Zone
 
 RATE = 0.3
@@ -30,6 +31,7 @@ class Sizing:
     low, high : (3,) corners of the box around the meshed body, mm
     zone : (n, 3) points of the contact surface in the zone, mm
     step : spacing of the background grid, mm
+    grading : edge lengths inside the body, if they are prescribed
     """
 
     size_mm: float
@@ -38,6 +40,7 @@ class Sizing:
     high: Float
     zone: Float
     step: float
+    grading: Grading | None = None
 
     def at(self, points: Float) -> Float:
         """Return the edge length (n,) at points (n, 3)."""
@@ -47,7 +50,7 @@ class Sizing:
         value: Float = np.minimum(
             self.base_mm, self.size_mm + RATE * np.maximum(0.0, reach - _PLATEAU_STEPS * self.step)
         )
-        return value
+        return value if self.grading is None else np.minimum(value, self.grading.at(points, RATE))
 
     def grid(self) -> tuple[list[Float], Float]:
         """Return the coordinates of the background grid along x, y, z, and its edge lengths (nx, ny, nz)."""
@@ -110,7 +113,7 @@ def sizing(design: Design, options: MeshSizes, zone: Zone, low: Float, high: Flo
     points = points[np.isfinite(points[:, 1])]
     if x1 < x0 or z1 < z0 or not len(points):
         raise Finger3dError(f"{design.name}: the predicted contact zone {zone} mm lies outside the meshed part")
-    return Sizing(options.size_mm, options.base_size_mm, low, high, points, step)
+    return Sizing(options.size_mm, options.base_size_mm, low, high, points, step, options.grading)
 
 
 def forecast(design: Design, field: Sizing, samples: int = 40) -> float:

@@ -84,7 +84,8 @@ def _grid(design: Design, options: MeshSizes, zone: Zone, dim: int, copies: int)
         what, allowed = ("model.domain", "'solid'") if dim == 2 else ("mesh.mesher = 'swept'", "'ftetwild'")
         raise Finger3dError(f"{what}: {design.name} has no constant section to mesh; allowed: {allowed}")
     low, high = folded_zone(zone, section.half_length_mm)
-    layout = rows(section, Sizes(options.size_mm, options.base_size_mm, low, high))
+    grading = options.grading.in_section if options.grading else None
+    layout = rows(section, Sizes(options.size_mm, options.base_size_mm, low, high, grading))
     check_count(2.0 * layout.count * copies, dim, options)
     return triangulate(section, layout), section
 

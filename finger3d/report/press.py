@@ -8,6 +8,7 @@ from typing import NotRequired, TypedDict
 
 import numpy as np
 
+from finger3d._types import TreeView
 from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.contact.conditions import TOLERANCE
 from finger3d.contact.friction import OPEN, STATUS_NAMES
@@ -61,6 +62,12 @@ _STEP_COLUMNS = {
 }
 """Key of a step -> column of the table of steps."""
 
+_CHANGES = {
+    "large_deformation_estimate": "What large deformation would change",
+    "more_increments_estimate": "What more increments would change",
+}
+"""Key of summary.json -> heading on the page."""
+
 _ERROR_REMARK = "The number after ± is the error of mesh and increments; it does not include the error of the model."
 _ROUND_OFF = 1e-9  # magnitude of round-off, relative to the force that a number is compared with
 
@@ -112,6 +119,7 @@ def press_page(folder: str | Path) -> Path:
         PageSection("Scene", how_modelled(summary, folder)),
         *([_proof(steps, states, good)] if steps else []),
         *([_error_bars(bars)] if summary.get("error_estimate") else []),
+        *_changes(summary),
         *([_steps(good)] if good else []),
         PageSection("Mesh and cost", [_mesh(summary["mesh"]), _cost(summary["cost"])]),
     ]
@@ -173,6 +181,19 @@ def _error_bars(bars: ErrorBars) -> PageSection:
     rows = [(name, value, bars.steps.get(name)) for name, value in bars.discretisation.items()]
     table = [Table(("error, in the unit of the name", "of the mesh", "of the increments"), rows)] if rows else []
     return PageSection("Error bars", [f"The number after ± is the sum of both errors. Method: {bars.method}", *table])
+
+
+def _changes(summary: TreeView) -> list[PageSection]:
+    """Return what large deformation and more increments would change, if it was estimated."""
+    out = []
+    for key, title in _CHANGES.items():
+        found = summary.get(key)
+        if not found or not found["changes"]:
+            continue
+        rows = [(name, c["value"], c["change"], c["error"]) for name, c in found["changes"].items()]
+        head = ("number, in the unit of its name", "in this press", "change", "its error")
+        out.append(PageSection(title, [f"Estimated from {found['method']}.", Table(head, rows)], folded=True))
+    return out
 
 
 def _proof(steps: Sequence[PressStep], states: States | None, good: Sequence[PressStep]) -> PageSection:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -101,7 +101,12 @@ class Scene:
         return legs_of(legs, self.design, self.object, self.tables)
 
     def with_mesh(self, mesh: MeshOptions) -> Scene:
-        """Return the scene with edge lengths in place of a tolerance."""
+        """Return the scene with edge lengths in place of a tolerance.
+
+        A graded mesh has no edge lengths that a scene could name: the scene keeps its tolerance, and finds them again.
+        """
+        if mesh.grading is not None:
+            return replace(self, mesh=mesh)
         return parse({**self.given, "mesh": mesh.as_table()}, self.path)
 
     def model(self) -> Model:

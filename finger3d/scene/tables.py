@@ -134,7 +134,8 @@ class MeshTable(TomlTable):
     size_mm : edge length at the contact
     base_size_mm : edge length far from it
     mesher : fTetWild, or structured and the same on every run, for extruded designs
-    tolerance : instead of sizes: refine until the estimated error is below it
+    tolerance : instead of sizes: refine until the estimated error of the goal is below it
+    goal : with tolerance: the number that the mesh is refined for, such as gauge_g36; the normal force unless given
     max_seconds : with tolerance: stop refining then, with the best so far
     """
 
@@ -142,6 +143,7 @@ class MeshTable(TomlTable):
     base_size_mm: Edge | None = None
     mesher: Literal["ftetwild", "swept"] = "ftetwild"
     tolerance: Annotated[float, Ge(1e-6), Lt(1)] | None = None
+    goal: Name | None = None
     max_seconds: Annotated[float, Ge(1e-3), Le(1e7)] | None = None
 
 

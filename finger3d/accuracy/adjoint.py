@@ -1,0 +1,252 @@
+"""Adjoint of the increments of a press: how its numbers change with the Delassus operator.
+
+In increment k the active set holds linear equations for the contact forces r_k, which are linear functions P_k x_k of
+its unknowns (`finger3d.contact.newton.ActiveSet`)::
+
+    D_k (W r_k - S_k W r_{k-1} + q_k) + E_k x_k = 0
+
+S_k keeps tangential components, since slip is counted from the increment before.  For a number J(r, W r) with the
+derivatives g_k by the forces and v_k by the displacements of increment k, the adjoint equations, backwards from the
+last increment, are ::
+
+    A_k^T y_k = P_k^T (g_k + W v_k + W S_{k+1} z_{k+1}),   z_k = D_k^T y_k,   A_k = D_k W P_k + E_k
+
+and a change of the Delassus operator changes the number by ``sum_k l_k . dW r_k`` with the adjoint loads
+``l_k = v_k - z_k + S_{k+1} z_{k+1}``.  Active sets and the normals of the object are held.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.linalg import lu_factor, lu_solve
+
+from finger3d._types import Float
+from finger3d.contact.conditions import ContactProblem, augmentation_parameters
+from finger3d.contact.friction import OPEN, SLIP
+from finger3d.contact.newton import ActiveSet
+from finger3d.mechanics.history import StepResult
+from finger3d.mechanics.linear_contact import LinearState, transported
+from finger3d.mechanics.problem import Problem
+from finger3d.objects import vertical_frame
+
+
+@dataclass(frozen=True, kw_only=True)
+class Goal:
+    """A number of a press, linearised about the solution of its N increments.
+
+    Attributes
+    ----------
+    by_force : (N, c d)
+        Derivative by the contact forces of each increment, per N, in the directions of an upright object.
+    by_displacement : (N, c d)
+        Derivative by the displacements of the contact points at the end of each increment, per mm.
+    row : int or None
+        Number of the reading row that gives the number itself, for a reading.
+    """
+
+    name: str
+    by_force: Float
+    by_displacement: Float
+    row: int | None = None
+
+
+@dataclass(frozen=True)
+class LinearisedIncrement:
+    """Equations of the active set of one increment, in the directions of an upright object (c d contact directions).
+
+    Attributes
+    ----------
+    forces : (c d, k) sparse, P
+    weights : (k, c d) sparse, D
+    factor : LU factors of A
+    turn : (c d, c d) sparse
+        From the directions of an upright object to those of each point.
+    """
+
+    forces: Any
+    weights: Any
+    factor: tuple[Float, Float]
+    turn: Any
+
+    @classmethod
+    def of(cls, problem: Problem, before: LinearState, after: LinearState) -> LinearisedIncrement:
+        """Linearise the increment between two states."""
+        c, d = after.force.shape
+        delassus = problem.delassus.reshape(c * d, c * d)
+        turn = _block_diagonal(_bases(after) @ vertical_frame(d).T)
+        rho = augmentation_parameters(delassus, d)
+        slip = after.tangential_displacement - transported(before, _bases(after)).tangential_displacement
+        normal, friction = after.force[:, 0], np.linalg.norm(after.force[:, 1:], axis=1)
+        slips = after.status == SLIP
+        mu = np.divide(friction, normal, out=np.zeros(c), where=slips & (normal > 0.0))
+        moved = np.concatenate([after.gap[:, None], slip], axis=1)
+        local = ContactProblem(moved, delassus, mu, rho, 1.0)
+        active = ActiveSet.of(local, after.status, after.force - rho * np.where(slips[:, None], moved, 0.0))
+        forces, weights = turn.T @ active.force_matrix(), active.weight_matrix(rho) @ turn
+        matrix = np.asarray(weights @ (delassus @ forces))
+        if active.is_3d:
+            across = np.arange(len(active.active_dofs), active.size)
+            matrix[across, across] += 1.0 - active.turning
+        return cls(forces, weights, lu_factor(matrix) if len(matrix) else (matrix, matrix), turn)
+
+    def adjoint(self, gradient: Float) -> Float:
+        """Return z (c d, g), D^T A^-T P^T times gradients (c d, g)."""
+        if not self.weights.shape[0]:
+            return np.zeros_like(gradient)
+        return np.asarray(self.weights.T @ lu_solve(self.factor, self.forces.T @ gradient, trans=1))
+
+    def tangential(self, vectors: Float, dim: int) -> Float:
+        """Return S times vectors (c d, g): their parts along the object's surface."""
+        local = self.turn @ vectors
+        local[::dim] = 0.0
+        return np.asarray(self.turn.T @ local)
+
+
+def adjoint_loads(problem: Problem, steps: Sequence[StepResult], goals: Sequence[Goal]) -> Float:
+    """Return the adjoint loads (N, c d, g) of goals.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If the active set of an increment is singular.
+    """
+    c, d = problem.delassus.shape[:2]
+    delassus = problem.delassus.reshape(c * d, c * d)
+    states = _states(problem, steps)
+    out = np.zeros((len(steps), c * d, len(goals)))
+    later = np.zeros((c * d, len(goals)))  # S z of the increment after
+    for k in range(len(steps) - 1, -1, -1):
+        increment = LinearisedIncrement.of(problem, states[k], states[k + 1])
+        direct = np.stack([goal.by_displacement[k] for goal in goals], axis=1)
+        gradient = np.stack([goal.by_force[k] for goal in goals], axis=1) + delassus @ (direct + later)
+        z = increment.adjoint(gradient)
+        out[k] = direct - z + later
+        later = increment.tangential(z, d)
+    return out
+
+
+def forces_of(problem: Problem, steps: Sequence[StepResult]) -> Float:
+    """Return the contact forces (c d, N) of increments, in the directions of an upright object."""
+    return np.stack([problem.upright_force(step.part).ravel() for step in steps], axis=1)
+
+
+def press_goals(problem: Problem, steps: Sequence[StepResult]) -> list[Goal]:
+    """Return normal force, friction sum, energies and readings of the last increment, linearised."""
+    c, d = problem.delassus.shape[:2]
+    states, zero = _states(problem, steps), np.zeros((len(steps), c * d))
+    count: Float = np.bincount(problem.symmetry.image_of, problem.symmetry.multiplicity, c).astype(np.float64)
+    last = states[-1]
+    vertical, shear = np.zeros((c, d)), np.zeros((c, d))
+    vertical[:, 0] = count  # the first direction of an upright object points down
+    friction = np.linalg.norm(last.force[:, 1:], axis=1)
+    shear[:, 1:] = last.force[:, 1:] * (count / np.where(friction > 0.0, friction, 1.0))[:, None]
+    found = [
+        Goal(name="normal_force_N", by_force=_at_end(zero, vertical), by_displacement=zero),
+        Goal(name="friction_sum_N", by_force=_at_end(zero, _upright(last, shear)), by_displacement=zero),
+        _work(problem, states, count, zero),
+        _dissipation(states, count, zero),
+    ]
+    rows = problem.system.reading_rows
+    return found + [
+        Goal(name=name, by_force=_at_end(zero, row), by_displacement=zero, row=k)
+        for k, (name, row) in enumerate(zip(_reading_columns(problem), rows, strict=True))
+    ]
+
+
+def _reading_columns(problem: Problem) -> list[str]:
+    """Return the names of readings as in `finger3d.mechanics.history.flat_readings`, in the order of their rows."""
+    columns = []
+    for reading in problem.model.readings:
+        for column in reading.columns(problem.dim):
+            axis = column.rpartition(".")[2]
+            columns.append(
+                {
+                    "gauge": f"gauge_{reading.name}",
+                    "marker": f"marker_{reading.name}_{axis}_mm",
+                    "taxel": f"taxel_{reading.name}_MPa",
+                }[reading.kind]
+            )
+    return columns
+
+
+def _states(problem: Problem, steps: Sequence[StepResult]) -> list[LinearState]:
+    """Return the states of the meshed part, that at first touch before the others."""
+    states = [problem.model.formulation.start(problem), *(step.part for step in steps)]
+    assert all(isinstance(state, LinearState) for state in states)
+    return cast("list[LinearState]", states)
+
+
+def _bases(state: LinearState) -> Float:
+    """Return the directions (c, d, d) of the points, which a linear state always knows."""
+    assert state.bases is not None
+    return state.bases
+
+
+def _upright(state: LinearState, local: Float) -> Float:
+    """Return vectors (c, d) in the directions of an upright object."""
+    d = local.shape[1]
+    return np.asarray(np.einsum("ca,cak->ck", local, _bases(state)) @ vertical_frame(d).T)
+
+
+def _at_end(zero: Float, gradient: Float) -> Float:
+    """Return gradients (N, c d) that are zero but in the last increment."""
+    out = zero.copy()
+    out[-1] = gradient.ravel()
+    return out
+
+
+def _work(problem: Problem, states: Sequence[LinearState], count: Float, zero: Float) -> Goal:
+    """Return the external work: the energy stored, and what friction takes in all increments."""
+    c, d = states[-1].force.shape
+    by_force, by_displacement = zero.copy(), zero.copy()
+    for k, (before, after) in enumerate(zip(states, states[1:], strict=False)):
+        start = transported(before, _bases(after))
+        slip, friction = np.zeros((c, d)), np.zeros((c, d))
+        slip[:, 1:] = after.tangential_displacement - start.tangential_displacement
+        friction[:, 1:] = (0.5 * (start.force + after.force))[:, 1:]
+        half_slip = 0.5 * _upright(after, count[:, None] * slip).ravel()
+        along = _upright(after, count[:, None] * friction).ravel()
+        by_force[k] -= half_slip
+        by_displacement[k] -= along
+        if k:
+            by_force[k - 1] -= half_slip
+            by_displacement[k - 1] += along
+    last = problem.upright_force(states[-1]).ravel()
+    half = 0.5 * 2.0 ** len(problem.axes)
+    by_force[-1] += half * (problem.delassus.reshape(c * d, c * d) @ last)
+    by_displacement[-1] += half * last
+    return Goal(name="external_work_mJ", by_force=by_force, by_displacement=by_displacement)
+
+
+def _dissipation(states: Sequence[LinearState], count: Float, zero: Float) -> Goal:
+    """Return the dissipation, mu times the mean normal force times the slip of all increments."""
+    by_force, by_displacement = zero.copy(), zero.copy()
+    for k, (before, after) in enumerate(zip(states, states[1:], strict=False)):
+        start = transported(before, _bases(after))
+        slips = (after.status == SLIP) & (after.status != OPEN) & (after.force[:, 0] > 0.0)
+        slip = np.where(slips[:, None], after.tangential_displacement - start.tangential_displacement, 0.0)
+        end = np.where(slips, after.force[:, 0], 1.0)
+        mu = np.where(slips, np.linalg.norm(after.force[:, 1:], axis=1) / end, 0.0)
+        normal = np.zeros_like(after.force)
+        normal[:, 0] = 0.5 * count * mu * np.linalg.norm(slip, axis=1)
+        along = np.zeros_like(after.force)
+        share = 0.5 * count * (start.force[:, 0] + after.force[:, 0]) / end
+        along[:, 1:] = np.where(slips[:, None], -after.force[:, 1:] * share[:, None], 0.0)
+        normal, along = _upright(after, normal).ravel(), _upright(after, along).ravel()
+        by_force[k] += normal
+        by_displacement[k] += along
+        if k:
+            by_force[k - 1] += normal
+            by_displacement[k - 1] -= along
+    return Goal(name="dissipation_mJ", by_force=by_force, by_displacement=by_displacement)
+
+
+def _block_diagonal(blocks: Float) -> Any:
+    """Return the sparse matrix (c d, c d) of blocks (c, d, d)."""
+    c = len(blocks)
+    return sp.bsr_array((blocks, np.arange(c), np.arange(c + 1))).tocsr()

@@ -1,0 +1,184 @@
+"""Error bars of a press in small strain from its own condensed body, without a second mesh.
+
+Two errors are independent of each other and add as squares:
+
+- that of the body's mesh, by dual-weighted residuals (`finger3d.accuracy.weighted_residuals`);
+- that of the contact discretisation, from the same press with every second multiplier
+  (`finger3d.accuracy.coarse_multipliers`), and from the resolution of the contact by its points.
+
+Lengths and areas of the zones of contact and stick follow from the places of the contact points alone.
+``validation/error_bars.py`` measures how often the true error lies within twice the bar.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from finger3d.accuracy.coarse_multipliers import with_coarse_multipliers
+from finger3d.accuracy.point_resolution import PointResolution
+from finger3d.accuracy.richardson import Kind, Quantity, largest_readings
+from finger3d.accuracy.weighted_residuals import BodyErrors, body_errors
+from finger3d.mechanics.history import StepResult, flat_readings, measure
+from finger3d.mechanics.model import Model
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.solve import march
+from finger3d.mechanics.step_halving import FLOOR
+
+
+@dataclass(frozen=True)
+class _Shares:
+    """How the errors of one kind of number follow from what was computed.
+
+    Attributes
+    ----------
+    change : change of the number with every second multiplier, over the error of the contact discretisation
+    body : error of the body's mesh over its estimate, in sections and in solids
+    points : relative error over (h/a)^power, h the distance of points and a the half-length of contact; readings are
+        relative to the largest of their kind
+    """
+
+    change: float = math.inf
+    body: tuple[float, float] = (1.0, 1.0)
+    points: float = 0.0
+    power: int = 1
+
+
+_SHARES = {
+    # on coarse meshes recovery underestimates the error at bonded corners, by a factor of 2 to 4
+    Kind.NORMAL_FORCE: _Shares(body=(2.0, 1.5), points=0.07, power=2),
+    Kind.FRICTION_SUM: _Shares(change=1.2, points=0.1),
+    Kind.WORK: _Shares(change=2.0, body=(1.5, 1.5), points=0.03, power=2),
+    Kind.DISSIPATION: _Shares(change=1.5, points=0.1),
+    Kind.STRAIN: _Shares(change=2.0),
+    Kind.DISPLACEMENT: _Shares(change=2.0, points=0.003),
+    # recovery is poor where a taxel ends, and at the corners of the base
+    Kind.BASE_PRESSURE: _Shares(change=2.0, body=(1.5, 1.5), points=0.01),
+}
+"""Found in the sections of validation/error_bars.py; the force changes too little with the multipliers to tell."""
+
+_BASE_SHARE = 0.015
+"""Relative error of the pressure on a taxel of a solid over the edge length of the base divided by its shorter side."""
+
+_MOST_INCREMENTS = 10
+"""Increments of a leg that the errors of mesh and contact are estimated with: they hardly depend on their number."""
+
+
+@dataclass(frozen=True)
+class AdjointBars:
+    """Discretisation errors by name.
+
+    Attributes
+    ----------
+    bars : magnitudes, in the units of the numbers
+    parts : of forces, energies and readings, the errors that the body's mesh and the contact discretisation cause
+    body : signed errors that the mesh of the body causes, and the shares of its cells
+    coarse : the press with every second multiplier
+    contact_half_length_mm : of the last increment
+    """
+
+    bars: Mapping[str, float]
+    parts: Mapping[str, tuple[float, float]]
+    body: BodyErrors
+    coarse: Problem
+    contact_half_length_mm: float
+
+    @staticmethod
+    def contact_order(name: str) -> int:
+        """Return the order in the edge length at the contact of the contact discretisation's error of a number."""
+        return _SHARES[Quantity.of(name).kind].power
+
+
+def applies(model: Model) -> bool:
+    """Whether the error bars of a model follow from its own condensed body.
+
+    The body must be linear elastic without inclusions, the object rigid, and every leg given by its depth.
+    """
+    plain = model.formulation.is_linear_elastic and model.inclusions is None and model.object_compliance is None
+    return plain and model.rule == "projection" and all(leg.force_N is None for leg in model.legs)
+
+
+def adjoint_bars(problem: Problem, steps: Sequence[StepResult]) -> AdjointBars:
+    """Estimate the discretisation errors of the last increment.
+
+    Parameters
+    ----------
+    problem : one whose model `applies`
+    steps : all increments, converged
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If the active set of an increment is singular.
+    """
+    short, few = _with_few_increments(problem, steps)
+    numbers, body = _numbers(short, few[-1]), body_errors(short, few)
+    presses = list(with_coarse_multipliers(short))
+    changes: dict[str, list[float]] = {name: [] for name in numbers}
+    for press in presses:
+        *_, last = march(press)
+        if last.outcome.ok:
+            for name, value in _numbers(press, last).items():
+                changes[name].append(abs(value - numbers[name]))
+    resolution = PointResolution.of(problem, steps[-1])
+    scales = largest_readings(numbers)
+    parts = {}
+    for name, value in numbers.items():
+        kind = Quantity.of(name).kind
+        shares = _SHARES[kind]
+        # along the width no contact ends, so that the normal force does not depend on the points there
+        spacing = resolution.along if kind in (Kind.NORMAL_FORCE, Kind.WORK) else resolution.share
+        scale = scales.get(kind, abs(value))
+        if resolution.alone and kind is Kind.FRICTION_SUM:
+            scale = max(scale, abs(numbers["normal_force_N"]))
+        relative = shares.points * spacing**shares.power * scale
+        contact = math.hypot(max(changes[name], default=0.0) / shares.change, relative)
+        parts[name] = shares.body[problem.dim - 2] * body.bar(name), contact
+    bars = {name: math.hypot(*both) for name, both in parts.items()}
+    for name, relative in _unresolved_by_base(problem):
+        bars[name] = math.hypot(bars[name], relative * numbers[name])
+    unresolved = FLOOR * resolution.share * abs(numbers["external_work_mJ"])
+    bars["dissipation_mJ"] = math.hypot(bars["dissipation_mJ"], unresolved)
+    reach = measure(problem.points, steps[-1])["contact_half_length_mm"]
+    return AdjointBars(bars | resolution.zone_bars, parts, body, presses[0], float(reach))
+
+
+def _unresolved_by_base(problem: Problem) -> list[tuple[str, float]]:
+    """Return the name of every taxel of a solid and the relative error that the edges of the base leave in it."""
+    mesh = problem.mesh
+    if mesh.dim == 2:
+        return []
+    corners = mesh.points[mesh.facets["base"][:, :3]]
+    edge = float(np.median(np.linalg.norm(corners[:, 0] - corners[:, 1], axis=1)))
+    taxels = problem.model.taxels
+    return [(f"taxel_{t.name}_MPa", _BASE_SHARE * edge / min(t.length_mm, t.width_mm)) for t in taxels]
+
+
+def short_press(problem: Problem) -> tuple[Problem, list[StepResult]]:
+    """Return the press with no more than `_MOST_INCREMENTS` increments in a leg, and its steps."""
+    legs = tuple(
+        replace(leg, steps=min(leg.steps, _MOST_INCREMENTS) if isinstance(leg.steps, int) else _MOST_INCREMENTS)
+        for leg in problem.model.legs
+    )
+    short = replace(problem, model=replace(problem.model, legs=legs))
+    return short, list(march(short))
+
+
+def _with_few_increments(problem: Problem, steps: Sequence[StepResult]) -> tuple[Problem, Sequence[StepResult]]:
+    """Return the press with few increments; it is solved again only where it had more."""
+    if all(isinstance(leg.steps, int) and leg.steps <= _MOST_INCREMENTS for leg in problem.model.legs):
+        return problem, steps
+    short, found = short_press(problem)
+    return (short, found) if found[-1].outcome.ok else (problem, steps)
+
+
+def _numbers(problem: Problem, step: StepResult) -> dict[str, float]:
+    """Return forces, energies and readings by name."""
+    numbers = measure(problem.points, step)
+    readings = flat_readings(numbers)
+    across = {f"marker_{name}_z_mm" for name in step.markers} if problem.dim == 2 else set()  # zero, without an error
+    main = ("normal_force_N", "friction_sum_N", "external_work_mJ", "dissipation_mJ")
+    return {name: float(numbers[name]) for name in main} | {k: v for k, v in readings.items() if k not in across}

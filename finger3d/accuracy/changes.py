@@ -1,0 +1,135 @@
+"""Estimated changes of the numbers of a press, each with its own error: what a better model or more increments do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from finger3d._types import Tree
+from finger3d.contact.rules import STEP_DEPENDENT_RULES
+from finger3d.errors import Finger3dError
+from finger3d.mechanics.history import StepResult, measure
+from finger3d.mechanics.model import Model
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.step_halving import condensation_s, contact_s
+
+_SURE = 1.0 / 3.0
+"""Relative error up to which a change is significant: the true change is then within a factor of 1.5 of it."""
+
+_LEAST_CHANGE = 0.01
+"""Significant change of a force, relative to it, and of a strain, relative to the largest of all gauges."""
+
+_SHARE, _SECONDS = 0.3, 1.0
+"""Largest cost of an estimate, over the cost of the press and in seconds; the larger counts, both are modelled."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """Estimated change of a number.
+
+    Attributes
+    ----------
+    value : the number in the press
+    change : what is to be added to it, in the same unit
+    error : half-width of the interval of `change`
+    significant : whether the interval is narrow and the change large enough to be reported
+    """
+
+    value: float
+    change: float
+    error: float
+    significant: bool
+
+    @property
+    def low(self) -> float:
+        """Lower end of the interval of `change`."""
+        return self.change - self.error
+
+    @property
+    def high(self) -> float:
+        """Upper end of the interval of `change`."""
+        return self.change + self.error
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChangeEstimate:
+    """Estimated changes of a press.
+
+    Attributes
+    ----------
+    changes : changes of normal force, friction sum and gauges by name; empty if there is no estimate
+    method : one line that says how the changes were estimated, or ``no estimate: ...``
+    seconds : wall time of the estimate
+    """
+
+    changes: Mapping[str, Change] = field(default_factory=dict)
+    method: str = ""
+    seconds: float = 0.0
+
+    @property
+    def significant(self) -> dict[str, Change]:
+        """The changes that are known well enough to be reported."""
+        return {name: change for name, change in self.changes.items() if change.significant}
+
+    def as_dict(self) -> Tree:
+        """Return the entry of summary.json; changes that are not significant are left out."""
+        shown = {name: {"value": c.value, "change": c.change, "error": c.error} for name, c in self.significant.items()}
+        return {
+            "changes": shown,
+            "method": self.method,
+            "seconds": self.seconds,
+        }
+
+
+def changing_numbers(problem: Problem, step: StepResult) -> dict[str, float]:
+    """Return the numbers whose changes are estimated: normal force, friction sum and gauges, by name.
+
+    Areas of contact and stick are not among them: the distance of the points hides their changes.
+    """
+    measured = measure(problem.points, step)
+    forces = {name: float(measured[name]) for name in ("normal_force_N", "friction_sum_N")}
+    return forces | {f"gauge_{name}": float(strain) for name, strain in measured["gauges"].items()}
+
+
+def judged(values: Mapping[str, float], changes: Mapping[str, float], errors: Mapping[str, float]) -> dict[str, Change]:
+    """Return the changes by name that are finite; those known within a factor of 1.5 and large are significant.
+
+    Parameters
+    ----------
+    values : numbers of the press by name, as `changing_numbers` returns them
+    changes, errors : estimated change of each, and half-width of its interval
+    """
+    strains = max((abs(x) for name, x in values.items() if name.startswith("gauge_")), default=0.0)
+    out = {}
+    for name, value in values.items():
+        change, error = changes[name], errors[name]
+        if all(map(math.isfinite, (value, change, error))):
+            scale = strains if name.startswith("gauge_") else abs(value)
+            significant = error <= _SURE * abs(change) and abs(change) >= _LEAST_CHANGE * scale > 0.0
+            out[name] = Change(value, change, error, significant)
+    return out
+
+
+def check_kind(model: Model) -> None:
+    """Raise for a kind of press that the estimates were not compared with the truth of.
+
+    Raises
+    ------
+    Finger3dError
+        For a model with an effect or a prescribed force, and where the result depends on the number of increments.
+    """
+    if model.filled:
+        names = ", ".join(name for _, name in model.filled)
+        raise Finger3dError(f"it was not compared with presses under {names}")
+    if any(leg.force_N is not None for leg in model.legs):
+        raise Finger3dError("it was not compared with presses to a force")
+    if model.rule in STEP_DEPENDENT_RULES or model.friction.depends_on_steps:
+        raise Finger3dError("the result depends on the number of increments")
+
+
+def budget_s(problem: Problem, increments: int) -> float:
+    """Return the modelled seconds that an estimate may take, from the modelled cost of a press in small strain."""
+    unknowns, points = problem.part.stiffness.upper.shape[0], len(problem.surface.nodes)
+    press = condensation_s(unknowns, problem.dim) + increments * contact_s(points, problem.dim)
+    return max(_SHARE * press, _SECONDS)

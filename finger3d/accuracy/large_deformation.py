@@ -1,0 +1,114 @@
+"""Change of the numbers of a press by large deformation, estimated from coarse presses with and without it.
+
+The scene is pressed on a coarser mesh and in few increments, in small strain and at large deformation (neo-Hookean).
+The change d of a number of the press is that of the coarse press; its error follows from the change d' on a mesh
+coarser still and in fewer increments ::
+
+    error of d = max(1.5 |d - d'|, 0.15 |d|)
+
+Both factors were chosen on the 60 sections of ``validation/_drawn.py`` with the seed 2026.
+``validation/advice_against_truth.py`` compares the changes with those of the same press at large deformation, in other
+scenes.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from finger3d.accuracy.changes import ChangeEstimate, budget_s, changing_numbers, check_kind, judged
+from finger3d.accuracy.companions import LEAST_RATIO, built_like, coarser, edge_ratio
+from finger3d.accuracy.cost import forecast
+from finger3d.effects.base import fill
+from finger3d.errors import Finger3dError
+from finger3d.mechanics.history import StepResult
+from finger3d.mechanics.model import Model
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.step_halving import last_step
+
+_FACTORS = (2.0, 2.83, 4.0)
+"""Edge lengths of the coarse mesh over those of the press; the first that is cheap enough is taken."""
+
+_COARSER_STILL = 2.0
+"""Edge lengths of the coarser of both meshes over those of the other."""
+
+_STEPS = (5, 3)
+"""Increments in each leg, on the coarse mesh and on the one that is coarser still."""
+
+_SAFETY, _LEAST_ERROR = 1.5, 0.15
+"""Error of a change over its difference between both meshes, and least error relative to the change."""
+
+
+def large_deformation(problem: Problem, last: StepResult, increments: int) -> ChangeEstimate:
+    """Estimate what large deformation would change in the last increment of a press in small strain.
+
+    Parameters
+    ----------
+    problem, last : the press, and its last increment
+    increments : number of increments of the press, from which its cost is modelled
+
+    Returns
+    -------
+    ChangeEstimate
+        Without changes, and with the reason, where no estimate can be made; a failure does not fail the press.
+    """
+    start = time.perf_counter()
+    try:
+        found = _estimated(problem, last, increments)
+    except (Finger3dError, RuntimeError, ValueError, np.linalg.LinAlgError, MemoryError) as error:
+        found = ChangeEstimate(method=f"no estimate: {error}")
+    return replace(found, seconds=time.perf_counter() - start)
+
+
+def _estimated(problem: Problem, last: StepResult, increments: int) -> ChangeEstimate:
+    check_kind(problem.model)
+    factor = _affordable_factor(problem, increments)
+    change, other = _changes_on_both_meshes(problem, factor)
+    errors = {name: max(_SAFETY * abs(d - other[name]), _LEAST_ERROR * abs(d)) for name, d in change.items()}
+    mesh = coarser(problem.model, factor).mesh
+    return ChangeEstimate(
+        changes=judged(changing_numbers(problem, last), change, errors),
+        method=f"presses with and without it, with {mesh.size_mm:.4g} and {mesh.base_size_mm:.4g} mm in {_STEPS[0]} "
+        f"increments a leg; error: with {_COARSER_STILL:g} times these edges in {_STEPS[1]} increments",
+    )
+
+
+def _affordable_factor(problem: Problem, increments: int) -> float:
+    """Return the edge lengths of the coarse mesh over those of the press.
+
+    What is modelled is the press at large deformation on this mesh, which takes half of the estimate or more.
+    """
+    budget = budget_s(problem, increments)
+    for factor in _FACTORS:
+        cost = forecast(_at_large_deformation(_coarse(problem.model, factor, _STEPS[0])))
+        if cost["total_s"] - cost["start_s"] - cost["output_s"] <= budget:
+            return factor
+    raise Finger3dError(f"it would take more than {budget:.2g} s")
+
+
+def _changes_on_both_meshes(problem: Problem, factor: float) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the changes by name on the coarse mesh, and on the one that is coarser still."""
+    found, finer = [], problem
+    for times, steps in zip((factor, _COARSER_STILL * factor), _STEPS, strict=True):
+        model = _coarse(problem.model, times, steps)
+        small, large = (built_like(problem, m) for m in (model, _at_large_deformation(model)))
+        if edge_ratio(finer, small) < LEAST_RATIO:
+            raise Finger3dError("the mesh is too coarse for a coarser one; lower mesh.size_mm")
+        before, after = (changing_numbers(p, last_step(p)) for p in (small, large))
+        found.append({name: after[name] - before[name] for name in before})
+        finer = small
+    return found[0], found[1]
+
+
+def _coarse(model: Model, factor: float, steps: int) -> Model:
+    return replace(coarser(model, factor), legs=tuple(replace(leg, steps=steps) for leg in model.legs))
+
+
+def _at_large_deformation(model: Model) -> Model:
+    # imported here: without this estimate, a press in small strain does not need them
+    from finger3d.fem.laws import NeoHooke
+    from finger3d.mechanics.finite_strain import FiniteStrain
+
+    return fill(model, "strain_measure", FiniteStrain(NeoHooke(1.0)), "large_deformation")

@@ -1,0 +1,62 @@
+"""Presses with every second multiplier: the same body and object, seen at fewer points."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from finger3d.accuracy.coarse_multipliers import with_coarse_multipliers
+from finger3d.accuracy.estimate import press_numbers
+from finger3d.mechanics.build import build
+from finger3d.mechanics.model import Leg, Model
+from finger3d.mechanics.solve import march
+from finger3d.objects import Sphere
+from tests.models import half_cylinder, swept_fig9
+
+MODELS = {
+    "section": half_cylinder(0.2, steps=4),
+    "solid": replace(swept_fig9(4.0), legs=(Leg(8.0, steps=3),)),
+    "ball on a section": replace(half_cylinder(0.2, steps=3), object=Sphere(radius_mm=20.0)),
+}
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_fewer_points_bear_nearly_the_same_press(name: str) -> None:
+    model: Model = MODELS[name]
+    problem = build(model)
+    exact = press_numbers(problem, list(march(problem))[-1])
+    for coarse in with_coarse_multipliers(problem):
+        assert 0.25 * len(problem.delassus) < len(coarse.delassus) < 0.8 * len(problem.delassus)
+        steps = list(march(coarse))
+        assert all(step.outcome.ok for step in steps)
+        found = press_numbers(coarse, steps[-1])
+        assert found["normal_force_N"] == pytest.approx(exact["normal_force_N"], rel=0.05)
+        assert found["friction_sum_N"] != exact["friction_sum_N"]
+
+
+def test_a_uniform_traction_keeps_its_force_and_its_work() -> None:
+    problem = build(MODELS["solid"])
+    c, d = problem.delassus.shape[:2]
+    for coarse in with_coarse_multipliers(problem):
+        fine, few = problem.surface.area, coarse.surface.area
+        assert few.sum() == pytest.approx(fine.sum(), rel=1e-12)
+        loads = [np.zeros((n, d)) for n in (c, len(few))]
+        loads[0][:, 0], loads[1][:, 0] = fine, few
+        energies = [
+            load.ravel() @ one.delassus.reshape(load.size, -1) @ load.ravel()
+            for load, one in zip(loads, (problem, coarse), strict=True)
+        ]
+        assert energies[1] == pytest.approx(energies[0], rel=1e-12)
+        # points and their images add up to the whole face
+        assert coarse.points.area.sum() == pytest.approx(problem.points.area.sum(), rel=1e-12)
+
+
+def test_the_gap_of_a_plane_is_exact() -> None:
+    problem = build(MODELS["section"])
+    target = problem.last_pose
+    fine = problem.gap(target)
+    for coarse in with_coarse_multipliers(problem):
+        mean = np.average(coarse.gap(target), weights=coarse.surface.area)
+        assert mean == pytest.approx(np.average(fine, weights=problem.surface.area), rel=1e-12)

@@ -1,0 +1,250 @@
+"""Is what a press says that large deformation, or more increments, would change within a factor of 1.5 of the truth?
+
+Truth is the same press on the same mesh at large deformation, or in 640 increments.  The scenes are drawn at random:
+sections as in error_bars, with another seed, so that none was used to choose the factors of the estimates, and coarse
+swept solids.  A press reports a change if the half-width of its interval is below a third of it, and if it is at least
+1 % of a force or of the largest gauge strain.  What it reports is judged by the factor in nine cases of ten, and by the
+interval in eight of ten.  Changes that are too small or too uncertain to be reported have no meaningful ratio to the
+truth: they are judged by the interval alone, in statements, since nothing is claimed of them.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from finger3d.accuracy.advice import LEAST_STRAIN, largest_principal_strain
+from finger3d.accuracy.changes import Change, changing_numbers
+from finger3d.accuracy.large_deformation import large_deformation
+from finger3d.accuracy.more_increments import more_increments
+from finger3d.analyses.study_rows import Result, Row
+from finger3d.contact.friction import Coulomb
+from finger3d.effects.large_deformation import Effect as LargeDeformation
+from finger3d.fem.material import Isotropic
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.build import build
+from finger3d.mechanics.history import StepResult
+from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.solve import march
+from finger3d.objects import Cylinder, Plane, Sphere
+
+from ._drawn import FAR, NEAR, UNDER, drawn
+from ._paper import columns
+
+SEED = 23
+"""The factors of the estimates were chosen with the seed 2026."""
+
+SECTIONS, SOLIDS = 54, 6
+COUNTS, TRUE_COUNT = (5, 10, 20), 640
+FACTOR, SHARE, COVERED = 1.5, 0.9, 0.8
+KINDS = {"normal_force_N": "normal force", "friction_sum_N": "friction sum", "gauge": "gauge"}
+LARGE, MORE = "large deformation", "more increments"
+CLAIM = "claim of finger3d for its advice"
+COLUMNS = "scene by number value change error reported true_change"
+
+
+@dataclass(frozen=True)
+class Judged:
+    """Estimated and true change of one number of one press; `by` is what changes it."""
+
+    scene: str
+    by: str
+    number: str
+    estimate: Change
+    true: float
+
+    @property
+    def kind(self) -> str:
+        """Number's kind: all gauges are one."""
+        return "gauge" if self.number.startswith("gauge") else self.number
+
+    @property
+    def ratio(self) -> float:
+        """True change over the estimated one."""
+        return self.true / self.estimate.change
+
+    @property
+    def within(self) -> bool:
+        """Whether the estimate is within the factor of the truth."""
+        return 1.0 / FACTOR <= self.ratio <= FACTOR
+
+    @property
+    def covered(self) -> bool:
+        """Whether the true change lies in the interval, up to round-off of the number."""
+        return abs(self.true - self.estimate.change) <= self.estimate.error + 1e-9 * abs(self.estimate.value)
+
+
+def solids(count: int) -> Iterator[tuple[str, Model]]:
+    """Names and models of coarse swept solids: three shapes in turn; width, nu, mu and depth at random."""
+    random = np.random.default_rng(SEED)
+    for number in range(count):
+        u = random.uniform(size=4)
+        fig9 = designs()["clipped_cylinder"](
+            radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=12.0 + 28.0 * u[0]
+        )
+        half = designs()["half_cylinder"](radius_mm=5.0, width_mm=3.0 + 5.0 * u[0])
+        block = designs()["block"](half_length_mm=8.0, height_mm=8.0, width_mm=10.0 + 6.0 * u[0])
+        shapes: tuple[tuple[Any, Any, tuple[Gauge, ...], float, float], ...] = (
+            (fig9, Plane(), FAR, 10.0, 3.0),
+            (half, Cylinder(radius_mm=10.0), NEAR, 1.0, 0.35),
+            (block, Sphere(radius_mm=10.0), UNDER, 1.2, 0.7),
+        )
+        design, rigid, gauges, depth, size = shapes[number % 3]
+        nu, mu = 0.3 + 0.19 * u[1], 0.03 * 40.0 ** u[2]
+        model = Model(
+            design, Isotropic(1.0, nu), MeshOptions(size, 4.0 * size, "swept"), (Leg((0.5 + 0.5 * u[3]) * depth),),
+            object=rigid, friction=Coulomb(mu), gauges=gauges, domain="solid",
+        )  # fmt: skip
+        yield f"solid {number}: {type(rigid).__name__} on {design.name}, nu = {nu:.3g}, mu = {mu:.3g}", model
+
+
+def scenes(quick: bool) -> Iterator[tuple[str, Model]]:
+    """Sections and solids; quick: one section on a coarser mesh."""
+    if quick:
+        for name, model in itertools.islice(drawn(2, SEED), 1, None):
+            edges = replace(model.mesh, size_mm=1.5 * model.mesh.size_mm, base_size_mm=1.5 * model.mesh.base_size_mm)
+            yield name, replace(model, mesh=edges)
+        return
+    yield from drawn(SECTIONS, SEED)
+    yield from solids(SOLIDS)
+
+
+def last(problem: Problem) -> StepResult:
+    """Return the last increment of a press, converged or not."""
+    return list(march(problem))[-1]
+
+
+def by_large_deformation(name: str, model: Model) -> Iterator[Judged]:
+    """Yield the changes by large deformation where a press estimates them."""
+    problem = build(model)
+    step = last(problem)
+    strain = problem.model.formulation.fields(problem, step.part)[1]
+    if largest_principal_strain(strain) < LEAST_STRAIN:
+        return
+    estimate = large_deformation(problem, step, sum(int(leg.steps) for leg in model.legs))
+    truth = build(LargeDeformation().apply(model))
+    end = last(truth)
+    if end.outcome.ok:
+        yield from _judged(name, LARGE, estimate.changes, changing_numbers(truth, end))
+
+
+def by_more_increments(name: str, model: Model, count: int, true_count: int) -> Iterator[Judged]:
+    """Yield the changes by more increments than `count` in each leg."""
+    few, many = (replace(model, legs=tuple(replace(leg, steps=n) for leg in model.legs)) for n in (count, true_count))
+    problem = build(few)
+    estimate = more_increments(problem, last(problem), count * len(few.legs))
+    end = last(replace(problem, model=many))
+    if end.outcome.ok:
+        yield from _judged(name, MORE, estimate.changes, changing_numbers(problem, end))
+
+
+def _judged(name: str, by: str, changes: Mapping[str, Change], truth: Mapping[str, float]) -> Iterator[Judged]:
+    for number, change in changes.items():
+        yield Judged(name, by, number, change, truth[number] - change.value)
+
+
+def run(quick: bool) -> Result:
+    """Large deformation and more increments in every scene."""
+    found: list[Judged] = []
+    pressed = 0
+    for number, (name, model) in enumerate(scenes(quick)):
+        found += by_large_deformation(name, model)
+        pressed += 1
+        found += by_more_increments(name, model, COUNTS[number % len(COUNTS)], 160 if quick else TRUE_COUNT)
+    rows = [_estimated(found, pressed)]
+    for by in (LARGE, MORE):
+        for kind in KINDS:
+            rows += _rows([j for j in found if j.by == by and j.kind == kind], f"{KINDS[kind]} by {by}")
+    lines = [
+        (j.scene, j.by, j.number, j.estimate.value, j.estimate.change, j.estimate.error, j.estimate.significant, j.true)
+        for j in found
+    ]
+    return Result(tuple(rows), columns(COLUMNS, lines), lambda figure: _draw(figure, found))
+
+
+def _estimated(found: list[Judged], pressed: int) -> Row:
+    share = len({j.scene for j in found if j.by == LARGE}) / pressed
+    return Row(
+        f"share of {pressed} scenes whose change by large deformation was estimated", CLAIM, SHARE, share, 0.0,
+        "the others have small strains, or a coarse press of them fails", measure="at least",
+    )  # fmt: skip
+
+
+def _rows(found: list[Judged], what: str) -> list[Row]:
+    """Return the shares of one kind of number; none where nothing is reported."""
+    said, silent = ([j for j in found if j.estimate.significant == significant] for significant in (True, False))
+    out = []
+    if said:
+        text = f"{what}, {len(said)} reported of {len(found)}"
+        within, covered = (float(np.mean([getattr(j, key) for j in said])) for key in ("within", "covered"))
+        out += [
+            Row(
+                f"share of reported changes within a factor of {FACTOR:g}: {text}", CLAIM, SHARE, within, 0.0,
+                "a bound", measure="at least",
+            ),
+            Row(
+                f"share of reported changes whose interval holds: {text}", CLAIM, COVERED, covered, 0.0, "a bound",
+                measure="at least",
+            ),
+        ]  # fmt: skip
+    if silent:
+        covered = float(np.mean([j.covered for j in silent]))
+        out.append(
+            Row(
+                f"share of changes not reported whose interval holds: {what}, {len(silent)} of {len(found)}",
+                "nothing is claimed of them",
+                COVERED,
+                covered,
+                0.0,
+                "that of reported changes",
+                "statement",
+                "at least",
+            )  # fmt: skip
+        )
+    return out
+
+
+def _draw(figure: Any, found: list[Judged]) -> None:
+    """Draw true over estimated changes, and the band of the factor."""
+    figure.set_size_inches(13.5, 8.6)
+    panels = figure.subplots(2, 3)
+    figure.suptitle("True change against the change that a press reports; the band is a factor of 1.5")
+    for line, by in zip(panels, (LARGE, MORE), strict=True):
+        for axes, kind in zip(line, KINDS, strict=True):
+            here = [j for j in found if j.by == by and j.kind == kind]
+            reach = 0.0
+            for said, colour, label in ((False, "#b0b0b0", "not reported"), (True, "#2c5d8f", "reported")):
+                some = [j for j in here if j.estimate.significant == said]
+                if not some:
+                    continue
+                scale = np.array([_scale(j, found) for j in some])
+                x, y = (
+                    100.0 * np.array(values) / scale
+                    for values in ([j.estimate.change for j in some], [j.true for j in some])
+                )
+                bar = 100.0 * np.array([j.estimate.error for j in some]) / scale if said else None
+                axes.errorbar(x, y, xerr=bar, fmt="o", ms=3.5, lw=0.8, color=colour, label=label)
+                if said:
+                    reach = max(float(np.abs([*x, *y]).max()), reach)
+            reach = 1.1 * reach or 2.0
+            line_x = np.linspace(-reach, reach, 101)
+            axes.fill_between(line_x, line_x / FACTOR, line_x * FACTOR, color="#2c5d8f", alpha=0.12, lw=0.0)
+            axes.plot(line_x, line_x, color="#222222", lw=0.8)
+            unit = "% of the largest strain" if kind == "gauge" else "% of the number"
+            axes.set(title=f"{KINDS[kind]}, {by}", xlim=(-reach, reach), ylim=(-reach, reach))
+            axes.set(xlabel=f"estimated change, {unit}", ylabel=f"true change, {unit}")
+            axes.grid(alpha=0.3)
+    panels[0, 0].legend(fontsize=8, loc="upper left")
+
+
+def _scale(judged: Judged, found: list[Judged]) -> float:
+    """Return what a change is drawn relative to: the number, or for gauges the largest strain of the press."""
+    if judged.kind != "gauge":
+        return max(abs(judged.estimate.value), 1e-12)
+    same = [j for j in found if (j.scene, j.by, j.kind) == (judged.scene, judged.by, "gauge")]
+    return max(max(abs(j.estimate.value) for j in same), 1e-12)

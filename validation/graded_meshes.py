@@ -1,0 +1,151 @@
+"""How many unknowns does a mesh graded towards a number save, and is the error then as small as the tolerance says?
+
+The Fig. 9 finger (nu = 0.49, mu = 0.25, 10 mm) as a section and as a 20 mm wide solid: meshes graded by the shares of
+the cells in the error of the goal (Becker and Rannacher 2001, sec. 5; `mesh.tolerance` with `mesh.goal`) beside meshes
+whose edges are four times as long far from the contact as at it, from the results of cost_of_accuracy.  Truth is
+extrapolated from the four finest of those with the order that fits them; for the gauge, whose values do not fall
+monotonically, it is the finest.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.optimize import least_squares
+
+import finger3d
+from finger3d.accuracy.estimate import press_numbers
+from finger3d.accuracy.refine import GOAL, refine_mesh
+from finger3d.analyses.study_rows import Result, Row
+from finger3d.mechanics.model import Domain, MeshOptions
+from finger3d.mechanics.solve import march
+
+from ._paper import columns
+
+FIG9 = Path(__file__).parents[1] / "geometries" / "fig9.toml"
+UNIFORM = Path(__file__).with_name("results") / "cost_of_accuracy_table.csv"
+STEPS, ROUNDING = 10, 1e-9
+GAUGE = "gauge_g36"
+TOLERANCES = {("plane-strain", GOAL): (1e-2, 3e-3, 1e-3, 3e-4), ("solid", GOAL): (5e-3, 2e-3, 1.5e-3)}
+TOLERANCES |= {("plane-strain", GAUGE): (3e-2, 1e-2, 4e-3)}
+START: dict[str, tuple[float, float]] = {"plane-strain": (2.0, 8.0), "solid": (4.0, 16.0)}
+COLUMN = {GOAL: "force", GAUGE: "gauge_strain"}
+WANTED = 10.0
+"""Unknowns of equal grading over those of a graded mesh: a goal of this project for the force of the solid."""
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A mesh and the error that it leaves in its goal, relative to the truth; `told` is the estimate, nan without."""
+
+    domain: str
+    goal: str
+    way: str
+    dofs: int
+    value: float
+    told: float
+    error: float
+
+
+def run(quick: bool) -> Result:
+    """All goals; quick: the force of the section."""
+    wanted = {("plane-strain", GOAL): (3e-3,)} if quick else TOLERANCES
+    found = [mesh for (domain, goal), tolerances in wanted.items() for mesh in _meshes(domain, goal, tolerances)]
+    lines = [tuple(vars(mesh).values()) for mesh in found]
+    names = "domain goal way dofs value estimate true_error"
+    return Result(tuple(_rows(found)), columns(names, lines), lambda figure: _draw(figure, found))
+
+
+def _meshes(domain: Domain, goal: str, tolerances: tuple[float, ...]) -> Iterator[Mesh]:
+    """Yield the meshes of equal grading, then those graded towards the goal."""
+    sizes, dofs, values = _uniform(domain, goal)
+    truth = _extrapolated(sizes[-4:], values[-4:]) if goal == GOAL else float(values[-1])
+    for n, value in zip(dofs, values, strict=True):
+        yield Mesh(domain, goal, "equal grading", int(n), float(value), float("nan"), abs(value / truth - 1.0))
+    keys = [
+        f"press.steps={STEPS}",
+        "mesh.mesher=swept",
+        f"model.domain={domain}",
+        "friction.mu=0.25",
+        "material.nu=0.49",
+    ]
+    model = replace(finger3d.load(FIG9, keys).model(), mesh=MeshOptions(*START[domain], "swept"))
+    for tolerance in tolerances:
+        refined = refine_mesh(model, tolerance, goal=goal)
+        assert refined.problem is not None, refined.stopped
+        value = press_numbers(refined.problem, list(march(refined.problem))[-1])[goal]
+        last = refined.rounds[-1]
+        yield Mesh(domain, goal, "graded", last.dofs, value, last.error, abs(value / truth - 1.0))
+
+
+def _uniform(domain: str, goal: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return edge lengths, unknowns and values of the mixed elements of cost_of_accuracy, coarse to fine."""
+    body = "section" if domain == "plane-strain" else "solid"
+    with UNIFORM.open(encoding="utf-8") as file:
+        rows = [
+            row for row in csv.DictReader(file)
+            if (row["kind"], row["body"], row["element"], row["mesher"]) == ("run", body, "mixed", "swept")
+            and (row["solver"], row["way"], row["steps"]) == ("pardiso", "condensed", str(STEPS))
+            and abs(float(row["base_size_mm"]) / float(row["size_mm"]) - 4.0) < ROUNDING
+        ]  # fmt: skip
+    unique = {float(row["size_mm"]): row for row in rows}
+    sizes = np.array(sorted(unique, reverse=True))
+    chosen = [unique[size] for size in sizes]
+    return sizes, np.array([int(r["dofs"]) for r in chosen]), np.array([float(r[COLUMN[goal]]) for r in chosen])
+
+
+def _extrapolated(sizes: np.ndarray, values: np.ndarray) -> float:
+    """Return the limit x of ``x + c h^p`` fitted to values, with an order between 1 and 4."""
+    scale = abs(values[-1])
+
+    def misfit(unknowns: np.ndarray) -> np.ndarray:
+        limit, factor, order = unknowns
+        return np.asarray(limit + factor * (sizes / sizes[0]) ** order - values / scale)
+
+    start = [values[-1] / scale, (values[0] - values[-1]) / scale, 1.5]
+    return float(least_squares(misfit, start, bounds=([-np.inf, -np.inf, 1.0], [np.inf, np.inf, 4.0])).x[0] * scale)
+
+
+def _rows(found: list[Mesh]) -> Iterator[Row]:
+    for domain, goal in dict.fromkeys((mesh.domain, mesh.goal) for mesh in found):
+        some = [mesh for mesh in found if (mesh.domain, mesh.goal) == (domain, goal)]
+        equal = [mesh for mesh in some if mesh.way == "equal grading"]
+        for mesh in (mesh for mesh in some if mesh.way == "graded"):
+            name = f"{goal}, {domain}, {mesh.dofs} unknowns"
+            yield Row(
+                f"true error over the estimate: {name}", "claim of finger3d for its error bars", 2.0,
+                mesh.error / mesh.told, 0.0, "two error bars", measure="at most",
+            )  # fmt: skip
+            # the mesh of equal grading whose error is the same, between two of them or beyond the finest
+            enough = [other.dofs for other in equal if other.error <= mesh.error]
+            ratio = min(enough, default=equal[-1].dofs) / mesh.dofs
+            yield Row(
+                f"unknowns of equal grading for no larger an error, over those of the graded mesh: {name}",
+                "goal of this project", WANTED, ratio, 0.0, "the finest of equal grading where none suffices",
+                "statement", "at least",
+            )  # fmt: skip
+
+
+def _draw(figure: Any, found: list[Mesh]) -> None:
+    pairs = list(dict.fromkeys((mesh.domain, mesh.goal) for mesh in found))
+    figure.set_size_inches(4.6 * len(pairs), 4.4)
+    figure.set_layout_engine("constrained")
+    panels = np.atleast_1d(figure.subplots(1, len(pairs)))
+    titles = {GOAL: "normal force", GAUGE: "strain of the gauge at x = 36 mm"}
+    for axes, (domain, goal) in zip(panels, pairs, strict=True):
+        for way, colour, marker in (("equal grading", "#2c5d8f", "o-"), ("graded", "#c0392b", "s-")):
+            some = [mesh for mesh in found if (mesh.domain, mesh.goal, mesh.way) == (domain, goal, way)]
+            label = "edges 4 times as long at the base" if way == "equal grading" else "graded towards the number"
+            axes.loglog([m.dofs for m in some], [100.0 * m.error for m in some], marker, color=colour, label=label)
+        told = [mesh for mesh in found if (mesh.domain, mesh.goal, mesh.way) == (domain, goal, "graded")]
+        axes.loglog([m.dofs for m in told], [100.0 * m.told for m in told], "s", mfc="none", color="#c0392b",
+                    label="its estimated error")  # fmt: skip
+        axes.set(title=f"{titles[goal]}, {'section' if domain != 'solid' else 'solid 20 mm wide'}")
+        axes.set(xlabel="unknowns", ylabel="true error, %")
+        axes.grid(True, which="major", lw=0.4)
+    panels[0].legend(fontsize=8)
