@@ -38,6 +38,7 @@ Dimension = Annotated[float, Ge(SMALLEST_MM), Le(LARGEST_MM)]  # of a finger
 Length = Annotated[float, Ge(1e-6), Le(1e6)]  # mm
 Place = Annotated[float, Ge(-FARTHEST_MM), Le(FARTHEST_MM)]  # mm
 Angle = Annotated[float, Ge(-360), Le(360)]  # degrees
+Turn = Annotated[float, Radians(Ge(-360), Le(360))]
 Edge = Annotated[float, Ge(1e-4), Le(LARGEST_MM)]  # mm, of a mesh
 Seconds = Annotated[float, Ge(1e-9), Le(1e12)]  # on a press's own clock
 Scale = Annotated[float, Ge(1e-6), Le(1e6)]

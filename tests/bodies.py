@@ -10,6 +10,12 @@ import numpy as np
 
 from finger3d.geometry.surface import Triangles
 
+CUBE = np.array([[x, y, z] for x in (0.0, 10.0) for y in (0.0, 10.0) for z in (0.0, 10.0)])
+SIDES = np.array(
+    [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4],
+     [1, 5, 7], [1, 7, 3]]
+)  # fmt: skip
+
 
 def box(x: float, y: float, z: float, middle: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Triangles:
     """A box with these edges around a point."""

@@ -64,3 +64,9 @@ def swept_fig9(size: float, mu: float = 0.125, nu: float = 0.4) -> Model:
     """The finger of Fig. 9 as a solid without gauges."""
     mesh = MeshOptions(size, 4.0 * size, "swept")
     return fig9(material=Isotropic(1.0, nu), mesh=mesh, friction=Coulomb(mu), gauges=())
+
+
+def ended(model: Model) -> tuple[Problem, StepResult]:
+    """A press, and its last increment."""
+    problem, frames = run(model)
+    return problem, frames[-1]

@@ -9,9 +9,33 @@ import numpy as np
 
 from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
 from finger3d.fem.simplex import Mesh, quadratic
+from finger3d.objects import Plane
+from finger3d.plotting import solid as render
+from finger3d.sensor.curve import Calibration, Tolerance
 from tests.meshes import grid
 
 MU = 0.25
+STEPS = [
+    {
+        "depth_mm": d,
+        "normal_force_N": 15.0 * d**1.3,
+        "friction_sum_N": 3.0 * d**1.3,
+        "contact_half_length_mm": 7.0 * d**0.7,
+        "stick_half_length_mm": 5.0 * d**0.7,
+    }
+    for d in range(1, 11)
+]
+PLATE = Plane().drawing(60.0)
+OBJECT = (PLATE.points + [0.0, 40.0, 0.0])[PLATE.faces]
+
+
+MUS = np.linspace(0.05, 1.0, 6)
+CAUSES = ("depth_mm", "E_percent", "nu", "tilt_deg", "gauge_x_mm", "gauge_y_mm", "gauge_angle_deg", "mesh")
+CURVE = Calibration(
+    "g36", MUS, 0.02 + 0.01 * MUS - 0.004 * MUS**2, 1.5e-4, 0.1,
+    tuple(Tolerance(name, "", 0.5, np.full(6, 1e-3), np.full(6, 1e-3)) for name in CAUSES), about={"domain": "solid"},
+)  # fmt: skip
+"""A calibration that nobody pressed, with every cause of uncertainty."""
 
 
 def top(x: np.ndarray) -> np.ndarray:
@@ -77,13 +101,29 @@ def share(path: Path, colour: str, within: float = 0.12) -> float:
     return float(np.mean(np.all(np.abs(pixels(path) - to_rgb(colour)) < within, axis=-1)))
 
 
-STEPS = [
-    {
-        "depth_mm": d,
-        "normal_force_N": 15.0 * d**1.3,
-        "friction_sum_N": 3.0 * d**1.3,
-        "contact_half_length_mm": 7.0 * d**0.7,
-        "stick_half_length_mm": 5.0 * d**0.7,
-    }
-    for d in range(1, 11)
-]
+def orange(image: np.ndarray) -> float:
+    """Share of the right half, above the keys, in slip's colour, whatever the light."""
+    high, wide = image.shape[:2]
+    panel = image[: int(0.75 * high), wide // 2 :]
+    return float(((panel[..., 0] - panel[..., 2] > 90) & (panel[..., 0] > panel[..., 1] + 30)).mean())
+
+
+def marked(image: np.ndarray) -> int:
+    """Pixels in the colour of gauges, or in that colour seen through the object."""
+    return int((np.abs(image - np.array([0xB0, 0x00, 0x6A])).max(axis=2) < 40).sum())
+
+
+def rgb(path: Path) -> np.ndarray:
+    """The picture as (h, w, 3) in 0 .. 255."""
+    from PIL import Image
+
+    return np.asarray(Image.open(path).convert("RGB"), dtype=float)
+
+
+def assert_shows_the_zones(path: Path) -> None:
+    """Both zones cover a visible part of the picture, and the pressure has the colours of a peak and of an edge."""
+    assert pixels(path).std() > 0.1
+    assert share(path, render.COLOURS[STICK]) > 0.01
+    assert share(path, render.COLOURS[SLIP]) > 0.01
+    assert share(path, "#dde318", within=0.2) > 0.01
+    assert share(path, "#33638d", within=0.2) > 0.003

@@ -44,6 +44,53 @@ y_mm = 4.0
 angle_deg = 30.0
 """
 """A half cylinder of radius 5 mm on a plane, in 2D, with a gauge inside."""
+BLOCK = """
+[finger]
+geometry = "block"
+half_length_mm = 10.0
+height_mm = 8.0
+width_mm = 6.0
+[material]
+E_MPa = 1.0
+nu = 0.3
+[press]
+depth_mm = 0.5
+steps = 2
+[model]
+domain = "plane-strain"
+[mesh]
+size_mm = 1.0
+base_size_mm = 4.0
+[[gauge]]
+name = "g"
+x_mm = 4.0
+y_mm = 6.0
+"""
+SWEPT_FINGER = (
+    """
+title = "coarse finger"
+"""
+    + FIG9
+    + """
+[material]
+E_MPa = 1.0
+nu = 0.49
+[friction]
+mu = 0.25
+[press]
+depth_mm = 10.0
+steps = 4
+[mesh]
+size_mm = 5.0
+base_size_mm = 12.0
+mesher = "swept"
+[[gauge]]
+name = "g36"
+x_mm = 36.0
+y_mm = 38.0
+angle_deg = 30.0
+"""
+)
 
 
 def changed(text: str, **values: object) -> str:
@@ -77,3 +124,10 @@ def words(page: Path) -> str:
     """What a reader reads: the page without scripts, styles, pictures and tags."""
     text = re.sub(r"<(script|style)\b.*?</\1>", " ", page.read_text(encoding="utf-8"), flags=re.DOTALL)
     return " ".join(unescape(re.sub(r"<[^>]*>", " ", text)).split())
+
+
+def written(folder: Path, text: str, name: str = "scene.toml") -> Path:
+    """Write a scene file, and return its path."""
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path

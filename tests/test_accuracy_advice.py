@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,38 +12,17 @@ import pytest
 import finger3d
 from finger3d.accuracy import large_deformation as module
 from finger3d.accuracy.advice import advise, largest_principal_strain
-from finger3d.accuracy.changes import Change, ChangeEstimate, changing_numbers, judged
-from finger3d.accuracy.large_deformation import large_deformation
-from finger3d.accuracy.more_increments import may_matter, more_increments
-from finger3d.contact.friction import Coulomb
-from finger3d.effects.kinetic_friction import Effect as KineticFriction
+from finger3d.accuracy.changes import Change, ChangeEstimate
+from finger3d.cli import main
 from finger3d.effects.large_deformation import Effect as LargeDeformation
-from finger3d.errors import Finger3dError
-from finger3d.mechanics.model import MeshOptions
 from finger3d.report.press import press_page
-from tests.models import half_cylinder, run
-from tests.scenes import HALF_CYLINDER, changed, words
+from tests.models import half_cylinder
+from tests.scenes import HALF_CYLINDER, changed, words, written
 
 COARSE = 0.3
+SHALLOW = changed(HALF_CYLINDER, steps=5, size_mm=0.2)
 DEEP = changed(HALF_CYLINDER, depth_mm=1.0, size_mm=0.2)
 """Principal strains of about 0.2."""
-
-
-def test_a_change_is_significant_if_its_interval_is_narrow_and_the_change_large() -> None:
-    values = {"normal_force_N": 10.0, "friction_sum_N": 4.0, "gauge_a": 0.1, "gauge_b": -0.001, "gauge_c": np.nan}
-    changes = {"normal_force_N": 3.0, "friction_sum_N": 0.03, "gauge_a": 0.01, "gauge_b": 0.0009, "gauge_c": 0.1}
-    errors = {"normal_force_N": 0.9, "friction_sum_N": 0.001, "gauge_a": 0.004, "gauge_b": 1e-5, "gauge_c": 1e-3}
-    found = judged(values, changes, errors)
-    # a strain is compared with the largest strain, of which 0.0009 is less than a hundredth
-    assert {name: change.significant for name, change in found.items()} == {
-        "normal_force_N": True, "friction_sum_N": False, "gauge_a": False, "gauge_b": False,
-    }  # fmt: skip
-    assert (found["normal_force_N"].low, found["normal_force_N"].high) == (2.1, 3.9)
-    # within a third of an estimate d lies what is within a factor of 1.5 of it: 2/3 d to 4/3 d
-    assert found["normal_force_N"].low > 3.0 / 1.5
-    assert not any(
-        change.significant for change in judged({"gauge_a": 0.0}, {"gauge_a": 0.0}, {"gauge_a": 0.0}).values()
-    )
 
 
 def test_a_line_of_advice_tells_changes_with_their_intervals() -> None:
@@ -84,71 +62,6 @@ def test_the_singular_corners_do_not_count_as_strain() -> None:
     assert largest_principal_strain(strain) == pytest.approx(0.07, rel=1e-12)
 
 
-def test_the_change_by_large_deformation_is_that_of_the_press_at_large_deformation() -> None:
-    model = half_cylinder(COARSE)
-    problem, frames = run(model)
-    estimate = large_deformation(problem, frames[-1], len(frames))
-    truth = changing_numbers(*_ended(LargeDeformation().apply(model)))
-    assert {"normal_force_N", "friction_sum_N"} <= set(estimate.significant)
-    for name, change in estimate.significant.items():
-        true = truth[name] - change.value
-        assert 1.0 / 1.5 <= true / change.change <= 1.5  # what is claimed, validation/advice_against_truth.py
-    assert "presses with and without it" in estimate.method
-
-
-def _ended(model: Any) -> tuple[Any, Any]:
-    problem, frames = run(model)
-    return problem, frames[-1]
-
-
-def test_no_change_is_told_where_none_can_be_estimated(monkeypatch: pytest.MonkeyPatch) -> None:
-    problem, step = _ended(half_cylinder(COARSE, 2))
-    filled = replace(problem, model=KineticFriction(ratio=0.5).apply(problem.model))
-    papers = replace(problem, model=replace(problem.model, rule="paper"))
-    legs = tuple(replace(leg, force_N=1.0) for leg in problem.model.legs)
-    forced = replace(problem, model=replace(problem.model, legs=legs))
-    whole, end = _ended(replace(half_cylinder(COARSE, 2), mesh=MeshOptions(5.0, 5.0, "swept")))
-    for found, why in (
-        (large_deformation(filled, step, 2), "kinetic_friction"),
-        (large_deformation(papers, step, 2), "number of increments"),
-        (large_deformation(whole, end, 2), "too coarse"),
-        (large_deformation(forced, step, 2), "to a force"),
-        (more_increments(filled, step, 2), "kinetic_friction"),
-        (more_increments(papers, step, 2), "number of increments"),
-        (more_increments(forced, step, 2), "to a force"),
-        (more_increments(problem, step, 10**6), "would take more than"),
-    ):
-        assert found.changes == {}
-        assert found.method.startswith("no estimate: ")
-        assert why in found.method
-
-    def fail(problem: Any) -> Any:
-        raise Finger3dError("a run did not converge")
-
-    monkeypatch.setattr(module, "last_step", fail)
-    assert large_deformation(problem, step, 2).method == "no estimate: a run did not converge"
-
-
-def test_the_change_by_more_increments_is_that_of_many() -> None:
-    model = replace(half_cylinder(COARSE, 5), friction=Coulomb(0.5))
-    problem, step = _ended(model)
-    estimate = more_increments(problem, step, 5)
-    many = changing_numbers(*_ended(replace(model, legs=tuple(replace(leg, steps=640) for leg in model.legs))))
-    assert estimate.significant
-    for name, change in estimate.significant.items():
-        assert 1.0 / 1.5 <= (many[name] - change.value) / change.change <= 1.5
-    auto = replace(problem, model=replace(model, legs=tuple(replace(leg, steps="auto") for leg in model.legs)))
-    assert "chosen by their error" in more_increments(auto, step, 5).method
-
-
-def test_more_increments_may_matter_from_a_hundredth() -> None:
-    numbers = {"normal_force_N": 10.0, "gauge_a": 0.1, "gauge_b": 0.001}
-    assert may_matter(numbers, {"normal_force_N": 0.11})
-    assert may_matter(numbers, {"gauge_a": 0.0011})
-    assert not may_matter(numbers, {"normal_force_N": 0.09, "gauge_b": 0.0009})  # of the largest strain
-    assert not may_matter(numbers, {})
-
-
 def test_a_press_tells_what_large_deformation_would_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(DEEP, encoding="utf-8")
@@ -171,3 +84,24 @@ def test_a_press_tells_what_large_deformation_would_change(tmp_path: Path, monke
     assert alone["steps"] == told["steps"]  # to the last digit
     assert alone["large_deformation_estimate"] is None
     assert any(text.startswith("principal strains reach") for text in alone["advice"])
+
+
+@pytest.mark.slow
+def test_advice_comes_with_numbers_and_goes_when_it_is_followed(tmp_path: Path) -> None:
+    said = {}
+    for name, keys in {
+        "small": ["press.depth_mm=1.0"],
+        "large": ["press.depth_mm=1.0", "effects.large_deformation={}", "press.steps=60"],
+        "viscous": ["press.depth_mm=1.0", "press.duration_s=1.0", "effects.viscosity={prony=[[0.3, 0.5]]}"],
+        "auto": ["press.steps=auto", "press.depth_mm=0.05"],
+    }.items():
+        out = tmp_path / name
+        settings = [word for key in keys for word in ("--set", key)]
+        assert main(["press", str(written(tmp_path, SHALLOW)), "--out", str(out), "--no-figures", *settings]) == 0
+        said[name] = " ".join(json.loads((out / "summary.json").read_text(encoding="utf-8"))["advice"])
+    assert "large deformation would change the normal force by +" in said["small"]
+    assert "more increments would change the friction sum by" in said["small"]
+    assert "[effects.large_deformation]" in said["viscous"]
+    assert "large_deformation" not in said["large"]
+    assert "would change" not in said["viscous"] + said["large"] + said["auto"]
+    assert "finger3d compare" in said["large"]

@@ -67,7 +67,7 @@ def made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
         return found, report.cad_volume_mm3, 0.0
 
     monkeypatch.setenv("FINGER3D_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(tetwild, "_new_mesh", mesh)
+    monkeypatch.setattr(tetwild, "new_mesh", mesh)
     return names
 
 

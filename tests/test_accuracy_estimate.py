@@ -12,7 +12,6 @@ import pytest
 import pyvista
 
 from finger3d.accuracy.companions import companion
-from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.accuracy.estimate import estimate, main_numbers, reading_error
 from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.accuracy.richardson import ORDER, mesh_error
@@ -82,14 +81,6 @@ def test_error_bars_do_not_depend_on_how_long_the_press_takes(monkeypatch: pytes
     monkeypatch.setattr("time.perf_counter", lambda: float(next(clock)))
     slow = estimate(problem, frames)
     assert (slow.discretisation, slow.steps, slow.method) == (found.discretisation, found.steps, found.method)
-
-
-def test_an_error_bar_is_the_sum_of_both_errors() -> None:
-    bars = ErrorBars(discretisation={"normal_force_N": 0.3, "gauge_g": 0.1}, steps={"normal_force_N": 0.2})
-    assert bars.totals() == {"normal_force_N": 0.5, "gauge_g": 0.1}
-    assert bars.total("friction_sum_N") is None
-    assert ErrorBars.of_summary({"error_estimate": bars.as_dict()}) == bars
-    assert ErrorBars.of_summary({"error_estimate": None}).totals() == {}
 
 
 def test_press_prints_error_bars_and_keeps_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,139 +2,15 @@
 
 from __future__ import annotations
 
-import csv
 import json
-import os
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import pytest
 
 from finger3d.cli import main
-from tests.scenes import HALF_CYLINDER, changed, solid
+from tests.scenes import HALF_CYLINDER, changed, written
 
 SECTION = changed(HALF_CYLINDER, steps=5, size_mm=0.2)
-SOLID = solid(SECTION, 0.4)
-STEP_KEYS = set(
-    """depth_mm slide_x_mm slide_z_mm time_s normal_force_N tangential_force_x_N tangential_force_z_N friction_sum_N
-    outward_friction_x_N outward_friction_z_N contact_area_mm2 stick_area_mm2 contact_half_length_mm
-    stick_half_length_mm largest_penetration_mm force_x_N force_y_N force_z_N moment_x_Nmm moment_y_Nmm moment_z_Nmm
-    turn_x_deg turn_y_deg turn_z_deg external_work_mJ dissipation_mJ gauges iterations residual outcome""".split()
-)
-CONTACT_COLUMNS = (
-    "face x_mm y_mm z_mm area_mm2 normal_x normal_y normal_z pressure_MPa shear_x_MPa shear_y_MPa shear_z_MPa gap_mm "
-    "slip_x_mm slip_y_mm slip_z_mm status".split()
-)
-
-
-def written(tmp_path: Path, text: str = SECTION, name: str = "scene.toml") -> Path:
-    path = tmp_path / name
-    path.write_text(text, encoding="utf-8")
-    return path
-
-
-def table(path: Path) -> list[dict[str, str]]:
-    with path.open(encoding="utf-8", newline="") as stream:
-        return list(csv.DictReader(stream))
-
-
-@pytest.mark.parametrize("text", [SECTION, SOLID], ids=["section", "solid"])
-def test_press_writes_what_the_contract_names(tmp_path: Path, text: str) -> None:
-    out = tmp_path / "results with spaces, ü"
-    assert main(["press", str(written(tmp_path, text)), "--out", str(out)]) == 0
-    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
-    assert set(summary) >= {"scene", "effects", "outcome", "steps", "mesh", "cost", "versions"}
-    assert summary["outcome"] == "converged"
-    assert summary["effects"] == []
-    assert summary["scene"]["contact"]["rule"] == "projection"  # defaults are filled in
-    assert len(summary["steps"]) == 5
-    for step in summary["steps"]:
-        assert set(step) >= STEP_KEYS
-        assert ("contact_half_length_end_mm" in step) == (text is SOLID)
-        assert step["outcome"] == "converged"
-        assert step["residual"] <= 1e-8
-    assert summary["cost"]["factorizations"] == 1
-    assert set(summary["cost"]["seconds"]) >= {"cad", "mesh", "assembly", "condensation", "contact", "output", "total"}
-    assert set(summary["mesh"]) >= {"points", "cells", "dofs", "contact_points", "min_dihedral_deg", "volume_mm3",
-                                    "cad_volume_mm3", "hash", "from_cache"}  # fmt: skip
-    assert {"finger3d", "numpy", "scipy"} <= set(summary["versions"])
-    points = table(out / "contact.csv")
-    assert list(points[0]) == CONTACT_COLUMNS
-    force = sum(float(p["pressure_MPa"]) * float(p["area_mm2"]) for p in points)
-    assert force == pytest.approx(summary["steps"][-1]["normal_force_N"], rel=1e-12)
-    assert {p["status"] for p in points} <= {"open", "stick", "slip"}
-    history = table(out / "history.csv")
-    assert [float(h["normal_force_N"]) for h in history] == [s["normal_force_N"] for s in summary["steps"]]
-    assert float(history[-1]["gauge_g"]) == summary["steps"][-1]["gauges"]["g"]
-    assert all((out / name).stat().st_size > 10_000 for name in ("finger.png", "contact.png", "force.png"))
-    # the scene as run gives the same run
-    again = tmp_path / "again"
-    assert main(["press", str(out / "scene.toml"), "--out", str(again), "--no-figures"]) == 0
-    repeated = json.loads((again / "summary.json").read_text(encoding="utf-8"))
-    assert repeated["steps"][-1]["normal_force_N"] == pytest.approx(summary["steps"][-1]["normal_force_N"], rel=1e-12)
-
-
-def test_fields_open_in_pyvista_and_agree_with_the_contact_table(tmp_path: Path) -> None:
-    import numpy as np
-    import pyvista
-    from scipy.spatial import KDTree
-
-    out = tmp_path / "out"
-    assert main(["press", str(written(tmp_path, SOLID)), "--out", str(out), "--no-figures"]) == 0
-    grid = pyvista.read(out / "fields.vtu")
-    assert set(grid.point_data) >= {"displacement", "strain", "stress", "pressure", "shear_x", "shear_z", "status"}
-    assert grid["strain"].shape == grid["stress"].shape == (grid.n_points, 6)
-    points = table(out / "contact.csv")
-    pressure = np.array([float(p["pressure_MPa"]) for p in points])
-    where = [grid.find_closest_point([float(p[f"{axis}_mm"]) for axis in "xyz"]) for p in points]
-    assert np.allclose(grid["pressure"][where], pressure, rtol=1e-6)
-    # between them, at the middles of edges, no spots: as many again and more carry what their ends do
-    assert np.count_nonzero(grid["pressure"]) > 2 * np.count_nonzero(pressure)
-    assert grid["pressure"].max() <= 1.000001 * pressure.max()
-    held = grid.points[:, 1] == 0.0
-    assert not grid["displacement"][held].any()
-    # the whole finger is mirrored from a quarter: the component normal to the mirror plane is odd, the others are even
-    for axis in (0, 2):
-        sign = np.where(np.arange(3) == axis, -1.0, 1.0)
-        apart, image = KDTree(grid.points).query(grid.points * sign)
-        assert apart.max() < 1e-6
-        assert np.allclose(grid["displacement"][image], grid["displacement"] * sign, rtol=0.0, atol=1e-12)
-    assert np.allclose(grid.bounds[0:2], [-5.0, 5.0], atol=1e-6)
-    # pressed by 0.5 mm: no vertex above the plane; mid-edge nodes by no more than the sagitta h^2 / 8 R, twice
-    assert (grid.points + grid["displacement"])[:, 1].max() <= 4.5 + 2 * 0.4**2 / (8 * 5.0)
-
-
-@pytest.mark.slow
-def test_advice_comes_with_numbers_and_goes_when_it_is_followed(tmp_path: Path) -> None:
-    said = {}
-    for name, keys in {
-        "small": ["press.depth_mm=1.0"],
-        "large": ["press.depth_mm=1.0", "effects.large_deformation={}", "press.steps=60"],
-        "viscous": ["press.depth_mm=1.0", "press.duration_s=1.0", "effects.viscosity={prony=[[0.3, 0.5]]}"],
-        "auto": ["press.steps=auto", "press.depth_mm=0.05"],
-    }.items():
-        out = tmp_path / name
-        settings = [word for key in keys for word in ("--set", key)]
-        assert main(["press", str(written(tmp_path)), "--out", str(out), "--no-figures", *settings]) == 0
-        said[name] = " ".join(json.loads((out / "summary.json").read_text(encoding="utf-8"))["advice"])
-    assert "large deformation would change the normal force by +" in said["small"]
-    assert "more increments would change the friction sum by" in said["small"]
-    assert "[effects.large_deformation]" in said["viscous"]
-    assert "large_deformation" not in said["large"]
-    assert "would change" not in said["viscous"] + said["large"] + said["auto"]
-    assert "finger3d compare" in said["large"]
-
-
-def test_effects_and_warnings_are_told(tmp_path: Path) -> None:
-    text = SECTION + '[effects.kinetic_friction]\nratio = 0.5\nbranch = "paper"\n'
-    out = tmp_path / "out"
-    assert main(["press", str(written(tmp_path, text)), "--out", str(out), "--no-figures"]) == 0
-    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
-    assert summary["effects"] == ["kinetic_friction"]
-    assert any("starts every step all stuck" in w for w in summary["warnings"])
 
 
 def test_steps_auto_reports_its_estimate(tmp_path: Path) -> None:
@@ -173,71 +49,6 @@ def test_the_papers_rule_takes_a_fixed_number_of_increments(tmp_path: Path) -> N
     summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
     assert summary["step_estimate"] is None
     assert len(summary["steps"]) == 10
-
-
-def test_uniqueness_is_reported_and_warned_of(tmp_path: Path) -> None:
-    found = {}
-    for mu in ("0.25", "1000.0"):
-        out = tmp_path / mu
-        main(
-            ["press", str(written(tmp_path, SECTION)), "--out", str(out), "--no-figures", "--set", f"friction.mu={mu}"]
-        )
-        found[mu] = json.loads((out / "summary.json").read_text(encoding="utf-8"))
-    ratio = found["1000.0"]["uniqueness"]["largest_coupling"] / found["0.25"]["uniqueness"]["largest_coupling"]
-    assert ratio == pytest.approx(4000.0, rel=1e-9)
-    assert not found["0.25"]["warnings"]
-    assert any("several contact states" in w for w in found["1000.0"]["warnings"])
-
-
-@pytest.mark.parametrize(
-    ("key", "text"), [("press.depth_mm=3.0", "small strain is a poor model"), ("mesh.size_mm=0.9", "points touch")]
-)
-def test_a_scene_beyond_what_can_be_trusted_is_warned_of(tmp_path: Path, key: str, text: str) -> None:
-    out = tmp_path / "out"
-    assert main(["press", str(written(tmp_path)), "--out", str(out), "--no-figures", "--set", key]) == 0
-    assert any(text in w for w in json.loads((out / "summary.json").read_text(encoding="utf-8"))["warnings"])
-
-
-def test_a_deep_press_at_finite_strain_is_not_warned_of_small_strain(tmp_path: Path) -> None:
-    settings = {"small": [], "large": ["--set", "effects.large_deformation={}"]}
-    said = {}
-    for name, more in settings.items():
-        command = ["press", str(written(tmp_path, changed(SECTION, depth_mm=1.6))), "--out", str(tmp_path / name)]
-        assert main([*command, "--no-figures", "--no-error", *more]) == 0
-        said[name] = json.loads((tmp_path / name / "summary.json").read_text(encoding="utf-8"))["warnings"]
-    assert len(said["small"]) == 1
-    assert not said["large"]
-
-
-def test_interruption_keeps_every_finished_step(tmp_path: Path) -> None:
-    scene = written(tmp_path, changed(SECTION, steps=10000))
-    out = tmp_path / "out"
-    command = [sys.executable, "-m", "finger3d", "press", str(scene), "--out", str(out)]
-    # its lines go nowhere: a pipe that nobody reads is full after some 750 of them, and stops it
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
-        history = out / "history.csv"
-        deadline = time.monotonic() + 60
-        while not (history.exists() and len(table(history)) >= 3):
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
-        os.kill(process.pid, signal.SIGINT)
-        _, err = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert err.count("\n") == 1
-    assert "Traceback" not in err
-    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
-    assert summary["outcome"].startswith("incomplete")
-    assert len(summary["steps"]) == len(table(out / "history.csv")) >= 3
-    assert all(s["outcome"] == "converged" for s in summary["steps"])
-
-
-def test_a_new_run_leaves_no_number_of_an_old_one(tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    scene = written(tmp_path, SECTION)
-    assert main(["press", str(scene), "--out", str(out)]) == 0
-    assert main(["press", str(scene), "--out", str(out), "--no-figures", "--set", "press.steps=2"]) == 0
-    assert not (out / "finger.png").exists()
-    assert len(table(out / "history.csv")) == 2
 
 
 def test_contact_beyond_the_candidate_points_is_solved_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

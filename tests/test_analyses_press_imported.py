@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bodies import step_of
 
 from finger3d.geometry.imported import imported
 from finger3d.scene import load
+from tests.bodies import step_of
 
 
 @pytest.fixture(scope="module")

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import json
-import math
 import subprocess
 import sys
 from dataclasses import replace
@@ -33,6 +30,7 @@ from tests.bodies import ball
 
 ROUND_OFF = 1e-12  # the same arithmetic on the same numbers
 MUS = (0.0, 0.1, 0.7)
+FILE = MeshObject(0.0, 0.0, surface=ball(20.0, 12, 16), path="ball.stl")
 
 
 def model(**changes: Any) -> Model:
@@ -60,7 +58,6 @@ def same(reduced: ReducedModel, problem: Any, mu: float) -> None:
             assert got[key] == pytest.approx(told[key], rel=1e-11, abs=ROUND_OFF * scale)
 
 
-FILE = MeshObject(0.0, 0.0, surface=ball(20.0, 12, 16), path="ball.stl")
 VARIANTS: dict[str, Any] = {
     "section": lambda: model(),
     "tilted": lambda: model(object=Plane(tilt=0.05)),
@@ -143,101 +140,3 @@ def test_effects_without_a_fixed_compliance_are_refused(effect: Any) -> None:
     problem = build(effect.apply(model(legs=(Leg(0.5, steps=4, duration_s=1.0),))))
     with pytest.raises(Finger3dError, match="no reduced model"):
         ReducedModel.of(problem)
-
-
-def replaced(header: Any, path: tuple[Any, ...], value: Any) -> Any:
-    copy = json.loads(json.dumps(header))
-    at = copy
-    for key in path[:-1]:
-        at = at[key]
-    at[path[-1]] = value
-    return copy
-
-
-def test_a_header_or_arrays_that_do_not_fit_are_one_line(tmp_path: Path) -> None:
-    good = ReducedModel.of(build(model())).save(tmp_path / "good.npz")
-    with np.load(good) as stored:
-        arrays = dict(stored)
-    header = json.loads(arrays.pop("header").tobytes())
-    numbers: list[tuple[Any, ...]] = [
-        ("material", "E_MPa"), ("material", "nu"), ("legs", 0, "depth_mm"), ("legs", 0, "steps"),
-        ("body", "height_mm"), ("touch_mm",), ("object", "x_mm"), ("friction", "mu"), ("gauges", 0, "x_mm"),
-    ]  # fmt: skip
-    headers = [replaced(header, path, v) for path in numbers for v in (None, "a", [], {}, math.nan, math.inf)]
-    headers += [replaced(header, path, -1) for path in numbers[:6]]
-    headers += [replaced(header, (key,), v) for key in ("legs", "object", "domain", "axes") for v in (None, 5, "a")]
-    contents = [
-        (header, {**arrays, name: value})
-        for name, a in arrays.items()
-        if a.size
-        for value in (a[:-1], a[..., None], np.full(a.shape, "x"), np.full(a.shape, np.nan), np.array(1.0))
-        if not (name == "edges" and value.shape == a[:-1].shape)  # any number of edges fits
-    ]
-    path = tmp_path / "bad.npz"
-    for told, values in [*((h, arrays) for h in headers), *contents]:
-        text = np.frombuffer(json.dumps(told).encode(), dtype=np.uint8)
-        np.savez(path, **values, header=text)
-        with pytest.raises(Finger3dError, match="condense the scene again") as found:
-            ReducedModel.load(path)
-        assert str(found.value).startswith(f"{path}: ")
-        assert "\n" not in str(found.value)
-
-
-def test_damaged_files_are_one_line(tmp_path: Path) -> None:
-    good = ReducedModel.of(build(model())).save(tmp_path / "good.npz")
-    data = good.read_bytes()
-    with np.load(good) as stored:
-        arrays = dict(stored)
-
-    def with_header(**changes: Any) -> bytes:
-        header = {**json.loads(arrays["header"].tobytes()), **changes}
-        stream = io.BytesIO()
-        np.savez(stream, **{**arrays, "header": np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)})
-        return stream.getvalue()
-
-    missing = io.BytesIO()
-    np.savez(missing, **{k: v for k, v in arrays.items() if k != "compliance"})
-    cases = {
-        "cut short": data[: len(data) // 2],
-        "no reduced model": b"hello",
-        "version 7": with_header(version=7),
-        "; `finger3d calibrate` writes one": with_header(format="a cake"),
-        "parts of the reduced model are missing": missing.getvalue(),
-    }
-
-    def with_array(name: str, change: Any) -> bytes:
-        stream = io.BytesIO()
-        np.savez(stream, **{**arrays, name: change(arrays[name].copy())})
-        return stream.getvalue()
-
-    def put(index: int, value: float) -> Any:
-        def changed(array: Any) -> Any:
-            array.flat[index] = value
-            return array
-
-        return changed
-
-    single = io.BytesIO()
-    np.save(single, np.zeros(3))
-    damaged = [
-        with_array("parent", put(0, 10**6)), with_array("parent", put(0, -1)), with_array("share", lambda a: a[:-1]),
-        with_array("face_mean_at", put(0, 10**6)), with_array("compliance", put(0, np.nan)),
-        with_array("reading_rows", put(0, np.inf)), with_array("sign", lambda a: a[:, :1]),
-        with_array("face_area", lambda a: a.astype(object).astype(str)),
-    ]  # fmt: skip
-    for content in damaged:
-        (tmp_path / "bad.npz").write_bytes(content)
-        with pytest.raises(Finger3dError, match="missing or damaged"):
-            ReducedModel.load(tmp_path / "bad.npz")
-    cases["reduced model, or cut"] = single.getvalue()
-    turned = bytearray(data)
-    turned[len(data) // 2] ^= 0xFF
-    cases["no reduced model, or cut short"] = bytes(turned)
-    for told, content in cases.items():
-        path = tmp_path / "bad.npz"
-        path.write_bytes(content)
-        with pytest.raises(Finger3dError, match=told) as found:
-            ReducedModel.load(path)
-        assert "\n" not in str(found.value)
-    with pytest.raises(Finger3dError, match="no such file"):
-        ReducedModel.load(tmp_path / "none.npz")

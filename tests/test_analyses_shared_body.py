@@ -173,10 +173,8 @@ def test_the_shared_path_goes_everywhere_and_nowhere_else() -> None:
     ],
     ids=["paper", "embedded gauge", "elastic object", "viscosity", "shear relaxes", "large deformation"],
 )
-@pytest.mark.parametrize("at_once", [8_000_000, 1], ids=["together", "in chunks"])
-def test_several_presses_are_proved_as_each_on_its_own(effect, at_once, monkeypatch) -> None:
+def test_several_presses_are_proved_as_each_on_its_own(effect) -> None:
     """The gaps beyond the candidates are those of a back-substitution for each press, over the whole face."""
-    monkeypatch.setattr("finger3d.mechanics.problem._AT_ONCE", at_once)
     model = scene(*effect).model()
     problem = build(model)
     assert 0 in beyond_candidates(problem).face

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import os
 import signal
@@ -18,6 +17,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from finger3d.analyses.sweep.points import combinations
+from tests.sweep_cases import table
 
 SETTINGS = ("model.domain=plane-strain", "mesh.size_mm=4", "mesh.base_size_mm=16", "press.steps=10")
 COARSE = [word for setting in SETTINGS for word in ("--set", setting)]
@@ -25,19 +25,9 @@ SLOW = ("--set", "press.steps=200")
 """Makes a point take some tenths of a second, so that a sweep of few points is still running when a signal comes."""
 
 
-@pytest.fixture
-def scene(root: Path) -> Path:
-    return root / "geometries" / "fig9.toml"
-
-
 def lines(out: Path) -> list[dict]:
     path = out / "points.jsonl"
     return [json.loads(line) for line in path.read_text().splitlines() if line.endswith("}")] if path.exists() else []
-
-
-def table(out: Path) -> list[dict]:
-    with (out / "results.csv").open(newline="") as file:
-        return list(csv.DictReader(file))
 
 
 def environment(root: Path, cache: str) -> dict[str, str]:
@@ -70,11 +60,11 @@ def free_port() -> int:
         return one.getsockname()[1]
 
 
-def sweeping(scene: Path, out: Path, mus: int, nus: int, *more: str) -> list[str]:
+def sweeping(paper_scene: Path, out: Path, mus: int, nus: int, *more: str) -> list[str]:
     """Return the command of a sweep of mus times nus points."""
     mu = ",".join(f"{0.02 + 1.0 * i / mus:.4f}" for i in range(mus))
     nu = ",".join(f"{0.3 + 0.19 * i / nus:.4f}" for i in range(nus))
-    command = [sys.executable, "-m", "finger3d", "sweep", str(scene), *COARSE, "--out", str(out)]
+    command = [sys.executable, "-m", "finger3d", "sweep", str(paper_scene), *COARSE, "--out", str(out)]
     return [*command, "--vary", f"friction.mu={mu}", "--vary", f"material.nu={nu}", *more]
 
 
@@ -118,18 +108,18 @@ def killed_and_resumed(command: list[str], out: Path, total: int, env: dict[str,
     assert lines(out)[: len(before)] == before
 
 
-def test_a_sweep_survives_kill_9_of_a_worker_and_of_the_parent(root, scene, tmp_path) -> None:
+def test_a_sweep_survives_kill_9_of_a_worker_and_of_the_parent(root, paper_scene, tmp_path) -> None:
     out = tmp_path / "out"
     env = environment(root, str(tmp_path))
-    killed_and_resumed(sweeping(scene, out, 30, 4, "--workers", "2"), out, 120, env, tmp_path)
+    killed_and_resumed(sweeping(paper_scene, out, 30, 4, "--workers", "2"), out, 120, env, tmp_path)
     assert_nothing_repeated_or_lost(out, 120)
 
 
 @pytest.mark.slow
-def test_a_thousand_points_survive_kill_9(root, scene, tmp_path) -> None:
+def test_a_thousand_points_survive_kill_9(root, paper_scene, tmp_path) -> None:
     out = tmp_path / "out"
     env = environment(root, str(tmp_path))
-    killed_and_resumed(sweeping(scene, out, 50, 20, "--workers", "2"), out, 1000, env, tmp_path)
+    killed_and_resumed(sweeping(paper_scene, out, 50, 20, "--workers", "2"), out, 1000, env, tmp_path)
     assert_nothing_repeated_or_lost(out, 1000)
 
 
@@ -148,23 +138,23 @@ def dask(workers: int, env: dict[str, str], where: Path) -> Iterator[tuple[str, 
         yield address, process
 
 
-def test_a_scheduler_and_two_workers_of_their_own(root, scene, tmp_path) -> None:
+def test_a_scheduler_and_two_workers_of_their_own(root, paper_scene, tmp_path) -> None:
     env, out = environment(root, str(tmp_path)), tmp_path / "out"
     with dask(2, env, tmp_path) as (address, _):
-        command = sweeping(scene, out, 3, 4, "--scheduler", address)
+        command = sweeping(paper_scene, out, 3, 4, "--scheduler", address)
         # the scheduler may still be on its way: the time limit is there for that, too
         done = subprocess.run(command, env=env, cwd=tmp_path, capture_output=True, text=True, timeout=120)
         assert done.returncode == 0, done.stderr
         assert done.stderr == ""
     assert_nothing_repeated_or_lost(out, 12)
-    assert {row["body"] for row in lines(out)} == {p.body for p in load_points(scene)}
+    assert {row["body"] for row in lines(out)} == {p.body for p in load_points(paper_scene)}
 
 
 @pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGTERM])
-def test_a_scheduler_that_dies_ends_a_sweep_with_3_and_one_line(sent, root, scene, tmp_path) -> None:
+def test_a_scheduler_that_dies_ends_a_sweep_with_3_and_one_line(sent, root, paper_scene, tmp_path) -> None:
     env, out = environment(root, str(tmp_path)), tmp_path / "out"
     with dask(1, env, tmp_path) as (address, scheduler):
-        command = sweeping(scene, out, 60, 2, "--scheduler", address, *SLOW)
+        command = sweeping(paper_scene, out, 60, 2, "--scheduler", address, *SLOW)
         with started(command, env, tmp_path, tmp_path / "log") as parent:
             until(lambda: len(lines(out)) >= 5, "five points")
             scheduler.send_signal(sent)
@@ -177,9 +167,9 @@ def test_a_scheduler_that_dies_ends_a_sweep_with_3_and_one_line(sent, root, scen
     assert len(table(out)) == count
 
 
-def load_points(scene: Path) -> list:
+def load_points(paper_scene: Path) -> list:
     nu = ",".join(f"{0.3 + 0.19 * i / 4:.4f}" for i in range(4))
-    return list(combinations(scene, SETTINGS, ["friction.mu=0.02", f"material.nu={nu}"]).points)
+    return list(combinations(paper_scene, SETTINGS, ["friction.mu=0.02", f"material.nu={nu}"]).points)
 
 
 AT_ONCE = "import finger3d.mechanics.parallel as s; s._ROWS_FOR_THREADS = 1; s.cores = lambda: 2; "
@@ -187,9 +177,9 @@ AT_ONCE += "from finger3d.cli import main; import sys; sys.exit(main())"
 
 
 @pytest.mark.parametrize("bodies", [1, 2, 0], ids=["here", "workers", "threads"])
-def test_ctrl_c_ends_with_130_and_one_line(bodies, root, scene, tmp_path) -> None:
+def test_ctrl_c_ends_with_130_and_one_line(bodies, root, paper_scene, tmp_path) -> None:
     out, threads, bodies = tmp_path / "out", bodies == 0, bodies or 1
-    command = sweeping(scene, out, 120 // bodies, bodies, "--workers", "1", *SLOW)
+    command = sweeping(paper_scene, out, 120 // bodies, bodies, "--workers", "1", *SLOW)
     if threads:
         command[1:3] = ["-c", AT_ONCE]
     with started(command, environment(root, str(tmp_path)), tmp_path, tmp_path / "log") as parent:

@@ -7,34 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from finger3d import cli
 from finger3d.analyses import validate as study
-from finger3d.analyses.validate import Row, Study, chosen, kept_rows, run_studies, studies
+from finger3d.analyses.validate import chosen, kept_rows, run_studies, studies
 from finger3d.errors import Finger3dError, MissingError
+from tests.study_cases import BAD, GOOD, STOPS
 
-GOOD = '''"""Is one and a half what it was?
-
-Source: none.
-"""
-from finger3d.analyses.study_rows import Result, Row
-
-from ._shared import VALUE
-
-def run(quick):
-    rows = (Row("value | mm", "a page", 1.5, VALUE + (0.001 if quick else 0.0), 0.01, "so", "sensitivity"),)
-    return Result(rows, {"x": [1, 2], "y": [0.1, 1 / 3]}, lambda figure: figure.subplots().plot([1, 2]))
-'''
-BAD = '''"""Does it fail?"""
-from finger3d.analyses.study_rows import Result, Row
-
-def run(quick):
-    return Result((Row("bound", "a page", 1e-8, 2e-8, 0.0, "so", measure="at most"),))
-'''
-STOPS = '''"""Is it interrupted?"""
-
-def run(quick):
-    raise KeyboardInterrupt
-'''
+PACKAGE = Path(study.__file__).parents[1]
 
 
 @pytest.fixture
@@ -48,30 +26,6 @@ def folder(tmp_path: Path) -> Path:
 
 def ran(home: Path, name: str) -> float:
     return (home / "results" / f"{name}.json").stat().st_mtime_ns
-
-
-@pytest.mark.parametrize(
-    ("measure", "wanted", "got", "error"),
-    [
-        ("relative", -2.0, -2.1, 0.05), ("absolute", 0.0, -0.2, 0.2), ("at most", 1.0, 0.5, 0.0),
-        ("at most", 1.0, 1.2, 0.2), ("at least", 1.0, 1.5, 0.0), ("at least", 1.0, 0.7, 0.3),
-    ],
-)  # fmt: skip
-def test_the_error_is_what_its_measure_says(measure: str, wanted: float, got: float, error: float) -> None:
-    row = Row("w", "r", wanted, got, 0.1, "so", measure=measure)
-    assert row.error == pytest.approx(error, abs=1e-12)
-    assert row.passed == (error <= 0.1)
-
-
-@pytest.mark.parametrize("measure", ["relative", "absolute", "at most", "at least"])
-def test_nan_never_passes(measure: str) -> None:
-    assert not Row("w", "r", 1.0, float("nan"), 1e9, "so", measure=measure).passed
-
-
-def test_a_statement_that_does_not_hold_fails_nothing() -> None:
-    rows = [Row("w", "r", 79.0, got, 0.02, "about", "statement") for got in (79.5, 60.0, float("nan"))]
-    assert [row.passed for row in rows] == [True, True, False]
-    assert [row.verdict for row in rows] == ["holds", "does not hold", "FAIL"]
 
 
 def test_results_are_kept_to_the_last_digit_and_indexed(folder: Path) -> None:
@@ -128,9 +82,6 @@ def test_results_are_out_of_date_under_another_version_of_a_library(
     assert good.stamp() != before
 
 
-PACKAGE = Path(study.__file__).parents[1]
-
-
 @pytest.mark.parametrize(
     "name",
     [
@@ -178,7 +129,7 @@ def test_a_new_module_counts_unless_it_is_left_out_by_name(tmp_path: Path) -> No
 
 def test_every_exclusion_is_there() -> None:
     left_out = set(PACKAGE.rglob("*")) - set(study.sources(PACKAGE))
-    for pattern in study._NO_NUMBERS:
+    for pattern in study.NO_NUMBERS:
         assert any(fnmatchcase(path.relative_to(PACKAGE).as_posix(), pattern) for path in left_out), pattern
 
 
@@ -209,36 +160,3 @@ def test_an_unknown_name_is_answered_with_the_nearest(folder: Path) -> None:
 def test_a_folder_without_studies_is_missing(tmp_path: Path) -> None:
     with pytest.raises(MissingError, match="from a checkout"):
         studies(tmp_path)
-
-
-@pytest.fixture
-def own_studies(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setattr(study, "studies", lambda: {n: Study(n, folder / f"{n}.py") for n in ("bad", "good", "stops")})
-    (folder / "stops.py").write_text(STOPS)
-    return folder
-
-
-def test_the_command_tells_verdicts_by_its_exit_code(
-    own_studies: Path, tmp_path: Path, capsys: pytest.CaptureFixture
-) -> None:
-    assert cli.main(["validate", "good"]) == 0
-    assert "pass" in capsys.readouterr().out
-    assert cli.main(["validate", "good", "bad", "--out", str(tmp_path / "out")]) == 3
-    assert capsys.readouterr().err == "finger3d: validate: outside the tolerance: bad (see the rows marked FAIL)\n"
-    assert (tmp_path / "out" / "results" / "bad.csv").is_file()
-    assert cli.main(["validate", "goood"]) == 2
-    assert "did you mean 'good'" in capsys.readouterr().err
-
-
-def test_quick_results_never_replace_full_ones(own_studies: Path, capsys: pytest.CaptureFixture) -> None:
-    assert cli.main(["validate", "good"]) == 0
-    before = (own_studies / "results" / "good.csv").read_bytes()
-    assert cli.main(["validate", "good", "--quick"]) == 0
-    assert "1.501" in capsys.readouterr().out
-    assert cli.main(["validate", "good", "--quick", "--out", str(own_studies)]) == 2
-    assert (own_studies / "results" / "good.csv").read_bytes() == before
-
-
-def test_an_interrupted_command_says_what_is_kept(own_studies: Path, capsys: pytest.CaptureFixture) -> None:
-    assert cli.main(["validate", "good", "stops"]) == 130
-    assert capsys.readouterr().err == f"finger3d: interrupted; 1 of 2 studies are kept in {own_studies}\n"

@@ -79,7 +79,7 @@ def test_condensed_foils_are_foils_in_the_stiffness(domain: str, nu: float) -> N
         sp.csr_matrix(problem.part.stiffness.upper + sp.triu(added)), problem.part.stiffness.pressure_vertices,
         problem.part.stiffness.pressure_scale,
     )  # fmt: skip
-    rows = problem.part.condensed._rows[: len(problem.system.active_dofs) + 2, : problem.mesh.points.size]
+    rows = problem.part.condensed.rows[: len(problem.system.active_dofs) + 2, : problem.mesh.points.size]
     direct = condense(stiffer, problem.part.fixed_dofs, rows).compliance
     r, mesh_alone = len(problem.system.active_dofs), problem.part.condensed.compliance.copy()
     mesh_alone[r:, r:] -= problem.inclusions.subgrid_compliance
@@ -172,17 +172,15 @@ def test_a_foil_off_the_middle_breaks_the_balance_of_friction() -> None:
 
 
 @pytest.mark.parametrize("domain", ["plane-strain", "solid"])
-def test_neither_more_bars_nor_a_finer_mesh_change_much(domain: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    import finger3d.effects.embedded_gauge as file
-
-    def ratio(size: float) -> float:
-        gauges = run(build(FOIL.apply(block(domain=domain, mesh=MeshOptions(size, 1.5 * size, "swept")))))[-1].gauges
+def test_neither_more_bars_nor_a_finer_mesh_change_much(domain: str) -> None:
+    def ratio(size: float, **more: object) -> float:
+        model = FOIL.apply(block(domain=domain, mesh=MeshOptions(size, 1.5 * size, "swept")))
+        gauges = run(build(replace(model, inclusions=replace(model.inclusions, **more))))[-1].gauges
         return gauges["g"] / gauges["g_free"]
 
     few = ratio(0.8)
     assert ratio(0.4) == pytest.approx(few, rel=0.02)
-    monkeypatch.setattr(file, "_PATCHES", {2: (32, 1), 3: (24, 16)})
-    assert ratio(0.8) == pytest.approx(few, rel=0.02)
+    assert ratio(0.8, patches=((32, 1), (24, 16))) == pytest.approx(few, rel=0.02)
 
 
 def foil(along: np.ndarray, at: float = 0.0, turn: float = 0.0, width: float = 0.01) -> FoilPatches:
@@ -285,7 +283,7 @@ GOOD = {"name": "g", "x_mm": 0.0, "y_mm": 3.0, "length_mm": 2.0}
         (
             {**FOIL_TABLE, "E_MPa": 0.0},
             (GOOD,),
-            r"effects\.embedded_gauge\.E_MPa = 0\.0: must be a number from 1e-9 to 1e9",
+            r"effects\.embedded_gauge\.E_MPa = 0\.0: must be",
         ),
         ({"E_MPa": 1.0, "width_mm": 1.0}, (GOOD,), r"effects\.embedded_gauge\.thickness_mm is missing"),
         (FOIL_TABLE, (GOOD, {**GOOD, "name": "g_free"}), r"gauge\.name = \"g_free\": effects\.embedded_gauge gives"),

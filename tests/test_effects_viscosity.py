@@ -12,13 +12,7 @@ import pytest
 from finger3d.cli import main
 from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.effects.viscosity import (
-    ConstantBulkModulus,
-    ConstantPoissonRatio,
     Effect,
-    InternalVariables,
-    RelaxationWorkspace,
-    Step,
-    Viscoelastic,
 )
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.fem.material import Isotropic
@@ -26,25 +20,12 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics import formulation
 from finger3d.mechanics.build import build
 from finger3d.mechanics.history import StepResult, measure
-from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
-from finger3d.objects import Cylinder, Plane, Sphere
+from finger3d.objects import Cylinder, Plane
 from finger3d.scene import parse
-
-TWO = ((0.5, 1.0), (0.2, 0.1))
-RAMP = (Leg(0.3, steps=6, duration_s=1.0),)
-RAMP_AND_HOLD = (*RAMP, Leg(0.3, steps=5, duration_s=3.0))
-UP_AND_DOWN = (*RAMP_AND_HOLD, Leg(0.0, steps=4, duration_s=0.5), Leg(0.0, steps=2, duration_s=2.0))
-
-
-def block(**changes: object) -> Model:
-    body = designs()["block"](half_length_mm=4.0, height_mm=3.0, width_mm=4.0)
-    model = Model(
-        body, Isotropic(1.0, 0.3), MeshOptions(0.8, 1.2, "swept"), UP_AND_DOWN, object=Sphere(radius_mm=4.0),
-        friction=Coulomb(0.25), gauges=(Gauge("g", 0.0, 1.5, 0.0, 0.0, 2.0),),
-    )  # fmt: skip
-    return replace(model, **changes)
+from tests.viscous_cases import RAMP, RAMP_AND_HOLD, TWO, UP_AND_DOWN, block, mean_relaxation, run, viscous
 
 
 def dome(**changes: object) -> Model:
@@ -53,29 +34,8 @@ def dome(**changes: object) -> Model:
     return block(design=body, mesh=MeshOptions(0.6, 1.5, "swept"), object=Plane(), gauges=(), **changes)
 
 
-def viscous(problem: Problem, prony: tuple = TWO, bulk: bool = True, **changes: object) -> Problem:
-    return replace(problem, model=Effect(prony, bulk).apply(replace(problem.model, **changes)))
-
-
-def run(problem: Problem) -> list[StepResult]:
-    frames = list(march(problem))
-    assert all(f.outcome.ok and f.residual <= 1e-8 for f in frames)
-    return frames
-
-
 def forces(problem: Problem, frames: list[StepResult]) -> np.ndarray:
     return np.array([measure(problem.points, f)["normal_force_N"] for f in frames])
-
-
-def relaxation(prony: tuple, t: np.ndarray) -> np.ndarray:
-    return 1.0 - sum(g * (1.0 - np.exp(-t / tau)) for g, tau in prony)
-
-
-def mean_relaxation(prony: tuple, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Mean of r from `low` to `high`."""
-    total = (1.0 - sum(g for g, _ in prony)) * (high - low)
-    total += sum(g * tau * (np.exp(-low / tau) - np.exp(-high / tau)) for g, tau in prony)
-    return total / (high - low)
 
 
 @pytest.mark.parametrize("mu", [0.0, 1e6], ids=["frictionless", "full stick"])
@@ -134,34 +94,6 @@ def test_quick_presses_are_instantaneous_and_slow_ones_relaxed(nu: float, bulk: 
         assert got.gauges["g"] == pytest.approx(elastic.gauges["g"], rel=close)
 
 
-def test_in_an_incompressible_body_both_kinds_are_one() -> None:
-    # two ways to the same numbers: row forces over the compliance, and displacements over new factors
-    problem = build(block(material=Isotropic(1.0, 0.5)))
-    a, b = (run(viscous(problem, TWO, bulk)) for bulk in (True, False))
-    largest = max(np.abs(f.part.force).max() for f in a)
-    for f, g in zip(a, b, strict=True):
-        assert np.abs(f.part.force - g.part.force).max() <= 1e-6 * largest
-        assert f.gauges["g"] == pytest.approx(g.gauges["g"], rel=1e-6)
-    stresses = [p.model.formulation.fields(p, f[9].part)[2] for p, f in
-                ((viscous(problem), a), (viscous(problem, TWO, False), b))]  # fmt: skip
-    assert np.abs(stresses[0] - stresses[1]).max() <= 1e-5 * np.abs(stresses[0]).max()
-
-
-def test_uniform_compression_relaxes_as_the_series_says() -> None:
-    # nu = 0 under a flat plate: a bar, stress = E int r(t - s) d'(s) ds / h
-    problem = build(block(material=Isotropic(2.0, 0.0), object=Plane(), friction=Coulomb(0.0), legs=RAMP_AND_HOLD))
-    held = viscous(problem)
-    for frame in run(held):
-        t = frame.target.time_s
-        mean = mean_relaxation(TWO, np.array(max(t - 1.0, 0.0)), np.array(t)) * min(t, 1.0)
-        stress = 2.0 * 0.3 / 3.0 * float(mean)
-        pressure = frame.state.force[:, 0] / problem.points.area
-        assert pressure == pytest.approx(stress, rel=1e-9)
-        _, strain, sigma = held.model.formulation.fields(held, frame.part)
-        assert sigma[:, 1, 1] == pytest.approx(-stress, rel=1e-9)
-        assert strain[:, 1, 1] == pytest.approx(-min(t, 1.0) * 0.1, rel=1e-9)
-
-
 @pytest.mark.parametrize(("domain", "nu", "bulk"), [
     ("plane-strain", 0.3, False), ("plane-strain", 0.49, False), ("plane-strain", 0.3, True),
     ("plane-stress", 0.3, True), ("solid", 0.3, False), ("solid", 0.49, False),
@@ -193,30 +125,6 @@ def _nodal_volume(problem: Problem) -> np.ndarray:
     out = np.zeros(len(mesh.points))
     np.add.at(out, mesh.cells, (det * w) @ mesh.element.shape(bary))
     return out
-
-
-@pytest.mark.parametrize("domain", ["plane-strain", "solid"])
-@pytest.mark.parametrize("nu", [0.3, 0.49])
-@pytest.mark.parametrize("kind", [ConstantPoissonRatio, ConstantBulkModulus])
-def test_the_compliance_of_a_step_is_the_difference_quotient_of_its_response(
-    kind: type, nu: float, domain: str
-) -> None:
-    problem = build(block(domain=domain, material=Isotropic(1.0, nu), legs=RAMP))
-    body = kind(problem)
-    rng = np.random.default_rng(0)
-    rows = len(problem.part.condensed.compliance)
-    memory = InternalVariables(np.zeros(body.size), np.zeros((2, body.size)))
-    workspace = RelaxationWorkspace()
-    for seconds in (0.3, 0.7):  # so that there is a past
-        step = Step(TWO, seconds)
-        response = body.respond(step, memory, workspace)
-        force = rng.normal(size=rows)
-        now = response.shape(force)
-        assert body.read(now) == pytest.approx(response.moved + response.compliance @ force, rel=1e-9, abs=1e-12)
-        change = rng.normal(size=rows)
-        moved = body.read(response.shape(force + change)) - body.read(now)
-        assert moved == pytest.approx(response.compliance @ change, rel=1e-7, abs=1e-9)
-        memory = step.after(memory, now)
 
 
 @pytest.mark.parametrize("bulk", [True, False])
@@ -375,11 +283,6 @@ def test_what_is_elastic_beside_the_body_stays_elastic() -> None:
     for frame in frames:
         wanted = np.interp(frame.target.time_s, t, stress)
         assert frame.part.force[:, 0] / problem.surface.area == pytest.approx(wanted, rel=2e-3)
-
-
-def test_settings_are_kept_as_the_model_compares_them() -> None:
-    assert Effect(((0.3, 0.5),)).apply(block()) == Effect(((0.3, 0.5),)).apply(block())
-    assert Viscoelastic(((0.3, 0.5),), True) != Viscoelastic(((0.3, 0.5),), False)
 
 
 def test_an_elastic_object_does_not_relax_with_the_finger() -> None:

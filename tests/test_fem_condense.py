@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +13,7 @@ from finger3d.fem.condense import condense
 from finger3d.fem.material import Elasticity
 from finger3d.fem.pardiso import available
 from finger3d.fem.simplex import quadratic
-from finger3d.fem.traces import displacement_row, local_rows, strain_row, surface
+from finger3d.fem.traces import local_rows, strain_row, surface
 from finger3d.objects import vertical_frame
 from tests.meshes import grid
 
@@ -67,40 +66,3 @@ def test_elimination_gives_the_rows_before_their_forces_are_known(solver: str, c
     want = found.solve(load + padded.T @ force)
     assert eliminated.unknowns(force).shape == load.shape
     assert np.abs(eliminated.unknowns(force) - want).max() < 1e-11 * np.abs(want).max()
-
-
-@pytest.mark.parametrize("solver", ["superlu", *(["pardiso"] if available() else [])])
-def test_a_body_never_solves_with_the_factor_of_a_later_one(solver: str) -> None:
-    """Twice the stiffness halves the displacements; the overwritten body may refuse, never answer for the other."""
-    mesh, matrix, fixed, rows = setup(0.3)
-    load = np.random.default_rng(0).normal(size=matrix.upper.shape[0])
-    first = condense(matrix, fixed, rows, solver)
-    before = first.solve(load)
-    twice = replace(matrix, upper=2.0 * matrix.upper)
-    second = condense(twice, fixed, rows, solver, replaced=first)
-    assert np.abs(second.solve(load) - 0.5 * before).max() < 1e-12 * np.abs(before).max()
-    assert np.array_equal(first.compliance, 2.0 * second.compliance)
-    with pytest.raises(RuntimeError) if solver == "pardiso" else nullcontext():
-        assert np.array_equal(first.solve(load), before)
-    third = condense(matrix, fixed, rows, solver, replaced=first)  # its factor is the second's by now
-    assert np.abs(third.solve(load) - before).max() < 1e-12 * np.abs(before).max()
-    assert np.abs(second.solve(load) - 0.5 * before).max() < 1e-12 * np.abs(before).max()
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-def test_traces_and_strains_read_a_linear_field_exactly(dim: int) -> None:
-    mesh = quadratic(grid((3,) * dim, 0.2))
-    slope = np.random.default_rng(1).normal(size=(dim, dim))
-    u = mesh.points @ slope.T
-    top = surface(mesh, "y+", thickness=2.0)
-    assert top.area.sum() == pytest.approx(2.0, rel=1e-13)
-    centre = top.average @ top.samples  # the hat's centre of gravity, where a weighted mean of a linear field is read
-    assert np.abs(top.trace @ u - centre @ slope.T).max() < 1e-13
-    direction = np.eye(dim)[0] * 0.6 + np.eye(dim)[1] * 0.8
-    point = np.full(dim, 1 / 3)  # on a shared facet
-    assert (strain_row(mesh, point, direction) @ u.ravel())[0] == pytest.approx(
-        direction @ slope @ direction, abs=1e-12
-    )
-    assert (displacement_row(mesh, point, direction) @ u.ravel())[0] == pytest.approx(
-        direction @ slope @ point, abs=1e-12
-    )

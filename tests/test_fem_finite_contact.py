@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from meshes import grid
 
 from finger3d.fem.finite_contact import DeformedContact, deformed_contact
 from finger3d.fem.simplex import Mesh, quadratic
 from finger3d.fem.traces import BoundarySurface, surface
+from tests.meshes import grid
 
 
 def made(d: int) -> tuple[Mesh, BoundarySurface, np.ndarray]:

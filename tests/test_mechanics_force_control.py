@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from models import block, fig9
 
 from finger3d.cli import main
 from finger3d.effects.large_deformation import Effect as LargeDeformation
@@ -18,6 +17,7 @@ from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.solve import march
 from finger3d.scene import load
+from tests.models import block, fig9
 
 
 def ends(model: Model) -> list[dict[str, float]]:

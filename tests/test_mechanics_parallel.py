@@ -18,17 +18,12 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.parallel import march_together
+from finger3d.mechanics.parallel import map_parallel, march_together
 from finger3d.mechanics.solve import march
 from tests.models import block
 
 
-def test_presses_at_once_are_the_presses_in_turn(monkeypatch: pytest.MonkeyPatch) -> None:
-    from finger3d.mechanics import parallel
-    from finger3d.mechanics.parallel import map_parallel
-
-    monkeypatch.setattr(parallel, "_ROWS_FOR_THREADS", 1)
-    monkeypatch.setattr(parallel, "cores", lambda: 2)
+def test_presses_at_once_are_the_presses_in_turn() -> None:
     design = designs()["half_cylinder"](radius_mm=5.0, width_mm=2.0)
     legs = (Leg(0.5, steps=4), Leg(0.5, slide_x_mm=0.1, steps=3))
     problem = build(Model(design, Isotropic(1.0, 0.3), MeshOptions(0.3, 1.5), legs, domain="plane-stress"))
@@ -38,7 +33,7 @@ def test_presses_at_once_are_the_presses_in_turn(monkeypatch: pytest.MonkeyPatch
         own = replace(problem, model=replace(problem.model, friction=Coulomb(mu)))
         return [f.part.force for f in march(own, before[-1] if before else ())]
 
-    at_once = list(map_parallel(problem, press, mus))
+    at_once = list(map_parallel(problem, press, mus, 2, threads_from=1))
     assert all(
         np.array_equal(a, b)
         for mu, found in zip(mus, at_once, strict=True)
@@ -46,13 +41,8 @@ def test_presses_at_once_are_the_presses_in_turn(monkeypatch: pytest.MonkeyPatch
     )
 
 
-def test_presses_nobody_waits_for_end_with_their_increment(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_presses_nobody_waits_for_end_with_their_increment() -> None:
     """As after Ctrl-C: a long press at once with a short one, after which no more is asked."""
-    from finger3d.mechanics import parallel
-    from finger3d.mechanics.parallel import map_parallel
-
-    monkeypatch.setattr(parallel, "_ROWS_FOR_THREADS", 1)
-    monkeypatch.setattr(parallel, "cores", lambda: 2)
     problem = build(block())
     increments = {1: 0, 2000: 0}
 
@@ -62,7 +52,7 @@ def test_presses_nobody_waits_for_end_with_their_increment(monkeypatch: pytest.M
             increments[steps] += 1
         return steps
 
-    told = map_parallel(problem, press, list(increments))
+    told = map_parallel(problem, press, list(increments), 2, threads_from=1)
     assert next(told) == 1
     told.close()
     assert increments[1] == 1

@@ -10,8 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bodies import ball, box, write_stl
-from scenes import FIG9 as FINGER
 
 from finger3d.cli import main
 from finger3d.contact.friction import OPEN, Coulomb
@@ -33,6 +31,8 @@ from finger3d.mechanics.resolution import (
 from finger3d.mechanics.solve import march
 from finger3d.mechanics.symmetry import symmetry
 from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
+from tests.bodies import ball, box, write_stl
+from tests.scenes import FIG9 as FINGER
 
 FIG9 = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
 SCENE = (

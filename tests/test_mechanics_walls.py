@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bodies import channel, write_stl
 
 from finger3d.cli import main
 from finger3d.contact.friction import OPEN, Coulomb
@@ -20,6 +19,7 @@ from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.solve import march
 from finger3d.objects import Cylinder, MeshObject, Plane, Sphere
+from tests.bodies import channel, write_stl
 from tests.models import block, fig9
 
 WALLS, ENDS = FREE_FACES.index("walls"), FREE_FACES.index("ends")

@@ -7,11 +7,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from scenes import FIG9
 
-from finger3d import cli
-from finger3d.errors import OUT_OF_MEMORY, out_of_memory
-from finger3d.fem import pardiso
+from finger3d.errors import OUT_OF_MEMORY
+from tests.scenes import FIG9
 
 SCENE = (
     FIG9
@@ -49,41 +47,3 @@ def test_one_line_and_exit_3(limit: int, tmp_path: Path) -> None:
     )
     assert run.returncode == 3, run.stderr
     assert run.stderr == f"finger3d: {OUT_OF_MEMORY}\n"
-
-
-@pytest.mark.parametrize(
-    ("error", "memory"),
-    [
-        (MemoryError("Unable to allocate 6 GiB"), True), (OSError(12, "Cannot allocate memory"), True),
-        (RuntimeError("can't start new thread"), True), (ImportError("x.so: failed to map segment"), True),
-        (OSError(2, "No such file"), False), (RuntimeError("other"), False),
-        (ValueError("cannot allocate memory"), False),
-    ],
-)  # fmt: skip
-def test_what_says_that_memory_ran_out(error: BaseException, memory: bool, monkeypatch, capsys) -> None:
-    assert out_of_memory(error) is memory
-
-    def fails(*args: object, **kwargs: object) -> int:
-        raise error
-
-    monkeypatch.setattr(cli, "app", fails)
-    if memory:
-        assert cli.main(["info"]) == 3
-        assert capsys.readouterr().err == f"finger3d: {OUT_OF_MEMORY}\n"
-    else:
-        with pytest.raises(type(error)):
-            cli.main(["info"])
-
-
-@pytest.mark.skipif(not pardiso.available(), reason="no MKL")
-def test_a_factor_without_memory_is_a_lack_of_memory(monkeypatch: pytest.MonkeyPatch) -> None:
-    import numpy as np
-    import scipy.sparse as sp
-
-    def refuses(*arguments: object) -> None:
-        phase = arguments[4]._obj.value
-        arguments[-1]._obj.value = -2 if phase == 22 else 0  # PARDISO's number for it
-
-    monkeypatch.setattr(pardiso, "_library", lambda: refuses)
-    with pytest.raises(MemoryError):
-        pardiso.SchurFactor(sp.csr_matrix(np.eye(3)), 1)

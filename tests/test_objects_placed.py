@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from bodies import ball, box
 from scipy.spatial import KDTree
 
 from finger3d.objects import (
     Cylinder,
-    DistanceTracker,
     MeshObject,
     ObjectPose,
     PlacedObject,
@@ -18,8 +19,8 @@ from finger3d.objects import (
     Sphere,
     Wave,
     Wedge,
-    between,
 )
+from tests.bodies import ball, box
 
 SHAPES = [
     Plane(),
@@ -101,26 +102,21 @@ def test_the_lowest_point_of_a_turned_object_is_its_reference_point(obj: RigidOb
     assert np.nanmin(placed.height(x, z)) == pytest.approx(4.0, abs=1e-4)
 
 
-def test_material_points_of_a_twisted_object_go_round_its_reference_point() -> None:
-    angle, at = 0.01, points(20)
-    before = PlacedObject.of(Sphere(1.0, radius_mm=3.0), 5.0, ObjectPose(0.2))
-    after = PlacedObject.of(Sphere(1.0, radius_mm=3.0), 5.0, ObjectPose(0.2, turn_y=angle))
-    arm = at - [1.0, 4.8, 0.0]
-    moved = after.moved_from(before, at)
-    assert moved == pytest.approx(np.cross([0.0, angle, 0.0], arm), abs=0.51 * angle**2 * 3.0)
-    assert moved[:, 1] == pytest.approx(0.0, abs=1e-12)
+def mirrors(obj: RigidObject) -> tuple[str, ...]:
+    return PlacedObject.of(obj, 0.0).mirrors()
 
 
-@pytest.mark.parametrize("within", [0.05, np.inf])
-def test_tracked_distances_are_exact_where_they_are_small(within: float) -> None:
-    obj = MeshObject(surface=ball(2.0))
-    tracker, at = DistanceTracker(), points(200) - [0.0, 1.0, 0.0]
-    last = ObjectPose(0.8, 0.5, 0.2, turn_y=0.3)
-    for share in np.linspace(0.0, 1.0, 12):
-        placed = PlacedObject.of(obj, 0.0, between(ObjectPose(0.0), last, float(share)))
-        value, gradient = tracker.distance(placed, at, within)
-        exact, normal = placed.distance(at)
-        near = exact < within
-        assert value[near] == pytest.approx(exact[near], abs=1e-12)
-        assert gradient[near] == pytest.approx(normal[near], abs=1e-12)
-        assert (value[~near] > min(within, exact[~near].min(initial=np.inf)) - 1e-12).all()
+def test_mirrors_of_an_object_in_its_pose() -> None:
+    assert mirrors(MeshObject(surface=ball(5.0))) == ("x", "z")
+    assert mirrors(MeshObject(1.0, surface=ball(5.0))) == ("z",)
+    skew = ball(5.0)
+    sheared = replace(skew, points=skew.points + 0.1 * skew.points[:, [1, 0, 2]] * [1, 0, 0])
+    assert mirrors(MeshObject(surface=sheared)) == ("z",)
+    assert mirrors(Plane()) == ("x", "z")
+    assert mirrors(Plane(tilt=0.1)) == ("z",)
+    assert mirrors(Cylinder(2.0, radius_mm=5.0)) == ("z",)
+    assert mirrors(Cylinder(radius_mm=5.0, turn_y=math.pi / 2.0)) == ("x", "z")
+    assert mirrors(Cylinder(radius_mm=5.0, turn_y=0.3)) == ()
+    assert mirrors(Sphere(radius_mm=5.0, turn_x=0.3, turn_y=1.0)) == ("x", "z")
+    assert mirrors(Wave(2.5, wavelength_mm=5.0, amplitude_mm=0.3)) == ("x", "z")  # half a wavelength
+    assert mirrors(Wedge(angle=0.4, turn_z=0.1)) == ("z",)

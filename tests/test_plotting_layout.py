@@ -22,21 +22,13 @@ from finger3d.plotting.strain_map import draw_map
 from finger3d.report.sweep import sweep_charts
 from finger3d.report.sweep_figure import draw as draw_sweep
 from finger3d.results.comparison import Case
-from finger3d.sensor.curve import Calibration, Tolerance
 from finger3d.sensor.maps import StrainMap
-from tests.pictures import MU, STEPS, finger, pressed
+from tests.pictures import CURVE, MU, MUS, STEPS, finger, pressed
 
 SHOWN = 960  # CSS pixels of the narrowest picture in a page: 60 rem
 LEGIBLE = 7  # CSS pixels of an em: below, lower-case letters have less than four pixels
 
 GAUGE = Gauge("g36", 36.0, 40.0)
-
-MUS = np.linspace(0.05, 1.0, 6)
-CAUSES = ("depth_mm", "E_percent", "nu", "tilt_deg", "gauge_x_mm", "gauge_y_mm", "gauge_angle_deg", "mesh")
-CURVE = Calibration(
-    "g36", MUS, 0.02 + 0.01 * MUS - 0.004 * MUS**2, 1.5e-4, 0.1,
-    tuple(Tolerance(name, "", 0.5, np.full(6, 1e-3), np.full(6, 1e-3)) for name in CAUSES), about={"domain": "solid"},
-)  # fmt: skip
 
 
 def contact(path: Path) -> None:
@@ -90,22 +82,6 @@ def search(path: Path) -> None:
     places = np.random.default_rng(0).random((30, 3))
     values = [-1000.0 * a if b > 0.2 else np.nan for a, b, _ in places]
     draw_search(path, ["finger.radius_mm", "gauge.g36.x_mm", "gauge.g36.angle_deg"], places, values, places[0], "best")
-
-
-@pytest.fixture
-def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
-    """The figures that are saved; solids are drawn by matplotlib."""
-    from matplotlib.figure import Figure
-
-    seen, save = [], Figure.savefig
-
-    def kept(figure: Any, *arguments: Any, **options: Any) -> None:
-        seen.append(figure)
-        save(figure, *arguments, **options)
-
-    monkeypatch.setattr(Figure, "savefig", kept)
-    monkeypatch.setenv("FINGER3D_RENDERER", "matplotlib")
-    return seen
 
 
 @pytest.mark.parametrize(

@@ -42,7 +42,7 @@ def test_a_line_that_was_cut_short_is_removed(tmp_path) -> None:
 
 def test_another_task_is_refused_and_its_rows_stay(tmp_path) -> None:
     rows_of(tmp_path, {"n": 0})
-    with pytest.raises(Finger3dError, match="holds the results of another task"):
+    with pytest.raises(Finger3dError, match="another task"):
         rows_of(tmp_path, task={**TASK, "points": 4})
     (tmp_path / "task.json").unlink()
     with pytest.raises(Finger3dError, match=r"holds rows.jsonl without task.json"):

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from finger3d.cli import main
-from finger3d.errors import Finger3dError
+from tests.commands import refused
 
 SCENE = """\
 title = "test"
@@ -192,20 +191,6 @@ MISTAKES = {
 }
 
 
-def refused(capsys, *arguments: str) -> str:
-    """Run the command line; it must end with 2 and one line."""
-    code = main([str(a) for a in arguments])
-    out, err = capsys.readouterr()
-    assert code == 2
-    assert out == ""
-    assert err.endswith("\n")
-    assert len(err.splitlines()) == 1, err
-    assert "Traceback" not in err
-    assert err.rstrip("\n").isprintable()
-    assert "pydantic" not in err.lower()
-    return err
-
-
 @pytest.fixture
 def scene(tmp_path):
     path = tmp_path / "test.toml"
@@ -225,26 +210,6 @@ def test_one_line_for_a_mistake(name, command, scene, capsys) -> None:
     for text in expected:
         assert text in err
     assert not out.exists()
-
-
-@pytest.mark.parametrize(
-    ("override", "expected"),
-    [
-        ("model.domain=plane-strain", ['model.domain = "plane-strain"', 'must be "solid"']),
-        ("mesh.mesher=swept", ['mesh.mesher = "swept"', 'must be "ftetwild"']),
-        ("gauge=[{name='a', x_mm=9.0, y_mm=1.0, z_mm=9.0}]", ["gauge.0.z_mm = 9.0", "nearer to 0"]),
-        ("gauge=[{name='a', x_mm=7.0, y_mm=9.0}]", ["gauge.0.y_mm = 9.0", "from 0 to 7.14142"]),
-    ],
-)
-def test_a_hemisphere_is_a_solid_without_a_section(override, expected, tmp_path, capsys) -> None:
-    path = tmp_path / "ball.toml"
-    path.write_text(
-        '[finger]\ngeometry = "hemisphere"\nradius_mm = 10.0\n'
-        "[material]\nE_MPa = 1.0\nnu = 0.4\n[press]\ndepth_mm = 1.0\n"
-    )
-    err = refused(capsys, "plan", path, "--set", override)
-    for text in expected:
-        assert text in err
 
 
 def test_the_first_of_several_mistakes_is_told_and_the_others_counted(scene, capsys) -> None:
@@ -300,23 +265,3 @@ def test_an_empty_file(tmp_path, capsys) -> None:
     path = tmp_path / "scene.toml"
     path.write_text("")
     assert "finger is missing" in refused(capsys, "plan", path)
-
-
-@pytest.mark.parametrize(
-    ("legs", "text"),
-    [
-        ([{"depth_mm": 0.0, "slide_x_mm": 1.0}], "moves before first touch"),
-        ([{"depth_mm": 1.0}, {"depth_mm": 1.0}], "goes nowhere"),
-    ],
-)
-def test_a_leg_that_does_nothing_is_refused(legs, text) -> None:
-    from finger3d.scene import parse
-
-    tables = {
-        "finger": {"geometry": "half_cylinder", "radius_mm": 5.0, "width_mm": 2.0},
-        "material": {"E_MPa": 1.0, "nu": 0.3},
-        "press": {"leg": legs},
-    }
-    with pytest.raises(Finger3dError, match=text) as refused:
-        parse(tables)
-    assert "\n" not in str(refused.value)

@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import csv
 import runpy
 import subprocess
 import sys
-import time
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
-import numpy as np
 import pytest
-from scipy.interpolate import PchipInterpolator
 
 from finger3d.sensor import save
-from finger3d.sensor.pchip import MonotoneCubic
 from tests.sensor_cases import curve, line, straight, together
 
 NUMPY_ONLY = """
@@ -29,17 +24,6 @@ sys.meta_path.insert(0, Refuse())
 import finger3d
 print(finger3d.estimate(sys.argv[1], [float(sys.argv[2])])[0].mu)
 """
-
-
-def test_the_interpolation_is_that_of_scipy() -> None:
-    random = np.random.default_rng(0)
-    for _ in range(300):
-        count = random.integers(2, 9)
-        x, y = np.cumsum(random.uniform(0.1, 2.0, count)), random.normal(size=count) * random.choice([0, 1, 1], count)
-        at = random.uniform(x[0], x[-1], 20)
-        found, wanted = MonotoneCubic.of(x, y), PchipInterpolator(x, y)
-        assert found(at) == pytest.approx(wanted(at), rel=1e-12, abs=1e-12)
-        assert found(at, 1) == pytest.approx(wanted(at, 1), rel=1e-9, abs=1e-9)
 
 
 def test_an_estimate_needs_no_library_but_numpy(tmp_path: Path) -> None:
@@ -59,59 +43,6 @@ def test_several_readings_need_no_library_but_numpy(tmp_path: Path) -> None:
         [sys.executable, "-c", code, str(kept), *readings], capture_output=True, text=True, check=True
     )
     assert float(said.stdout) == pytest.approx(0.3, abs=1e-3)
-
-
-def follow(*arguments: object, **options: object) -> subprocess.Popen:
-    command = [sys.executable, "-m", "finger3d", "estimate", *map(str, arguments)]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
-
-
-def test_readings_are_answered_as_they_are_written(tmp_path: Path) -> None:
-    kept, readings = save(curve(straight), tmp_path / "calibration.json"), tmp_path / "readings.csv"
-    readings.write_text("time,strain\n")
-    child = follow(kept, "--follow", readings)
-    try:
-        assert child.stdout.readline().startswith("strain,reading_std,mu,std")
-        for mu in (0.2, 0.4):
-            text = f"1,{straight(mu)!r}\n"
-            with readings.open("a") as stream:
-                stream.write(text[:7])
-                stream.flush()
-                time.sleep(0.1)  # half a line is no reading
-                stream.write(text[7:])
-            assert float(child.stdout.readline().split(",")[2]) == pytest.approx(mu)
-    finally:
-        child.send_signal(2)
-        assert child.wait(timeout=20) == 130
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("x\n1\n", "must have a column named strain"),
-        ("strain\nabc\n", "line 2: strain = 'abc': must be a number"),
-        ("strain\n0.01\nnan\n", "line 3: strain = nan: must be a finite number"),
-        ("strain,std\n0.01,-1\n", "line 2: std = -1.0: must be"),
-    ],
-)
-def test_a_reading_that_is_none_ends_the_stream_with_one_line(tmp_path: Path, text: str, said: str) -> None:
-    kept = save(curve(straight), tmp_path / "calibration.json")
-    child = follow(kept, "--follow", "-", stdin=subprocess.PIPE)
-    out, error = child.communicate(text)
-    assert child.returncode == 2
-    assert said in error
-    assert len(error.splitlines()) == 1
-    assert len(out.splitlines()) == text.count("\n") - 1  # names, and an answer to every reading before
-
-
-def test_standard_input_is_answered_until_it_ends(tmp_path: Path) -> None:
-    kept = save(curve(straight), tmp_path / "calibration.json")
-    child = follow(kept, "--follow", "-", stdin=subprocess.PIPE)
-    out, error = child.communicate(f"strain\n{straight(0.3)!r}\n0.2\n")
-    assert (child.returncode, error) == (0, "")
-    rows = list(csv.DictReader(out.splitlines()))
-    assert float(rows[0]["mu"]) == pytest.approx(0.3)
-    assert rows[1]["status"] == "outside"
 
 
 def test_the_ros_node_publishes_what_estimate_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -21,8 +21,6 @@ from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.symmetry import symmetry
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.swept import mesh_section
-from finger3d.objects import Sphere
-from finger3d.objects.triangulated import MeshObject
 
 Say = Callable[[str], None]
 
@@ -147,5 +145,5 @@ def _spacing(problem: Problem) -> float:
 
 def is_unstructured(model: Model) -> bool:
     """Return whether pytetwild meshes the finger or the object."""
-    soft = model.object_compliance is not None and isinstance(model.object, Sphere | MeshObject)
+    soft = model.object_compliance is not None and model.object.body_mesher != "swept"
     return model.domain == "solid" and (soft or model.mesh.mesher != "swept")

@@ -28,7 +28,7 @@ from finger3d.geometry.registry import import_from
 from finger3d.io import atomic, write_csv, write_json
 from finger3d.progress import Progress
 
-_NO_NUMBERS = ("cli/*", "plotting/*", "report/*", "__main__.py", "_notebook.py", "progress.py", "py.typed")
+NO_NUMBERS = ("cli/*", "plotting/*", "report/*", "__main__.py", "_notebook.py", "progress.py", "py.typed")
 """Files of the package that only draw, write pages, report progress or parse commands. A change of any other one makes
 the results of all studies out of date."""
 
@@ -99,7 +99,7 @@ def sources(package: Path) -> list[Path]:
 
     def counts(path: Path) -> bool:
         name = path.relative_to(package).as_posix()
-        return not any(fnmatchcase(name, pattern) for pattern in _NO_NUMBERS)
+        return not any(fnmatchcase(name, pattern) for pattern in NO_NUMBERS)
 
     files = (path for path in sorted(package.rglob("*")) if path.is_file() and "__pycache__" not in path.parts)
     return [path for path in files if counts(path) and "geometries" not in path.parts]

@@ -8,6 +8,7 @@ means (`finger3d.fem.transfer`), so the two meshes need not match and each force
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -33,13 +34,21 @@ from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.symmetry import held_dofs
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.swept import mesh_section
-from finger3d.objects import Cylinder, MeshObject, PlacedObject, Plane, Sphere, vertical_frame
+from finger3d.objects import HeldBody, PlacedObject, vertical_frame
 
 Zone = tuple[float, float, float, float]
 Say = Callable[[str], None]
 
 _SURFACE = 401  # places along x and z where the highest point of a wedge or wave is looked for
-_TURNED = {"symmetry_x": "symmetry_z", "symmetry_z": "symmetry_x", "ends": "walls", "walls": "ends"}
+_SWAPPED = {
+    "x": "z",
+    "z": "x",
+    "symmetry_x": "symmetry_z",
+    "symmetry_z": "symmetry_x",
+    "ends": "walls",
+    "walls": "ends",
+}
+"""Axes and labels of faces where x and z change places."""
 
 
 @dataclass(frozen=True)
@@ -111,17 +120,8 @@ class ObjectBody:
 
     def mesh(self) -> tuple[Mesh, bool]:
         """Return the mesh, and whether it is a whole object although only a part of the finger is meshed."""
-        obj = self.model.object
-        if isinstance(obj, MeshObject):
-            return self._file(obj), True
-        solid = self.model.domain == "solid"
-        if isinstance(obj, Cylinder) and (obj.axis == "z" or not solid):
-            return self._bar(obj), False
-        if isinstance(obj, Cylinder):
-            return self._crosswise(obj), False
-        if isinstance(obj, Sphere):
-            return self._ball(obj, solid), False
-        return self._block(), False
+        held = self.model.object.held_body(self.model.design, self.model.domain == "solid")
+        return (self._block(), False) if held is None else (self._held(held), held.is_whole)
 
     def _made(self, design: Design, zone: Zone, mesher: str = "swept", axes: tuple[str, ...] | None = None) -> Mesh:
         """Return the mesh of a design with the edge lengths of the finger; its contact face is on top."""
@@ -137,48 +137,25 @@ class ObjectBody:
             else mesh_section(design, options, zone, axes)[0]
         )
 
-    def _moved(self, zone: Zone, x: float, z: float) -> Zone:
-        return zone[0] - x, zone[1] - x, zone[2] - z, zone[3] - z
-
-    def _bar(self, obj: Cylinder) -> Mesh:
-        """Return half a cylinder along z, as wide as the finger; in a section of a cylinder along x, a rectangle."""
-        width = self.model.design.width_mm
-        if obj.axis == "z":
-            design = designs()["half_cylinder"](radius_mm=obj.radius_mm, width_mm=width)
-            return _placed(self._made(design, self._moved(self.zone, obj.x_mm, 0.0)), obj.x_mm, 0.0)
-        half = self.model.design.half_length_mm
-        return _placed(
-            self._made(designs()["block"](half_length_mm=half, height_mm=obj.radius_mm, width_mm=width), self.zone),
-            0,
-            0,
-        )
-
-    def _crosswise(self, obj: Cylinder) -> Mesh:
-        """Return half a cylinder along x, as long as the finger; it is meshed along z and turned."""
-        design = designs()["half_cylinder"](radius_mm=obj.radius_mm, width_mm=2.0 * self.model.design.half_length_mm)
-        x0, x1, z0, z1 = self._moved(self.zone, 0.0, obj.z_mm)
-        axes = tuple({"x": "z", "z": "x"}[a] for a in self.axes)
-        mesh = self._made(design, (z0, z1, x0, x1), axes=axes)
-        # With y turned down too this is a proper rotation: the cells stay positive.
-        points = mesh.points[:, [2, 1, 0]] * [1.0, -1.0, 1.0] + [0.0, 0.0, obj.z_mm]
-        return Mesh(points, mesh.cells, {_TURNED.get(label, label): f for label, f in mesh.facets.items()})
-
-    def _ball(self, obj: Sphere, solid: bool) -> Mesh:
-        """Return half a ball; in a section, half a disc."""
-        zone = self._moved(self.zone, obj.x_mm, obj.z_mm)
-        if solid:
-            return _placed(
-                self._made(designs()["hemisphere"](radius_mm=obj.radius_mm), zone, "ftetwild"), obj.x_mm, obj.z_mm
-            )
-        design = designs()["half_cylinder"](radius_mm=obj.radius_mm, width_mm=self.model.design.width_mm)
-        return _placed(self._made(design, zone), obj.x_mm, 0.0)
+    def _held(self, held: HeldBody) -> Mesh:
+        """Return the mesh of a design, turned and moved to where the object is."""
+        x0, x1, z0, z1 = self.zone
+        corners = held.to_design(np.array([[x0, 0.0, z0], [x1, 0.0, z1]]))
+        (low_x, _, low_z), (high_x, _, high_z) = corners.min(axis=0), corners.max(axis=0)
+        axes = () if held.is_whole else self.axes
+        swap = _SWAPPED if held.is_crosswise else {}
+        axes = tuple(swap.get(axis, axis) for axis in axes)
+        made = self._made(held.design, (low_x, high_x, low_z, high_z), held.mesher, axes)
+        cells = reflected(made, 1) if held.is_reflected else made
+        facets = {swap.get(label, label): f for label, f in cells.facets.items()}
+        return Mesh(held.to_scene(made.points), cells.cells, facets)
 
     def _block(self) -> Mesh:
         """Return a block behind the surface with the length and width of the finger and a flat far face."""
         finger, obj = self.model.design, self.model.object
-        tilt = obj.tilt if isinstance(obj, Plane) else 0.0
+        tilt = math.atan(float(obj.profile(np.ones(1), np.zeros(1))[0])) if obj.is_flat else 0.0
         reach = finger.half_length_mm / np.cos(tilt)
-        if isinstance(obj, Plane):
+        if obj.is_flat:
             low = high = 0.0
         else:
             x, z = np.meshgrid(
@@ -194,7 +171,7 @@ class ObjectBody:
         x0, x1, z0, z1 = np.array(self.zone) * stretch
         mesh = reflected(self._made(design, (x0, x1, z0, z1)), 1)
         points = mesh.points.copy()
-        if isinstance(obj, Plane):
+        if obj.is_flat:
             c, s = np.cos(tilt), np.sin(tilt)
             points[:, 0], points[:, 1] = (
                 c * mesh.points[:, 0] - s * (mesh.points[:, 1] + height),
@@ -207,29 +184,6 @@ class ObjectBody:
             PlacedObject.of(obj, 0.0).height(points[:, 0], z_at) * (1.0 - behind) + (high + self.height_mm) * behind
         )
         return Mesh(points, mesh.cells, mesh.facets)
-
-    def _file(self, obj: MeshObject) -> Mesh:
-        """Return the mesh of a body from a file, held on its highest plane."""
-        from finger3d.geometry.imported import imported, of_surface
-
-        body = imported(obj.path, True, obj.scale) if obj.path else of_surface(obj.surface, "object", True)
-        # Turned about z by half a turn, measured from the middle of the plane it is held on.
-        lowest = np.array([-obj.origin[0], -obj.origin[1], obj.origin[2]]) - body.middle
-        zone = (
-            lowest[0] - (self.zone[1] - obj.x_mm),
-            lowest[0] - (self.zone[0] - obj.x_mm),
-            lowest[2] + self.zone[2] - obj.z_mm,
-            lowest[2] + self.zone[3] - obj.z_mm,
-        )
-        mesh = self._made(body, zone, "ftetwild", ())
-        points = (mesh.points - lowest) * [-1.0, -1.0, 1.0] + [obj.x_mm, 0.0, obj.z_mm]
-        return Mesh(points, mesh.cells, mesh.facets)
-
-
-def _placed(mesh: Mesh, x: float, z: float) -> Mesh:
-    """Return a mesh turned upside down, with its middle over (x, z)."""
-    down = reflected(mesh, 1)
-    return Mesh(down.points + np.array([x, 0.0, z])[: mesh.dim], down.cells, down.facets)
 
 
 @dataclass(frozen=True)
@@ -251,14 +205,14 @@ class Effect:
     def apply(self, model: Model) -> Model:
         """Fill the slot of the object's compliance."""
         obj = model.object
-        if self.height_mm is not None and isinstance(obj, Cylinder | Sphere | MeshObject):
+        if self.height_mm is not None and not obj.is_face:
             raise Finger3dError(
                 "effects.elastic_object.height_mm: only for a plane, wedge or wave, which are the face of a block; a "
                 "cylinder, a sphere and a mesh are held where they are cut, or on top; take it out"
             )
-        if isinstance(obj, MeshObject) and model.domain != "solid":
+        if not obj.has_section and model.domain != "solid":
             raise Finger3dError('effects.elastic_object: a mesh as object has no section; set model.domain = "solid"')
-        if obj.is_turned and not isinstance(obj, Sphere):
+        if obj.is_turned:
             raise Finger3dError(
                 "effects.elastic_object: not with a turned object; take turn_x_deg, turn_y_deg and turn_z_deg out"
             )

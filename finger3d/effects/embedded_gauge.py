@@ -31,8 +31,6 @@ from finger3d.mechanics.cost import AddedCost, PressCost
 from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.model import EmbeddedBars, Model
 
-_PATCHES = {2: (16, 1), 3: (12, 8)}  # along and across, by dimension: within half a percent of any number
-
 _ROWS = {2: 16, 3: 96}
 """Condensed rows of a foil with its mirror images, by dimension; for the estimated cost."""
 
@@ -44,11 +42,16 @@ _COINCIDENT = 1e-9  # mm, and radians
 
 @dataclass(frozen=True)
 class Strips:
-    """Foils along the gauges of a model: Young's modulus (MPa) and section (mm)."""
+    """Foils along the gauges of a model: Young's modulus (MPa) and section (mm).
+
+    `patches` are the divisions of a foil along and across, in a section and in a solid; those given are within half a
+    percent of any number.
+    """
 
     E_MPa: float
     thickness_mm: float
     width_mm: float
+    patches: tuple[tuple[int, int], tuple[int, int]] = ((16, 1), (12, 8))
 
     def added_cost(self, model: Model, press: PressCost) -> AddedCost:
         """Return the cost of the foils' rows and of the press without foils."""
@@ -79,7 +82,8 @@ class Strips:
         """
         copies = 2 ** len(axes)
         foils = [
-            FoilPatches.of(g.middle, g.direction, g.length_mm, self.width_mm, *_PATCHES[mesh.dim]) for g in model.gauges
+            FoilPatches.of(g.middle, g.direction, g.length_mm, self.width_mm, *self.patches[mesh.dim - 2])
+            for g in model.gauges
         ]
         bars: dict[tuple[float, ...], tuple[Float, sp.csr_matrix]] = {}
         numbers = np.concatenate([_insert(bars, foil, mesh, axes) for foil in foils])

@@ -50,6 +50,8 @@ class Condensation:
     ----------
     compliance : (r, r) mm/N
         Row displacements per unit row force, symmetric: ``R K^-1 R^T``.
+    rows : (r, N) sparse
+        Rows that the body is condensed to.
     perturbed_pivots : int
         Number of pivots that PARDISO replaced; 0 if the factor is accurate.
     """
@@ -59,7 +61,7 @@ class Condensation:
     factorizations: int
     seconds: float
     solver: str
-    _rows: sp.csr_matrix = field(repr=False)
+    rows: sp.csr_matrix = field(repr=False)
     _free: Int = field(repr=False)
     _factor: _Factor = field(repr=False)
     _scale: float = field(repr=False)  # of the stiffness, as it was factored
@@ -77,7 +79,7 @@ class Condensation:
 
     def solve(self, load: Float) -> Float:
         """Return all unknowns (N, ...) under loads (N, ...); fixed unknowns are zero."""
-        return self.eliminated(load).unknowns(np.zeros((self._rows.shape[0], *load.shape[1:])))
+        return self.eliminated(load).unknowns(np.zeros((self.rows.shape[0], *load.shape[1:])))
 
     def eliminated(self, load: Float) -> Elimination:
         """Eliminate the unknowns under loads (N, ...): the first half of a solution, which gives the rows."""
@@ -88,18 +90,18 @@ class Condensation:
 
     def _substituted(self, eliminated: Float | None, force: Float) -> Float:
         columns = self._row_scales[:, None] * force.reshape(len(self._row_scales), -1)
-        whole = np.zeros((self._rows.shape[1], columns.shape[1]), order="F")  # one field after another
+        whole = np.zeros((self.rows.shape[1], columns.shape[1]), order="F")  # one field after another
         whole[self._free] = self._factor.substituted(eliminated, columns) / self._scale
         return whole.reshape(-1, *force.shape[1:], order="A")
 
     def read(self, unknowns: Float) -> Float:
         """Return the row displacements (r,), mm, of all unknowns (N,)."""
-        return np.asarray(self._rows @ unknowns)
+        return np.asarray(self.rows @ unknowns)
 
     def again(self, stiffness: Stiffness) -> Condensation:
         """Condense another stiffness with the same fixed unknowns and rows; this takes one more factorisation."""
-        fixed = np.setdiff1d(np.arange(self._rows.shape[1]), self._free)
-        return condense(stiffness, fixed, self._rows, self.solver)
+        fixed = np.setdiff1d(np.arange(self.rows.shape[1]), self._free)
+        return condense(stiffness, fixed, self.rows, self.solver)
 
 
 @dataclass(frozen=True)

@@ -22,5 +22,5 @@ def bases_of(normal: Float) -> Float:
     factor = 1.0 / np.where(opposite, 1.0, half)
     along = np.stack([1.0 - factor * n[:, 0] ** 2, n[:, 0], -factor * n[:, 0] * n[:, 2]], axis=1)
     across = np.stack([-factor * n[:, 0] * n[:, 2], n[:, 2], 1.0 - factor * n[:, 2] ** 2], axis=1)
-    along[opposite], across[opposite] = [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]
+    along[opposite], across[opposite] = [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]  # about z, which a section has too
     return np.stack([n, along, across], axis=1)[:, :d, :d]

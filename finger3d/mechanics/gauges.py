@@ -9,6 +9,7 @@ from typing import ClassVar, Literal
 import numpy as np
 import scipy.sparse as sp
 
+from finger3d._ranges import Turn
 from finger3d._types import Float
 from finger3d.fem.simplex import Mesh, reflect_into_part
 from finger3d.fem.traces import displacement_row, strain_row
@@ -26,7 +27,7 @@ class Gauge:
     x_mm: float
     y_mm: float
     z_mm: float = 0.0
-    angle: float = 0.0
+    angle: Turn = 0.0
     length_mm: float = 0.0
     kind: ClassVar[Literal["gauge"]] = "gauge"
 

@@ -33,6 +33,7 @@ def map_parallel(
     press: Callable[[Variant, Sequence[Result], Workspace, Event], Result],
     variants: Sequence[Variant],
     most: int | None = None,
+    threads_from: int | None = None,
 ) -> Generator[Result, None, None]:
     """Press one body as several variants, and yield the results in the order of the variants.
 
@@ -48,12 +49,15 @@ def map_parallel(
     variants : sequence
     most : int, optional
         Largest number of presses at once; the number of cores unless given.
+    threads_from : int, optional
+        Number of contact rows from which presses run at once; `_ROWS_FOR_THREADS` unless given.
     """
     formulation = problem.model.formulation
     known: tuple[Result, ...] = ()
     at_once = min(len(variants), cores() if most is None else most)
     cancel = Event()
-    if len(problem.system.active_dofs) < _ROWS_FOR_THREADS or at_once < 2 or formulation.refactorises:
+    least = _ROWS_FOR_THREADS if threads_from is None else threads_from
+    if len(problem.system.active_dofs) < least or at_once < 2 or formulation.refactorises:
         workspace = formulation.workspace()
         for variant in variants:
             known = (*known, press(variant, known, workspace, cancel))[-2:]

@@ -237,9 +237,9 @@ class Problem:
         """All unknowns (N,) of the part's body under contact forces (c, d)."""
         return self._unknowns(self.row_forces(force))
 
-    def unknowns_of(self, forces: Sequence[Float]) -> Iterator[Float]:
-        """All unknowns (N,) for each of several forces (c, d), in blocks of limited memory."""
-        at_once = max(1, _AT_ONCE // self.part.stiffness.upper.shape[0])
+    def unknowns_of(self, forces: Sequence[Float], block: int = _AT_ONCE) -> Iterator[Float]:
+        """All unknowns (N,) for each of several forces (c, d), by solutions for about `block` unknowns at once."""
+        at_once = max(1, block // self.part.stiffness.upper.shape[0])
         for first in range(0, len(forces), at_once):
             rows = np.stack([self.row_forces(force) for force in forces[first : first + at_once]], axis=1)
             yield from self._unknowns(rows).T

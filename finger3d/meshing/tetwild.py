@@ -64,7 +64,7 @@ def mesh_tetwild(
         say(f"mesh from the cache, {path}")
         seconds = {"cad": 0.0, "mesh": time.perf_counter() - start}
         return mesh, report(mesh, multiple, volume, seconds, from_cache=True, cache_path=str(path))
-    mesh, volume, cad_seconds = _new_mesh(design, options, zone, symmetry, say)
+    mesh, volume, cad_seconds = new_mesh(design, options, zone, symmetry, say)
     stored = cache.save(path, mesh, volume)
     if not stored:
         say(f"the mesh could not be kept in {path.parent}; the next run will mesh again")
@@ -72,7 +72,7 @@ def mesh_tetwild(
     return mesh, report(mesh, multiple, volume, seconds, cache_path=str(path) if stored else None)
 
 
-def _new_mesh(
+def new_mesh(
     design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...], say: Callable[[str], None]
 ) -> tuple[Mesh, float, float]:
     """Return the mesh, the volume (mm3) of the whole body, and the seconds spent on CAD."""
@@ -99,7 +99,7 @@ def _new_mesh(
     limit = _limit_seconds(cells, len(body.triangles))
     for _ in range(ATTEMPTS):
         try:
-            points, tets = _child(body.points, body.triangles, field, epsilon, limit)
+            points, tets = run_child(body.points, body.triangles, field, epsilon, limit)
             check_tets(points, tets, body.volume_mm3)
             mesh = snap(points, tets, body)
             return mesh, whole, cad_seconds
@@ -187,7 +187,7 @@ def _limit_seconds(cells: float, triangles: int) -> float:
     return 5.0 * (10.0 + 8e-4 * cells + 5e-3 * triangles)
 
 
-def _child(points: Float, triangles: Int, field: Sizing, epsilon: float, limit: float) -> tuple[Float, Int]:
+def run_child(points: Float, triangles: Int, field: Sizing, epsilon: float, limit: float) -> tuple[Float, Int]:
     """Run pytetwild in a child process."""
     from finger3d.meshing.snap import UnusableMeshError
 

@@ -1,10 +1,12 @@
 """Rigid objects, analytic or triangulated, and their first contact with the finger."""
 
 from finger3d.objects.first_contact import ContactPath, InitialContact, first_contact_height, initial_contact
+from finger3d.objects.held import HeldBody
 from finger3d.objects.placed import PlacedObject
 from finger3d.objects.pose import ObjectPose, between
 from finger3d.objects.registry import OBJECTS
-from finger3d.objects.shapes import Axis, Cylinder, Plane, RigidObject, Sphere, Wedge, vertical_frame
+from finger3d.objects.rigid import Axis, RigidObject, vertical_frame
+from finger3d.objects.shapes import Cylinder, Plane, Sphere, Wedge
 from finger3d.objects.tracking import DistanceTracker
 from finger3d.objects.triangulated import MeshObject
 from finger3d.objects.wave import Wave
@@ -15,6 +17,7 @@ __all__ = [
     "ContactPath",
     "Cylinder",
     "DistanceTracker",
+    "HeldBody",
     "InitialContact",
     "MeshObject",
     "ObjectPose",

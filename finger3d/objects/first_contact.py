@@ -13,7 +13,7 @@ from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.objects.placed import PlacedObject
 from finger3d.objects.pose import ObjectPose, between
-from finger3d.objects.shapes import RigidObject
+from finger3d.objects.rigid import RigidObject
 
 Top = Callable[[Float, Float], Float]
 

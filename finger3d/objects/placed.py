@@ -11,7 +11,7 @@ from finger3d._arrays import freeze_arrays
 from finger3d._types import Float
 from finger3d.geometry.surface import Triangles
 from finger3d.objects.pose import ObjectPose
-from finger3d.objects.shapes import RigidObject
+from finger3d.objects.rigid import RigidObject
 from finger3d.objects.triangulated import MeshObject
 
 _SURFACE = 1e-13

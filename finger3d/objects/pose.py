@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.objects.shapes import rotation
+from finger3d.objects.rigid import rotation
 
 
 @dataclass(frozen=True)

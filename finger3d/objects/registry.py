@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from finger3d.objects.shapes import Cylinder, Plane, RigidObject, Sphere, Wedge
+from finger3d.objects.rigid import RigidObject
+from finger3d.objects.shapes import Cylinder, Plane, Sphere, Wedge
 from finger3d.objects.triangulated import ObjectFile
 from finger3d.objects.wave import Wave
 

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from finger3d._ranges import PathName, Scale
 from finger3d._types import Float
+from finger3d.geometry.design import Design
 from finger3d.geometry.surface import Triangles
-from finger3d.objects.shapes import RigidObject
+from finger3d.objects.held import HALF_TURN, HeldBody
+from finger3d.objects.rigid import RigidObject
 
 _LEVEL = 1e-6  # of the size: points this little above the lowest one count as lowest too (STL has single precision)
 _MOST = 2_000  # points that are compared with their mirror images
@@ -27,6 +30,10 @@ class MeshObject(RigidObject):
     surface : the body as it was drawn, mm; :func:`finger3d.geometry.files.read_surface` reads and checks a file
     path, scale : the file it came from, and what its numbers were multiplied with
     """
+
+    has_section: ClassVar[bool] = False
+    is_face: ClassVar[bool] = False
+    body_mesher: ClassVar[Literal["ftetwild", "swept"]] = "ftetwild"
 
     surface: Triangles = field(kw_only=True)
     path: str | None = field(default=None, kw_only=True, compare=False)
@@ -80,6 +87,16 @@ class MeshObject(RigidObject):
     def probe_reach(self) -> float:
         """The size of the body."""
         return self.surface.size
+
+    def held_body(self, finger: Design, solid: bool) -> HeldBody:
+        """Return the whole body, held on its highest plane; a STEP file is read with its CAD faces."""
+        from finger3d.geometry.imported import imported, of_surface
+
+        body = imported(self.path, True, self.scale) if self.path else of_surface(self.surface, "object", True)
+        # Designs are measured from the middle of the plane on which they are held, the object from its lowest point.
+        origin = np.array([-self.origin[0], -self.origin[1], self.origin[2]]) - body.middle
+        place = np.array([self.x_mm, 0.0, self.z_mm])
+        return HeldBody(design=body, turn=HALF_TURN, origin=origin, place=place, mesher=self.body_mesher, is_whole=True)
 
     def drawing(self, reach_mm: float) -> Triangles:
         """Return all triangles."""

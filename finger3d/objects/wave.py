@@ -9,7 +9,7 @@ import numpy as np
 
 from finger3d._ranges import Length, Zero
 from finger3d._types import Float
-from finger3d.objects.shapes import Axis, Detail, Prism
+from finger3d.objects.rigid import Axis, Detail, Prism
 
 _NEAREST_STARTS = 17, 65
 """Points over one wavelength from which the nearest point is searched: of a wave with slopes up to 1, and of others."""

@@ -146,8 +146,8 @@ def unshared(corners: Float) -> tuple[Float, Int]:
     return np.ascontiguousarray(corners.reshape(-1, 3)), np.arange(count).reshape(corners.shape[:2])
 
 
-# Reason of the first failure to render. Later calls do not try again, since a driver that crashed will crash again.
-_failure: list[str] = []
+FAILURES: list[str] = []
+"""Reason of the first failure to render. Later calls do not try again, since a driver that crashed will crash again."""
 
 
 def render(drawings: Sequence[Drawing]) -> list[Image] | None:
@@ -168,7 +168,7 @@ def render(drawings: Sequence[Drawing]) -> list[Image] | None:
     wanted = os.environ.get("FINGER3D_RENDERER", "")
     if wanted == "matplotlib":
         return None
-    if not _failure:
+    if not FAILURES:
         with tempfile.TemporaryDirectory(prefix="finger3d-") as folder:
             source, target = Path(folder) / "drawings", Path(folder) / "images"
             source.write_bytes(pickle.dumps(list(drawings)))
@@ -176,9 +176,9 @@ def render(drawings: Sequence[Drawing]) -> list[Image] | None:
             if why is None and target.exists():
                 images: list[Image] = pickle.loads(target.read_bytes())
                 return images
-            _failure.append(why or "it wrote no picture")
+            FAILURES.append(why or "it wrote no picture")
     if wanted == "pyvista":
-        raise MissingError(f"PyVista cannot render here: {_failure[0]}; unset FINGER3D_RENDERER to use matplotlib")
+        raise MissingError(f"PyVista cannot render here: {FAILURES[0]}; unset FINGER3D_RENDERER to use matplotlib")
     return None
 
 

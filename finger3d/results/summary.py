@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,6 +11,7 @@ from pathlib import Path
 from finger3d._types import Tree, TreeView
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.gauges import Gauge
+from finger3d.scene.tables import GaugeTable, record_of
 
 
 @dataclass(frozen=True)
@@ -139,19 +139,7 @@ def gauges_of(scene: TreeView) -> list[Gauge]:
 
     Raises
     ------
-    KeyError, TypeError, ValueError, OverflowError
+    ValueError, TypeError
         If they are not as a press writes them.
     """
-
-    def number(value: object) -> float:
-        if not isinstance(value, int | float) or not math.isfinite(value):
-            raise ValueError(value)
-        return float(value)
-
-    return [
-        Gauge(
-            str(g["name"]), number(g["x_mm"]), number(g["y_mm"]), number(g["z_mm"]),
-            math.radians(number(g["angle_deg"])), number(g["length_mm"]),
-        )
-        for g in scene.get("gauge") or ()
-    ]  # fmt: skip
+    return [record_of(Gauge, GaugeTable.model_validate(gauge)) for gauge in scene.get("gauge") or ()]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -120,11 +119,9 @@ class Scene:
             legs=self.legs,
             object=self.object,
             friction=Coulomb(t.friction.mu),
-            gauges=tuple(
-                Gauge(g.name, g.x_mm, g.y_mm, g.z_mm, math.radians(g.angle_deg), g.length_mm) for g in t.gauge
-            ),
-            markers=tuple(Marker(m.name, m.x_mm, m.y_mm, m.z_mm) for m in t.marker),
-            taxels=tuple(Taxel(x.name, x.x_mm, x.z_mm, x.length_mm, x.width_mm) for x in t.taxel),
+            gauges=tuple(record_of(Gauge, gauge) for gauge in t.gauge),
+            markers=tuple(record_of(Marker, marker) for marker in t.marker),
+            taxels=tuple(record_of(Taxel, taxel) for taxel in t.taxel),
             domain=t.model.domain,
             rule=t.contact.rule,
         )

@@ -253,7 +253,7 @@ def _degrees(hint: Any) -> tuple[Any, ...] | None:
 
 
 def record_of(record: type[Record], settings: TomlTable) -> Record:
-    """Return the dataclass that a table of `table_of` stands for, its angles in radians."""
+    """Return the dataclass that a table stands for, which has its fields as keys; its angles in radians."""
     hints = typing.get_type_hints(record, include_extras=True)
     return record(
         **{

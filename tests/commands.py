@@ -1,0 +1,39 @@
+"""Commands of the command line, run in this process."""
+
+from __future__ import annotations
+
+from finger3d.cli import main
+
+STEP = {
+    "depth_mm": 10.0,
+    "normal_force_N": 304.5,
+    "friction_sum_N": 72.0,
+    "contact_half_length_mm": 36.0,
+    "stick_half_length_mm": 8.5,
+    "contact_area_mm2": 1460.0,
+    "stick_area_mm2": 130.0,
+    "residual": 3e-11,
+    "gauges": {"g36": -0.0123},
+    "markers": {"m1": [0.5, -2.0, 0.0]},
+    "taxels": {"t1": 0.125},
+    "outcome": "converged",
+}
+
+
+def run(*arguments: object) -> int:
+    """Exit code of one command."""
+    return main([str(a) for a in arguments])
+
+
+def refused(capsys, *arguments: str) -> str:
+    """Run the command line; it must end with 2 and one line."""
+    code = main([str(a) for a in arguments])
+    out, err = capsys.readouterr()
+    assert code == 2
+    assert out == ""
+    assert err.endswith("\n")
+    assert len(err.splitlines()) == 1, err
+    assert "Traceback" not in err
+    assert err.rstrip("\n").isprintable()
+    assert "pydantic" not in err.lower()
+    return err

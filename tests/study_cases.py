@@ -1,0 +1,27 @@
+"""Studies that pass, fail and are interrupted."""
+
+from __future__ import annotations
+
+GOOD = '''"""Is one and a half what it was?
+
+Source: none.
+"""
+from finger3d.analyses.study_rows import Result, Row
+
+from ._shared import VALUE
+
+def run(quick):
+    rows = (Row("value | mm", "a page", 1.5, VALUE + (0.001 if quick else 0.0), 0.01, "so", "sensitivity"),)
+    return Result(rows, {"x": [1, 2], "y": [0.1, 1 / 3]}, lambda figure: figure.subplots().plot([1, 2]))
+'''
+BAD = '''"""Does it fail?"""
+from finger3d.analyses.study_rows import Result, Row
+
+def run(quick):
+    return Result((Row("bound", "a page", 1e-8, 2e-8, 0.0, "so", measure="at most"),))
+'''
+STOPS = '''"""Is it interrupted?"""
+
+def run(quick):
+    raise KeyboardInterrupt
+'''

@@ -1,0 +1,39 @@
+"""Error bars of a press from its own condensed body."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from finger3d.accuracy.adjoint_bars import adjoint_bars, applies, short_press
+from finger3d.effects.elastic_object import Effect as ElasticObject
+from finger3d.effects.large_deformation import Effect as LargeDeformation
+from finger3d.mechanics.model import Leg
+from tests.models import half_cylinder, run
+
+
+def test_only_a_linear_press_by_depth_is_its_own_judge() -> None:
+    model = half_cylinder(0.4, 2)
+    assert applies(model)
+    for other in (
+        LargeDeformation().apply(model),
+        ElasticObject(10.0, 0.3).apply(model),
+        replace(model, rule="paper"),
+        replace(model, legs=(Leg(1.0, force_N=3.0),)),
+    ):
+        assert not applies(other)
+
+
+def test_errors_of_body_and_contact_add_as_squares_and_many_increments_are_not_repeated() -> None:
+    problem, frames = run(half_cylinder(0.3, 4))
+    found = adjoint_bars(problem, frames)
+    body, contact = found.parts["normal_force_N"]
+    assert found.bars["normal_force_N"] == pytest.approx(math.hypot(body, contact))
+    assert 0.0 < found.bars["normal_force_N"] < 0.1 * sum(f.part.scene_force[:, 1].sum() for f in frames[-1:]) * -2.0
+    assert len(found.coarse.surface.nodes) < len(problem.surface.nodes)
+    long = replace(problem, model=half_cylinder(0.3, 40))
+    short, steps = short_press(long)
+    assert len(steps) == 10
+    assert [leg.depth_mm for leg in short.model.legs] == [leg.depth_mm for leg in long.model.legs]

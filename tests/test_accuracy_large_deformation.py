@@ -1,0 +1,60 @@
+"""The change by large deformation, estimated beside a press."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from finger3d.accuracy import large_deformation as module
+from finger3d.accuracy.changes import changing_numbers
+from finger3d.accuracy.large_deformation import large_deformation
+from finger3d.accuracy.more_increments import more_increments
+from finger3d.effects.kinetic_friction import Effect as KineticFriction
+from finger3d.effects.large_deformation import Effect as LargeDeformation
+from finger3d.errors import Finger3dError
+from finger3d.mechanics.model import MeshOptions
+from tests.models import ended, half_cylinder, run
+
+COARSE = 0.3
+
+
+def test_the_change_by_large_deformation_is_that_of_the_press_at_large_deformation() -> None:
+    model = half_cylinder(COARSE)
+    problem, frames = run(model)
+    estimate = large_deformation(problem, frames[-1], len(frames))
+    truth = changing_numbers(*ended(LargeDeformation().apply(model)))
+    assert {"normal_force_N", "friction_sum_N"} <= set(estimate.significant)
+    for name, change in estimate.significant.items():
+        true = truth[name] - change.value
+        assert 1.0 / 1.5 <= true / change.change <= 1.5  # what is claimed, validation/advice_against_truth.py
+    assert "presses with and without it" in estimate.method
+
+
+def test_no_change_is_told_where_none_can_be_estimated(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem, step = ended(half_cylinder(COARSE, 2))
+    filled = replace(problem, model=KineticFriction(ratio=0.5).apply(problem.model))
+    papers = replace(problem, model=replace(problem.model, rule="paper"))
+    legs = tuple(replace(leg, force_N=1.0) for leg in problem.model.legs)
+    forced = replace(problem, model=replace(problem.model, legs=legs))
+    whole, end = ended(replace(half_cylinder(COARSE, 2), mesh=MeshOptions(5.0, 5.0, "swept")))
+    for found, why in (
+        (large_deformation(filled, step, 2), "kinetic_friction"),
+        (large_deformation(papers, step, 2), "number of increments"),
+        (large_deformation(whole, end, 2), "too coarse"),
+        (large_deformation(forced, step, 2), "to a force"),
+        (more_increments(filled, step, 2), "kinetic_friction"),
+        (more_increments(papers, step, 2), "number of increments"),
+        (more_increments(forced, step, 2), "to a force"),
+        (more_increments(problem, step, 10**6), "would take more than"),
+    ):
+        assert found.changes == {}
+        assert found.method.startswith("no estimate: ")
+        assert why in found.method
+
+    def fail(problem: Any) -> Any:
+        raise Finger3dError("a run did not converge")
+
+    monkeypatch.setattr(module, "last_step", fail)
+    assert large_deformation(problem, step, 2).method == "no estimate: a run did not converge"

@@ -1,0 +1,66 @@
+"""Bodies and paths that differ by a tolerance."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from finger3d.analyses.calibrate.variations import deeper, poisson_step, tilted_mesh, with_modulus
+from finger3d.effects.elastic_object import Effect as ElasticObject
+from finger3d.effects.embedded_gauge import Effect as Foil
+from finger3d.mechanics.build import build
+from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.readings import Taxel
+from finger3d.objects import Plane
+from tests.models import block
+
+COARSE = block(mesh=MeshOptions(1.5, 1.5, "swept"), gauges=(Gauge("g", 1.0, 1.5, length_mm=1.0),))
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        COARSE,
+        replace(COARSE, taxels=(Taxel("t", 0.5, 0.0, 2.0, 1.0),)),
+        ElasticObject(10.0, 0.3).apply(replace(COARSE, object=Plane())),
+        Foil(3000.0, 0.02, 1.0).apply(COARSE),
+    ],
+    ids=["plain", "taxel", "elastic object", "foil"],
+)
+def test_a_body_of_another_modulus_is_the_body_built_with_it(model: Model) -> None:
+    problem = with_modulus(build(model), 1.25)
+    wanted = build(replace(model, material=replace(model.material, E_MPa=1.25)))
+    assert problem.delassus == pytest.approx(wanted.delassus, rel=1e-7, abs=1e-9 * np.abs(wanted.delassus).max())
+    rows = wanted.system.reading_rows
+    assert problem.system.reading_rows == pytest.approx(rows, rel=1e-6, abs=1e-8 * np.abs(rows).max())
+    if wanted.system.object_share is not None:
+        assert problem.system.object_share == pytest.approx(wanted.system.object_share, rel=1e-6)
+
+
+def test_a_deeper_path_leaves_first_touch_where_it_is() -> None:
+    legs = (Leg(0.3), Leg(0.3, 1.0), Leg(0.0))
+    assert [leg.depth_mm for leg in deeper(legs, 0.1)] == pytest.approx([0.4, 0.4, 0.0])
+    assert deeper(legs, 0.1)[1].slide_x_mm == 1.0
+
+
+@pytest.mark.parametrize(("nu", "sd", "step"), [(0.45, 0.01, -0.01), (0.005, 0.01, 0.01), (0.5, 0.01, -0.01)])
+def test_poissons_ratio_stays_in_its_range(nu: float, sd: float, step: float) -> None:
+    assert poisson_step(nu, sd) == step
+    assert 0.0 <= nu + step <= 0.5
+
+
+def test_poissons_ratio_keeps_its_element_if_it_can() -> None:
+    from finger3d.fem.material import MIXED_FROM
+
+    assert poisson_step(MIXED_FROM, 0.002) == 0.002
+    assert poisson_step(MIXED_FROM - 0.001, 0.002) == -0.002
+
+
+def test_a_tilted_body_has_a_coarser_swept_mesh() -> None:
+    fine = build(replace(COARSE, mesh=MeshOptions(0.01, 1.0, "swept"), domain="plane-strain"))
+    options = tilted_mesh(fine)
+    assert options == MeshOptions(0.02, 2.0, "swept")
+    coarse = build(replace(COARSE, domain="plane-strain"))
+    assert tilted_mesh(coarse) == MeshOptions(1.5, 1.5, "swept")

@@ -1,0 +1,39 @@
+"""The fit of a response to measured values, and its intervals."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from finger3d.analyses.identify.fit import Scale, uncertainty
+
+
+def test_an_interval_follows_a_response_that_saturates() -> None:
+    """Steep below 0.5, flat above: the sum of squares rises by one at 0.49 and at the upper bound."""
+    scales = [Scale("a", 0.0, 1.0)]
+    steep = np.array([[100.0]])
+    found = uncertainty(
+        scales, np.array([0.5]), steep, lambda values: np.array([100.0 * min(float(values[0]) - 0.5, 0.0)])
+    )
+    assert found.low[0] == pytest.approx(0.49, abs=1e-3)
+    assert found.high[0] == 1.0
+
+
+def test_dependent_and_independent_values() -> None:
+    scales = [Scale("a", 0.0, 1.0), Scale("b", 1.0, 100.0)]
+    assert scales[1].is_logarithmic
+    assert scales[1].share(scales[1].value(0.3)) == pytest.approx(0.3)
+    only_sum = np.array([[100.0, 100.0], [50.0, 50.0]])
+
+    def linear(slope: Any) -> Any:
+        return lambda values: slope @ np.array([s.share(v) - 0.5 for s, v in zip(scales, values, strict=True)])
+
+    told = uncertainty(scales, np.array([0.5, 0.5]), only_sum, linear(only_sum))
+    assert told.untold == ("the data cannot tell a and b apart: they may change against each other and fit as well",)
+    good = uncertainty(scales, np.array([0.5, 0.5]), np.diag([100.0, 200.0]), linear(np.diag([100.0, 200.0])))
+    assert good.untold == ()
+    # 1 / 100 of the range, and 1 / 200 of the logarithmic range times the value 10
+    assert good.stds == pytest.approx([0.01, 0.005 * 10.0 * math.log(100.0)], rel=1e-2)

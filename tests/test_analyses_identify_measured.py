@@ -1,0 +1,47 @@
+"""Files of a measured press."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from finger3d.analyses.identify.measured import read_measured
+from finger3d.errors import Finger3dError
+from tests.sensor_cases import scene
+
+KNOWN = ("normal_force_N", "gauge_a")
+
+
+@pytest.fixture
+def scene_file(tmp_path: Path) -> Path:
+    path = tmp_path / "scene.toml"
+    path.write_text(scene(press={"depth_mm": 10.0, "steps": 8}).to_toml(), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("normal_force_N\n1\n", "must have a column"),
+        ("depth_mm\n1\n2\n", "has no measured column"),
+        ("depth_mm,normal_force\n1,2\n2,3\n", 'column "normal_force" is unknown; did you mean "normal_force_N"'),
+        ("depth_mm,gauge_a_std\n1,2\n2,3\n", 'column "gauge_a_std" has no column "gauge_a"'),
+        ("depth_mm,gauge_a,gauge_a\n1,2,3\n2,3,4\n", 'two columns are called "gauge_a"'),
+        ("depth_mm,gauge_a\n1,2\n2,\n", "line 3: gauge_a is empty"),
+        ("depth_mm,gauge_a\n1,2\n2,much\n", "line 3: gauge_a = 'much': must be a finite number"),
+        ("depth_mm,gauge_a\n1,nan\n2,3\n", "line 2: gauge_a = 'nan': must be a finite number"),
+        ("depth_mm,gauge_a\n1,2,3\n2,3\n", "line 2: has 3 cells, and there are 2 columns"),
+        ("depth_mm,gauge_a\n1,2\n3,3\n2,4\n", "line 4: depth_mm = 2: must be larger than before"),
+        ("depth_mm,gauge_a\n1,2\n", "has 1 rows; at least 2"),
+        ("depth_mm,gauge_a,gauge_a_std\n1,2,0.1\n2,3,0\n", "line 3: gauge_a_std = 0: must be above 0"),
+        ("", "must have a column"),
+    ],
+)
+def test_files_that_are_refused(tmp_path: Path, text: str, told: str) -> None:
+    path = tmp_path / "bench.csv"
+    path.write_text(text)
+    with pytest.raises(Finger3dError) as found:
+        read_measured(path, KNOWN)
+    assert told in str(found.value)
+    assert "\n" not in str(found.value)

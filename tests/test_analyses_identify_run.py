@@ -1,0 +1,120 @@
+"""Identification: values that are known are found again, with deviations that hold; bad files are refused by line."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import finger3d
+from finger3d.results.journal import Journal
+from finger3d.scene import parse
+from tests.identify_cases import FREE, TRUE, bench
+from tests.sensor_cases import scene
+
+
+@pytest.fixture
+def scene_file(tmp_path: Path) -> Path:
+    path = tmp_path / "scene.toml"
+    path.write_text(scene(press={"depth_mm": 10.0, "steps": 8}).to_toml(), encoding="utf-8")
+    return path
+
+
+def test_known_values_are_found_again(tmp_path: Path, scene_file: Path) -> None:
+    found = finger3d.identify(scene_file, bench(tmp_path / "bench.csv"), FREE, tmp_path / "out")
+    for value, std, true in zip(found.fitted.values, found.fitted.stds, TRUE.values(), strict=True):
+        assert value == pytest.approx(true, abs=4.0 * std)
+        assert std < 0.15 * true
+    assert found.notes == ()
+    data = json.loads((tmp_path / "out" / "identify.json").read_text())
+    assert data["values"]["friction.mu"]["value"] == found.fitted.values[1]
+    again = finger3d.load(tmp_path / "out" / "identified.toml")
+    assert again.model().material.E_MPa == pytest.approx(found.fitted.values[0])
+    assert {"identify.png", "identify.csv", "report.html", "presses.jsonl"} <= {
+        p.name for p in (tmp_path / "out").iterdir()
+    }
+
+
+@pytest.mark.slow
+def test_intervals_hold_over_many_benches(tmp_path: Path, scene_file: Path) -> None:
+    inside = []
+    for seed in range(30):
+        measured = bench(tmp_path / f"bench{seed}.csv", seed, stds=True)
+        fitted = finger3d.identify(scene_file, measured, FREE, tmp_path / f"out{seed}").fitted
+        inside += [low <= t <= high for low, high, t in zip(fitted.low, fitted.high, TRUE.values(), strict=True)]
+    # a share of 60 has a standard deviation of 0.06
+    assert np.mean(inside) == pytest.approx(0.683, abs=0.15)
+
+
+def test_the_modulus_alone_needs_one_press(tmp_path: Path, scene_file: Path) -> None:
+    measured = bench(tmp_path / "bench.csv")
+    found = finger3d.identify(
+        scene_file, measured, {"material.E_MPa": (0.05, 5.0)}, tmp_path / "out", ["friction.mu=0.6"]
+    )
+    assert found.presses == 1
+    assert found.fitted.values[0] == pytest.approx(0.37, abs=4.0 * found.fitted.stds[0])
+
+
+def test_an_offset_of_the_depth_is_found(tmp_path: Path, scene_file: Path) -> None:
+    measured = bench(tmp_path / "bench.csv", offset=0.3)
+    free = {"material.E_MPa": (0.05, 5.0), "depth_offset_mm": (-1.0, 0.0)}
+    found = finger3d.identify(scene_file, measured, free, tmp_path / "out", ["friction.mu=0.6", "press.depth_mm=10.5"])
+    assert found.fitted.values[1] == pytest.approx(-0.3, abs=0.05)
+
+
+def test_the_depth_is_fitted_under_a_prescribed_force(tmp_path: Path, scene_file: Path) -> None:
+    force = {"press": {"force_N": 60.0, "steps": 5}}
+    true = parse(scene(**force, material={"nu": 0.45, "E_MPa": 0.8}).as_dict() | {"press": force["press"]})
+    rows = [f"{i},{step.depth_mm!r}" for i, step in enumerate(finger3d.press(true).steps, start=1)]
+    measured = tmp_path / "bench.csv"
+    measured.write_text("step,depth_mm\n" + "\n".join(rows) + "\n")
+    scene_file.write_text(parse(scene(**force).as_dict() | {"press": force["press"]}).to_toml(defaults=False))
+    found = finger3d.identify(scene_file, measured, {"material.E_MPa": (0.3, 2.0)}, tmp_path / "out")
+    assert found.presses > 3  # under a force everything depends on the modulus
+    assert found.fitted.values[0] == pytest.approx(0.8, rel=5e-3)
+
+
+def test_what_the_data_cannot_tell_is_said(tmp_path: Path, scene_file: Path) -> None:
+    """A force at one small depth tells E nu together, and nothing of friction."""
+    rows = list(csv.DictReader(bench(tmp_path / "all.csv").open()))
+    measured = tmp_path / "bench.csv"
+    lines = [f"{r['depth_mm']},{r['normal_force_N']},1.0" for r in rows]
+    measured.write_text("depth_mm,normal_force_N,normal_force_N_std\n" + "\n".join(lines) + "\n")
+    free = {"material.E_MPa": (0.05, 5.0), "friction.mu": (0.5, 0.7)}
+    found = finger3d.identify(scene_file, measured, free, tmp_path / "out")
+    assert "the data cannot tell friction.mu within its bounds" in found.notes
+
+
+def test_a_scene_that_does_not_fit_is_said(tmp_path: Path, scene_file: Path) -> None:
+    measured = bench(tmp_path / "bench.csv", stds=True)
+    found = finger3d.identify(
+        scene_file, measured, {"material.E_MPa": (0.05, 5.0)}, tmp_path / "out", ["friction.mu=0.05"]
+    )
+    assert found.reduced_chi_square > 10.0
+    assert any("does not explain the data" in note for note in found.notes)
+
+
+def test_an_interrupted_identification_continues(tmp_path: Path, scene_file: Path, monkeypatch: Any) -> None:
+    measured, out = bench(tmp_path / "bench.csv"), tmp_path / "out"
+    whole, count = Journal.append, 0
+
+    def some(journal: Journal, row: Any) -> None:
+        nonlocal count
+        count += 1
+        if count > 5:
+            raise KeyboardInterrupt
+        whole(journal, row)
+
+    monkeypatch.setattr(Journal, "append", some)
+    with pytest.raises(KeyboardInterrupt):
+        finger3d.identify(scene_file, measured, FREE, out)
+    assert len((out / "presses.jsonl").read_text().splitlines()) == 5
+    monkeypatch.setattr(Journal, "append", whole)
+    solved: list[Any] = []
+    monkeypatch.setattr(Journal, "append", lambda journal, row: (solved.append(row), whole(journal, row))[1])
+    found = finger3d.identify(scene_file, measured, FREE, out)
+    assert len(solved) == found.presses - 5

@@ -1,0 +1,75 @@
+"""Simulated presses for values of the free keys."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from finger3d.analyses.free_keys import FreeKey
+from finger3d.analyses.identify.measured import MeasuredPress
+from finger3d.analyses.identify.simulated import Simulation, largest, names_of, row_mistake
+from finger3d.errors import Finger3dError
+from finger3d.results.journal import Journal
+from tests.sensor_cases import SCENE, scene
+
+FREE = (FreeKey("material.E_MPa", 0.5, 2.0), FreeKey("depth_offset_mm", -0.5, 0.5))
+ROW = {
+    "values": [1.25, 0.0],
+    "outcome": "converged",
+    "curve": {"depth_mm": [0.0, 5.0, 10.0], "normal_force_N": [0.0, 2.0, 5.0], "gauge_g36": [0.0, 0.01, 0.03]},
+}
+
+
+def simulation(path: Path, *rows: dict) -> Simulation:
+    """A simulation whose solutions are known: nothing is pressed."""
+    return Simulation(SCENE, None, FREE, Journal(path / "presses.jsonl", list(rows)))
+
+
+def measured(at: list[float], path: str = "bench.csv") -> MeasuredPress:
+    columns = {name: np.zeros(len(at)) for name in ("normal_force_N", "gauge_g36")}
+    return MeasuredPress(Path(path), "depth_mm", np.array(at), columns, {})
+
+
+def test_forces_scale_with_the_modulus_and_strains_do_not(tmp_path: Path) -> None:
+    known = simulation(tmp_path, ROW)
+    found = known.curve([2.5, 0.3])
+    assert [*found["normal_force_N"]] == [0.0, 4.0, 10.0]
+    assert [*found["gauge_g36"]] == [0.0, 0.01, 0.03]
+    assert known.solved == 1
+
+
+def test_the_offset_is_added_to_the_measured_depth(tmp_path: Path) -> None:
+    known = simulation(tmp_path, ROW)
+    found = known.at([1.25, 0.5], measured([4.5, 9.5]))
+    assert [*found["normal_force_N"]] == pytest.approx([2.0, 5.0])
+    with pytest.raises(Finger3dError, match=r"bench\.csv: line 2: depth_mm = 10\.5: .* 10$"):
+        known.at([1.25, 0.5], measured([10.0]))
+
+
+def test_a_press_that_failed_is_not_tried_again(tmp_path: Path) -> None:
+    known = simulation(tmp_path, {"values": [1.25, 0.0], "outcome": "too deep", "curve": {}})
+    with pytest.raises(Finger3dError, match=r"fails with material\.E_MPa = 1\.25.*too deep"):
+        known.curve([0.7, 0.1])
+
+
+@pytest.mark.parametrize(
+    ("row", "said"),
+    [
+        (3, "no JSON object"),
+        ({**ROW, "values": [1.0]}, "values must be 2 numbers"),
+        ({**ROW, "outcome": None}, "outcome must be text"),
+        ({**ROW, "curve": {"a": [1.0], "b": [1.0, 2.0]}}, "lists of one length"),
+        (ROW, ""),
+    ],
+)
+def test_a_stored_solution_is_checked(row: object, said: str) -> None:
+    assert row_mistake(FREE)(row) == said or (said and said in row_mistake(FREE)(row))
+
+
+def test_names_and_magnitudes() -> None:
+    names = names_of(scene().model())
+    assert {"depth_mm", "normal_force_N", "time_s", "gauge_g36", "gauge_long"} <= set(names)
+    assert "method" not in names
+    assert largest({"a": np.array([-3.0, 2.0]), "b": np.array([])}) == {"a": 3.0, "b": 0.0}

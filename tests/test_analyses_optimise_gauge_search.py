@@ -1,0 +1,27 @@
+"""The search for the best places of several gauges."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from finger3d.analyses.optimise.gauge_fields import GaugeFields
+from finger3d.analyses.optimise.gauge_search import Candidates, Region, objectives
+from finger3d.sensor.information import prior
+from tests.sensor_cases import scene
+
+MUS = (0.1, 0.25, 0.4, 0.55, 0.7)
+
+
+def test_the_first_gauge_is_the_best_of_all_candidates() -> None:
+    fields = GaugeFields.of(scene().model(), MUS, 1.5e-4, {"depth_mm": 0.1}, lambda text: None)
+    region = Region((10.0, 40.0), (10.0, 30.0), (0.0, 0.0), (0.0, math.pi))
+    candidates = Candidates.of(fields, region.grid()[0], region.angles())
+    base = prior(1, 0.2)
+    values = objectives(base, candidates)
+    # one by one, by the definition of the information
+    for i in np.random.default_rng(0).integers(0, len(values), 20):
+        one = base + candidates.effects.fisher[i]
+        assert values[i] == pytest.approx(np.mean([np.sqrt(np.linalg.inv(f)[0, 0]) for f in one]))

@@ -1,0 +1,132 @@
+"""The result of a press: numbers, tables, fields, and how a notebook shows it."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from dataclasses import asdict
+from html import escape
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import finger3d
+import finger3d.analyses.press
+from finger3d.analyses.result import PressResult
+from finger3d.errors import Finger3dError
+from finger3d.results.vtu import grid
+from tests.scenes import SECTION, SOLID, written
+
+
+@pytest.fixture(scope="module")
+def solid(tmp_path_factory: pytest.TempPathFactory) -> PressResult:
+    folder = tmp_path_factory.mktemp("api")
+    (folder / "scene.toml").write_text(SOLID, encoding="utf-8")
+    return finger3d.press(folder / "scene.toml", folder / "out", figures=False, error=False)
+
+
+def test_tables_are_those_of_the_files(solid: PressResult) -> None:
+    for name, table in {"history.csv": "history", "contact.csv": "contact"}.items():
+        with (solid.out / name).open(encoding="utf-8", newline="") as stream:
+            rows = list(csv.DictReader(stream))
+        frame = solid.to_dataframe(table)
+        assert list(frame.columns) == list(rows[0])
+        assert [str(v) for v in frame.iloc[-1]] == list(rows[-1].values())
+        assert len(frame) == len(rows)
+    with pytest.raises(Finger3dError, match="history"):
+        solid.to_dataframe("forces")
+
+
+def test_the_summary_is_that_of_the_file(solid: PressResult) -> None:
+    file = json.loads((solid.out / "summary.json").read_text(encoding="utf-8"))
+    assert file["steps"] == json.loads(json.dumps(solid.summary()["steps"]))
+
+
+def test_fields_of_the_end_and_of_every_kept_step(solid: PressResult) -> None:
+    end = solid.to_pyvista()
+    assert {"displacement", "strain", "stress", "pressure", "status"} <= set(end.point_data)
+    assert np.allclose(solid.to_pyvista(step=4)["displacement"], end["displacement"], atol=1e-6)
+    first = solid.to_pyvista(step=1)
+    assert set(first.point_data) == {"displacement", "pressure", "shear_x", "shear_z", "status"}
+    # the top comes down with the plane: 1/4 of 0.5 mm, up to the weighting of the gap over a facet, h^2 / 8 R, twice
+    top = np.argmax(end.points[:, 1])
+    assert first["displacement"][top, 1] == pytest.approx(-0.125, abs=2 * 0.5**2 / (8 * 5.0))
+    with pytest.raises(Finger3dError, match="step 9 .* 1, 2, 3, 4"):
+        solid.to_pyvista(step=9)
+    with pytest.raises(Finger3dError, match=r"holds no fields\.vtu"):
+        grid(solid.out / "nothing")
+
+
+def test_a_notebook_shows_numbers_and_the_picture(solid: PressResult, tmp_path: Path) -> None:
+    html = solid._repr_html_()
+    force = solid.summary()["steps"][-1]["normal_force_N"]
+    assert re.search(rf"<td[^>]*>normal force</td><td[^>]*>{force:.5g} N</td>", html)
+    assert "<script>" not in html  # of the scene's title
+    assert all(escape(text) in html for text in solid.summary()["advice"])
+    assert repr(solid).endswith(f": converged, 4 steps, {force:.5g} N at 0.5 mm>")
+    picture = solid.plot_contact()
+    assert picture._repr_png_().startswith(b"\x89PNG")
+    picture.save(tmp_path / "new" / "contact.png")
+    assert (tmp_path / "new" / "contact.png").stat().st_size > 10_000
+
+
+def test_what_a_notebook_prints_of_the_other_objects_is_short_and_its_html_is_whole(
+    solid: PressResult, tmp_path: Path
+) -> None:
+    from finger3d._notebook import card
+    from finger3d.analyses.compare.run import Comparison
+    from finger3d.mechanics.build import build
+    from finger3d.results.comparison import Case
+    from finger3d.sensor.curve import Calibration
+
+    scene = finger3d.load(written(tmp_path, SECTION))
+    mu = np.linspace(0.1, 1.0, 5)
+    good = Case(
+        "solid", 2.0, 0.5, "swept", finger3d.Outcome.CONVERGED, {"force_N_per_mm": 1.5}, {"force_N_per_mm": 0.1}
+    )
+    failed = Case("plane <b>", 2.0, 0.5, "swept", finger3d.Outcome.NO_CONVERGENCE)
+    shown = {
+        "Scene": scene,
+        "Calibration": Calibration("<g>", mu, 0.01 * mu, 1e-4, 0.1),
+        "Comparison": Comparison((good, failed), ("2D would do",), tmp_path),
+        "ReducedModel": finger3d.ReducedModel.of(build(scene.model())),
+        "History": solid.history,
+        "Mesh": build(scene.model()).mesh,
+    }
+    for name, found in shown.items():
+        assert repr(found).startswith(f"<{name}")
+        assert len(repr(found)) < 250
+        assert "\n" not in repr(found)
+    parts = {
+        "Scene": ("E_MPa = 1.0", "domain = plane-stress", "steps = 4"),
+        "Calibration": ("Gauge &lt;g&gt;", "second-order fit", "usable from mu"),
+        "Comparison": ("1.50 ± 0.10", "plane &lt;b&gt;", escape(str(finger3d.Outcome.NO_CONVERGENCE)), "2D would do"),
+    }
+    for name, texts in parts.items():
+        html = shown[name]._repr_html_()  # type: ignore[attr-defined]
+        assert all(text in html for text in texts), (name, html)
+    assert "1 remark<" in card("t", "s", folded=["<a>"])
+    assert "&lt;a&gt;" in card("t", "s", folded=["<a>"])
+
+
+def test_without_a_folder_the_files_go_with_the_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = finger3d.press(finger3d.load(written(tmp_path, SECTION)), error=False)
+    out = result.out
+    assert (out / "summary.json").exists()
+    assert not (out / "report.html").exists()  # no pictures that nobody will see
+    assert result.to_pyvista()["displacement"].shape[1] == 3
+    assert result.to_pyvista(step=2)["displacement"].shape[1] == 3
+    del result
+    assert not out.exists()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["scene.toml"]
+
+
+def test_steps_have_typed_numbers_that_are_those_of_the_summary(solid: PressResult) -> None:
+    assert [asdict(step) for step in solid.steps] == [
+        {**step, "gauges": dict(step["gauges"])} for step in solid.summary()["steps"]
+    ]
+    assert solid.last == solid.steps[-1]
+    assert solid.last.normal_force_N > solid.last.friction_sum_N > 0.0

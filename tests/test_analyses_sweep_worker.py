@@ -1,0 +1,26 @@
+"""Rows that a worker returns."""
+
+from __future__ import annotations
+
+from finger3d.analyses.sweep import worker
+from finger3d.errors import Finger3dError
+from tests.sweep_cases import points_of, pressed_here
+
+
+def test_a_body_that_cannot_be_built_and_a_point_that_fails_are_rows(paper_scene, monkeypatch) -> None:
+    sweep = points_of(paper_scene, "friction.mu=0.06,1")
+
+    def fails(*arguments: object) -> None:
+        raise Finger3dError("no mesh")
+
+    monkeypatch.setattr(worker, "SharedBody", fails)
+    assert [row["outcome"] for row in pressed_here(sweep)] == ["no mesh", "no mesh"]
+
+    class Weak:
+        seconds = 0.0
+
+        def presses(self, variants: list, most: int | None) -> list:
+            return [MemoryError() for _ in variants]
+
+    monkeypatch.setattr(worker, "SharedBody", lambda *a: Weak())
+    assert [row["outcome"] for row in pressed_here(sweep)] == ["MemoryError: no further information"] * 2

@@ -1,0 +1,176 @@
+"""Command ``estimate``: readings on the command line and in files, and what is refused."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from finger3d.sensor import JointCalibration, save
+from tests.commands import run
+from tests.sensor_cases import curve, line, straight, together, tolerance
+
+
+def test_many_readings_from_a_csv(tmp_path: Path, capsys: Any) -> None:
+    kept = save(curve(straight), tmp_path / "calibration.json")
+    readings = tmp_path / "readings.csv"
+    readings.write_text(f"time,strain,std\n0,{straight(0.3)!r},1e-5\n1,0.2,1e-5\n")
+    assert run("estimate", kept, "--csv", readings) == 0
+    rows = list(csv.DictReader(capsys.readouterr().out.splitlines()))
+    assert float(rows[0]["mu"]) == pytest.approx(0.3)
+    assert rows[1]["status"] == "outside"
+    assert run("estimate", kept, "--csv", readings, "--out", tmp_path / "mu.csv") == 0
+    assert "1 of 2 readings determine mu" in capsys.readouterr().out
+    assert len((tmp_path / "mu.csv").read_text().splitlines()) == 3
+    assert run("estimate", kept, "--csv", readings, "--json", "--curve", "fit") == 0
+    assert [a["status"] for a in json.loads(capsys.readouterr().out)] == ["ok", "outside"]
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "told"),
+    [
+        ("strain\n0.01\nabc\n", [], "line 3: strain = 'abc': must be a number"),
+        ("strain\n0.01\nnan\n", [], "strain = nan (reading 2 of 2)"),
+        ("x\n1\n", [], "must have a column named strain"),
+        ("", [], "at least one reading"),
+        ("strain,std\n0.01,-1\n", [], "std = -1.0: must be"),
+        ("strain\n0.01\n", ["--strain", "0.1"], "give either"),
+    ],
+)
+def test_mistakes_in_readings(text: str, options: list[str], told: str, tmp_path: Path, capsys: Any) -> None:
+    kept = save(curve(straight), tmp_path / "calibration.json")
+    (tmp_path / "readings.csv").write_text(text)
+    assert run("estimate", kept, "--csv", tmp_path / "readings.csv", *options) == 2
+    err = capsys.readouterr().err
+    assert told in err
+    assert len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("options", [["--strain", "1e300"], ["--strain", "0.01", "--std", "1e300"]])
+def test_a_reading_that_would_overflow_is_refused(options: list[str], tmp_path: Path, capsys: Any) -> None:
+    kept = save(curve(straight), tmp_path / "calibration.json")
+    assert run("estimate", kept, *options) == 2
+    assert "1e+300: must be" in capsys.readouterr().err
+
+
+def test_estimate_of_nan_and_of_nothing(tmp_path: Path, capsys: Any) -> None:
+    kept = save(curve(straight), tmp_path / "calibration.json")
+    assert run("estimate", kept, "--strain", "nan") == 2
+    assert "strain = nan: must be a finite number" in capsys.readouterr().err
+    assert run("estimate", kept) == 2
+    assert run("estimate", kept, "--strain", "0.1", "--out", tmp_path / "x.csv") == 2
+
+
+@pytest.fixture
+def joint() -> JointCalibration:
+    depth = tolerance("depth_mm", 0.1, 0.02)
+    return together(curve(line(0.01), tolerances=(depth,)), curve(line(-0.006), tolerances=(depth,)))
+
+
+def test_the_command_takes_readings_by_name(tmp_path: Path, joint: JointCalibration, capsys: Any) -> None:
+    kept = save(joint, tmp_path / "calibration.json")
+    a, b = (repr(float(v)) for v in joint.at([0.4])[0])
+    assert run("estimate", kept, "--strain", f"a={a}", "--strain", f"b={b}", "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["mu"] == pytest.approx(0.4, abs=0.01)
+    assert found["readings"] == {"a": float(a), "b": float(b)}
+    assert run("estimate", kept, "--strain", f"a={a}", "--strain", f"b={b}", "--std", "1e-3", "--std", "b=1e-3") == 2
+    assert "b is given twice" in capsys.readouterr().err
+    assert run("estimate", kept, "--strain", f"a={a}", "--strain", f"b={float(b) + 0.03}") == 0
+    assert "no mu from 0.02 to 1.2 has these readings, or they contradict" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (("--strain", "0.05"), "for instance --strain a=0.05"),
+        (("--strain", "c=0.05"), "c is not calibrated"),
+        (("--strain", "a=much"), "must be a number, or NAME=NUMBER"),
+        (("--strain", "a=0.05", "--strain", "a=0.06"), "a is given twice"),
+        (("--strain", "a=nan", "--strain", "b=0.05"), "a = nan: must be a finite number"),
+        (("--strain", "a=0.05", "--std", "b=-1"), "std"),
+    ],
+)
+def test_commands_that_are_refused(
+    tmp_path: Path, joint: JointCalibration, capsys: Any, options: tuple[str, ...], told: str
+) -> None:
+    kept = save(joint, tmp_path / "calibration.json")
+    assert run("estimate", kept, *options) == 2
+    said = capsys.readouterr().err.strip()
+    assert told in said
+    assert "\n" not in said
+
+
+def test_a_file_has_a_column_for_every_reading(tmp_path: Path, joint: JointCalibration, capsys: Any) -> None:
+    kept, readings = save(joint, tmp_path / "calibration.json"), tmp_path / "readings.csv"
+    rows = joint.at([0.3, 0.7])
+    readings.write_text("time,b,a,a_std\n" + "".join(f"0,{b!r},{a!r},1e-4\n" for a, b in rows.tolist()))
+    assert run("estimate", kept, "--csv", readings) == 0
+    found = list(csv.DictReader(io.StringIO(capsys.readouterr().out)))
+    assert [float(row["mu"]) for row in found] == pytest.approx([0.3, 0.7], abs=0.01)
+    assert [float(row["a"]) for row in found] == list(rows[:, 0])
+    assert run("estimate", kept, "--csv", readings, "--out", tmp_path / "mu.csv") == 0
+    assert "2 of 2 readings determine mu" in capsys.readouterr().out
+    readings.write_text("time,b\n0,0.05\n")
+    assert run("estimate", kept, "--csv", readings) == 2
+    assert "must have a column named a" in capsys.readouterr().err
+
+
+def follow(*arguments: object, **options: object) -> subprocess.Popen:
+    command = [sys.executable, "-m", "finger3d", "estimate", *map(str, arguments)]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
+
+
+def test_readings_are_answered_as_they_are_written(tmp_path: Path) -> None:
+    kept, readings = save(curve(straight), tmp_path / "calibration.json"), tmp_path / "readings.csv"
+    readings.write_text("time,strain\n")
+    child = follow(kept, "--follow", readings)
+    try:
+        assert child.stdout.readline().startswith("strain,reading_std,mu,std")
+        for mu in (0.2, 0.4):
+            text = f"1,{straight(mu)!r}\n"
+            with readings.open("a") as stream:
+                stream.write(text[:7])
+                stream.flush()
+                time.sleep(0.1)  # half a line is no reading
+                stream.write(text[7:])
+            assert float(child.stdout.readline().split(",")[2]) == pytest.approx(mu)
+    finally:
+        child.send_signal(2)
+        assert child.wait(timeout=20) == 130
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("x\n1\n", "must have a column named strain"),
+        ("strain\nabc\n", "line 2: strain = 'abc': must be a number"),
+        ("strain\n0.01\nnan\n", "line 3: strain = nan: must be a finite number"),
+        ("strain,std\n0.01,-1\n", "line 2: std = -1.0: must be"),
+    ],
+)
+def test_a_reading_that_is_none_ends_the_stream_with_one_line(tmp_path: Path, text: str, said: str) -> None:
+    kept = save(curve(straight), tmp_path / "calibration.json")
+    child = follow(kept, "--follow", "-", stdin=subprocess.PIPE)
+    out, error = child.communicate(text)
+    assert child.returncode == 2
+    assert said in error
+    assert len(error.splitlines()) == 1
+    assert len(out.splitlines()) == text.count("\n") - 1  # names, and an answer to every reading before
+
+
+def test_standard_input_is_answered_until_it_ends(tmp_path: Path) -> None:
+    kept = save(curve(straight), tmp_path / "calibration.json")
+    child = follow(kept, "--follow", "-", stdin=subprocess.PIPE)
+    out, error = child.communicate(f"strain\n{straight(0.3)!r}\n0.2\n")
+    assert (child.returncode, error) == (0, "")
+    rows = list(csv.DictReader(out.splitlines()))
+    assert float(rows[0]["mu"]) == pytest.approx(0.3)
+    assert rows[1]["status"] == "outside"

@@ -1,0 +1,83 @@
+"""Command ``export``: files of the finger, and the mold with its table."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from finger3d.cli import main
+from finger3d.scene import load
+from tests.scenes import BLOCK
+
+
+@pytest.fixture
+def scene_file(tmp_path) -> Path:
+    path = tmp_path / "scene.toml"
+    assert main(["new", str(path)]) == 0
+    return path
+
+
+def test_the_command_writes_a_mold(scene_file, tmp_path, capsys, monkeypatch) -> None:
+    monkeypatch.setenv("FINGER3D_RENDERER", "matplotlib")
+    out = tmp_path / "Gießform, neu"
+    assert main(["export", str(scene_file), "--out", str(out), "--mold", "--shrinkage=0.002", "--bed=100x100x100"]) == 0
+    printed, err = capsys.readouterr()
+    assert err == ""
+    names = {"finger.step", "finger.stl", "mold.3mf", "mold.step", "mold.png", "sheet.txt"}
+    names |= {f"mold_{part}.stl" for part in ("half_a", "half_b", "lid")}
+    assert {f.name for f in out.glob("[!.]*")} == names
+    text = (out / "sheet.txt").read_text(encoding="utf-8")
+    volume = load(scene_file).design.volume_mm3 / 0.998**3 / 1e3
+    assert f"cavity              {volume:.2f} ml" in text
+    assert "too large for 100 x 100 x 100 mm" in text
+    assert "g36" in text
+    assert "remark: mold_half_a: 116" in printed
+    assert max(len(line) for line in text.splitlines()) <= 120
+    from matplotlib.image import imread
+
+    assert imread(out / "mold.png")[..., :3].std() > 0.05
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--wall-mm", "20"], "--mold"),
+        (["--tolerance-mm", "0"], "--tolerance-mm 0.0: must be from 0.0001"),
+        (["--tolerance-mm", "nan"], "--tolerance-mm nan"),
+        (["--mold", "--split", "y"], "y"),
+        (["--mold", "--wall-mm", "4"], "--wall-mm 4.0: must be at least 6.8"),
+        (["--mold", "--set", "gauge=[]", "--split-mm", "11"], "the split plane misses the finger"),
+    ],
+)
+def test_the_command_refuses_in_one_line(arguments, told, scene_file, tmp_path, capsys) -> None:
+    assert main(["export", str(scene_file), "--out", str(tmp_path / "out"), *arguments]) == 2
+    err = capsys.readouterr().err
+    assert len(err.splitlines()) == 1
+    assert told in err
+    assert not list((tmp_path / "out").glob("*"))
+
+
+def test_a_folder_that_cannot_be_written(scene_file, capsys) -> None:
+    assert main(["export", str(scene_file), "--out", str(scene_file)]) == 2
+    assert "is a file; name a folder" in capsys.readouterr().err
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    path = tmp_path / "scene.toml"
+    path.write_text(BLOCK, encoding="utf-8")
+    return path
+
+
+def test_export_prints_json_alone(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export", str(scene), "--out", str(tmp_path / "out"), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["results"] == str(tmp_path / "out")
+    assert [Path(file).name for file in found["files"]] == ["finger.step", "finger.stl"]
+    # a box: its triangles are the box
+    assert found["volume_mm3"] == pytest.approx(20.0 * 8.0 * 6.0)
+    assert found["stl_volume_mm3"] == pytest.approx(20.0 * 8.0 * 6.0, rel=1e-6)
+    assert found["silicone_ml"] is None
+    assert found["remarks"] == []

@@ -1,0 +1,43 @@
+"""Command ``identify``: what is refused."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from finger3d.cli import main
+from tests.identify_cases import FREE, bench
+from tests.sensor_cases import scene
+
+
+@pytest.fixture
+def scene_file(tmp_path: Path) -> Path:
+    path = tmp_path / "scene.toml"
+    path.write_text(scene(press={"depth_mm": 10.0, "steps": 8}).to_toml(), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("factor", "free", "told"),
+    [
+        (1000.0, FREE, "line 9: gauge_g36 ="),
+        (1.0, {"material.E_MP": (0.05, 5.0)}, "E_MP"),
+        (1.0, {"press.depth_mm": (5.0, 6.0)}, "path of the scene ends at 5"),
+        (1.0, {"gauge.x.x_mm": (1.0, 2.0)}, 'no gauge "x"'),
+    ],
+)
+def test_commands_that_are_refused(
+    tmp_path: Path, scene_file: Path, capsys: Any, factor: float, free: Any, told: str
+) -> None:
+    rows = list(csv.DictReader(bench(tmp_path / "all.csv").open()))
+    measured = tmp_path / "bench.csv"
+    lines = [f"{r['depth_mm']},{r['normal_force_N']},{factor * float(r['gauge_g36'])}" for r in rows]
+    measured.write_text("depth_mm,normal_force_N,gauge_g36\n" + "\n".join(lines) + "\n")
+    options = [text for key, (low, high) in free.items() for text in ("--free", f"{key}={low}:{high}")]
+    command = ["identify", str(scene_file), "--measured", str(measured), "--out", str(tmp_path / "out"), *options]
+    assert main(command) == 2
+    said = capsys.readouterr().err.strip().splitlines()[-1]
+    assert told in said

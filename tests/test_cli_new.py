@@ -1,0 +1,61 @@
+"""Command ``new``: an example scene that loads and explains every key."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from finger3d.mechanics.model import MeshOptions
+from finger3d.scene import load
+from finger3d.scene.reference import reference
+from finger3d.scene.registry import effect_names
+from tests.commands import run
+
+
+def test_new_says_what_to_do_next(tmp_path, capsys) -> None:
+    path = tmp_path / "mine.toml"
+    assert run("new", path) == 0
+    assert f"finger3d press {path} --out out" in capsys.readouterr().out
+
+
+def test_new_writes_a_scene_that_loads_and_is_the_papers_finger(scene) -> None:
+    loaded = load(scene)
+    assert loaded.design.width_mm == 20.0
+    assert loaded.model().mesh == MeshOptions(2.0, 8.0, "ftetwild")
+    assert [leg.depth_mm for leg in loaded.legs] == [10.0]
+
+
+def test_new_explains_every_key(scene) -> None:
+    text = scene.read_text(encoding="utf-8")
+    keys = set(re.findall(r"^\| `(\w+)` \|", reference(), re.MULTILINE))
+    assert {"depth_mm", "prony", "tolerance"} <= keys
+    assert not [key for key in keys if not re.search(rf"\b{key}\b", text)]
+    assert not [name for name in effect_names() if f"\n# [effects.{name}]\n" not in text]
+
+
+@pytest.mark.parametrize("name", effect_names())
+def test_an_effect_of_the_new_scene_is_switched_on_by_uncommenting_it(scene, name) -> None:
+    before, block = scene.read_text(encoding="utf-8").split(f"# [effects.{name}]\n")
+    keys = re.match(r"(?:# \w+ = .*\n)*", block)[0].replace("# ", "", 1).replace("\n# ", "\n")
+    text = before.replace("length_mm = 0.0", "length_mm = 2.0").replace("[press]", "[press]\nduration_s = 1.0", 1)
+    scene.write_text(f"{text}\n[effects.{name}]\n{keys}\n", encoding="utf-8")
+    assert set(load(scene).effects) == {name}
+
+
+def test_new_leaves_a_file_alone_that_is_there(scene, capsys) -> None:
+    scene.write_text("mine", encoding="utf-8")
+    assert run("new", scene) == 2
+    assert f"{scene}: there already" in capsys.readouterr().err
+    assert scene.read_text(encoding="utf-8") == "mine"
+
+
+def test_new_without_a_name_writes_scene_toml(tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run("new") == 0
+    assert load("scene.toml").title == "Fig. 9 finger, 20 mm wide"
+
+
+def test_new_in_a_folder_that_is_not_there(tmp_path, capsys) -> None:
+    assert run("new", tmp_path / "no" / "scene.toml") == 2
+    assert "cannot be written" in capsys.readouterr().err

@@ -1,0 +1,51 @@
+"""Objects made of triangles."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.model import Leg, MeshOptions
+from finger3d.objects import MeshObject, ObjectPose, PlacedObject, Sphere
+from tests.bodies import ball, box
+from tests.object_cases import pad, pressed
+
+
+def test_a_mesh_object_stands_on_its_lowest_point() -> None:
+    surface = ball(5.0)
+    moved = MeshObject(3.0, -2.0, surface=replace(surface, points=surface.points + [7.0, 8.0, 9.0]))
+    placed = PlacedObject.of(moved, 0.0)
+    assert placed.height(np.array([3.0]), np.array([-2.0]))[0] == pytest.approx(0.0, abs=1e-12)
+    assert PlacedObject.of(moved, 0.0, ObjectPose(0.0, 1.0, 0.5)).lowest == pytest.approx((4.0, -1.5))
+    distance, normal = placed.distance(np.array([[3.0, -1.0, -2.0], [3.0, 1.0, -2.0]]))
+    np.testing.assert_allclose(distance, [1.0, -1.0], atol=2e-2)
+    np.testing.assert_allclose(normal, [[0, -1, 0]] * 2, atol=0.1)
+    flat = MeshObject(surface=box(4.0, 1.0, 2.0, (1.0, 2.0, 3.0)))  # of many lowest points the middle
+    height = flat.profile(np.array([1.99, 2.01]), np.zeros(2))
+    assert height[0] == 0.0
+    assert np.isnan(height[1])
+
+
+def test_a_triangulated_ball_presses_like_the_exact_one() -> None:
+    exact, _ = pressed(pad(object=Sphere(radius_mm=4.0)))
+    meshed, _ = pressed(pad(object=MeshObject(surface=ball(4.0, 60, 120))))
+    # facets of 3 degrees lie up to 1.4 um inside, 0.5 % of the depth
+    assert meshed["normal_force_N"] == pytest.approx(exact["normal_force_N"], rel=0.01)
+    assert abs(meshed["tangential_force_x_N"]) < 1e-10  # symmetric, so the quarter is solved
+
+
+def test_turning_a_mesh_object_and_its_slide_turns_the_result() -> None:
+    # A quarter turn about y of a square pad: x becomes z. The mesh is not its own image, so to its accuracy only.
+    square = designs()["block"](half_length_mm=3.0, height_mm=3.0, width_mm=6.0)
+    surface = replace(ball(4.0), points=ball(4.0).points * [1.8, 1.0, 1.0])
+    turned = replace(surface, points=surface.points[:, [2, 1, 0]] * [1.0, 1.0, -1.0])
+    options = MeshOptions(0.4, 1.5, "swept")
+    legs = (Leg(0.2, steps=1), Leg(0.2, slide_x_mm=0.05, steps=1))
+    across = (Leg(0.2, steps=1), Leg(0.2, slide_z_mm=-0.05, steps=1))
+    a, _ = pressed(pad(design=square, mesh=options, object=MeshObject(0.5, 0.2, surface=surface), legs=legs))
+    b, _ = pressed(pad(design=square, mesh=options, object=MeshObject(0.2, -0.5, surface=turned), legs=across))
+    assert b["normal_force_N"] == pytest.approx(a["normal_force_N"], rel=0.03)
+    assert b["tangential_force_z_N"] == pytest.approx(-a["tangential_force_x_N"], rel=0.05)

@@ -1,0 +1,53 @@
+"""Pictures of solids."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES
+from finger3d.fem.simplex import Mesh
+from finger3d.plotting import solid as render
+from finger3d.plotting.figures import finger_picture
+from tests.pictures import OBJECT, assert_shows_the_zones, finger, pressed, top
+
+pytestmark = pytest.mark.usefixtures("fresh_renderer")
+
+
+@pytest.fixture(scope="module")
+def solid() -> tuple[Mesh, dict[str, Any]]:
+    mesh = finger((20, 5, 6))
+    return mesh, pressed(mesh)
+
+
+def test_a_solid_is_drawn_by_matplotlib_when_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, solid: tuple[Mesh, dict[str, Any]]
+) -> None:
+    monkeypatch.setenv("FINGER3D_RENDERER", "matplotlib")
+    mesh, result = solid
+    assert finger_picture(tmp_path / "f.png", mesh, **result, title="Fig. 9", thing=OBJECT) == "matplotlib"
+    assert_shows_the_zones(tmp_path / "f.png")
+
+
+def test_the_skin_is_the_whole_boundary_and_lies_on_the_curved_surface(solid: tuple[Mesh, dict[str, Any]]) -> None:
+    mesh, result = solid
+    table = result["table"]
+    status = np.array([STATUS_NAMES.index(s) for s in table["status"]])
+    shear = np.column_stack([table[f"shear_{axis}_MPa"] for axis in "xyz"])
+    still = np.zeros_like(mesh.points)
+    nodes = result["contact_nodes"]
+    skin = render.skin_of(mesh, still, table["pressure_MPa"], shear, status, nodes, np.zeros(len(nodes), dtype=int))
+    assert len(skin.contact) == 6 * len(mesh.facets["contact"])
+    assert len(skin.body) == sum(len(f) for k, f in mesh.facets.items() if k != "contact")
+    assert np.abs(skin.contact[..., 1] - top(skin.contact[..., 0])).max() < 0.2  # sagitta of a facet 5 mm long
+    edges = skin.contact[:, 1:] - skin.contact[:, :1]
+    area = 0.5 * np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+    assert area.sum() == pytest.approx(20.0 * 200.0 * np.arcsin(0.5), rel=1e-3)
+    # Every contact point owns as much of the picture as of the surface: slip's share of the touching area.
+    touching = skin.status != OPEN
+    assert 0.4 < area[skin.status == SLIP].sum() / area[touching].sum() < 0.9
+    assert 20 < len(skin.arrow) < 150
+    assert np.linalg.norm(skin.arrow, axis=1).max() <= 1.0 + 1e-12

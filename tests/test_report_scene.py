@@ -1,0 +1,29 @@
+"""The scene in a page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from finger3d.report.build import Code, Table
+from finger3d.report.scene import how_modelled
+from tests.sensor_cases import scene
+
+
+def test_every_table_of_the_scene_with_its_defaults(tmp_path: Path) -> None:
+    data = scene(effects={"kinetic_friction": {"ratio": 0.7}}).as_dict()
+    (table,) = how_modelled({"scene": data}, tmp_path)
+    assert isinstance(table, Table)
+    rows = dict(table.rows)
+    assert rows["finger"].startswith("geometry = clipped_cylinder, radius_mm = 100")
+    assert {"material", "press", "model", "mesh", "gauge g36", "gauge long"} <= set(rows)
+    assert "x_mm = 36" in rows["gauge g36"]
+    assert "ratio = 0.7" in rows["effect kinetic_friction"]
+    assert "branch = keep" in rows["effect kinetic_friction"]
+
+
+def test_a_scene_without_effects_says_so_and_its_file_is_quoted(tmp_path: Path) -> None:
+    (tmp_path / "scene.toml").write_text('title = "mine"\n', encoding="utf-8")
+    table, baseline, file = how_modelled({"scene": scene().as_dict()}, tmp_path)
+    assert not [name for name, _ in table.rows if name.startswith("effect")]
+    assert "linear elasticity" in baseline
+    assert file == Code('title = "mine"\n', "scene.toml")

@@ -1,0 +1,48 @@
+"""Checks of a scene beyond single keys."""
+
+from __future__ import annotations
+
+import pytest
+
+from finger3d.errors import Finger3dError
+from tests.commands import refused
+
+
+@pytest.mark.parametrize(
+    ("override", "expected"),
+    [
+        ("model.domain=plane-strain", ['model.domain = "plane-strain"', 'must be "solid"']),
+        ("mesh.mesher=swept", ['mesh.mesher = "swept"', 'must be "ftetwild"']),
+        ("gauge=[{name='a', x_mm=9.0, y_mm=1.0, z_mm=9.0}]", ["gauge.0.z_mm = 9.0", "nearer to 0"]),
+        ("gauge=[{name='a', x_mm=7.0, y_mm=9.0}]", ["gauge.0.y_mm = 9.0", "from 0 to 7.14142"]),
+    ],
+)
+def test_a_hemisphere_is_a_solid_without_a_section(override, expected, tmp_path, capsys) -> None:
+    path = tmp_path / "ball.toml"
+    path.write_text(
+        '[finger]\ngeometry = "hemisphere"\nradius_mm = 10.0\n'
+        "[material]\nE_MPa = 1.0\nnu = 0.4\n[press]\ndepth_mm = 1.0\n"
+    )
+    err = refused(capsys, "plan", path, "--set", override)
+    for text in expected:
+        assert text in err
+
+
+@pytest.mark.parametrize(
+    ("legs", "text"),
+    [
+        ([{"depth_mm": 0.0, "slide_x_mm": 1.0}], "moves before first touch"),
+        ([{"depth_mm": 1.0}, {"depth_mm": 1.0}], "goes nowhere"),
+    ],
+)
+def test_a_leg_that_does_nothing_is_refused(legs, text) -> None:
+    from finger3d.scene import parse
+
+    tables = {
+        "finger": {"geometry": "half_cylinder", "radius_mm": 5.0, "width_mm": 2.0},
+        "material": {"E_MPa": 1.0, "nu": 0.3},
+        "press": {"leg": legs},
+    }
+    with pytest.raises(Finger3dError, match=text) as refused:
+        parse(tables)
+    assert "\n" not in str(refused.value)

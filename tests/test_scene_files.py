@@ -1,0 +1,63 @@
+"""Files that a scene names."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from finger3d.errors import Finger3dError
+from finger3d.geometry.surface import Triangles
+from finger3d.objects import MeshObject
+from finger3d.scene import load, parse
+from tests.bodies import box, channel, write_stl
+
+FINGER = {"geometry": "half_cylinder", "radius_mm": 5.0, "width_mm": 4.0}
+SCENE: dict[str, Any] = {"finger": FINGER, "material": {"E_MPa": 1.0, "nu": 0.3}, "press": {"depth_mm": 0.5}}
+
+
+def scene_with(path: Path, **table: Any) -> dict[str, Any]:
+    return {**SCENE, "object": {"shape": "mesh", "path": str(path), **table}}
+
+
+@pytest.mark.parametrize(
+    ("surface", "table", "text"),
+    [
+        (box(2, 2, 2), {"x_mm": 50.0}, "never touches"),
+        (channel(12.0, 4.9), {}, "touches the base first"),
+        (box(2e3, 2e3, 2e3), {}, "200 times as large as the finger of 10 mm"),
+        (box(2e-3, 2e-3, 2e-3), {}, r"times smaller than the finger of 10 mm; .* 1000 if it was drawn in metres"),
+        (box(2, 2, 2), {"scale": 0.0}, "object.scale = 0.0: must be a number from 1e-6 to 1e6"),
+        (box(2, 2, 2), {"scael": 2.0}, 'did you mean "scale"'),
+        (Triangles(box(2, 2, 2).points, box(2, 2, 2).faces[2:]), {}, "not closed"),
+    ],
+    ids=["beside", "base", "huge", "tiny", "scale", "misspelt", "hole"],
+)
+def test_objects_that_a_scene_refuses(tmp_path: Path, surface: Triangles, table: dict[str, Any], text: str) -> None:
+    surface = replace(surface, points=surface.points * 1.0001)
+    with pytest.raises(Finger3dError, match=text) as refused:
+        parse(scene_with(write_stl(tmp_path / "object.stl", surface), **table))
+    assert "\n" not in str(refused.value)
+
+
+def test_paths_are_relative_to_the_scene_and_survive_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "parts").mkdir()
+    write_stl(tmp_path / "parts" / "plate.stl", box(6.0, 1.0, 6.0))
+    text = parse(scene_with(tmp_path / "parts" / "plate.stl")).to_toml()
+    (tmp_path / "a.toml").write_text(text.replace(str(tmp_path / "parts"), "parts"), encoding="utf-8")
+    monkeypatch.chdir("/")
+    scene = load(tmp_path / "a.toml")
+    assert isinstance(scene.object, MeshObject)
+    elsewhere = tmp_path / "results"
+    elsewhere.mkdir()
+    (elsewhere / "scene.toml").write_text(scene.to_toml(), encoding="utf-8")
+    assert load(elsewhere / "scene.toml") == scene
+
+
+def test_object_scale_changes_the_object(tmp_path: Path) -> None:
+    path = write_stl(tmp_path / "inches.stl", box(0.2, 0.1, 0.2))
+    obj = parse(scene_with(path, scale=25.4)).object
+    assert isinstance(obj, MeshObject)
+    assert obj.surface.volume == pytest.approx(0.004 * 25.4**3)

@@ -1,0 +1,52 @@
+"""Bodies that relax, and the relaxation in closed form."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from finger3d.contact.friction import Coulomb
+from finger3d.effects.viscosity import Effect
+from finger3d.fem.material import Isotropic
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.history import StepResult
+from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.solve import march
+from finger3d.objects import Sphere
+
+TWO = ((0.5, 1.0), (0.2, 0.1))
+RAMP = (Leg(0.3, steps=6, duration_s=1.0),)
+RAMP_AND_HOLD = (*RAMP, Leg(0.3, steps=5, duration_s=3.0))
+UP_AND_DOWN = (*RAMP_AND_HOLD, Leg(0.0, steps=4, duration_s=0.5), Leg(0.0, steps=2, duration_s=2.0))
+
+
+def block(**changes: object) -> Model:
+    body = designs()["block"](half_length_mm=4.0, height_mm=3.0, width_mm=4.0)
+    model = Model(
+        body, Isotropic(1.0, 0.3), MeshOptions(0.8, 1.2, "swept"), UP_AND_DOWN, object=Sphere(radius_mm=4.0),
+        friction=Coulomb(0.25), gauges=(Gauge("g", 0.0, 1.5, 0.0, 0.0, 2.0),),
+    )  # fmt: skip
+    return replace(model, **changes)
+
+
+def viscous(problem: Problem, prony: tuple = TWO, bulk: bool = True, **changes: object) -> Problem:
+    return replace(problem, model=Effect(prony, bulk).apply(replace(problem.model, **changes)))
+
+
+def run(problem: Problem) -> list[StepResult]:
+    frames = list(march(problem))
+    assert all(f.outcome.ok and f.residual <= 1e-8 for f in frames)
+    return frames
+
+
+def mean_relaxation(prony: tuple, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Mean of r from `low` to `high`."""
+    total = (1.0 - sum(g for g, _ in prony)) * (high - low)
+    total += sum(g * tau * (np.exp(-low / tau) - np.exp(-high / tau)) for g, tau in prony)
+    return total / (high - low)
+
+
+def relaxation(prony: tuple, t: np.ndarray) -> np.ndarray:
+    return 1.0 - sum(g * (1.0 - np.exp(-t / tau)) for g, tau in prony)
