@@ -125,8 +125,11 @@ def edge_ratio(problem: Problem, beside: Problem) -> float:
 
     Between swept meshes the ratio follows from the numbers of unknowns, since edges at the base are bounded by the
     finger; between unstructured meshes from the distance of contact points, since both grow alike away from the
-    contact; between an unstructured and a swept mesh it is the geometric mean of the two.
+    contact; between an unstructured and a swept mesh it is the geometric mean of the two.  Between meshes refined
+    around gauges it is that of the sizes asked for, to which edges near the contact and the gauges are proportional.
     """
+    if problem.model.gauges and problem.model.mesh.gauge_refinement > 1.0:
+        return beside.model.mesh.size_mm / problem.model.mesh.size_mm
     by_unknowns = float(
         (problem.part.stiffness.upper.shape[0] / beside.part.stiffness.upper.shape[0]) ** (1.0 / problem.dim)
     )
