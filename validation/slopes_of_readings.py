@@ -3,9 +3,9 @@
 The calibrated strain of a gauge tells mu by its slope.  The finger of Fig. 9 (nu = 0.49) is pressed 10 mm onto a plane
 in equal increments, the same number on every mesh, at mu = 0.05, 0.15 to 1.05; its gauge lies 3 mm below the contact
 face and 4 mm beside the edge of the contact.  The slope at mu = 0.1, 0.2 to 1 is the difference over 0.1.  Two meshes,
-one twice as fine as the other, shall agree within 5 % of the largest slope: of a section in plane strain, and of a solid
-20 mm wide with structured and with unstructured meshes.  They are meshed as `size_mm` says, and refined around the
-gauge by ``mesh.gauge_refinement``.
+one twice as fine as the other, shall agree within 5 % of the largest slope: of a section in plane strain, and of a
+solid 20 mm wide with structured and with unstructured meshes.  They are meshed as `size_mm` says, and refined around
+the gauge by ``mesh.gauge_refinement``.
 
 Without refinement a cell at the gauge is as large as its distance from the edge of the contact: that is most of the
 difference.  The rest is contact: its edge, and that of the stick zone, lie between two points.  It counts in the wide
