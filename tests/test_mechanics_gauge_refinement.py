@@ -8,6 +8,7 @@ import pytest
 
 from finger3d._types import Float
 from finger3d.accuracy.companions import companion, edge_ratio
+from finger3d.accuracy.cost import forecast
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
@@ -86,3 +87,10 @@ def test_the_key_of_a_scene_reaches_the_mesh_and_is_written_with_it() -> None:
     assert scene.model().mesh.gauge_refinement == 3.0
     assert scene.with_mesh(replace(scene.mesh, size_mm=0.5)).mesh.gauge_refinement == 3.0
     assert scene.as_dict()["mesh"]["gauge_refinement"] == 3.0
+
+
+def test_a_forecast_counts_the_cells_around_gauges() -> None:
+    finer = model(2.0, 4.0)
+    expected, built = forecast(finer), build(finer)
+    assert expected["cells"] == built.part.report.cells
+    assert expected["dofs"] == built.part.stiffness.upper.shape[0]
