@@ -1,7 +1,7 @@
 """Refinement of a mesh around the gauges of a model.
 
 The strain at a gauge close to the edge of the contact varies over its distance from that edge.  Edges as long as those
-at the contact do not resolve it, and its slope against friction then follows the contact points one by one
+at the contact do not resolve it, and its slope against friction then follows the mesh
 (validation/slopes_of_readings.py).
 """
 
