@@ -123,16 +123,24 @@ def edge_ratio(problem: Problem, beside: Problem) -> float:
 
     Between swept meshes the ratio follows from the numbers of unknowns, since edges at the base are bounded by the
     finger; between unstructured meshes from the distance of contact points, since both grow alike away from the
-    contact; between an unstructured and a swept mesh it is the geometric mean of the two.
+    contact; between an unstructured and a swept mesh it is the geometric mean of the two.  Cells added
+    around gauges do not count: their number is nearly the same at all edge lengths.
     """
-    by_unknowns = float(
-        (problem.part.stiffness.upper.shape[0] / beside.part.stiffness.upper.shape[0]) ** (1.0 / problem.dim)
-    )
+    by_unknowns = float((_unknowns(problem) / _unknowns(beside)) ** (1.0 / problem.dim))
     wild = sum(p.dim == 3 and p.model.mesh.mesher != "swept" for p in (problem, beside))
     if not wild:
         return by_unknowns
     at_contact = _spacing(beside) / _spacing(problem)
     return at_contact if wild == 2 else math.sqrt(by_unknowns * at_contact)
+
+
+def _unknowns(problem: Problem) -> int:
+    """Return the number of unknowns of a mesh, of the displacements only if it was refined around gauges since."""
+    model = problem.model
+    if model.mesh.gauge_refinement == 1.0 or not model.gauges:
+        return int(problem.part.stiffness.upper.shape[0])
+    made = mesh_solid if model.domain == "solid" else mesh_section
+    return int(made(model.design, model.mesh, contact_box(model), symmetry(model))[0].points.size)
 
 
 def _spacing(problem: Problem) -> float:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from finger3d._types import Tree
 from finger3d.mechanics.build import contact_box
 from finger3d.mechanics.cost import AddedCost, PressCost
+from finger3d.mechanics.gauge_refinement import refined_at_gauges
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.path import AUTO_START
 from finger3d.mechanics.step_halving import automatic, condensation_s, contact_s, limits
@@ -118,7 +119,7 @@ def _size(model: Model, zone: tuple[float, float, float, float], axes: tuple[str
     h = model.mesh.size_mm
     if model.domain != "solid" or model.mesh.mesher == "swept":
         make = mesh_solid if model.domain == "solid" else mesh_section
-        mesh, report = make(model.design, model.mesh, zone, axes)
+        mesh, report = refined_at_gauges(model, *make(model.design, model.mesh, zone, axes), axes)
         d, vertices = mesh.dim, len(mesh.vertices)
         points, cells = report.points, report.cells
         length = zone[1] - zone[0]

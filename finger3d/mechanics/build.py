@@ -18,6 +18,7 @@ from finger3d.fem.condense import condense, stiffened
 from finger3d.fem.simplex import CONTACT, Mesh
 from finger3d.fem.traces import BoundarySurface, local_rows, restrict
 from finger3d.mechanics.contact_geometry import contact_geometry, may_touch
+from finger3d.mechanics.gauge_refinement import refined_at_gauges
 from finger3d.mechanics.model import EmbeddedBars, Leg, Model, ObjectResponse
 from finger3d.mechanics.path import targets
 from finger3d.mechanics.problem import (
@@ -168,8 +169,10 @@ def _mesh(
     model: Model, zone: tuple[float, float, float, float], axes: tuple[str, ...], say: Say
 ) -> tuple[Mesh, MeshReport]:
     if model.domain == "solid":
-        return mesh_solid(model.design, model.mesh, zone, axes, say)
-    return mesh_section(model.design, model.mesh, zone, axes)
+        mesh, report = mesh_solid(model.design, model.mesh, zone, axes, say)
+    else:
+        mesh, report = mesh_section(model.design, model.mesh, zone, axes)
+    return refined_at_gauges(model, mesh, report, axes)
 
 
 def _readings(model: Model, body: MeshedBody, bars: EmbeddedBars | None, say: Say) -> list[sp.csr_matrix]:

@@ -71,6 +71,7 @@ class MeshOptions:
 
     `layers` is the least number of layers of a swept mesh over half the width; one layer cannot follow the bulge of a
     free end.  `grading` prescribes edge lengths inside the body, as a refinement towards a goal finds them.
+    `gauge_refinement` is the edge length at the contact over that around gauges; at 1 they change no mesh.
     """
 
     size_mm: float
@@ -78,10 +79,13 @@ class MeshOptions:
     mesher: Literal["ftetwild", "swept"] = "ftetwild"
     layers: int = 2
     grading: Grading | None = None
+    gauge_refinement: float = 1.0
 
     def as_table(self) -> dict[str, float | str]:
         """The keys of ``[mesh]`` in a scene."""
-        return {"size_mm": self.size_mm, "base_size_mm": self.base_size_mm, "mesher": self.mesher}
+        sizes: dict[str, float | str] = {"size_mm": self.size_mm, "base_size_mm": self.base_size_mm}
+        finer = {} if self.gauge_refinement == 1.0 else {"gauge_refinement": self.gauge_refinement}
+        return sizes | finer | {"mesher": self.mesher}
 
 
 @dataclass(frozen=True)

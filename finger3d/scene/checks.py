@@ -165,7 +165,7 @@ def chosen(mesh: MeshTable, design: Design, domain: Domain, obj: RigidObject, bo
         size = _rounded(max(min(coarse, _detail(obj, box, solid)), coarse * _FINEST))
     if base is None:
         base = max(_rounded(min(share * BASE_SHARE, smallest_mm(design, solid=False))), size)
-    return MeshOptions(size, base, mesh.mesher)
+    return MeshOptions(size, base, mesh.mesher, gauge_refinement=mesh.gauge_refinement)
 
 
 def _detail(obj: RigidObject, box: Box, solid: bool) -> float:

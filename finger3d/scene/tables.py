@@ -133,6 +133,7 @@ class MeshTable(TomlTable):
     ----------
     size_mm : edge length at the contact
     base_size_mm : edge length far from it
+    gauge_refinement : edge length at the contact over that around gauges; 1: gauges do not change the mesh
     mesher : fTetWild, or structured and the same on every run, for extruded designs
     tolerance : instead of sizes: refine until the estimated error of the goal is below it
     goal : with tolerance: the number that the mesh is refined for, such as gauge_g36; the normal force unless given
@@ -141,6 +142,7 @@ class MeshTable(TomlTable):
 
     size_mm: Edge | None = None
     base_size_mm: Edge | None = None
+    gauge_refinement: Annotated[float, Ge(1), Le(100)] = 1.0
     mesher: Literal["ftetwild", "swept"] = "ftetwild"
     tolerance: Annotated[float, Ge(1e-6), Lt(1)] | None = None
     goal: Name | None = None

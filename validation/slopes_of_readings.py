@@ -1,0 +1,187 @@
+"""Does the slope of a gauge's strain against friction follow the mesh, and what makes it smooth?
+
+The calibrated strain of a gauge tells mu by its slope.  The finger of Fig. 9 (nu = 0.49) is pressed 10 mm onto a plane
+in equal increments, the same number on every mesh, at mu = 0.05, 0.15 to 1.05; its gauge lies 3 mm below the contact
+face and 4 mm beside the edge of the contact.  The slope at mu = 0.1, 0.2 to 1 is the difference over 0.1.  Two meshes,
+one twice as fine as the other, shall agree within 5 % of the largest slope: of a section in plane strain, and of a
+solid 20 mm wide with structured and with unstructured meshes.  They are meshed as `size_mm` says, and refined around
+the gauge by ``mesh.gauge_refinement``.
+
+Without refinement a cell at the gauge is as large as its distance from the edge of the contact: that is most of the
+difference.  The rest is contact: its edge, and that of the stick zone, lie between two points.  It counts in the wide
+finger, whose strain moves with mu by a tenth of what it does in the section, since the effects of normal and tangential
+tractions nearly cancel.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d.analyses.study_rows import Result, Row
+from finger3d.contact.friction import Coulomb
+from finger3d.fem.material import Isotropic
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.build import build
+from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.solve import march
+
+from ._paper import columns
+
+Float = NDArray[np.float64]
+
+SECTION, SWEPT, WILD = "section", "20 mm wide, swept", "20 mm wide, fTetWild"
+CASES: dict[str, tuple[Domain, Literal["swept", "ftetwild"]]] = {
+    SECTION: ("plane-strain", "swept"),
+    SWEPT: ("solid", "swept"),
+    WILD: ("solid", "ftetwild"),
+}
+PLAIN, REFINED = 1.0, 2.0
+SIZES = {SECTION: (4.0, 2.0, 1.0, 0.5, 0.25), SWEPT: (4.0, 2.8, 2.0, 1.4), WILD: (4.0, 2.8, 2.0, 1.4)}
+QUICK = {SECTION: (1.0, 0.5)}
+ENDS = np.linspace(0.05, 1.05, 11)
+MUS = 0.5 * (ENDS[1:] + ENDS[:-1])
+STEPS, QUICK_STEPS = 40, 10
+ALLOWED = 0.05
+SHADES = {
+    4.0: "#fdbe85", 2.8: "#fd8d3c", 2.0: "#d94701", 1.4: "#9ecae1", 1.0: "#3182bd", 0.5: "#08519c", 0.25: "#222222",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Strain (11,) at `ENDS` on a mesh, and its numbers of unknowns and contact points."""
+
+    strain: Float
+    dofs: int
+    points: int
+
+    @property
+    def slope(self) -> Float:
+        """Slope (10,) of the strain at `MUS`."""
+        return np.asarray(np.diff(self.strain) / np.diff(ENDS))
+
+    def error(self, finer: Curve) -> float:
+        """Return the largest error of the slope by a finer mesh, over the largest slope there."""
+        return float(np.abs(self.slope - finer.slope).max() / np.abs(finer.slope).max())
+
+
+Curves = dict[tuple[str, float, float], Curve]
+
+
+def curve(case: str, refinement: float, size: float, steps: int) -> Curve:
+    """Return the strain of the gauge over mu on a mesh."""
+    domain, mesher = CASES[case]
+    design = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
+    mesh = MeshOptions(size, 4.0 * size, mesher, gauge_refinement=refinement)
+    gauge = Gauge("g", 36.0, 40.0, angle=math.radians(30.0))
+    model = Model(design, Isotropic(1.0, 0.49), mesh, (Leg(10.0, steps=steps),), gauges=(gauge,), domain=domain)
+    problem = build(model)
+    strain = []
+    near: Sequence[Float] = ()
+    for mu in ENDS:
+        frames = list(march(replace(problem, model=replace(model, friction=Coulomb(float(mu)))), near))
+        strain.append(frames[-1].gauges["g"] if frames[-1].outcome.ok else math.nan)
+        near = [frame.part.force for frame in frames]
+    return Curve(np.array(strain), problem.part.stiffness.upper.shape[0], len(problem.surface.nodes))
+
+
+def run(quick: bool) -> Result:
+    """Quick: the section on two meshes, in ten increments."""
+    steps = QUICK_STEPS if quick else STEPS
+    found: Curves = {
+        (case, refinement, size): curve(case, refinement, size, steps)
+        for case, sizes in (QUICK if quick else SIZES).items()
+        for refinement in (PLAIN, REFINED)
+        for size in sizes
+    }
+    lines = [
+        (case, refinement, size, c.dofs, c.points, float(mu), float(slope))
+        for (case, refinement, size), c in found.items()
+        for mu, slope in zip(MUS, c.slope, strict=True)
+    ]
+    names = "case gauge_refinement size_mm dofs contact_points mu strain_per_mu"
+    return Result(
+        (*_against_finer(found), *_between_meshers(found), *_section(found)),
+        columns(names, lines),
+        lambda figure: _draw(figure, found),
+    )
+
+
+def _against_finer(found: Curves) -> list[Row]:
+    """The goal, mesh by mesh, and what the refinement leaves of the error."""
+    error = {key: c.error(found[half]) for key, c in found.items() if (half := (*key[:2], key[2] / 2.0)) in found}
+    what = "largest error of d strain / d mu, mu = .1 to 1, over the largest slope"
+    goal = [
+        Row(
+            f"{what}, {case}, {size:g} mm, gauge_refinement = {refinement:g}", "half the edges", ALLOWED, value, 0.0,
+            "the goal", "statement", "at most",
+        )
+        for (case, refinement, size), value in error.items()
+    ]  # fmt: skip
+    left = [
+        Row(
+            f"that error with gauge_refinement = 2, over that without, {case}, {size:g} mm", "no refinement", 0.5,
+            value / error[case, PLAIN, size], 0.0, "half pays for its cells", "statement", "at most",
+        )
+        for (case, refinement, size), value in error.items()
+        if refinement == REFINED
+    ]  # fmt: skip
+    return goal + left
+
+
+def _between_meshers(found: Curves) -> list[Row]:
+    """Two unrelated meshes of the solid with edges of 1.4 mm."""
+    what = (
+        "largest difference of d strain / d mu between swept and fTetWild, over the largest slope, 20 mm wide, 1.4 mm"
+    )
+    return [
+        Row(
+            f"{what}, gauge_refinement = {refinement:g}", "the other mesher", 2.0 * ALLOWED,
+            found[SWEPT, refinement, 1.4].error(found[WILD, refinement, 1.4]), 0.0, "the goal, of each of them",
+            "statement", "at most",
+        )
+        for refinement in (PLAIN, REFINED)
+        if (WILD, refinement, 1.4) in found
+    ]  # fmt: skip
+
+
+def _section(found: Curves) -> list[Row]:
+    """The section, judged: its meshes can be made so fine that the finest one is known to be better than the others."""
+    finest = found[min((key for key in found if key[:2] == (SECTION, REFINED)), key=lambda key: key[2])]
+    error = {refinement: found[SECTION, refinement, 1.0].error(finest) for refinement in (PLAIN, REFINED)}
+    what = "largest error of d strain / d mu by the finest refined mesh, over the largest slope, section, 1 mm"
+    return [
+        Row(
+            f"{what}, gauge_refinement = 2", "finest mesh", ALLOWED, error[REFINED], 0.0, "the goal", "sensitivity",
+            "at most",
+        ),
+        Row(
+            f"{what}, gauge_refinement = 2 over 1", "no refinement", 0.5, error[REFINED] / error[PLAIN], 0.0,
+            "edges half as long at the gauge leave a quarter of its error", "sensitivity", "at most",
+        ),
+    ]  # fmt: skip
+
+
+def _draw(figure: Any, found: Curves) -> None:
+    cases = list(dict.fromkeys(key[0] for key in found))
+    figure.set_size_inches(11.0, 3.6 * len(cases))
+    figure.set_layout_engine("constrained")
+    panels = figure.subplots(len(cases), 2, sharex=True, sharey="row", squeeze=False)
+    for case, row in zip(cases, panels, strict=True):
+        row[0].set_ylabel("d strain / d mu, 1e-3")
+        for refinement, axes in zip((PLAIN, REFINED), row, strict=True):
+            for (_, _, size), c in ((k, c) for k, c in found.items() if k[:2] == (case, refinement)):
+                label = f"{size:g} mm: {c.dofs} unknowns, {c.points} points"
+                axes.plot(MUS, 1e3 * c.slope, "o-", ms=3, lw=1.5, color=SHADES[size], label=label)
+            kind = "no refinement" if refinement == PLAIN else f"gauge_refinement = {refinement:g}"
+            axes.set_title(f"{case}: {kind}", fontsize=10)
+            axes.grid(alpha=0.3)
+            axes.legend(fontsize=8, frameon=False)
+    for axes in panels[-1]:
+        axes.set_xlabel("friction coefficient mu")
