@@ -60,7 +60,7 @@ _NEARLY_FIXED = 1e-2
 """Relative mismatch below which the expected forces are the initial guess themselves."""
 
 _ROWS_IN_CACHE = 64
-"""Rows of the Delassus operator that are gathered at a time; this halves the time and the memory of a gather at once."""
+"""Rows of the Delassus operator gathered at a time, which takes half the time and memory of one gather."""
 
 _ONE_THREAD_BELOW = 3000
 """Rows of the Delassus operator below which two threads gain little; on a busy machine they lose a factor of 10."""
