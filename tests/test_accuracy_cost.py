@@ -104,8 +104,11 @@ def test_step_lengths_are_counted() -> None:
     assert "2 more factorisations" in forecast(model)["viscosity"]
 
 
-def test_presses_took_what_is_foretold(root: Path) -> None:
-    # whole presses of the Fig. 9 finger as measured last, 10 000 to 509 000 unknowns; a factor 2 is what it claims
+def test_presses_took_what_is_foretold(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # whole presses of the Fig. 9 finger as measured last, 12 000 unknowns and more; a factor 2 is what it claims
+    from finger3d.meshing import limits
+
+    monkeypatch.setattr(limits, "memory_bytes", lambda: (10**12, 10**12))  # larger ones need more than this machine has
     with (root / "validation" / "results" / "scaling_table.csv").open(encoding="utf-8", newline="") as file:
         measured = list(csv.DictReader(file))
     assert {row["series"] for row in measured} == {"unknowns", "contact rows"}

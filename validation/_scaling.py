@@ -32,7 +32,7 @@ class Size:
 
 
 class Watch(Progress):
-    """Tells by the job's own announcements which stage runs, and keeps the seconds and the largest memory of each."""
+    """Tells by the job's own announcements which stage runs, and keeps seconds, processor seconds and peak of each."""
 
     _STARTS: Mapping[str, str] = {
         "meshing": "mesh", "assembling": "assembly", "condensing": "condensation", "pressing": "contact",
@@ -42,7 +42,8 @@ class Watch(Progress):
     def __init__(self) -> None:
         self.peaks = dict.fromkeys(STAGES, 0.0)
         self.seconds = dict.fromkeys(STAGES, 0.0)
-        self.since = time.perf_counter()
+        self.processor = dict.fromkeys(STAGES, 0.0)
+        self.since = time.perf_counter(), time.process_time()
         self.now = "mesh"
 
     def stage(self, text: str) -> None:
@@ -63,8 +64,9 @@ class Watch(Progress):
         """End of a stage: its peak is kept, and the next begins at what is in use."""
         self.peaks[self.now] = max(self.peaks[self.now], peak_mb())
         reset_peak()
-        now = time.perf_counter()
-        self.seconds[self.now] += now - self.since
+        now = time.perf_counter(), time.process_time()
+        self.seconds[self.now] += now[0] - self.since[0]
+        self.processor[self.now] += now[1] - self.since[1]
         self.since = now
 
 
@@ -101,7 +103,10 @@ def sweep_seconds(size: Size, workers: int) -> float:
 
 
 def pressed(given: dict[str, Any]) -> dict[str, Any]:
-    """Seconds and peaks (MB) by stage, and sizes, of a press given as a dict."""
+    """Seconds, processor seconds and peaks (MB) by stage, and sizes, of a press given as a dict.
+
+    Processor seconds are those of this process; the children that draw pictures are not among them.
+    """
     scene = _scene(given["size"], given["base"])
     watch = Watch()
     with tempfile.TemporaryDirectory(prefix="finger3d_scaling_") as folder:
@@ -111,6 +116,7 @@ def pressed(given: dict[str, Any]) -> dict[str, Any]:
     last = summary["steps"][-1]
     return {
         "seconds": watch.seconds,
+        "processor_seconds": watch.processor,
         "peaks": watch.peaks,
         "peak_MB": max(watch.peaks.values()),
         "dofs": summary["mesh"]["dofs"],

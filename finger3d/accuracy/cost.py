@@ -161,5 +161,5 @@ def _states_mb(model: Model, press: PressCost, axes: tuple[str, ...]) -> float:
 
 
 def _memory(size: _Size, d: int, gauges: int = 0) -> float:
-    per_dof = 3.0 * (size.dofs / 85_000.0) ** 0.3 * 4e-3 if d == 3 else 2.5e-3
-    return _BASE_MB + per_dof * size.dofs + 1e3 * rows_gb(d * size.contact_points + gauges)
+    body = 1.19e-3 * size.dofs**1.2 if d == 3 else 2.5e-3 * size.dofs
+    return _BASE_MB + body + 1e3 * rows_gb(d * size.contact_points + gauges)

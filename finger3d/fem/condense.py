@@ -165,11 +165,13 @@ def condense(
     if solver == "pardiso":
         before = replaced._factor if replaced else None
         factor = _Pardiso.of(scaled, free, read, before if isinstance(before, _Pardiso) else None)
-        compliance, perturbed = -factor.factor.schur, factor.factor.perturbed
+        schur, perturbed = factor.factor.schur, factor.factor.perturbed
     else:
         factor = _SuperLU.of(scaled[free][:, free], read[:, free].tocsr())
-        compliance, perturbed = factor.compliance(), 0
-    compliance = units[:, None] * (0.5 / unit * (compliance + compliance.T)) * units
+        schur, perturbed = -factor.compliance(), 0
+    compliance = schur + schur.T  # scaled in place: with 10 000 rows each copy takes 0.8 GB
+    compliance *= (-0.5 / unit) * units[:, None]
+    compliance *= units
     seconds = time.perf_counter() - start
     return Condensation(compliance, perturbed, 1, seconds, solver, padded, free, factor, unit, units)
 

@@ -95,7 +95,9 @@ class SchurFactor:
         self._perm = np.zeros(self._n, dtype=np.int32)
         self._perm[self._n - rows :] = 1
         self._iparm = np.zeros(64, dtype=np.int32)
-        self._iparm[[0, 1, 9, 20]] = 1, 3, 13, 1  # own settings, parallel METIS, pivot threshold 1e-13, Bunch-Kaufman
+        # Own settings, parallel METIS, pivot threshold 1e-13, Bunch-Kaufman.  Two-level factorisation, other
+        # pivoting and matching save no time; out of core, the Schur complement returned is zero.
+        self._iparm[[0, 1, 9, 20]] = 1, 3, 13, 1
         self._iparm[35] = 2  # Schur complement, and keep the factor for solves
         self._finalizer = weakref.finalize(self, _release, self._call, self._pt, self._n, self._iparm)
         self.factorizations = 0
