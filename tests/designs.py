@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
 from typing import Any
 
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.model import MeshOptions
 
 GOOD: dict[str, dict[str, float]] = {
     "half_cylinder": {"radius_mm": 5.0, "width_mm": 10.0},
@@ -18,7 +18,7 @@ GOOD: dict[str, dict[str, float]] = {
 FIG9 = designs()["clipped_cylinder"](100.0, 50.0, 36.6, 20.0)
 """The finger of Maeno 2004, Fig. 9, 20 mm wide."""
 
-OPTIONS = SimpleNamespace(size_mm=5.0, base_size_mm=10.0, mesher="ftetwild")
+OPTIONS = MeshOptions(5.0, 10.0, "ftetwild")
 ZONE = (-40.0, 40.0, -10.0, 10.0)
 """Sizes and contact zone with which pytetwild meshes the Fig. 9 finger in a second."""
 

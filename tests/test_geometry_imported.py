@@ -6,7 +6,6 @@ import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from finger3d.geometry.cad import labelled_faces
 from finger3d.geometry.files import read_solid
 from finger3d.geometry.imported import imported
 from finger3d.geometry.surface import Triangles
+from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing import cache
 from finger3d.scene import parse
 from tests.bodies import ball, box, channel, step_of, write_stl
@@ -86,7 +86,7 @@ def test_a_face_named_base_that_is_none_is_refused(tmp_path: Path) -> None:
 
 
 def options(size: float, base: float) -> Any:
-    return SimpleNamespace(size_mm=size, base_size_mm=base, mesher="ftetwild")
+    return MeshOptions(size, base, "ftetwild")
 
 
 def test_meshes_are_kept_by_the_files_content(drawn: Path, tmp_path: Path) -> None:

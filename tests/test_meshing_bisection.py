@@ -1,7 +1,5 @@
 """Local refinement by bisection: conforming, on the same curved body, graded, and no flatter than it must be."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
@@ -11,6 +9,7 @@ from finger3d.fem.elements import EDGES
 from finger3d.fem.quality import curved_jacobians, curved_volume, min_angle_deg
 from finger3d.fem.simplex import Mesh, boundary
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing.bisection import refined
 from finger3d.meshing.swept import mesh_section, mesh_swept
 
@@ -20,7 +19,7 @@ PLACE, SHORTEST = np.array([3.0, 3.5, 0.0]), 0.2
 def body(dim: int) -> Mesh:
     """Half of a half cylinder of radius 5, whose contact facets are curved."""
     design = designs()["half_cylinder"](radius_mm=5.0, width_mm=4.0)
-    options = SimpleNamespace(size_mm=1.5, base_size_mm=3.0, mesher="swept", layers=2)
+    options = MeshOptions(size_mm=1.5, base_size_mm=3.0, mesher="swept", layers=2)
     mesher = mesh_section if dim == 2 else mesh_swept
     return mesher(design, options, (-2.0, 2.0, -2.0, 2.0), ("x",) if dim == 2 else ("x", "z"))[0]
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ import pytest
 
 from finger3d.fem.simplex import Mesh
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing import cache, tetwild
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.sizing import rounded_zone
@@ -42,7 +42,8 @@ def test_a_warm_cache_needs_no_cad(real: tuple[Mesh, Any, list[str]]) -> None:
     code = (
         "import sys; from types import SimpleNamespace as N; from finger3d.geometry.registry import *;"
         "from finger3d.meshing.generate import *;"
-        "d = designs()['clipped_cylinder'](100.0, 50.0, 36.6, 20.0); o = N(size_mm=5.0, base_size_mm=10.0, mesher='');"
+        "d = designs()['clipped_cylinder'](100.0, 50.0, 36.6, 20.0);"
+        "o = N(size_mm=5.0, base_size_mm=10.0, mesher='', grading=None);"
         f"r = mesh_solid(d, o, {ZONE}, {BOTH})[1];"
         "print(r.from_cache, {'build123d', 'OCP', 'pytetwild', 'trimesh', 'scipy', 'vtk'} & set(sys.modules))"
     )
@@ -53,7 +54,7 @@ def test_a_warm_cache_needs_no_cad(real: tuple[Mesh, Any, list[str]]) -> None:
 @pytest.fixture
 def stored(tmp_path: Path) -> tuple[Path, Mesh]:
     """A small mesh in a file."""
-    options = SimpleNamespace(size_mm=2.0, base_size_mm=4.0, mesher="swept", layers=2)
+    options = MeshOptions(size_mm=2.0, base_size_mm=4.0, mesher="swept", layers=2)
     mesh = mesh_solid(designs()["block"](5.0, 5.0, 5.0), options, (-1, 1, -1, 1))[0]
     path = tmp_path / "mesh.npz"
     assert cache.save(path, mesh, 250.0)
@@ -116,8 +117,8 @@ def test_a_cache_that_cannot_be_written_is_said_and_does_not_stop_the_work(
 
 def test_the_key_knows_all_that_shapes_the_mesh() -> None:
     other = designs()["clipped_cylinder"](100.0, 50.0, 36.6, 20.0 + 1e-12)
-    finer = SimpleNamespace(size_mm=4.0, base_size_mm=10.0)
-    coarser = SimpleNamespace(size_mm=5.0, base_size_mm=12.0)
+    finer = MeshOptions(size_mm=4.0, base_size_mm=10.0)
+    coarser = MeshOptions(size_mm=5.0, base_size_mm=12.0)
     keys = [
         cache.key(FIG9, OPTIONS, ZONE, BOTH),
         cache.key(other, OPTIONS, ZONE, BOTH),

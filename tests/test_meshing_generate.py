@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ import pytest
 
 from finger3d.geometry.faceted import body as faceted_body
 from finger3d.geometry.imported import imported
+from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing.generate import mesh_solid
 from tests.designs import SMALL
 
@@ -18,7 +18,7 @@ BOTH = ("x", "z")
 
 
 def options(size: float, base: float) -> Any:
-    return SimpleNamespace(size_mm=size, base_size_mm=base, mesher="ftetwild")
+    return MeshOptions(size_mm=size, base_size_mm=base, mesher="ftetwild")
 
 
 def test_a_step_finger_is_meshed_on_its_cad_faces(drawn: Path) -> None:

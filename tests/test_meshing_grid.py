@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ import pytest
 
 from finger3d.errors import Finger3dError
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.swept import mesh_section
 from tests.designs import FIG9
@@ -25,7 +25,7 @@ def zone(design: Any) -> tuple[float, float, float, float]:
 
 @pytest.mark.parametrize("size", [0.5, 1.0, 2.0])
 def test_edges_have_the_asked_length_in_the_zone_and_grow_away_from_it(size: float) -> None:
-    options = SimpleNamespace(size_mm=size, base_size_mm=8.0, mesher="swept")
+    options = MeshOptions(size_mm=size, base_size_mm=8.0, mesher="swept")
     mesh = mesh_section(FIG9, options, (-40.0, 40.0, 0.0, 0.0))[0]
     edges = mesh.points[mesh.facets["contact"][:, :2]]
     length = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
@@ -48,7 +48,7 @@ def test_edges_have_the_asked_length_in_the_zone_and_grow_away_from_it(size: flo
     ],
 )
 def test_sizes_that_cannot_work_are_refused_in_one_line(changes: dict[str, float], text: str) -> None:
-    options = SimpleNamespace(**{"size_mm": 2.0, "base_size_mm": 8.0, "mesher": "swept", "layers": 2, **changes})
+    options = MeshOptions(**{"size_mm": 2.0, "base_size_mm": 8.0, "mesher": "swept", "layers": 2, **changes})
     with pytest.raises(Finger3dError, match=text) as refused:
         mesh_solid(FIG9, options, zone(FIG9))
     assert "\n" not in str(refused.value)
@@ -57,12 +57,12 @@ def test_sizes_that_cannot_work_are_refused_in_one_line(changes: dict[str, float
 def test_a_wall_too_thin_for_the_size_is_refused() -> None:
     design = designs()["clipped_cylinder"](100.0, 100.0, 0.02, 20.0)
     with pytest.raises(Finger3dError, match="choose smaller sizes, or edge_height_mm = 0"):
-        mesh_section(design, SimpleNamespace(size_mm=20.0, base_size_mm=50.0), (-20.0, 20.0, 0.0, 0.0))
+        mesh_section(design, MeshOptions(size_mm=20.0, base_size_mm=50.0), (-20.0, 20.0, 0.0, 0.0))
 
 
 @pytest.mark.parametrize("size", [5.6, 4.0, 2.8, 2.0])
 def test_no_layer_along_z_is_thicker_than_the_edges_at_the_contact(size: float) -> None:
-    options = SimpleNamespace(size_mm=size, base_size_mm=4.0 * size, mesher="swept", layers=2)
+    options = MeshOptions(size_mm=size, base_size_mm=4.0 * size, mesher="swept", layers=2)
     mesh = mesh_solid(FIG9, options, zone(FIG9))[0]
     levels = np.unique(mesh.points[np.unique(mesh.facets["contact"][:, :3]), 2])
     assert np.diff(levels).max() <= size
@@ -70,7 +70,7 @@ def test_no_layer_along_z_is_thicker_than_the_edges_at_the_contact(size: float) 
 
 def test_the_least_number_of_layers_is_kept() -> None:
     for layers in (1, 2, 4):
-        options = SimpleNamespace(size_mm=12.0, base_size_mm=12.0, mesher="swept", layers=layers)
+        options = MeshOptions(size_mm=12.0, base_size_mm=12.0, mesher="swept", layers=layers)
         mesh = mesh_solid(FIG9, options, zone(FIG9))[0]
         levels = np.unique(mesh.points[np.unique(mesh.facets["contact"][:, :3]), 2])
         assert len(levels) == 2 * layers + 1

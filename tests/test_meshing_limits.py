@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import pytest
 
 from finger3d.errors import Finger3dError
+from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing.generate import mesh_solid
 from tests.designs import FIG9, ZONE
 
@@ -17,6 +16,6 @@ BOTH = ("x", "z")
     ("size", "text"), [(30.0, "larger than the finger"), (0.05, "tetrahedra, forecast .* GB; allowed: at most")]
 )
 def test_sizes_that_hang_pytetwild_are_refused_before_cad(size: float, text: str) -> None:
-    options = SimpleNamespace(size_mm=size, base_size_mm=30.0, mesher="ftetwild")
+    options = MeshOptions(size_mm=size, base_size_mm=30.0, mesher="ftetwild")
     with pytest.raises(Finger3dError, match=text):
         mesh_solid(FIG9, options, ZONE, BOTH)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from finger3d.fem.simplex import boundary, unfold
 from finger3d.geometry.cad import cut
 from finger3d.geometry.registry import designs
 from finger3d.geometry.tessellate import CadFace, Tessellation, tessellate
+from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.snap import MIN_DIHEDRAL_DEG, UnusableMeshError, check_closed, repair, snap
 from tests.designs import FIG9
@@ -28,7 +28,7 @@ def body_of(design: Any, symmetry: tuple[str, ...] = (), tolerance: float = 0.01
 def shaken(design: Any, symmetry: tuple[str, ...], by: float) -> tuple[np.ndarray, np.ndarray]:
     """Vertices and linear tets of a swept mesh, every vertex moved at random by up to `by` mm along each axis."""
     size = 0.12 * design.height_mm
-    options = SimpleNamespace(size_mm=size, base_size_mm=2 * size, mesher="swept", layers=2)
+    options = MeshOptions(size_mm=size, base_size_mm=2 * size, mesher="swept", layers=2)
     mesh = mesh_solid(design, options, (-size, size, -size, size), symmetry)[0]
     used, tets = np.unique(mesh.cells[:, :4], return_inverse=True)
     points = mesh.points[used] + np.random.default_rng(1).uniform(-by, by, (len(used), 3))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import subprocess
 import sys
 import time
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -17,6 +16,7 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.quality import curved_jacobians
 from finger3d.fem.simplex import Mesh, boundary, signed_volumes, unfold
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.swept import mesh_section
 from tests.designs import FIG9
@@ -32,7 +32,7 @@ ZONE = (-0.4, 0.4, -0.5, 0.5)
 
 def sizes(design: Any, share: float = 0.08, grow: float = 4.0) -> Any:
     size = share * design.height_mm
-    return SimpleNamespace(size_mm=size, base_size_mm=grow * size, mesher="swept", layers=2)
+    return MeshOptions(size_mm=size, base_size_mm=grow * size, mesher="swept", layers=2)
 
 
 def zone(design: Any) -> tuple[float, float, float, float]:
@@ -137,7 +137,7 @@ def test_the_curved_area_converges_with_the_fourth_power_of_the_size() -> None:
 
 
 def test_a_section_of_25_000_unknowns_takes_less_than_03_s() -> None:
-    options = SimpleNamespace(size_mm=0.38, base_size_mm=1.5)
+    options = MeshOptions(size_mm=0.38, base_size_mm=1.5)
     mesh_section(FIG9, options, (-44.0, 44.0, 0.0, 0.0))
     start = time.perf_counter()
     mesh = mesh_section(FIG9, options, (-44.0, 44.0, 0.0, 0.0))[0]
@@ -159,7 +159,7 @@ def test_any_finger_gives_a_sound_section(
 ) -> None:
     design = designs()["clipped_cylinder"](radius, length * radius, edge * radius, 10.0)
     size = share * min(design.height_mm, design.half_length_mm)
-    options = SimpleNamespace(size_mm=size, base_size_mm=grow * size)
+    options = MeshOptions(size_mm=size, base_size_mm=grow * size)
     low, high = sorted(w * design.half_length_mm for w in where)
     mesh, report = mesh_section(design, options, (low, high, 0.0, 0.0))
     check_whole(mesh)
@@ -168,7 +168,7 @@ def test_any_finger_gives_a_sound_section(
 
 def test_a_design_without_section_cannot_be_swept() -> None:
     ball = designs()["hemisphere"](5.0)
-    options = SimpleNamespace(size_mm=1.0, base_size_mm=2.0, mesher="swept", layers=2)
+    options = MeshOptions(size_mm=1.0, base_size_mm=2.0, mesher="swept", layers=2)
     with pytest.raises(Finger3dError, match="hemisphere.*'ftetwild'"):
         mesh_solid(ball, options, (-1, 1, -1, 1))
     with pytest.raises(Finger3dError, match="hemisphere.*'solid'"):
@@ -179,7 +179,8 @@ def test_structured_meshes_load_no_cad() -> None:
     code = (
         "import sys; from types import SimpleNamespace as N; from finger3d.geometry.registry import *;"
         "from finger3d.meshing.generate import *; from finger3d.meshing.swept import *;"
-        "d = designs()['half_cylinder'](5.0, 10.0); o = N(size_mm=0.5, base_size_mm=2.0, mesher='swept', layers=2);"
+        "d = designs()['half_cylinder'](5.0, 10.0);"
+        "o = N(size_mm=0.5, base_size_mm=2.0, mesher='swept', layers=2, grading=None);"
         "z = (-2, 2, -5, 5); mesh_section(d, o, z); mesh_solid(d, o, z);"
         "print({'build123d', 'OCP', 'pytetwild', 'trimesh', 'scipy', 'vtk'} & set(sys.modules))"
     )

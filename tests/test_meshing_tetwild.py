@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.quality import curved_jacobians, curved_volume
 from finger3d.fem.simplex import Mesh, boundary, signed_volumes, unfold
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing import tetwild
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.snap import UnusableMeshError, check_closed
@@ -60,7 +60,7 @@ def test_a_real_mesh_is_finer_in_the_zone_than_at_the_base(real: tuple[Mesh, Any
 
 
 def test_a_hemisphere_is_meshed_off_the_middle() -> None:
-    options = SimpleNamespace(size_mm=1.2, base_size_mm=2.0, mesher="ftetwild")
+    options = MeshOptions(size_mm=1.2, base_size_mm=2.0, mesher="ftetwild")
     mesh, report = mesh_solid(BALL, options, (0.0, 2.0, -1.0, 1.0), ("z",))
     assert set(mesh.facets) == {"contact", "base", "symmetry_z"}
     contact = mesh.points[np.unique(mesh.facets["contact"])]

@@ -7,13 +7,13 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing import tetwild
 from finger3d.meshing.sizing import sizing
 from finger3d.meshing.snap import UnusableMeshError
@@ -21,13 +21,13 @@ from tests.bodies import CUBE, SIDES
 
 KILLED = """
 import numpy as np
-from types import SimpleNamespace
+from finger3d.mechanics.model import MeshOptions
 from finger3d.geometry.registry import designs
 from finger3d.meshing import tetwild
 from finger3d.meshing.sizing import sizing
 from tests.test_meshing_tetwild import CUBE, SIDES
 low, high = np.array([-5.0, 0, -5]), np.array([5.0, 10, 5])
-options = SimpleNamespace(size_mm=0.3, base_size_mm=0.3)
+options = MeshOptions(size_mm=0.3, base_size_mm=0.3)
 field = sizing(designs()["block"](5.0, 10.0, 10.0), options, (-5, 5, -5, 5), low, high)
 print("meshing", flush=True)
 tetwild.run_child(CUBE, SIDES, field, 1e-3, 60.0)
@@ -36,7 +36,7 @@ tetwild.run_child(CUBE, SIDES, field, 1e-3, 60.0)
 
 def fine() -> Any:
     block = designs()["block"](5.0, 10.0, 10.0)
-    options = SimpleNamespace(size_mm=4.0, base_size_mm=5.0)
+    options = MeshOptions(size_mm=4.0, base_size_mm=5.0)
     return sizing(block, options, (-5, 5, -5, 5), np.array([-5.0, 0, -5]), np.array([5.0, 10, 5]))
 
 
