@@ -275,8 +275,8 @@ class IncrementEquations:
         out[:, 1:] = np.einsum("ctk,ck->ct", bases[:, 1:], increment)
         return self._active(out.ravel())
 
-    def residual(self, now: Configuration, solution: ContactState) -> float:
-        """Largest violation of contact conditions, equilibrium and p = K (J - 1), dimensionless.
+    def residual(self, now: Configuration, solution: ContactState, out_of_balance: Float) -> float:
+        """Return the largest violation of contact conditions, equilibrium and p = K (J - 1), dimensionless.
 
         Lengths are divided by the depth, forces by the largest at a contact point, p by the shear modulus.  The
         friction coefficients are those that the contact solution has used.
@@ -285,7 +285,7 @@ class IncrementEquations:
         mesh, n = problem.mesh, problem.mesh.points.size
         normal, tangential = force[:, 0], np.linalg.norm(force[:, 1:], axis=1)
         mu = tangential / np.where(normal > 0.0, normal, 1.0)
-        unbalanced = self.out_of_balance(now, force)
+        unbalanced = out_of_balance.copy()
         unbalanced[problem.part.fixed_dofs] = 0.0
         equilibrium = float(np.abs(unbalanced[:n]).max()) / max(
             float(np.linalg.norm(force, axis=1).max()), self._least_force

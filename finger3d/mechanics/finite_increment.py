@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.contact.state import ContactSolution
+from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.errors import Outcome
 from finger3d.fem.hyperelastic import InvertedError
 from finger3d.mechanics.finite_equations import Configuration, IncrementEquations, converged
@@ -75,7 +75,7 @@ class FiniteIncrement(IncrementEquations):
                 linearisation, (now, force), error = None, first, math.inf
                 continue
             now, force = after, solution.state.force
-            last_error, error = error, self.residual(now, solution.state)
+            last_error, error = error, self._error(now, solution.state)
             if converged(error, last_error):
                 return self.finished(now, solution, error, spent)
             if factors and error > _DIVERGED:
@@ -96,7 +96,7 @@ class FiniteIncrement(IncrementEquations):
         for _ in range(_DAMPED_FACTORS):
             solution, after = self._advance(now, force, self.linearise(now, force, damping))
             spent += solution.iterations
-            found = math.inf if after is None else self.residual(after, solution.state)
+            found = math.inf if after is None else self._error(after, solution.state)
             if after is None or found > _LARGEST_RISE * error:
                 damping = max(damping, _LEAST_DAMPING) * _MORE_DAMPING
                 continue
@@ -108,6 +108,9 @@ class FiniteIncrement(IncrementEquations):
             damping = min(damping, _MORE_DAMPING)
             damping = damping if damping > _LEAST_DAMPING else 0.0
         return self.failed(now, Outcome.NEWTON, error, spent)
+
+    def _error(self, now: Configuration, state: ContactState) -> float:
+        return self.residual(now, state, self.out_of_balance(now, state.force))
 
     def _advance(
         self, now: Configuration, force: Float, linearisation: Linearisation

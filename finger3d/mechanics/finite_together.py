@@ -58,6 +58,7 @@ class _Trial:
     first: tuple[Configuration, Float]
     now: Configuration = field(init=False)
     force: Float = field(init=False)
+    out_of_balance: Float = field(init=False)
     error: float = math.inf
     last_error: float = math.inf
     spent: int = 0
@@ -71,10 +72,7 @@ class _Trial:
     def begin(self) -> None:
         """Go back to where the iteration began."""
         (self.now, self.force), self.error = self.first, math.inf
-
-    def load(self) -> Float:
-        """Return the forces out of balance (N,) that the next step takes away."""
-        return -self.equations.out_of_balance(self.now, self.force)
+        self.out_of_balance = self.equations.out_of_balance(self.now, self.force)
 
     def contact(self, linearisation: Linearisation, displacement: Float) -> Float | None:
         """Solve contact; returns the changes (r,) of the forces on the rows, None if there is no solution."""
@@ -92,7 +90,8 @@ class _Trial:
         except InvertedError:
             return False
         self.force, self.last_error = self.solution.state.force, self.error
-        self.error = self.equations.residual(self.now, self.solution.state)
+        self.out_of_balance = self.equations.out_of_balance(self.now, self.force)
+        self.error = self.equations.residual(self.now, self.solution.state, self.out_of_balance)
         return True
 
     @property
@@ -158,14 +157,14 @@ def solve_together(
                 for trial in active:
                     if not trial.is_new and trial.error > _ASTRAY:
                         trial.begin()
-            elif factors:
+            elif factors or first not in active:
                 active = [trial for trial in active if trial is first or not trial.lags()]
     return found
 
 
 def _advanced(trials: list[_Trial], linearisation: Linearisation, pool: ThreadPoolExecutor) -> list[_Trial]:
     """Advance all trials by an iteration; returns those that may converge."""
-    eliminated = linearisation.condensation.eliminated(np.column_stack([trial.load() for trial in trials]))
+    eliminated = linearisation.condensation.eliminated(-np.column_stack([trial.out_of_balance for trial in trials]))
     changes = _mapped(pool, lambda trial, moved: trial.contact(linearisation, moved), trials, eliminated.displacement.T)
     none = np.zeros(len(eliminated.displacement))
     steps = eliminated.unknowns(np.column_stack([none if change is None else change for change in changes]))
