@@ -136,6 +136,8 @@ def solve_together(
     factors = 0
     with ThreadPoolExecutor(min(cores(), len(trials))) as pool:
         for _ in range(_ITERATIONS):
+            if not active:
+                break
             if linearisation is None:
                 if factors == _FACTORS:
                     break
@@ -149,8 +151,6 @@ def solve_together(
                     one = trial.equations.finished(trial.now, trial.solution, trial.error, trial.spent)
                     found[trial.number] = one if one.outcome.ok else None
             active = [trial for trial in active if not trial.has_converged]
-            if not active:
-                break
             ahead = sum(max(trial.remaining - _NEW_TANGENT, 0.0) for trial in active)
             if first in active and (first.remaining > _TOO_SLOW if factors else ahead > _FACTOR_COST):
                 linearisation = None
