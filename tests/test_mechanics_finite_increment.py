@@ -37,10 +37,10 @@ def test_newton_with_a_new_tangent_in_every_iteration_converges_quadratically(
     from finger3d.mechanics import finite_increment
 
     errors: list[float] = []
-    residual = finite_increment.FiniteIncrement._residual
+    residual = finite_increment.FiniteIncrement.residual
     monkeypatch.setattr(finite_increment, "_SLOW", 0.0)
     monkeypatch.setattr(
-        finite_increment.FiniteIncrement, "_residual", lambda *a: errors.append(residual(*a)) or errors[-1]
+        finite_increment.FiniteIncrement, "residual", lambda *a: errors.append(residual(*a)) or errors[-1]
     )
     problem = build(fig9(nu, legs=(Leg(10.0, steps=5),)))
     workspace = problem.model.formulation.workspace()

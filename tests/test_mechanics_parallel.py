@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import CancelledError
 from dataclasses import replace
 from threading import Event
 from typing import Any
 
 import numpy as np
-import pytest
 
 from finger3d.contact.friction import Coulomb
-from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.parallel import map_parallel, march_together
+from finger3d.mechanics.parallel import map_parallel
 from finger3d.mechanics.solve import march
 from tests.models import block
 
@@ -57,34 +54,3 @@ def test_presses_nobody_waits_for_end_with_their_increment() -> None:
     told.close()
     assert increments[1] == 1
     assert increments[2000] < 2000
-
-
-def test_presses_that_share_factors_are_those_pressed_alone_and_come_in_waves() -> None:
-    """What a wave has found is kept, whatever becomes of the next."""
-    design = designs()["half_cylinder"](radius_mm=5.0, width_mm=2.0)
-    legs = (Leg(1.0, steps=4), Leg(1.0, slide_x_mm=0.2, steps=2))
-    model = Model(design, Isotropic(1.0, 0.45), MeshOptions(0.5, 1.5, "swept"), legs, domain="plane-strain")
-    problem = build(LargeDeformation().apply(model))
-    problems = [
-        replace(problem, model=replace(problem.model, friction=Coulomb(mu))) for mu in (0.1, 0.2, 0.4, 0.7, 1.0)
-    ]
-    shared = problem.model.formulation.workspace()
-    found = dict(march_together(problems, shared, Event()))
-    assert list(found) == [0, 4, 2, 1, 3]
-    alone = 0
-    for number, steps in found.items():
-        workspace = problem.model.formulation.workspace()
-        wanted = list(march(problems[number], workspace=workspace))
-        alone += workspace.factorizations
-        assert len(steps) == len(wanted) == 6
-        for a, b in zip(steps, wanted, strict=True):
-            assert a.outcome.ok
-            # both are solved to a residual of 1e-8
-            assert np.abs(a.part.force - b.part.force).max() < 1e-6 * np.abs(b.part.force).max()
-    assert shared.factorizations < alone
-    interrupted = Event()
-    waves = march_together(problems, problem.model.formulation.workspace(), interrupted)
-    assert [next(waves)[0], next(waves)[0]] == [0, 4]
-    interrupted.set()
-    with pytest.raises(CancelledError):
-        next(waves)

@@ -20,6 +20,7 @@ from finger3d.mechanics.cost import AddedCost, PressCost, finite_strain_s
 from finger3d.mechanics.finite_body import FiniteBody
 from finger3d.mechanics.finite_increment import FiniteIncrement
 from finger3d.mechanics.finite_state import DeformedState, FiniteStrainWorkspace, contact_of
+from finger3d.mechanics.finite_together import solve_together
 from finger3d.mechanics.formulation import Workspace, moment_of
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.relaxation import InternalVariables, Relaxation, Step, relaxed
@@ -101,18 +102,57 @@ class FiniteStrain:
         workspace: Workspace,
     ) -> ContactSolution:
         """Iterate until equilibrium and contact conditions hold in the deformed configuration."""
+        known, workspace.known = workspace.known, None
+        if known is not None:
+            return known
+        increment = self._increment(problem, state, a, b, workspace)
+        return self._remembered(increment, increment.solve(guess))
+
+    def increments(
+        self,
+        problems: Sequence[Problem],
+        starts: Sequence[tuple[ContactState, Float | None]],
+        a: ObjectPose,
+        b: ObjectPose,
+        workspace: Workspace,
+        leader: int,
+    ) -> list[ContactSolution | None]:
+        """Advance several presses of one body at once, from their states and with their guesses of the forces.
+
+        See `finger3d.mechanics.finite_together.solve_together`.
+        """
+        increments = [
+            self._increment(problem, state, a, b, workspace)
+            for problem, (state, _) in zip(problems, starts, strict=True)
+        ]
+        found = solve_together(increments, [guess for _, guess in starts], leader)
+        pairs = zip(increments, found, strict=True)
+        return [None if one is None else self._remembered(increment, one) for increment, one in pairs]
+
+    def _increment(
+        self,
+        problem: Problem,
+        state: ContactState,
+        a: ObjectPose,
+        b: ObjectPose,
+        workspace: Workspace,
+    ) -> FiniteIncrement:
         assert isinstance(state, DeformedState)
         assert isinstance(workspace, FiniteStrainWorkspace)
-        body, seconds = self._body(problem, workspace), b.time_s - a.time_s
+        body = self._body(problem, workspace)
         if self.relaxation is not None and state.memory is not None:
-            body = body.over(self.relaxation, state.memory, seconds)
-        found = FiniteIncrement(problem, body, state, a, b, workspace).solve(guess)
-        after = found.state
-        if not found.outcome.ok or self.relaxation is None or state.memory is None:
+            body = body.over(self.relaxation, state.memory, b.time_s - a.time_s)
+        return FiniteIncrement(problem, body, state, a, b, workspace)
+
+    def _remembered(self, increment: FiniteIncrement, found: ContactSolution) -> ContactSolution:
+        """Return a solution with the internal variables at the end of the increment."""
+        start, after = increment.start, found.state
+        if not found.outcome.ok or self.relaxation is None or start.memory is None:
             return found
         assert isinstance(after, DeformedState)
-        strained = body.relaxing_variables(after.unknowns, self.relaxation.bulk)
-        memory = Step(self.relaxation.prony, seconds).after(state.memory, strained)
+        strained = increment.body.relaxing_variables(after.unknowns, self.relaxation.bulk)
+        seconds = increment.b.time_s - increment.a.time_s
+        memory = Step(self.relaxation.prony, seconds).after(start.memory, strained)
         return replace(found, state=replace(after, memory=memory))
 
     def unknowns(self, problem: Problem, state: ContactState) -> Float:

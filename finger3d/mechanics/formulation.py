@@ -33,12 +33,12 @@ class Workspace:
     ----------
     factorizations : number of factorisations made with this workspace
     tracker : distances of the finger's surface from the object
-    similar : states of similar presses at both ends of the next increment, which begins with the mean of their changes
+    known : solution of the next increment, if it has been found already together with those of other presses
     """
 
     factorizations: int = 0
     tracker: DistanceTracker = field(default_factory=DistanceTracker)
-    similar: tuple[tuple[ContactState, ContactState], ...] = ()
+    known: ContactSolution | None = None
 
 
 class Formulation(Protocol):

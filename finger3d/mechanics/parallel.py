@@ -1,9 +1,9 @@
-"""Presses of one body with several friction laws and paths: in parallel, or increment by increment in turn."""
+"""Presses of one body with several friction laws and paths, in parallel."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from itertools import islice
 from threading import Event
@@ -11,21 +11,14 @@ from typing import TypeVar
 
 from finger3d._machine import cores
 from finger3d.contact.acceleration import one_thread
-from finger3d.contact.state import ContactState
 from finger3d.mechanics.formulation import Workspace
-from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.solve import march
 
 Variant = TypeVar("Variant")
 Result = TypeVar("Result")
 
 _ROWS_FOR_THREADS = 1000
 """Contact rows from which presses at once are quicker than in turn; below that their time is spent in Python."""
-
-
-_STRIDES = (4, 2, 1)
-"""Distances between the friction laws that are pressed in one wave."""
 
 
 def map_parallel(
@@ -82,43 +75,3 @@ def map_parallel(
         finally:
             cancel.set()
             pool.shutdown(cancel_futures=True)
-
-
-def march_together(
-    problems: Sequence[Problem], workspace: Workspace, cancel: Event
-) -> Iterator[tuple[int, list[StepResult]]]:
-    """Press one body with several friction laws, in waves: every fourth law first, then those half way, then the rest.
-
-    A wave solves every increment with all of its laws before the next, so that they share the factor.  The increments
-    of the later waves begin with the mean of what they changed with their neighbours of the waves before.
-
-    Yields
-    ------
-    Number of the problem, and the results of its increments, in the order of the waves.
-    """
-    found: dict[int, list[StepResult]] = {}
-    rest = [problem.model.formulation.start(problem) for problem in problems]
-
-    def change(number: int, increment: int) -> tuple[ContactState, ContactState] | None:
-        """The states of a press at both ends of an increment; None if it did not get there."""
-        steps = found.get(number, [])
-        if increment >= len(steps):
-            return None
-        return (steps[increment - 1].part if increment else rest[number]), steps[increment].part
-
-    for stride in _STRIDES:
-        wave = [number for number in range(0, len(problems), stride) if number not in found]
-        running = {number: march(problems[number], (), workspace, cancel) for number in wave}
-        steps: dict[int, list[StepResult]] = {number: [] for number in wave}
-        while running:
-            for number, press in list(running.items()):
-                near = [change(n, len(steps[number])) for n in (number - stride, number + stride)]
-                workspace.similar = tuple(pair for pair in near if pair is not None)
-                step = next(press, None)
-                workspace.similar = ()
-                if step is None:
-                    del running[number]
-                else:
-                    steps[number].append(step)
-        found |= steps
-        yield from steps.items()

@@ -70,7 +70,7 @@ def march(
     for number, (target, load) in enumerate(zip(targets(model.legs), prescribed_forces(model.legs), strict=True)):
         if cancel is not None and cancel.is_set():
             raise CancelledError
-        guess = near[number] if number < len(near) else _extrapolated(state, at, target, previous)
+        guess = near[number] if number < len(near) else extrapolated_force(state, at, target, previous)
         if load is None:
             found, substeps = _increment(problem, workspace, state, at, target, most_cuts, guess)
         else:
@@ -162,7 +162,7 @@ class _FailedError(Exception):
     """An increment at a trial depth did not converge."""
 
 
-def _extrapolated(
+def extrapolated_force(
     state: ContactState, a: ObjectPose, b: ObjectPose, previous: tuple[ObjectPose, Float] | None
 ) -> Float | None:
     """Return the forces extrapolated linearly, if the path continues in the direction of the previous increment."""

@@ -12,8 +12,9 @@ from threading import Event
 
 from finger3d._types import Float
 from finger3d.mechanics.formulation import Workspace
+from finger3d.mechanics.groups import march_in_groups
 from finger3d.mechanics.history import StepResult
-from finger3d.mechanics.parallel import map_parallel, march_together
+from finger3d.mechanics.parallel import map_parallel
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
 
@@ -67,7 +68,7 @@ def press(
 def presses(problem: Problem, mus: Sequence[float], initial: PressesByMu | None = None) -> Iterator[Press]:
     """Yield a press for each of ascending values of mu, started from the press of `initial` with the same mu if any.
 
-    At finite strain they come in another order than that of mu; see `march_together`.
+    At finite strain they come in another order than that of mu; see `march_in_groups`.
     """
     if problem.model.formulation.finite_strain:
         yield from _together(problem, mus)
@@ -84,7 +85,7 @@ def _together(problem: Problem, mus: Sequence[float]) -> Iterator[Press]:
     """Yield the presses with all values of mu, which share factors."""
     workspace, model, counted = problem.model.formulation.workspace(), problem.model, 0
     problems = [replace(problem, model=replace(model, friction=model.friction.with_mu(mu))) for mu in mus]
-    for number, steps in march_together(problems, workspace, Event()):
+    for number, steps in march_in_groups(problems, workspace, Event()):
         new, counted = workspace.factorizations - counted, workspace.factorizations
         yield Press(mus[number], steps[-1], tuple(step.part.force for step in steps), new)
 

@@ -1,0 +1,49 @@
+"""How far the surface enters the object between contact points, whose mean gaps alone are never negative."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from finger3d.contact.friction import Coulomb
+from finger3d.effects.large_deformation import Effect
+from finger3d.fem.material import Isotropic
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.build import build
+from finger3d.mechanics.coverage import check_surface
+from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.solve import march
+from finger3d.objects import Plane, RigidObject, Wedge
+
+HEIGHT, DEPTH = 10.0, 0.6
+
+
+def penetration(obj: RigidObject, size: float, mu: float, base: float = 2.0) -> float:
+    """Deepest place inside the object over the depth, of a section of a block."""
+    design = designs()["block"](half_length_mm=7.0, height_mm=HEIGHT, width_mm=HEIGHT)
+    options = MeshOptions(size, base * size, "swept")
+    model = Model(design, Isotropic(1.0, 0.4), options, (Leg(DEPTH, steps=3),), object=obj, friction=Coulomb(mu))
+    model = Effect().apply(Model(**(vars(model) | {"domain": "plane-strain"})))
+    problem = build(model)
+    steps = list(march(problem))
+    assert all(step.outcome.ok for step in steps)
+    return max(check.penetration_mm for check in check_surface(problem, steps)) / DEPTH
+
+
+def test_penetration_under_a_round_object_is_at_most_some_times_the_sagitta_of_a_facet() -> None:
+    """It is largest at the edge of contact, where the mean gap of a point is of a part that touches and one that opens.
+
+    It depends on where the edge lies between the points: 0.8 to 2.1 times the sagitta on these meshes.
+    """
+    radius, sizes = 2.4, np.array([0.4, 0.2, 0.1])
+    wedge = Wedge(angle=float(np.radians(31.0)), tip_radius_mm=radius)
+    found = np.array([penetration(wedge, size, 0.25) for size in sizes])
+    assert (found < 3.0 * sizes**2 / (8.0 * radius * DEPTH)).all()
+    assert found[-1] < 0.01  # at a section's default edge length, a hundredth of the height
+    assert found[-1] < 0.5 * found[0]
+
+
+def test_penetration_at_a_sharp_edge_of_the_finger_is_that_of_the_edges_there() -> None:
+    """The stress is singular at the corner of a block that sticks; longer edges away from it hardly matter."""
+    found = [penetration(Plane(), size, 2.0) for size in (0.8, 0.4, 0.2)]
+    assert found[0] > 1.2 * found[1] > 1.44 * found[2]
+    assert penetration(Plane(), 0.4, 2.0, base=1.0) > 0.8 * found[1]
