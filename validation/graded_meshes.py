@@ -1,7 +1,7 @@
 """How many unknowns does a mesh graded towards a number save, and is the error then as small as the tolerance says?
 
 The Fig. 9 finger (nu = 0.49, mu = 0.25, 10 mm) as a section and as a 20 mm wide solid: meshes graded by the shares of
-the cells in the error of the goal (Becker and Rannacher 2001, sec. 5; `mesh.tolerance` with `mesh.goal`) beside meshes
+the cells in the error of the goal (Becker and Rannacher 2001; `mesh.tolerance` with `mesh.goal`) beside meshes
 whose edges are four times as long far from the contact as at it, from the results of cost_of_accuracy.  Truth is
 extrapolated from the four finest of those with the order that fits them; for the gauge, whose values do not fall
 monotonically, it is the finest.

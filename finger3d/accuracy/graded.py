@@ -2,7 +2,7 @@
 
 A cell of edge length h has the share s of the error.  It falls as h^p, and the number of cells grows as h^-d, so that
 the fewest cells for a given error have equal shares: the wanted length is ``h (C / s)^(1 / (p + d))``, with C from the
-error that is allowed (Becker and Rannacher 2001, sec. 5).  The edge length at the contact follows from the error of the
+error that is allowed (Becker and Rannacher 2001).  The edge length at the contact follows from the error of the
 contact discretisation alone.
 """
 
