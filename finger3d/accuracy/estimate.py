@@ -18,7 +18,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from finger3d._types import Float, Tree
-from finger3d.accuracy.adjoint_bars import adjoint_bars, applies
+from finger3d.accuracy.adjoint_bars import AdjointBars, adjoint_bars, applies
 from finger3d.accuracy.companions import Say, companion, edge_ratio, is_unstructured
 from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.accuracy.point_resolution import PointResolution
@@ -180,8 +180,8 @@ def discretisation(
     beside : a press that costs less than this one
     where : what that press differs in, in words
     """
-    if applies(own.model) and numbers in (main_numbers, press_numbers):
-        bars = adjoint_bars(own, frames)
+    bars = _own_bars(own, frames) if numbers in (main_numbers, press_numbers) else None
+    if bars is not None:
         named = {name: bars.bars[name] for name in numbers(own, frames[-1])}
         method = "mesh: dual-weighted residuals, and every second multiplier"
         return (
@@ -200,6 +200,14 @@ def discretisation(
         ratio=ratio,
     )
     return found, beside, f"on the {kind} mesh"
+
+
+def _own_bars(own: Problem, frames: Sequence[StepResult]) -> AdjointBars | None:
+    """Return the error bars from the condensed body itself; None where a companion mesh must tell them."""
+    try:
+        return adjoint_bars(own, frames) if applies(own.model) else None
+    except np.linalg.LinAlgError:  # the contact forces are not unique, and then the adjoint is not
+        return None
 
 
 def _marching_cost(problem: Problem) -> float:
