@@ -6,12 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from finger3d.accuracy.companions import FACTOR
-from finger3d.accuracy.estimate import estimate
+from finger3d.accuracy.companions import FACTOR, companion
+from finger3d.accuracy.estimate import compared, estimate
 from finger3d.analyses.compare import cases
 from finger3d.analyses.compare.cases import press_with_errors, resized, widened
 from finger3d.mechanics.build import build
 from finger3d.mechanics.solve import march
+from finger3d.mechanics.step_halving import last_step
 from finger3d.results.comparison import FORCE
 from finger3d.scene import load
 from tests.scenes import SWEPT_FINGER
@@ -38,21 +39,20 @@ def test_error_bars_hold_the_answer_of_a_fine_mesh(scene, domain, nu) -> None:
 
 
 @pytest.mark.parametrize("domain", ["plane-strain", "solid"])
-def test_a_case_has_the_very_bars_of_a_press(scene, domain) -> None:
+def test_a_case_has_the_bars_of_a_press_beside_its_companion_mesh(scene, domain) -> None:
     model = load(scene, [f"model.domain={domain}"]).model()
     case = press_with_errors(domain, model)
     problem = build(model)
-    # what a press spends decides how its increments are judged: so much that four times as many are affordable here
     frames = tuple(march(problem))
-    bars = estimate(problem, frames)
+    beside = companion(problem)
+    bars = compared(problem, frames[-1], beside, last_step(beside))
     main = {FORCE: "normal_force_N", "friction_sum_N_per_mm": "friction_sum_N", "gauge_g36": "gauge_g36"}
     main |= {"contact_length_mm": "contact_half_length_mm", "stick_length_mm": "stick_half_length_mm"}
     # the same problem but for the points that never touch: round-off apart, the error of the mesh is the very same
     found = estimate(problem, frames, numbers=lambda p, f: cases.quantities(p.points, f))
     for key, name in main.items():
         times = 2.0 if "length" in key else 1.0 if "gauge" in key else 1.0 / model.design.width_mm
-        assert found.discretisation[key] == pytest.approx(times * bars.discretisation[name], rel=1e-6), key
-        assert found.steps[key] == pytest.approx(times * bars.steps[name], rel=1e-6, abs=1e-12), key
+        assert found.discretisation[key] == pytest.approx(times * bars[name], rel=1e-6), key
         assert case.errors[key] >= 0.999999 * found.discretisation[key], key
     assert set(case.errors) == set(case.numbers)
 
