@@ -27,7 +27,7 @@ _POWER = 3.0
 _BODY_SHARE = 0.85
 """Error of the body over the whole error that is allowed; errors add as squares, which leaves half for the contact."""
 
-_FACTORS = (0.35, 2.0)
+_FACTORS = (0.5, 2.0)
 """Least and largest change of an edge length in one round."""
 
 _CELLS_PER_CUBE = {2: 2.3, 3: 10.0}

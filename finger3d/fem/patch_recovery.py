@@ -118,7 +118,7 @@ class RecoveredErrors:
     def _factors(self, first: slice, second: slice) -> Iterator[tuple[Float, Float]]:
         """Yield arrays (e', n, a) and (e', n, b) of some cells; the products are sums over n."""
         mesh, d, elastic = self.recovery.mesh, self.recovery.mesh.dim, self.elastic
-        bary, weights = quadrature(d, 4)
+        bary, weights = quadrature(d, 5)
         pairs = _components(d)
         double = np.array([1.0 if i == j else 2.0 for i, j in pairs])
         diagonal = [k for k, (i, j) in enumerate(pairs) if i == j]
