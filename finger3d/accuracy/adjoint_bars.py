@@ -60,7 +60,7 @@ _SHARES = {
 }
 """Found in the sections of validation/error_bars.py; the force changes too little with the multipliers to tell."""
 
-_BASE_SHARE = 0.025
+_BASE_SHARE = 0.035
 """Relative error of the pressure on a taxel of a solid over the edge length of the base divided by its shorter side."""
 
 _MOST_INCREMENTS = 10

@@ -25,6 +25,9 @@ _RESOLUTION_FLOOR = 0.1
 """Points of distance h at the edge of a contact of half-length a leave a relative error of about this times (h/a)^2 in
 the normal force, and of this times h/a in friction and strains (validation/error_bars.py)."""
 
+_UNRESOLVED = 2e-4
+"""Dissipation that points of distance h leave unresolved over the external work times h/a: few of them slip."""
+
 
 class Kind(Enum):
     """Kind of a number, which determines the bounds of its error from below."""
@@ -133,5 +136,7 @@ def mesh_error(
                 scale = max(scale, normal_force)
             power = 2 if kind is Kind.NORMAL_FORCE else 1
             bound = max(bound, _RESOLUTION_FLOOR * own.share**power * scale)
+        if kind is Kind.DISSIPATION:
+            bound = max(bound, _UNRESOLVED * own.share * largest(numbers, Kind.WORK))
         found[name] = max(change / gain(ratio), bound)
     return {name: float(error) for name, error in found.items() if math.isfinite(error)}
