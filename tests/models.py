@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from finger3d.contact.friction import Coulomb
+from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
@@ -25,6 +26,14 @@ def fig9(**changes: object) -> Model:
         gauges=(Gauge("g36", 36.0, 40.0, 0.0, np.deg2rad(30.0)),),
     )  # fmt: skip
     return replace(model, **changes)
+
+
+def large_fig9(nu: float, size: float = 2.0, **changes: object) -> Model:
+    """The section of that finger at large deformation, with a gauge and its mirror image."""
+    gauges = (Gauge("g", 36.0, 40.0, 0.0, 0.5236), Gauge("mirror", -36.0, 40.0, 0.0, np.pi - 0.5236))
+    mesh = MeshOptions(size, 4 * size, "swept")
+    model = fig9(material=Isotropic(1.0, nu), mesh=mesh, gauges=gauges, domain="plane-strain")
+    return LargeDeformation().apply(replace(model, **changes))
 
 
 def block(**changes: object) -> Model:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -22,23 +20,12 @@ from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.solve import march
 from finger3d.objects import Cylinder, Plane
-from tests.models import block, last
-
-
-def fig9(nu: float, size: float = 2.0, **changes: object) -> Model:
-    finger = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
-    model = Model(
-        finger, Isotropic(1.0, nu), MeshOptions(size, 4 * size, "swept"), (Leg(10.0, steps=10),),
-        friction=Coulomb(0.25),
-        gauges=(Gauge("g", 36.0, 40.0, 0.0, 0.5236), Gauge("mirror", -36.0, 40.0, 0.0, np.pi - 0.5236)),
-        domain="plane-strain",
-    )  # fmt: skip
-    return Effect().apply(replace(model, **changes))
+from tests.models import block, large_fig9, last
 
 
 def test_fig9_agrees_with_calculix() -> None:
     # validation/REFERENCES.md, 6.5: 28.5 N per mm by CalculiX, and 22.35 in small strain; stick zone 33 mm
-    problem = build(fig9(0.45, 1.0))
+    problem = build(large_fig9(0.45, 1.0))
     workspace = problem.model.formulation.workspace()
     *_, end = march(problem, workspace=workspace)
     got = measure(problem.points, end)
@@ -53,7 +40,7 @@ def test_fig9_agrees_with_calculix() -> None:
 def test_incompressible_plane_stress_converges_to_the_limit_of_nu() -> None:
     forces = []
     for nu in (0.499, 0.4999, 0.5):
-        problem = build(fig9(nu, 4.0, domain="plane-stress", legs=(Leg(3.0, steps=3),)))
+        problem = build(large_fig9(nu, 4.0, domain="plane-stress", legs=(Leg(3.0, steps=3),)))
         workspace = problem.model.formulation.workspace()
         *_, end = march(problem, workspace=workspace)
         assert end.outcome is Outcome.CONVERGED
@@ -65,7 +52,7 @@ def test_incompressible_plane_stress_converges_to_the_limit_of_nu() -> None:
 
 def test_half_the_height() -> None:
     # the contact reaches the corner of the section on the way; nu = 0.5 in the test above is the mixed form
-    problem = build(fig9(0.45, 4.0, legs=(Leg(25.0, steps=12),)))
+    problem = build(large_fig9(0.45, 4.0, legs=(Leg(25.0, steps=12),)))
     frames = list(march(problem))
     assert frames[-1].outcome.ok
     forces = np.array([measure(problem.points, f)["normal_force_N"] for f in frames])
@@ -123,7 +110,7 @@ def test_a_bonded_block_folds_over() -> None:
 
 @pytest.mark.slow
 def test_a_press_too_deep_ends_in_an_outcome_with_all_earlier_steps_kept() -> None:
-    problem = build(fig9(0.3, 8.0, legs=(Leg(48.0, steps=6),)))
+    problem = build(large_fig9(0.3, 8.0, legs=(Leg(48.0, steps=6),)))
     frames = list(march(problem))
     assert frames[0].outcome.ok
     assert frames[-1].outcome in {Outcome.INVERTED, Outcome.NEWTON, Outcome.NO_CONVERGENCE}

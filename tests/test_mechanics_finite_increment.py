@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from finger3d.contact.friction import Coulomb
@@ -15,19 +14,9 @@ from finger3d.fem.quality import curved_jacobians
 from finger3d.fem.recover import displacement
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
-from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.solve import march
-
-
-def fig9(nu: float, size: float = 2.0, **changes: object) -> Model:
-    finger = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
-    model = Model(
-        finger, Isotropic(1.0, nu), MeshOptions(size, 4 * size, "swept"), (Leg(10.0, steps=10),),
-        friction=Coulomb(0.25),
-        gauges=(Gauge("g", 36.0, 40.0, 0.0, 0.5236), Gauge("mirror", -36.0, 40.0, 0.0, np.pi - 0.5236)),
-        domain="plane-strain",
-    )  # fmt: skip
-    return Effect().apply(replace(model, **changes))
+from tests.models import large_fig9
 
 
 @pytest.mark.parametrize("nu", [0.45, 0.5])
@@ -42,7 +31,7 @@ def test_newton_with_a_new_tangent_in_every_iteration_converges_quadratically(
     monkeypatch.setattr(
         finite_increment.FiniteIncrement, "residual", lambda *a: errors.append(residual(*a)) or errors[-1]
     )
-    problem = build(fig9(nu, legs=(Leg(10.0, steps=5),)))
+    problem = build(large_fig9(nu, legs=(Leg(10.0, steps=5),)))
     workspace = problem.model.formulation.workspace()
     frames = list(march(problem, workspace=workspace))
     assert all(f.outcome.ok for f in frames)

@@ -13,28 +13,18 @@ from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
 from finger3d.mechanics.history import measure
-from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.small_strain import SmallStrain
 from finger3d.mechanics.solve import march
 from finger3d.objects import Cylinder
-
-
-def fig9(nu: float, size: float = 2.0, **changes: object) -> Model:
-    finger = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
-    model = Model(
-        finger, Isotropic(1.0, nu), MeshOptions(size, 4 * size, "swept"), (Leg(10.0, steps=10),),
-        friction=Coulomb(0.25),
-        gauges=(Gauge("g", 36.0, 40.0, 0.0, 0.5236), Gauge("mirror", -36.0, 40.0, 0.0, np.pi - 0.5236)),
-        domain="plane-strain",
-    )  # fmt: skip
-    return Effect().apply(replace(model, **changes))
+from tests.models import large_fig9
 
 
 @pytest.mark.parametrize("nu", [0.3, 0.49])
 def test_light_load_is_small_strain(nu: float) -> None:
     ratios = []
     for depth in (0.08, 0.01):
-        model = fig9(nu, legs=(Leg(depth, steps=2),), mesh=MeshOptions(0.2, 8.0))
+        model = large_fig9(nu, legs=(Leg(depth, steps=2),), mesh=MeshOptions(0.2, 8.0))
         problem = build(model)
         small = list(march(replace(problem, model=replace(model, strain_measure=SmallStrain()))))
         large = list(march(problem))

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from finger3d._types import Tree
 from finger3d.contact.rules import STEP_DEPENDENT_RULES
@@ -80,6 +83,16 @@ class ChangeEstimate:
             "method": self.method,
             "seconds": self.seconds,
         }
+
+
+def attempted(estimate: Callable[[], ChangeEstimate]) -> ChangeEstimate:
+    """Return an estimate with its time, or one without changes that tells why none can be made."""
+    start = time.perf_counter()
+    try:
+        found = estimate()
+    except (Finger3dError, RuntimeError, ValueError, np.linalg.LinAlgError, MemoryError) as error:
+        found = ChangeEstimate(method=f"no estimate: {error}")
+    return replace(found, seconds=time.perf_counter() - start)
 
 
 def changing_numbers(problem: Problem, step: StepResult) -> dict[str, float]:

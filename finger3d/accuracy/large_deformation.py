@@ -13,12 +13,9 @@ scenes.
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 
-import numpy as np
-
-from finger3d.accuracy.changes import ChangeEstimate, budget_s, changing_numbers, check_kind, judged
+from finger3d.accuracy.changes import ChangeEstimate, attempted, budget_s, changing_numbers, check_kind, judged
 from finger3d.accuracy.companions import LEAST_RATIO, built_like, coarser, edge_ratio
 from finger3d.accuracy.cost import forecast
 from finger3d.effects.base import fill
@@ -54,12 +51,7 @@ def large_deformation(problem: Problem, last: StepResult, increments: int) -> Ch
     ChangeEstimate
         Without changes, and with the reason, where no estimate can be made; a failure does not fail the press.
     """
-    start = time.perf_counter()
-    try:
-        found = _estimated(problem, last, increments)
-    except (Finger3dError, RuntimeError, ValueError, np.linalg.LinAlgError, MemoryError) as error:
-        found = ChangeEstimate(method=f"no estimate: {error}")
-    return replace(found, seconds=time.perf_counter() - start)
+    return attempted(lambda: _estimated(problem, last, increments))
 
 
 def _estimated(problem: Problem, last: StepResult, increments: int) -> ChangeEstimate:

@@ -12,13 +12,10 @@ seed 2026; ``validation/advice_against_truth.py`` compares d with the truth in o
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from dataclasses import replace
 
-import numpy as np
-
-from finger3d.accuracy.changes import ChangeEstimate, budget_s, changing_numbers, check_kind, judged
+from finger3d.accuracy.changes import ChangeEstimate, attempted, budget_s, changing_numbers, check_kind, judged
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.problem import Problem
@@ -59,12 +56,7 @@ def more_increments(problem: Problem, last: StepResult, increments: int) -> Chan
     ChangeEstimate
         Without changes, and with the reason, where no estimate can be made; a failure does not fail the press.
     """
-    start = time.perf_counter()
-    try:
-        found = _estimated(problem, last, increments)
-    except (Finger3dError, RuntimeError, ValueError, np.linalg.LinAlgError, MemoryError) as error:
-        found = ChangeEstimate(method=f"no estimate: {error}")
-    return replace(found, seconds=time.perf_counter() - start)
+    return attempted(lambda: _estimated(problem, last, increments))
 
 
 def _estimated(problem: Problem, last: StepResult, increments: int) -> ChangeEstimate:
