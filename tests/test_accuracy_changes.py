@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import replace
+from pathlib import Path
 
-from finger3d.accuracy.changes import judged
+import numpy as np
+import pytest
+
+from finger3d.accuracy.changes import check_kind, judged
+from finger3d.errors import Finger3dError
+from finger3d.objects import Plane
+from finger3d.scene import load
 
 
 def test_a_change_is_significant_if_its_interval_is_narrow_and_the_change_large() -> None:
@@ -22,3 +29,10 @@ def test_a_change_is_significant_if_its_interval_is_narrow_and_the_change_large(
     assert not any(
         change.significant for change in judged({"gauge_a": 0.0}, {"gauge_a": 0.0}, {"gauge_a": 0.0}).values()
     )
+
+
+def test_triangulated_objects_are_not_judged_by_coarse_presses() -> None:
+    gear = load(Path(__file__).parents[1] / "geometries" / "gear.toml").model()
+    with pytest.raises(Finger3dError, match="triangulated"):
+        check_kind(gear)
+    check_kind(replace(gear, object=Plane()))
