@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from finger3d.accuracy.adjoint_bars import adjoint_bars, short_press
+from finger3d.accuracy.graded import cell_growth, graded_sizes
 from finger3d.accuracy.refine import Refinement, Round, _affordable, refine_mesh
 from finger3d.cli import main
 from finger3d.contact.friction import Coulomb
@@ -98,6 +100,19 @@ def test_the_time_stops_it_with_the_best_so_far() -> None:
     assert not found.met
     assert found.warning.startswith("mesh.tolerance = 0.0001 was not met (max_seconds = 0): ")
     assert f"{found.rounds[0].error:.2g}" in found.warning
+
+
+def test_a_graded_mesh_is_forecast_by_its_cells() -> None:
+    found = refine_mesh(section(0.5), 1e-4, max_seconds=1e4)
+    assert found.met
+    first, second = found.rounds[0], found.rounds[1]
+    problem = build(section(0.5))
+    short, steps = short_press(problem)
+    bars = adjoint_bars(short, steps)
+    force = -steps[-1].part.force[:, 0].sum() * 2.0
+    growth = cell_growth(short, graded_sizes(short, bars, "normal_force_N", 0.9 * 1e-4 * abs(force)))
+    # prescribed lengths grow with the distance, and rows of the structured mesh are as fine as their finest place
+    assert 0.5 * growth < second.dofs / first.dofs < 4.0 * growth
 
 
 def test_too_large_a_mesh_stops_it_with_the_best_so_far(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -88,10 +88,7 @@ class LinearisedIncrement:
         local = ContactProblem(moved, delassus, mu, rho, 1.0)
         active = ActiveSet.of(local, after.status, after.force - rho * np.where(slips[:, None], moved, 0.0))
         forces, weights = turn.T @ active.force_matrix(), active.weight_matrix(rho) @ turn
-        matrix = np.asarray(weights @ (delassus @ forces))
-        if active.is_3d:
-            across = np.arange(len(active.active_dofs), active.size)
-            matrix[across, across] += 1.0 - active.turning
+        matrix = active.with_turning(np.asarray(weights @ (delassus @ forces)))
         return cls(forces, weights, lu_factor(matrix) if len(matrix) else (matrix, matrix), turn)
 
     def adjoint(self, gradient: Float) -> Float:

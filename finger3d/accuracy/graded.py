@@ -47,8 +47,7 @@ def graded_sizes(problem: Problem, bars: AdjointBars, goal: str, allowed: float)
     """
     body, contact = bars.parts[goal]
     mesh, options = problem.mesh, problem.model.mesh
-    volume = signed_volumes(mesh)
-    length = (_CELLS_PER_CUBE[mesh.dim] * volume) ** (1.0 / mesh.dim)
+    length = _edge_lengths(mesh)
     share = _smoothed(mesh, np.abs(bars.body.shares[goal]))
     factors = _factors(share, _BODY_SHARE * allowed / body if body > 0.0 else math.inf, mesh.dim)
     largest = 0.5 * min(problem.model.design.height_mm, 2.0 * problem.model.design.half_length_mm)
@@ -63,6 +62,17 @@ def graded_sizes(problem: Problem, bars: AdjointBars, goal: str, allowed: float)
     at_contact = max(at_contact, _FACTORS[0] * options.size_mm)
     base = max(at_contact, float(sizes.max()))
     return replace(options, size_mm=at_contact, base_size_mm=base, grading=Grading(points, sizes))
+
+
+def cell_growth(problem: Problem, options: MeshOptions) -> float:
+    """Return the number of cells that the grading of options asks for, over that of the mesh that it was made from."""
+    assert options.grading is not None
+    return float(np.mean((_edge_lengths(problem.mesh) / options.grading.sizes) ** problem.dim))
+
+
+def _edge_lengths(mesh: Mesh) -> Float:
+    """Return the edge lengths (e,) mm that cells of the volumes of a mesh's cells have."""
+    return np.asarray((_CELLS_PER_CUBE[mesh.dim] * signed_volumes(mesh)) ** (1.0 / mesh.dim))
 
 
 def _contact_factor(bars: AdjointBars, goal: str, allowed: float, contact: float) -> float:

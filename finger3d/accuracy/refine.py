@@ -17,7 +17,7 @@ from finger3d._types import Tree
 from finger3d.accuracy.adjoint_bars import adjoint_bars, applies, short_press
 from finger3d.accuracy.companions import FACTOR, companion
 from finger3d.accuracy.estimate import compared, press_numbers
-from finger3d.accuracy.graded import graded_sizes
+from finger3d.accuracy.graded import cell_growth, graded_sizes
 from finger3d.accuracy.richardson import ORDER, Quantity, largest_readings
 from finger3d.errors import Finger3dError, UnresolvedError
 from finger3d.mechanics.build import build
@@ -155,7 +155,10 @@ def refine_mesh(
             stopped = "met"
             break
         left = math.inf if max_seconds is None else max_seconds - (time.perf_counter() - start)
-        found = _affordable(options, wanted, done.seconds, left, 3 if model.domain == "solid" else 2)
+        if wanted.grading is None:
+            found = _affordable(options, wanted, done.seconds, left, 3 if model.domain == "solid" else 2)
+        else:
+            found = wanted if _graded_seconds(problem, wanted, done.seconds) <= left else None
         if found is None:
             stopped = f"max_seconds = {max_seconds:g}"
             break
@@ -265,6 +268,13 @@ def _affordable(now: MeshOptions, wanted: MeshOptions, seconds: float, left: flo
         b * (w / b) ** part for b, w in ((now.size_mm, wanted.size_mm), (now.base_size_mm, wanted.base_size_mm))
     )
     return replace(now, size_mm=_rounded(size), base_size_mm=_rounded(max(size, base)))
+
+
+def _graded_seconds(problem: Problem, wanted: MeshOptions, seconds: float) -> float:
+    """Return the forecast seconds of a press on a graded mesh, from those of a round on the mesh that it follows."""
+    at_contact = (problem.model.mesh.size_mm / wanted.size_mm) ** (problem.dim - 1)
+    growth = max(cell_growth(problem, wanted), at_contact)
+    return float(_PRESS_TO_ROUND * seconds * growth ** _EXPONENT[problem.dim])
 
 
 def _rounded(value: float) -> float:

@@ -184,6 +184,13 @@ class ActiveSet:
             return rows
         return np.concatenate([rows, self.turning * np.sum(self.tangent * w[self.slip_points, 1:], axis=1)])
 
+    def with_turning(self, matrix: Float) -> Float:
+        """Return D W P (k, k) with the diagonal 1 - a of the unknowns across slip added in place."""
+        if self.is_3d:
+            across = np.arange(len(self.active_dofs), self.size)
+            matrix[across, across] += 1.0 - self.turning
+        return matrix
+
     def force_matrix(self) -> Any:
         """Return P (c d, k), sparse: the forces of unknowns."""
         m, s = len(self.active_dofs), len(self.slip_points)
@@ -213,11 +220,7 @@ Assembly: TypeAlias = Callable[[ContactProblem, ActiveSet, Precision], Array]
 def assemble(problem: ContactProblem, active: ActiveSet, precision: Precision) -> Array:
     """Return the matrix A = D W P + diag(0, 0, 1 - a) (k, k) of the equations of an active set."""
     forces, weights = active.force_matrix(), active.weight_matrix(problem.augmentation)
-    matrix: Array = weights @ (problem.delassus @ forces)
-    if active.is_3d:
-        across = np.arange(len(active.active_dofs), active.size)
-        matrix[across, across] += 1.0 - active.turning
-    return matrix.astype(precision, copy=False)
+    return active.with_turning(weights @ (problem.delassus @ forces)).astype(precision, copy=False)
 
 
 Entries: TypeAlias = list[tuple[NDArray[np.int64], NDArray[np.int64], Float]]
