@@ -55,6 +55,11 @@ def channel(inner: float, leg: float, wall: float = 5.0, length: float = 40.0) -
     return Triangles(points, np.vstack([caps[:, ::-1], caps + 8, *sides]))
 
 
+def random_points(count: int, seed: int = 0) -> np.ndarray:
+    """Random points (count, 3) mm in a cube with edges of 3 mm about the origin."""
+    return np.random.default_rng(seed).uniform(-1.5, 1.5, (count, 3))
+
+
 def write_stl(path: Path, surface: Triangles) -> Path:
     """Write a text STL, with all digits."""
     lines = ["solid test"]

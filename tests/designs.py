@@ -22,9 +22,16 @@ OPTIONS = MeshOptions(5.0, 10.0, "ftetwild")
 ZONE = (-40.0, 40.0, -10.0, 10.0)
 """Sizes and contact zone with which pytetwild meshes the Fig. 9 finger in a second."""
 
+HALF = designs()["half_cylinder"](5.0, 10.0)
 SMALL = designs()["clipped_cylinder"](20.0, 10.0, 5.0, 8.0)
 
 
 def make(name: str, **changes: Any) -> Any:
     """A design with these dimensions, but for some."""
     return designs()[name](**{**GOOD[name], **changes})
+
+
+def zone_of(design: Any) -> tuple[float, float, float, float]:
+    """A contact zone as wide as the design, and 0.8 times as long."""
+    length, width = design.half_length_mm, design.width_mm
+    return -0.4 * length, 0.4 * length, -0.5 * width, 0.5 * width

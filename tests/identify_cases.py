@@ -14,12 +14,13 @@ from tests.sensor_cases import scene
 
 NOISE = {"normal_force_N": 0.5, "gauge_g36": 3e-4}
 TRUE = {"material.E_MPa": 0.37, "friction.mu": 0.6}
+PRESS = {"depth_mm": 10.0, "steps": 8}
 FREE = {"material.E_MPa": (0.05, 5.0), "friction.mu": (0.05, 1.0)}
 
 
 def bench(path: Path, seed: int = 0, stds: bool = False, offset: float = 0.0, **changes: Any) -> Path:
     """A measured press of the scene with the true values, with noise."""
-    tables: dict[str, Any] = {"press": {"depth_mm": 10.0, "steps": 8}, **changes}
+    tables: dict[str, Any] = {"press": PRESS, **changes}
     material = {"nu": 0.45, "E_MPa": TRUE["material.E_MPa"]}
     true = parse(scene(**tables, material=material, friction={"mu": TRUE["friction.mu"]}).as_dict())
     random, rows = np.random.default_rng(seed), []

@@ -6,9 +6,14 @@ import itertools
 from collections.abc import Callable
 
 import numpy as np
+import scipy.sparse as sp
 
-from finger3d.fem.elements import quadrature
+from finger3d.fem.assembly import Stiffness, stiffness
+from finger3d.fem.elements import Element, quadrature
+from finger3d.fem.material import Elasticity
 from finger3d.fem.simplex import Mesh, boundary, quadratic, signed_volumes
+from finger3d.fem.traces import local_rows, strain_row, surface
+from finger3d.objects import vertical_frame
 
 
 def grid(counts: tuple[int, ...], shuffle: float = 0.0, seed: int = 0) -> Mesh:
@@ -41,6 +46,26 @@ def mapped(mesh: Mesh, function: Callable[[np.ndarray], np.ndarray]) -> Mesh:
     """Quadratic mesh with its nodes moved by a function of the points (n, d)."""
     whole = quadratic(mesh) if not mesh.element.is_quadratic else mesh
     return Mesh(function(whole.points), whole.cells, whole.facets)
+
+
+def full(upper: sp.csr_matrix) -> sp.csr_matrix:
+    """The symmetric matrix with this upper triangle."""
+    return (upper + sp.triu(upper, 1).T).tocsr()
+
+
+def held_cube(nu: float, dim: int = 3) -> tuple[Mesh, Stiffness, np.ndarray, sp.csr_matrix]:
+    """A unit square or cube fixed at its base: mesh, stiffness, fixed unknowns, and rows of its top and of a strain."""
+    mesh = quadratic(grid((3,) * dim, 0.2))
+    held = np.unique(mesh.facets["y-"])
+    fixed = (held[:, None] * dim + np.arange(dim)).ravel()
+    top = surface(mesh, "y+")
+    rows = sp.vstack([local_rows(top, vertical_frame(dim)), strain_row(mesh, np.full(dim, 0.4), np.eye(dim)[0])])
+    return mesh, stiffness(mesh, Elasticity.of(1.0, nu)), fixed, sp.csr_matrix(rows)
+
+
+def points_in(element: Element) -> np.ndarray:
+    """Seven random points of an element, in barycentric coordinates."""
+    return np.random.default_rng(1).dirichlet(np.ones(element.dim + 1), 7)
 
 
 def body_load(mesh: Mesh, force: Callable[[np.ndarray], np.ndarray], degree: int = 6) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -46,12 +47,27 @@ def block(**changes: object) -> Model:
     return replace(model, **changes)
 
 
+def small_section(**changes: Any) -> Model:
+    """A section 5 mm high with a gauge at a point and one along a line."""
+    finger = designs()["clipped_cylinder"](radius_mm=10.0, half_length_mm=5.0, edge_height_mm=4.0, width_mm=3.0)
+    model = Model(
+        finger, Isotropic(1.0, 0.45), MeshOptions(0.6, 1.5, "swept"), (Leg(0.5, steps=4),), friction=Coulomb(0.25),
+        gauges=(Gauge("g", 2.0, 4.5, angle=0.5), Gauge("long", -1.0, 4.5, length_mm=1.0)), domain="plane-strain",
+    )  # fmt: skip
+    return replace(model, **changes)
+
+
 def run(model: Model) -> tuple[Problem, list[StepResult]]:
     """Condense and press a model; every increment converges."""
     problem = build(model)
+    return problem, marched(problem)
+
+
+def marched(problem: Problem) -> list[StepResult]:
+    """Press a condensed body; every increment converges."""
     frames = list(march(problem))
     assert all(f.outcome.ok and f.residual <= 1e-8 for f in frames)
-    return problem, frames
+    return frames
 
 
 def last(model: Model) -> dict[str, float]:

@@ -87,6 +87,12 @@ def pressed(mesh: Mesh) -> dict[str, Any]:
     return {"displacement": u, "table": table, "contact_nodes": nodes}
 
 
+def solid_finger() -> tuple[Mesh, dict[str, Any]]:
+    """A solid finger, and the fields of its press."""
+    mesh = finger((20, 5, 6))
+    return mesh, pressed(mesh)
+
+
 def pixels(path: Path) -> np.ndarray:
     """The picture as (h, w, 3) in 0 .. 1."""
     from matplotlib.image import imread

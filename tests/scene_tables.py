@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
 FINGER = {
     "geometry": "clipped_cylinder",
     "radius_mm": 100.0,
@@ -12,3 +15,14 @@ FINGER = {
 
 
 SMALL = {"finger": FINGER, "material": {"E_MPa": 1.0, "nu": 0.49}, "press": {"depth_mm": 10.0}}
+
+HALF_CYLINDER: dict[str, Any] = {
+    "finger": {"geometry": "half_cylinder", "radius_mm": 5.0, "width_mm": 4.0},
+    "material": {"E_MPa": 1.0, "nu": 0.3},
+    "press": {"depth_mm": 0.5},
+}
+
+
+def scene_with_object(path: Path, **table: Any) -> dict[str, Any]:
+    """The half cylinder under a triangulated object, with other keys of its table."""
+    return {**HALF_CYLINDER, "object": {"shape": "mesh", "path": str(path), **table}}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 GOOD = '''"""Is one and a half what it was?
 
 Source: none.
@@ -25,3 +27,11 @@ STOPS = '''"""Is it interrupted?"""
 def run(quick):
     raise KeyboardInterrupt
 '''
+
+
+def write_studies(home: Path) -> Path:
+    """Write a study that passes and one that fails into a new folder, and return it."""
+    home.mkdir()
+    for name, text in {"good": GOOD, "bad": BAD, "_shared": "VALUE = 1.5\n"}.items():
+        (home / f"{name}.py").write_text(text)
+    return home

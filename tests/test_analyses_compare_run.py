@@ -13,14 +13,12 @@ from finger3d.analyses.compare.run import compare
 from finger3d.errors import Finger3dError
 from finger3d.results.comparison import FORCE
 from finger3d.scene import load
-from tests.scenes import SWEPT_FINGER
+from tests.scenes import SWEPT_FINGER, written
 
 
 @pytest.fixture
 def scene(tmp_path) -> Path:
-    path = tmp_path / "scene.toml"
-    path.write_text(SWEPT_FINGER)
-    return path
+    return written(tmp_path, SWEPT_FINGER)
 
 
 @pytest.fixture(scope="module")

@@ -8,6 +8,8 @@ import pytest
 
 from finger3d.analyses.identify.measured import read_measured
 from finger3d.errors import Finger3dError
+from tests.identify_cases import PRESS
+from tests.scenes import written
 from tests.sensor_cases import scene
 
 KNOWN = ("normal_force_N", "gauge_a")
@@ -15,9 +17,7 @@ KNOWN = ("normal_force_N", "gauge_a")
 
 @pytest.fixture
 def scene_file(tmp_path: Path) -> Path:
-    path = tmp_path / "scene.toml"
-    path.write_text(scene(press={"depth_mm": 10.0, "steps": 8}).to_toml(), encoding="utf-8")
-    return path
+    return written(tmp_path, scene(press=PRESS).to_toml())
 
 
 @pytest.mark.parametrize(

@@ -13,15 +13,14 @@ import pytest
 import finger3d
 from finger3d.results.journal import Journal
 from finger3d.scene import parse
-from tests.identify_cases import FREE, TRUE, bench
+from tests.identify_cases import FREE, PRESS, TRUE, bench
+from tests.scenes import written
 from tests.sensor_cases import scene
 
 
 @pytest.fixture
 def scene_file(tmp_path: Path) -> Path:
-    path = tmp_path / "scene.toml"
-    path.write_text(scene(press={"depth_mm": 10.0, "steps": 8}).to_toml(), encoding="utf-8")
-    return path
+    return written(tmp_path, scene(press=PRESS).to_toml())
 
 
 def test_known_values_are_found_again(tmp_path: Path, scene_file: Path) -> None:

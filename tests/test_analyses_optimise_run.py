@@ -7,17 +7,17 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from finger3d.analyses.free_keys import FreeKey
 from finger3d.analyses.optimise.run import optimise
-from finger3d.analyses.optimise.task import ObjectiveTable, OptimisationProblem, sensitivity
+from finger3d.analyses.optimise.task import OptimisationProblem, sensitivity
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.build import build
 from finger3d.mechanics.solve import march
 from finger3d.scene import load, tree
 from tests.scenes import words
+from tests.sensor_cases import objective_table
 
 SETS = ["model.domain=plane-strain", "mesh.size_mm=4", "mesh.base_size_mm=16", "press.steps=10"]
 ANGLE = FreeKey("gauge.g36.angle_deg", 0.0, 90.0)
@@ -30,10 +30,6 @@ def problem(root: Path) -> OptimisationProblem:
     return OptimisationProblem(tree.override(tree.read(path), SETS), (ANGLE,), path=path, mus=MUS, budget=12)
 
 
-def table_of(strain: list[float], mu: tuple[float, ...] = MUS) -> ObjectiveTable:
-    return ObjectiveTable(np.array(mu), {"g": np.array(strain)}, (), 1e-3, "g", None)  # type: ignore[arg-type]
-
-
 def test_gauges_are_searched_in_one_body_and_read_as_a_press_reads_them(problem, tmp_path) -> None:
     found = optimise(problem, tmp_path)
     assert found.bodies == 1
@@ -44,7 +40,9 @@ def test_gauges_are_searched_in_one_body_and_read_as_a_press_reads_them(problem,
     for mu in MUS:
         own = build(replace(model, friction=replace(model.friction, mu=mu)))
         strain.append(list(march(own))[-1].gauges["g36"])
-    assert found.best.value == pytest.approx(sensitivity(replace(table_of(strain), noise=problem.noise)), rel=1e-9)
+    assert found.best.value == pytest.approx(
+        sensitivity(replace(objective_table(strain), noise=problem.noise)), rel=1e-9
+    )
     assert load(tmp_path / "best.toml").tables.gauge[0].angle_deg == found.best.values[0]
 
 
@@ -60,7 +58,9 @@ def test_gauges_of_a_body_that_relaxes_are_read_as_a_press_reads_them(problem, b
     for mu in MUS:
         own = build(replace(model, friction=replace(model.friction, mu=mu)))
         strain.append(list(march(own))[-1].gauges["g36"])
-    assert found.best.value == pytest.approx(sensitivity(replace(table_of(strain), noise=problem.noise)), rel=1e-9)
+    assert found.best.value == pytest.approx(
+        sensitivity(replace(objective_table(strain), noise=problem.noise)), rel=1e-9
+    )
 
 
 def test_a_search_goes_on_with_what_is_kept_and_is_the_same_every_time(problem, tmp_path) -> None:

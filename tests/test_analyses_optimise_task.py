@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
-from finger3d.analyses.optimise.task import ObjectiveTable, sensitivity
+from finger3d.analyses.optimise.task import sensitivity
+from tests.sensor_cases import objective_table
 
 MUS = (0.1, 0.5, 1.0)
 
 
-def table_of(strain: list[float], mu: tuple[float, ...] = MUS) -> ObjectiveTable:
-    return ObjectiveTable(np.array(mu), {"g": np.array(strain)}, (), 1e-3, "g", None)  # type: ignore[arg-type]
-
-
 def test_sensitivity_is_the_least_slope_in_units_of_noise() -> None:
     # slopes 0.1/0.4 and 0.05/0.5 per mu, noise 1e-3
-    assert sensitivity(table_of([0.0, 0.1, 0.15])) == pytest.approx(100.0)
-    assert sensitivity(table_of([0.0, -0.1, -0.15])) == pytest.approx(100.0)
+    assert sensitivity(objective_table([0.0, 0.1, 0.15])) == pytest.approx(100.0)
+    assert sensitivity(objective_table([0.0, -0.1, -0.15])) == pytest.approx(100.0)
     # it turns back: two mu share a strain
-    assert sensitivity(table_of([0.0, 0.1, 0.05])) == pytest.approx(-100.0)
+    assert sensitivity(objective_table([0.0, 0.1, 0.05])) == pytest.approx(-100.0)

@@ -19,27 +19,18 @@ from finger3d.effects.kinetic_friction import Effect as Kinetic
 from finger3d.effects.large_deformation import Effect as Large
 from finger3d.effects.viscosity import Effect as Viscous
 from finger3d.errors import Finger3dError
-from finger3d.fem.material import Isotropic
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
 from finger3d.mechanics.history import measure
-from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.model import Gauge, Leg, MeshOptions
 from finger3d.mechanics.solve import march
 from finger3d.objects import Cylinder, MeshObject, Plane, Sphere, Wave, Wedge
 from tests.bodies import ball
+from tests.models import small_section
 
 ROUND_OFF = 1e-12  # the same arithmetic on the same numbers
 MUS = (0.0, 0.1, 0.7)
 FILE = MeshObject(0.0, 0.0, surface=ball(20.0, 12, 16), path="ball.stl")
-
-
-def model(**changes: Any) -> Model:
-    finger = designs()["clipped_cylinder"](radius_mm=10.0, half_length_mm=5.0, edge_height_mm=4.0, width_mm=3.0)
-    base = Model(
-        finger, Isotropic(1.0, 0.45), MeshOptions(0.6, 1.5, "swept"), (Leg(0.5, steps=4),), friction=Coulomb(0.25),
-        gauges=(Gauge("g", 2.0, 4.5, angle=0.5), Gauge("long", -1.0, 4.5, length_mm=1.0)), domain="plane-strain",
-    )  # fmt: skip
-    return replace(base, **changes)
+LONG = Gauge("g", 2.0, 4.0, angle=0.5, length_mm=1.0)
 
 
 def same(reduced: ReducedModel, problem: Any, mu: float) -> None:
@@ -59,18 +50,18 @@ def same(reduced: ReducedModel, problem: Any, mu: float) -> None:
 
 
 VARIANTS: dict[str, Any] = {
-    "section": lambda: model(),
-    "tilted": lambda: model(object=Plane(tilt=0.05)),
-    "solid": lambda: model(domain="solid", mesh=MeshOptions(1.2, 2.5, "swept")),
-    "cylinder": lambda: model(object=Cylinder(0.5, radius_mm=8.0)),
-    "sphere": lambda: model(object=Sphere(radius_mm=9.0), domain="solid", mesh=MeshOptions(1.5, 2.5, "swept")),
-    "wedge": lambda: model(object=Wedge(angle=0.4, tip_radius_mm=2.0)),
-    "wave": lambda: model(object=Wave(wavelength_mm=4.0, amplitude_mm=0.1)),
-    "file": lambda: model(object=FILE),
-    "slide": lambda: model(legs=(Leg(0.5, steps=3), Leg(0.5, slide_x_mm=0.2, steps=2), Leg(0.1, 0.2, steps=2))),
-    "kinetic": lambda: Kinetic(0.7).apply(model()),
-    "elastic": lambda: ElasticObject(2.0, 0.4).apply(model()),
-    "foil": lambda: Foil(3000.0, 0.02, 1.0).apply(model(gauges=(Gauge("g", 2.0, 4.0, angle=0.5, length_mm=1.0),))),
+    "section": lambda: small_section(),
+    "tilted": lambda: small_section(object=Plane(tilt=0.05)),
+    "solid": lambda: small_section(domain="solid", mesh=MeshOptions(1.2, 2.5, "swept")),
+    "cylinder": lambda: small_section(object=Cylinder(0.5, radius_mm=8.0)),
+    "sphere": lambda: small_section(object=Sphere(radius_mm=9.0), domain="solid", mesh=MeshOptions(1.5, 2.5, "swept")),
+    "wedge": lambda: small_section(object=Wedge(angle=0.4, tip_radius_mm=2.0)),
+    "wave": lambda: small_section(object=Wave(wavelength_mm=4.0, amplitude_mm=0.1)),
+    "file": lambda: small_section(object=FILE),
+    "slide": lambda: small_section(legs=(Leg(0.5, steps=3), Leg(0.5, slide_x_mm=0.2, steps=2), Leg(0.1, 0.2, steps=2))),
+    "kinetic": lambda: Kinetic(0.7).apply(small_section()),
+    "elastic": lambda: ElasticObject(2.0, 0.4).apply(small_section()),
+    "foil": lambda: Foil(3000.0, 0.02, 1.0).apply(small_section(gauges=(LONG,))),
 }
 
 
@@ -85,15 +76,15 @@ def test_a_saved_body_presses_as_the_scene_does(name: str, tmp_path: Path) -> No
 
 def test_other_legs_and_a_kinetic_ratio_are_those_of_the_scene() -> None:
     legs = (Leg(0.3, steps=3), Leg(0.0, steps=2))
-    changed = Kinetic(0.6, "paper").apply(model(friction=Coulomb(0.4), legs=legs))
-    small = ReducedModel.of(build(model())).press(0.4, legs, ratio=0.6, branch="paper")
-    whole = list(march(replace(build(model()), model=changed)))
+    changed = Kinetic(0.6, "paper").apply(small_section(friction=Coulomb(0.4), legs=legs))
+    small = ReducedModel.of(build(small_section())).press(0.4, legs, ratio=0.6, branch="paper")
+    whole = list(march(replace(build(small_section()), model=changed)))
     assert small.steps[2].gauges["g"] == pytest.approx(whole[2].gauges["g"], abs=ROUND_OFF)
     assert small.steps[-1].dissipation_mJ == pytest.approx(whole[-1].dissipation_mJ, rel=1e-11)
 
 
 def test_loading_and_pressing_need_no_mesher_cad_or_factorisation(tmp_path: Path) -> None:
-    path = ReducedModel.of(build(model())).save(tmp_path / "reduced.npz")
+    path = ReducedModel.of(build(small_section())).save(tmp_path / "reduced.npz")
     code = (
         "import sys, finger3d\n"
         f"assert finger3d.ReducedModel.load({str(path)!r}).press(0.3).outcome.ok\n"
@@ -105,7 +96,7 @@ def test_loading_and_pressing_need_no_mesher_cad_or_factorisation(tmp_path: Path
 
 
 def test_fields_are_refused() -> None:
-    reduced = ReducedModel.of(build(model()))
+    reduced = ReducedModel.of(build(small_section()))
     with pytest.raises(Finger3dError, match="no mesh"):
         reduced.problem.part.condensed.solve(np.zeros(0))
 
@@ -125,18 +116,18 @@ def test_fields_are_refused() -> None:
 )
 def test_what_was_not_condensed_is_refused(asked: dict[str, Any], told: str) -> None:
     with pytest.raises(Finger3dError, match=told) as found:
-        ReducedModel.of(build(model())).press(**asked)
+        ReducedModel.of(build(small_section())).press(**asked)
     assert "\n" not in str(found.value)
 
 
 def test_a_section_does_not_slide_across() -> None:
-    reduced = ReducedModel.of(build(model()))
+    reduced = ReducedModel.of(build(small_section()))
     with pytest.raises(Finger3dError, match="section"):
         reduced.press(legs=[Leg(0.5, slide_z_mm=0.1)])
 
 
 @pytest.mark.parametrize("effect", [Large(), Viscous(((0.3, 0.5),))])
 def test_effects_without_a_fixed_compliance_are_refused(effect: Any) -> None:
-    problem = build(effect.apply(model(legs=(Leg(0.5, steps=4, duration_s=1.0),))))
+    problem = build(effect.apply(small_section(legs=(Leg(0.5, steps=4, duration_s=1.0),))))
     with pytest.raises(Finger3dError, match="no reduced model"):
         ReducedModel.of(problem)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import json
 import math
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,21 +12,9 @@ import numpy as np
 import pytest
 
 from finger3d.analyses.reduced import ReducedModel
-from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
-from finger3d.fem.material import Isotropic
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
-from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-
-
-def model(**changes: Any) -> Model:
-    finger = designs()["clipped_cylinder"](radius_mm=10.0, half_length_mm=5.0, edge_height_mm=4.0, width_mm=3.0)
-    base = Model(
-        finger, Isotropic(1.0, 0.45), MeshOptions(0.6, 1.5, "swept"), (Leg(0.5, steps=4),), friction=Coulomb(0.25),
-        gauges=(Gauge("g", 2.0, 4.5, angle=0.5), Gauge("long", -1.0, 4.5, length_mm=1.0)), domain="plane-strain",
-    )  # fmt: skip
-    return replace(base, **changes)
+from tests.models import small_section
 
 
 def replaced(header: Any, path: tuple[Any, ...], value: Any) -> Any:
@@ -40,7 +27,7 @@ def replaced(header: Any, path: tuple[Any, ...], value: Any) -> Any:
 
 
 def test_a_header_or_arrays_that_do_not_fit_are_one_line(tmp_path: Path) -> None:
-    good = ReducedModel.of(build(model())).save(tmp_path / "good.npz")
+    good = ReducedModel.of(build(small_section())).save(tmp_path / "good.npz")
     with np.load(good) as stored:
         arrays = dict(stored)
     header = json.loads(arrays.pop("header").tobytes())
@@ -69,7 +56,7 @@ def test_a_header_or_arrays_that_do_not_fit_are_one_line(tmp_path: Path) -> None
 
 
 def test_damaged_files_are_one_line(tmp_path: Path) -> None:
-    good = ReducedModel.of(build(model())).save(tmp_path / "good.npz")
+    good = ReducedModel.of(build(small_section())).save(tmp_path / "good.npz")
     data = good.read_bytes()
     with np.load(good) as stored:
         arrays = dict(stored)

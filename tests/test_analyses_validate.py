@@ -10,18 +10,14 @@ import pytest
 from finger3d.analyses import validate as study
 from finger3d.analyses.validate import chosen, kept_rows, run_studies, studies
 from finger3d.errors import Finger3dError, MissingError
-from tests.study_cases import BAD, GOOD, STOPS
+from tests.study_cases import BAD, STOPS, write_studies
 
 PACKAGE = Path(study.__file__).parents[1]
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    home = tmp_path / "validation"
-    home.mkdir()
-    for name, text in {"good": GOOD, "bad": BAD, "_shared": "VALUE = 1.5\n"}.items():
-        (home / f"{name}.py").write_text(text)
-    return home
+    return write_studies(tmp_path / "validation")
 
 
 def ran(home: Path, name: str) -> float:

@@ -14,14 +14,12 @@ from finger3d.cli import main
 from finger3d.errors import Outcome
 from finger3d.results.comparison import Case
 from tests.commands import run
-from tests.scenes import SWEPT_FINGER
+from tests.scenes import SWEPT_FINGER, written
 
 
 @pytest.fixture
 def scene(tmp_path) -> Path:
-    path = tmp_path / "scene.toml"
-    path.write_text(SWEPT_FINGER)
-    return path
+    return written(tmp_path, SWEPT_FINGER)
 
 
 def test_compare_as_json_prints_its_file(scene, tmp_path, monkeypatch, capsys) -> None:

@@ -15,7 +15,7 @@ import pytest
 
 from finger3d.sensor import JointCalibration, save
 from tests.commands import run
-from tests.sensor_cases import curve, line, straight, together, tolerance
+from tests.sensor_cases import curve, opposite, straight
 
 
 def test_many_readings_from_a_csv(tmp_path: Path, capsys: Any) -> None:
@@ -70,8 +70,7 @@ def test_estimate_of_nan_and_of_nothing(tmp_path: Path, capsys: Any) -> None:
 
 @pytest.fixture
 def joint() -> JointCalibration:
-    depth = tolerance("depth_mm", 0.1, 0.02)
-    return together(curve(line(0.01), tolerances=(depth,)), curve(line(-0.006), tolerances=(depth,)))
+    return opposite()
 
 
 def test_the_command_takes_readings_by_name(tmp_path: Path, joint: JointCalibration, capsys: Any) -> None:

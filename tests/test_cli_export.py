@@ -9,7 +9,7 @@ import pytest
 
 from finger3d.cli import main
 from finger3d.scene import load
-from tests.scenes import BLOCK
+from tests.scenes import BLOCK, written
 
 
 @pytest.fixture
@@ -66,9 +66,7 @@ def test_a_folder_that_cannot_be_written(scene_file, capsys) -> None:
 
 @pytest.fixture
 def scene(tmp_path: Path) -> Path:
-    path = tmp_path / "scene.toml"
-    path.write_text(BLOCK, encoding="utf-8")
-    return path
+    return written(tmp_path, BLOCK)
 
 
 def test_export_prints_json_alone(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

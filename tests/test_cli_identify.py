@@ -9,15 +9,14 @@ from typing import Any
 import pytest
 
 from finger3d.cli import main
-from tests.identify_cases import FREE, bench
+from tests.identify_cases import FREE, PRESS, bench
+from tests.scenes import written
 from tests.sensor_cases import scene
 
 
 @pytest.fixture
 def scene_file(tmp_path: Path) -> Path:
-    path = tmp_path / "scene.toml"
-    path.write_text(scene(press={"depth_mm": 10.0, "steps": 8}).to_toml(), encoding="utf-8")
-    return path
+    return written(tmp_path, scene(press=PRESS).to_toml())
 
 
 @pytest.mark.parametrize(

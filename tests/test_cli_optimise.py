@@ -10,7 +10,7 @@ import pytest
 
 from finger3d.cli import main
 from finger3d.scene import load
-from tests.scenes import BLOCK
+from tests.scenes import BLOCK, written
 from tests.sensor_cases import scene
 
 SETS = ["model.domain=plane-strain", "mesh.size_mm=4", "mesh.base_size_mm=16", "press.steps=10"]
@@ -45,9 +45,7 @@ def test_foils_are_refused(tmp_path: Path, capsys: Any) -> None:
 
 @pytest.fixture
 def block(tmp_path: Path) -> Path:
-    path = tmp_path / "scene.toml"
-    path.write_text(BLOCK, encoding="utf-8")
-    return path
+    return written(tmp_path, BLOCK)
 
 
 def test_design_prints_json_alone(block: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

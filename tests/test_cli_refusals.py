@@ -7,14 +7,12 @@ from pathlib import Path
 import pytest
 
 from finger3d.cli import main
-from tests.scenes import BLOCK
+from tests.scenes import BLOCK, written
 
 
 @pytest.fixture
 def scene(tmp_path: Path) -> Path:
-    path = tmp_path / "scene.toml"
-    path.write_text(BLOCK, encoding="utf-8")
-    return path
+    return written(tmp_path, BLOCK)
 
 
 @pytest.mark.parametrize(

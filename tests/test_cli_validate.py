@@ -9,16 +9,12 @@ import pytest
 from finger3d import cli
 from finger3d.analyses import validate as study
 from finger3d.analyses.validate import Study
-from tests.study_cases import BAD, GOOD, STOPS
+from tests.study_cases import STOPS, write_studies
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    home = tmp_path / "validation"
-    home.mkdir()
-    for name, text in {"good": GOOD, "bad": BAD, "_shared": "VALUE = 1.5\n"}.items():
-        (home / f"{name}.py").write_text(text)
-    return home
+    return write_studies(tmp_path / "validation")
 
 
 @pytest.fixture

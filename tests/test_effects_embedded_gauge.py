@@ -21,13 +21,12 @@ from finger3d.fem.kelvin import FoilPatches, InfiniteBody
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
-from finger3d.mechanics.history import StepResult, measure
+from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.solve import march
 from finger3d.mechanics.symmetry import symmetry
 from finger3d.objects import Plane, Sphere
 from finger3d.scene import parse
+from tests.models import marched
 
 FOIL = Effect(3000.0, 0.02, 1.0)
 LEGS = (Leg(0.3, steps=3, duration_s=1.0), Leg(0.3, slide_x_mm=0.1, steps=2, duration_s=1.0))
@@ -42,12 +41,6 @@ def block(**changes: object) -> Model:
         friction=Coulomb(0.25), gauges=(MIDDLE,),
     )  # fmt: skip
     return replace(model, **changes)
-
-
-def run(problem: Problem) -> list[StepResult]:
-    frames = list(march(problem))
-    assert all(f.outcome.ok and f.residual <= 1e-8 for f in frames)
-    return frames
 
 
 def test_springs_on_rows_are_those_of_the_stiffer_body() -> None:
@@ -109,7 +102,7 @@ def test_a_foil_across_a_bar_shares_its_load() -> None:
     )  # fmt: skip
     reads = []
     for modulus in (0.1, 10.0, 100.0, 1e4):
-        last = run(build(replace(FOIL, E_MPa=modulus).apply(model)))[-1]
+        last = marched(build(replace(FOIL, E_MPa=modulus).apply(model)))[-1]
         assert last.gauges["v_free"] == pytest.approx(-0.1, rel=1e-9)
         reads.append(last.gauges["v"] / last.gauges["v_free"])
     assert 1.0 > reads[0] > reads[1] > reads[2] > reads[3] > 0.0
@@ -120,7 +113,7 @@ def test_a_foil_across_a_bar_shares_its_load() -> None:
 def test_free_strain_is_that_of_the_scene_without_the_effect() -> None:
     # bars cover all of a foil but a hundredth of its length; and a solid's foil has a width, a line has none
     for domain, close in (("plane-strain", 0.01), ("solid", 0.05)):
-        plain, foiled = (run(build(m)) for m in (block(domain=domain), FOIL.apply(block(domain=domain))))
+        plain, foiled = (marched(build(m)) for m in (block(domain=domain), FOIL.apply(block(domain=domain))))
         for a, b in zip(plain, foiled, strict=True):
             assert set(b.gauges) == {"g", "g_free"}
             assert b.gauges["g_free"] == pytest.approx(a.gauges["g"], rel=close)
@@ -128,7 +121,7 @@ def test_free_strain_is_that_of_the_scene_without_the_effect() -> None:
 
 
 def test_a_foil_as_soft_as_nothing_reads_the_free_strain() -> None:
-    for frame in run(build(replace(FOIL, E_MPa=1e-12).apply(block(gauges=(MIDDLE, ASIDE))))):
+    for frame in marched(build(replace(FOIL, E_MPa=1e-12).apply(block(gauges=(MIDDLE, ASIDE))))):
         for name in ("g", "a"):
             assert frame.gauges[name] == pytest.approx(frame.gauges[f"{name}_free"], rel=1e-11)
 
@@ -157,7 +150,7 @@ def test_quarter_and_whole_agree() -> None:
     model = FOIL.apply(block(gauges=pair))
     quarter, whole = build(model), build(replace(model, symmetry=()))
     assert (quarter.axes, whole.axes) == (("x", "z"), ())
-    a, b = run(quarter)[-1], run(whole)[-1]
+    a, b = marched(quarter)[-1], marched(whole)[-1]
     for name in ("a", "b", "g", "a_free", "g_free"):
         assert a.gauges[name] == pytest.approx(b.gauges[name], rel=1e-8)
     assert a.gauges["a"] == pytest.approx(a.gauges["b"], rel=1e-12)
@@ -168,14 +161,14 @@ def test_quarter_and_whole_agree() -> None:
 def test_a_foil_off_the_middle_breaks_the_balance_of_friction() -> None:
     problem = build(FOIL.apply(block(gauges=(ASIDE,), domain="plane-strain")))
     assert problem.axes == ()
-    assert abs(measure(problem.points, run(problem)[-1])["tangential_force_x_N"]) > 1e-5
+    assert abs(measure(problem.points, marched(problem)[-1])["tangential_force_x_N"]) > 1e-5
 
 
 @pytest.mark.parametrize("domain", ["plane-strain", "solid"])
 def test_neither_more_bars_nor_a_finer_mesh_change_much(domain: str) -> None:
     def ratio(size: float, **more: object) -> float:
         model = FOIL.apply(block(domain=domain, mesh=MeshOptions(size, 1.5 * size, "swept")))
-        gauges = run(build(replace(model, inclusions=replace(model.inclusions, **more))))[-1].gauges
+        gauges = marched(build(replace(model, inclusions=replace(model.inclusions, **more))))[-1].gauges
         return gauges["g"] / gauges["g_free"]
 
     few = ratio(0.8)
@@ -235,13 +228,13 @@ def test_what_two_foils_do_to_each_other_is_mutual() -> None:
 def test_a_foil_in_a_relaxing_body_does_not_relax(bulk: bool) -> None:
     prony = ((0.9, 0.01),)
     model = block(gauges=(MIDDLE,), friction=Coulomb(0.0), legs=(Leg(0.3, steps=1, duration_s=1e6),))
-    slow = run(build(Viscosity(prony, bulk).apply(FOIL.apply(model))))[-1]
+    slow = marched(build(Viscosity(prony, bulk).apply(FOIL.apply(model))))[-1]
     # at last: the body of a tenth of the shear modulus, around the same foil
     soft = Isotropic(0.1, 0.3)
     if not bulk:
         low, volume = 0.1 / 2.6, 1.0 / 1.2
         soft = Isotropic(9.0 * volume * low / (3.0 * volume + low), (1.5 * volume - low) / (3.0 * volume + low))
-    wanted = run(build(FOIL.apply(replace(model, material=soft))))[-1]
+    wanted = marched(build(FOIL.apply(replace(model, material=soft))))[-1]
     close = 1e-6 if bulk else 0.01  # the foil's neighbourhood relaxes as if nu were constant
     assert slow.gauges["g"] == pytest.approx(wanted.gauges["g"], rel=close)
     assert slow.gauges["g_free"] == pytest.approx(wanted.gauges["g_free"], rel=close)
@@ -252,7 +245,7 @@ def test_viscosity_with_and_without_bulk_agree_around_a_foil_in_an_incompressibl
     model = FOIL.apply(block(gauges=(MIDDLE,), material=Isotropic(1.0, 0.5), legs=LEGS))
     problem = build(model)
     prony = ((0.5, 1.0), (0.2, 0.1))
-    a, b = (run(replace(problem, model=Viscosity(prony, bulk).apply(model)))[-1] for bulk in (True, False))
+    a, b = (marched(replace(problem, model=Viscosity(prony, bulk).apply(model)))[-1] for bulk in (True, False))
     assert a.part.force == pytest.approx(b.part.force, abs=1e-6 * a.part.force.max())
     for name in ("g", "g_free"):
         assert a.gauges[name] == pytest.approx(b.gauges[name], rel=1e-5)

@@ -14,13 +14,14 @@ from finger3d.effects.viscosity import (
 )
 from finger3d.fem.material import Isotropic
 from finger3d.mechanics.build import build
-from tests.viscous_cases import RAMP, TWO, block, run, viscous
+from tests.models import marched
+from tests.viscous_cases import RAMP, TWO, block, viscous
 
 
 def test_in_an_incompressible_body_both_kinds_are_one() -> None:
     # two ways to the same numbers: row forces over the compliance, and displacements over new factors
     problem = build(block(material=Isotropic(1.0, 0.5)))
-    a, b = (run(viscous(problem, TWO, bulk)) for bulk in (True, False))
+    a, b = (marched(viscous(problem, TWO, bulk)) for bulk in (True, False))
     largest = max(np.abs(f.part.force).max() for f in a)
     for f, g in zip(a, b, strict=True):
         assert np.abs(f.part.force - g.part.force).max() <= 1e-6 * largest

@@ -25,7 +25,8 @@ from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
 from finger3d.objects import Cylinder, Plane
 from finger3d.scene import parse
-from tests.viscous_cases import RAMP, RAMP_AND_HOLD, TWO, UP_AND_DOWN, block, mean_relaxation, run, viscous
+from tests.models import marched
+from tests.viscous_cases import RAMP, RAMP_AND_HOLD, TWO, UP_AND_DOWN, block, mean_relaxation, viscous
 
 
 def dome(**changes: object) -> Model:
@@ -42,7 +43,7 @@ def forces(problem: Problem, frames: list[StepResult]) -> np.ndarray:
 def test_a_growing_contact_is_the_convolution_of_the_elastic_one_to_round_off(mu: float) -> None:
     # Lee and Radok 1960: while contact grows, f(t) = int r(t - s) df_e; linear within a step, as the integrator has it
     problem = build(dome(legs=RAMP_AND_HOLD, friction=Coulomb(mu)))
-    elastic, slow = run(problem), run(viscous(problem))
+    elastic, slow = marched(problem), marched(viscous(problem))
     t = np.array([0.0] + [f.target.time_s for f in elastic])
     rates = np.diff(np.array([np.zeros_like(elastic[0].part.force)] + [f.part.force for f in elastic]), axis=0)
     for n, frame in enumerate(slow, start=1):
@@ -59,14 +60,14 @@ def test_the_error_of_the_step_falls_with_its_square() -> None:
     )  # fmt: skip
     problem = build(section)
     counts = (5, 10, 20, 40, 80)
-    ends = [forces(problem, run(viscous(problem, legs=(replace(RAMP[0], steps=n),))))[-1] for n in counts]
+    ends = [forces(problem, marched(viscous(problem, legs=(replace(RAMP[0], steps=n),))))[-1] for n in counts]
     changes = np.diff(ends)
     assert (changes[0] / changes[-1]) ** (1.0 / 3.0) == pytest.approx(4.0, rel=0.3)
 
 
 def test_a_hold_is_exact_in_one_step() -> None:
     problem = build(dome(legs=RAMP_AND_HOLD, friction=Coulomb(0.0)))
-    many, one = run(viscous(problem)), run(viscous(problem, legs=(*RAMP, replace(RAMP_AND_HOLD[1], steps=1))))
+    many, one = marched(viscous(problem)), marched(viscous(problem, legs=(*RAMP, replace(RAMP_AND_HOLD[1], steps=1))))
     assert one[-1].part.force == pytest.approx(many[-1].part.force, abs=1e-12)
 
 
@@ -88,7 +89,7 @@ def test_quick_presses_are_instantaneous_and_slow_ones_relaxed(nu: float, bulk: 
         wanted = build(replace(model, legs=legs, material=material))
         # one form for all: mixed and displacement elements differ by their mesh error
         assert wanted.part.elastic.mixed == problem.part.elastic.mixed or not bulk
-        got, elastic = run(viscous(problem, TWO, bulk, legs=legs))[-1], run(wanted)[-1]
+        got, elastic = marched(viscous(problem, TWO, bulk, legs=legs))[-1], marched(wanted)[-1]
         close = 1e-7 if wanted.part.elastic.mixed == problem.part.elastic.mixed else 0.01
         assert got.part.force == pytest.approx(elastic.part.force, abs=close * elastic.part.force.max())
         assert got.gauges["g"] == pytest.approx(elastic.gauges["g"], rel=close)
@@ -103,7 +104,7 @@ def test_stress_carries_the_force(domain: str, nu: float, bulk: bool) -> None:
     problem = build(block(material=Isotropic(1.0, nu), object=Plane(), friction=Coulomb(0.0), domain=domain,
                           legs=RAMP_AND_HOLD))  # fmt: skip
     held = viscous(problem, TWO, bulk)
-    frame = run(held)[-1]
+    frame = marched(held)[-1]
     sigma = held.model.formulation.fields(held, frame.part)[2]
     assert sigma.shape[1:] == (3, 3)
     parts = 2 ** len(problem.axes)
@@ -130,7 +131,7 @@ def _nodal_volume(problem: Problem) -> np.ndarray:
 @pytest.mark.parametrize("bulk", [True, False])
 def test_quarter_and_whole_agree(bulk: bool) -> None:
     quarter, whole = (build(block(symmetry=axes)) for axes in (("x", "z"), ()))
-    a, b = (run(viscous(p, TWO, bulk)) for p in (quarter, whole))
+    a, b = (marched(viscous(p, TWO, bulk)) for p in (quarter, whole))
     assert forces(quarter, a) == pytest.approx(forces(whole, b), abs=1e-9)
     assert [f.gauges["g"] for f in a] == pytest.approx([f.gauges["g"] for f in b], rel=1e-8)
 
@@ -139,7 +140,7 @@ def test_quarter_and_whole_agree(bulk: bool) -> None:
 def test_a_finger_let_go_creeps_back_and_is_met_later(bulk: bool) -> None:
     again = (*UP_AND_DOWN, Leg(0.3, steps=6, duration_s=1.0))
     problem = build(block())
-    frames = run(viscous(problem, TWO, bulk, legs=again))
+    frames = marched(viscous(problem, TWO, bulk, legs=again))
     free = frames[11:17]  # out of contact before the object is back at first touch
     assert all((f.part.status == OPEN).all() and not f.part.force.any() for f in frames[14:17])
     strains = np.array([f.gauges["g"] for f in free])
@@ -147,7 +148,7 @@ def test_a_finger_let_go_creeps_back_and_is_met_later(bulk: bool) -> None:
     assert (np.diff(strains) < 0.0).all()
     first, later = forces(problem, frames)[:6], forces(problem, frames)[17:]
     assert (later < first).all()  # the dent is not yet filled
-    long = run(viscous(problem, TWO, bulk, legs=(*UP_AND_DOWN, Leg(0.0, steps=1, duration_s=1e6))))[-1]
+    long = marched(viscous(problem, TWO, bulk, legs=(*UP_AND_DOWN, Leg(0.0, steps=1, duration_s=1e6))))[-1]
     assert abs(long.gauges["g"]) < 1e-6
     assert np.abs(long.part.gap - problem.gap(problem.origin)).max() < 1e-6
 
@@ -171,7 +172,7 @@ def test_an_increment_cut_in_two_starts_from_the_state_restored(monkeypatch: pyt
     cut = list(march(cut_problem))[-1]
     monkeypatch.undo()
     assert seen.calls == 9
-    two = run(viscous(problem, TWO, bulk, legs=(*RAMP, Leg(0.0, steps=2, duration_s=0.5))))[-1]
+    two = marched(viscous(problem, TWO, bulk, legs=(*RAMP, Leg(0.0, steps=2, duration_s=0.5))))[-1]
     assert cut.method == "cut back"
     assert np.array_equal(cut.part.force, two.part.force)
     assert cut.gauges == two.gauges
@@ -265,7 +266,7 @@ def test_what_is_elastic_beside_the_body_stays_elastic() -> None:
     soft = 3.0 / problem.surface.area  # as soft as the bar below, of E = 1 and height 3
     series = problem.delassus.reshape(c * d, c * d).copy()
     series[np.arange(c) * d, np.arange(c) * d] += soft
-    frames = run(
+    frames = marched(
         viscous(replace(problem, system=replace(problem.system, delassus=series.reshape(c, d, c, d))), ((0.5, 1.0),))
     )
     # two springs of 1 in series, one of them relaxing, pulled by 0.1 in 1 s; in fine steps
@@ -293,4 +294,4 @@ def test_an_elastic_object_does_not_relax_with_the_finger() -> None:
     problem = build(model)
     relaxed = viscous(problem, ((0.7, 1.0),))
     wanted = build(replace(model, material=Isotropic(0.3, 0.3)))
-    assert forces(problem, run(relaxed))[-1] == pytest.approx(forces(wanted, run(wanted))[-1], rel=1e-7)
+    assert forces(problem, marched(relaxed))[-1] == pytest.approx(forces(wanted, marched(wanted))[-1], rel=1e-7)

@@ -4,20 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from finger3d.fem.assembly import _CHUNK, stiffness
 from finger3d.fem.elements import quadrature
 from finger3d.fem.material import Elasticity
 from finger3d.fem.simplex import Mesh, quadratic
-from tests.meshes import body_load, edge_load, error_norms, grid, mapped
+from tests.meshes import body_load, edge_load, error_norms, full, grid, mapped
 
 PI = np.pi
-
-
-def full(upper: sp.csr_matrix) -> sp.csr_matrix:
-    return (upper + sp.triu(upper, 1).T).tocsr()
 
 
 def solve(mesh: Mesh, elastic: Elasticity, load: np.ndarray, held: np.ndarray, value: np.ndarray) -> np.ndarray:

@@ -8,29 +8,15 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from finger3d.fem.assembly import stiffness
 from finger3d.fem.condense import condense
-from finger3d.fem.material import Elasticity
 from finger3d.fem.pardiso import available
-from finger3d.fem.simplex import quadratic
-from finger3d.fem.traces import local_rows, strain_row, surface
-from finger3d.objects import vertical_frame
-from tests.meshes import grid
-
-
-def setup(nu: float, dim: int = 3):
-    mesh = quadratic(grid((3,) * dim, 0.2))
-    held = np.unique(mesh.facets["y-"])
-    fixed = (held[:, None] * dim + np.arange(dim)).ravel()
-    top = surface(mesh, "y+")
-    rows = sp.vstack([local_rows(top, vertical_frame(dim)), strain_row(mesh, np.full(dim, 0.4), np.eye(dim)[0])])
-    return mesh, stiffness(mesh, Elasticity.of(1.0, nu)), fixed, sp.csr_matrix(rows)
+from tests.meshes import held_cube
 
 
 @pytest.mark.parametrize("nu", [0.3, 0.49, 0.5])
 @pytest.mark.parametrize("solver", ["superlu", *(["pardiso"] if available() else [])])
 def test_compliance_equals_a_dense_inverse(nu: float, solver: str) -> None:
-    mesh, matrix, fixed, rows = setup(nu)
+    mesh, matrix, fixed, rows = held_cube(nu)
     full = (matrix.upper + sp.triu(matrix.upper, 1).T).toarray()
     free = np.setdiff1d(np.arange(len(full)), fixed)
     r = np.zeros((rows.shape[0], len(full)))
@@ -44,7 +30,7 @@ def test_compliance_equals_a_dense_inverse(nu: float, solver: str) -> None:
 
 @pytest.mark.parametrize("solver", ["superlu", *(["pardiso"] if available() else [])])
 def test_field_follows_from_the_same_factor(solver: str) -> None:
-    mesh, matrix, fixed, rows = setup(0.3)
+    mesh, matrix, fixed, rows = held_cube(0.3)
     found = condense(matrix, fixed, rows, solver)
     force = np.random.default_rng(0).normal(size=rows.shape[0])
     u = found.unknowns(force)
@@ -56,7 +42,7 @@ def test_field_follows_from_the_same_factor(solver: str) -> None:
 @pytest.mark.parametrize("solver", ["superlu", *(["pardiso"] if available() else [])])
 def test_elimination_gives_the_rows_before_their_forces_are_known(solver: str, columns: tuple[int, ...]) -> None:
     """Against one solution with loads and row forces together, with a modulus that scales the matrix."""
-    mesh, matrix, fixed, rows = setup(0.49)
+    mesh, matrix, fixed, rows = held_cube(0.49)
     found = condense(replace(matrix, upper=1e5 * matrix.upper), fixed, rows, solver)
     random = np.random.default_rng(0)
     load, force = (random.normal(size=(n, *columns)) for n in (matrix.upper.shape[0], rows.shape[0]))

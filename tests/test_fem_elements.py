@@ -8,23 +8,20 @@ import numpy as np
 import pytest
 
 from finger3d.fem.elements import LINE2, LINE3, TET4, TET10, TRI3, TRI6, Element, quadrature
+from tests.meshes import points_in
 
 ELEMENTS = [LINE2, LINE3, TRI3, TRI6, TET4, TET10]
-
-
-def points(element: Element) -> np.ndarray:
-    return np.random.default_rng(1).dirichlet(np.ones(element.dim + 1), 7)
 
 
 @pytest.mark.parametrize("element", ELEMENTS, ids=lambda e: e.name)
 def test_shape_functions_are_one_at_their_own_node_and_sum_to_one(element: Element) -> None:
     np.testing.assert_allclose(element.shape(element.nodes), np.eye(element.node_count), atol=1e-15)
-    np.testing.assert_allclose(element.shape(points(element)).sum(axis=1), 1.0)
+    np.testing.assert_allclose(element.shape(points_in(element)).sum(axis=1), 1.0)
 
 
 @pytest.mark.parametrize("element", ELEMENTS, ids=lambda e: e.name)
 def test_gradient_is_the_difference_quotient_of_the_shape_functions(element: Element) -> None:
-    bary, h = points(element), 1e-6
+    bary, h = points_in(element), 1e-6
     for axis in range(element.dim):
         step = np.zeros(element.dim + 1)
         step[[0, axis + 1]] = -h, h
@@ -37,7 +34,7 @@ def test_mirrored_nodes_keep_a_reflected_cell_positive(element: Element) -> None
     assert element.mirrored.tolist() == element.mirrored[element.mirrored[element.mirrored]].tolist()
     nodes = element.nodes[:, 1:].copy()
     nodes[:, 0] *= -1.0
-    jacobian = element.jacobians(nodes[element.mirrored][None], points(element))
+    jacobian = element.jacobians(nodes[element.mirrored][None], points_in(element))
     assert (np.linalg.det(jacobian) > 0.0).all()
 
 

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from finger3d.fem.assembly import Pattern, stiffness
@@ -14,12 +13,7 @@ from finger3d.fem.hyperelastic import Hyperelastic, InvertedError, Relaxing, Tot
 from finger3d.fem.laws import IsochoricLaw, MooneyRivlin, NeoHooke
 from finger3d.fem.material import Elasticity
 from finger3d.fem.simplex import Mesh, quadratic
-from tests.meshes import edge_load, grid, mapped
-
-
-def full(upper: sp.csr_matrix) -> sp.csr_matrix:
-    return (upper + sp.triu(upper, 1).T).tocsr()
-
+from tests.meshes import edge_load, full, grid, mapped
 
 LAW = MooneyRivlin(0.4, 0.3)
 CASES = [(2, 0.3, False), (2, 0.45, True), (2, 0.5, True), (2, 0.5, False), (3, 0.3, False), (3, 0.5, False)]

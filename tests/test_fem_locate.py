@@ -8,10 +8,7 @@ import pytest
 from finger3d.fem.elements import TET4, TET10, TRI3, TRI6, Element
 from finger3d.fem.locate import cells_at, inverse_map, locate
 from finger3d.fem.simplex import Mesh, quadratic
-
-
-def points(element: Element) -> np.ndarray:
-    return np.random.default_rng(1).dirichlet(np.ones(element.dim + 1), 7)
+from tests.meshes import points_in
 
 
 @pytest.mark.parametrize("element", [TRI3, TRI6, TET4, TET10], ids=lambda e: e.name)
@@ -19,7 +16,7 @@ def test_inverse_map_recovers_points_of_a_curved_cell(element: Element) -> None:
     nodes = element.nodes[:, 1:].copy()
     if element.is_quadratic:
         nodes[element.dim + 1 :] += np.random.default_rng(2).uniform(-0.05, 0.05, nodes[element.dim + 1 :].shape)
-    bary = points(element)
+    bary = points_in(element)
     at = element.shape(bary) @ nodes
     found = inverse_map(element, np.broadcast_to(nodes, (len(at), *nodes.shape)), at)
     np.testing.assert_allclose(found, bary, atol=1e-12)

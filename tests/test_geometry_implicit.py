@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from finger3d.geometry.implicit import Freeform, ImplicitCylinder, surface_of
-from finger3d.geometry.tessellate import CadFace
 from finger3d.meshing.snap import project
-
-
-def faces_of(*surfaces: Any) -> tuple[CadFace, ...]:
-    return tuple(CadFace("contact", s, np.full(3, -9.0), np.full(3, 9.0), 1.0) for s in surfaces)
+from tests.cad_cases import faces_of
 
 
 def test_free_form_surfaces_are_reached_by_projection() -> None:

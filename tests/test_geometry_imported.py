@@ -22,10 +22,9 @@ from finger3d.meshing import cache
 from finger3d.scene import parse
 from tests.bodies import ball, box, channel, step_of, write_stl
 from tests.designs import SMALL
+from tests.scene_tables import HALF_CYLINDER, scene_with_object
 
 BOTH = ("x", "z")
-FINGER = {"geometry": "half_cylinder", "radius_mm": 5.0, "width_mm": 4.0}
-SCENE: dict[str, Any] = {"finger": FINGER, "material": {"E_MPa": 1.0, "nu": 0.3}, "press": {"depth_mm": 0.5}}
 
 
 @pytest.mark.parametrize("name", ["finger.step", "inches.step", "finger.stl"])
@@ -128,10 +127,6 @@ def test_a_body_that_runs_through_itself_is_refused(tmp_path: Path) -> None:
         imported(write_stl(tmp_path / "body.stl", bad))
 
 
-def scene_with(path: Path, **table: Any) -> dict[str, Any]:
-    return {**SCENE, "object": {"shape": "mesh", "path": str(path), **table}}
-
-
 def test_press_takes_a_finger_and_an_object_from_files(drawn: Path, tmp_path: Path, capsys: Any) -> None:
     write_stl(tmp_path / "plate.stl", box(30.0, 1.0, 20.0))
     scene = tmp_path / "scene.toml"
@@ -155,7 +150,7 @@ def test_press_takes_a_finger_and_an_object_from_files(drawn: Path, tmp_path: Pa
     }
     same = parse(
         {
-            **SCENE,
+            **HALF_CYLINDER,
             "finger": design,
             "press": {"depth_mm": 0.6, "steps": 2},
             "mesh": {"size_mm": 1.2, "base_size_mm": 3.0, "mesher": "swept"},
@@ -175,7 +170,7 @@ def test_a_bad_file_ends_the_command_with_one_line_and_code_2(tmp_path: Path, ca
     scene = tmp_path / "scene.toml"
     import tomli_w
 
-    scene.write_text(tomli_w.dumps(scene_with(Path("object.stl"))), encoding="utf-8")
+    scene.write_text(tomli_w.dumps(scene_with_object(Path("object.stl"))), encoding="utf-8")
     assert main(["press", str(scene), "--out", str(tmp_path / "out")]) == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1

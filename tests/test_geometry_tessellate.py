@@ -2,23 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 
-from finger3d.geometry.cad import cut
-from finger3d.geometry.registry import designs
-from finger3d.geometry.tessellate import Tessellation, tessellate
+from finger3d.geometry.tessellate import tessellate
 from finger3d.meshing.snap import check_closed
-from tests.designs import FIG9
-
-HALF = designs()["half_cylinder"](5.0, 10.0)
-EXACT = (0.0, 10.0, -10.0, 5.0, -5.0, 50.0, -50.0)
-
-
-def body_of(design: Any, symmetry: tuple[str, ...] = (), tolerance: float = 0.01) -> Tessellation:
-    return tessellate(cut(design.solid(), symmetry), tolerance, exact=EXACT)
+from tests.cad_cases import EXACT, body_of
+from tests.designs import FIG9, HALF
 
 
 @pytest.mark.parametrize(

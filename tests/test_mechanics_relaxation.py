@@ -10,14 +10,15 @@ from finger3d.effects.viscosity import Effect, Viscoelastic
 from finger3d.fem.material import Isotropic
 from finger3d.mechanics.build import build
 from finger3d.objects import Plane
-from tests.viscous_cases import RAMP_AND_HOLD, TWO, block, mean_relaxation, run, viscous
+from tests.models import marched
+from tests.viscous_cases import RAMP_AND_HOLD, TWO, block, mean_relaxation, viscous
 
 
 def test_uniform_compression_relaxes_as_the_series_says() -> None:
     # nu = 0 under a flat plate: a bar, stress = E int r(t - s) d'(s) ds / h
     problem = build(block(material=Isotropic(2.0, 0.0), object=Plane(), friction=Coulomb(0.0), legs=RAMP_AND_HOLD))
     held = viscous(problem)
-    for frame in run(held):
+    for frame in marched(held):
         t = frame.target.time_s
         mean = mean_relaxation(TWO, np.array(max(t - 1.0, 0.0)), np.array(t)) * min(t, 1.0)
         stress = 2.0 * 0.3 / 3.0 * float(mean)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,14 +12,7 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.swept import mesh_section
-from tests.designs import FIG9
-
-ZONE = (-0.4, 0.4, -0.5, 0.5)
-
-
-def zone(design: Any) -> tuple[float, float, float, float]:
-    length, width = design.half_length_mm, design.width_mm
-    return ZONE[0] * length, ZONE[1] * length, ZONE[2] * width, ZONE[3] * width
+from tests.designs import FIG9, zone_of
 
 
 @pytest.mark.parametrize("size", [0.5, 1.0, 2.0])
@@ -50,7 +42,7 @@ def test_edges_have_the_asked_length_in_the_zone_and_grow_away_from_it(size: flo
 def test_sizes_that_cannot_work_are_refused_in_one_line(changes: dict[str, float], text: str) -> None:
     options = MeshOptions(**{"size_mm": 2.0, "base_size_mm": 8.0, "mesher": "swept", "layers": 2, **changes})
     with pytest.raises(Finger3dError, match=text) as refused:
-        mesh_solid(FIG9, options, zone(FIG9))
+        mesh_solid(FIG9, options, zone_of(FIG9))
     assert "\n" not in str(refused.value)
 
 
@@ -63,7 +55,7 @@ def test_a_wall_too_thin_for_the_size_is_refused() -> None:
 @pytest.mark.parametrize("size", [5.6, 4.0, 2.8, 2.0])
 def test_no_layer_along_z_is_thicker_than_the_edges_at_the_contact(size: float) -> None:
     options = MeshOptions(size_mm=size, base_size_mm=4.0 * size, mesher="swept", layers=2)
-    mesh = mesh_solid(FIG9, options, zone(FIG9))[0]
+    mesh = mesh_solid(FIG9, options, zone_of(FIG9))[0]
     levels = np.unique(mesh.points[np.unique(mesh.facets["contact"][:, :3]), 2])
     assert np.diff(levels).max() <= size
 
@@ -71,6 +63,6 @@ def test_no_layer_along_z_is_thicker_than_the_edges_at_the_contact(size: float) 
 def test_the_least_number_of_layers_is_kept() -> None:
     for layers in (1, 2, 4):
         options = MeshOptions(size_mm=12.0, base_size_mm=12.0, mesher="swept", layers=layers)
-        mesh = mesh_solid(FIG9, options, zone(FIG9))[0]
+        mesh = mesh_solid(FIG9, options, zone_of(FIG9))[0]
         levels = np.unique(mesh.points[np.unique(mesh.facets["contact"][:, :3]), 2])
         assert len(levels) == 2 * layers + 1

@@ -9,13 +9,10 @@ import pytest
 
 from finger3d.geometry.cad import sound
 from finger3d.geometry.implicit import ImplicitCylinder, ImplicitPlane, ImplicitSphere
-from finger3d.geometry.tessellate import CadFace, Tessellation, tessellate
+from finger3d.geometry.tessellate import Tessellation, tessellate
 from finger3d.meshing.seams import Seams
 from finger3d.meshing.snap import UnusableMeshError, project, snap_nodes
-
-
-def faces_of(*surfaces: Any) -> tuple[CadFace, ...]:
-    return tuple(CadFace("contact", s, np.full(3, -9.0), np.full(3, 9.0), 1.0) for s in surfaces)
+from tests.cad_cases import faces_of
 
 
 def test_points_go_where_their_surfaces_meet() -> None:

@@ -9,20 +9,11 @@ import pytest
 
 from finger3d.fem.quality import cell_angles_deg, curved_jacobians, curved_volume
 from finger3d.fem.simplex import boundary, unfold
-from finger3d.geometry.cad import cut
-from finger3d.geometry.registry import designs
-from finger3d.geometry.tessellate import CadFace, Tessellation, tessellate
 from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.snap import MIN_DIHEDRAL_DEG, UnusableMeshError, check_closed, repair, snap
-from tests.designs import FIG9
-
-HALF = designs()["half_cylinder"](5.0, 10.0)
-EXACT = (0.0, 10.0, -10.0, 5.0, -5.0, 50.0, -50.0)
-
-
-def body_of(design: Any, symmetry: tuple[str, ...] = (), tolerance: float = 0.01) -> Tessellation:
-    return tessellate(cut(design.solid(), symmetry), tolerance, exact=EXACT)
+from tests.cad_cases import body_of
+from tests.designs import FIG9, HALF
 
 
 def shaken(design: Any, symmetry: tuple[str, ...], by: float) -> tuple[np.ndarray, np.ndarray]:
@@ -86,7 +77,3 @@ def test_an_open_boundary_is_refused() -> None:
     check_closed(boundary(np.array([[0, 1, 2, 3]]), 3))
     with pytest.raises(UnusableMeshError, match="not closed"):
         check_closed(boundary(np.array([[0, 1, 2, 3]]), 3)[:3])
-
-
-def faces_of(*surfaces: Any) -> tuple[CadFace, ...]:
-    return tuple(CadFace("contact", s, np.full(3, -9.0), np.full(3, 9.0), 1.0) for s in surfaces)

@@ -19,25 +19,18 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.swept import mesh_section
-from tests.designs import FIG9
+from tests.designs import FIG9, HALF, zone_of
 
-HALF = designs()["half_cylinder"](5.0, 10.0)
 BLOCK = designs()["block"](20.0, 20.0, 20.0)
 LENS = designs()["clipped_cylinder"](100.0, 50.0, 0.0, 20.0)
 LOW = designs()["clipped_cylinder"](100.0, 80.0, 5.0, 20.0)
 ARCH = designs()["clipped_cylinder"](10.0, 10.0, 10.0, 8.0)
 ALL = {"fig9": FIG9, "half": HALF, "block": BLOCK, "lens": LENS, "low": LOW, "arch": ARCH}
-ZONE = (-0.4, 0.4, -0.5, 0.5)
 
 
 def sizes(design: Any, share: float = 0.08, grow: float = 4.0) -> Any:
     size = share * design.height_mm
     return MeshOptions(size_mm=size, base_size_mm=grow * size, mesher="swept", layers=2)
-
-
-def zone(design: Any) -> tuple[float, float, float, float]:
-    length, width = design.half_length_mm, design.width_mm
-    return ZONE[0] * length, ZONE[1] * length, ZONE[2] * width, ZONE[3] * width
 
 
 def check_whole(mesh: Mesh) -> None:
@@ -74,7 +67,7 @@ def check_planes(mesh: Mesh, design: Any) -> None:
 @pytest.mark.parametrize("name", ALL)
 def test_sections_are_sound(name: str, symmetry: tuple[str, ...]) -> None:
     design = ALL[name]
-    mesh, report = mesh_section(design, sizes(design), zone(design), symmetry)
+    mesh, report = mesh_section(design, sizes(design), zone_of(design), symmetry)
     assert mesh.dim == 2
     check_whole(mesh)
     check_planes(mesh, design)
@@ -90,7 +83,7 @@ def test_sections_are_sound(name: str, symmetry: tuple[str, ...]) -> None:
 @pytest.mark.parametrize("name", ["fig9", "half", "block"])
 def test_swept_solids_are_sound(name: str, symmetry: tuple[str, ...]) -> None:
     design = ALL[name]
-    mesh, report = mesh_solid(design, sizes(design), zone(design), symmetry)
+    mesh, report = mesh_solid(design, sizes(design), zone_of(design), symmetry)
     check_whole(mesh)
     check_planes(mesh, design)
     assert {f"symmetry_{axis}" for axis in symmetry} == {label for label in mesh.facets if "symmetry" in label}
@@ -101,8 +94,8 @@ def test_swept_solids_are_sound(name: str, symmetry: tuple[str, ...]) -> None:
 
 
 def test_meshes_are_deterministic() -> None:
-    first, second = (mesh_solid(FIG9, sizes(FIG9), zone(FIG9), ())[1].hash for _ in range(2))
-    assert first == second != mesh_solid(FIG9, sizes(FIG9, 0.07), zone(FIG9), ())[1].hash
+    first, second = (mesh_solid(FIG9, sizes(FIG9), zone_of(FIG9), ())[1].hash for _ in range(2))
+    assert first == second != mesh_solid(FIG9, sizes(FIG9, 0.07), zone_of(FIG9), ())[1].hash
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -120,17 +113,17 @@ def test_the_whole_is_its_own_mirror_image_to_the_last_bit(dim: int) -> None:
 
 
 def test_a_quarter_unfolds_to_the_whole() -> None:
-    quarter, report = mesh_solid(HALF, sizes(HALF), zone(HALF), ("x", "z"))
+    quarter, report = mesh_solid(HALF, sizes(HALF), zone_of(HALF), ("x", "z"))
     whole = unfold(quarter, (0, 2))[0]
     check_whole(whole)
-    assert mesh_solid(HALF, sizes(HALF), zone(HALF), ())[1].points == len(whole.points)
+    assert mesh_solid(HALF, sizes(HALF), zone_of(HALF), ())[1].points == len(whole.points)
     assert report.volume_mm3 == pytest.approx(HALF.volume_mm3, rel=1e-4)
 
 
 def test_the_curved_area_converges_with_the_fourth_power_of_the_size() -> None:
     errors = []
     for share in (0.16, 0.08, 0.04):
-        report = mesh_section(HALF, sizes(HALF, share, 1.0), zone(HALF))[1]
+        report = mesh_section(HALF, sizes(HALF, share, 1.0), zone_of(HALF))[1]
         errors.append(abs(report.volume_mm3 / report.cad_volume_mm3 - 1.0))
     rates = np.log2(np.array(errors[:-1]) / errors[1:])
     assert (rates > 3.5).all()

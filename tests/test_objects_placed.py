@@ -20,7 +20,7 @@ from finger3d.objects import (
     Wave,
     Wedge,
 )
-from tests.bodies import ball, box
+from tests.bodies import ball, box, random_points
 
 SHAPES = [
     Plane(),
@@ -35,17 +35,13 @@ SHAPES = [
 TURNED = ObjectPose(0.3, 0.4, -0.2, turn_x=0.2, turn_y=-0.5, turn_z=0.3)
 
 
-def points(count: int, seed: int = 0) -> np.ndarray:
-    return np.random.default_rng(seed).uniform(-1.5, 1.5, (count, 3))
-
-
 @pytest.mark.parametrize("obj", SHAPES, ids=repr)
 def test_the_distance_is_that_of_the_nearest_point_of_the_surface(obj: RigidObject) -> None:
     x, z = (v.ravel() for v in np.meshgrid(np.linspace(-3.0, 3.0, 601), np.linspace(-3.0, 3.0, 601)))
     y = obj.profile(x, z)
     known = np.isfinite(y)
     surface = np.stack([x, y, z], axis=1)[known]
-    at = points(300)
+    at = random_points(300)
     value, gradient = obj.distance(at)
     nearest = KDTree(surface).query(at)[0]
     # a grid of 10 um misses the nearest point by up to 7 um: the distance is longer by 7^2 / 2d um, 7 um at the surface
@@ -56,7 +52,7 @@ def test_the_distance_is_that_of_the_nearest_point_of_the_surface(obj: RigidObje
 
 @pytest.mark.parametrize("obj", SHAPES, ids=repr)
 def test_the_gradient_is_the_derivative_and_no_slope_exceeds_one(obj: RigidObject) -> None:
-    placed, at, step = PlacedObject.of(obj, 1.0, TURNED), points(400, 1), 1e-6
+    placed, at, step = PlacedObject.of(obj, 1.0, TURNED), random_points(400, 1), 1e-6
     value, gradient = placed.distance(at)
     ahead, behind = (
         np.stack([placed.distance(at + sign * step * e)[0] for e in np.eye(3)], axis=1) for sign in (1.0, -1.0)
@@ -64,13 +60,13 @@ def test_the_gradient_is_the_derivative_and_no_slope_exceeds_one(obj: RigidObjec
     smooth = np.abs(ahead + behind - 2.0 * value[:, None]).max(axis=1) < 1e-9  # not on the medial axis
     assert smooth.mean() > 0.95
     assert np.abs((ahead - behind) / (2.0 * step) - gradient)[smooth].max() < 1e-5
-    others = points(400, 2)
+    others = random_points(400, 2)
     assert (np.abs(value - placed.distance(others)[0]) <= np.linalg.norm(at - others, axis=1) + 1e-12).all()
 
 
 @pytest.mark.parametrize("obj", SHAPES, ids=repr)
 def test_a_turned_object_is_a_turned_scene(obj: RigidObject) -> None:
-    at, placed = points(100), PlacedObject.of(obj, 1.0, TURNED)
+    at, placed = random_points(100), PlacedObject.of(obj, 1.0, TURNED)
     reference = np.array([0.4, 0.7, -0.2])
     own = (at - reference) @ TURNED.turn
     assert placed.distance(at)[0] == pytest.approx(obj.distance(own)[0], abs=1e-12)
@@ -80,7 +76,7 @@ def test_a_turned_object_is_a_turned_scene(obj: RigidObject) -> None:
 @pytest.mark.parametrize("obj", [*SHAPES[1:4], SHAPES[7]], ids=repr)
 def test_the_height_of_a_turned_object_is_where_a_line_from_below_meets_it_first(obj: RigidObject) -> None:
     placed = PlacedObject.of(obj, 1.0, ObjectPose(0.0, turn_x=0.2, turn_y=0.5, turn_z=0.1))
-    x, _, z = points(50).T
+    x, _, z = random_points(50).T
     y = placed.height(x, z)
     met = np.isfinite(y)
     assert met.any()

@@ -6,14 +6,11 @@ import numpy as np
 import pytest
 
 from finger3d.objects import ObjectPose, PlacedObject, Sphere
-
-
-def points(count: int, seed: int = 0) -> np.ndarray:
-    return np.random.default_rng(seed).uniform(-1.5, 1.5, (count, 3))
+from tests.bodies import random_points
 
 
 def test_material_points_of_a_twisted_object_go_round_its_reference_point() -> None:
-    angle, at = 0.01, points(20)
+    angle, at = 0.01, random_points(20)
     before = PlacedObject.of(Sphere(1.0, radius_mm=3.0), 5.0, ObjectPose(0.2))
     after = PlacedObject.of(Sphere(1.0, radius_mm=3.0), 5.0, ObjectPose(0.2, turn_y=angle))
     arm = at - [1.0, 4.8, 0.0]

@@ -6,17 +6,13 @@ import numpy as np
 import pytest
 
 from finger3d.objects import DistanceTracker, MeshObject, ObjectPose, PlacedObject, between
-from tests.bodies import ball
-
-
-def points(count: int, seed: int = 0) -> np.ndarray:
-    return np.random.default_rng(seed).uniform(-1.5, 1.5, (count, 3))
+from tests.bodies import ball, random_points
 
 
 @pytest.mark.parametrize("within", [0.05, np.inf])
 def test_tracked_distances_are_exact_where_they_are_small(within: float) -> None:
     obj = MeshObject(surface=ball(2.0))
-    tracker, at = DistanceTracker(), points(200) - [0.0, 1.0, 0.0]
+    tracker, at = DistanceTracker(), random_points(200) - [0.0, 1.0, 0.0]
     last = ObjectPose(0.8, 0.5, 0.2, turn_y=0.3)
     for share in np.linspace(0.0, 1.0, 12):
         placed = PlacedObject.of(obj, 0.0, between(ObjectPose(0.0), last, float(share)))

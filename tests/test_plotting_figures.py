@@ -14,15 +14,14 @@ from finger3d.contact.friction import OPEN, SLIP, STICK
 from finger3d.fem.simplex import Mesh
 from finger3d.plotting import solid as render
 from finger3d.plotting.figures import contact_figure, finger_picture, force_figure, zones
-from tests.pictures import MU, STEPS, finger, pixels, pressed, share
+from tests.pictures import MU, STEPS, finger, pixels, pressed, share, solid_finger
 
 pytestmark = pytest.mark.usefixtures("fresh_renderer")
 
 
 @pytest.fixture(scope="module")
 def solid() -> tuple[Mesh, dict[str, Any]]:
-    mesh = finger((20, 5, 6))
-    return mesh, pressed(mesh)
+    return solid_finger()
 
 
 def test_a_section_is_drawn_without_vtk(tmp_path: Path) -> None:

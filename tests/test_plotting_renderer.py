@@ -12,15 +12,14 @@ from finger3d.errors import MissingError
 from finger3d.fem.simplex import Mesh
 from finger3d.plotting import renderer
 from finger3d.plotting.figures import finger_picture
-from tests.pictures import OBJECT, assert_shows_the_zones, finger, pressed
+from tests.pictures import OBJECT, assert_shows_the_zones, solid_finger
 
 pytestmark = pytest.mark.usefixtures("fresh_renderer")
 
 
 @pytest.fixture(scope="module")
 def solid() -> tuple[Mesh, dict[str, Any]]:
-    mesh = finger((20, 5, 6))
-    return mesh, pressed(mesh)
+    return solid_finger()
 
 
 def test_pyvista_draws_a_solid_or_tells_that_opengl_is_missing(

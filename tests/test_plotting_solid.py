@@ -12,15 +12,14 @@ from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES
 from finger3d.fem.simplex import Mesh
 from finger3d.plotting import solid as render
 from finger3d.plotting.figures import finger_picture
-from tests.pictures import OBJECT, assert_shows_the_zones, finger, pressed, top
+from tests.pictures import OBJECT, assert_shows_the_zones, solid_finger, top
 
 pytestmark = pytest.mark.usefixtures("fresh_renderer")
 
 
 @pytest.fixture(scope="module")
 def solid() -> tuple[Mesh, dict[str, Any]]:
-    mesh = finger((20, 5, 6))
-    return mesh, pressed(mesh)
+    return solid_finger()
 
 
 def test_a_solid_is_drawn_by_matplotlib_when_asked_for(

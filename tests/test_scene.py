@@ -5,20 +5,14 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 from finger3d.scene import load, parse
 from tests.scene_tables import SMALL
-
-
-def write(folder: Path, text: str) -> Path:
-    path = folder / "scene.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
+from tests.scenes import written
 
 
 def test_loading_a_scene_needs_no_cad_and_no_drawing(tmp_path) -> None:
-    path = write(tmp_path, parse(SMALL).to_toml())
+    path = written(tmp_path, parse(SMALL).to_toml())
     heavy = "{'OCP', 'build123d', 'vtk', 'vtkmodules', 'pyvista', 'pytetwild', 'matplotlib'}"
     code = f"import sys, finger3d; finger3d.load({str(path)!r}).model(); print({heavy} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

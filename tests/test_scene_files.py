@@ -13,13 +13,7 @@ from finger3d.geometry.surface import Triangles
 from finger3d.objects import MeshObject
 from finger3d.scene import load, parse
 from tests.bodies import box, channel, write_stl
-
-FINGER = {"geometry": "half_cylinder", "radius_mm": 5.0, "width_mm": 4.0}
-SCENE: dict[str, Any] = {"finger": FINGER, "material": {"E_MPa": 1.0, "nu": 0.3}, "press": {"depth_mm": 0.5}}
-
-
-def scene_with(path: Path, **table: Any) -> dict[str, Any]:
-    return {**SCENE, "object": {"shape": "mesh", "path": str(path), **table}}
+from tests.scene_tables import scene_with_object
 
 
 @pytest.mark.parametrize(
@@ -38,14 +32,14 @@ def scene_with(path: Path, **table: Any) -> dict[str, Any]:
 def test_objects_that_a_scene_refuses(tmp_path: Path, surface: Triangles, table: dict[str, Any], text: str) -> None:
     surface = replace(surface, points=surface.points * 1.0001)
     with pytest.raises(Finger3dError, match=text) as refused:
-        parse(scene_with(write_stl(tmp_path / "object.stl", surface), **table))
+        parse(scene_with_object(write_stl(tmp_path / "object.stl", surface), **table))
     assert "\n" not in str(refused.value)
 
 
 def test_paths_are_relative_to_the_scene_and_survive_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "parts").mkdir()
     write_stl(tmp_path / "parts" / "plate.stl", box(6.0, 1.0, 6.0))
-    text = parse(scene_with(tmp_path / "parts" / "plate.stl")).to_toml()
+    text = parse(scene_with_object(tmp_path / "parts" / "plate.stl")).to_toml()
     (tmp_path / "a.toml").write_text(text.replace(str(tmp_path / "parts"), "parts"), encoding="utf-8")
     monkeypatch.chdir("/")
     scene = load(tmp_path / "a.toml")
@@ -58,6 +52,6 @@ def test_paths_are_relative_to_the_scene_and_survive_it(tmp_path: Path, monkeypa
 
 def test_object_scale_changes_the_object(tmp_path: Path) -> None:
     path = write_stl(tmp_path / "inches.stl", box(0.2, 0.1, 0.2))
-    obj = parse(scene_with(path, scale=25.4)).object
+    obj = parse(scene_with_object(path, scale=25.4)).object
     assert isinstance(obj, MeshObject)
     assert obj.surface.volume == pytest.approx(0.004 * 25.4**3)

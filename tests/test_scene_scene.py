@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import tomllib
-from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -17,14 +16,9 @@ from finger3d.mechanics.model import Leg, MeshOptions
 from finger3d.objects import Plane
 from finger3d.scene import load, parse
 from tests.scene_tables import FINGER, SMALL
+from tests.scenes import written
 
 HEIGHT = 36.6 + 100.0 - math.sqrt(100.0**2 - 50.0**2)
-
-
-def write(folder: Path, text: str) -> Path:
-    path = folder / "scene.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
 
 
 def test_the_least_scene_is_frictionless_on_a_plane_as_a_solid() -> None:
@@ -74,7 +68,7 @@ def test_the_contract_example_loads_without_its_effects(tmp_path) -> None:
         angle_deg = 30.0
         length_mm = 0.0
     """
-    scene = load(write(tmp_path, contract))
+    scene = load(written(tmp_path, contract))
     model = scene.model()
     assert scene.title == "Fig. 9 finger, 20 mm wide"
     assert model.friction == Coulomb(0.25)

@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from finger3d.contact.friction import Coulomb
 from finger3d.mechanics.model import Leg
 from finger3d.scene import load, parse
 from tests.scene_tables import SMALL
-
-
-def write(folder: Path, text: str) -> Path:
-    path = folder / "scene.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
+from tests.scenes import written
 
 
 def test_overrides_are_applied_before_checking(tmp_path) -> None:
     # nu is missing in the file: only the override makes it a scene.
-    path = write(tmp_path, parse(SMALL).to_toml(defaults=False).replace("nu = 0.49\n", ""))
+    path = written(tmp_path, parse(SMALL).to_toml(defaults=False).replace("nu = 0.49\n", ""))
     overrides = [
         "material.nu=0.3",
         "friction.mu=0.5",
@@ -39,12 +32,12 @@ def test_overrides_are_applied_before_checking(tmp_path) -> None:
 
 def test_an_override_reaches_into_a_list(tmp_path) -> None:
     legs = {"leg": [{"depth_mm": 5.0}, {"depth_mm": 0.0}]}
-    path = write(tmp_path, parse({**SMALL, "press": legs}).to_toml())
+    path = written(tmp_path, parse({**SMALL, "press": legs}).to_toml())
     assert load(path, ["press.leg.1.depth_mm=2.5"]).legs == (Leg(5.0, steps="auto"), Leg(2.5, steps="auto"))
 
 
 def test_the_file_is_not_changed_by_an_override(tmp_path) -> None:
-    path = write(tmp_path, parse(SMALL).to_toml())
+    path = written(tmp_path, parse(SMALL).to_toml())
     before = path.read_bytes()
     load(path, ["friction.mu=0.5"])
     assert path.read_bytes() == before

@@ -11,13 +11,12 @@ import pytest
 
 from finger3d.errors import Finger3dError
 from finger3d.sensor import JointCalibration, estimate, load, save
-from tests.sensor_cases import curve, line, straight, together, tolerance
+from tests.sensor_cases import curve, line, opposite, straight, together
 
 
 @pytest.fixture
 def joint() -> JointCalibration:
-    depth = tolerance("depth_mm", 0.1, 0.02)
-    return together(curve(line(0.01), tolerances=(depth,)), curve(line(-0.006), tolerances=(depth,)))
+    return opposite()
 
 
 def test_a_single_gauge_may_be_named() -> None:

@@ -10,10 +10,8 @@ from finger3d.contact.friction import Coulomb
 from finger3d.effects.viscosity import Effect
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.solve import march
 from finger3d.objects import Sphere
 
 TWO = ((0.5, 1.0), (0.2, 0.1))
@@ -33,12 +31,6 @@ def block(**changes: object) -> Model:
 
 def viscous(problem: Problem, prony: tuple = TWO, bulk: bool = True, **changes: object) -> Problem:
     return replace(problem, model=Effect(prony, bulk).apply(replace(problem.model, **changes)))
-
-
-def run(problem: Problem) -> list[StepResult]:
-    frames = list(march(problem))
-    assert all(f.outcome.ok and f.residual <= 1e-8 for f in frames)
-    return frames
 
 
 def mean_relaxation(prony: tuple, low: np.ndarray, high: np.ndarray) -> np.ndarray:
