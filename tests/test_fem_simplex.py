@@ -1,11 +1,13 @@
 """Simplex meshes: facets, mid-edge nodes, mirror images."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from finger3d.fem.elements import EDGES, TET4
 from finger3d.fem.quality import curved_volume
-from finger3d.fem.simplex import Mesh, boundary, quadratic, signed_volumes, unfold
+from finger3d.fem.simplex import Mesh, boundary, quadratic, reflected, signed_volumes, unfold
 
 TRIANGLE = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), np.array([[0, 1, 2]]), {})
 TET = Mesh(np.vstack([np.zeros(3), np.eye(3)]), np.array([[0, 1, 2, 3]]), {})
@@ -69,3 +71,12 @@ def test_unfolded_cells_are_positive_and_facets_are_the_whole_boundary(
 def test_unfolded_mid_edge_nodes_stay_in_the_middle_of_their_edges() -> None:
     whole = unfold(quadratic(_labelled(TET)), (0, 2))[0]
     np.testing.assert_allclose(whole.points[whole.cells[:, 4:]], whole.points[whole.cells[:, TET4.edges]].mean(axis=2))
+
+
+@pytest.mark.parametrize("axes", [(0,), (0, 2)])
+def test_cells_keep_their_part_in_quadratic_and_unfolded_meshes(axes: tuple[int, ...]) -> None:
+    cube = replace(_labelled(TET), part=np.array([1]), part_labels=("core",))
+    whole, _, _ = unfold(quadratic(cube), axes)
+    assert whole.part_labels == ("core",)
+    np.testing.assert_array_equal(whole.part, np.ones(2 ** len(axes)))
+    np.testing.assert_array_equal(reflected(cube, 0).part, [1])

@@ -38,11 +38,15 @@ class Mesh:
     cells : (e, d + 1) linear, or (e, 6 | 10) quadratic, node numbers in VTK order
     facets : label -> (m, d) linear, or (m, 3 | 6) quadratic boundary facets, oriented outward
         Labels in use: contact, base, ends, walls, symmetry_x, symmetry_z.
+    part : (e,) number of the part that each cell belongs to, 0 for the main body; None: there is no other part
+    part_labels : labels of parts 1, 2, ...
     """
 
     points: Float
     cells: Int
     facets: Mapping[str, Int]
+    part: Int | None = None
+    part_labels: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
@@ -51,7 +55,10 @@ class Mesh:
         """One line: the arrays would fill pages."""
         kind = "quadratic" if self.element.is_quadratic else "linear"
         labels = ", ".join(f"{label} {len(found)}" for label, found in self.facets.items())
-        return f"<Mesh of {len(self.cells)} {kind} cells, {len(self.points)} points, {self.dim}D; facets: {labels}>"
+        parts = f"; parts: {', '.join(self.part_labels)}" if self.part_labels else ""
+        return (
+            f"<Mesh of {len(self.cells)} {kind} cells, {len(self.points)} points, {self.dim}D; facets: {labels}{parts}>"
+        )
 
     @property
     def dim(self) -> int:
@@ -111,7 +118,7 @@ def quadratic(mesh: Mesh) -> Mesh:
         for label, f in mesh.facets.items()
     }
     cells = np.hstack([mesh.cells, n + number.reshape(key.shape)])
-    return Mesh(np.vstack([mesh.points, mids]), cells, facets)
+    return replace(mesh, points=np.vstack([mesh.points, mids]), cells=cells, facets=facets)
 
 
 def reflected(mesh: Mesh, axis: int) -> Mesh:
@@ -119,7 +126,8 @@ def reflected(mesh: Mesh, axis: int) -> Mesh:
     points = mesh.points.copy()
     points[:, axis] *= -1.0
     of_cell, of_facet = mesh.element.mirrored, mesh.facet_element.mirrored
-    return Mesh(points, mesh.cells[:, of_cell], {label: f[:, of_facet] for label, f in mesh.facets.items()})
+    facets = {label: f[:, of_facet] for label, f in mesh.facets.items()}
+    return replace(mesh, points=points, cells=mesh.cells[:, of_cell], facets=facets)
 
 
 def axis_numbers(axes: Iterable[str]) -> tuple[int, ...]:
@@ -156,7 +164,9 @@ def unfold(mesh: Mesh, axes: tuple[int, ...]) -> tuple[Mesh, Int, Float]:
         plane = "symmetry_" + "xyz"[axis]
         facets = {label: np.vstack([f, image[f][:, of_facet]]) for label, f in mesh.facets.items() if label != plane}
         cells = np.vstack([mesh.cells, image[mesh.cells][:, of_cell]])
-        mesh = replace(mesh, points=np.vstack([mesh.points, flipped]), cells=cells, facets=facets)
+        part = None if mesh.part is None else np.tile(mesh.part, 2)
+        points = np.vstack([mesh.points, flipped])
+        mesh = replace(mesh, points=points, cells=cells, facets=facets, part=part)
         parent = np.concatenate([parent, parent[off]])
         sign = np.vstack([sign, flipped_sign])
     return mesh, parent, sign

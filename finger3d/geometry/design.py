@@ -50,6 +50,10 @@ class Design(Protocol):
     def cache_fields(self) -> Mapping[str, object]:
         """Key of the body's meshes in the cache: equal for equal shapes only."""
 
+    @property
+    def part_labels(self) -> tuple[str, ...]:
+        """Labels of the solids beside the main body; empty for a body of one solid."""
+
     def section(self) -> Section | None:
         """Return the section x >= 0 of a body extruded along z; None if the section is not constant."""
 
@@ -77,6 +81,7 @@ class ParametricDesign(ABC):
 
     name: ClassVar[str]
     may_be_zero: ClassVar[tuple[str, ...]] = ()
+    part_labels: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
         check_dimensions(self.name, self.dimensions, self.may_be_zero)
@@ -147,6 +152,7 @@ class DesignSummary:
     """Height and width (mm) of a body whose shape is not known, as in a reduced model."""
 
     name: ClassVar[str] = "reduced"
+    part_labels: ClassVar[tuple[str, ...]] = ()
     half_length_mm: ClassVar[float] = math.nan
     volume_mm3: ClassVar[float] = math.nan
 

@@ -66,6 +66,11 @@ class Imported:
         return Path(self.path).name
 
     @property
+    def part_labels(self) -> tuple[str, ...]:
+        """See :attr:`Design.part_labels`."""
+        return ()
+
+    @property
     def cache_fields(self) -> Mapping[str, object]:
         """Content of the file and how it was turned; the file's name does not matter."""
         turned = {"named_base": "True"} if self.named_base else {}
