@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 
 from finger3d.fem.elements import quadrature
 from finger3d.fem.material import Isotropic
-from finger3d.fem.recover import across, extrapolated, nodal_pressure, nodal_strain, stress
+from finger3d.fem.recover import extrapolated, nodal_pressure, nodal_strain, strain_and_stress
 from finger3d.fem.simplex import quadratic
 from tests.meshes import grid
 
@@ -30,19 +32,22 @@ def test_a_linear_field_is_recovered_from_vertices_and_from_quadrature_points(di
     assert np.allclose(extrapolated(mesh, at.reshape(-1)), linear)
 
 
-def test_across_a_section_are_no_strain_or_no_stress() -> None:
-    material, strain = Isotropic(2.0, 0.3), np.array([[[0.01, 0.002], [0.002, -0.003]]])
-    for plane_strain in (True, False):
-        elastic = material.elasticity(not plane_strain)
-        e, s = across(strain, stress(strain, elastic), material, plane_strain)
-        assert np.array_equal(e[:, :2, :2], strain)
-        assert (e if plane_strain else s)[0, 2, 2] == pytest.approx(0.0, abs=1e-15)
-        # Hooke's law along z: E e_z = s_z - nu (s_x + s_y)
-        assert 2.0 * e[0, 2, 2] == pytest.approx(s[0, 2, 2] - 0.3 * (s[0, 0, 0] + s[0, 1, 1]), abs=1e-15)
+@pytest.mark.parametrize("plane_strain", [True, False])
+def test_across_a_section_are_no_strain_or_no_stress(plane_strain: bool) -> None:
+    material, mesh = Isotropic(2.0, 0.3), quadratic(grid((1, 1)))
+    slope = np.array([[0.01, 0.002], [0.002, -0.003]])
+    law = material.elasticity(not plane_strain)
+    across = partial(material.across, plane_strain=plane_strain)
+    e, s = (field[0] for field in strain_and_stress(mesh, (mesh.points @ slope).ravel(), [law], 1.0, [across]))
+    np.testing.assert_allclose(e[:2, :2], slope, atol=1e-15)
+    assert (e if plane_strain else s)[2, 2] == pytest.approx(0.0, abs=1e-15)
+    # Hooke's law along z: E e_z = s_z - nu (s_x + s_y)
+    assert 2.0 * e[2, 2] == pytest.approx(s[2, 2] - 0.3 * (s[0, 0] + s[1, 1]), abs=1e-15)
 
 
 def test_the_pressure_of_the_mixed_form_is_added_to_the_normal_stresses() -> None:
-    elastic, strain = Isotropic(1.0, 0.3).elasticity(False), np.zeros((2, 3, 3))
-    assert np.array_equal(
-        stress(strain, elastic, np.array([0.5, -1.0])), np.array([0.5, -1.0])[:, None, None] * np.eye(3)
-    )
+    mesh, law = quadratic(grid((1, 1, 1))), Isotropic(1.0, 0.49).elasticity()
+    pressures = np.arange(len(mesh.vertices))
+    unknowns = np.concatenate([np.zeros(mesh.points.size), pressures])
+    _, sigma = strain_and_stress(mesh, unknowns, [law], 0.25)
+    np.testing.assert_array_equal(sigma[mesh.vertices], 0.25 * pressures[:, None, None] * np.eye(3))

@@ -44,7 +44,7 @@ def forecast(model: Model) -> Tree:
     d = 3 if model.domain == "solid" else 2
     axes = symmetry(model)
     zone = contact_box(model)
-    mixed = model.domain != "plane-stress" and model.material.is_nearly_incompressible
+    mixed = model.mixed
     size = _size(model, zone, axes, mixed)
     runs, free = _runs(model, size, d), sum(leg.steps == "auto" for leg in model.legs)
     fixed = sum(leg.steps for leg in model.legs if isinstance(leg.steps, int))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -13,7 +14,9 @@ from finger3d._types import Float
 from finger3d.fem.assembly import Stiffness, stiffness, times
 from finger3d.fem.condense import Condensation
 from finger3d.fem.material import Elasticity
-from finger3d.fem.recover import displacement, nodal_strain, pressure, stress
+from finger3d.fem.parts import ElasticityByPart
+from finger3d.fem.recover import averaged, displacement, nodal_pressure, nodal_strain
+from finger3d.fem.simplex import MeshPart
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.relaxation import InternalVariables, Prony, Step, relaxed
@@ -79,7 +82,7 @@ class ViscoelasticBody(Protocol):
         ...
 
     def stress(self, prony: Prony, memory: InternalVariables) -> Float:
-        """Nodal stress (n, 3, 3), or (n, 2, 2) and (n,) across the section."""
+        """Nodal stress (n, 3, 3), MPa."""
         ...
 
     def nodal_forces(self, prony: Prony, memory: InternalVariables) -> Float:
@@ -114,11 +117,7 @@ class ConstantPoissonRatio:
 
     def stress(self, prony: Prony, memory: InternalVariables) -> Float:
         """Return the stress of the elastic body under the relaxed forces."""
-        problem = self.problem
-        unknowns = self.unknowns(relaxed(prony, memory))
-        strain = nodal_strain(problem.mesh, displacement(problem.mesh, unknowns))
-        p = pressure(problem.mesh, problem.part.stiffness, unknowns) if problem.part.elastic.mixed else None
-        return stress(strain, problem.part.elastic, p)
+        return self.problem.strain_and_stress(self.unknowns(relaxed(prony, memory)))[1]
 
     def nodal_forces(self, prony: Prony, memory: InternalVariables) -> Float:
         """Return the nodal forces of the elastic body under the relaxed row forces."""
@@ -145,16 +144,28 @@ class ConstantBulkModulus:
         """Number of unknowns, and of rows that yield beyond the mesh."""
         return self._own + len(self.problem.inclusions.subgrid_compliance)
 
-    @property
-    def _elastic(self) -> Elasticity:
-        return self.problem.model.material.isotropic("effects.viscosity.bulk = false").elasticity()
+    @cached_property
+    def _laws(self) -> list[Elasticity]:
+        """Laws of the parts by their number."""
+        problem = self.problem
+        materials = problem.model.materials(problem.mesh.part_labels)
+        user, mixed = "effects.viscosity.bulk = false", problem.part.elastic.mixed
+        return [material.isotropic(user).elasticity(mixed=mixed) for material in materials]
 
-    @property
-    def _bulk(self) -> float:
-        return self._elastic.lame + 2.0 / 3.0 * self._elastic.shear
+    @cached_property
+    def _of_pressures(self) -> tuple[Float, Float]:
+        """Shear modulus and Lame's first constant (p,), MPa, of the part that each pressure belongs to."""
+        mesh = self.problem.mesh
+        number = np.zeros(len(mesh.part_corners[0]), dtype=np.int64)
+        for part in mesh.by_part:
+            number[part.corners] = part.number
+        constants = np.array([[law.shear, law.lame] for law in self._laws])[number]
+        return constants[:, 0], constants[:, 1]
 
-    def _lame(self, alpha: float) -> float:
-        return self._bulk - 2.0 / 3.0 * alpha * self._elastic.shear
+    def _lame(self, alpha: float) -> Float:
+        """Return Lame's first constant (p,) with the shear modulus multiplied by alpha."""
+        shear, lame = self._of_pressures
+        return np.asarray(lame + 2.0 / 3.0 * (1.0 - alpha) * shear)
 
     def respond(self, step: Step, memory: InternalVariables, workspace: RelaxationWorkspace) -> Response:
         """Return the response of the body with its shear modulus multiplied by alpha, loaded by the past."""
@@ -170,7 +181,8 @@ class ConstantBulkModulus:
 
         def shape(rows: Float) -> Float:
             found = settled + body.unknowns(rows)
-            found[problem.mesh.points.size :] *= problem.part.stiffness.pressure_scale / self._lame(alpha)
+            if problem.part.elastic.mixed:
+                found[problem.mesh.points.size :] *= problem.part.stiffness.pressure_scale / self._lame(alpha)
             return np.concatenate([found, (rows[first:] + past[self._own :]) / alpha])
 
         return Response(compliance, moved, shape)
@@ -178,9 +190,10 @@ class ConstantBulkModulus:
     def _shear_part(self, workspace: RelaxationWorkspace) -> sp.csr_matrix:
         """Return the deviatoric stiffness K_s of the displacement form; in a section, that in its plane."""
         if workspace.shear_part is None:
-            problem, shear = self.problem, self._elastic.shear
-            part = Elasticity(shear, -2.0 / 3.0 * shear, False)
-            workspace.shear_part = stiffness(problem.mesh, part, problem.part.thickness).upper
+            problem, mesh = self.problem, self.problem.mesh
+            laws = tuple(Elasticity(law.shear, -2.0 / 3.0 * law.shear, False) for law in self._laws)
+            deviatoric = laws[0] if mesh.part is None else ElasticityByPart(laws, mesh.part)
+            workspace.shear_part = stiffness(mesh, deviatoric, problem.part.thickness).upper
         return workspace.shear_part
 
     def _stiffness(self, alpha: float, workspace: RelaxationWorkspace) -> Stiffness:
@@ -192,7 +205,8 @@ class ConstantBulkModulus:
         upper, n = whole.upper.copy(), problem.mesh.points.size
         row = np.repeat(np.arange(upper.shape[0]), np.diff(upper.indptr))
         upper.data[upper.indices < n] *= alpha
-        upper.data[row >= n] *= self._elastic.lame / self._lame(alpha)
+        of_pressure = row >= n
+        upper.data[of_pressure] *= (self._of_pressures[1] / self._lame(alpha))[row[of_pressure] - n]
         return Stiffness(upper, whole.pressure_vertices, whole.pressure_scale)
 
     def _shear_force(self, shape: Float, workspace: RelaxationWorkspace) -> Float:
@@ -201,7 +215,7 @@ class ConstantBulkModulus:
         if not problem.part.elastic.mixed:
             return times(self._shear_part(workspace), shape)
         deviator = shape.copy()
-        deviator[n:] *= -2.0 / 3.0 * self._elastic.shear / problem.part.stiffness.pressure_scale
+        deviator[n:] *= -2.0 / 3.0 * self._of_pressures[0] / problem.part.stiffness.pressure_scale
         load = times(problem.part.stiffness.upper, deviator)
         load[n:] = 0.0
         return load
@@ -210,7 +224,8 @@ class ConstantBulkModulus:
         """Return the displacements, which are the shape."""
         n = self.problem.mesh.points.size
         out = now[: self._own].copy()
-        out[n:] *= self._elastic.lame / self.problem.part.stiffness.pressure_scale
+        if self.problem.part.elastic.mixed:
+            out[n:] *= self._of_pressures[1] / self.problem.part.stiffness.pressure_scale
         return out
 
     def read(self, now: Float) -> Float:
@@ -221,13 +236,19 @@ class ConstantBulkModulus:
 
     def stress(self, prony: Prony, memory: InternalVariables) -> Float:
         """Return the stress (n, 3, 3): 2 G dev(eps) relaxed, and the bulk modulus times the dilatation."""
-        shear, left = self._elastic.shear, relaxed(prony, memory)
-        strain, swelling = self._strain(left[: self._own])
-        spherical = self._bulk * self._strain(memory.elastic[: self._own])[1] - 2.0 / 3.0 * shear * swelling
-        d = self.problem.dim
-        whole = np.zeros((len(strain), 3, 3))
-        whole[:, :d, :d] = 2.0 * shear * strain
-        return whole + spherical[:, None, None] * np.eye(3)
+        mesh, d = self.problem.mesh, self.problem.dim
+        left, now = relaxed(prony, memory)[: self._own], memory.elastic[: self._own]
+
+        def of_part(part: MeshPart) -> tuple[Float]:
+            law = self._laws[part.number]
+            strain, swelling = self._strain(part, left)
+            bulk = law.lame + 2.0 / 3.0 * law.shear
+            spherical = bulk * self._strain(part, now)[1] - 2.0 / 3.0 * law.shear * swelling
+            whole = np.zeros((len(strain), 3, 3))
+            whole[:, :d, :d] = 2.0 * law.shear * strain
+            return (whole + spherical[:, None, None] * np.eye(3),)
+
+        return averaged(mesh, of_part)[0]
 
     def nodal_forces(self, prony: Prony, memory: InternalVariables) -> Float:
         """Return the instantaneous nodal forces, less the part of the shear stress that has relaxed."""
@@ -236,9 +257,10 @@ class ConstantBulkModulus:
         forces -= self._shear_force(lost[: self._own], RelaxationWorkspace())
         return forces[: mesh.points.size].reshape(-1, mesh.dim)
 
-    def _strain(self, shape: Float) -> tuple[Float, Float]:
-        problem = self.problem
-        strain = nodal_strain(problem.mesh, displacement(problem.mesh, shape))
-        if not problem.part.elastic.mixed:
+    def _strain(self, part: MeshPart, shape: Float) -> tuple[Float, Float]:
+        """Return strain (n', d, d) and dilatation (n',) of a shape at the nodes of a part."""
+        mesh = self.problem.mesh
+        strain = nodal_strain(part.mesh, displacement(mesh, shape)[part.nodes])
+        if not self.problem.part.elastic.mixed:
             return strain, np.trace(strain, axis1=1, axis2=2)
-        return strain, pressure(problem.mesh, problem.part.stiffness, shape) / problem.part.stiffness.pressure_scale
+        return strain, nodal_pressure(part.mesh, shape[mesh.points.size :][part.corners])

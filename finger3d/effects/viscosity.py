@@ -33,7 +33,7 @@ from finger3d.effects._viscoelastic_body import (
 from finger3d.effects.base import fill
 from finger3d.errors import Finger3dError
 from finger3d.fem.condense import spring_forces, stiffened
-from finger3d.fem.recover import across, displacement, nodal_strain
+from finger3d.fem.recover import displacement
 from finger3d.mechanics.cost import AddedCost, PressCost
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.linear_contact import LinearBody, LinearState, solve_increment
@@ -152,14 +152,9 @@ class Viscoelastic(SmallStrain):
 
     def fields(self, problem: Problem, state: ContactState) -> tuple[Float, Float, Float]:
         """Return displacement, linear strain and relaxed stress."""
-        u = displacement(problem.mesh, self.unknowns(problem, state))
-        strain = nodal_strain(problem.mesh, u)
-        sigma = self._body(problem).stress(self.prony, self._memory(state))
-        if problem.dim == 3:
-            return u, strain, sigma
-        material, plane_strain = problem.model.material, problem.model.domain == "plane-strain"
-        whole = across(strain, sigma[:, :2, :2], material, plane_strain)
-        return u, whole[0], (whole[1] if self.bulk else sigma)
+        unknowns = self.unknowns(problem, state)
+        strain, _ = problem.strain_and_stress(unknowns)
+        return displacement(problem.mesh, unknowns), strain, self._body(problem).stress(self.prony, self._memory(state))
 
 
 @dataclass(frozen=True)

@@ -72,7 +72,7 @@ class Pattern:
     length : (blocks,) entries in the first of the rows that the block stands in
     slot : (e, pairs) block of every local pair: of two nodes, then of a pressure and a node, then of two pressures
     swapped : (e, pairs of nodes) whether a pair's nodes stand the other way round in the matrix
-    vertices : numbers of the nodes with a pressure, ascending
+    vertices : (p,) node of every pressure, see `finger3d.fem.simplex.Mesh.part_corners`
     """
 
     indptr: AnyInt
@@ -87,10 +87,8 @@ class Pattern:
     def of(cls, mesh: Mesh, mixed: bool, linked: tuple[Int, Int] | None = None) -> Pattern:
         """Find the pattern of a mesh, with pressures if `mixed`, and with places for `linked` pairs of nodes."""
         n, d = mesh.points.shape
-        vertices = mesh.vertices if mixed else np.zeros(0, dtype=np.int64)
+        vertices, corner = mesh.part_corners if mixed else (np.zeros(0, dtype=np.int64), mesh.cells[:, :0])
         count = n + len(vertices)
-        number = np.full(n, -1)
-        number[vertices] = np.arange(n, count)
         k, corners = mesh.cells.shape[1], d + 1 if mixed else 0
         (a, b), (p, r) = _pairs(k), _pairs(corners)
         pairs = len(a) + corners * k + len(p)
@@ -102,7 +100,7 @@ class Pattern:
         swapped = np.empty((len(mesh.cells), len(a)), dtype=np.bool_)
         for part in cell_parts(mesh):
             cells = mesh.cells[part]
-            pressures = number[cells[:, :corners]]
+            pressures = n + corner[part]
             beside = (cells[:, None] * count + pressures[:, :, None]).reshape(len(cells), -1)
             found = [_key(cells[:, a], cells[:, b], count), beside, _key(pressures[:, p], pressures[:, r], count)]
             np.concatenate(found, axis=1, out=of_cells[part])
@@ -227,12 +225,14 @@ def stiffness(mesh: Mesh, elastic: LinearElasticity, thickness: float = 1.0) -> 
     for part in cell_parts(mesh):
         gradients, det = mesh.element.physical_gradients(mesh.points[mesh.cells[part]], bary)
         weights = det * (w * thickness)
-        pattern.add(data, part, elastic.contract(_outer_products(gradients, weights)))
+        law = elastic.of_cells(part)
+        pattern.add(data, part, law.contract(_outer_products(gradients, weights)))
         if elastic.mixed:
             weighted = np.swapaxes(weights[:, :, None] * hats, 1, 2)  # (e, p, q)
             e, q, k, _ = gradients.shape
             coupling = np.matmul(scale * weighted, gradients.reshape(e, q, k * d)).reshape(e, -1, k, d)
-            mass = -(scale**2) / elastic.pressure_modulus * np.matmul(weighted, hats)
+            compressibility = 1.0 / np.reshape(law.pressure_modulus, (-1, 1, 1))
+            mass = -(scale**2) * compressibility * np.matmul(weighted, hats)
             pattern.add_pressure(data, part, coupling, mass)
     return Stiffness(pattern.matrix(data), pattern.vertices, scale)
 

@@ -10,21 +10,23 @@ Piola-Kirchhoff stress that its start determines, see `Relaxing`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 
 from finger3d._arrays import freeze_arrays
-from finger3d._types import Float
+from finger3d._types import Float, Int
 from finger3d.fem.assembly import Pattern, Stiffness, cell_parts, pressure_scale
 from finger3d.fem.elements import quadrature
 from finger3d.fem.laws import IsochoricLaw
+from finger3d.fem.laws.inhomogeneous import Inhomogeneous
 from finger3d.fem.locate import cells_at
-from finger3d.fem.material import LEAST_COMPRESSIBILITY, MIXED_FROM
-from finger3d.fem.recover import displacement, nodal_gradient, nodal_pressure
-from finger3d.fem.simplex import Mesh
+from finger3d.fem.material import LEAST_COMPRESSIBILITY, MIXED_FROM, Isotropic
+from finger3d.fem.recover import averaged, displacement, nodal_gradient, nodal_pressure
+from finger3d.fem.simplex import Mesh, MeshPart
 from finger3d.fem.tensors import cofactor, determinant
 
 _THICKNESS_ITERATIONS = 30
@@ -58,18 +60,47 @@ class Relaxing:
 
 @dataclass(frozen=True)
 class Hyperelastic:
-    """A hyperelastic material: isochoric law, bulk modulus (MPa), and which form is used."""
+    """A hyperelastic material: isochoric law, bulk modulus (MPa), and which form is used.
+
+    In an inhomogeneous body law and bulk modulus (m,) belong to m points, at which the material is evaluated.
+    """
 
     law: IsochoricLaw
-    bulk: float
+    bulk: float | Float
     mixed: bool
     plane_stress: bool = False
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
 
     @classmethod
     def of(cls, law: IsochoricLaw, nu: float, plane_stress: bool = False) -> Hyperelastic:
         """Return the material with a Poisson's ratio in the limit of small strain."""
-        compressibility = max(1.5 * (1.0 - 2.0 * nu) / (1.0 + nu), LEAST_COMPRESSIBILITY) / law.shear
-        return cls(law, 1.0 / compressibility, nu >= MIXED_FROM and not plane_stress, plane_stress)
+        return cls(law, _bulk_modulus(law.shear, nu), nu >= MIXED_FROM and not plane_stress, plane_stress)
+
+    @classmethod
+    def of_parts(
+        cls, law: IsochoricLaw, materials: Sequence[Isotropic], part: Int, plane_stress: bool = False
+    ) -> Hyperelastic:
+        """Return the material of a body of several parts.
+
+        Parameters
+        ----------
+        law : of all parts, but for its shear modulus
+        materials : limit of small strain of each part, by its number
+        part : (m,) number of the part at each point
+        """
+        shear = np.array([material.E_MPa / (2.0 * (1.0 + material.nu)) for material in materials])
+        bulk = np.array([_bulk_modulus(g, m.nu) for g, m in zip(shear, materials, strict=True)])
+        mixed = any(material.is_nearly_incompressible for material in materials)
+        everywhere = Inhomogeneous(law.with_shear(float(shear[0])), (shear / shear[0])[part])
+        return cls(everywhere, bulk[part], mixed and not plane_stress, plane_stress)
+
+    def of_points(self, points: slice) -> Hyperelastic:
+        """Return the material at some of the points of a body; itself if it is homogeneous."""
+        if not isinstance(self.law, Inhomogeneous):
+            return self
+        return replace(self, law=self.law.of_points(points), bulk=np.asarray(self.bulk)[points])
 
     def deformation(self, slope: Float, relaxing: Relaxing | None = None) -> Float:
         """Return F (..., 3, 3) from displacement gradients (..., d, d), row the component.
@@ -168,6 +199,10 @@ class Hyperelastic:
         return np.asarray(np.swapaxes(cof, -1, -2) @ first / determinant(f)[..., None, None])
 
 
+def _bulk_modulus(shear: float, nu: float) -> float:
+    return shear / max(1.5 * (1.0 - 2.0 * nu) / (1.0 + nu), LEAST_COMPRESSIBILITY)
+
+
 def _factors(relaxing: Relaxing | None) -> tuple[float, float, Float]:
     return (
         (1.0, 1.0, np.zeros((3, 3))) if relaxing is None else (relaxing.isochoric, relaxing.volumetric, relaxing.past)
@@ -193,7 +228,7 @@ class TotalLagrangian:
 
     @cached_property
     def _operators(self) -> tuple[sp.csr_matrix, Float, sp.csr_matrix | None]:
-        """Gradient (e q d, n) of nodal fields, weights (e, q), and values (e q, n) of fields linear in every cell."""
+        """Gradient (e q d, n) of nodal fields, weights (e, q), and values (e q, v) of fields linear in every cell."""
         mesh, d = self.mesh, self.mesh.dim
         bary, w = quadrature(d, 2)
         cells, q = mesh.cells, len(bary)
@@ -208,8 +243,9 @@ class TotalLagrangian:
         if not self.material.mixed:
             return gradient, weights, None
         values = np.broadcast_to(bary, (e, q, d + 1)).ravel()
-        corners = np.broadcast_to(cells[:, None, : d + 1], (e, q, d + 1)).ravel()
-        hats = sp.csr_matrix((values, corners, np.arange(e * q + 1) * (d + 1)), shape=(e * q, n))
+        vertices, corner = mesh.part_corners
+        corners = np.broadcast_to(corner[:, None], (e, q, d + 1)).ravel()
+        hats = sp.csr_matrix((values, corners, np.arange(e * q + 1) * (d + 1)), shape=(e * q, len(vertices)))
         return gradient, weights, hats
 
     @cached_property
@@ -228,9 +264,7 @@ class TotalLagrangian:
         hats = self._operators[2]
         if hats is None:
             return None
-        nodal = np.zeros(len(self.mesh.points))
-        nodal[self.pattern.vertices] = self.pressure_scale * x[self.mesh.points.size :]
-        return np.asarray(hats @ nodal)
+        return np.asarray(hats @ (self.pressure_scale * x[self.mesh.points.size :]))
 
     def deformation(self, x: Float, relaxing: Relaxing | None = None) -> Float:
         """Return the deformation gradients (m, 3, 3) at the quadrature points; raises InvertedError."""
@@ -253,12 +287,12 @@ class TotalLagrangian:
             return np.asarray(force.ravel())
         excess = (determinant(f) - 1.0 - p / self.material.bulk) * weights.ravel()
         share = 1.0 if relaxing is None else relaxing.volumetric
-        volume = (share * self.pressure_scale * (hats.T @ excess))[self.pattern.vertices]
+        volume = share * self.pressure_scale * (hats.T @ excess)
         return np.concatenate([force.ravel(), volume])
 
     def tangent(self, x: Float, relaxing: Relaxing | None = None) -> Stiffness:
         """Return the tangent stiffness, the derivative of the internal forces; may raise InvertedError."""
-        mesh, d, material, p = self.mesh, self.mesh.dim, self.material, self.pressures(x)
+        mesh, d, p = self.mesh, self.mesh.dim, self.pressures(x)
         gradient, weights, _ = self._operators
         e, q = weights.shape
         gradients = gradient.data.reshape(e, q, d, -1)
@@ -267,11 +301,11 @@ class TotalLagrangian:
         data = np.zeros(len(self.pattern.indices))
         share = 1.0 if relaxing is None else relaxing.volumetric
         scale = share * self.pressure_scale
-        mass = -scale * self.pressure_scale / material.bulk * np.einsum("qp,qr->qpr", hats, hats)
+        mass = -scale * self.pressure_scale * np.einsum("qp,qr->qpr", hats, hats)
         for part in cell_parts(mesh):
             points = slice(part.start * q, part.stop * q)
             own = relaxing.of_points(points) if relaxing else None
-            local, w = gradients[part], weights[part]
+            local, w, material = gradients[part], weights[part], self.material.of_points(points)
             f = material.deformation(slopes[part].reshape(-1, d, d), own)
             _, tangent = material.stress_and_tangent(f, None if p is None else p[points], own)
             if material.plane_stress:
@@ -286,7 +320,8 @@ class TotalLagrangian:
                 flux = np.matmul(cofactor(f)[:, :d, :d].reshape(-1, q, d, d), local)  # (e, q, i, a)
                 flux = np.swapaxes(flux * (scale * w)[:, :, None, None], 2, 3).reshape(len(w), q, k * d)
                 coupling = np.matmul(hats.T, flux).reshape(-1, d + 1, k, d)
-                self.pattern.add_pressure(data, part, coupling, np.tensordot(w, mass, axes=1))
+                compliance = w / np.broadcast_to(material.bulk, w.size).reshape(w.shape)
+                self.pattern.add_pressure(data, part, coupling, np.tensordot(compliance, mass, axes=1))
         return Stiffness(self.pattern.matrix(data), self.pattern.vertices, self.pressure_scale)
 
     def energy(self, x: Float) -> float:
@@ -316,8 +351,15 @@ def nodal_fields(body: TotalLagrangian, x: Float) -> tuple[Float, Float, Float]:
 
     They follow from the volume-weighted mean of the displacement gradient at every node.
     """
-    mesh, material, size = body.mesh, body.material, body.mesh.points.size
-    f = material.deformation(nodal_gradient(mesh, displacement(mesh, x)))
-    p = nodal_pressure(mesh, body.pressure_scale * x[size:]) if material.mixed else None
-    cauchy = material.stress(f, p) @ np.swapaxes(f, 1, 2) / determinant(f)[:, None, None]
+    points, u = len(quadrature(body.mesh.dim, 2)[0]), displacement(body.mesh, x)
+    vertex_pressure = body.pressure_scale * x[body.mesh.points.size :]
+
+    def of_part(part: MeshPart) -> tuple[Float, Float]:
+        first = part.cells[0] * points  # one point stands for all of a part
+        material = body.material.of_points(slice(first, first + 1))
+        f = material.deformation(nodal_gradient(part.mesh, u[part.nodes]))
+        p = nodal_pressure(part.mesh, vertex_pressure[part.corners]) if material.mixed else None
+        return f, material.stress(f, p) @ np.swapaxes(f, 1, 2) / determinant(f)[:, None, None]
+
+    f, cauchy = averaged(body.mesh, of_part)
     return f, 0.5 * (np.swapaxes(f, 1, 2) @ f - np.eye(3)), cauchy

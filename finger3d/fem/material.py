@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from finger3d._types import Float
+from finger3d._types import Float, Int
 
 MIXED_FROM = 0.48
 """Poisson's ratio from which the mixed form is used: near 1/2 linear elements lock (validation/cook.py), and the
@@ -21,6 +21,15 @@ LEAST_COMPRESSIBILITY = 1e-7
 
 It keeps every pivot of the mixed form away from zero at nu = 0.5 and changes results by about 1e-7 (relative).
 """
+
+LARGEST_COMPRESSIBILITY = 1e7
+"""Largest compressibility of the mixed form, in units of 1/G.
+
+It keeps the pressures finite at nu = 0, where another part of the body is nearly incompressible.
+"""
+
+RIGID_RATIO = 1e6
+"""Young's modulus of a rigid part over the largest of the other parts: results deviate by about its inverse."""
 
 
 class LinearElasticity(Protocol):
@@ -41,8 +50,12 @@ class LinearElasticity(Protocol):
         ...
 
     @property
-    def pressure_modulus(self) -> float:
-        """Pressure per dilatation of the mixed form, MPa."""
+    def pressure_modulus(self) -> float | Float:
+        """Pressure per dilatation of the mixed form, MPa; (e,) if it differs between cells."""
+        ...
+
+    def of_cells(self, cells: slice | Int) -> LinearElasticity:
+        """Return the law of some of the cells of the body."""
         ...
 
     def contract(self, outer: Float) -> Float:
@@ -53,7 +66,7 @@ class LinearElasticity(Protocol):
         ...
 
     def stress(self, strain: Float) -> Float:
-        """Return ``C : strain`` (n, d, d), MPa."""
+        """Return ``C : strain`` (n, d, d), MPa; if laws differ between cells, of equally many strains in each cell."""
         ...
 
 
@@ -65,8 +78,13 @@ class Material(Protocol):
         """Whether solids and plane strain need the mixed form."""
         ...
 
-    def elasticity(self, plane_stress: bool = False) -> LinearElasticity:
-        """Return the small-strain law; in plane stress with the strain across the section condensed."""
+    def elasticity(self, plane_stress: bool = False, mixed: bool | None = None) -> LinearElasticity:
+        """Return the small-strain law; in plane stress with the strain across the section condensed.
+
+        Parameters
+        ----------
+        mixed : the form; None chooses it by `is_nearly_incompressible`
+        """
         ...
 
     def across(self, strain: Float, stress: Float, plane_strain: bool) -> tuple[Float, Float]:
@@ -101,7 +119,10 @@ class Elasticity:
         compressibility = (
             max((1.0 - 2.0 * nu) * (1.0 + nu) / (E_MPa * nu), LEAST_COMPRESSIBILITY / shear) if nu else np.inf
         )
-        return cls(shear, 1.0 / compressibility, nu >= MIXED_FROM if mixed is None else mixed)
+        is_mixed = nu >= MIXED_FROM if mixed is None else mixed
+        if is_mixed:
+            compressibility = min(compressibility, LARGEST_COMPRESSIBILITY / shear)
+        return cls(shear, 1.0 / compressibility, is_mixed)
 
     @property
     def shear_modulus(self) -> float:
@@ -112,6 +133,10 @@ class Elasticity:
     def pressure_modulus(self) -> float:
         """Lame's first constant, MPa."""
         return self.lame
+
+    def of_cells(self, cells: slice | Int) -> Elasticity:
+        """Return the law itself: it is the same in all cells."""
+        return self
 
     def contract(self, outer: Float) -> Float:
         """Return element matrices ``lame A_aibj + shear (A_ajbi + delta_ij A_ambm)``, lame only without pressures."""
@@ -153,9 +178,9 @@ class Isotropic:
         """Whether nu is close to 1/2."""
         return self.nu >= MIXED_FROM
 
-    def elasticity(self, plane_stress: bool = False) -> Elasticity:
+    def elasticity(self, plane_stress: bool = False, mixed: bool | None = None) -> Elasticity:
         """Return the law of a solid or plane strain, or of plane stress."""
-        return Elasticity.of(self.E_MPa, self.nu, plane_stress)
+        return Elasticity.of(self.E_MPa, self.nu, plane_stress, mixed)
 
     def across(self, strain: Float, stress: Float, plane_strain: bool) -> tuple[Float, Float]:
         """Return strain and stress (n,) across a section: ``s_zz = nu tr(s)`` or ``e_zz = -nu/E tr(s)``."""

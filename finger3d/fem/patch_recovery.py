@@ -1,9 +1,10 @@
 """Recovered strain and pressure of a displacement field, and the errors that they estimate.
 
 Superconvergent patch recovery (Zienkiewicz and Zhu 1992): around every vertex a polynomial of degree 2 is fitted to the
-strains at the quadrature points of the adjacent cells, where they are most accurate.  In a cell the recovered strain is
-the mean of the polynomials of its vertices, weighted with the barycentric coordinates.  It is more accurate than the
-strain itself, so that their difference estimates the error of the strain, cell by cell and with its sign.
+strains at the quadrature points of the adjacent cells, where they are most accurate; at an interface every part has a
+polynomial of its own.  In a cell the recovered strain is the mean of the polynomials of its vertices, weighted with the
+barycentric coordinates.  It is more accurate than the strain itself, so that their difference estimates the error of
+the strain, cell by cell and with its sign.
 """
 
 from __future__ import annotations
@@ -57,8 +58,7 @@ class PatchRecovery:
         d, count = mesh.dim, len(mesh.cells)
         bary, _ = quadrature(d, 2)
         samples = len(bary)
-        vertices, corner = np.unique(mesh.cells[:, : d + 1], return_inverse=True)
-        corner = corner.reshape(count, d + 1)
+        vertices, corner = mesh.part_corners
         centre, v = mesh.points[vertices], len(vertices)
         patches = _patches(corner, v, math.ceil(_SAMPLES_PER_COEFFICIENT * _basis(np.zeros((1, d))).shape[1] / samples))
         of, cell = np.repeat(np.arange(v), np.diff(patches.indptr)), patches.indices
@@ -129,12 +129,13 @@ class RecoveredErrors:
             recovered = recovered.reshape(*recovered.shape[:2], -1, strain.shape[-1])
             error = recovered[:, :, : len(pairs)] - strain
             left, right = error[..., first], error[..., second]
-            stress = _components_of(elastic.stress(_tensors(left, d)), left.shape)
+            law = elastic.of_cells(cells)
+            stress = _components_of(law.stress(_tensors(left, d)), left.shape)
             one, two = [stress * double[:, None]], [right]
             if elastic.mixed:
                 pressure = self._pressure(cells, bary)[:, :, None]
                 off = recovered[:, :, -1:] - pressure
-                residual = pressure[..., first] / elastic.pressure_modulus
+                residual = pressure[..., first] / np.reshape(law.pressure_modulus, (-1, 1, 1, 1))
                 residual = residual - strain[:, :, diagonal, first].sum(axis=2, keepdims=True)
                 one += [off[..., first], residual]
                 two += [right[:, :, diagonal].sum(axis=2, keepdims=True), off[..., second]]

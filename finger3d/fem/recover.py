@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.fem.assembly import Stiffness
 from finger3d.fem.elements import quadrature
-from finger3d.fem.material import LinearElasticity, Material
-from finger3d.fem.simplex import Mesh
+from finger3d.fem.material import LinearElasticity
+from finger3d.fem.simplex import Mesh, MeshPart, signed_volumes
+
+Across = Callable[[Float, Float], tuple[Float, Float]]
 
 _CELLS_AT_ONCE = 4096  # bounds the memory of their gradients
 
@@ -18,9 +21,63 @@ def displacement(mesh: Mesh, unknowns: Float) -> Float:
     return unknowns[: mesh.points.size].reshape(mesh.points.shape)
 
 
-def pressure(mesh: Mesh, stiffness: Stiffness, unknowns: Float) -> Float:
-    """Nodal pressure (n,) MPa of the mixed form, linear over each cell."""
-    return nodal_pressure(mesh, stiffness.pressure_scale * unknowns[mesh.points.size :])
+def averaged(mesh: Mesh, of_part: Callable[[MeshPart], tuple[Float, ...]]) -> tuple[Float, ...]:
+    """Nodal fields (n, ...) of a body of several parts, at interfaces the mean of the parts weighted by volume.
+
+    Parameters
+    ----------
+    of_part : returns the fields (n', ...) at the nodes of one part
+    """
+    parts = mesh.by_part
+    if len(parts) == 1:
+        return of_part(parts[0])
+    weight = np.zeros((len(parts), len(mesh.points)))
+    for row, part in zip(weight, parts, strict=True):
+        volume = np.abs(signed_volumes(part.mesh))
+        np.add.at(row, part.nodes[part.mesh.cells], volume[:, None])
+    weight /= weight.sum(axis=0)
+    total: list[Float] = []
+    for row, part in zip(weight, parts, strict=True):
+        found = of_part(part)
+        total = total or [np.zeros((len(mesh.points), *field.shape[1:])) for field in found]
+        for sum_, field in zip(total, found, strict=True):
+            sum_[part.nodes] += row[part.nodes].reshape(-1, *[1] * (field.ndim - 1)) * field
+    return tuple(total)
+
+
+def strain_and_stress(
+    mesh: Mesh,
+    unknowns: Float,
+    laws: Sequence[LinearElasticity],
+    pressure_scale: float,
+    across: Sequence[Across] | None = None,
+) -> tuple[Float, Float]:
+    """Linear strain and stress (MPa) at the nodes.
+
+    Parameters
+    ----------
+    unknowns : (N,) displacements, then pressures in units of `pressure_scale` (MPa) in the mixed form
+    laws : of the parts by their number
+    across : of a section, returns strain and stress (n,) across it from those in its plane, for every part
+
+    Returns
+    -------
+    strain, stress : (n, d, d), or (n, 3, 3) with `across`
+    """
+    u, vertex_pressure = displacement(mesh, unknowns), pressure_scale * unknowns[mesh.points.size :]
+
+    def of_part(part: MeshPart) -> tuple[Float, Float]:
+        law, strain = laws[part.number], nodal_strain(part.mesh, u[part.nodes])
+        sigma = law.stress(strain)
+        if law.mixed:
+            p = nodal_pressure(part.mesh, vertex_pressure[part.corners])
+            sigma = sigma + p[:, None, None] * np.eye(mesh.dim)
+        if across is None:
+            return strain, sigma
+        return whole(strain, sigma, *across[part.number](strain, sigma))
+
+    strain, sigma = averaged(mesh, of_part)
+    return strain, sigma
 
 
 def nodal_pressure(mesh: Mesh, at_vertices: Float) -> Float:
@@ -70,15 +127,9 @@ def nodal_strain(mesh: Mesh, u: Float) -> Float:
     return 0.5 * (slope + np.swapaxes(slope, 1, 2))
 
 
-def stress(strain: Float, elastic: LinearElasticity, p: Float | None = None) -> Float:
-    """Stress (n, d, d) MPa from strain, with the pressure `p` (n,) MPa of the mixed form."""
-    out = elastic.stress(strain)
-    return out if p is None else out + p[:, None, None] * np.eye(strain.shape[-1])
-
-
-def across(strain: Float, sigma: Float, material: Material, plane_strain: bool) -> tuple[Float, Float]:
-    """Strain and stress (n, 3, 3) of a section (n, 2, 2), with what plane strain or plane stress implies across it."""
+def whole(strain: Float, sigma: Float, strain_across: Float, stress_across: Float) -> tuple[Float, Float]:
+    """Strain and stress (n, 3, 3) of a section from those in its plane (n, 2, 2) and across it (n,)."""
     e, s = np.zeros((len(strain), 3, 3)), np.zeros((len(strain), 3, 3))
     e[:, :2, :2], s[:, :2, :2] = strain, sigma
-    e[:, 2, 2], s[:, 2, 2] = material.across(strain, sigma, plane_strain)
+    e[:, 2, 2], s[:, 2, 2] = strain_across, stress_across
     return e, s

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -79,6 +80,57 @@ class Mesh:
     def vertices(self) -> Int:
         """Numbers of the corner nodes, ascending."""
         return np.unique(self.cells[:, : self.dim + 1])
+
+    @cached_property
+    def part_corners(self) -> tuple[Int, Int]:
+        """Nodes (v,) at the corners of cells, and the number (e, d + 1) of each cell's corners among them.
+
+        A node on an interface counts once in every part that it belongs to, so that fields over these corners may be
+        discontinuous there.  They are sorted by part, then by node.
+        """
+        corners = self.cells[:, : self.dim + 1]
+        of = np.zeros(len(corners), dtype=np.int64) if self.part is None else self.part
+        keys, corner = np.unique(of[:, None] * len(self.points) + corners, return_inverse=True)
+        return keys % len(self.points), corner.reshape(corners.shape)
+
+    @cached_property
+    def by_part(self) -> tuple[MeshPart, ...]:
+        """The parts that have cells, each as a mesh of its own."""
+        if self.part is None:
+            everything = np.arange(len(self.points)), np.arange(len(self.cells))
+            return (MeshPart(0, self, *everything, slice(None)),)
+        found, first = [], 0
+        for number in np.unique(self.part):
+            cells = np.flatnonzero(self.part == number)
+            nodes, own = np.unique(self.cells[cells], return_inverse=True)
+            mesh = Mesh(self.points[nodes], own.reshape(len(cells), -1), {})
+            last = first + len(mesh.vertices)
+            found.append(MeshPart(int(number), mesh, nodes, cells, slice(first, last)))
+            first = last
+        return tuple(found)
+
+
+@dataclass(frozen=True)
+class MeshPart:
+    """One part of a body as a mesh of its own.
+
+    Attributes
+    ----------
+    number : of the part
+    mesh : the cells of the part
+    nodes : (n',) nodes of the whole mesh
+    cells : (e',) cells of the whole mesh
+    corners : slice of the part's corners among `Mesh.part_corners` of the whole mesh
+    """
+
+    number: int
+    mesh: Mesh
+    nodes: Int
+    cells: Int
+    corners: slice
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
 
 
 def boundary(cells: Int, dim: int) -> Int:

@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 from finger3d._types import Float
 from finger3d.fem.assembly import stiffness
 from finger3d.fem.condense import condense, stiffened
+from finger3d.fem.parts import elasticity_of
 from finger3d.fem.simplex import CONTACT, Mesh
 from finger3d.fem.traces import BoundarySurface, local_rows, restrict
 from finger3d.mechanics.contact_geometry import contact_geometry, may_touch
@@ -79,7 +80,7 @@ def build(model: Model, say: Say = lambda text: None, margin: float = MARGIN) ->
     check(model, free, contact.first_contact_mm, contact.place, axes)
     say("assembling")
     start = time.perf_counter()
-    elastic = model.material.elasticity(model.domain == "plane-stress")
+    elastic = elasticity_of(model.materials(mesh.part_labels), mesh, model.domain == "plane-stress")
     matrix = stiffness(mesh, elastic, thickness)
     candidates = candidate_points(model, free, contact.first_contact_mm, margin)
     active = active_dofs(candidates, axes)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from finger3d._types import Float
 from finger3d.contact.state import ContactSolution, ContactState
+from finger3d.fem.elements import quadrature
 from finger3d.fem.hyperelastic import Hyperelastic, nodal_fields
 from finger3d.fem.laws import IsochoricLaw
 from finger3d.fem.recover import displacement, extrapolated
@@ -73,12 +74,20 @@ class FiniteStrain:
         has_inclusions = problem.inclusions.bars is not None
         if workspace is not None and has_inclusions in workspace.bodies:
             return workspace.bodies[has_inclusions]
-        linear = problem.model.material.isotropic("effects.large_deformation")
-        law = self.law.with_shear(linear.E_MPa / (2.0 * (1.0 + linear.nu)))
-        body = FiniteBody.of(problem, Hyperelastic.of(law, linear.nu, problem.model.domain == "plane-stress"))
+        body = FiniteBody.of(problem, self._material(problem))
         if workspace is not None:
             workspace.bodies[has_inclusions] = body
         return body
+
+    def _material(self, problem: Problem) -> Hyperelastic:
+        mesh, plane_stress = problem.mesh, problem.model.domain == "plane-stress"
+        found = problem.model.materials(mesh.part_labels)
+        linear = [material.isotropic("effects.large_deformation") for material in found]
+        if mesh.part is None:
+            law = self.law.with_shear(linear[0].E_MPa / (2.0 * (1.0 + linear[0].nu)))
+            return Hyperelastic.of(law, linear[0].nu, plane_stress)
+        points = len(quadrature(mesh.dim, 2)[0])
+        return Hyperelastic.of_parts(self.law, linear, np.repeat(mesh.part, points), plane_stress)
 
     def start(self, problem: Problem) -> DeformedState:
         """State at rest."""

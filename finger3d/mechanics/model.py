@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, Protocol
 
@@ -200,6 +200,7 @@ class Model:
     relaxation : of the moduli; None without viscosity
     held_ends : both end faces held in z (plane strain realised in 3D; Python only)
     symmetry : symmetry planes that are used, "x" and "z"; None determines them
+    parts : label and material of every solid of the design whose material is another
     filled : slots that an effect has set, as pairs (slot, effect)
     warnings : entries of the summary
     """
@@ -221,6 +222,7 @@ class Model:
     rule: RuleName = "projection"
     held_ends: bool = False
     symmetry: tuple[str, ...] | None = None
+    parts: tuple[tuple[str, Material], ...] = ()
     filled: tuple[tuple[str, str], ...] = ()
     warnings: tuple[str, ...] = ()
 
@@ -228,6 +230,17 @@ class Model:
     def formulation(self) -> Formulation:
         """Strain measure and material response of the body."""
         return self.strain_measure if self.relaxation is None else self.strain_measure.relaxing(self.relaxation)
+
+    @property
+    def mixed(self) -> bool:
+        """Whether the pressure is an unknown of its own: one of the materials is nearly incompressible."""
+        materials = (self.material, *(material for _, material in self.parts))
+        return self.domain != "plane-stress" and any(material.is_nearly_incompressible for material in materials)
+
+    def materials(self, labels: Sequence[str]) -> tuple[Material, ...]:
+        """Return the material of the main body, and those of the parts with these labels."""
+        own = dict(self.parts)
+        return (self.material, *(own.get(label, self.material) for label in labels))
 
     @property
     def readings(self) -> tuple[Reading, ...]:
@@ -244,7 +257,7 @@ class Model:
     def forces_scale_with_modulus(self) -> bool:
         """Whether all forces are proportional to Young's modulus, and no displacement depends on it."""
         forced = any(leg.force_N is not None for leg in self.legs)
-        return self.inclusions is None and self.object_compliance is None and not forced
+        return not self.parts and self.inclusions is None and self.object_compliance is None and not forced
 
     @property
     def largest_depth_mm(self) -> float:

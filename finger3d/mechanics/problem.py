@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from finger3d.fem.assembly import Stiffness
 from finger3d.fem.bars import Bars
 from finger3d.fem.condense import Condensation, spring_forces
 from finger3d.fem.material import LinearElasticity
+from finger3d.fem.recover import strain_and_stress
 from finger3d.fem.simplex import FREE_FACES, Mesh
 from finger3d.fem.traces import BoundarySurface, joined, surface
 from finger3d.mechanics.contact_geometry import contact_geometry, may_touch
@@ -221,6 +223,14 @@ class Problem:
     def read(self, force: Float) -> dict[str, float]:
         """Readings by name under contact forces (c, d), through the condensed rows."""
         return dict(zip(self.model.reading_names, map(float, self.system.reading_rows @ force.ravel()), strict=True))
+
+    def strain_and_stress(self, unknowns: Float) -> tuple[Float, Float]:
+        """Linear strain and elastic stress (n, 3, 3), MPa, at the nodes of the part, from all unknowns (N,)."""
+        part, plane_strain = self.part, self.model.domain == "plane-strain"
+        materials = self.model.materials(self.mesh.part_labels)
+        laws = [material.elasticity(self.model.domain == "plane-stress", part.elastic.mixed) for material in materials]
+        across = None if self.dim == 3 else [partial(m.across, plane_strain=plane_strain) for m in materials]
+        return strain_and_stress(self.mesh, unknowns, laws, part.stiffness.pressure_scale, across)
 
     @property
     def meshed_body(self) -> MeshedBody:

@@ -112,14 +112,7 @@ class SmallStrain:
 
     def fields(self, problem: Problem, state: ContactState) -> tuple[Float, Float, Float]:
         """Return displacement, linear strain and stress; in a section also the out-of-plane components."""
-        from finger3d.fem.recover import across, displacement, nodal_strain, pressure, stress
+        from finger3d.fem.recover import displacement
 
         unknowns = self.unknowns(problem, state)
-        u = displacement(problem.mesh, unknowns)
-        strain = nodal_strain(problem.mesh, u)
-        p = pressure(problem.mesh, problem.part.stiffness, unknowns) if problem.part.elastic.mixed else None
-        sigma = stress(strain, problem.part.elastic, p)
-        if problem.dim == 3:
-            return u, strain, sigma
-        material, plane_strain = problem.model.material, problem.model.domain == "plane-strain"
-        return u, *across(strain, sigma, material, plane_strain)
+        return displacement(problem.mesh, unknowns), *problem.strain_and_stress(unknowns)
