@@ -146,6 +146,7 @@ class ResultWriter:
                 "stress": _voigt(fields.stress),
                 **surface,
             },
+            {} if mesh.part is None else {"part": mesh.part},
         )
 
     def pictures(self, record: PressRecord, fields: Fields) -> None:

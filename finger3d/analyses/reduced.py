@@ -81,7 +81,7 @@ class ReducedModel:
             "effects": sorted({effect for _, effect in model.filled}),
         }
         size = DesignSummary(float(model.design.height_mm), float(model.design.width_mm))
-        light = replace(model, design=size, inclusions=None, object_compliance=None, symmetry=problem.axes)
+        light = replace(model, design=size, inclusions=None, object_compliance=None, symmetry=problem.axes, parts=())
         return cls(
             assembled(light, arrays_of(problem), problem.system.first_contact_mm, problem.axes), bare(others), about
         )

@@ -25,6 +25,8 @@ from finger3d._types import Float, Int
 from finger3d.effects.base import fill
 from finger3d.errors import Finger3dError
 from finger3d.fem.kelvin import FoilPatches, InfiniteBody
+from finger3d.fem.locate import cells_at
+from finger3d.fem.material import Isotropic
 from finger3d.fem.simplex import Mesh, reflect_into_part
 from finger3d.fem.traces import displacement_rows
 from finger3d.mechanics.cost import AddedCost, PressCost
@@ -94,16 +96,43 @@ class Strips:
         np.add.at(gauge_weights, (gauge, numbers), stiff / np.bincount(gauge, stiff)[gauge])
         weights = np.zeros((len(bars), len(numbers)))
         weights[numbers, np.arange(len(numbers))] = stiff / (copies * bar_stiffness[numbers])
-        self_compliance = copies * weights @ _infinite_body_compliance(model, foils) @ weights.T
+        around = _surroundings(model, mesh, axes)
+        self_compliance = copies * weights @ _infinite_body_compliance(model, around, foils) @ weights.T
         directions, relative = zip(*bars.values(), strict=True)
         rows = sp.vstack(relative, format="csr")
         return EmbeddedBars(np.array(directions), rows, bar_stiffness, gauge_weights, self_compliance)
 
 
-def _infinite_body_compliance(model: Model, foils: list[FoilPatches]) -> Float:
+def _surroundings(model: Model, mesh: Mesh, axes: tuple[str, ...]) -> Isotropic:
+    """Return the material that all foils lie in.
+
+    Raises
+    ------
+    Finger3dError
+        If they lie in several parts: each foil must be surrounded by the material that unloads it.
+    """
+    materials, found = model.materials(mesh.part_labels), dict[int, str]()
+    part = np.zeros(len(mesh.cells), dtype=np.int64) if mesh.part is None else mesh.part
+    for gauge in model.gauges:
+        for place in (gauge.middle, *gauge.ends):
+            inside, _ = reflect_into_part(place, np.ones(3), axes, mesh.dim)
+            for cell, _ in cells_at(mesh, inside):
+                found.setdefault(int(part[cell]), gauge.name)
+    if len(found) > 1:
+        first, second = list(found.values())[:2]
+        where = (
+            f'gauge "{first}" crosses an interface' if first == second else f'gauges "{first}" and "{second}" do not'
+        )
+        raise Finger3dError(
+            f"effects.embedded_gauge: all foils must lie in one part of the finger, and {where}; move them, or press "
+            "with the foils of one part at a time"
+        )
+    return materials[next(iter(found), 0)].isotropic("effects.embedded_gauge")
+
+
+def _infinite_body_compliance(model: Model, material: Isotropic, foils: list[FoilPatches]) -> Float:
     """Return the compliance of all bars in an infinite body."""
     section = None if model.domain == "solid" else model.design.width_mm
-    material = model.material.isotropic("effects.embedded_gauge")
     body = InfiniteBody(material.E_MPa, material.nu, model.domain == "plane-stress", section)
     compliance = np.block([[a.strain_due_to(b, body) for b in foils] for a in foils])
     return np.asarray(0.5 * (compliance + compliance.T))

@@ -58,7 +58,8 @@ class Effect:
 
     def apply(self, model: Model) -> Model:
         """Set the strain measure and the law of the model."""
-        model.material.isotropic(_TABLE)
+        for material in (model.material, *(material for _, material in model.parts)):
+            material.isotropic(_TABLE)
         law = self._isochoric_law()
         for mode, strain in {} if law.is_stable else unstable_from(law).items():
             if abs(strain) < _LEAST_STABLE_STRAIN:

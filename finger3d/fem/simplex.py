@@ -140,6 +140,18 @@ def boundary(cells: Int, dim: int) -> Int:
     return np.asarray(faces[np.sort(first[count == 1])])
 
 
+def part_of_facets(mesh: Mesh, facets: Int) -> Int:
+    """Numbers (m,) of the parts that boundary facets belong to."""
+    d = mesh.dim
+    if mesh.part is None:
+        return np.zeros(len(facets), dtype=np.int64)
+    faces = np.sort(mesh.cells[:, FACETS[d]].reshape(-1, d), axis=1)
+    _, number = np.unique(np.vstack([faces, np.sort(facets[:, :d], axis=1)]), axis=0, return_inverse=True)
+    part = np.zeros(number.max() + 1, dtype=np.int64)
+    part[number[: len(faces)]] = np.repeat(mesh.part, d + 1)
+    return part[number[len(faces) :]]
+
+
 def signed_volumes(mesh: Mesh) -> Float:
     """Signed volume (area in 2D) (e,) of the straight cells, mm^d."""
     corners = mesh.points[mesh.cells[:, : mesh.dim + 1]]

@@ -19,7 +19,19 @@ from finger3d.mechanics.gauges import Gauge
 from finger3d.plotting import panels as view
 from finger3d.plotting.camera import flat
 from finger3d.plotting.gauges import draw_marks, marks_of
-from finger3d.plotting.solid import BODY, LINE, OBJECT, OBJECT_TINT, REST, Skin, draw_solid, render_solids, skin_of
+from finger3d.plotting.outlines import interfaces_of
+from finger3d.plotting.solid import (
+    BODY,
+    FEATURE,
+    LINE,
+    OBJECT,
+    OBJECT_TINT,
+    REST,
+    Skin,
+    draw_solid,
+    render_solids,
+    skin_of,
+)
 from finger3d.results.states import States
 
 if TYPE_CHECKING:
@@ -69,7 +81,8 @@ def mesh_of(states: States) -> Mesh:
     """Return the undeformed mesh of the whole finger; the facets that cannot touch are labelled body."""
     labels = [*enumerate(FREE_FACES), (-1, "body")]
     facets = {label: states.facets[states.facet_face == k].astype(int) for k, label in labels}
-    return Mesh(states.points.astype(float), states.cells.astype(int), facets)
+    part = states.part.astype(int) if states.part.any() else None
+    return Mesh(states.points.astype(float), states.cells.astype(int), facets, part)
 
 
 def write_png(path: str | Path, figure: Figure) -> None:
@@ -100,12 +113,13 @@ def _sections(
 ) -> list[Figure]:
     """Draw steps of a 2D model."""
     from matplotlib.collections import LineCollection, PolyCollection
+    from matplotlib.patches import PathPatch
 
     moved = states.points + states.displacement[list(numbers)]
     everywhere = np.concatenate([states.points[None], moved]).reshape(-1, 2)
     low, span = everywhere.min(axis=0), np.ptp(everywhere, axis=0)
     arc, outline = states.facets[states.on_contact], states.facets[:, :2]
-    corners = states.cells[:, :3]
+    corners, mesh = states.cells[:, :3], mesh_of(states)
     figures = []
     for k, at, title, lines in zip(numbers, moved, titles, marks, strict=True):
         middle = at[arc[:, 2]] if arc.shape[1] == 3 else at[arc].mean(axis=1)
@@ -118,6 +132,7 @@ def _sections(
             axes.add_collection(PolyCollection(list(at[corners]), facecolor=BODY, edgecolor=BODY, lw=0.3))
             axes.add_collection(LineCollection(list(states.points[outline]), colors=REST, lw=0.8, linestyles=":"))
             axes.add_collection(LineCollection(list(at[outline]), colors=LINE, lw=0.8))
+            axes.add_artist(PathPatch(interfaces_of(mesh, at), facecolor="none", edgecolor=FEATURE, lw=0.9))
             axes.add_collection(LineCollection(list(view.sliced(states.object_at(k))), colors=OBJECT, lw=1.0))
             axes.add_collection(LineCollection(list(halves), colors=colours, lw=5, capstyle="butt", zorder=3))
             axes.set(xlim=low[0] + span[0] * np.array([-0.04, 1.04]), ylim=low[1] + span[1] * np.array([-0.04, 1.1]))

@@ -19,11 +19,12 @@ from finger3d.fem.simplex import CONTACT, FREE_FACES, Mesh
 from finger3d.plotting.camera import flat
 from finger3d.plotting.gauges import Mark, draw_marks
 from finger3d.plotting.layout import WIDEST, save, sheet, style
-from finger3d.plotting.outlines import edges_of, outline_of
+from finger3d.plotting.outlines import edges_of, interfaces_of, outline_of
 from finger3d.plotting.panels import Marks, highest_of, keys, palette, patches, pressure_colours, sliced, two_panels
 from finger3d.plotting.solid import (
     BODY,
     COLOURS,
+    FEATURE,
     LINE,
     OBJECT,
     OBJECT_TINT,
@@ -290,10 +291,11 @@ def _section(
     limits = low - 0.04 * span, low + 1.08 * span
     figure, panels = two_panels(span[1] / span[0], title, ticks=True)
     by_status = palette()[np.concatenate(of_state)]
-    outline, edges = outline_of(mesh, moved), edges_of(mesh, moved)
+    outline, edges, interfaces = (draw(mesh, moved) for draw in (outline_of, edges_of, interfaces_of))
     for axes, colours in zip(panels, (pressure_colours(np.concatenate(of_half), highest), by_status), strict=True):
         axes.add_artist(PathPatch(outline, facecolor=BODY, edgecolor=LINE, lw=0.5))
         axes.add_artist(PathPatch(edges, facecolor="none", edgecolor=LINE, lw=0.25))
+        axes.add_artist(PathPatch(interfaces, facecolor="none", edgecolor=FEATURE, lw=0.9))
         if thing is not None:
             axes.add_collection(LineCollection(list(thing), colors=OBJECT, lw=1.2, zorder=2))
         axes.add_collection(

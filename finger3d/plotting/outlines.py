@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from finger3d._types import Float
+from finger3d._types import Float, Int
 from finger3d.fem.simplex import Mesh
 
 if TYPE_CHECKING:
@@ -29,12 +29,30 @@ def edges_of(mesh: Mesh, moved: Float) -> Path:
     """Return every edge of the cells once, at nodes moved to (n, 2) mm; an empty path for a very fine mesh."""
     if len(mesh.cells) > _MOST_CELLS:
         return _runs(np.zeros((0, 2, 2)))
+    edges = _sides(mesh)
+    ends = np.sort(edges[:, [0, -1]], axis=1)
+    return _runs(moved[edges[np.unique(ends, axis=0, return_index=True)[1]]])
+
+
+def interfaces_of(mesh: Mesh, moved: Float) -> Path:
+    """Return the edges between the parts of a section, at nodes moved to (n, 2) mm; an empty path for one part."""
+    edges = _sides(mesh)
+    if mesh.part is None:
+        return _runs(moved[edges[:0]])
+    part = np.repeat(mesh.part, 3)
+    _, first, number = np.unique(np.sort(edges[:, [0, -1]], axis=1), axis=0, return_index=True, return_inverse=True)
+    between = np.zeros(len(first), dtype=np.bool_)
+    number = number.ravel()
+    np.logical_or.at(between, number, part != part[first[number]])
+    return _runs(moved[edges[first[between]]])
+
+
+def _sides(mesh: Mesh) -> Int:
+    """Return the nodes (3 e, 2 or 3) along the edges of all cells, in order."""
     sides = mesh.element.edges
     if mesh.element.is_quadratic:
         sides = np.insert(sides, 1, range(3, 6), axis=1)
-    edges = mesh.cells[:, sides].reshape(-1, len(sides[0]))
-    ends = np.sort(edges[:, [0, -1]], axis=1)
-    return _runs(moved[edges[np.unique(ends, axis=0, return_index=True)[1]]])
+    return np.asarray(mesh.cells[:, sides].reshape(-1, len(sides[0])))
 
 
 def outline_of(mesh: Mesh, moved: Float) -> Path:

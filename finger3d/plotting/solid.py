@@ -13,7 +13,7 @@ from finger3d._arrays import freeze_arrays
 from finger3d._types import Float, Int
 from finger3d.contact.friction import OPEN, SLIP, STICK
 from finger3d.fem.elements import TRI3, TRI6
-from finger3d.fem.simplex import CONTACT, FREE_FACES, Mesh
+from finger3d.fem.simplex import CONTACT, FREE_FACES, Mesh, part_of_facets
 from finger3d.plotting.camera import AXES, WINDOW, flat, framed, half_height
 from finger3d.plotting.renderer import Arrows, Camera, Drawing, Image, Polygons, Polylines, render, unshared
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-BODY, LINE, REST, OBJECT = "#d9d6cf", "#8d8a84", "#777777", "#222222"
+BODY, LINE, FEATURE, REST, OBJECT = "#d9d6cf", "#8d8a84", "#444444", "#777777", "#222222"
 COLOURS = {OPEN: "#c4c4c4", STICK: "#1f3f77", SLIP: "#f28e2b"}
 OBJECT_TINT, OBJECT_OPACITY = "#7fa7c9", 0.12
 ARROWS = {STICK: "#ffffff", SLIP: "#000000"}
@@ -51,7 +51,7 @@ class Skin:
     pressure : (t, 3) contact pressure at their corners, MPa
     status : (t,) status of the contact point that each triangle belongs to
     lines : (k, 3, 3) edges of the facets of the body: end, middle, end
-    features : (k, 3, 3) edges between the faces of the body
+    features : (k, 3, 3) edges between the faces of the body, and between its parts on them
     rest : (k, 3, 3) edges of the undeformed contact surface
     thing : (k, 3, 3) triangles of the object; none without one
     arrow_at : (a, 3) contact points with a friction arrow
@@ -146,6 +146,7 @@ def skin_of(
     contact, values, states = (np.concatenate([part[k] for part in parts]) for k in range(3))
     body = np.concatenate([_six_nodes(f, moved) for f in others]) if others else np.zeros((0, 6, 3))
     rims = [_rim(mesh.facets[label]) for label in touched]
+    between = [_rim(part) for f in mesh.facets.values() for part in _by_part(mesh, f)] if mesh.part is not None else []
     chosen, arrow, largest = _arrows(moved[nodes], shear, status)
     return Skin(
         body=body,
@@ -153,7 +154,7 @@ def skin_of(
         pressure=values,
         status=states,
         lines=body[:, _SIDES].reshape(-1, 3, 3),
-        features=np.concatenate([_edge_points(edges, moved) for edges in (*rims, *map(_rim, others))]),
+        features=np.concatenate([_edge_points(edges, moved) for edges in (*rims, *map(_rim, others), *between)]),
         rest=_edge_points(rims[0], mesh.points),
         thing=np.zeros((0, 3, 3)) if thing is None else thing,
         arrow_at=moved[nodes[chosen]],
@@ -194,6 +195,12 @@ def _rim(facets: Int) -> Int:
     _, first, count = np.unique(np.sort(ends, axis=1), axis=0, return_index=True, return_counts=True)
     rim: Int = np.hstack([ends, middles])[first[count == 1]]
     return rim
+
+
+def _by_part(mesh: Mesh, facets: Int) -> list[Int]:
+    """Return the facets of each part."""
+    part = part_of_facets(mesh, facets)
+    return [facets[part == number] for number in np.unique(part)]
 
 
 def _edge_points(edges: Int, points: Float) -> Float:
@@ -334,7 +341,7 @@ def _parts(skin: Skin, colours: Float, arrows: bool) -> tuple[Polygons | Polylin
     )
     lines = (
         Polylines(skin.lines, LINE, 1.0, 0.5),
-        Polylines(skin.features, "#444444", 2.0),
+        Polylines(skin.features, FEATURE, 2.0),
         Polylines(skin.rest, REST, 1.5, 0.6),
     )
     parts: list[Polygons | Polylines | Arrows] = [Polygons(*unshared(at), colour) for at, colour in surfaces if len(at)]

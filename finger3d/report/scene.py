@@ -20,6 +20,7 @@ def how_modelled(summary: Mapping[str, object], folder: Path) -> list[Part]:
     """
     scene = _mapping(summary["scene"])
     rows = [(name, _settings(scene[name])) for name in _TABLES if scene.get(name)]
+    rows += [(f"part {label}", _settings(settings)) for label, settings in _mapping(scene.get("parts")).items()]
     gauges = scene.get("gauge")
     for gauge in map(_mapping, gauges if isinstance(gauges, list | tuple) else ()):
         rows.append((f"gauge {gauge['name']}", _settings({k: v for k, v in gauge.items() if k != "name"})))

@@ -36,6 +36,7 @@ class States:
     ----------
     points : (n, d) mm at rest, in the order of fields.vtu
     cells, facets : (e, k), (t, j) as in `finger3d.fem.simplex.Mesh`; facets of all labels together
+    part : (e,) number of the part that each cell belongs to, 0 for the main body
     facet_face : (t,) number in `finger3d.fem.simplex.FREE_FACES` of the face of each facet, -1 for any other
     nodes : (m,) numbers of the contact points among `points`, in the order of contact.csv
     face : (m,) number of the face that each contact point belongs to
@@ -51,6 +52,7 @@ class States:
 
     points: Array
     cells: Array
+    part: Array
     facets: Array
     facet_face: Array
     nodes: Array
@@ -147,6 +149,7 @@ def states_of(
     return States(
         points=mesh.points.astype(np.float32),
         cells=mesh.cells.astype(np.int32),
+        part=(np.zeros(len(mesh.cells)) if mesh.part is None else mesh.part).astype(np.int8),
         facets=np.concatenate(list(facets.values())).astype(np.int32),
         facet_face=np.concatenate([np.full(len(f), faces[label], dtype=np.int8) for label, f in facets.items()]),
         nodes=problem.points.nodes.astype(np.int32),
@@ -212,6 +215,7 @@ def _check(states: States) -> None:
     wanted: dict[str, tuple[tuple[tuple[int, ...], ...], str]] = {
         "points": (((n, d),), "f"),
         "cells": (((e, d + 1), (e, (d + 1) * (d + 2) // 2)), "iu"),
+        "part": (((e,),), "i"),
         "facets": (((t, d), (t, d * (d + 1) // 2)), "iu"),
         "facet_face": (((t,),), "i"),
         "nodes": (((m,),), "iu"),
@@ -234,7 +238,12 @@ def _check(states: States) -> None:
         if values.dtype.kind == "f" and not (np.abs(values) < _LARGEST).all():
             raise ValueError(f"{name} has a number that is not finite or too large")
     bounds = {"cells": (0, n), "facets": (0, n), "nodes": (0, n), "status": (0, 3), "step": (1, 2**31)}
-    bounds |= {"object_faces": (0, v), "face": (0, len(FREE_FACES)), "facet_face": (-1, len(FREE_FACES))}
+    bounds |= {
+        "part": (0, 128),
+        "object_faces": (0, v),
+        "face": (0, len(FREE_FACES)),
+        "facet_face": (-1, len(FREE_FACES)),
+    }
     for name, (low, high) in bounds.items():
         values = getattr(states, name)
         if values.size and (values.min() < low or values.max() >= high):

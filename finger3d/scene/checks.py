@@ -13,6 +13,7 @@ from finger3d.geometry.design import Design
 from finger3d.mechanics.model import Domain, MeshOptions
 from finger3d.objects import RigidObject
 from finger3d.scene.messages import dotted, shown
+from finger3d.scene.parts import check_parts
 from finger3d.scene.tables import GaugeTable, LegTable, MarkerTable, MeshTable, SceneTable, TaxelTable
 
 Box = tuple[float, float, float, float]
@@ -37,6 +38,7 @@ def check(tables: SceneTable, legs: tuple[LegTable, ...], design: Design) -> lis
             lines.append(f'model.domain = {shown(tables.model.domain)}: {lacks}; must be "solid"')
         if tables.mesh.mesher == "swept":
             lines.append(f'mesh.mesher = "swept": {lacks}; must be "ftetwild"')
+    lines += check_parts(tables, design)
     lines += _legs(tables.press, legs, design, solid)
     lines += _sizes(tables.mesh, design, solid)
     lines += _goal(tables, solid)

@@ -152,6 +152,8 @@ def _target(table: type[TomlTable], place: Place) -> tuple[Place, type[TomlTable
             holder, hint = hint, typing.get_type_hints(hint, include_extras=True).get(part)
         elif typing.get_origin(hint) is tuple and isinstance(part, int) and _is_table(typing.get_args(hint)[0]):
             hint = typing.get_args(hint)[0]
+        elif typing.get_origin(hint) is dict and isinstance(part, str) and _is_table(typing.get_args(hint)[1]):
+            hint = typing.get_args(hint)[1]
         else:
             break  # what follows is the checker's own name for a branch of a union, or a place within a list
         typed.append(part)

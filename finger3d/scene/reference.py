@@ -21,6 +21,7 @@ from finger3d.scene.tables import (
     MarkerTable,
     MaterialTable,
     MeshTable,
+    PartTable,
     TaxelTable,
     TomlTable,
     table_of,
@@ -48,6 +49,7 @@ def _tables() -> Iterator[tuple[str, list[_Row]]]:
     for name, design in designs().items():
         yield f'[finger] geometry = "{name}"', _rows(table_of(design), design)
     yield "[material]", _rows(MaterialTable)
+    yield "[parts.LABEL]", _rows(PartTable)
     common = _rows(table_of(RigidObject), RigidObject)
     yield "[object]", [("shape", listed(OBJECTS), '`"plane"`', "what the finger is pressed on"), *common]
     for shape, record in OBJECTS.items():

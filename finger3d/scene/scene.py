@@ -25,6 +25,7 @@ from finger3d.objects import OBJECTS, RigidObject, initial_contact
 from finger3d.scene import checks, files, tree
 from finger3d.scene.legs import legs_of
 from finger3d.scene.messages import Place, choose, described, dotted, listed, messages_from, nearest, shown, unknown
+from finger3d.scene.parts import parts_of
 from finger3d.scene.registry import effect_names, effect_type
 from finger3d.scene.tables import (
     FileTable,
@@ -124,6 +125,7 @@ class Scene:
             taxels=tuple(record_of(Taxel, taxel) for taxel in t.taxel),
             domain=t.model.domain,
             rule=t.contact.rule,
+            parts=parts_of(t),
         )
         for name in sorted(self.effects):
             model = self.effects[name].apply(model)

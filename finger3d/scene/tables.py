@@ -57,6 +57,21 @@ class MaterialTable(TomlTable):
     nu: Poisson
 
 
+class PartTable(TomlTable):
+    """[parts.LABEL]: the solid of the finger with that label; any number of them.
+
+    Attributes
+    ----------
+    E_MPa : Young's modulus
+    nu : Poisson's ratio
+    rigid : true: the part keeps its shape, and takes neither E_MPa nor nu
+    """
+
+    E_MPa: Modulus | None = None
+    nu: Poisson | None = None
+    rigid: bool = False
+
+
 class FrictionTable(TomlTable):
     """[friction]; without it: none.
 
@@ -217,6 +232,7 @@ class SceneTable(TomlTable):
     title: Title | None = None
     finger: Tree
     material: MaterialTable
+    parts: dict[str, PartTable] = {}
     object: Tree | None = None
     friction: FrictionTable = FrictionTable(mu=0.0)
     press: Tree
