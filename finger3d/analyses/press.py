@@ -209,6 +209,7 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fie
     """Recover and write the fields after the last converged increment, and judge from them; None without increments."""
     from finger3d.accuracy.advice import largest_principal_strain
     from finger3d.mechanics import resolution
+    from finger3d.mechanics.cavity import cavity_warnings
     from finger3d.mechanics.coverage import penetration_warnings
 
     begin = time.perf_counter()
@@ -220,6 +221,7 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fie
         record.largest_strain = largest_principal_strain(strain)
         _advise(record)
         fields = Fields.of(record, u, strain, stress)
+        record.warnings += cavity_warnings(fields.mesh, fields.displacement)
         writer.fields(record, fields)
     record.warnings += point_count_warning(record) + resolution.increments_without_contact(problem, record.steps)
     record.seconds["output"] += time.perf_counter() - begin
