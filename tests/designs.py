@@ -10,7 +10,16 @@ from finger3d.mechanics.model import MeshOptions
 GOOD: dict[str, dict[str, float]] = {
     "half_cylinder": {"radius_mm": 5.0, "width_mm": 10.0},
     "clipped_cylinder": {"radius_mm": 100.0, "half_length_mm": 50.0, "edge_height_mm": 36.6, "width_mm": 20.0},
-    "block": {"half_length_mm": 20.0, "height_mm": 15.0, "width_mm": 10.0},
+    "block": {"half_length_mm": 20.0, "height_mm": 15.0, "width_mm": 10.0, "skin_mm": 2.0},
+    "fingertip": {
+        "radius_mm": 10.0,
+        "half_length_mm": 8.0,
+        "edge_height_mm": 8.0,
+        "width_mm": 16.0,
+        "skin_mm": 1.0,
+        "core_half_length_mm": 3.0,
+        "core_height_mm": 6.0,
+    },
     "hemisphere": {"radius_mm": 5.0},
 }
 """Typical dimensions of every design."""

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from finger3d.fem.assembly import Stiffness, stiffness
 from finger3d.fem.elements import Element, quadrature
 from finger3d.fem.material import Elasticity
-from finger3d.fem.simplex import Mesh, boundary, quadratic, signed_volumes
+from finger3d.fem.simplex import FACETS, Mesh, boundary, quadratic, signed_volumes
 from finger3d.fem.traces import local_rows, strain_row, surface
 from finger3d.objects import vertical_frame
 
@@ -105,3 +105,19 @@ def error_norms(mesh: Mesh, u: np.ndarray, exact: Callable, exact_slope: Callabl
     l2 = np.sqrt(np.sum(weight * np.sum((value - exact(at)) ** 2, axis=1)))
     h1 = np.sqrt(np.sum(weight * np.sum((slope - exact_slope(at)) ** 2, axis=(1, 2))))
     return float(l2), float(h1)
+
+
+def interface(mesh: Mesh, first: int, second: int) -> np.ndarray:
+    """Nodes (m, 3 | 6) of the quadratic facets between cells of two parts."""
+    assert mesh.part is not None
+    d = mesh.dim
+    corners = np.sort(mesh.cells[:, FACETS[d]].reshape(-1, d), axis=1)
+    owner = np.repeat(mesh.part, d + 1)
+    both = set(map(tuple, corners[owner == first].tolist())) & set(map(tuple, corners[owner == second].tolist()))
+    chosen = np.array(sorted(both), dtype=np.int64).reshape(-1, d)
+    n = len(mesh.points)
+    ends = np.sort(mesh.cells[:, mesh.element.edges].reshape(-1, 2), axis=1) @ [n, 1]
+    key, where = np.unique(ends, return_index=True)
+    middle = mesh.cells[:, d + 1 :].ravel()[where]
+    pairs = [(0, 1)] if d == 2 else [(0, 1), (1, 2), (0, 2)]
+    return np.hstack([chosen, *(middle[np.searchsorted(key, chosen[:, p] @ [n, 1])][:, None] for p in pairs)])

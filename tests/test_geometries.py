@@ -29,9 +29,23 @@ def test_the_solid_has_the_stated_volume_extent_and_labels(name: str) -> None:
             "half_cylinder": ["base", "contact", "ends", "ends"],
             "clipped_cylinder": ["base", "contact", "ends", "ends", "walls", "walls"],
             "block": ["base", "contact", "ends", "ends", "walls", "walls"],
+            "fingertip": ["base", "contact", "ends", "ends", "walls", "walls"],
             "hemisphere": ["base", "contact"],
         }[name]
     )
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_the_solids_of_the_parts_make_up_the_body(name: str) -> None:
+    design = make(name)
+    solids = design.solids()
+    assert tuple(solids) == ("", *design.part_labels)
+    assert sum(solid.volume for solid in solids.values()) == pytest.approx(design.volume_mm3, rel=1e-12)
+    whole = design.solid()
+    for label, solid in solids.items():
+        assert (whole & solid).volume == pytest.approx(solid.volume, rel=1e-9)
+        if design.section():
+            assert solid.volume == pytest.approx(design.section().areas_mm2[label] * design.width_mm, rel=1e-12)
 
 
 @pytest.mark.parametrize("name", GOOD)

@@ -25,10 +25,13 @@ def test_every_dimension_refuses_what_is_no_length(name: str, value: Any) -> Non
         assert "\n" not in message
 
 
-def test_zero_is_allowed_for_the_edge_height_only() -> None:
+MAY_BE_ZERO = {"edge_height_mm", "skin_mm"}
+
+
+def test_zero_is_allowed_for_the_edge_height_and_for_parts_only() -> None:
     assert make("clipped_cylinder", edge_height_mm=0.0).height_mm == pytest.approx(100.0 - math.sqrt(7500.0))
     for name, dimensions in GOOD.items():
-        for key in set(dimensions) - {"edge_height_mm"}:
+        for key in set(dimensions) - MAY_BE_ZERO:
             with pytest.raises(Finger3dError, match=key):
                 make(name, **{key: 0.0})
 

@@ -7,6 +7,16 @@ import math
 import numpy as np
 import pytest
 
+from finger3d.geometry.section import (
+    Core,
+    Section,
+    block_section,
+    cylinder_section,
+    largest_core_mm,
+    largest_layer_mm,
+    with_core,
+    with_layer,
+)
 from tests.designs import make
 
 
@@ -22,3 +32,41 @@ def test_a_clipped_cylinder_without_clipping_is_the_half_cylinder() -> None:
     assert clipped.height_mm == half.height_mm
     x, z = np.linspace(-6, 6, 25), np.zeros(25)
     np.testing.assert_array_equal(clipped.top(x, z), half.top(x, z))
+
+
+def test_a_skin_is_the_ring_between_concentric_arcs() -> None:
+    # between half circles of radii 5 and 4
+    round_ = with_layer(cylinder_section(5.0, 5.0, 0.0), 1.0)
+    assert round_.areas_mm2["skin"] == pytest.approx(0.5 * math.pi * (25.0 - 16.0))
+    assert round_.inner.half_length_mm == 4.0
+    x = np.linspace(0.0, 45.0, 7)
+    fig9 = with_layer(cylinder_section(100.0, 50.0, 36.6), 3.0)
+    # along the radius the arcs are 3 mm apart
+    outer = np.hypot(x, fig9.contact.height(x) - fig9.inner.contact.centre_y_mm)
+    inner = np.hypot(x, fig9.inner.contact.height(x) - fig9.inner.contact.centre_y_mm)
+    np.testing.assert_allclose(outer - inner, 3.0, rtol=1e-12)
+    assert fig9.inner.half_length_mm == 50.0
+    assert fig9.inner.edge_height_mm == pytest.approx(float(fig9.inner.contact.height(np.array(50.0))))
+
+
+def test_areas_of_parts_sum_up_to_the_section() -> None:
+    section = with_core(with_layer(block_section(20.0, 15.0), 2.0), Core(5.0, 10.0))
+    assert section.part_labels == ("skin", "core")
+    assert section.areas_mm2 == {"": 40.0 * 13.0 - 100.0, "skin": 80.0, "core": 100.0}
+    assert sum(section.areas_mm2.values()) == section.area_mm2
+
+
+def test_parts_that_do_not_fit_raise() -> None:
+    fig9 = cylinder_section(100.0, 50.0, 36.6)
+    with pytest.raises(ValueError, match="does not fit"):
+        with_layer(fig9, largest_layer_mm(fig9))
+    with pytest.raises(ValueError, match="does not fit"):
+        with_core(fig9, Core(10.0, largest_core_mm(fig9, 10.0)))
+    assert largest_core_mm(fig9, 50.0) == pytest.approx(36.6)
+    assert largest_layer_mm(block_section(3.0, 2.0)) == 2.0
+
+
+@pytest.mark.parametrize("section", [cylinder_section(100.0, 50.0, 36.6), block_section(20.0, 15.0)])
+def test_fractions_are_the_inverse_of_points(section: Section) -> None:
+    u = np.linspace(0.0, 1.0, 11)
+    np.testing.assert_allclose(section.contact.fraction(section.contact.at(u)[:, 0]), u, atol=1e-14)

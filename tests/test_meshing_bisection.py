@@ -1,5 +1,7 @@
 """Local refinement by bisection: conforming, on the same curved body, graded, and no flatter than it must be."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,7 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing.bisection import refined
 from finger3d.meshing.swept import mesh_section, mesh_swept
+from tests.designs import make, zone_of
 
 PLACE, SHORTEST = np.array([3.0, 3.5, 0.0]), 0.2
 
@@ -81,3 +84,20 @@ def test_a_check_of_the_number_of_cells_ends_the_refinement() -> None:
 
     with pytest.raises(Finger3dError, match="too many"):
         refined(body(3), lambda points: np.full(len(points), 0.05), check)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_refined_cells_stay_in_their_parts(dim: int) -> None:
+    design = make("fingertip")
+    options = MeshOptions(size_mm=1.5, base_size_mm=3.0, mesher="swept", layers=1)
+    mesher = mesh_section if dim == 2 else mesh_swept
+    mesh = mesher(design, options, zone_of(design), ("x",) if dim == 2 else ("x", "z"))[0]
+    corner = np.array([3.0, 6.0, 0.0])[:dim]
+    finer = refined(mesh, lambda points: 0.15 + 0.3 * np.linalg.norm(points - corner, axis=1))
+    assert mesh.part is not None
+    assert finer.part is not None
+    assert finer.part_labels == mesh.part_labels == ("skin", "core")
+    assert len(finer.cells) > 1.5 * len(mesh.cells)
+    for number in range(3):
+        before, after = (curved_volume(replace(m, cells=m.cells[m.part == number], part=None)) for m in (mesh, finer))
+        assert after == pytest.approx(before, rel=1e-12)

@@ -16,7 +16,7 @@ from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing import cache, tetwild
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.sizing import rounded_zone
-from tests.designs import FIG9, OPTIONS, ZONE
+from tests.designs import FIG9, OPTIONS, ZONE, make
 
 BOTH = ("x", "z")
 
@@ -67,6 +67,23 @@ def test_the_cache_returns_what_was_stored(stored: tuple[Path, Mesh]) -> None:
     np.testing.assert_array_equal(found[0].cells, stored[1].cells)
     assert set(found[0].facets) == set(stored[1].facets)
     assert found[1] == 250.0
+
+
+def test_the_cache_keeps_parts(tmp_path: Path) -> None:
+    design = make("fingertip")
+    options = MeshOptions(size_mm=2.0, base_size_mm=4.0, mesher="swept", layers=1)
+    mesh = mesh_solid(design, options, (-1, 1, -1, 1), BOTH)[0]
+    path = tmp_path / "mesh.npz"
+    assert cache.save(path, mesh, design.volume_mm3)
+    found = cache.load(path)
+    assert found is not None
+    assert found[0].part_labels == ("skin", "core")
+    np.testing.assert_array_equal(found[0].part, mesh.part)
+    with np.load(path) as whole:
+        arrays = {name: whole[name] for name in whole.files}
+    arrays["part"] = 0 * arrays["part"]
+    np.savez(path, **arrays)
+    assert cache.load(path) is None
 
 
 @pytest.mark.parametrize("damage", ["cut", "empty", "noise", "text", "absent", "changed", "array"])

@@ -14,7 +14,7 @@ from finger3d.errors import Finger3dError
 from finger3d.geometry.section import Arc, Section
 
 if TYPE_CHECKING:
-    from build123d import Edge, Face, Part, Shape, Solid, Wire
+    from build123d import Edge, Face, Part, Shape, Sketch, Solid, Wire
 
 LABELS = ("contact", "base", "ends", "walls", "symmetry_x", "symmetry_z")
 
@@ -24,7 +24,38 @@ _LEAST_UPWARD_NORMAL = 1e-6  # of a contact face; round-off of a vertical round 
 
 def extruded(section: Section, width_mm: float, name: str) -> Solid:
     """Extrude the whole section along z from -width/2 to width/2, with labelled faces."""
-    from build123d import Line, Polyline, ThreePointArc, extrude, make_face
+    from build123d import extrude
+
+    return sound(extrude(_face(section), amount=0.5 * width_mm, both=True), name)
+
+
+def extruded_parts(section: Section, width_mm: float, name: str) -> dict[str, Solid]:
+    """Extrude each part of a section along z from -width/2 to width/2; the key "" is the main body."""
+    from build123d import Polyline, extrude, make_face
+
+    inner = section.inner
+    regions = {"": _face(inner)}
+    if section.layer:
+        regions[section.layer.label] = _face(section) - _face(inner)
+    if inner.core:
+        core = inner.core
+        x, y = core.half_length_mm, core.height_mm
+        corners = [(-x, 0.0), (x, 0.0), (x, y), (-x, y)]
+        regions[core.label] = make_face([Polyline(*corners, close=True)])
+        regions[""] = regions[""] - regions[core.label]
+    parts = {}
+    for label, region in regions.items():
+        solids = extrude(region, amount=0.5 * width_mm, both=True).solids()
+        if len(solids) != 1 or not solids[0].is_valid:
+            raise Finger3dError(f"{name}: CAD made {len(solids)} solids of the part '{label}'; change its dimensions")
+        parts[label] = solids[0]
+        parts[label].label = label
+    return parts
+
+
+def _face(section: Section) -> Sketch:
+    """Return the whole section, both halves, as a plane face."""
+    from build123d import Line, Polyline, ThreePointArc, make_face
 
     length, edge = section.half_length_mm, section.edge_height_mm
     if isinstance(section.contact, Arc):
@@ -36,7 +67,7 @@ def extruded(section: Section, width_mm: float, name: str) -> Solid:
         edges.append(Polyline((-length, edge), (-length, 0.0), (length, 0.0), (length, edge)))
     else:
         edges.append(Line((-length, 0.0), (length, 0.0)))
-    return sound(extrude(make_face(edges), amount=0.5 * width_mm, both=True), name)
+    return make_face(edges)
 
 
 def sound(shape: Part | Shape, name: str) -> Solid:

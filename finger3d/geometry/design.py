@@ -69,6 +69,9 @@ class Design(Protocol):
     def solid(self) -> Solid:
         """Return the build123d solid of the whole body, its faces labelled."""
 
+    def solids(self) -> Mapping[str, Solid]:
+        """Return the build123d solids of the parts by their labels, "" the main body; together they are `solid()`."""
+
     def tessellation(self) -> Tessellation | None:
         """Return the body's own triangles if it has no CAD; None for a body that is meshed from CAD."""
 
@@ -81,7 +84,6 @@ class ParametricDesign(ABC):
 
     name: ClassVar[str]
     may_be_zero: ClassVar[tuple[str, ...]] = ()
-    part_labels: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
         check_dimensions(self.name, self.dimensions, self.may_be_zero)
@@ -96,6 +98,11 @@ class ParametricDesign(ABC):
     def cache_fields(self) -> Mapping[str, object]:
         """Name and dimensions; the cache adds a hash of the design's file."""
         return {"design": self.name, "dimensions": {key: repr(value) for key, value in self.dimensions.items()}}
+
+    @property
+    def part_labels(self) -> tuple[str, ...]:
+        """No labels: the body is one solid."""
+        return ()
 
     def section(self) -> Section | None:
         """Return None: the section is not constant along z."""
@@ -117,6 +124,10 @@ class ParametricDesign(ABC):
     def solid(self) -> Solid:
         """See :meth:`Design.solid`."""
 
+    def solids(self) -> Mapping[str, Solid]:
+        """Return the main body only."""
+        return {"": self.solid()}
+
     def tessellation(self) -> Tessellation | None:
         """Return None: the body is meshed from CAD."""
         return None
@@ -132,6 +143,11 @@ class ExtrudedDesign(ParametricDesign):
         """Return the section x >= 0."""
 
     @property
+    def part_labels(self) -> tuple[str, ...]:
+        """Labels of the section's parts."""
+        return self.section().part_labels
+
+    @property
     def volume_mm3(self) -> float:
         """Volume in closed form."""
         return self.section().area_mm2 * self.width_mm
@@ -145,6 +161,12 @@ class ExtrudedDesign(ParametricDesign):
         from finger3d.geometry.cad import extruded
 
         return extruded(self.section(), self.width_mm, self.name)
+
+    def solids(self) -> Mapping[str, Solid]:
+        """Return the extruded solids of the parts."""
+        from finger3d.geometry.cad import extruded_parts
+
+        return extruded_parts(self.section(), self.width_mm, self.name)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -181,6 +203,10 @@ class DesignSummary:
     def solid(self) -> Solid:
         """Raise a Finger3dError: the shape is not known."""
         raise Finger3dError("a reduced model has no solid; use the scene that it was made of")
+
+    def solids(self) -> Mapping[str, Solid]:
+        """Raise a Finger3dError: the shape is not known."""
+        return {"": self.solid()}
 
     def tessellation(self) -> None:
         """Return None: the shape is not known."""

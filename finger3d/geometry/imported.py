@@ -133,6 +133,10 @@ class Imported:
             raise Finger3dError(f"{self.path}: an STL file has triangles, and no CAD solid; export it as STL again")
         return sound(self.cad, self.name)
 
+    def solids(self) -> Mapping[str, Solid]:
+        """Return the main body only."""
+        return {"": self.solid()}
+
     def tessellation(self) -> Tessellation | None:
         """Return the triangles of an STL file in labelled patches; None for STEP, which is meshed from CAD."""
         from finger3d.geometry.faceted import body

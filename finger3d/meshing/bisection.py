@@ -8,6 +8,7 @@ the smallest one of the mesh (Rosenberg and Stenger 1975).  New nodes lie on the
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import combinations
 from typing import NamedTuple
 
@@ -74,11 +75,13 @@ def refined(mesh: Mesh, size: Callable[[Float], Float], check: Callable[[int], N
         return mesh
     used, compact = np.unique(cells, return_inverse=True)
     renumbered = {label: np.searchsorted(used, f) for label, f in facets.items()}
-    made = quadratic(Mesh(points[used], compact.reshape(cells.shape), renumbered))
+    part = None if mesh.part is None else mesh.part[parents]
+    linear = replace(mesh, points=points[used], cells=compact.reshape(cells.shape), facets=renumbered, part=part)
+    made = quadratic(linear)
     curved = made.points.copy()
     for k, (i, j) in enumerate(EDGES[d]):
         curved[made.cells[:, d + 1 + k]] = _positions(mesh, parents, 0.5 * (places[:, i] + places[:, j]))
-    return Mesh(curved, made.cells, made.facets)
+    return replace(made, points=curved)
 
 
 def _pairs(corners: int) -> Int:

@@ -65,7 +65,8 @@ def load(path: Path) -> tuple[Mesh, float] | None:
     try:
         arrays = read_arrays(path)
         facets = {name[7:]: array for name, array in arrays.items() if name.startswith("facets_")}
-        mesh = Mesh(arrays["points"], arrays["cells"], facets)
+        labels = tuple(str(label) for label in arrays["part_labels"]) if "part" in arrays else ()
+        mesh = Mesh(arrays["points"], arrays["cells"], facets, arrays.get("part"), labels)
         return (mesh, float(arrays["cad_volume_mm3"])) if str(arrays["hash"]) == _checksum(mesh) else None
     except (OSError, ValueError, TypeError, KeyError, IndexError, AttributeError):  # or an archive of other arrays
         return None
@@ -80,6 +81,8 @@ def save(path: Path, mesh: Mesh, cad_volume_mm3: float) -> bool:
         "cad_volume_mm3": np.array(cad_volume_mm3),
         **{f"facets_{label}": facets for label, facets in mesh.facets.items()},
     }
+    if mesh.part is not None:
+        arrays |= {"part": mesh.part, "part_labels": np.array(mesh.part_labels)}
     try:
         with atomic(path) as temporary, temporary.open("wb") as file:
             np.savez(file, allow_pickle=False, **arrays)
@@ -89,9 +92,12 @@ def save(path: Path, mesh: Mesh, cad_volume_mm3: float) -> bool:
 
 
 def _checksum(mesh: Mesh) -> str:
-    """Return the SHA-256 of points, cells and facets."""
+    """Return the SHA-256 of points, cells, facets and parts."""
     digest = hashlib.sha256(content_hash(mesh).encode())
     for label in sorted(mesh.facets):
         digest.update(label.encode())
         digest.update(np.ascontiguousarray(mesh.facets[label], dtype=np.int64).tobytes())
+    if mesh.part is not None:
+        digest.update("\n".join(mesh.part_labels).encode())
+        digest.update(np.ascontiguousarray(mesh.part, dtype=np.int64).tobytes())
     return digest.hexdigest()

@@ -1,27 +1,27 @@
 """Structured triangulation of a half section: rows of points from the contact curve down, zipped into triangles.
 
-Rows are the contact curve lowered towards the base, or, where the wall is too low for that, the outline shrunk towards
-the origin. Their number and the points on them follow the size field, so triangles stay well shaped while they grow.
+Rows run along the bands of the section. Their number and the points on them follow the size field, so triangles stay
+well shaped while they grow. Parts of a section are bands, or ranges of a band, and no triangle crosses their border.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
 from finger3d._types import Float, Int
-from finger3d.geometry.section import Section
+from finger3d.geometry.section import Arc, Core, Flat, Section
+from finger3d.meshing.bands import Band, Bands, bands, ranges, thin_places
 from finger3d.meshing.grading import Grading
 
 RATE = 0.25
 """Growth of the edge length per length away from the contact zone."""
 
 _ASPECT = 3.0  # quadratic elements bear 5:1; zipping rows of different counts costs the rest
-_LOW_WALL = 0.3  # below this share of the height, columns at the wall would be squashed
 _PLACES, _STATIONS = 80, 400  # along the outline and in depth, where prescribed edge lengths are looked up
-_STEEP = np.radians(60.0)  # a curve that ends steeper than this would be lowered along itself
 
 
 @dataclass(frozen=True)
@@ -37,8 +37,8 @@ class Sizes:
     high: float
     grading: Grading | None = None
 
-    def steps(self, length: float, longest: Callable[[Float], Float] | None = None) -> Float:
-        """Depths (n + 1,), mm, of rows from 0 to `length` below the zone.
+    def steps(self, length: float, longest: Callable[[Float], Float] | None = None, start: float = 0.0) -> Float:
+        """Depths (n + 1,), mm, of rows from 0 to `length` below a place that lies `start` below the zone.
 
         `longest` returns the largest distance of rows at depths; without it, it follows from the edge lengths alone.
         """
@@ -50,7 +50,7 @@ class Sizes:
 
         sample = np.concatenate([np.linspace(0.0, length, 4001), np.geomspace(1e-6 * length, length, 2000)])
         sample = np.unique(sample)
-        total = count(sample)
+        total = count(start + sample) - count(np.array(start))
         if longest is not None:
             density = np.maximum(np.gradient(total, sample), 1.0 / longest(sample))
             total = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(sample))])
@@ -68,17 +68,37 @@ class Sizes:
 
 
 @dataclass(frozen=True)
-class Rows:
-    """Points on rows: row k has the parameters `params[k]` on the outline, and is scaled by `scales[k]`."""
+class Strip:
+    """Two neighbouring rows of nodes, numbers and parameters of each, between which the cells belong to one part."""
 
-    scales: Float
-    params: list[Float]
-    columns: bool
+    upper: Int
+    lower: Int
+    at_upper: Float
+    at_lower: Float
+    part: int
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Points on rows.
+
+    Attributes
+    ----------
+    points : (n, 2) mm
+    strips : pairs of rows
+    facets : label -> (k, 2) edges of the boundary, outward
+    curves : a curve, and its parameter (n,) at every point, nan away from it; for the contact curve and curved borders
+    """
+
+    points: Float
+    strips: tuple[Strip, ...]
+    facets: Mapping[str, Int]
+    curves: tuple[tuple[Arc | Flat, Float], ...]
 
     @property
     def count(self) -> int:
         """Number of points."""
-        return sum(len(p) for p in self.params)
+        return len(self.points)
 
 
 @dataclass(frozen=True)
@@ -90,13 +110,15 @@ class Grid:
     points : (n, 2) mm
     cells : (m, 3) counter-clockwise
     facets : label -> (k, 2) edges, outward
-    arc : (n,) parameter on the contact curve, nan away from it
+    curves : see :class:`Layout`
+    part : (m,) number of the part of each triangle
     """
 
     points: Float
     cells: Int
     facets: Mapping[str, Int]
-    arc: Float
+    curves: tuple[tuple[Arc | Flat, Float], ...]
+    part: Int
 
 
 def folded_zone(zone: tuple[float, float, float, float], half_length: float) -> tuple[float, float]:
@@ -105,15 +127,6 @@ def folded_zone(zone: tuple[float, float, float, float], half_length: float) -> 
     near = 0.0 if lo <= 0.0 <= hi else min(abs(lo), abs(hi))
     far = max(abs(lo), abs(hi))
     return min(near, half_length), min(far, half_length)
-
-
-def _outline(section: Section, u: Float) -> Float:
-    """Points (n, 2) of the outline: the contact curve for 0 <= u <= 1, the wall for 1 <= u <= 2."""
-    points = section.contact.at(np.minimum(u, 1.0))
-    wall = u > 1.0
-    points[wall, 0] = section.half_length_mm
-    points[wall, 1] = section.edge_height_mm * (2.0 - u[wall])
-    return points
 
 
 def _spread(u: Float, points: Float, size: Float, least: int) -> Float:
@@ -126,57 +139,214 @@ def _spread(u: Float, points: Float, size: Float, least: int) -> Float:
     return params
 
 
-def rows(section: Section, sizes: Sizes) -> Rows:
+@dataclass(frozen=True)
+class _Place:
+    """A row in a band: its share, and the largest edge length (n,), mm, that its distance from other rows allows."""
+
+    band: Band
+    share: float
+    longest: Float
+
+
+@dataclass(frozen=True)
+class Row:
+    """Numbers and parameters of the nodes on a row, each (n,), and the points (n, 2), mm."""
+
+    nodes: Int
+    u: Float
+    points: Float
+
+    def part(self, low: float, high: float) -> tuple[Int, Float]:
+        """Nodes and parameters from `low` to `high`."""
+        inside = (low <= self.u) & (self.u <= high)
+        return self.nodes[inside], self.u[inside]
+
+
+def rows(section: Section, sizes: Sizes) -> Layout:
     """Lay out the rows and the points on them."""
-    wall = section.edge_height_mm
-    steep = getattr(section.contact, "angle", 0.0) > _STEEP
-    columns = wall >= _LOW_WALL * section.height_mm and not steep
+    found = bands(section)
+    sizes = _with_thin_places(section, sizes)
+    u = _samples(section, sizes, found)
+    places: list[list[_Place]] = []
+    start = 0.0
+    for band in found.bands:
+        own = u[u <= band.end]
+        length = _middle(section, sizes, found, band)
+        longest = _longest(sizes, band, own, length) if sizes.grading else None
+        depth = sizes.steps(length, longest, start)
+        scales = 1.0 - depth / length
+        scales[-1] = 0.0
+        gaps = np.diff(depth)
+        gap = np.minimum(np.append(gaps, gaps[-1]), np.insert(gaps, 0, gaps[0]))
+        travel = band.travel(own)
+        new = [[_Place(band, float(s), _ASPECT * g * travel / length)] for s, g in zip(scales, gap, strict=True)]
+        if places:
+            places[-1] += new.pop(0)
+        places += new
+        start += length
+    laid, count = [], 0
+    for k, at in enumerate(places):
+        params = _on_row(section, sizes, u, at, first=k == 0)
+        points = at[-1].band.at(params, at[-1].share)
+        laid.append(Row(count + np.arange(len(params)), params, points))
+        count += len(params)
+    return _joined(section, sizes, found, places, laid)
+
+
+def _with_thin_places(section: Section, sizes: Sizes) -> Sizes:
+    """Return the sizes with edge lengths that follow from the thickness of the parts."""
+    points, wanted = thin_places(section)
+    few = wanted < sizes.at(points[:, :2], section)
+    if not few.any():
+        return sizes
+    known = sizes.grading or Grading(np.zeros((0, 3)), np.zeros(0))
+    return replace(
+        sizes,
+        grading=Grading(np.vstack([known.points, points[few]]), np.concatenate([known.sizes, wanted[few]])),
+    )
+
+
+def _samples(section: Section, sizes: Sizes, found: Bands) -> Float:
+    """Return parameters at which curves are sampled, with those of corners and borders."""
     samples = int(np.clip(4.0 * section.contact.length_mm / sizes.size_mm, 400, 20_000))
     u = np.linspace(0.0, 1.0, samples + 1)
-    if not columns and wall > 0.0:
+    if found.bands[-1].end > 1.0:
         u = np.concatenate([u, np.linspace(1.0, 2.0, samples // 4 + 2)[1:]])
-    outline = _outline(section, u)
-    middle = section.contact.at(np.zeros(1))[0]
-    if sizes.low > 0.0:
-        x = 0.5 * (sizes.low + sizes.high)
-        middle = np.array([x, float(section.contact.height(np.array(x)))])
-    travel = outline[:, 1] if columns else np.hypot(outline[:, 0], outline[:, 1])
-    length = middle[1] if columns else float(np.hypot(*middle))
-    depth = sizes.steps(length, _longest(sizes, outline, columns, length) if sizes.grading else None)
-    scales = 1.0 - depth / length
-    scales[-1] = 0.0
-    gaps = np.diff(depth)
-    gap = np.minimum(np.append(gaps, gaps[-1]), np.insert(gaps, 0, gaps[0]))
-    params = []
-    for k, s in enumerate(scales):
-        if s == 0.0 and not columns:
-            params.append(np.zeros(1))
-            continue
-        points = outline * [1.0, s] if columns else outline * s
-        size = np.minimum(sizes.at(points, section), _ASPECT * gap[k] * travel / length)
-        corner = samples
-        if u[-1] > 1.0:
-            below = _spread(u[corner:], points[corner:], size[corner:], 1 if k == 0 else 0)
-            if len(below) > 1:
-                above = _spread(u[: corner + 1], points[: corner + 1], size[: corner + 1], 1)
-                params.append(np.concatenate([above, below[1:]]))
-                continue
-        params.append(_spread(u, points, size, 2 if k == 0 else 1))
-    return Rows(scales, params, columns)
+    breaks = [b for band in found.bands for b in (*band.borders, band.corner) if b is not None]
+    return np.union1d(u, breaks) if breaks else u
 
 
-def _longest(sizes: Sizes, outline: Float, columns: bool, length: float) -> Callable[[Float], Float]:
+def _middle(section: Section, sizes: Sizes, found: Bands, band: Band) -> float:
+    """Return the distance of a band's curves below the middle of the contact zone, mm."""
+    x = 0.5 * (sizes.low + sizes.high) if sizes.low > 0.0 else 0.0
+    if len(found.bands) == 1 and found.core is None:
+        middle = section.contact.at(np.zeros(1))[0]
+        if x > 0.0:
+            middle = np.array([x, float(section.contact.height(np.array(x)))])
+        return float(middle[1]) if found.walled else float(np.hypot(*middle))
+    return float(band.travel(section.contact.fraction(np.array([x])))[0])
+
+
+def _on_row(section: Section, sizes: Sizes, u: Float, at: list[_Place], first: bool) -> Float:
+    """Return the parameters of the points on a row."""
+    last = at[-1]
+    band = last.band
+    if last.share == 0.0 and band.shrinks:
+        return np.zeros(1)
+    u = u[u <= band.end]
+    points = band.at(u, last.share)
+    size = sizes.at(points, section)
+    for place in at:
+        reach = len(place.longest)
+        size[:reach] = np.minimum(size[:reach], place.longest)
+    breaks = sorted({b for place in at for b in place.band.borders})
+    breaks += [place.band.corner for place in at if place.share == 0.0 and place.band.corner is not None]
+    breaks = sorted(set(breaks))
+    if not breaks and u[-1] > 1.0:
+        corner = int(np.searchsorted(u, 1.0))
+        below = _spread(u[corner:], points[corner:], size[corner:], 1 if first or len(at) > 1 else 0)
+        if len(below) > 1:
+            above = _spread(u[: corner + 1], points[: corner + 1], size[: corner + 1], 1)
+            return np.concatenate([above, below[1:]])
+    if not breaks:
+        return _spread(u, points, size, 2 if first else 1)
+    pieces = []
+    for low, high in ranges(breaks, float(u[-1])):
+        inside = (low <= u) & (u <= high)
+        pieces.append(_spread(u[inside], points[inside], size[inside], 1))
+    return np.concatenate([pieces[0], *(p[1:] for p in pieces[1:])])
+
+
+def _longest(sizes: Sizes, band: Band, u: Float, length: float) -> Callable[[Float], Float]:
     """Return a function of depths (n,) mm: the largest distance of rows (n,) mm that prescribed edge lengths allow."""
     grading = sizes.grading
     assert grading is not None
-    places = outline[np.linspace(0, len(outline) - 1, _PLACES).astype(int)]
-    travel = places[:, 1] if columns else np.hypot(places[:, 0], places[:, 1])
+    places = u[np.linspace(0, len(u) - 1, _PLACES).astype(int)]
+    travel = band.travel(places)
     stations = np.linspace(0.0, length, _STATIONS)
-    shares = 1.0 - stations / length
-    at = places * np.stack([np.ones_like(shares) if columns else shares, shares], axis=1)[:, None]
-    size = grading.at(at.reshape(-1, 2), RATE).reshape(_STATIONS, _PLACES)
+    at = np.vstack([band.at(places, share) for share in 1.0 - stations / length])
+    size = grading.at(at, RATE).reshape(_STATIONS, _PLACES)
     least = (size * length / np.maximum(travel, 1e-3 * length)).min(axis=1)
     return lambda depth: np.interp(depth, stations, least)
+
+
+def _joined(section: Section, sizes: Sizes, found: Bands, places: list[list[_Place]], laid: list[Row]) -> Layout:
+    """Return the strips between the rows, the boundary, and the curves."""
+    strips: list[Strip] = []
+    ends: dict[str, list[int]] = {}
+    for at, upper, lower in zip(places, laid[:-1], laid[1:], strict=False):
+        band = at[-1].band
+        for low, high, part in band.parts:
+            (a, ua), (b, ub) = upper.part(low, high), lower.part(low, high)
+            strips.append(Strip(a, b, ua, ub, part))
+        ends.setdefault(band.right, [int(strips[-1].upper[-1])]).append(int(strips[-1].lower[-1]))
+    right = {label: np.array(nodes) for label, nodes in ends.items()}
+    side = laid[-1]
+    if found.core:
+        core, part = found.core
+        filling = _core_rows(section, sizes, core, side)
+        strips += [Strip(a.nodes, b.nodes, a.u, b.u, part) for a, b in pairwise(filling)]
+        laid = [*laid, *filling[1:]]
+    points = np.full((int(max(row.nodes.max() for row in laid)) + 1, 2), np.nan)
+    for row in laid:
+        points[row.nodes] = row.points
+    first = np.array([row.nodes[0] for row in laid])
+    points[first, 0] = 0.0
+    for label, nodes in right.items():
+        axis, value = (0, section.half_length_mm) if label == "walls" else (1, 0.0)
+        points[nodes, axis] = value
+    bottom = laid[-1].nodes
+    if found.walled or found.core:
+        points[bottom, 1] = 0.0
+    facets = {
+        "contact": _edges(laid[0].part(0.0, 1.0)[0])[:, ::-1],
+        "symmetry_x": _edges(first),
+        "base": np.vstack(
+            [_edges(bottom), *(_edges(nodes)[:, ::-1] for label, nodes in right.items() if label == "base")]
+        ),
+        "walls": np.vstack(
+            [_edges(nodes)[:, ::-1] for label, nodes in right.items() if label == "walls"] or [_NO_EDGES]
+        ),
+    }
+    borders = [(section, laid[0])]
+    if section.layer:
+        borders.append((section.inner, laid[next(k for k, at in enumerate(places) if len(at) > 1)]))
+    curves = []
+    for owner, row in borders:
+        beyond = row.part(1.0, 2.0)[0]
+        facets["walls"] = np.vstack([facets["walls"], _edges(beyond)[:, ::-1]])
+        nodes, u = row.part(0.0, 1.0)
+        param = np.full(len(points), np.nan)
+        param[nodes] = u
+        curves.append((owner.contact, param))
+    return Layout(points, tuple(strips), facets, tuple(curves))
+
+
+_NO_EDGES = np.zeros((0, 2), dtype=np.int64)
+
+
+def _edges(nodes: Int) -> Int:
+    """Edges (n - 1, 2) of a chain of nodes (n,)."""
+    return np.stack([nodes[:-1], nodes[1:]], axis=1)
+
+
+def _core_rows(section: Section, sizes: Sizes, core: Core, around: Row) -> list[Row]:
+    """Return the rows of a core, from the one on its upper side to the base, with the nodes on its vertical side."""
+    x, y = around.points.T
+    on_top, beside = y == core.height_mm, x == core.half_length_mm
+    side, heights = around.nodes[beside], y[beside]
+    found = [Row(around.nodes[on_top], x[on_top] / core.half_length_mm, around.points[on_top])]
+    count = int(around.nodes[-1]) + 1
+    u = np.linspace(0.0, 1.0, _STATIONS + 1)
+    for k in range(1, len(side)):
+        gap = np.abs(np.diff(heights[max(0, k - 1) : k + 2])).min()
+        points = np.stack([core.half_length_mm * u, np.full_like(u, heights[k])], axis=1)
+        params = _spread(u, points, np.minimum(sizes.at(points, section), _ASPECT * gap), 1)
+        nodes = np.append(count + np.arange(len(params) - 1), side[k])
+        count += len(params) - 1
+        points = np.stack([core.half_length_mm * params, np.full_like(params, heights[k])], axis=1)
+        found.append(Row(nodes, params, points))
+    return found
 
 
 def _zip(upper: Int, lower: Int, at_upper: Float, at_lower: Float) -> Int:
@@ -190,35 +360,8 @@ def _zip(upper: Int, lower: Int, at_upper: Float, at_lower: Float) -> Int:
     return np.vstack([down, up])
 
 
-def triangulate(section: Section, layout: Rows) -> Grid:
+def triangulate(layout: Layout) -> Grid:
     """Turn rows into triangles with labelled edges."""
-    offset = np.concatenate([[0], np.cumsum([len(p) for p in layout.params])])
-    numbers = [np.arange(a, b) for a, b in zip(offset[:-1], offset[1:], strict=True)]
-    points = []
-    for s, u in zip(layout.scales, layout.params, strict=True):
-        row = _outline(section, u)
-        points.append(row * [1.0, s] if layout.columns else row * s)
-    pairs = list(zip(numbers[:-1], numbers[1:], layout.params[:-1], layout.params[1:], strict=True))
-    cells = np.vstack([_zip(a, b, ua, ub) for a, b, ua, ub in pairs])
-    first, last = np.array([n[0] for n in numbers]), np.array([n[-1] for n in numbers])
-    left = np.stack([first[:-1], first[1:]], axis=1)
-    right = np.stack([last[1:], last[:-1]], axis=1)
-    top = np.stack([numbers[0][1:], numbers[0][:-1]], axis=1)
-    on_wall = layout.params[0][1:] > 1.0
-    facets = {"contact": top[~on_wall], "symmetry_x": left}
-    if layout.columns:
-        facets["base"] = np.stack([numbers[-1][:-1], numbers[-1][1:]], axis=1)
-        facets["walls"] = right
-    else:
-        facets["base"] = right
-        facets["walls"] = top[on_wall]
-    arc = np.full(offset[-1], np.nan)
-    arc[: offset[1]] = np.where(layout.params[0] <= 1.0, layout.params[0], np.nan)
-    xy = np.vstack(points)
-    xy[first, 0] = 0.0
-    if layout.columns:
-        xy[last, 0] = section.half_length_mm
-        xy[numbers[-1], 1] = 0.0
-    else:
-        xy[last, 1] = 0.0
-    return Grid(xy, cells, facets, arc)
+    cells = [_zip(s.upper, s.lower, s.at_upper, s.at_lower) for s in layout.strips]
+    part = np.repeat([s.part for s in layout.strips], [len(c) for c in cells])
+    return Grid(layout.points, np.vstack(cells), layout.facets, layout.curves, part)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from finger3d._types import Float, Int
 from finger3d.errors import Finger3dError
 from finger3d.fem.simplex import Mesh, boundary, quadratic, unfold
 from finger3d.geometry.design import Design
-from finger3d.geometry.section import Section
+from finger3d.geometry.section import Arc, Flat, Section
 from finger3d.meshing.grid import Grid, Sizes, folded_zone, rows, triangulate
 from finger3d.meshing.limits import check_count, check_sizes
 from finger3d.meshing.options import MeshSizes, Zone
@@ -38,7 +39,9 @@ def mesh_section(
     check_sizes(design, options, 2)
     axes = tuple(_AXIS[a] for a in ("x",) if a not in symmetry)
     grid, section = _grid(design, options, zone, 2, 2 ** len(axes))
-    mesh = _on_curve(quadratic(Mesh(grid.points, grid.cells, grid.facets)), section, grid.arc)
+    mesh = _on_curves(
+        quadratic(_with_parts(Mesh(grid.points, grid.cells, grid.facets), section, grid.part)), grid.curves
+    )
     whole = unfold(mesh, axes)[0]
     seconds = {"cad": 0.0, "mesh": time.perf_counter() - start}
     multiple = design.width_mm * (2 - len(axes))
@@ -60,7 +63,8 @@ def mesh_swept(
     axes = tuple(_AXIS[a] for a in ("x", "z") if a not in symmetry)
     grid, section = _grid(design, options, zone, 3, 3 * layers * 2 ** len(axes))
     levels = np.linspace(0.0, half, layers + 1)
-    mesh = _on_curve(quadratic(_sweep(grid, levels)), section, np.tile(grid.arc, layers + 1))
+    swept = _with_parts(_sweep(grid, levels), section, np.tile(np.tile(grid.part, 3), layers))
+    mesh = _on_curves(quadratic(swept), tuple((curve, np.tile(at, layers + 1)) for curve, at in grid.curves))
     whole = unfold(mesh, axes)[0]
     seconds = {"cad": 0.0, "mesh": time.perf_counter() - start}
     multiple = 4.0 / 2 ** len(axes)
@@ -87,21 +91,24 @@ def _grid(design: Design, options: MeshSizes, zone: Zone, dim: int, copies: int)
     grading = options.grading.in_section if options.grading else None
     layout = rows(section, Sizes(options.size_mm, options.base_size_mm, low, high, grading))
     check_count(2.0 * layout.count * copies, dim, options)
-    return triangulate(section, layout), section
+    return triangulate(layout), section
 
 
-def _on_curve(mesh: Mesh, section: Section, arc: Float) -> Mesh:
-    """Move the mid-edge nodes of contact facets onto the contact curve; `arc` (v,) is the parameter of every vertex."""
-    d = mesh.dim
-    facets = mesh.facets["contact"]
-    pairs = ((0, 1),) if d == 2 else ((0, 1), (1, 2), (2, 0))
+def _with_parts(mesh: Mesh, section: Section, part: Int) -> Mesh:
+    """Return the mesh with the numbers (e,) of its cells' parts, if the section has parts."""
+    return replace(mesh, part=part, part_labels=section.part_labels) if section.part_labels else mesh
+
+
+def _on_curves(mesh: Mesh, curves: tuple[tuple[Arc | Flat, Float], ...]) -> Mesh:
+    """Move the nodes in the middle of edges between points of a curve onto it; every vertex (v,) has its parameter."""
     points = mesh.points.copy()
-    for k, (i, j) in enumerate(pairs):
-        ends, middle = arc[facets[:, [i, j]]], facets[:, d + k]
-        bent = ends[:, 0] != ends[:, 1]  # edges along z are straight
-        points[middle[bent], :2] = section.contact.at(ends[bent].mean(axis=1))
+    pairs, middle = mesh.cells[:, mesh.element.edges].reshape(-1, 2), mesh.cells[:, mesh.dim + 1 :].ravel()
+    for curve, at in curves:
+        ends = at[pairs]
+        bent = np.isfinite(ends).all(axis=1) & (ends[:, 0] != ends[:, 1])  # edges along z are straight
+        points[middle[bent], :2] = curve.at(ends[bent].mean(axis=1))
     points[mesh.facets["symmetry_x"].ravel(), 0] = 0.0
-    return Mesh(points, mesh.cells, mesh.facets)
+    return replace(mesh, points=points)
 
 
 def _sweep(grid: Grid, levels: Float) -> Mesh:
