@@ -13,22 +13,24 @@ from tests.meshes import grid
 
 
 def hollow() -> Mesh:
-    """A unit cube of 3 x 3 x 3 cells without the cell in its middle."""
-    mesh = grid((3, 3, 3))
+    """A unit cube of 6 x 6 x 6 cells without the cells of a cube of half its size in its middle."""
+    mesh = grid((6, 6, 6))
     centre = mesh.points[mesh.cells].mean(axis=1)
-    cells = mesh.cells[(np.abs(centre - 0.5) > 1.0 / 6.0).any(axis=1)]
+    cells = mesh.cells[(np.abs(centre - 0.5) > 1.0 / 3.0).any(axis=1)]
     facets = boundary(cells, 3)
-    inner = (np.abs(mesh.points[facets] - 0.5) < 0.2).all(axis=(1, 2))
+    inner = (np.abs(mesh.points[facets] - 0.5) < 0.4).all(axis=(1, 2))
     return quadratic(replace(mesh, cells=cells, facets={"walls": facets[~inner], CAVITY: facets[inner]}))
 
 
-@pytest.mark.parametrize(("squeeze", "crosses"), [(0.0, False), (0.9, False), (1.2, True)])
-def test_an_inner_surface_is_told_to_cross_itself_when_its_faces_pass_each_other(squeeze: float, crosses: bool) -> None:
-    # The faces y = 1/3 and y = 2/3 move together by the share `squeeze` of their distance, one corner less than others.
+@pytest.mark.parametrize(("share", "crosses"), [(0.0, False), (0.9, False), (1.1, True)])
+def test_an_inner_surface_is_told_to_cross_itself_when_its_faces_pass_each_other(share: float, crosses: bool) -> None:
+    # The top of the cavity bulges down by a share of the cavity's height, 2/3, and aside, so that no points coincide.
     mesh = hollow()
-    on_top = np.isclose(mesh.points[:, 1], 2.0 / 3.0) & (np.abs(mesh.points[:, [0, 2]] - 0.5) < 0.2).all(axis=1)
+    x, y, z = mesh.points.T
+    top = np.isclose(y, 5.0 / 6.0) & (np.abs(x - 0.5) < 0.3) & (np.abs(z - 0.5) < 0.3)
     move = np.zeros_like(mesh.points)
-    move[on_top, 1] = -squeeze / 3.0 * (1.0 - 0.1 * mesh.points[on_top, 0])
+    move[top, 1] = -share * 2.0 / 3.0 * np.cos(np.pi * (x[top] - 0.5)) * np.cos(np.pi * (z[top] - 0.5))
+    move[top, 0] = 0.05 * share
     assert bool(cavity_warnings(mesh, move)) == crosses
 
 
