@@ -14,9 +14,9 @@ from finger3d.errors import Finger3dError
 from finger3d.geometry.section import Arc, Section
 
 if TYPE_CHECKING:
-    from build123d import Edge, Face, Part, Shape, Sketch, Solid, Wire
+    from build123d import Compound, Edge, Face, Part, Shape, Sketch, Solid, Wire
 
-LABELS = ("contact", "base", "ends", "walls", "symmetry_x", "symmetry_z")
+LABELS = ("contact", "base", "ends", "walls", "cavity", "symmetry_x", "symmetry_z")
 
 _CAD_TOLERANCE_MM = 1e-7
 _LEAST_UPWARD_NORMAL = 1e-6  # of a contact face; round-off of a vertical round wall is smaller
@@ -99,10 +99,15 @@ def labelled_faces(solid: Solid) -> list[Face]:
     """
     faces = list(solid.faces())
     for face in faces:
-        centre = np.array([*face.center()])
-        normal = np.array([*face.normal_at(face.center())])
-        face.label = _label(centre, normal, face.is_planar)
+        label_face(face)
     return faces
+
+
+def label_face(face: Face) -> None:
+    """Label a face of a solid; see :func:`labelled_faces`."""
+    centre = np.array([*face.center()])
+    normal = np.array([*face.normal_at(face.center())])
+    face.label = _label(centre, normal, face.is_planar)
 
 
 def _label(centre: np.ndarray, normal: np.ndarray, planar: bool) -> str:
@@ -118,11 +123,20 @@ def _label(centre: np.ndarray, normal: np.ndarray, planar: bool) -> str:
 
 def cut(solid: Solid, symmetry: tuple[str, ...]) -> Solid:
     """Return the part x >= 0 and/or z >= 0 of a solid."""
-    if not symmetry:
-        return solid
+    return sound(_kept(solid, symmetry), solid.label) if symmetry else solid
+
+
+def cut_part(solid: Solid, symmetry: tuple[str, ...]) -> Compound:
+    """Return the part x >= 0 and/or z >= 0 of a solid that need not be a whole body."""
+    from build123d import Compound
+
+    return Compound((_kept(solid, symmetry) if symmetry else solid).solids())
+
+
+def _kept(solid: Solid, symmetry: tuple[str, ...]) -> Shape:
     from build123d import Align, Box
 
     box = solid.bounding_box()
     reach = 4.0 * math.dist([*box.min], [*box.max])
     x, z = (Align.MIN if axis in symmetry else Align.CENTER for axis in ("x", "z"))
-    return sound(solid & Box(reach, reach, reach, align=(x, Align.CENTER, z)), solid.label)
+    return solid & Box(reach, reach, reach, align=(x, Align.CENTER, z))

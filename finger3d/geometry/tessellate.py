@@ -1,45 +1,57 @@
-"""CAD solid -> closed triangles with an absolute tolerance, and the CAD face under every triangle."""
+"""CAD solids -> closed triangles with an absolute tolerance, and the CAD face under every triangle."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger3d._arrays import freeze_arrays
 from finger3d._types import Float, Int
 from finger3d.geometry.cad import labelled_faces
 from finger3d.geometry.implicit import ImplicitSurface, surface_of
+from finger3d.geometry.parts import OUTSIDE, Glued, GluedFace
+from finger3d.geometry.surface import Triangles
 
 if TYPE_CHECKING:
-    from build123d import Face, Solid
+    from build123d import Face, Shape, Solid
 
+
+Bool = NDArray[np.bool_]
 
 _WELD = 1e-7  # mm
 
 
 @dataclass(frozen=True)
 class CadFace:
-    """One face of a solid: its label, its surface, the box (mm) around it, and +1 if the surface's normal looks out."""
+    """One face of a solid: its label, its surface, the box (mm) around it, and +1 if the surface's normal looks out.
+
+    `inside` and `outside` are the numbers of the parts on its sides; a face between two parts has no label, and "out"
+    is away from the part `inside`.
+    """
 
     label: str
     surface: ImplicitSurface
     low: Float
     high: Float
     sign: float
+    inside: int = 0
+    outside: int = OUTSIDE
 
 
 @dataclass(frozen=True)
 class Tessellation:
-    """A solid as closed triangles.
+    """A solid, or several solids that share faces, as closed triangles.
 
     Attributes
     ----------
     points : (n, 3) mm
-    triangles : (m, 3) outward
+    triangles : (m, 3) outward from the part inside their face
     face : (m,) number of the CAD face in `faces`
-    corners : (k, 3) mm where three faces or more meet, and `corner_faces`, the numbers of these
+    corners : (k, 3) mm where three faces or more and three of their edges meet, and `corner_faces`, their numbers
+    part_labels : labels of parts 1, 2, ..., for a body of several parts
     """
 
     points: Float
@@ -48,6 +60,7 @@ class Tessellation:
     faces: tuple[CadFace, ...]
     corners: Float
     corner_faces: tuple[tuple[int, ...], ...]
+    part_labels: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
@@ -60,8 +73,21 @@ class Tessellation:
     @property
     def volume_mm3(self) -> float:
         """Enclosed volume."""
-        a, b, c = (self.points[self.triangles[:, i]] for i in range(3))
-        return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
+        return Triangles(self.points, self.surface).volume
+
+    @property
+    def surface(self) -> Int:
+        """Triangles (k, 3) of the surface, without those between parts."""
+        free = np.array([f.outside == OUTSIDE for f in self.faces])
+        return np.asarray(self.triangles[free[self.face]])
+
+    def part(self, number: int) -> Triangles:
+        """Return the closed surface of a part."""
+        inside, outside = (
+            np.array([getattr(f, side) for f in self.faces])[self.face] for side in ("inside", "outside")
+        )
+        own, other = self.triangles[inside == number], self.triangles[outside == number]
+        return Triangles(self.points, np.vstack([own, other[:, ::-1]]))
 
 
 def tessellate(
@@ -72,17 +98,71 @@ def tessellate(
     build123d's own `tessellate` and `export_stl` take a relative tolerance and reuse what was tessellated before.
     `exact` lists numbers (mm) that a plane's constant coordinate may stand for to the last bit.
     """
-    faces = labelled_faces(solid)
-    points, triangles, face = triangulated(solid, faces, tolerance_mm, angle)
-    known = tuple(_cad_face(f, points, triangles[face == i], surface_of(f, exact)) for i, f in enumerate(faces))
+    faces = tuple(GluedFace(face, 0, OUTSIDE) for face in labelled_faces(solid))
+    return _tessellation(solid, faces, (), tolerance_mm, angle, exact)
+
+
+def tessellate_parts(
+    body: Glued, tolerance_mm: float, angle: float = 0.5, exact: tuple[float, ...] = (0.0,)
+) -> Tessellation:
+    """Tessellate glued solids like :func:`tessellate`; faces between them have their triangles once."""
+    return _tessellation(body.shape, body.faces, body.labels[1:], tolerance_mm, angle, exact)
+
+
+def _tessellation(
+    shape: Shape,
+    faces: tuple[GluedFace, ...],
+    part_labels: tuple[str, ...],
+    tolerance_mm: float,
+    angle: float,
+    exact: tuple[float, ...],
+) -> Tessellation:
+    points, triangles, face = triangulated(shape, [f.face for f in faces], tolerance_mm, angle)
+    hollow = _in_cavities(points, triangles, np.array([f.outside == OUTSIDE for f in faces])[face])
+    known = []
+    for i, f in enumerate(faces):
+        mine = face == i
+        found = _cad_face(f.face, points, triangles[mine], surface_of(f.face, exact))
+        label = found.label if f.outside == OUTSIDE else ""
+        known.append(
+            replace(found, label="cavity" if hollow[mine].all() else label, inside=f.inside, outside=f.outside)
+        )
     touching = np.unique(np.stack([triangles.ravel(), np.repeat(face, 3)], axis=1), axis=0)
-    many = np.flatnonzero(np.bincount(touching[:, 0], minlength=len(points)) >= 3)
+    several = np.bincount(touching[:, 0], minlength=len(points)) >= 3
+    many = np.flatnonzero(several & (_seams_at_points(triangles, face, len(points)) >= 3))
     sets = tuple(tuple(int(i) for i in touching[touching[:, 0] == v, 1]) for v in many)
-    return Tessellation(points, triangles, face, known, points[many], sets)
+    return Tessellation(points, triangles, face, tuple(known), points[many], sets, part_labels)
 
 
-def triangulated(solid: Solid, faces: list[Face], tolerance_mm: float, angle: float) -> tuple[Float, Int, Int]:
-    """Points (n, 3) mm and outward triangles (m, 3) of a solid, welded, and the number (m,) of each one's face.
+def _in_cavities(points: Float, triangles: Int, free: Bool) -> Bool:
+    """Return which triangles (m,) belong to a closed piece of the free surface that encloses a void."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    used = triangles[free]
+    ends = used[:, [[0, 1], [1, 2]]].reshape(-1, 2)
+    joined = coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(len(points), len(points)))
+    piece = connected_components(joined, directed=False)[1][used[:, 0]]
+    a, b, c = (points[used[:, i]] for i in range(3))
+    volume = np.bincount(piece, np.einsum("ij,ij->i", a, np.cross(b, c)))
+    out = np.zeros(len(triangles), dtype=bool)
+    out[free] = volume[piece] < 0.0
+    return out
+
+
+def _seams_at_points(triangles: Int, face: Int, count: int) -> Int:
+    """Number (n,) of edges at every point that lie between different faces."""
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    owner = np.repeat(face, 3)
+    order = np.lexsort([owner, edges[:, 1], edges[:, 0]])
+    edges, owner = edges[order], owner[order]
+    between = (edges[1:] == edges[:-1]).all(axis=1) & (owner[1:] != owner[:-1])
+    seams = np.unique(edges[1:][between], axis=0)
+    return np.bincount(seams.ravel(), minlength=count)
+
+
+def triangulated(solid: Shape, faces: list[Face], tolerance_mm: float, angle: float) -> tuple[Float, Int, Int]:
+    """Points (n, 3) mm and outward triangles (m, 3) of solids, welded, and the number (m,) of each one's face.
 
     Absolute tolerances: mm, and radians between facets; nothing cached is used.
     """

@@ -34,6 +34,7 @@ def main() -> None:
             num_threads=1,
             quiet=True,
             vtk_ordering=True,
+            disable_filtering=bool(given["keep_outside"]),
             bg_vertices=given["bg_points"],
             bg_tets=given["bg_tets"].astype(np.int32),
             bg_values=given["bg_values"],

@@ -2,6 +2,7 @@
 
 A boundary facet belongs to the CAD face it is nearest to and parallel with; a node belongs to the faces of its facets,
 and goes where these surfaces meet; of faces that join smoothly there it goes onto the nearest. Mid-edge nodes likewise.
+A facet between two parts of a body belongs to a CAD face between these parts.
 """
 
 from __future__ import annotations
@@ -15,10 +16,12 @@ from numpy.typing import NDArray
 from finger3d._types import Float, Int
 from finger3d.fem.elements import TET4, TRI3
 from finger3d.fem.quality import cell_angles_deg, curved_jacobians
-from finger3d.fem.simplex import Mesh, boundary, quadratic
+from finger3d.fem.simplex import Mesh, quadratic
 from finger3d.geometry.faceted import Faceted, moved_onto
 from finger3d.geometry.implicit import ImplicitPlane
+from finger3d.geometry.parts import OUTSIDE
 from finger3d.geometry.tessellate import CadFace, Tessellation
+from finger3d.meshing.interfaces import PartFacets, part_facets
 from finger3d.meshing.seams import Seams
 
 Bool = NDArray[np.bool_]
@@ -37,8 +40,10 @@ class UnusableMeshError(Exception):
     """The mesh is unusable; another attempt of the mesher may succeed."""
 
 
-def snap(points: Float, tets: Int, body: Tessellation) -> Mesh:
+def snap(points: Float, tets: Int, body: Tessellation, part: Int | None = None) -> Mesh:
     """Return a quadratic mesh with labelled facets on the CAD surfaces, from linear tets near them.
+
+    `part` (t,) is the number of the part of each tet, for a body of several parts.
 
     Raises
     ------
@@ -46,20 +51,21 @@ def snap(points: Float, tets: Int, body: Tessellation) -> Mesh:
         If the boundary is open, a node cannot be placed, or cells remain flat or inverted.
     """
     seams = Seams(body)
-    faces = boundary(tets, 3)
-    check_closed(faces)
-    sets = _node_sets(points, faces, _cad_faces(points, faces, body), body)
-    points, sets = snap_nodes(points, sets, seams, _MAX_MOVE * _edge_lengths(points, faces))
-    points, tets, sets = repair(points, tets, sets)
-    faces = boundary(tets, 3)
-    check_closed(faces)
-    owner = _cad_faces(points, faces, body, sets)
+    facets = part_facets(tets, part)
+    check_parts_closed(facets)
+    sets = _node_sets(points, facets.faces, _cad_faces(points, facets, body), body)
+    points, sets = snap_nodes(points, sets, seams, _MAX_MOVE * _edge_lengths(points, facets.faces))
+    points, tets, sets, part = repair(points, tets, sets, part)
+    facets = part_facets(tets, part)
+    check_parts_closed(facets)
+    owner = _cad_faces(points, facets, body, sets)
     label = np.array([f.label for f in body.faces])[owner]
-    mesh = quadratic(Mesh(points, tets, {str(name): faces[label == name] for name in np.unique(label)}))
+    labelled = {str(name): facets.faces[label == name] for name in np.unique(label)}
+    mesh = quadratic(Mesh(points, tets, labelled, part, body.part_labels))
     mesh = _straighten_inverted(_snap_mid_edge_nodes(mesh, owner[np.argsort(label, kind="stable")], sets, seams))
     if (bad := int(np.sum(curved_jacobians(mesh) <= 0.0))) > 0:
         raise UnusableMeshError(f"{bad} curved cells turned inside out at the surface")
-    return mesh
+    return replace(mesh, facets={name: f for name, f in mesh.facets.items() if name})  # facets between parts have none
 
 
 def _edge_lengths(points: Float, faces: Int) -> Float:
@@ -88,8 +94,20 @@ def check_closed(faces: Int) -> None:
         raise UnusableMeshError("its boundary is not closed")
 
 
-def _cad_faces(points: Float, faces: Int, body: Tessellation, sets: Bool | None = None) -> Int:
-    """Return the number (m,) of the CAD face of each boundary facet; with `sets`, one that all its nodes lie on."""
+def check_parts_closed(facets: PartFacets) -> None:
+    """Raise an error if the surface of a part has an edge that does not belong to exactly two facets."""
+    check_closed(facets.free)
+    for number in np.unique([facets.inside, facets.outside]) if (facets.outside != OUTSIDE).any() else []:
+        if number != OUTSIDE:
+            check_closed(facets.faces[(facets.inside == number) | (facets.outside == number)])
+
+
+def _cad_faces(points: Float, facets: PartFacets, body: Tessellation, sets: Bool | None = None) -> Int:
+    """Return the number (m,) of the CAD face of each facet, between the same parts if there is one.
+
+    With `sets`, all nodes of the facet lie on it.
+    """
+    faces = facets.faces
     a, b, c = (points[faces[:, i]] for i in range(3))
     normal = np.cross(b - a, c - a)
     twice = np.linalg.norm(normal, axis=1)
@@ -104,6 +122,7 @@ def _cad_faces(points: Float, faces: Int, body: Tessellation, sets: Bool | None 
         distance, gradient = f.surface.distance(middle[near])
         aligned = f.sign * np.einsum("ij,ij->i", normal[near], gradient)
         cost[i, near] = np.abs(distance) / longest[near] + outside[near] + 1.0 - aligned
+        cost[i] += np.where((facets.inside == f.inside) & (facets.outside == f.outside), 0.0, 1e2)
     if sets is not None:
         shared = np.logical_and.reduce(sets[faces], axis=1)
         none = np.logical_not(shared.any(axis=1))
@@ -190,26 +209,26 @@ def _projection(points: Float, sets: Bool, faces: tuple[CadFace, ...]) -> tuple[
     return points, failed
 
 
-def repair(points: Float, tets: Int, sets: Bool) -> tuple[Float, Int, Bool]:
-    """Collapse short edges until no cell is flat or inverted; return points, cells and sets that are left."""
+def repair(points: Float, tets: Int, sets: Bool, part: Int | None = None) -> tuple[Float, Int, Bool, Int | None]:
+    """Collapse short edges until no cell is flat or inverted; return points, cells, sets and parts that are left."""
     for _ in range(_MAX_COLLAPSES):
         angles = cell_angles_deg(points, tets)
         worst = int(np.argmin(angles))
         if angles[worst] >= MIN_DIHEDRAL_DEG:
             break
-        tets = _collapse_edge(points, tets, sets, tets[worst])
+        tets, part = _collapse_edge(points, tets, sets, part, tets[worst])
     else:
         raise UnusableMeshError("too many flat cells")
     used = np.unique(tets)
     number = np.full(len(points), -1)
     number[used] = np.arange(len(used))
-    return points[used], number[tets], sets[used]
+    return points[used], number[tets], sets[used], part
 
 
-def _collapse_edge(points: Float, tets: Int, sets: Bool, cell: Int) -> Int:
-    """Return the tets after the shortest collapsible edge of a cell has been collapsed."""
+def _collapse_edge(points: Float, tets: Int, sets: Bool, part: Int | None, cell: Int) -> tuple[Int, Int | None]:
+    """Return the tets and their parts after the shortest collapsible edge of a cell has been collapsed."""
     edges = cell[TET4.edges]
-    faces = boundary(tets, 3)
+    faces = part_facets(tets, part).faces
     outer = {tuple(e) for e in np.sort(faces[:, TRI3.edges].reshape(-1, 2), axis=1).tolist()}
     for u, v in edges[np.argsort(np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1))]:
         on_surface = sets[u].any() and sets[v].any()
@@ -219,16 +238,17 @@ def _collapse_edge(points: Float, tets: Int, sets: Bool, cell: Int) -> Int:
             if (sets[removed] & ~sets[kept]).any():
                 continue
             star = (tets == removed).any(axis=1)
-            changed = tets[star & ~(tets == kept).any(axis=1)]
-            changed = np.where(changed == removed, kept, changed)
+            moved = star & ~(tets == kept).any(axis=1)
+            changed = np.where(tets[moved] == removed, kept, tets[moved])
             if len(changed) and cell_angles_deg(points, changed).min() < MIN_DIHEDRAL_DEG:
                 continue
             left = np.vstack([tets[~star], changed])
+            left_part = None if part is None else np.concatenate([part[~star], part[moved]])
             try:
-                check_closed(boundary(left, 3))
+                check_parts_closed(part_facets(left, left_part))
             except UnusableMeshError:
                 continue
-            return left
+            return left, left_part
     raise UnusableMeshError("a flat cell at the surface could not be removed")
 
 

@@ -13,23 +13,28 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from finger3d._process import child_environment
+from finger3d._ranges import at_least
 from finger3d._types import Float, Int
 from finger3d.errors import Finger3dError, MissingError
+from finger3d.fem.quality import curved_volume
 from finger3d.fem.simplex import Mesh, signed_volumes
 from finger3d.geometry.design import Design
 from finger3d.meshing import cache
+from finger3d.meshing.grading import Grading
 from finger3d.meshing.limits import MAX_TETS, check_count, check_sizes
 from finger3d.meshing.options import MeshSizes, Zone
 from finger3d.meshing.report import MeshReport, report
 from finger3d.meshing.sizing import Sizing, forecast, rounded_zone, sizing
 
 if TYPE_CHECKING:
+    from finger3d.geometry.parts import Glued
     from finger3d.geometry.tessellate import Tessellation
 
 
@@ -87,8 +92,12 @@ def new_mesh(
     check_count(cells, 3, options, MAX_TETS)
     say("building the CAD solid")
     body, epsilon = _body(design, symmetry, field)
+    if body.part_labels:
+        field = _finer_in_layers(field, body)
+        cells = forecast(design, field)
+        check_count(cells, 3, options, MAX_TETS)
     cad_seconds = time.perf_counter() - start
-    check_surface(body.points, body.triangles)
+    check_surface(body.points, body.surface)
     whole = design.volume_mm3
     if abs(body.volume_mm3 * 2 ** len(symmetry) / whole - 1.0) > _VOLUME_TOLERANCE:
         raise Finger3dError(
@@ -99,9 +108,13 @@ def new_mesh(
     limit = _limit_seconds(cells, len(body.triangles))
     for _ in range(ATTEMPTS):
         try:
-            points, tets = run_child(body.points, body.triangles, field, epsilon, limit)
+            points, tets = run_child(body.points, body.triangles, field, epsilon, limit, bool(body.part_labels))
+            part = None
+            if body.part_labels:
+                points, tets, part = _in_parts(points, tets, body)
             check_tets(points, tets, body.volume_mm3)
-            mesh = snap(points, tets, body)
+            mesh = snap(points, tets, body, part)
+            check_part_volumes(mesh, body)
             return mesh, whole, cad_seconds
         except UnusableMeshError as error:
             reasons.append(str(error))
@@ -121,14 +134,22 @@ def box(design: Design, symmetry: tuple[str, ...]) -> tuple[Float, Float]:
 
 def _body(design: Design, symmetry: tuple[str, ...], field: Sizing) -> tuple[Tessellation, float]:
     """Return the tessellated part, and fTetWild's envelope over its diagonal."""
-    from finger3d.geometry.cad import cut, labelled_faces
+    from finger3d.geometry.cad import cut, cut_part, labelled_faces
     from finger3d.geometry.faceted import coarser
     from finger3d.geometry.implicit import surface_of
-    from finger3d.geometry.tessellate import tessellate
+    from finger3d.geometry.parts import glue
+    from finger3d.geometry.tessellate import tessellate, tessellate_parts
 
     faceted = design.tessellation()
-    solid = None if faceted else cut(design.solid(), symmetry)
-    surfaces = [f.surface for f in faceted.faces] if faceted else [surface_of(f) for f in labelled_faces(solid)]
+    glued = solid = None
+    if faceted:
+        surfaces = [f.surface for f in faceted.faces]
+    elif design.part_labels:
+        glued = glue({label: cut_part(part, symmetry) for label, part in design.solids().items()}, design.name)
+        surfaces = [surface_of(f.face) for f in glued.faces]
+    else:
+        solid = cut(design.solid(), symmetry)
+        surfaces = [surface_of(f) for f in labelled_faces(solid)]
     radius = min(getattr(surface, "radius", math.inf) for surface in surfaces)
     diagonal = float(np.linalg.norm(field.high - field.low))
     # With an envelope below the sagitta of the longest edge a hemisphere takes 20 times as long and gets too fine.
@@ -137,11 +158,72 @@ def _body(design: Design, symmetry: tuple[str, ...], field: Sizing) -> tuple[Tes
         max(usual, field.base_mm**2 / (8.0 * radius * diagonal)), most, _ENVELOPE_SHARE * field.size_mm / diagonal
     )
     epsilon = max(epsilon, least)
+    if glued:
+        epsilon = _within_layers(design, glued, epsilon, diagonal)
     if faceted:
         return coarser(faceted, _DECIMATION_SHARE * epsilon * diagonal), epsilon
     half_width, half_length = 0.5 * design.width_mm, design.half_length_mm
     exact = (0.0, half_width, -half_width, half_length, -half_length, design.height_mm)
-    return tessellate(solid, _ENVELOPE_SHARE * epsilon * diagonal, exact=exact), epsilon
+    tolerance = _ENVELOPE_SHARE * epsilon * diagonal
+    if glued:
+        return tessellate_parts(glued, tolerance, exact=exact), epsilon
+    return tessellate(solid, tolerance, exact=exact), epsilon
+
+
+def _within_layers(design: Design, glued: Glued, epsilon: float, diagonal: float) -> float:
+    """Return an envelope that is small beside the thickness of every part, or raise a Finger3dError."""
+    for number, label in enumerate(glued.labels):
+        area = sum(f.face.area for f in glued.faces if number in (f.inside, f.outside))
+        thickness = 2.0 * glued.volumes_mm3[number] / area if area else math.inf
+        epsilon = min(epsilon, _ENVELOPE_SHARE * thickness / diagonal)
+        if epsilon < _ENVELOPE[0]:
+            raise Finger3dError(
+                f"{design.name}: the part '{label}' is {thickness:.3g} mm thin; mesh.mesher = 'ftetwild' needs at "
+                f"least {at_least(_ENVELOPE[0] * diagonal / _ENVELOPE_SHARE, 3)} mm, or mesher = 'swept'"
+            )
+    return epsilon
+
+
+def _finer_in_layers(field: Sizing, body: Tessellation) -> Sizing:
+    """Return the size field with edge lengths at every part that are no longer than the part is thick."""
+    from finger3d.meshing.interfaces import points_on, thickness
+
+    points, sizes = [np.zeros((0, 3))], [np.zeros(0)]
+    for number in range(len(body.part_labels) + 1):
+        if not len((surface := body.part(number)).faces):
+            continue
+        limit = thickness(surface)
+        places = points_on(surface, limit)
+        few = places[field.at(places) > limit]
+        points.append(np.abs(few) * [1, 0, 1] + few * [0, 1, 0])  # where a Grading has its points
+        sizes.append(np.full(len(few), limit))
+    known = field.grading or Grading(points[0], sizes[0])
+    grading = Grading(np.vstack([known.points, *points]), np.concatenate([known.sizes, *sizes]))
+    return replace(field, grading=grading) if len(grading.sizes) else field
+
+
+def _in_parts(points: Float, tets: Int, body: Tessellation) -> tuple[Float, Int, Int]:
+    """Return the points and tets inside the body, and the part (t,) of each tet."""
+    from finger3d.geometry.parts import OUTSIDE
+    from finger3d.meshing.interfaces import parts_of
+
+    part = parts_of(points[tets].mean(axis=1), body)
+    inside = part != OUTSIDE
+    used, compact = np.unique(tets[inside], return_inverse=True)
+    return points[used], compact.reshape(-1, 4), part[inside]
+
+
+def check_part_volumes(mesh: Mesh, body: Tessellation) -> None:
+    """Raise an UnusableMeshError if a part's cells do not fill its surface."""
+    from finger3d.meshing.snap import UnusableMeshError
+
+    if mesh.part is None:
+        return
+    for number, label in enumerate(("", *body.part_labels)):
+        wanted = body.part(number).volume if (mesh.part == number).any() else 0.0
+        found = curved_volume(replace(mesh, cells=mesh.cells[mesh.part == number], part=None)) if wanted else 0.0
+        if not math.isclose(found, wanted, rel_tol=_VOLUME_TOLERANCE):
+            raise UnusableMeshError(f"the volume of part '{label}' is {found:.6g} mm3, not {wanted:.6g}")
 
 
 def check_surface(points: Float, triangles: Int) -> None:
@@ -187,8 +269,13 @@ def _limit_seconds(cells: float, triangles: int) -> float:
     return 5.0 * (10.0 + 8e-4 * cells + 5e-3 * triangles)
 
 
-def run_child(points: Float, triangles: Int, field: Sizing, epsilon: float, limit: float) -> tuple[Float, Int]:
-    """Run pytetwild in a child process."""
+def run_child(
+    points: Float, triangles: Int, field: Sizing, epsilon: float, limit: float, keep_outside: bool = False
+) -> tuple[Float, Int]:
+    """Run pytetwild in a child process; `keep_outside` keeps the cells outside the surface, up to a box around it.
+
+    With triangles inside the body pytetwild could not tell inside and outside, which it does by winding numbers.
+    """
     from finger3d.meshing.snap import UnusableMeshError
 
     extent = np.ptp(points, axis=0)
@@ -201,6 +288,7 @@ def run_child(points: Float, triangles: Int, field: Sizing, epsilon: float, limi
         edge_length=min(field.base_mm, float(extent.min())),  # an edge longer than the body hangs it
         epsilon=epsilon,
         stop_energy=STOP_ENERGY,
+        keep_outside=keep_outside,
         bg_points=bg_points,
         bg_tets=bg_tets,
         bg_values=bg_values,
