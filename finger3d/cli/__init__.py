@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from cyclopts import CycloptsError
 
 # Importing a module registers its command.
+import finger3d.cli.app  # noqa: F401
 from finger3d.cli import (  # noqa: F401
     calibrate,
     compare,

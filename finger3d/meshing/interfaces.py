@@ -83,4 +83,4 @@ def points_on(surface: Triangles, step: float) -> Float:
     random = np.random.default_rng(0)  # the same points every time
     chosen = random.choice(len(area), count, p=area / area.sum())
     weight = random.dirichlet(np.ones(3), count)
-    return np.einsum("nk,nkd->nd", weight, surface.corners[chosen])
+    return np.asarray(np.einsum("nk,nkd->nd", weight, surface.corners[chosen]))

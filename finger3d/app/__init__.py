@@ -1,0 +1,1 @@
+"""A local page that answers while its sliders move, from a condensed finger."""

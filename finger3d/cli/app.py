@@ -1,0 +1,50 @@
+"""Command ``app``: a local page that answers while its sliders move."""
+
+from __future__ import annotations
+
+import webbrowser
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from finger3d.cli.common import Set, app, job, load
+from finger3d.errors import MissingError
+
+
+@app.command(name="app")
+def app_(
+    scene: Path,
+    /,
+    *,
+    port: Annotated[int, Parameter(help="Port on 127.0.0.1; default: a free one.")] = 0,
+    browser: Annotated[bool, Parameter(help="Open the page in the browser.")] = True,
+    set_: Set = None,
+) -> None:
+    """Open a local page with sliders for friction, depth and a gauge, which answers from the condensed finger.
+
+    The finger is pressed straight down, to at most the depth of the scene. Ctrl-C ends the page.
+
+    Example: finger3d app scene.toml --set model.domain=plane-strain
+
+    Parameters
+    ----------
+    scene
+        The scene file (TOML).
+    """
+    if find_spec("dash") is None:
+        raise MissingError('app: needs the package dash; install it with pip install "finger3d[app]"')
+    loaded = load(scene, set_)
+    from finger3d.app.live_body import LiveBody
+    from finger3d.app.page import page
+    from finger3d.app.server import local_server
+
+    with job(False, lambda report: "nothing was to be written") as report:
+        report.stage("condensing")
+        body = LiveBody.of(loaded, report.say)
+    server = local_server(page(body, loaded.tables.friction.mu), port)
+    print(f"open {server.url}", flush=True)
+    if browser:
+        webbrowser.open(server.url)
+    server.serve()

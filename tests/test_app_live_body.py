@@ -1,0 +1,81 @@
+"""The condensed finger behind the local page: it answers what a press of the scene answers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
+from finger3d.app.live_body import MU_STEP, STEPS, LiveBody
+from finger3d.errors import Finger3dError
+from finger3d.mechanics.build import build
+from finger3d.mechanics.gauges import Gauge
+from finger3d.scene.scene import parse
+from tests.models import marched
+
+SCENE = {
+    "finger": {"geometry": "half_cylinder", "radius_mm": 5.0, "width_mm": 2.0},
+    "material": {"E_MPa": 1.0, "nu": 0.45},
+    "friction": {"mu": 0.3},
+    "press": {"depth_mm": 0.6, "steps": STEPS},
+    "model": {"domain": "plane-strain"},
+    "mesh": {"size_mm": 0.25, "base_size_mm": 1.0, "mesher": "swept"},
+}
+GAUGE = {"name": "g", "x_mm": 1.0, "y_mm": 4.0, "angle_deg": 20.0}
+
+
+@pytest.fixture(scope="module")
+def body() -> LiveBody:
+    return LiveBody.of(parse(SCENE))
+
+
+def pressed(mu: float, **gauge: float) -> tuple[float, float]:
+    """Force and strain of a press of the scene."""
+    scene = parse(SCENE | {"friction": {"mu": mu}, "gauge": ({**GAUGE, **gauge},)})
+    step = marched(build(scene.model()))[-1]
+    return float(step.state.force[:, 0].sum()), step.gauges["g"]
+
+
+def test_force_and_strain_are_those_of_the_scene(body: LiveBody) -> None:
+    gauge = Gauge("g", 1.0, 4.0, angle=math.radians(20.0))
+    for mu in (0.1, 0.3):
+        force, strain = pressed(mu)
+        assert body.press(mu, 0.6).numbers["normal_force_N"] == pytest.approx(force, rel=1e-3)  # flat: normals are -y
+        assert body.read(gauge, mu, 0.6, 0.0).strain == pytest.approx(strain, rel=1e-9)
+
+
+def test_the_standard_deviation_of_mu_is_that_of_the_strain_over_its_slope(body: LiveBody) -> None:
+    found = body.read(Gauge("g", 1.0, 4.0, angle=math.radians(20.0)), 0.3, 0.6, 1e-3)
+    low, high = (pressed(0.3 + step)[1] for step in (-MU_STEP, MU_STEP))
+    assert found.slope == pytest.approx((high - low) / (2.0 * MU_STEP), rel=1e-6)
+    moved = [
+        pressed(0.3, **{key: GAUGE[key] + TOLERANCES[f"gauge_{key}"][0]})[1] - found.strain
+        for key in ("x_mm", "y_mm", "angle_deg")
+    ]
+    assert found.strain_sd == pytest.approx(math.hypot(1e-3, *moved), rel=1e-6)
+    assert found.mu_sd == pytest.approx(found.strain_sd / abs(found.slope))
+
+
+def test_traction_obeys_coulomb_along_the_middle_line(body: LiveBody) -> None:
+    press = body.press(0.05, 0.4)
+    assert (np.diff(press.x_mm) > 0.0).all()
+    slips, sticks = press.status == "slip", press.status == "stick"
+    assert sticks.any()
+    assert slips.any()
+    np.testing.assert_allclose(press.shear_MPa[slips], 0.05 * press.pressure_MPa[slips], rtol=1e-8)
+    assert (press.shear_MPa[sticks] <= 0.05 * press.pressure_MPa[sticks] * (1.0 + 1e-8)).all()
+
+
+def test_a_gauge_outside_the_finger_is_refused(body: LiveBody) -> None:
+    with pytest.raises(Finger3dError):
+        body.read(Gauge("g", 4.9, 4.9), 0.3, 0.6, 0.0)
+
+
+@pytest.mark.parametrize("effect", ["large_deformation", "viscosity"])
+def test_effects_whose_compliance_changes_are_refused_by_name(effect: str) -> None:
+    settings = {"prony": ((0.3, 0.5),)} if effect == "viscosity" else {}
+    press = {"depth_mm": 0.6, "duration_s": 1.0}
+    with pytest.raises(Finger3dError, match=effect):
+        LiveBody.of(parse(SCENE | {"press": press, "effects": {effect: settings}}))

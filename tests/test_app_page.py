@@ -1,0 +1,73 @@
+"""The local page: its figures, and in a browser its sliders."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from finger3d.app.live_body import LiveBody, Press, Reading
+from finger3d.app.page import numbers_of, page, section_figure, text_of, traction_figure
+from finger3d.app.server import LocalServer, local_server
+from finger3d.mechanics.gauges import Gauge
+from finger3d.scene.scene import parse
+from tests.test_app_live_body import SCENE
+
+PRESS = Press(
+    {"normal_force_N": 2.0, "friction_sum_N": 0.5, "contact_half_length_mm": 1.5, "stick_half_length_mm": 0.5},
+    np.array([-1.0, 0.0, 1.0]), np.array([0.1, 0.3, 0.1]), np.array([0.03, 0.0, 0.03]),
+    np.array(["slip", "stick", "slip"]), np.zeros((1, 2)),
+)  # fmt: skip
+
+
+def test_lines_give_lengths_in_full_and_say_when_mu_cannot_be_told() -> None:
+    assert all(number in numbers_of(PRESS) for number in ("2 N", "0.5 N", "3 mm", "1 mm"))
+    assert "0.05" in text_of(Reading(0.01, 0.1, 5e-3, 0.05))
+    assert "inf" not in text_of(Reading(0.01, 0.0, 5e-3, np.inf))
+
+
+def test_figures_have_units_and_the_data() -> None:
+    traction = traction_figure(PRESS, 0.3)
+    assert "mm" in traction.layout.xaxis.title.text
+    assert "MPa" in traction.layout.yaxis.title.text
+    by_name = {trace.name.split()[-1]: trace for trace in traction.data}
+    np.testing.assert_array_equal(by_name["slip"].x, [-1.0, 1.0])
+    section = section_figure(LiveBody.of(parse(SCENE)), Gauge("g", 1.0, 2.0))
+    assert np.mean(section.data[1].x) == pytest.approx(1.0)
+
+
+@pytest.fixture
+def running() -> Iterator[LocalServer]:
+    server = local_server(page(LiveBody.of(parse(SCENE)), 0.3))
+    thread = threading.Thread(target=server.serve)
+    thread.start()
+    yield server
+    server.stop()
+    thread.join()
+
+
+@pytest.mark.browser
+def test_a_moved_slider_changes_numbers_and_figures_in_a_browser(running: LocalServer) -> None:
+    from playwright.sync_api import expect, sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=["--no-sandbox"])
+        tab = browser.new_page()
+        complaints: list[str] = []
+        tab.on("pageerror", lambda error: complaints.append(str(error)))
+        asked: list[str] = []
+        tab.on("request", lambda request: asked.append(request.url))
+        tab.goto(running.url)
+        expect(tab.locator("#numbers")).to_contain_text("N", timeout=60_000)
+        before = tab.locator("#numbers").inner_text()
+        handle = tab.locator("#mu").get_by_role("slider").or_(tab.locator("[role=slider]")).first
+        handle.focus()
+        for _ in range(5):
+            tab.keyboard.press("ArrowLeft")
+        expect(tab.locator("#numbers")).not_to_have_text(before, timeout=60_000)
+        expect(tab.locator("#traction .main-svg").first).to_be_visible()
+        browser.close()
+    assert complaints == []
+    assert all(url.startswith((running.url.partition("?")[0], "data:", "blob:")) for url in asked)
