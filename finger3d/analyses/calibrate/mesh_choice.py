@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 SHARE = 0.1
 """Largest share of the mesh in the variance of mu."""
 
-_LONGEST_S = 60.0
+LONGEST_S = 60.0
 """Estimated seconds of a calibration beyond which a finer mesh is named, and not made."""
 
 _FINER, _FINEST, _COARSEST = 0.9, 0.3, 0.8
@@ -50,6 +50,7 @@ def choose_mesh(
     automatic: bool,
     calibrated: Callable[[Model], tuple[CurvePoints, Calibration | JointCalibration]],
     say: Callable[[str], None],
+    longest_s: float = LONGEST_S,
 ) -> CalibratedMesh:
     """Calibrate on finer and finer meshes, until the mesh matters little or the next one would take too long.
 
@@ -57,6 +58,7 @@ def choose_mesh(
     ----------
     automatic : whether the mesh may be refined; otherwise a finer one is only named
     calibrated : calibrates a model
+    longest_s : estimated time of a calibration, s, beyond which a finer mesh is only named
     """
     found: CalibratedMesh | None = None
     while True:
@@ -79,7 +81,7 @@ def choose_mesh(
             f"in about {seconds:.2g} s"
         )
         found = CalibratedMesh(curve, calibration, note)
-        if not automatic or seconds > _LONGEST_S:
+        if not automatic or seconds > longest_s:
             return found
         say(f"{note}; calibrating again")
         model = finer
