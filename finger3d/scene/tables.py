@@ -169,7 +169,7 @@ class GaugeTable(TomlTable):
 
     Attributes
     ----------
-    name : by which results call it
+    name : name in the results
     x_mm, y_mm, z_mm : its middle, on the finger at rest
     angle_deg : from +x towards +y
     length_mm : above 0: the mean over that length
@@ -188,7 +188,7 @@ class MarkerTable(TomlTable):
 
     Attributes
     ----------
-    name : by which results call it
+    name : name in the results
     x_mm, y_mm, z_mm : its place on the finger at rest
     """
 
@@ -214,7 +214,7 @@ class TaxelTable(TomlTable):
 
     Attributes
     ----------
-    name : by which results call it
+    name : name in the results
     x_mm, z_mm : its middle on the base
     length_mm, width_mm : along x and along z; a section has the length only
     """
