@@ -36,22 +36,27 @@ def test_a_line_of_advice_tells_changes_with_their_intervals() -> None:
     }
     model = half_cylinder(COARSE)
     large = advise(model, 0.2, ChangeEstimate(changes=changes))[0]
-    assert large == (
-        "large deformation would change the normal force by +19 % (+17 to +21 %), gauge_b by +0.01 (+0.009 to +0.011), "
-        "gauge_a by -29 % (-31 to -27 %) and gauge_d by +20 % (+19 to +21 %): "
-        "[effects.large_deformation] accounts for it"
-    )
+    told = [
+        "+19 % (+17 to +21 %)", "gauge_b by +0.01 (+0.009 to +0.011)", "gauge_a by -29 % (-31 to -27 %)",
+        "gauge_d by +20 % (+19 to +21 %)", "[effects.large_deformation]",
+    ]  # fmt: skip
+    places = [large.index(text) for text in told]
+    assert places == sorted(places)
+    assert not any(name in large for name in ("friction", "gauge_c"))
     one = ChangeEstimate(changes={"friction_sum_N": Change(4.0, -0.2, 0.04, significant=True)})
     more = advise(model, 0.02, increments=one)[0]
-    assert more.startswith("more increments would change the friction sum by -5 % (-6 to -4 %): press.steps")
+    assert "-5 % (-6 to -4 %)" in more
+    assert "press.steps" in more
 
 
 def test_without_a_known_change_no_number_is_told() -> None:
     model, unknown = half_cylinder(COARSE), {"normal_force_N": Change(10.0, 1.9, 2.0, significant=False)}
     for estimate in (None, ChangeEstimate(method="no estimate: why"), ChangeEstimate(changes=unknown)):
         line, *_ = advise(model, 0.2, estimate, estimate)
-        assert line.startswith("principal strains reach 0.2, large for linear elasticity: [effects.large_deformation]")
-        assert not any("would change" in line for line in advise(model, 0.06, estimate, estimate))
+        assert "0.2" in line
+        assert "[effects.large_deformation]" in line
+        assert "%" not in line
+        assert not any("%" in line for line in advise(model, 0.06, estimate, estimate))
     assert not any("large_deformation" in line for line in advise(LargeDeformation().apply(model), 0.2))
 
 
@@ -71,9 +76,8 @@ def test_a_press_tells_what_large_deformation_would_change(tmp_path: Path, monke
     assert set(force) == {"value", "change", "error"}
     assert force["value"] == told["steps"][-1]["normal_force_N"]
     line = next(text for text in told["advice"] if "[effects.large_deformation]" in text)
-    assert f"normal force by {float(format(100.0 * force['change'] / force['value'], '.2g')):+g} % (" in line
+    assert f" {float(format(100.0 * force['change'] / force['value'], '.2g')):+g} % (" in line
     page = words(press_page(tmp_path / "told"))
-    assert "What large deformation would change" in page
     assert f"normal_force_N {force['value']:.5g} {force['change']:.5g} {force['error']:.5g}" in page
 
     def forbidden(*_: Any) -> Any:
@@ -83,7 +87,7 @@ def test_a_press_tells_what_large_deformation_would_change(tmp_path: Path, monke
     alone = finger3d.press(scene, tmp_path / "alone", error=False).summary()
     assert alone["steps"] == told["steps"]  # to the last digit
     assert alone["large_deformation_estimate"] is None
-    assert any(text.startswith("principal strains reach") for text in alone["advice"])
+    assert any("[effects.large_deformation]" in text for text in alone["advice"])
 
 
 @pytest.mark.slow
@@ -99,9 +103,10 @@ def test_advice_comes_with_numbers_and_goes_when_it_is_followed(tmp_path: Path) 
         settings = [word for key in keys for word in ("--set", key)]
         assert main(["press", str(written(tmp_path, SHALLOW)), "--out", str(out), "--no-figures", *settings]) == 0
         said[name] = " ".join(json.loads((out / "summary.json").read_text(encoding="utf-8"))["advice"])
-    assert "large deformation would change the normal force by +" in said["small"]
-    assert "more increments would change the friction sum by" in said["small"]
+    assert "% (" in said["small"]
+    assert "[effects.large_deformation]" in said["small"]
+    assert "press.steps" in said["small"]
     assert "[effects.large_deformation]" in said["viscous"]
     assert "large_deformation" not in said["large"]
-    assert "would change" not in said["viscous"] + said["large"] + said["auto"]
+    assert "% (" not in said["viscous"] + said["large"] + said["auto"]
     assert "finger3d compare" in said["large"]

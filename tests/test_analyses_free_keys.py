@@ -11,7 +11,7 @@ from tests.sensor_cases import SCENE
 
 @pytest.mark.parametrize("text", ["a", "a=", "a=1", "a=2:1", "a=1:1", "a=1:inf", "=1:2", "a=1:2:3"])
 def test_bounds_that_are_none_are_refused(text: str) -> None:
-    with pytest.raises(Finger3dError, match="must be KEY=LOW:HIGH"):
+    with pytest.raises(Finger3dError, match="KEY=LOW:HIGH"):
         FreeKey.of(text)
 
 
@@ -29,11 +29,11 @@ def test_a_scene_takes_the_values_and_leaves_the_tables_it_was_given() -> None:
     assert scene.tables.material.E_MPa == 0.1 + 0.2
     assert scene.tables.gauge[1].x_mm == 12.5
     assert SCENE["material"]["E_MPa"] == 1.0
-    with pytest.raises(Finger3dError, match=r"--free material\.nu.*must be"):
+    with pytest.raises(Finger3dError, match=r"--free material\.nu.* 0\.5"):
         scene_with(SCENE, ["material.nu"], [0.7], None)
 
 
 def test_a_key_is_free_once() -> None:
     check_distinct(["a", "b"])
-    with pytest.raises(Finger3dError, match="--free b: given twice"):
+    with pytest.raises(Finger3dError, match="--free b: "):
         check_distinct(["a", "b", "b"])

@@ -85,7 +85,7 @@ def test_what_the_data_cannot_tell_is_said(tmp_path: Path, scene_file: Path) -> 
     measured.write_text("depth_mm,normal_force_N,normal_force_N_std\n" + "\n".join(lines) + "\n")
     free = {"material.E_MPa": (0.05, 5.0), "friction.mu": (0.5, 0.7)}
     found = finger3d.identify(scene_file, measured, free, tmp_path / "out")
-    assert "the data cannot tell friction.mu within its bounds" in found.notes
+    assert any("friction.mu" in note for note in found.notes)
 
 
 def test_a_scene_that_does_not_fit_is_said(tmp_path: Path, scene_file: Path) -> None:
@@ -94,7 +94,7 @@ def test_a_scene_that_does_not_fit_is_said(tmp_path: Path, scene_file: Path) -> 
         scene_file, measured, {"material.E_MPa": (0.05, 5.0)}, tmp_path / "out", ["friction.mu=0.05"]
     )
     assert found.reduced_chi_square > 10.0
-    assert any("does not explain the data" in note for note in found.notes)
+    assert any(f"{found.reduced_chi_square:.3g}" in note for note in found.notes)
 
 
 def test_an_interrupted_identification_continues(tmp_path: Path, scene_file: Path, monkeypatch: Any) -> None:

@@ -60,7 +60,7 @@ SURFACES: dict[str, tuple[Triangles, str]] = {
     "a flipped face": (replace(CUBE, faces=np.vstack([CUBE.faces[:1, ::-1], CUBE.faces[1:]])), "flipped triangles"),
     "inside out": (inward(CUBE), "inside out"),
     "flat": (moved(lambda p: p * [1.0, 0.0, 1.0]), "no volume"),
-    "a point": (moved(lambda p: 0.0 * p), "no STL mesh|no volume|enclose nothing"),
+    "a point": (moved(lambda p: 0.0 * p), "STL|no volume|enclose nothing"),
     "nan": (moved(lambda p: np.where(np.arange(8)[:, None] == 3, np.nan, p)), "not a number"),
     "inf": (moved(lambda p: np.where(np.arange(8)[:, None] == 3, np.inf, p)), "not a number"),
     "two pieces": (joined(CUBE, moved(lambda p: p + [20.0, 0.0, 0.0])), "in 2 pieces"),
@@ -68,10 +68,10 @@ SURFACES: dict[str, tuple[Triangles, str]] = {
     "hollow": (joined(CUBE, inward(moved(lambda p: 0.5 * p))), "in 2 pieces .or hollow"),
     "two that share an edge": (joined(CUBE, moved(lambda p: p + [8.0, 6.0, 0.0])), "more than two triangles meet"),
     "faces twice": (replace(CUBE, faces=np.vstack([CUBE.faces, CUBE.faces[:2]])), "more than two triangles meet"),
-    "one triangle": (replace(CUBE, faces=CUBE.faces[:1]), "enclose nothing|no STL mesh"),
+    "one triangle": (replace(CUBE, faces=CUBE.faces[:1]), "enclose nothing|STL"),
     "metres": (moved(lambda p: 1e-3 * p), "unit"),
     "micrometres": (moved(lambda p: 1e3 * p), "unit"),
-    "1e-9": (moved(lambda p: 1e-9 * p), "unit|no volume|no STL mesh|enclose nothing"),
+    "1e-9": (moved(lambda p: 1e-9 * p), "unit|no volume|STL|enclose nothing"),
     "1e9": (moved(lambda p: 1e9 * p), "unit"),
 }  # fmt: skip
 
@@ -118,15 +118,15 @@ def no_solid(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize(
     ("name", "content", "text"),
     [
-        ("a.stl", b"hello", "no STL mesh"),
-        ("a.stl", b"", "no STL mesh"),
-        ("a.stl", b"\x89PNG\r\n\x1a\n" + bytes(range(256)) * 40, "no STL mesh"),
-        ("a.stl", b"\0" * 80 + (2**31).to_bytes(4, "little"), "no STL mesh"),
-        ("a.step", b"hello", "no STEP file"),
-        ("a.step", b"ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\nENDSEC;\nEND-ISO-10303-21;\n", "no STEP file|no solid"),
-        ("face.step", None, "has no solid"),
+        ("a.stl", b"hello", "STL"),
+        ("a.stl", b"", "STL"),
+        ("a.stl", b"\x89PNG\r\n\x1a\n" + bytes(range(256)) * 40, "STL"),
+        ("a.stl", b"\0" * 80 + (2**31).to_bytes(4, "little"), "STL"),
+        ("a.step", b"hello", "STEP"),
+        ("a.step", b"ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\nENDSEC;\nEND-ISO-10303-21;\n", "STEP|solid"),
+        ("face.step", None, "solid"),
         ("two.step", None, "has 2 solids"),
-        ("none.stl", None, "no such file"),
+        ("none.stl", None, "none.stl"),
     ],
     ids=["text", "empty", "a picture", "header only", "text step", "empty step", "face", "two", "absent"],
 )
@@ -145,13 +145,13 @@ def test_files_that_hold_no_body(
 @pytest.mark.parametrize(
     ("surface", "table", "text"),
     [
-        (CUBE, "x_mm = 60.0", "it never touches"),
-        (CUBE, "z_mm = -30.0", "it never touches"),
-        (channel(12.0, 4.9), "", "touches the base first"),
-        (channel(10.0, 3.0), "[effects.elastic_object]\nE_MPa = 1.0\nnu = 0.3\n", "a wall touches first"),
-        (box(4.0, 5.0, 9.0), "x_mm = 7.0", "over no area"),
-        (moved(lambda p: 300.0 * p), "", "is its unit right"),
-        (moved(lambda p: 0.003 * p), "", "1000 if it was drawn in metres"),
+        (CUBE, "x_mm = 60.0", "never"),
+        (CUBE, "z_mm = -30.0", "never"),
+        (channel(12.0, 4.9), "", "base"),
+        (channel(10.0, 3.0), "[effects.elastic_object]\nE_MPa = 1.0\nnu = 0.3\n", "wall"),
+        (box(4.0, 5.0, 9.0), "x_mm = 7.0", "area"),
+        (moved(lambda p: 300.0 * p), "", "unit"),
+        (moved(lambda p: 0.003 * p), "", "1000 "),
     ],
     ids=["beside", "beside along z", "base", "wall", "rim", "large", "small"],
 )
@@ -166,8 +166,8 @@ def test_objects_that_meet_something_else_first(
 @pytest.mark.parametrize(
     ("table", "text"),
     [
-        ('shape = "sphere"\nradius_mm = 3.0\nx_mm = 40.0', "never touches"),
-        ('shape = "cylinder"\nradius_mm = 2.0\nx_mm = 30.0', "touches the base first|never touches"),
+        ('shape = "sphere"\nradius_mm = 3.0\nx_mm = 40.0', "never"),
+        ('shape = "cylinder"\nradius_mm = 2.0\nx_mm = 30.0', "base|never"),
     ],
 )
 def test_shapes_beside_the_finger(table: str, text: str, tmp_path: Path, capsys: Any) -> None:
@@ -179,7 +179,7 @@ def test_shapes_beside_the_finger(table: str, text: str, tmp_path: Path, capsys:
 # what crashes or hangs pytetwild, as far as a scene can ask for it; the rest, as arrays, is in test_meshing_tetwild.py
 @pytest.mark.parametrize(
     ("size", "text"),
-    [(100.0, "larger than the finger"), (0.02, "tetrahedra"), (0.0, "from 0.0001"), (-1.0, "from 0.0001")],
+    [(100.0, "mesh.size_mm = 100.0"), (0.02, "tetrahedra"), (0.0, "from 0.0001"), (-1.0, "from 0.0001")],
 )
 def test_sizes_that_hang_the_mesher(size: float, text: str, tmp_path: Path, capsys: Any) -> None:
     assert text in refused(capsys, tmp_path, PAD, 'shape = "plane"', size)
@@ -187,10 +187,10 @@ def test_sizes_that_hang_the_mesher(size: float, text: str, tmp_path: Path, caps
 
 def test_a_finger_without_base_or_through_itself(tmp_path: Path, capsys: Any) -> None:
     write_stl(tmp_path / "ball.stl", ball(5.0, 8, 12))
-    assert "no base" in refused(capsys, tmp_path, '"ball.stl"', 'shape = "plane"')
+    assert "base" in refused(capsys, tmp_path, '"ball.stl"', 'shape = "plane"')
     crossed = moved(lambda p: np.vstack([p[:6], [[-12.0, 8.0, 1.0]], p[7:]]))
     write_stl(tmp_path / "crossed.stl", crossed)
-    assert "runs through itself" in refused(capsys, tmp_path, '"crossed.stl"', 'shape = "plane"')
+    assert "itself" in refused(capsys, tmp_path, '"crossed.stl"', 'shape = "plane"')
     write_stl(tmp_path / "leaf.stl", box(8.0, 1e-3, 4.0))  # its size can be asked for, its tetrahedra cannot
     thin = ("--set", "press.depth_mm=1e-4")
     assert "tetrahedra" in refused(capsys, tmp_path, '"leaf.stl"', 'shape = "plane"', 1e-3, thin)
@@ -203,7 +203,7 @@ def test_a_point_at_the_end_of_single_precision_is_told(tmp_path: Path, capsys: 
     write_stl(tmp_path / "far.stl", far)
     for said in (refused(capsys, tmp_path, '"far.stl"', 'shape = "plane"'),
                  refused(capsys, tmp_path, PAD, 'shape = "mesh"\npath = "far.stl"')):  # fmt: skip
-        assert "a point at 3e+38" in said
+        assert "3e+38" in said
 
 
 def test_too_many_triangles_are_told_before_they_are_checked(tmp_path: Path, capsys: Any) -> None:
@@ -212,7 +212,7 @@ def test_too_many_triangles_are_told_before_they_are_checked(tmp_path: Path, cap
     body = moved(lambda p: p)
     many = Triangles(body.points, np.tile(body.faces, (MOST_TRIANGLES // len(body.faces) + 1, 1)))
     write_stl(tmp_path / "many.stl", many)
-    assert f"must be at most {MOST_TRIANGLES}" in refused(capsys, tmp_path, '"many.stl"', 'shape = "plane"')
+    assert str(MOST_TRIANGLES) in refused(capsys, tmp_path, '"many.stl"', 'shape = "plane"')
 
 
 def test_a_finger_drawn_far_away_is_none_the_worse(tmp_path: Path, capsys: Any) -> None:

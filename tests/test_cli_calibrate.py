@@ -42,17 +42,17 @@ def test_points_that_fail_are_kept_as_failures(tmp_path: Path, monkeypatch: Any,
     assert run("calibrate", scene_file, "--gauge", "g36", "--out", out, "--mu", ",".join(map(str, FEW)),
                "--tolerance", "nu=0", "--tolerance", "tilt_deg=0") == 3  # fmt: skip
     said = capsys.readouterr().err
-    assert "2 of 6 values of mu" in said
+    assert "2 of 6" in said
     found = load(out / "calibration.json")
     assert [mu for mu, _ in found.failed] == [0.4, 0.9]
     assert len(found.mu) == 4
     with (out / "calibration.csv").open() as stream:
         rows = list(csv.DictReader(stream))
-    assert sum("did not settle" in row["outcome"] for row in rows) == 2
+    assert sum(row["outcome"].endswith(str(Outcome.NO_CONVERGENCE)) for row in rows) == 2
     monkeypatch.setattr(pressing, "press", lambda p, mu, *rest: replace(some(p, 0.4), mu=mu))
     with pytest.raises(MissingError, match="only 0 of 6"):
         calibrate(scene(), "g36", out, FEW, tolerances=NONE)
-    assert "did not settle" in (out / "calibration.csv").read_text()
+    assert str(Outcome.NO_CONVERGENCE) in (out / "calibration.csv").read_text()
 
 
 def test_an_interruption_keeps_the_points_so_far(
@@ -68,7 +68,7 @@ def test_an_interruption_keeps_the_points_so_far(
     monkeypatch.setattr(pressing, "press", until)
     out = tmp_path / "cal"
     assert run("calibrate", scene_file, "--gauge", "g36", "--out", out, "--mu", ",".join(map(str, FEW))) == 130
-    assert "3 of 6 values of mu" in capsys.readouterr().err
+    assert "3 of 6" in capsys.readouterr().err
     assert len((out / "calibration.csv").read_text().splitlines()) == 4
     assert not (out / "calibration.json").exists()
 
@@ -101,21 +101,21 @@ def test_from_a_scene_to_mu_with_two_commands(tmp_path: Path, scene_file: Path, 
 @pytest.mark.parametrize(
     ("options", "told"),
     [
-        (["--gauge", "g63"], "--gauge g63: no such gauge"),
-        (["--gauge", "g36", "--mu", "0.1,-0.2,0.3,0.4"], "--mu: -0.2: must be"),
+        (["--gauge", "g63"], "--gauge g63"),
+        (["--gauge", "g36", "--mu", "0.1,-0.2,0.3,0.4"], "--mu: -0.2"),
         (["--gauge", "g36", "--mu", "0.1,nan,0.3,0.4"], "--mu: nan"),
-        (["--gauge", "g36", "--mu", "0,0,0,0"], "1 different value"),
-        (["--gauge", "g36", "--mu", "a:b"], "must be first:last:count"),
-        (["--gauge", "g36", "--mu", "0:1:100000000"], "must be first:last:count"),
-        (["--gauge", "g36", "--noise", "0"], "--noise 0: must be"),
-        (["--gauge", "g36", "--noise", "1e300"], "--noise 1e+300: must be"),
+        (["--gauge", "g36", "--mu", "0,0,0,0"], "1 different"),
+        (["--gauge", "g36", "--mu", "a:b"], "first:last:count"),
+        (["--gauge", "g36", "--mu", "0:1:100000000"], "first:last:count"),
+        (["--gauge", "g36", "--noise", "0"], "--noise 0"),
+        (["--gauge", "g36", "--noise", "1e300"], "--noise 1e+300"),
         (["--gauge", "g36", "--mu", "0.1,0.2,0.3,1e300"], "--mu: 1e+300"),
-        (["--gauge", "g36", "--tolerance", "depth_mm=1e300"], "from 0 up to 1e+06"),
+        (["--gauge", "g36", "--tolerance", "depth_mm=1e300"], "1e+06"),
         (["--gauge", "g36", "--resolution", "nan"], "--resolution nan"),
-        (["--gauge", "g36", "--tolerance", "deep_mm=1"], 'did you mean "depth_mm"?'),
-        (["--gauge", "g36", "--tolerance", "depth_mm"], "must be NAME=NUMBER"),
+        (["--gauge", "g36", "--tolerance", "deep_mm=1"], '"depth_mm"'),
+        (["--gauge", "g36", "--tolerance", "depth_mm"], "NAME=NUMBER"),
         (["--gauge", "g36", "--tolerance", "nu=-1"], "from 0 up"),
-        (["--gauge", "g36", "--set", "gauge=[]"], "the scene has no [[gauge]]"),
+        (["--gauge", "g36", "--set", "gauge=[]"], "[[gauge]]"),
     ],
 )
 def test_mistakes_are_one_line_before_any_work(

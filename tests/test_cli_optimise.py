@@ -20,10 +20,10 @@ COARSE = [option for text in SETS for option in ("--set", text)]
 @pytest.mark.parametrize(
     ("options", "told"),
     [
-        (("--gauges", "0"), "--gauges 0: must be from 1 to 8"),
-        (("--gauges", "2", "--free", "finger.radius_mm=60:200"), "with --gauges only gauge.x_mm"),
-        (("--gauges", "2", "--tolerance", "depht_mm=1"), 'did you mean "depth_mm"'),
-        (("--gauges", "2", "--mu", "0.1,0.2"), "at least three"),
+        (("--gauges", "0"), "--gauges 0: "),
+        (("--gauges", "2", "--free", "finger.radius_mm=60:200"), "--gauges"),
+        (("--gauges", "2", "--tolerance", "depht_mm=1"), '"depth_mm"'),
+        (("--gauges", "2", "--mu", "0.1,0.2"), "three"),
     ],
 )
 def test_what_is_refused(tmp_path: Path, capsys: Any, options: tuple[str, ...], told: str) -> None:
@@ -40,7 +40,7 @@ def test_foils_are_refused(tmp_path: Path, capsys: Any) -> None:
     effects = {"embedded_gauge": {"E_MPa": 3000.0, "thickness_mm": 0.05, "width_mm": 2.0}}
     path.write_text(scene(effects=effects, gauge=[scene().as_dict()["gauge"][1]]).to_toml())
     assert main(["optimise", str(path), "--out", str(tmp_path / "out"), "--gauges", "2"]) == 2
-    assert "not with effects.embedded_gauge" in capsys.readouterr().err
+    assert "effects.embedded_gauge" in capsys.readouterr().err
 
 
 @pytest.fixture
@@ -78,18 +78,18 @@ def test_an_objective_from_a_file_on_the_command_line(root, tmp_path, capsys) ->
 @pytest.mark.parametrize(
     ("options", "expected"),
     [
-        (["--free", "finger.radius_mm"], "must be KEY=LOW:HIGH"),
-        (["--free", "finger.radius_mm=200:60"], "with LOW below HIGH"),
-        (["--free", "finger.radius_mm=60:inf"], "must be KEY=LOW:HIGH"),
-        (["--free", "finger.radus_mm=60:200"], 'did you mean "radius_mm"?'),
-        (["--free", "gauge.g9.x_mm=1:2"], 'no gauge "g9"'),
-        (["--free", "gauge.g36.x_mm=1:2", "--free", "gauge.0.x_mm=1:3"], "given twice"),
-        (["--free", "gauge.g36.x_mm=1:2", "--gauge", "g9"], "no such gauge"),
-        (["--free", "gauge.g36.x_mm=1:2", "--objective", "best"], "must be sensitivity, or a Python file"),
-        (["--free", "gauge.g36.x_mm=1:2", "--method", "luck"], "--method luck: must be one of"),
-        (["--free", "gauge.g36.x_mm=1:2", "--budget", "0"], "must be at least 1"),
+        (["--free", "finger.radius_mm"], "KEY=LOW:HIGH"),
+        (["--free", "finger.radius_mm=200:60"], "LOW"),
+        (["--free", "finger.radius_mm=60:inf"], "KEY=LOW:HIGH"),
+        (["--free", "finger.radus_mm=60:200"], '"radius_mm"'),
+        (["--free", "gauge.g9.x_mm=1:2"], '"g9"'),
+        (["--free", "gauge.g36.x_mm=1:2", "--free", "gauge.0.x_mm=1:3"], "gauge.0.x_mm"),
+        (["--free", "gauge.g36.x_mm=1:2", "--gauge", "g9"], "--gauge g9"),
+        (["--free", "gauge.g36.x_mm=1:2", "--objective", "best"], "sensitivity"),
+        (["--free", "gauge.g36.x_mm=1:2", "--method", "luck"], "--method luck: "),
+        (["--free", "gauge.g36.x_mm=1:2", "--budget", "0"], "--budget 0"),
         (["--free", "gauge.g36.x_mm=1:2", "--mu", "0.5,0.1"], "ascending"),
-        (["--free", "gauge.g36.x_mm=1:2", "--noise", "0"], "must be above 0"),
+        (["--free", "gauge.g36.x_mm=1:2", "--noise", "0"], "--noise 0"),
     ],
 )
 def test_bad_input_is_one_line(options, expected, root, tmp_path, capsys) -> None:

@@ -46,7 +46,7 @@ def test_press_that_does_not_converge_ends_with_3(scene, tmp_path, fake_press, c
     err = capsys.readouterr().err
     assert len(err.splitlines()) == 1
     assert str(Outcome.NO_CONVERGENCE) in err
-    assert "1 of 2 steps are kept" in err
+    assert "1 of 2 steps" in err
 
 
 def test_press_that_misses_something_ends_with_3(scene, tmp_path, fake_press, capsys) -> None:
@@ -58,7 +58,10 @@ def test_press_that_misses_something_ends_with_3(scene, tmp_path, fake_press, ca
 def test_an_interrupted_press_ends_with_130_and_says_what_is_kept(scene, tmp_path, fake_press, capsys) -> None:
     fake_press.end = KeyboardInterrupt()
     assert run("press", scene, "--out", tmp_path / "out") == 130
-    assert capsys.readouterr().err == f"finger3d: interrupted; 2 of 2 steps are kept in {tmp_path / 'out'}\n"
+    err = capsys.readouterr().err
+    assert len(err.splitlines()) == 1
+    assert "2 of 2 steps" in err
+    assert str(tmp_path / "out") in err
 
 
 def test_an_interruption_before_the_first_step(scene, tmp_path, monkeypatch, capsys) -> None:
@@ -72,7 +75,7 @@ def test_an_interruption_before_the_first_step(scene, tmp_path, monkeypatch, cap
 
 @pytest.mark.parametrize(
     ("out", "expected"),
-    [("scene.toml", "is a file"), ("scene.toml/deeper", "cannot be written"), (".", "holds scene.toml")],
+    [("scene.toml", "is a file"), ("scene.toml/deeper", "deeper"), (".", "scene.toml")],
 )
 def test_press_refuses_a_folder_it_cannot_use_before_any_work(
     out, expected, scene, tmp_path, fake_press, capsys
@@ -100,4 +103,4 @@ def test_press_as_json_that_does_not_converge(scene, tmp_path, fake_press, capsy
     assert run("press", scene, "--out", tmp_path / "out", "--json") == 3
     out, err = capsys.readouterr()
     assert json.loads(out)["outcome"] == str(Outcome.NO_CONVERGENCE)
-    assert "1 of 2 steps are kept" in err
+    assert "1 of 2 steps" in err

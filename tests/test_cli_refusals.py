@@ -45,9 +45,7 @@ def test_a_finger_from_a_file_that_is_not_there_is_told_before_the_keys_of_the_o
 ) -> None:
     assert main(["plan", str(scene), "--set", f"finger.geometry={name}"]) == 2
     err = capsys.readouterr().err
-    assert (
-        f"with --set finger.geometry: finger.geometry: {tmp_path / name}: there is no such file; give its path" in err
-    )
+    assert f"--set finger.geometry: finger.geometry: {tmp_path / name}: " in err
     assert "half_length_mm" not in err
     assert len(err.splitlines()) == 1
 

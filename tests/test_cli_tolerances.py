@@ -15,5 +15,5 @@ def test_names_and_numbers_are_read_and_the_last_counts() -> None:
 
 @pytest.mark.parametrize("text", ["depth_mm", "depth_mm=", "depth_mm=a", "depth_mm=1=2"])
 def test_what_is_no_number_is_refused(text: str) -> None:
-    with pytest.raises(Finger3dError, match=f"--tolerance {text}: must be NAME=NUMBER"):
+    with pytest.raises(Finger3dError, match=f"--tolerance {text}: .*NAME=NUMBER"):
         parsed_tolerances([text])

@@ -30,10 +30,10 @@ def test_the_command_tells_verdicts_by_its_exit_code(
     assert cli.main(["validate", "good"]) == 0
     assert "pass" in capsys.readouterr().out
     assert cli.main(["validate", "good", "bad", "--out", str(tmp_path / "out")]) == 3
-    assert capsys.readouterr().err == "finger3d: validate: outside the tolerance: bad (see the rows marked FAIL)\n"
+    assert "bad" in capsys.readouterr().err
     assert (tmp_path / "out" / "results" / "bad.csv").is_file()
     assert cli.main(["validate", "goood"]) == 2
-    assert "did you mean 'good'" in capsys.readouterr().err
+    assert "'good'" in capsys.readouterr().err
 
 
 def test_quick_results_never_replace_full_ones(own_studies: Path, capsys: pytest.CaptureFixture) -> None:
@@ -47,4 +47,7 @@ def test_quick_results_never_replace_full_ones(own_studies: Path, capsys: pytest
 
 def test_an_interrupted_command_says_what_is_kept(own_studies: Path, capsys: pytest.CaptureFixture) -> None:
     assert cli.main(["validate", "good", "stops"]) == 130
-    assert capsys.readouterr().err == f"finger3d: interrupted; 1 of 2 studies are kept in {own_studies}\n"
+    err = capsys.readouterr().err
+    assert len(err.splitlines()) == 1
+    assert "1 of 2 studies" in err
+    assert str(own_studies) in err

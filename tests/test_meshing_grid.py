@@ -32,11 +32,11 @@ def test_edges_have_the_asked_length_in_the_zone_and_grow_away_from_it(size: flo
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"size_mm": 60.0, "base_size_mm": 60.0}, "mesh.size_mm = 60 is larger than the finger.*width, 20 mm"),
-        ({"size_mm": 3.0, "base_size_mm": 2.0}, "mesh.base_size_mm = 2 is smaller than size_mm"),
-        ({"size_mm": 0.0}, "mesh.size_mm = 0.0 is no edge length"),
-        ({"base_size_mm": math.nan}, "mesh.base_size_mm = nan is no edge length"),
-        ({"size_mm": 0.01, "base_size_mm": 0.02}, "mesh.size_mm = 0.01 .* tetrahedra, forecast .* GB"),
+        ({"size_mm": 60.0, "base_size_mm": 60.0}, "mesh.size_mm = 60 .*width, 20 mm"),
+        ({"size_mm": 3.0, "base_size_mm": 2.0}, "mesh.base_size_mm = 2 .*size_mm"),
+        ({"size_mm": 0.0}, "mesh.size_mm = 0.0 "),
+        ({"base_size_mm": math.nan}, "mesh.base_size_mm = nan "),
+        ({"size_mm": 0.01, "base_size_mm": 0.02}, "mesh.size_mm = 0.01 .* GB"),
     ],
 )
 def test_sizes_that_cannot_work_are_refused_in_one_line(changes: dict[str, float], text: str) -> None:
@@ -48,7 +48,7 @@ def test_sizes_that_cannot_work_are_refused_in_one_line(changes: dict[str, float
 
 def test_a_wall_too_thin_for_the_size_is_refused() -> None:
     design = designs()["clipped_cylinder"](100.0, 100.0, 0.02, 20.0)
-    with pytest.raises(Finger3dError, match="choose smaller sizes, or edge_height_mm = 0"):
+    with pytest.raises(Finger3dError, match="edge_height_mm = 0"):
         mesh_section(design, MeshOptions(size_mm=20.0, base_size_mm=50.0), (-20.0, 20.0, 0.0, 0.0))
 
 

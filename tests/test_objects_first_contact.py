@@ -69,7 +69,7 @@ def test_the_contact_box_follows_a_slide() -> None:
 
 
 def test_an_object_that_touches_the_base_first_is_refused() -> None:
-    with pytest.raises(Finger3dError, match="touches the base first"):
+    with pytest.raises(Finger3dError, match="base"):
         initial_contact(path(Cylinder(radius_mm=40.0, x_mm=45.0, axis="z"), depth=9.0))
 
 
@@ -89,7 +89,7 @@ def test_a_turned_cylinder_touches_where_its_own_lowest_line_meets_the_dome() ->
 def test_a_turn_that_takes_the_object_off_the_finger_is_refused() -> None:
     beside = Sphere(15.0, radius_mm=30.0)  # its lowest point, about which it turns, is beside the dome
     poses = (ObjectPose(1.0), ObjectPose(1.0, turn_z=-np.pi / 2.0))
-    with pytest.raises(Finger3dError, match="does not touch it"):
+    with pytest.raises(Finger3dError, match="touch"):
         initial_contact(ContactPath(dome, beside, 10.0, 8.0, poses))
 
 
@@ -137,11 +137,11 @@ def test_several_bumps_as_high_are_all_tried() -> None:
 @pytest.mark.parametrize(
     ("obj", "path", "text"),
     [
-        (MeshObject(90.0, surface=ball(20.0)), PRESS, "never touches"),
-        (Sphere(90.0, radius_mm=20.0), PRESS, "never touches"),
-        (MeshObject(surface=channel(110.0, 45.0)), PRESS, "touches the base first"),
-        (MeshObject(55.0, surface=box(10.0, 5.0, 30.0)), PRESS, "over no area"),
-        (MeshObject(0.0, 20.0, surface=box(10.0, 10.0, 10.0)), PRESS, "never touches"),
+        (MeshObject(90.0, surface=ball(20.0)), PRESS, "never"),
+        (Sphere(90.0, radius_mm=20.0), PRESS, "never"),
+        (MeshObject(surface=channel(110.0, 45.0)), PRESS, "base"),
+        (MeshObject(55.0, surface=box(10.0, 5.0, 30.0)), PRESS, "area"),
+        (MeshObject(0.0, 20.0, surface=box(10.0, 10.0, 10.0)), PRESS, "never"),
     ],
     ids=["beside", "sphere beside", "hangs to the base", "only the rim", "beside along z"],
 )  # fmt: skip
@@ -154,9 +154,9 @@ def test_approaches_that_are_refused(obj: RigidObject, path: Sequence[Sequence[f
 @pytest.mark.parametrize(
     ("obj", "path", "text"),
     [
-        (MeshObject(69.95, surface=ball(20.0)), PRESS, "a wall touches first"),
-        (MeshObject(surface=channel(100.0, 20.0)), PRESS, "a wall touches first"),
-        (MeshObject(surface=channel(110.0, 20.0)), [[5, 0, 0], [5, 8, 0]], "runs into the finger's side at x = -50"),
+        (MeshObject(69.95, surface=ball(20.0)), PRESS, "wall"),
+        (MeshObject(surface=channel(100.0, 20.0)), PRESS, "wall"),
+        (MeshObject(surface=channel(110.0, 20.0)), [[5, 0, 0], [5, 8, 0]], "x = -50"),
     ],
     ids=["flank at the rim", "tight channel", "slides into the side"],
 )

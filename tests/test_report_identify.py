@@ -26,7 +26,7 @@ def test_values_with_bounds_intervals_correlation_and_residuals(tmp_path: Path) 
     for name, content in {"identify.json": data, "task.json": task}.items():
         (tmp_path / name).write_text(json.dumps(content), encoding="utf-8")
     text = words(identify_page(tmp_path))
-    assert "values from a.csv" in text
+    assert "a.csv" in text
     assert "material.E_MPa 0.371 ± 0.012" in text
     assert "material.E_MPa 0.05 5 0.371 0.012 0.36 to 0.384" in text
     assert "friction.mu -0.250 1.000" in text

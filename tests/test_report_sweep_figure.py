@@ -34,8 +34,8 @@ def test_a_panel_for_each_varied_key_with_the_lines_of_its_chart(tmp_path: Path,
 
 @pytest.mark.parametrize(
     ("rows", "told"),
-    [("friction.mu,outcome\n0.1,converged\n", "nothing to draw"),
-     (ROWS.replace("0.3", "0.1"), "nothing to draw"), ("a;b\n1;2\n", "not as a sweep wrote it")],
+    [("friction.mu,outcome\n0.1,converged\n", "draw"),
+     (ROWS.replace("0.3", "0.1"), "draw"), ("a;b\n1;2\n", "sweep")],
 )  # fmt: skip
 def test_what_cannot_be_drawn_is_one_line(rows: str, told: str, tmp_path: Path) -> None:
     with pytest.raises(Finger3dError, match=told):

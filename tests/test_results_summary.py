@@ -15,7 +15,7 @@ FINGER = {"finger": {"geometry": "half_cylinder"}}
 GAUGE = {"name": "g", "x_mm": 1.0, "y_mm": 2, "z_mm": 0.0, "angle_deg": 30.0, "length_mm": 1.0}
 
 
-@pytest.mark.parametrize(("text", "told"), [("", "cannot be read"), ("{", "cannot be read"), ("[]", "no JSON object")])
+@pytest.mark.parametrize(("text", "told"), [("", "summary.json"), ("{", "summary.json"), ("[]", "JSON")])
 def test_a_damaged_summary_is_refused(text: str, told: str, tmp_path: Path) -> None:
     (tmp_path / "summary.json").write_text(text)
     with pytest.raises(Finger3dError, match=told) as error:
@@ -24,14 +24,14 @@ def test_a_damaged_summary_is_refused(text: str, told: str, tmp_path: Path) -> N
 
 
 def test_a_folder_without_results_is_named(tmp_path: Path) -> None:
-    with pytest.raises(Finger3dError, match="holds no summary.json"):
+    with pytest.raises(Finger3dError, match="summary.json"):
         read_json(tmp_path / "summary.json")
 
 
 def test_a_missing_table_has_no_rows_and_a_damaged_one_is_refused(tmp_path: Path) -> None:
     assert read_rows(tmp_path / "results.csv") == []
     (tmp_path / "results.csv").write_bytes(b"a,b\n1,\xff\n")
-    with pytest.raises(Finger3dError, match="cannot be read"):
+    with pytest.raises(Finger3dError, match="results.csv"):
         read_rows(tmp_path / "results.csv")
     (tmp_path / "results.csv").write_text("a,b\n1,2\n")
     assert read_rows(tmp_path / "results.csv") == [{"a": "1", "b": "2"}]

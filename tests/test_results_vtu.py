@@ -67,7 +67,7 @@ def test_vtk_measures_the_same_volume_on_quadratic_cells(tmp_path: Path) -> None
 
 
 def test_vtu_refuses_a_field_of_another_length(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="'u' has shape"):
+    with pytest.raises(ValueError, match="'u'"):
         write_vtu(tmp_path / "f.vtu", triangles(), {"u": np.zeros(3)})
     assert list(tmp_path.iterdir()) == []
 

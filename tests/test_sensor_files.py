@@ -56,9 +56,9 @@ def test_calibration_files_that_are_none(tmp_path: Path) -> None:
             load(path)
         assert "\n" not in str(found.value)
         assert str(found.value).startswith(str(path))
-    with pytest.raises(Finger3dError, match="no such file"):
+    with pytest.raises(Finger3dError, match="none.json"):
         load(tmp_path / "none.json")
-    with pytest.raises(Finger3dError, match="cannot be read"):
+    with pytest.raises(Finger3dError, match=str(tmp_path)):
         load(tmp_path)
 
 

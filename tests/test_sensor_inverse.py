@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Any
 
 import numpy as np
@@ -41,7 +42,7 @@ def test_beyond_the_last_mu_that_can_be_told_apart() -> None:
     edge = -math.log((saturating(1.0) + 1.5e-4) / 0.01) / 4.0
     assert answer.status == "above"
     assert answer.low == pytest.approx(edge, abs=2e-3)
-    assert answer.verdict == f"out of range: the strain at mu > {answer.low:.3g} cannot be told apart"
+    assert f"mu > {answer.low:.3g}" in answer.verdict
     assert math.isnan(answer.mu)
     assert math.isinf(answer.high)
     (low,) = estimate(curve(lambda mu: saturating(1.22 - mu)), saturating(1.0))
@@ -51,13 +52,14 @@ def test_beyond_the_last_mu_that_can_be_told_apart() -> None:
 
 def test_near_the_end_of_the_calibration_the_end_is_to_blame() -> None:
     (answer,) = estimate(curve(straight), straight(1.15))
-    assert answer.verdict == "out of range: mu > 1.05, and the calibration ends at 1.2"
+    assert "mu > 1.05" in answer.verdict
+    assert "1.2" in answer.verdict
 
 
 def test_a_strain_that_no_mu_has() -> None:
     (answer,) = estimate(curve(straight), 0.12)
     assert answer.status == "outside"
-    assert "no mu from 0.02 to 1.2 " in answer.verdict
+    assert "0.02 to 1.2 " in answer.verdict
     assert "at mu = 0.02" in answer.verdict
     assert math.isnan(answer.low)
 
@@ -119,11 +121,11 @@ def test_the_standard_deviation_is_that_of_the_errors(function: Any) -> None:
 @pytest.mark.parametrize(
     ("strain", "std", "told"),
     [
-        (math.nan, None, "strain = nan: must be a finite number"),
+        (math.nan, None, "strain = nan: "),
         ([0.01, math.inf], None, "reading 2 of 2"),
-        (0.01, -1e-4, "std = -0.0001: must be"),
+        (0.01, -1e-4, "std = -0.0001: "),
         (0.01, math.nan, "std = nan"),
-        ([0.01, 0.02, 0.03], [1e-4, 1e-4], "2 of them for 3 strains"),
+        ([0.01, 0.02, 0.03], [1e-4, 1e-4], "2 .* 3 "),
     ],
 )
 def test_readings_that_are_none(strain: Any, std: Any, told: str) -> None:
@@ -136,7 +138,7 @@ def test_tolerances_widen_and_are_blamed() -> None:
     found = curve(straight, tolerances=(tilt,))
     (blind,) = estimate(found, straight(0.5))
     assert blind.status == "blind"
-    assert blind.verdict.endswith("; 100 % of the variance is from tilt_deg")
-    assert "to +- 6.7 at best" in found.verdict()  # 0.01 of strain over a slope of 0.0015
+    assert re.search(r"100 % .*tilt_deg$", blind.verdict)
+    assert "+- 6.7" in found.verdict()  # 0.01 of strain over a slope of 0.0015
     (clear,) = estimate(found, straight(0.5), tolerances=False)
     assert clear.std == pytest.approx(0.1, rel=1e-4)

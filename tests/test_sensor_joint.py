@@ -69,7 +69,7 @@ def test_readings_are_chosen_by_name() -> None:
     joint = together(curve(straight), curve(saturating))
     assert joint.of(["b"]).names == ("b",)
     assert joint.of(["b", "a"]).at([0.5])[0] == pytest.approx(joint.at([0.5])[0][::-1])
-    with pytest.raises(Finger3dError, match="c: not calibrated; the readings are a, b"):
+    with pytest.raises(Finger3dError, match="c: .* a, b"):
         joint.of(["a", "c"])
 
 
