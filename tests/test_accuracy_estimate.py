@@ -106,7 +106,7 @@ def test_a_companion_mesh_judges_what_the_body_itself_cannot() -> None:
     problem, frames = run(model)
     found = estimate(problem, frames)
     assert found.body is None
-    assert re.search(r"structured, 1\.5 and 2\.5 mm.* 1\.2$", found.method)
+    assert re.search(r"structured, 1\.5 and 2\.5 mm.* 1\.2;", found.method)
     told = main_numbers(problem, frames[-1])
     truth = last_of(LargeDeformation().apply(half_cylinder(0.2)))
     assert set(found.discretisation) == set(told)

@@ -49,7 +49,7 @@ def test_the_verdict_of_the_papers_finger(compared) -> None:
     text = " ".join(compared.verdict)
     (percent,) = re.findall(r"At width/height 0.4 .* plane strain overstates the force by (\d+) %", text)
     assert 70 <= int(percent) <= 78
-    assert re.search(r"plane stress \w+ it by \d+ %", text)
+    assert "plane stress understates" in text
     (width,) = re.findall(r"Plane strain is within 5 % .* from a width of (\d+) mm", text)
     assert 700 <= int(width) <= 1000
     assert "Gauge g36: solid" in text
