@@ -11,6 +11,7 @@ from finger3d._types import Float, TreeView
 from finger3d.analyses.sweep.points import numbered
 from finger3d.errors import Finger3dError
 from finger3d.scene import Scene, parse, tree
+from finger3d.scene.material import modulus_of
 from finger3d.scene.messages import shown
 
 
@@ -41,8 +42,12 @@ class FreeKey:
         return numbered(self.key, given, "--free")
 
     def start(self, given: TreeView) -> float:
-        """Return the value of the scene as written, or the middle of the bounds where it lies outside."""
-        own = tree.value_at(given, self.numbered(given))
+        """Return the value of the scene as written, or the middle of the bounds where it lies outside.
+
+        A modulus that the scene gives by a hardness or a silicone is that of this material.
+        """
+        key = self.numbered(given)
+        own = tree.value_at(given, key) or modulus_of(given, key)
         return float(own) if isinstance(own, int | float) and self.low <= own <= self.high else self.middle
 
     @property

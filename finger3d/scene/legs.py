@@ -24,7 +24,8 @@ def _leg(table: TreeView, design: Design, obj: RigidObject, tables: SceneTable) 
     if leg["depth_mm"] is None:
         from finger3d.mechanics.force_control import forecast_depth
 
-        material = Isotropic(tables.material.E_MPa, tables.material.nu)
+        constants = tables.material.constants
+        material = Isotropic(constants.E_MPa, constants.nu)
         way = contact_path(design, obj, (), tables.model.domain)
         leg["depth_mm"] = forecast_depth(way, material, leg["force_N"], design.height_mm, design.width_mm)
     return Leg(**leg)

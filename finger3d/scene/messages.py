@@ -5,15 +5,18 @@ from __future__ import annotations
 import difflib
 import json
 import math
+import re
 import types
 import typing
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Annotated, Any
 
 import annotated_types as at
 from pydantic import ValidationError
 
 from finger3d._ranges import Zero, number
+from finger3d.errors import Finger3dError
 from finger3d.scene.tables import TomlTable
 
 Place = tuple[str | int, ...]
@@ -127,8 +130,9 @@ def described(hint: Any) -> str:
             return "a list of tables under double brackets," if tables else f"a list, each item {described(items[0])}"
         return "[" + ", ".join(described(a) for a in items) + "]"
     if _is_table(hint):
-        needed = [n for n, f in hint.model_fields.items() if f.is_required()]
-        return "a table" + (f" with {', '.join(needed)}" if needed else "")
+        required = ", ".join(n for n, f in hint.model_fields.items() if f.is_required())
+        needed = getattr(hint, "needed", required)
+        return "a table" + (f" with {needed}" if needed else "")
     names = {float: "a number", int: "a whole number", str: "a text", bool: "true or false"}
     return names.get(hint, "a table")
 
@@ -198,3 +202,15 @@ def messages_from(
             lines[full] = f"{dotted(full)} = {shown(value)}: must be {allowed}"
     # A list that shrank because of the mistakes in it is not itself a mistake.
     return {p: line for p, line in lines.items() if not any(q != p and q[: len(p)] == p for q in lines)}
+
+
+def refusal(lines: list[str], path: Path | None, set_keys: Iterable[str] | Mapping[str, str]) -> Finger3dError:
+    """Return the error of a scene: its first mistake, the number of the others, and where the key came from."""
+    first, more = lines[0], len(lines) - 1
+    source = str(path) if path else "scene"
+    place = re.split(r"[: ]", first, maxsplit=1)[0] + "."
+    if key := next((k for k in set_keys if place.startswith(f"{k}.") or f"{k}.".startswith(place)), None):
+        option = set_keys[key] if isinstance(set_keys, Mapping) else "--set"
+        source += f" with {option} {key}"
+    rest = f" (and {more} more mistake{'s' if more > 1 else ''})" if more else ""
+    return Finger3dError(f"{source}: {first}{rest}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -18,11 +17,12 @@ from finger3d.fem.material import Isotropic
 from finger3d.geometry.design import Design
 from finger3d.geometry.files import SUFFIXES
 from finger3d.geometry.registry import designs
+from finger3d.materials.elastic import ElasticConstants
 from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model, contact_path
 from finger3d.mechanics.readings import Marker, Taxel
 from finger3d.objects import OBJECTS, RigidObject, initial_contact
-from finger3d.scene import checks, files, tree
+from finger3d.scene import checks, files, material, messages, tree
 from finger3d.scene.legs import legs_of
 from finger3d.scene.messages import Place, choose, described, dotted, listed, messages_from, nearest, shown, unknown
 from finger3d.scene.parts import parts_of
@@ -101,6 +101,11 @@ class Scene:
         legs = press["leg"] if "leg" in press else (press,)
         return legs_of(legs, self.design, self.object, self.tables)
 
+    @property
+    def constants(self) -> ElasticConstants:
+        """Elastic constants of the finger, with the spread and the origin of Young's modulus."""
+        return self.tables.material.constants
+
     def with_mesh(self, mesh: MeshOptions) -> Scene:
         """Return the scene with edge lengths in place of a tolerance.
 
@@ -115,7 +120,7 @@ class Scene:
         t = self.tables
         model = Model(
             design=self.design,
-            material=Isotropic(t.material.E_MPa, t.material.nu),
+            material=Isotropic(self.constants.E_MPa, self.constants.nu),
             mesh=self.mesh,
             legs=self.legs,
             object=self.object,
@@ -132,12 +137,13 @@ class Scene:
         return model
 
     def as_dict(self) -> Tree:
-        """Return the tables with every default filled in, as plain dicts and lists."""
-        return tree.plain(self.tables.model_dump())
+        """Return the tables with every default filled in, as plain dicts and lists, and Young's modulus in any case."""
+        tables = self.tables.model_dump()
+        return tree.plain(tables | {"material": material.with_modulus(self.tables.material)})
 
     def to_toml(self, defaults: bool = True) -> str:
         """Return TOML text that loads as this scene: with every default, or just what was given."""
-        return tree.written(self.as_dict() if defaults else self.given)
+        return tree.written(self.tables.model_dump() if defaults else self.given)
 
 
 def load(path: str | Path, overrides: Iterable[str] = ()) -> Scene:
@@ -173,15 +179,15 @@ def parse(given: TreeView, path: Path | None = None, set_keys: Iterable[str] | M
     if parts is None:
         order = [*given]
         places = sorted(found, key=lambda p: order.index(p[0]) if p[0] in order else len(order))
-        raise _refusal([found[p] for p in places], path, set_keys)
+        raise messages.refusal([found[p] for p in places], path, set_keys)
     if lines := parts.contradictions():
-        raise _refusal(lines, path, set_keys)
+        raise messages.refusal(lines, path, set_keys)
     try:
         mesh = parts.mesh()
         scene = Scene(parts.filled_in(mesh), parts.design, parts.object, mesh, parts.effects, given, path)
         scene.model()  # effects may refuse what the rest of the scene asks for
     except Finger3dError as error:
-        raise _refusal([str(error)], path, set_keys) from None
+        raise messages.refusal([str(error)], path, set_keys) from None
     return scene
 
 
@@ -227,6 +233,7 @@ class _Parts:
         return self.tables.model_copy(
             update={
                 "finger": {"geometry": self.geometry, **self.dimensions.model_dump()},
+                "material": material.filled_in(self.tables.material),
                 "object": {"shape": self.shape, **dict(self.placed)},
                 "press": self.press.model_dump(),
                 # with a tolerance the press finds the sizes
@@ -241,6 +248,7 @@ class _Parts:
 def _read(given: TreeView, found: dict[Place, str]) -> _Parts | None:
     """Check every table by itself; None if there are mistakes, which are put into `found`."""
     tables = _checked(SceneTable, given, (), found)
+    found |= material.mistakes(tables.material, ("material",)) if tables else {}
     geometry, dimensions = _named(given, "finger", "geometry", designs(), found)
     design = _design(geometry, dimensions, found)
     shape, placed = _named({**given, "object": _shaped(given.get("object", {}))}, "object", "shape", OBJECTS, found)
@@ -261,17 +269,6 @@ def _read(given: TreeView, found: dict[Place, str]) -> _Parts | None:
         settings=settings,
         effects=effects,
     )
-
-
-def _refusal(lines: list[str], path: Path | None, set_keys: Iterable[str] | Mapping[str, str]) -> Finger3dError:
-    first, more = lines[0], len(lines) - 1
-    source = str(path) if path else "scene"
-    place = re.split(r"[: ]", first, maxsplit=1)[0] + "."
-    if key := next((k for k in set_keys if place.startswith(f"{k}.") or f"{k}.".startswith(place)), None):
-        option = set_keys[key] if isinstance(set_keys, Mapping) else "--set"
-        source += f" with {option} {key}"
-    rest = f" (and {more} more mistake{'s' if more > 1 else ''})" if more else ""
-    return Finger3dError(f"{source}: {first}{rest}")
 
 
 def _checked(

@@ -7,7 +7,7 @@ import functools
 import math
 import types
 import typing
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 from annotated_types import Ge, Gt, Interval, Le, Lt, MinLen
 from pydantic import BaseModel, ConfigDict, create_model
@@ -25,11 +25,13 @@ from finger3d._ranges import (
     Poisson,
     Radians,
     Seconds,
+    Shore,
     Title,
     Zero,
 )
 from finger3d._types import Tree
 from finger3d.contact.rules import RuleName
+from finger3d.materials.elastic import MODULUS_KEYS, ElasticConstants, elastic_constants
 from finger3d.mechanics.model import Domain
 
 Record = TypeVar("Record")
@@ -44,17 +46,34 @@ class TomlTable(BaseModel):
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-class MaterialTable(TomlTable):
-    """[material]: nu has no default because the paper gives none.
+class ElasticTable(TomlTable):
+    """Keys that give elastic constants: exactly one for Young's modulus (see `finger3d.scene.material`), and nu.
 
     Attributes
     ----------
     E_MPa : Young's modulus
-    nu : Poisson's ratio, 0.5 included; the paper gives none
+    shore_A : in place of E_MPa: Shore A hardness
+    shore_00 : in place of E_MPa: Shore 00 hardness
+    silicone : in place of E_MPa: a silicone of the table in docs/materials.md, such as "Dragon Skin 20"
+    nu : Poisson's ratio, 0.5 included; required with E_MPa, else 0.49
     """
 
-    E_MPa: Modulus
-    nu: Poisson
+    needed: ClassVar[str] = "E_MPa, nu, or with shore_A, shore_00 or silicone"
+
+    E_MPa: Modulus | None = None
+    shore_A: Shore | None = None
+    shore_00: Shore | None = None
+    silicone: Name | None = None
+    nu: Poisson | None = None
+
+    @property
+    def constants(self) -> ElasticConstants:
+        """The elastic constants with the spread and the origin of Young's modulus."""
+        return elastic_constants({key: getattr(self, key) for key in (*MODULUS_KEYS, "nu")})
+
+
+class MaterialTable(ElasticTable):
+    """[material]: of the finger; nu has no default beside E_MPa because the paper gives none."""
 
 
 class PartTable(TomlTable):

@@ -10,6 +10,7 @@ from typing import Any
 
 from finger3d._types import Tree, TreeView
 from finger3d.errors import Finger3dError
+from finger3d.scene.material import replace_modulus
 from finger3d.scene.messages import shown
 
 
@@ -68,12 +69,15 @@ def override(tree: Tree, overrides: Iterable[str], option: str = "--set") -> Tre
     `option` is where the texts come from, for messages.
     """
     changed = copy.deepcopy(plain(tree))
+    keys = []
     for text in overrides:
         key, equals, value = text.partition("=")
         parts = [p.strip() for p in key.split(".")]
         if not equals or not all(parts):
             raise Finger3dError(f"{option} {shown(text)}: must be KEY=VALUE, for instance {option} friction.mu=0.5")
         _set(changed, parts, parsed(value.strip()), f"{option} {key.strip()}")
+        keys.append(".".join(parts))
+    replace_modulus(changed, keys)
     return frozen(changed)
 
 

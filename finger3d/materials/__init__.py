@@ -1,0 +1,1 @@
+"""Elastic constants of silicones: a table with sources, and Young's modulus from Shore hardness."""
