@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
 from finger3d._types import Tree, TreeView
 from finger3d.accuracy.cost import forecast
+from finger3d.materials.elastic import ElasticConstants
 from finger3d.mechanics.resolution import warnings_before_meshing
 from finger3d.mechanics.symmetry import symmetry
 
@@ -22,12 +23,14 @@ class Plan:
     Attributes
     ----------
     title : of the scene
+    material : Young's modulus and Poisson's ratio, with the relative spread and the origin of the modulus
     effects : settings by name of the effects that are on
     forecast : printable values by name: model, size, seconds of each stage, memory
     warnings : what the mesh will not resolve
     """
 
     title: str
+    material: ElasticConstants
     effects: Mapping[str, TreeView]
     forecast: TreeView
     warnings: tuple[str, ...]
@@ -56,6 +59,7 @@ class Plan:
         """Return what `finger3d plan --json` prints."""
         return {
             "title": self.title,
+            "material": asdict(self.material),
             "effects": dict(self.effects),
             "forecast": dict(self.forecast),
             "warnings": list(self.warnings),
@@ -69,4 +73,4 @@ def plan(scene: Scene) -> Plan:
     tolerance = scene.tables.mesh.tolerance
     if tolerance is not None:
         expected = {"mesh": f"the first of those refined to tolerance = {tolerance:g}"} | expected
-    return Plan(scene.title, scene.as_dict()["effects"], expected, tuple(warnings))
+    return Plan(scene.title, scene.constants, scene.as_dict()["effects"], expected, tuple(warnings))

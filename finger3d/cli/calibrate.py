@@ -77,7 +77,7 @@ def calibrate(
         print_json(as_dict(found))
     else:
         rows = joint_summary(found) if isinstance(found, JointCalibration) else summary(found)
-        print_rows(loaded.title, [*rows, ("results", str(out))])
+        print_rows(loaded.title, [("modulus", str(loaded.constants)), *rows, ("results", str(out))])
         print(found.verdict())
     if found.failed:
         mu_failed, why = found.failed[0]

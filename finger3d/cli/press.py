@@ -47,7 +47,7 @@ def press(
     if json_:
         print_json(summary)
     else:
-        print_rows(loaded.title, _rows(summary, out))
+        print_rows(loaded.title, [("modulus", str(loaded.constants)), *_rows(summary, out)])
     for kind in ("warnings", "advice"):
         for text in summary.get(kind, ()):
             print(f"{kind.removesuffix('s')}: {text}", file=sys.stderr if json_ else sys.stdout)

@@ -16,7 +16,8 @@ Tolerances = Annotated[
         name="--tolerance",
         negative=(),
         help="Standard deviation of an uncertain quantity, for instance depth_mm=0.05; 0: exact; may be repeated. "
-        f"Quantities: {', '.join(TOLERANCES)}.",
+        f"Quantities: {', '.join(TOLERANCES)}. E_percent: unless given, the spread of the modulus of a silicone or a "
+        "Shore hardness that the scene names.",
     ),
 ]
 

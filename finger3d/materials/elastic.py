@@ -54,7 +54,7 @@ def elastic_constants(table: Mapping[str, object]) -> ElasticConstants:
     >>> elastic_constants({"E_MPa": 1.0, "nu": 0.4})
     ElasticConstants(E_MPa=1.0, nu=0.4, spread=None, origin='given')
     >>> print(elastic_constants({"shore_00": 30.0}))
-    0.103 MPa +- 45 %, Shore 00 30 by Hertz's solution
+    0.103 MPa +- 45 %, Shore 00-30 by Hertz's solution
     """
     nu = table.get("nu")
     found = _modulus(table)

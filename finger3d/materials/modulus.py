@@ -71,7 +71,7 @@ def of_shore(scale: str, shore: float) -> YoungsModulus:
     if scale == "A":
         origin = f"Shore A {shore:g} by Gent 1958; cast silicones are {SOFTER_A:g} times softer on average"
         return YoungsModulus(modulus_of_shore_A(shore), SPREAD_A, origin)
-    return YoungsModulus(modulus_of_shore_00(shore), SPREAD_00, f"Shore 00 {shore:g} by Hertz's solution")
+    return YoungsModulus(modulus_of_shore_00(shore), SPREAD_00, f"Shore 00-{shore:g} by Hertz's solution")
 
 
 def _estimates(silicone: Silicone) -> list[tuple[float, float, str]]:

@@ -21,6 +21,7 @@ def how_modelled(summary: Mapping[str, object], folder: Path) -> list[Part]:
     scene = _mapping(summary["scene"])
     rows = [(name, _settings(scene[name])) for name in _TABLES if scene.get(name)]
     rows += [(f"part {label}", _settings(settings)) for label, settings in _mapping(scene.get("parts")).items()]
+    rows += _modulus(_mapping(scene.get("material")))
     gauges = scene.get("gauge")
     for gauge in map(_mapping, gauges if isinstance(gauges, list | tuple) else ()):
         rows.append((f"gauge {gauge['name']}", _settings({k: v for k, v in gauge.items() if k != "name"})))
@@ -37,6 +38,14 @@ def how_modelled(summary: Mapping[str, object], folder: Path) -> list[Part]:
     return parts
 
 
+def _modulus(material: Mapping[str, object]) -> list[tuple[str, str]]:
+    """Return the row of a Young's modulus that follows from a hardness or a silicone, with its spread and origin."""
+    E, spread, origin = (material.get(key) for key in ("E_MPa", "E_spread", "E_origin"))
+    if not (isinstance(E, float) and isinstance(spread, float) and origin):
+        return []
+    return [("Young's modulus", f"{E:.3g} MPa \u00b1 {100.0 * spread:.0f} %: {origin}")]
+
+
 def _mapping(value: object) -> Mapping[str, object]:
     """Return a JSON object, empty if it is missing."""
     return value if isinstance(value, Mapping) else {}
@@ -46,7 +55,9 @@ def _settings(settings: object) -> str:
     """Return a table of a scene in one line."""
     if not isinstance(settings, Mapping):
         return str(settings)
-    return ", ".join(f"{k} = {_value(v)}" for k, v in settings.items() if v is not None)
+    # the spread and the origin of a modulus have a row of their own
+    told = {k: v for k, v in settings.items() if v is not None and k not in ("E_spread", "E_origin")}
+    return ", ".join(f"{k} = {_value(v)}" for k, v in told.items())
 
 
 def _value(value: object) -> str:

@@ -119,7 +119,8 @@ def calibrate(
     out : folder for calibration.json, .csv, .png, reduced.npz (and map.png, map.csv); None writes nothing
     mus : coefficients of friction, from 0 up
     noise, limit : standard deviation of a strain reading, and largest one of mu at which the sensor is usable
-    tolerances : standard deviations by name, in place of the defaults of `TOLERANCES`; 0 omits one
+    tolerances : standard deviations by name, in place of the defaults of `TOLERANCES`; 0 omits one. The default of
+        E_percent is the spread of the modulus, if the scene gives a hardness or a silicone
     report : receives the progress
     maps : also map the sensitivity of strain to mu over the section
     marker_noise_mm, taxel_noise_MPa : standard deviation of a reading of a marker, and of a taxel
@@ -143,7 +144,8 @@ def calibrate(
     model = scene.model()
     noises: dict[Kind, float] = {"gauge": noise, "marker": marker_noise_mm, "taxel": taxel_noise_MPa}
     readings = found_readings(model, [gauge] if isinstance(gauge, str) else gauge, noises)
-    settings = CalibrationSettings(readings, tuple(mus), limit, with_defaults(tolerances), maps)
+    tolerances = with_defaults(tolerances, scene.constants.spread)
+    settings = CalibrationSettings(readings, tuple(mus), limit, tolerances, maps)
     if maps:
         from finger3d.sensor.maps import check
 

@@ -45,8 +45,13 @@ Effect: TypeAlias = tuple[float, Float]
 """Step of a quantity in its unit, and the changes (k, m) of readings at several mu that it causes."""
 
 
-def with_defaults(given: Mapping[str, float] | None) -> dict[str, float]:
+def with_defaults(given: Mapping[str, float] | None, spread: float | None = None) -> dict[str, float]:
     """Return the standard deviations by name: the defaults, updated with the given ones, without those that are zero.
+
+    Parameters
+    ----------
+    given : standard deviations by name
+    spread : relative standard deviation of Young's modulus, which takes the place of the default of E_percent
 
     Raises
     ------
@@ -56,6 +61,8 @@ def with_defaults(given: Mapping[str, float] | None) -> dict[str, float]:
     from difflib import get_close_matches
 
     found = {name: sd for name, (sd, _) in TOLERANCES.items()}
+    if spread is not None:
+        found["E_percent"] = 100.0 * spread
     for name, sd in (given or {}).items():
         if name not in TOLERANCES:
             near = get_close_matches(name, TOLERANCES, n=1, cutoff=0.0)[0]

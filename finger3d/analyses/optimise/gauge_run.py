@@ -107,7 +107,8 @@ def place_gauges(
     """
     report = report or Progress()
     _check(count, mus, noise)
-    model = parse(given, path).model()
+    scene = parse(given, path)
+    model = scene.model()
     if model.inclusions is not None:
         raise Finger3dError(
             "optimise --gauges: not with effects.embedded_gauge, whose foils change the body wherever they lie; "
@@ -115,7 +116,7 @@ def place_gauges(
         )
     region = _region(model, free)
     with claimed(out, "optimise") as folder:
-        fields = GaugeFields.of(model, mus, noise, with_defaults(tolerances), report.stage)
+        fields = GaugeFields.of(model, mus, noise, with_defaults(tolerances, scene.constants.spread), report.stage)
         found, everywhere = search(fields, region, count, report.stage)
         maps = tuple(_map(found, i, everywhere) for i in range(count))
         result = GaugePlaces(tuple(mus), found, maps, _with_gauges(given, path, found))
