@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from finger3d.errors import Finger3dError
 from finger3d.geometry.imported import Imported
+from finger3d.materials.silicones import silicone_named
 from finger3d.mold.options import MoldOptions
 from finger3d.progress import Progress
 
@@ -110,7 +111,9 @@ def export(
         if made is not None:
             from finger3d.mold.output import write_mold
 
-            written, told = write_mold(scene.title, made, body, out, text, report)
+            name = scene.tables.material.silicone
+            named = silicone_named(name) if name else None
+            written, told = write_mold(scene.title, made, body, out, text, report, named)
             files, remarks, silicone = files + written, remarks + told, made.silicone_mm3 / 1e3
     return Exported(
         tuple(files), _volume(design, solid, body), body.surface.volume, body.tolerance_mm, silicone, tuple(remarks)

@@ -9,6 +9,7 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.io import atomic
+from finger3d.materials.silicones import Silicone
 from finger3d.mold.parts import Mold, strips
 from finger3d.mold.sheet import oversize, sheet
 from finger3d.mold.shell import Shell, shell, write_3mf, write_step, write_stl
@@ -48,7 +49,7 @@ def plate(printed: dict[str, Shell]) -> tuple[dict[str, Shell], Float]:
 
 
 def write_mold(
-    title: str, made: Mold, body: Shell, out: Path, text: bool, report: Progress
+    title: str, made: Mold, body: Shell, out: Path, text: bool, report: Progress, silicone: Silicone | None = None
 ) -> tuple[list[Path], list[str]]:
     """Write all files of a mold; returns them, and remarks for the user.
 
@@ -56,6 +57,7 @@ def write_mold(
     ----------
     body : the finger's shell; the cavity is made as finely
     text : STL as text
+    silicone : that the scene names, for the instructions
     """
     from build123d import Compound
 
@@ -70,7 +72,7 @@ def write_mold(
         write_3mf(out / "mold.3mf", placed)
         write_step(out / "mold.step", Compound(label="mold", children=list(made.parts.values())))
         with atomic(out / "sheet.txt") as temporary:
-            temporary.write_text(sheet(title, made, printed, size), encoding="utf-8")
+            temporary.write_text(sheet(title, made, printed, size, silicone), encoding="utf-8")
         drawn.result()
     remarks = [f"mold_{n}: {why}" for n, part in printed.items() if (why := oversize(part, made.options.bed_mm))]
     return [out / name for name in FILES], remarks

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d.materials.silicones import Silicone
+from finger3d.mold import casting
 from finger3d.mold.parts import Mold
 from finger3d.mold.shell import Shell
 
@@ -27,17 +29,20 @@ def oversize(part: Shell, bed: Sizes) -> str:
     return f"{_sizes(part.extent)} mm is too large for {_sizes(bed)} mm"
 
 
-def sheet(title: str, made: Mold, printed: Mapping[str, Shell], plate: Sizes) -> str:
+def sheet(title: str, made: Mold, printed: Mapping[str, Shell], plate: Sizes, silicone: Silicone | None = None) -> str:
     """Return the instructions.
 
     Parameters
     ----------
     printed : the parts as they lie on the bed
     plate : length, width and height of all parts side by side, as in the 3MF file
+    silicone : that the scene names; None if it names none
     """
     o = made.options
     ports = sum(_port_volumes(made))
     cavity = made.silicone_mm3
+    mixed_ml = SPARE * (cavity + ports) / 1e3
+    hole = casting.PourHole(made.ports.pour_mm, made.ports.funnel_mm, o.lid_mm)
     lines = [
         f"Mold of {title}",
         "",
@@ -46,8 +51,9 @@ def sheet(title: str, made: Mold, printed: Mapping[str, Shell], plate: Sizes) ->
         "SILICONE",
         f"  cavity              {cavity / 1e3:.2f} ml",
         f"  pour hole and vents {ports / 1e3:.2f} ml",
-        f"  mix about           {SPARE * (cavity + ports) / 1e3:.1f} ml ({100 * (SPARE - 1):.0f} % more than both)",
+        f"  mix about           {mixed_ml:.1f} ml ({100 * (SPARE - 1):.0f} % more than both)",
         f"  shrinkage allowed   {100 * o.shrinkage:g} % of every length: the cavity is the sensor times {o.scale:.6g}",
+        *casting.silicone_lines(silicone, mixed_ml, hole, o.shrinkage),
         "",
         "PARTS",
     ]
@@ -64,11 +70,13 @@ def sheet(title: str, made: Mold, printed: Mapping[str, Shell], plate: Sizes) ->
         "  The files lie as they should be printed: outer faces down, pegs up, no support needed.",
         f"  Pegs of {o.peg_mm:g} mm have {o.clearance_mm:g} mm of room all around; one of each pattern is thinner, so",
         "  that no part fits the wrong way round.",
-        "  Printed layers leave their marks on the silicone: use thin layers, or smooth the cavity.",
         "",
+        *casting.surface_lines(o.split),
+        *casting.inhibition_lines(),
         *_gauge_lines(made),
+        *casting.mixing_lines(),
         "POUR",
-        "  1. Grease the halves and the lid with a release agent; some silicones do not cure on printed resin.",
+        "  1. Spray the halves and the lid with a release agent that is safe for platinum silicones.",
         *_closing(made),
         "  3. Stand the mold with the open side, the sensor's base, up. Push the lid on; it holds the halves together.",
         f"  4. Pour the degassed silicone through the middle hole ({made.ports.pour_mm:.3g} mm) until it stands in",
