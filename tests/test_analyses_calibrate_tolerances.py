@@ -55,6 +55,22 @@ def test_every_tolerance_is_the_difference_of_two_scenes() -> None:
     assert slopes["depth_mm"][number] == pytest.approx((deep[0] - deep[1]) / 0.2, rel=1e-6)
 
 
+def test_the_spread_of_a_silicone_is_the_tolerance_of_its_modulus() -> None:
+    """Unless another is given, and not where the scene gives E_MPa."""
+    assert slopes.with_defaults(None)["E_percent"] == TOLERANCES["E_percent"][0]
+    assert slopes.with_defaults(None, 0.3)["E_percent"] == pytest.approx(30.0)
+    assert slopes.with_defaults({"E_percent": 2.0}, 0.3)["E_percent"] == 2.0
+    assert "E_percent" not in slopes.with_defaults({"E_percent": 0.0}, 0.3)
+    silicone = scene(material={"silicone": "Ecoflex 00-30", "nu": 0.45})
+    few = NONE | {"depth_mm": 0.1}
+    del few["E_percent"]
+    found = calibrate(silicone, "g36", mus=FEW, tolerances=few)
+    assert {t.name: t.sd for t in found.tolerances} == {
+        "depth_mm": 0.1,
+        "E_percent": pytest.approx(100.0 * silicone.constants.spread),
+    }
+
+
 def test_slopes_between_the_few_mu_that_are_tried(monkeypatch: Any) -> None:
     """Within a fifth of the largest, about what a tolerance is known to; where all of the contact begins to stick,
     the effect of nu turns between two of them.

@@ -24,6 +24,15 @@ def test_a_key_starts_at_the_scenes_value_or_in_the_middle_of_its_bounds() -> No
     assert gauge.start(SCENE) == 30.0
 
 
+def test_a_modulus_starts_at_that_of_the_silicone_and_replaces_it() -> None:
+    given = {**SCENE, "material": {"silicone": "Dragon Skin 20"}}
+    key = FreeKey("material.E_MPa", 0.1, 2.0)
+    assert 0.3 < key.start(given) < 0.6
+    scene = scene_with(given, ["material.E_MPa"], [0.7], None)
+    assert scene.as_dict()["material"] == {"E_MPa": 0.7, "nu": 0.49}
+    assert given["material"] == {"silicone": "Dragon Skin 20"}
+
+
 def test_a_scene_takes_the_values_and_leaves_the_tables_it_was_given() -> None:
     scene = scene_with(SCENE, ["material.E_MPa", "gauge.1.x_mm"], [0.1 + 0.2, 12.5], None)
     assert scene.tables.material.E_MPa == 0.1 + 0.2

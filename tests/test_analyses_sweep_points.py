@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from finger3d.analyses.sweep.points import Vary
+from finger3d.analyses.sweep.points import Vary, combinations
 from tests.sweep_cases import points_of
 
 
@@ -26,3 +26,12 @@ def test_every_combination_is_a_point_and_only_the_material_makes_bodies(paper_s
 )
 def test_values_are_told_apart_by_commas_outside_brackets_and_quotes(text, values) -> None:
     assert Vary.of(text).values == values
+
+
+def test_a_varied_modulus_or_silicone_replaces_what_the_scene_gives(paper_scene) -> None:
+    named = ["material.silicone=Dragon Skin 20"]
+    moduli = combinations(paper_scene, named, ["material.E_MPa=0.3,0.5"])
+    assert [p.values["material.E_MPa"] for p in moduli.points] == [0.3, 0.5]
+    assert len(moduli.bodies) == 2
+    silicones = combinations(paper_scene, (), ['material.silicone="Ecoflex 00-30","dragon skin 20"'])
+    assert len(silicones.bodies) == 2

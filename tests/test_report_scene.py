@@ -27,3 +27,11 @@ def test_a_scene_without_effects_says_so_and_its_file_is_quoted(tmp_path: Path) 
     assert not [name for name, _ in table.rows if name.startswith("effect")]
     assert "elasticity" in baseline
     assert file == Code('title = "mine"\n', "scene.toml")
+
+
+def test_where_a_modulus_comes_from(tmp_path: Path) -> None:
+    data = scene(material={"silicone": "Dragon Skin 20"}).as_dict()
+    rows = dict(how_modelled({"scene": data}, tmp_path)[0].rows)
+    assert rows["Young's modulus"].startswith("0.423 MPa \u00b1 25 %: Dragon Skin 20, ")
+    assert "E_spread" not in rows["material"]
+    assert "Young's modulus" not in dict(how_modelled({"scene": scene().as_dict()}, tmp_path)[0].rows)

@@ -1,7 +1,8 @@
 """Young's modulus from Shore hardness.
 
 A durometer pushes an indenter by at most 2.54 mm into the material; the reading S is 100 less 1 for every 0.0254 mm.
-Type A has a truncated cone, whose flat end Gent (1958) takes for a rigid punch on an incompressible half-space ::
+Type A has a truncated cone, which Gent (1958) takes for a flat rigid punch of its mean radius, 0.515 mm, on an
+incompressible half-space ::
 
     E = 0.0981 (56 + 7.62336 S) / (0.137505 (254 - 2.54 S))     MPa
 

@@ -1,0 +1,79 @@
+"""Young's modulus of a silicone from its sources."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from finger3d.materials.modulus import BATCH, NEO_HOOKEAN, SHOULDERS, of_shore, youngs_modulus
+from finger3d.materials.silicones import Silicone, silicone_named, silicones
+
+
+def made(**values) -> Silicone:
+    return Silicone(name="mine", maker="me", scale="A", shore=20.0, sources=("me",), **values)
+
+
+def test_a_neo_hookean_curve_has_this_modulus() -> None:
+    stretch, shear = 2.0, 1.0
+    stress = shear * (stretch - stretch**-2)
+    assert pytest.approx(3.0 * shear / stress) == NEO_HOOKEAN
+
+
+def test_the_shoulders_of_the_dumbbell() -> None:
+    """ISO 37 type 1, as ASTM D412 die C: 33 mm of 6 mm, then arcs of 25 and 14 mm to tabs of 25 mm."""
+    inner, outer, rise = 25.0, 14.0, 0.5 * (25.0 - 6.0)
+    angle = math.acos(1.0 - rise / (inner + outer))
+    length = (inner + outer) * math.sin(angle)
+    x = np.linspace(0.0, length, 4001)
+    first = inner - np.sqrt(inner**2 - np.minimum(x, inner * math.sin(angle)) ** 2)
+    second = rise - outer + np.sqrt(outer**2 - np.minimum(length - x, outer * math.sin(angle)) ** 2)
+    added = np.trapezoid(3.0 / (3.0 + np.where(x < inner * math.sin(angle), first, second)), x)
+    assert (33.0 + 2.0 * added) / 33.0 == pytest.approx(SHOULDERS, abs=0.01)
+
+
+def test_batches_scatter_about_their_data_sheets() -> None:
+    families: dict[str, list[float]] = {}
+    for name, one in silicones().items():
+        if one.stress_100_tension_MPa and one.modulus_100_MPa:
+            ratio = math.log(one.stress_100_tension_MPa / one.modulus_100_MPa)
+            families.setdefault(name.split()[0], []).append(ratio)
+    assert {name: len(ratios) for name, ratios in families.items()} == {"Ecoflex": 3, "Dragon": 3}
+    variance = sum(np.var(r) * len(r) for r in families.values()) / sum(len(r) - 1 for r in families.values())
+    assert math.sqrt(variance) == pytest.approx(BATCH, abs=0.01)
+
+
+def test_one_estimate_is_the_middle_of_its_bounds() -> None:
+    found = youngs_modulus(made(modulus_100_psi=100.0))
+    low = 100.0 * 6.894757e-3
+    assert found.E_MPa == pytest.approx(math.sqrt(low * 12.0 / 7.0 * low))
+    assert found.spread == pytest.approx(math.hypot(BATCH, math.log(12.0 / 7.0) / math.sqrt(12.0)))
+    assert found.origin == "mine, 100 % modulus of the data sheet"
+    by_law = youngs_modulus(made(modulus_fit_MPa=0.5))
+    assert (by_law.E_MPa, by_law.spread) == (pytest.approx(0.5), pytest.approx(BATCH))
+    by_range = youngs_modulus(made(modulus_range_MPa=(1.0, 4.0)))
+    assert by_range.E_MPa == pytest.approx(2.0)
+
+
+def test_several_estimates_meet_in_their_geometric_mean() -> None:
+    found = youngs_modulus(made(modulus_compression_MPa=0.1, modulus_fit_MPa=0.4))
+    assert found.E_MPa == pytest.approx(0.2)
+    # standard error of two logarithms that are log 4 apart: half of it
+    assert found.spread == pytest.approx(math.hypot(BATCH, 0.5 * math.log(4.0)))
+    assert found.origin == "mine, a compression test and a published hyperelastic law"
+
+
+def test_without_a_measurement_the_hardness_decides() -> None:
+    found = youngs_modulus(made())
+    assert (found.E_MPa, found.spread) == (of_shore("A", 20.0).E_MPa, of_shore("A", 20.0).spread)
+    assert found.origin.startswith("mine, Shore A 20 by Gent 1958")
+
+
+@pytest.mark.parametrize(
+    ("name", "low", "high"),
+    [("Ecoflex 00-10", 0.022, 0.0946), ("Ecoflex 00-30", 0.0441, 0.1182), ("Dragon Skin 30", 0.4556, 1.02)],
+)
+def test_the_modulus_lies_between_its_bounds(name: str, low: float, high: float) -> None:
+    """Bounds: the slope of the tensile test, and the neo-Hookean modulus of the data sheet."""
+    assert low < youngs_modulus(silicone_named(name)).E_MPa < high
