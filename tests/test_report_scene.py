@@ -35,3 +35,10 @@ def test_where_a_modulus_comes_from(tmp_path: Path) -> None:
     assert rows["Young's modulus"].startswith("0.423 MPa \u00b1 25 %: Dragon Skin 20, ")
     assert "E_spread" not in rows["material"]
     assert "Young's modulus" not in dict(how_modelled({"scene": scene().as_dict()}, tmp_path)[0].rows)
+
+
+def test_where_the_modulus_of_a_part_comes_from(tmp_path: Path) -> None:
+    data = scene().as_dict() | {"parts": {"skin": {"shore_A": 20.0, "E_MPa": 0.7, "E_spread": 0.6, "E_origin": "Gent"}}}
+    rows = dict(how_modelled({"scene": data}, tmp_path)[0].rows)
+    assert rows["part skin"] == "shore_A = 20, E_MPa = 0.7"
+    assert rows["Young's modulus of skin"] == "0.7 MPa \u00b1 60 %: Gent"

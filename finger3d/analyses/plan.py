@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from finger3d._types import Tree, TreeView
 from finger3d.accuracy.cost import forecast
-from finger3d.materials.elastic import ElasticConstants
 from finger3d.mechanics.resolution import warnings_before_meshing
 from finger3d.mechanics.symmetry import symmetry
+from finger3d.scene.parts import moduli
 
 if TYPE_CHECKING:
     from finger3d.scene import Scene
@@ -23,14 +23,14 @@ class Plan:
     Attributes
     ----------
     title : of the scene
-    material : Young's modulus and Poisson's ratio, with the relative spread and the origin of the modulus
+    moduli : Young's modulus of the finger and of its parts in words, with spread and origin
     effects : settings by name of the effects that are on
     forecast : printable values by name: model, size, seconds of each stage, memory
     warnings : what the mesh will not resolve
     """
 
     title: str
-    material: ElasticConstants
+    moduli: Mapping[str, str]
     effects: Mapping[str, TreeView]
     forecast: TreeView
     warnings: tuple[str, ...]
@@ -59,7 +59,7 @@ class Plan:
         """Return what `finger3d plan --json` prints."""
         return {
             "title": self.title,
-            "material": asdict(self.material),
+            "moduli": dict(self.moduli),
             "effects": dict(self.effects),
             "forecast": dict(self.forecast),
             "warnings": list(self.warnings),
@@ -73,4 +73,4 @@ def plan(scene: Scene) -> Plan:
     tolerance = scene.tables.mesh.tolerance
     if tolerance is not None:
         expected = {"mesh": f"the first of those refined to tolerance = {tolerance:g}"} | expected
-    return Plan(scene.title, scene.constants, scene.as_dict()["effects"], expected, tuple(warnings))
+    return Plan(scene.title, moduli(scene.tables), scene.as_dict()["effects"], expected, tuple(warnings))

@@ -55,6 +55,7 @@ def calibrate(
     loaded = load(scene, set_, out)
     from finger3d.analyses.calibrate.run import calibrate as run
     from finger3d.analyses.calibrate.settings import parsed_mus
+    from finger3d.scene.parts import moduli
     from finger3d.sensor.curve import summary
     from finger3d.sensor.files import as_dict
     from finger3d.sensor.joint import JointCalibration, joint_summary
@@ -77,7 +78,7 @@ def calibrate(
         print_json(as_dict(found))
     else:
         rows = joint_summary(found) if isinstance(found, JointCalibration) else summary(found)
-        print_rows(loaded.title, [("modulus", str(loaded.constants)), *rows, ("results", str(out))])
+        print_rows(loaded.title, [*moduli(loaded.tables).items(), *rows, ("results", str(out))])
         print(found.verdict())
     if found.failed:
         mu_failed, why = found.failed[0]

@@ -29,7 +29,7 @@ def plan(scene: Path, /, *, set_: Set = None, json_: Json = False) -> None:
     if json_:
         print_json(found.summary())
         return
-    print_rows("material", [("Young's modulus", str(found.material)), ("Poisson's ratio", f"{found.material.nu:g}")])
+    print_rows("material", found.moduli.items())
     print_rows("effects", effect_rows(loaded))
     print_rows(loaded.title, [(key.replace("_", " "), value) for key, value in found.forecast.items()])
     for text in found.warnings:

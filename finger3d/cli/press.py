@@ -40,6 +40,7 @@ def press(
     """
     loaded = load(scene, set_, out)
     from finger3d.analyses.press import press as run
+    from finger3d.scene.parts import moduli
 
     with job(json_, lambda report: _kept(out, report.steps_total)) as report:
         result = run(loaded, out, report, figures=figures, error=error)
@@ -47,7 +48,7 @@ def press(
     if json_:
         print_json(summary)
     else:
-        print_rows(loaded.title, [("modulus", str(loaded.constants)), *_rows(summary, out)])
+        print_rows(loaded.title, [*moduli(loaded.tables).items(), *_rows(summary, out)])
     for kind in ("warnings", "advice"):
         for text in summary.get(kind, ()):
             print(f"{kind.removesuffix('s')}: {text}", file=sys.stderr if json_ else sys.stdout)

@@ -20,8 +20,9 @@ def how_modelled(summary: Mapping[str, object], folder: Path) -> list[Part]:
     """
     scene = _mapping(summary["scene"])
     rows = [(name, _settings(scene[name])) for name in _TABLES if scene.get(name)]
-    rows += [(f"part {label}", _settings(settings)) for label, settings in _mapping(scene.get("parts")).items()]
-    rows += _modulus(_mapping(scene.get("material")))
+    rows += _modulus("", scene.get("material"))
+    for label, settings in _mapping(scene.get("parts")).items():
+        rows += [(f"part {label}", _settings(settings)), *_modulus(f" of {label}", settings)]
     gauges = scene.get("gauge")
     for gauge in map(_mapping, gauges if isinstance(gauges, list | tuple) else ()):
         rows.append((f"gauge {gauge['name']}", _settings({k: v for k, v in gauge.items() if k != "name"})))
@@ -38,12 +39,12 @@ def how_modelled(summary: Mapping[str, object], folder: Path) -> list[Part]:
     return parts
 
 
-def _modulus(material: Mapping[str, object]) -> list[tuple[str, str]]:
+def _modulus(of: str, table: object) -> list[tuple[str, str]]:
     """Return the row of a Young's modulus that follows from a hardness or a silicone, with its spread and origin."""
-    E, spread, origin = (material.get(key) for key in ("E_MPa", "E_spread", "E_origin"))
+    E, spread, origin = (_mapping(table).get(key) for key in ("E_MPa", "E_spread", "E_origin"))
     if not (isinstance(E, float) and isinstance(spread, float) and origin):
         return []
-    return [("Young's modulus", f"{E:.3g} MPa \u00b1 {100.0 * spread:.0f} %: {origin}")]
+    return [(f"Young's modulus{of}", f"{E:.3g} MPa \u00b1 {100.0 * spread:.0f} %: {origin}")]
 
 
 def _mapping(value: object) -> Mapping[str, object]:

@@ -10,7 +10,7 @@ from finger3d.errors import Finger3dError
 from finger3d.materials.elastic import MODULUS_KEYS, NU
 from finger3d.materials.silicones import silicone_named
 from finger3d.scene.messages import Place, dotted, shown
-from finger3d.scene.tables import ElasticTable
+from finger3d.scene.tables import ElasticTable, PartTable
 
 Elastic = TypeVar("Elastic", bound=ElasticTable)
 
@@ -44,8 +44,15 @@ def mistakes(table: ElasticTable, place: Place) -> dict[Place, str]:
     return {}
 
 
+def is_rigid(table: ElasticTable) -> bool:
+    """Whether a table is that of a rigid part, which has no elastic constants."""
+    return isinstance(table, PartTable) and table.rigid
+
+
 def filled_in(table: Elastic) -> Elastic:
-    """Return the table with Poisson's ratio, and the silicone as the table of silicones spells it."""
+    """Return the table with Poisson's ratio and the silicone's own name; that of a rigid part as it is."""
+    if is_rigid(table):
+        return table
     changes: Tree = {"nu": table.constants.nu}
     if table.silicone is not None:
         changes["silicone"] = silicone_named(table.silicone).name
@@ -55,7 +62,7 @@ def filled_in(table: Elastic) -> Elastic:
 def with_modulus(table: ElasticTable) -> Tree:
     """Return the keys of a table; if another key gives Young's modulus, with it, its spread and its origin."""
     given = {key: value for key, value in table.model_dump().items() if value is not None}
-    if table.E_MPa is not None:
+    if table.E_MPa is not None or is_rigid(table):
         return given
     constants = table.constants
     return given | {"E_MPa": constants.E_MPa, "E_spread": constants.spread, "E_origin": constants.origin}

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from finger3d.fem.material import RIGID_RATIO, Isotropic, Material
 from finger3d.geometry.design import Design
+from finger3d.materials.elastic import ElasticConstants
+from finger3d.scene.material import mistakes
 from finger3d.scene.messages import dotted, shown, unknown
 from finger3d.scene.tables import SceneTable
 
@@ -15,14 +17,28 @@ def parts_of(tables: SceneTable) -> tuple[tuple[str, Material], ...]:
 
     A rigid part is one whose Young's modulus is `RIGID_RATIO` times the largest of the others.
     """
-    stiffest = max([tables.material.E_MPa, *(part.E_MPa for part in tables.parts.values() if part.E_MPa is not None)])
-    found: list[tuple[str, Material]] = []
+    elastic = {label: part.constants for label, part in tables.parts.items() if not part.rigid}
+    stiffest = max(one.E_MPa for one in (tables.material.constants, *elastic.values()))
+    rigid = Isotropic(RIGID_RATIO * stiffest, _NU_OF_RIGID)
+    return tuple((label, _isotropic(elastic[label]) if label in elastic else rigid) for label in tables.parts)
+
+
+def _isotropic(constants: ElasticConstants) -> Isotropic:
+    return Isotropic(constants.E_MPa, constants.nu)
+
+
+def largest_spread(tables: SceneTable) -> float | None:
+    """Return the largest relative standard deviation of a Young's modulus of the finger; None if all are given."""
+    elastic = (tables.material, *(part for part in tables.parts.values() if not part.rigid))
+    return max((s for table in elastic if (s := table.constants.spread) is not None), default=None)
+
+
+def moduli(tables: SceneTable) -> dict[str, str]:
+    """Return Young's modulus of the finger and of its parts in words, with spread and origin, by what it is of."""
+    found = {"modulus": str(tables.material.constants)}
     for label, part in tables.parts.items():
-        if part.rigid:
-            found.append((label, Isotropic(RIGID_RATIO * stiffest, _NU_OF_RIGID)))
-        elif part.E_MPa is not None and part.nu is not None:
-            found.append((label, Isotropic(part.E_MPa, part.nu)))
-    return tuple(found)
+        found[f"modulus of {label}"] = "rigid" if part.rigid else str(part.constants)
+    return found
 
 
 def check_parts(tables: SceneTable, design: Design) -> list[str]:
@@ -30,13 +46,12 @@ def check_parts(tables: SceneTable, design: Design) -> list[str]:
     lines = []
     for label, part in tables.parts.items():
         place = ("parts", label)
-        given = {key: value for key, value in (("E_MPa", part.E_MPa), ("nu", part.nu)) if value is not None}
+        given = {key: value for key, value in part.model_dump(exclude={"rigid"}).items() if value is not None}
         if label not in design.part_labels:
             lines.append(unknown(place, {}, design.part_labels, kind=f"part of {design.name}"))
         elif part.rigid and given:
             key, value = next(iter(given.items()))
             lines.append(f"{dotted((*place, key))} = {shown(value)}: not with rigid = true; take one of the two out")
-        elif not part.rigid and len(given) < 2:
-            missing = "nu" if "E_MPa" in given else "E_MPa"
-            lines.append(f"{dotted((*place, missing))} is missing: a part needs E_MPa and nu, or rigid = true")
+        elif not part.rigid:
+            lines += [f"{line}; or rigid = true" for line in mistakes(part, place).values()]
     return lines

@@ -98,8 +98,7 @@ class Scene:
     def legs(self) -> tuple[Leg, ...]:
         """Targets of the press; the shorthand is one leg."""
         press = self.tables.press
-        legs = press["leg"] if "leg" in press else (press,)
-        return legs_of(legs, self.design, self.object, self.tables)
+        return legs_of(press.get("leg", (press,)), self.design, self.object, self.tables)
 
     @property
     def constants(self) -> ElasticConstants:
@@ -138,8 +137,9 @@ class Scene:
 
     def as_dict(self) -> Tree:
         """Return the tables with every default filled in, as plain dicts and lists, and Young's modulus in any case."""
-        tables = self.tables.model_dump()
-        return tree.plain(tables | {"material": material.with_modulus(self.tables.material)})
+        t = self.tables
+        parts = {label: material.with_modulus(part) for label, part in t.parts.items()}
+        return tree.plain(t.model_dump() | {"material": material.with_modulus(t.material), "parts": parts})
 
     def to_toml(self, defaults: bool = True) -> str:
         """Return TOML text that loads as this scene: with every default, or just what was given."""
@@ -234,6 +234,7 @@ class _Parts:
             update={
                 "finger": {"geometry": self.geometry, **self.dimensions.model_dump()},
                 "material": material.filled_in(self.tables.material),
+                "parts": {label: material.filled_in(part) for label, part in self.tables.parts.items()},
                 "object": {"shape": self.shape, **dict(self.placed)},
                 "press": self.press.model_dump(),
                 # with a tolerance the press finds the sizes

@@ -76,18 +76,16 @@ class MaterialTable(ElasticTable):
     """[material]: of the finger; nu has no default beside E_MPa because the paper gives none."""
 
 
-class PartTable(TomlTable):
+class PartTable(ElasticTable):
     """[parts.LABEL]: the solid of the finger with that label; any number of them.
 
     Attributes
     ----------
-    E_MPa : Young's modulus
-    nu : Poisson's ratio
-    rigid : true: the part keeps its shape, and takes neither E_MPa nor nu
+    rigid : true: the part keeps its shape, and takes neither a modulus nor nu
     """
 
-    E_MPa: Modulus | None = None
-    nu: Poisson | None = None
+    needed: ClassVar[str] = "E_MPa, nu, or with shore_A, shore_00 or silicone, or with rigid"
+
     rigid: bool = False
 
 

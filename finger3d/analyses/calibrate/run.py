@@ -120,7 +120,7 @@ def calibrate(
     mus : coefficients of friction, from 0 up
     noise, limit : standard deviation of a strain reading, and largest one of mu at which the sensor is usable
     tolerances : standard deviations by name, in place of the defaults of `TOLERANCES`; 0 omits one. The default of
-        E_percent is the spread of the modulus, if the scene gives a hardness or a silicone
+        E_percent is the largest spread of a modulus, if the scene gives hardnesses or silicones
     report : receives the progress
     maps : also map the sensitivity of strain to mu over the section
     marker_noise_mm, taxel_noise_MPa : standard deviation of a reading of a marker, and of a taxel
@@ -138,13 +138,14 @@ def calibrate(
         If fewer than four values of mu converge; the others are in calibration.csv.
     """
     from finger3d.scene import load
+    from finger3d.scene.parts import largest_spread
 
     report = report or Progress()
     scene = load(scene) if isinstance(scene, str | Path) else scene
     model = scene.model()
     noises: dict[Kind, float] = {"gauge": noise, "marker": marker_noise_mm, "taxel": taxel_noise_MPa}
     readings = found_readings(model, [gauge] if isinstance(gauge, str) else gauge, noises)
-    tolerances = with_defaults(tolerances, scene.constants.spread)
+    tolerances = with_defaults(tolerances, largest_spread(scene.tables))
     settings = CalibrationSettings(readings, tuple(mus), limit, tolerances, maps)
     if maps:
         from finger3d.sensor.maps import check

@@ -22,6 +22,7 @@ from finger3d.plotting.gauge_places import GaugeMap, draw
 from finger3d.progress import Progress
 from finger3d.report.gauge_places import gauge_places_page
 from finger3d.scene import Scene, parse, tree
+from finger3d.scene.parts import largest_spread
 from finger3d.sensor.curve import LARGEST_STRAIN
 
 MOST = 8
@@ -116,7 +117,9 @@ def place_gauges(
         )
     region = _region(model, free)
     with claimed(out, "optimise") as folder:
-        fields = GaugeFields.of(model, mus, noise, with_defaults(tolerances, scene.constants.spread), report.stage)
+        fields = GaugeFields.of(
+            model, mus, noise, with_defaults(tolerances, largest_spread(scene.tables)), report.stage
+        )
         found, everywhere = search(fields, region, count, report.stage)
         maps = tuple(_map(found, i, everywhere) for i in range(count))
         result = GaugePlaces(tuple(mus), found, maps, _with_gauges(given, path, found))
