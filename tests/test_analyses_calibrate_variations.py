@@ -10,9 +10,13 @@ import pytest
 from finger3d.analyses.calibrate.variations import deeper, poisson_step, tilted_mesh, with_modulus
 from finger3d.effects.elastic_object import Effect as ElasticObject
 from finger3d.effects.embedded_gauge import Effect as Foil
+from finger3d.effects.large_deformation import Effect as LargeDeformation
+from finger3d.fem.material import Isotropic
+from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.readings import Taxel
+from finger3d.mechanics.solve import march
 from finger3d.objects import Plane
 from tests.models import block
 
@@ -37,6 +41,15 @@ def test_a_body_of_another_modulus_is_the_body_built_with_it(model: Model) -> No
     assert problem.system.reading_rows == pytest.approx(rows, rel=1e-6, abs=1e-8 * np.abs(rows).max())
     if wanted.system.object_share is not None:
         assert problem.system.object_share == pytest.approx(wanted.system.object_share, rel=1e-6)
+
+
+@pytest.mark.parametrize("large", [False, True], ids=["small strain", "finite strain"])
+def test_the_moduli_of_all_parts_are_multiplied(large: bool) -> None:
+    finger = designs()["block"](half_length_mm=3.0, height_mm=3.0, width_mm=2.0, skin_mm=1.0)
+    model = replace(COARSE, design=finger, domain="plane-strain", gauges=(), parts=(("skin", Isotropic(3.0, 0.3)),))
+    base = build(LargeDeformation().apply(model) if large else model)
+    (*_, soft), (*_, stiff) = march(base), march(with_modulus(base, 1.25))
+    assert stiff.state.force == pytest.approx(1.25 * soft.state.force, rel=1e-6, abs=1e-9)
 
 
 def test_a_deeper_path_leaves_first_touch_where_it_is() -> None:

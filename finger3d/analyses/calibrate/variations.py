@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from finger3d.fem.condense import stiffened
-from finger3d.fem.material import MIXED_FROM
+from finger3d.fem.material import MIXED_FROM, Isotropic, Material
 from finger3d.mechanics.build import build
 from finger3d.mechanics.model import Leg, MeshOptions
 from finger3d.mechanics.problem import Problem, object_share, scatter_to_points
@@ -30,11 +30,11 @@ def poisson_step(nu: float, sd: float) -> float:
 
 
 def with_modulus(problem: Problem, factor: float) -> Problem:
-    """Return the problem with Young's modulus multiplied; in small strain the condensation is reused."""
+    """Return the problem with Young's moduli of all parts multiplied; in small strain the condensation is reused."""
     model = problem.model
     if not model.formulation.is_linear_elastic:
-        material = model.material.isotropic("the tolerance of E_MPa")
-        return build(replace(problem.model, material=replace(material, E_MPa=material.E_MPa * factor)))
+        parts = tuple((label, _stiffer(material, factor)) for label, material in model.parts)
+        return build(replace(model, material=_stiffer(model.material, factor), parts=parts))
     c, d = problem.delassus.shape[:2]
 
     def scaled(one: Problem) -> Problem:
@@ -52,6 +52,11 @@ def with_modulus(problem: Problem, factor: float) -> Problem:
 
     changed, bare = scaled(problem), problem.without_inclusions
     return replace(changed, without_inclusions=scaled(bare)) if bare else changed
+
+
+def _stiffer(material: Material, factor: float) -> Isotropic:
+    isotropic = material.isotropic("the tolerance of E_MPa")
+    return replace(isotropic, E_MPa=isotropic.E_MPa * factor)
 
 
 def tilted_mesh(problem: Problem) -> MeshOptions:
