@@ -99,7 +99,7 @@ def test_a_thin_finger_gets_two_elements_across() -> None:
     "finger",
     [
         {"geometry": "half_cylinder", "radius_mm": 5.0, "width_mm": 10.0},
-        {"geometry": "block", "half_length_mm": 10.0, "height_mm": 5.0, "width_mm": 10.0},
+        {"geometry": "block", "half_length_mm": 10.0, "height_mm": 5.0, "width_mm": 10.0, "skin_mm": 0.5},
     ],
 )
 def test_every_design_loads(finger) -> None:
