@@ -261,9 +261,11 @@ def _estimate_changes(record: PressRecord, report: Progress) -> None:
 def _advise(record: PressRecord) -> None:
     """Enter the lines of advice that follow from what is known so far."""
     from finger3d.accuracy.advice import advise
+    from finger3d.mechanics.coverage import penetration_advice
 
     record.advice = advise(
         record.problem.model, record.largest_strain, record.large_deformation, record.more_increments
     )
+    record.advice += penetration_advice(record.problem, record.surface_checks)
     if record.step_estimate and record.step_estimate.advice:
         record.advice.append(record.step_estimate.advice)

@@ -53,6 +53,16 @@ def inverted_place(mesh: Mesh, u: Float) -> Float | None:
     return np.asarray(mesh.points[mesh.cells[worst, : mesh.dim + 1]].mean(axis=0))
 
 
+def most_distorted(mesh: Mesh, u: Float) -> tuple[int, float]:
+    """Return the cell that displacements u (n, d) mm compress most, and its ratio of volumes after and before.
+
+    Volumes are the smallest Jacobian determinants over the nodes and the centre of a cell.
+    """
+    ratio = curved_jacobians(replace(mesh, points=mesh.points + u)) / curved_jacobians(mesh)
+    worst = int(ratio.argmin())
+    return worst, float(ratio[worst])
+
+
 def cell_angles_deg(points: Float, cells: Int) -> Float:
     """Smallest angle (2D) or dihedral angle (3D) (e,) of straight cells, degrees; 0 for a flat or inverted one."""
     d = points.shape[1]

@@ -22,8 +22,16 @@ _TOUCHES = {True: 1e-9, False: 1e-3}
 are chosen with a margin, and on other faces, where those at a crease overlap by what the mesh does not resolve."""
 
 
-_WARN_ABOVE = 0.1
-"""Penetration, over the depth of the press, above which a press is warned of."""
+_ADVISE_ABOVE, _WARN_ABOVE = 0.01, 0.1
+"""Penetration, over the depth of the press, above which a finer mesh is advised, and above which it is warned of."""
+
+_ORDER, _ORDER_AT_CREASE = 1.5, 0.7
+"""Power of the edge length with which penetration falls: at the edge of contact, beyond which the gap opens with the
+distance to the power 1.5 (Johnson 1985, sec. 4.2), and at a sharp edge of the finger, where .5 to 1 were measured
+(tests/test_mechanics_penetration.py)."""
+
+_MARGIN = 0.9
+"""Edge length that is advised, over the one that follows: penetration depends on where contact ends between points."""
 
 
 @dataclass(frozen=True)
@@ -36,17 +44,22 @@ class SurfaceCheck:
     penetration_mm : how deep its deepest place is inside the object; of an elastic object's deformed surface only what
         the contact points know is told
     place : (d,) mm, that place
+    face : number in `FREE_FACES` of its face
+    at_crease : whether a sharp edge of the finger bounds its facet
     """
 
     within_candidates: bool
     penetration_mm: float
     place: Float
+    face: int
+    at_crease: bool
 
 
 def check_surface(problem: Problem, steps: Sequence[StepResult]) -> list[SurfaceCheck]:
     """Check the free surface after each step; in small strain by one back-substitution for all of them."""
     tracker, rigid = DistanceTracker(), problem.model.object_compliance is None
     free, others = _surfaces(problem, steps)
+    hats, creased = free.hats.tocsc(), np.bincount(free.nodes)[free.nodes] > 1
     out = []
     for u, step in zip(_displacements(problem, steps), steps, strict=True):
         within = _stays_out(problem, u, step.target, others)
@@ -54,7 +67,8 @@ def check_surface(problem: Problem, steps: Sequence[StepResult]) -> list[Surface
         value, _ = tracker.distance(problem.placed(step.target), at, 0.0)
         worst = int(value.argmin())
         depth = max(-float(value[worst]), 0.0) if rigid else step.penetration_mm
-        out.append(SurfaceCheck(within, depth, at[worst]))
+        corners = hats[:, [worst]].indices
+        out.append(SurfaceCheck(within, depth, at[worst], int(free.face[corners[0]]), bool(creased[corners].any())))
     return out
 
 
@@ -69,13 +83,38 @@ def contact_within_candidates(problem: Problem, steps: Sequence[StepResult]) -> 
 
 def penetration_warnings(problem: Problem, checks: Sequence[SurfaceCheck]) -> list[str]:
     """Return warnings about penetration between the contact points during a press."""
+    return _penetration(problem, checks, _WARN_ABOVE, np.inf)
+
+
+def penetration_advice(problem: Problem, checks: Sequence[SurfaceCheck]) -> list[str]:
+    """Return advice about penetration that is more than a hundredth of the depth and not yet warned of."""
+    return _penetration(problem, checks, _ADVISE_ABOVE, _WARN_ABOVE)
+
+
+def resolving_edge(problem: Problem, check: SurfaceCheck) -> float:
+    """Return the edge length, over the present one, at which penetration is a hundredth of the depth."""
+    share = check.penetration_mm / problem.model.largest_depth_mm
+    order = _ORDER_AT_CREASE if check.at_crease else _ORDER
+    return float(min(1.0, _MARGIN * (_ADVISE_ABOVE / share) ** (1.0 / order))) if share > _ADVISE_ABOVE else 1.0
+
+
+def _penetration(problem: Problem, checks: Sequence[SurfaceCheck], above: float, most: float) -> list[str]:
+    """Return a line about the deepest place if its penetration over the depth is between two bounds."""
     deepest = max(checks, key=lambda check: check.penetration_mm, default=None)
-    if deepest is None or (depth := deepest.penetration_mm) <= _WARN_ABOVE * problem.model.largest_depth_mm:
+    mesh, depth = problem.model.mesh, problem.model.largest_depth_mm
+    if deepest is None or not above * depth < deepest.penetration_mm <= most * depth:
         return []
     where = ", ".join(f"{axis} = {value:.3g}" for axis, value in zip("xyz", deepest.place, strict=False))
+    on_wall = deepest.face != CONTACT and not deepest.at_crease
+    key, length = ("base_size_mm", mesh.base_size_mm) if on_wall else ("size_mm", mesh.size_mm)
+    cure = f"mesh.{key} = {resolving_edge(problem, deepest) * length:.2g} leaves about {_ADVISE_ABOVE:.0%}"
+    if mesh.grading is not None:
+        cure = "a smaller mesh.tolerance leaves less"
+    if deepest.at_crease:
+        cure += "; a fillet at that sharp edge of the finger leaves less"
     return [
-        f"the finger's surface is up to {depth:.2g} mm inside the object between the contact points ({where} mm); "
-        "lower mesh.size_mm, or mesh.base_size_mm if that is on a wall"
+        f"the finger's surface is up to {deepest.penetration_mm:.2g} mm, {deepest.penetration_mm / depth:.2g} of the "
+        f"depth, inside the object between the contact points ({where} mm); {cure}"
     ]
 
 

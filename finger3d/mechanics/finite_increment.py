@@ -15,6 +15,8 @@ from finger3d._types import Float
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.errors import Outcome
 from finger3d.fem.hyperelastic import InvertedError
+from finger3d.fem.recover import displacement
+from finger3d.mechanics.failure import cause_of_failure
 from finger3d.mechanics.finite_equations import Configuration, IncrementEquations, converged
 from finger3d.mechanics.finite_state import Linearisation
 
@@ -51,7 +53,10 @@ class FiniteIncrement(IncrementEquations):
         if found.outcome.ok or found.detail:
             return found
         damped = self._iterate_damped()
-        return replace(damped, iterations=found.iterations + damped.iterations)
+        detail = damped.detail
+        if damped.outcome is Outcome.NEWTON:
+            detail = cause_of_failure(self.problem, displacement(self.problem.mesh, self.start.unknowns))
+        return replace(damped, iterations=found.iterations + damped.iterations, detail=detail)
 
     def _iterate(self, guess: Float | None) -> ContactSolution:
         """Iterate from the configuration extrapolated, with a new tangent where the residual falls slowly.

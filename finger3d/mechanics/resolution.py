@@ -256,7 +256,7 @@ def warnings_before_meshing(model: Model, axes: tuple[str, ...]) -> list[str]:
 
 
 def _messages(model: Model, touch_mm: float, landmarks: Float | None, found: UnresolvedOverlap) -> list[str]:
-    messages = _details(model)
+    messages = unresolved_details(model)
     if found.share > _WARN_ABOVE or not found.in_contact:
         messages.append(_refusal(model, found, resolving_size(model, touch_mm, found, landmarks)))
     return messages
@@ -359,8 +359,8 @@ def _refusal(model: Model, found: UnresolvedOverlap, size: float | None) -> str:
     return f"{now}: {what}; no edge length above {_FINER**_TRIES * model.mesh.size_mm:.1g} mm resolves it"
 
 
-def _details(model: Model) -> list[str]:
-    """Messages about lengths of the object that are short compared with the edges of the mesh."""
+def unresolved_details(model: Model) -> list[str]:
+    """Return messages about lengths of the object that are short compared with the edges of the mesh."""
     detail, size, largest = model.object.detail, model.mesh.size_mm, _resolving(model.object)
     if detail is None or size <= largest * (1.0 + 1e-9):
         return []
