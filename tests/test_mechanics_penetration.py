@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
 from finger3d.contact.friction import Coulomb
@@ -9,10 +11,12 @@ from finger3d.effects.large_deformation import Effect
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
-from finger3d.mechanics.coverage import check_surface
+from finger3d.mechanics.coverage import SurfaceCheck, check_surface, penetration_advice, penetration_warnings
 from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
 from finger3d.objects import Plane, RigidObject, Wedge
+from finger3d.scene import parse
 
 HEIGHT, DEPTH = 10.0, 0.6
 
@@ -47,3 +51,48 @@ def test_penetration_at_a_sharp_edge_of_the_finger_is_that_of_the_edges_there() 
     found = [penetration(Plane(), size, 2.0) for size in (0.8, 0.4, 0.2)]
     assert found[0] > 1.2 * found[1] > 1.44 * found[2]
     assert penetration(Plane(), 0.4, 2.0, base=1.0) > 0.8 * found[1]
+
+
+SOLID = {
+    "finger": {"geometry": "block", "half_length_mm": 7.0, "height_mm": HEIGHT, "width_mm": 14.0},
+    "material": {"E_MPa": 1.0, "nu": 0.45},
+    "press": {"depth_mm": 0.9, "steps": 3},
+    "mesh": {"mesher": "swept"},
+}
+
+
+def pressed(model: Model) -> tuple[Problem, SurfaceCheck]:
+    problem = build(model)
+    return problem, check_surface(problem, list(march(problem)))[-1]
+
+
+def test_a_ball_enters_a_solid_by_less_than_a_hundredth_of_the_depth_by_default() -> None:
+    scene = parse({**SOLID, "object": {"shape": "sphere", "radius_mm": 6.8}})
+    _, check = pressed(scene.model())
+    assert check.penetration_mm < 0.01 * 0.9
+
+
+def test_the_edge_length_that_is_advised_leaves_a_hundredth_of_the_depth() -> None:
+    scene = parse({**SOLID, "object": {"shape": "sphere", "radius_mm": 6.8}})
+    model = Model(**(vars(scene.model()) | {"mesh": MeshOptions(0.6, 2.0, "swept")}))
+    problem, check = pressed(model)
+    assert not penetration_warnings(problem, [check])
+    (line,) = penetration_advice(problem, [check])
+    (length,) = re.findall(r"mesh\.size_mm = ([\d.]+) leaves about 1%", line)
+    finer = Model(**(vars(model) | {"mesh": MeshOptions(float(length), 2.0, "swept")}))
+    assert 0.2 < float(length) < 0.6
+    problem, check = pressed(finer)
+    assert check.penetration_mm < 0.01 * 0.9
+    assert not penetration_advice(problem, [check])
+
+
+def test_a_sharp_edge_of_the_finger_is_named_where_the_object_enters_there() -> None:
+    model = Model(
+        designs()["block"](half_length_mm=7.0, height_mm=HEIGHT, width_mm=HEIGHT), Isotropic(1.0, 0.4),
+        MeshOptions(0.8, 1.6, "swept"), (Leg(DEPTH, steps=3),), object=Plane(), friction=Coulomb(2.0),
+        domain="plane-strain",
+    )  # fmt: skip
+    problem, check = pressed(Effect().apply(model))
+    assert check.at_crease
+    (line,) = penetration_advice(problem, [check])
+    assert "sharp edge of the finger" in line

@@ -15,7 +15,7 @@ SLOW = (
     "error_bars", "calibration_z_scores", "ssnv503", "strain_to_friction", "paper_mesh", "press_release",
     "fig11_shear_mu", "fig07_strains_mu", "gallery", "triangulated_objects", "twisted_sphere", "increment_size",
     "object_curvature", "turned_scene", "hard_cases", "foil_at_large_deformation",
-    "embedded_gauge_study", "design_search", "action_reaction", "rolling_cylinder",
+    "embedded_gauge_study", "design_search", "action_reaction", "rolling_cylinder", "hard_large_deformation",
 )  # fmt: skip
 """Studies that take about seven seconds or more in their quick form; `make test-all` runs them."""
 

@@ -9,7 +9,7 @@ Every state is checked again here, from the compliance and the forces alone: gap
 friction against slip.  The paper's literal swap runs through the same histories up to its first cycle.  A state in
 which friction helps slip satisfies the paper's own conditions; it is counted as wrong_way, and the history goes on.
 
-A second half is at large deformation: random scenes of `_hard_large.py`, to depths of 40 % of the height.
+The same at large deformation: `hard_large_deformation.py`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
 
-from . import _hard, _hard_large
+from . import _hard
 from ._common import free_motion
 
 DEPTH = 10.0
@@ -164,7 +164,7 @@ def run(quick: bool) -> Result:
     *listed, counts = zip(*table, strict=True)
     columns = dict(zip(COLUMNS, map(list, listed), strict=True))
     rows = [row for dim in (2, 3) for row in _grid_rows(dim, columns, counts)]
-    return Result((*rows, *_hard.rows(quick), *_hard_large.rows(quick)), columns, lambda figure: _draw(figure, columns))
+    return Result((*rows, *_hard.rows(quick)), columns, lambda figure: _draw(figure, columns))
 
 
 def _grid_rows(dim: int, columns: dict[str, list[Any]], counts: tuple[list[int], ...]) -> list[Row]:

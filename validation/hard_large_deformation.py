@@ -1,0 +1,321 @@
+"""Does large deformation settle in every case a user can write, with nothing inside the object or inverted?
+
+Random fingers and blocks, objects, paths, materials and friction; every scene follows from its number.  Bodies are 10
+mm high; depths go to 40 % of the height, mu to 100, nu to 0.5.  A scene settles if all increments of all legs converge.
+
+The meshes are coarse, 4 to 12 times as coarse as those a scene gets by default: that is harder to settle, and lets the
+object in between the contact points.  What of this is left on default meshes is seen in the presses (first legs) of the
+first scenes again, with the edge lengths of a scene that gives none; solids are cut to 5 mm of width, with the object
+above their middle, so that a quarter is meshed.  Blocks pressed deep may fold at their corners on these, and end
+earlier.  Penetration is the deepest place of the whole free surface in any increment, over the depth of the press.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import trimesh
+
+from finger3d._types import Float
+from finger3d.analyses.study_rows import Result, Row
+from finger3d.contact.friction import Coulomb
+from finger3d.effects.large_deformation import Effect
+from finger3d.errors import Finger3dError, Outcome
+from finger3d.fem.material import Isotropic
+from finger3d.fem.recover import displacement
+from finger3d.geometry.design import Design
+from finger3d.geometry.registry import designs
+from finger3d.geometry.surface import Triangles
+from finger3d.mechanics.build import MARGIN, build, contact_box
+from finger3d.mechanics.coverage import SurfaceCheck, check_surface
+from finger3d.mechanics.history import StepResult
+from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.solve import march
+from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
+from finger3d.scene.checks import chosen
+from finger3d.scene.tables import MeshTable
+
+HEIGHT = 10.0
+SCENES, SCENES_QUICK = 320, 8
+RESOLVED, RESOLVED_QUICK = {2: 30, 3: 8}, {2: 2, 3: 0}
+GOAL = "goal of this project"
+ROBUST = "what a robust method does; REFERENCES.md, 8.2"
+RESOLVED_WIDTH = 5.0
+_NU, _MU = (0.3, 0.4, 0.45, 0.49, 0.5), (0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 10.0, 100.0)
+
+
+@dataclass(frozen=True)
+class Found:
+    """Result of a scene.
+
+    Attributes
+    ----------
+    settled : whether all increments converged
+    folds : whether it ended at a sharp edge of the finger, with a cell turned inside out or nearly so
+    says : outcome of the increment that failed
+    increments, factorizations, iterations : in all
+    penetration : deepest place of the surface inside the object, over the depth
+    at_sharp_edge : whether it is beside a sharp edge of the finger, or under an object that has edges
+    outside : whether no point of the surface is inside the object but those in contact
+    least_volume : smallest ratio of deformed to initial volume at the nodes of all cells, over all increments
+    """
+
+    settled: bool
+    folds: bool
+    says: str
+    increments: int
+    factorizations: int
+    iterations: int
+    penetration: float
+    at_sharp_edge: bool
+    outside: bool
+    least_volume: float
+
+
+def scene(number: int) -> Model:
+    """Return the model of a scene."""
+    rng = np.random.default_rng(number)
+    solid = bool(rng.uniform() < 0.25)
+    domain = "solid" if solid else str(rng.choice(["plane-strain", "plane-strain", "plane-stress"]))
+    size = HEIGHT / (6.0 if solid else 12.0) * rng.uniform(0.7, 1.2)
+    return Effect().apply(
+        Model(
+            _finger(rng, float(rng.uniform(4.0, 16.0)) if solid else HEIGHT),
+            Isotropic(1.0, float(rng.choice(_NU))),
+            MeshOptions(size, 2.0 * size, "swept"),
+            _path(rng, solid),
+            object=_object(rng, solid),
+            friction=Coulomb(float(rng.choice(_MU))),
+            domain=domain,  # type: ignore[arg-type]
+        )
+    )
+
+
+def resolved_scene(number: int) -> Model:
+    """Return the press of a scene on the mesh that is chosen by default."""
+    model = scene(number)
+    if model.domain == "solid":
+        design = replace(model.design, width_mm=min(model.design.width_mm, RESOLVED_WIDTH))  # type: ignore[type-var]
+        model = replace(model, design=design, object=replace(model.object, x_mm=0.0))
+    model = replace(model, legs=model.legs[:1])
+    sizes = chosen(MeshTable(mesher="swept"), model.design, model.domain, model.object, contact_box(model))
+    return replace(model, mesh=sizes)
+
+
+def _finger(rng: np.random.Generator, width: float) -> Design:
+    kind = rng.choice(["block", "block", "half_cylinder", "clipped_cylinder", "clipped_cylinder"])
+    if kind == "block":
+        return designs()["block"](half_length_mm=float(rng.uniform(4.0, 15.0)), height_mm=HEIGHT, width_mm=width)
+    if kind == "half_cylinder":
+        return designs()["half_cylinder"](radius_mm=HEIGHT, width_mm=width)
+    edge, half = rng.uniform(2.0, 8.0), rng.uniform(8.0, 14.0)
+    rise = HEIGHT - edge
+    radius = float((half**2 + rise**2) / (2.0 * rise))
+    return designs()["clipped_cylinder"](
+        radius_mm=radius, half_length_mm=float(half), edge_height_mm=float(edge), width_mm=width
+    )
+
+
+def _object(rng: np.random.Generator, solid: bool) -> RigidObject:
+    x = float(rng.uniform(-2.0, 2.0)) if rng.uniform() < 0.5 else 0.0
+    axis = str(rng.choice(["z", "x"])) if solid else "z"
+    match rng.choice(["plane", "plane", "cylinder", "sphere" if solid else "cylinder", "wedge", "wave", "mesh"]):
+        case "cylinder":
+            return Cylinder(x_mm=x, radius_mm=float(rng.uniform(4.0, 20.0)), axis=axis)  # type: ignore[arg-type]
+        case "sphere":
+            return Sphere(x_mm=x, radius_mm=float(rng.uniform(5.0, 20.0)))
+        case "wedge":
+            angle, radius = np.radians(rng.uniform(10.0, 40.0)), rng.uniform(2.0, 4.0)
+            return Wedge(x_mm=x, angle=float(angle), tip_radius_mm=float(radius))
+        case "wave":
+            length, amplitude = rng.uniform(8.0, 20.0), rng.uniform(0.1, 0.6)
+            return Wave(x_mm=x, wavelength_mm=float(length), amplitude_mm=float(amplitude))
+        case "mesh" if solid:
+            ball = trimesh.creation.icosphere(subdivisions=3, radius=float(rng.uniform(6.0, 15.0)))
+            return MeshObject(x_mm=x, surface=Triangles(np.array(ball.vertices), np.array(ball.faces)))
+    return Plane(tilt=float(np.radians(rng.uniform(-10.0, 10.0))) if rng.uniform() < 0.5 else 0.0)
+
+
+def _path(rng: np.random.Generator, solid: bool) -> tuple[Leg, ...]:
+    """Press; often slide, turn, and release half or all of it."""
+    depth, steps = float(rng.uniform(0.05, 0.4) * HEIGHT), int(rng.integers(3, 11))
+    legs, place = [Leg(depth, steps=steps)], {}
+    if rng.uniform() < 0.4:
+        place = {"slide_x_mm": float(rng.uniform(-0.5, 0.5) * depth)}
+        if solid:
+            place["slide_z_mm"] = float(rng.uniform(-0.3, 0.3) * depth)
+        legs.append(Leg(depth, steps=steps, **place))
+    if rng.uniform() < 0.2:
+        place["turn_z"] = float(np.radians(rng.uniform(-5.0, 5.0)))
+        if solid:
+            place["turn_y"] = float(np.radians(rng.uniform(-15.0, 15.0)))
+        legs.append(Leg(depth, steps=steps, **place))
+    if rng.uniform() < 0.4:
+        legs.append(Leg(float(rng.choice([0.0, 0.5])) * depth, steps=steps, **place))
+    return tuple(legs)
+
+
+def solved(model: Model) -> Found | None:
+    """Return the result of a scene, pressed again with more candidate points if contact left them; None if refused."""
+    for margin in (MARGIN, np.inf):
+        try:
+            problem = build(model, margin=margin)
+        except Finger3dError:  # the mesh is too coarse for the object
+            return None
+        workspace = model.formulation.workspace()
+        steps = list(march(problem, workspace=workspace))
+        good = [step for step in steps if step.outcome.ok]
+        checks = check_surface(problem, good)
+        if all(check.within_candidates for check in checks):
+            break
+    return _found(problem, steps, checks, workspace.factorizations)
+
+
+def _found(problem: Problem, steps: list[StepResult], checks: list[SurfaceCheck], factorizations: int) -> Found:
+    model, good = problem.model, [step for step in steps if step.outcome.ok]
+    last = steps[-1]
+    deepest = max(checks, key=lambda check: check.penetration_mm, default=None)
+    return Found(
+        settled=last.outcome.ok,
+        folds=last.outcome is Outcome.INVERTED or "sharp edge of the finger" in last.detail,
+        says=f"{last.outcome} ({last.detail})" if last.detail else str(last.outcome),
+        increments=sum(int(leg.steps) for leg in model.legs),
+        factorizations=factorizations,
+        iterations=sum(step.iterations for step in steps),
+        penetration=deepest.penetration_mm / model.largest_depth_mm if deepest else 0.0,
+        at_sharp_edge=isinstance(model.object, MeshObject) or bool(deepest and deepest.at_crease),
+        outside=all(check.within_candidates for check in checks),
+        least_volume=min((_least_volume(problem, step) for step in good), default=1.0),
+    )
+
+
+def _least_volume(problem: Problem, step: StepResult) -> float:
+    """Smallest determinant of the deformation gradient at the nodes of all cells, in the plane of a section."""
+    mesh = problem.mesh
+    u: Float = displacement(mesh, problem.model.formulation.unknowns(problem, step.part))
+    gradients, _ = mesh.element.physical_gradients(mesh.points[mesh.cells], mesh.element.nodes)
+    slope = np.einsum("eki,eqkj->eqij", u[mesh.cells], gradients, optimize=True)
+    return float(np.linalg.det(slope + np.eye(mesh.dim)).min())
+
+
+def coarse(count: int) -> Iterator[tuple[int, Model, Found]]:
+    """Yield number, model and result of the first scenes that are not refused."""
+    number = 0
+    while count:
+        model = scene(number)
+        if (found := solved(model)) is not None:
+            count -= 1
+            yield number, model, found
+        number += 1
+
+
+def resolved(counts: dict[int, int]) -> Iterator[tuple[int, Model, Found]]:
+    """Yield number, model and result of presses on default meshes, as many as asked for of sections and solids."""
+    left, number = dict(counts), 0
+    while any(left.values()):
+        dim = 3 if scene(number).domain == "solid" else 2
+        if left[dim]:
+            model = resolved_scene(number)
+            if (found := solved(model)) is not None:
+                left[dim] -= 1
+                yield number, model, found
+        number += 1
+
+
+def run(quick: bool) -> Result:
+    """Solve the scenes on their coarse meshes, and some of them on those of default."""
+    found = {
+        "coarse": list(coarse(SCENES_QUICK if quick else SCENES)),
+        "default": list(resolved(RESOLVED_QUICK if quick else RESOLVED)),
+    }
+    table = _table(found)
+    rows = _settling([f for *_, f in found["coarse"]]) + _penetration(found)
+    return Result(tuple(rows), table, lambda figure: _draw(figure, table))
+
+
+def _bound(what: str, most: float, got: float, reason: str, reference: str = ROBUST) -> Row:
+    return Row(what, reference, float(most), float(got), 0.0, reason, measure="at most")
+
+
+def _settling(found: Sequence[Found]) -> list[Row]:
+    """How many scenes settle, at what cost, and whether a cell is inverted."""
+    here = f"{len(found)} random scenes"
+    unsettled = [f for f in found if not f.settled]
+    increments = sum(f.increments for f in found)
+    return [
+        _bound(f"{here}: share unsettled", 0.02, len(unsettled) / len(found), "sharp corners that fold without end"),
+        _bound(f"{here}: unsettled without cause or cure", 0, sum(not _cured(f) for f in unsettled), "none"),
+        Row(f"{here}: unsettled where no sharp edge of the finger folds", GOAL, 0.0,
+            float(sum(not f.folds for f in unsettled)), 0.0, "none", "statement", "at most"),
+        _bound(f"{here}: scenes with a point inside the object that is not in contact", 0,
+               sum(not f.outside for f in found), "none"),
+        Row(f"{here}: smallest ratio of volumes at any node", ROBUST, 0.0, min(f.least_volume for f in found), 0.0,
+            "no cell inverted", measure="at least"),
+        _bound(f"{here}: factorisations of an increment", 3.0, sum(f.factorizations for f in found) / increments, GOAL,
+               GOAL),
+    ]  # fmt: skip
+
+
+def _cured(found: Found) -> bool:
+    """Whether the outcome names the place or the length at fault in one line, and what to try."""
+    return "try" in found.says and "mm" in found.says and "\n" not in found.says
+
+
+def _penetration(found: dict[str, list[tuple[int, Model, Found]]]) -> list[Row]:
+    """How deep the object is between the contact points, over the depth."""
+    rows = []
+    for mesh, scenes in found.items():
+        for kind, solid in (("sections", False), ("solids", True)):
+            of_kind = [f for _, model, f in scenes if (model.domain == "solid") == solid]
+            if not of_kind:
+                continue
+            here = f"{len(of_kind)} {kind} on {mesh} meshes: largest penetration over the depth"
+            if mesh == "coarse":
+                rows.append(Row(here, GOAL, 0.01, max(f.penetration for f in of_kind), 0.0,
+                                "between points of coarse meshes", "statement", "at most"))  # fmt: skip
+                continue
+            smooth = max((f.penetration for f in of_kind if not f.at_sharp_edge), default=0.0)
+            rows.append(_bound(f"{here}, where finger and object are smooth", 0.01, smooth, "a hundredth", GOAL))
+            rows.append(Row(here, GOAL, 0.01, max(f.penetration for f in of_kind), 0.0,
+                            "singular at sharp edges of finger and object", "statement", "at most"))  # fmt: skip
+    return rows
+
+
+def _table(found: dict[str, list[tuple[int, Model, Found]]]) -> dict[str, list[Any]]:
+    rows = [
+        {
+            "mesh": mesh, "scene": number, "domain": model.domain, "finger": model.design.name,
+            "object": type(model.object).__name__.lower(), "nu": model.material.nu, "mu": model.friction.mu,
+            "depth_mm": model.largest_depth_mm, "size_mm": model.mesh.size_mm, "settled": f.settled,
+            "penetration_over_depth": f.penetration,
+            "at_sharp_edge": f.at_sharp_edge if mesh == "default" else "",  # coarse edges blur where it is
+            "increments": f.increments, "factorizations": f.factorizations, "least_volume": f.least_volume,
+        }
+        for mesh, scenes in found.items()
+        for number, model, f in scenes
+    ]  # fmt: skip
+    return {key: [row[key] for row in rows] for key in rows[0]}
+
+
+def _draw(figure: Any, table: dict[str, list[Any]]) -> None:
+    left, right = figure.subplots(1, 2)
+    t = {key: np.array(values) for key, values in table.items()}
+    share = 100.0 * np.maximum(t["penetration_over_depth"].astype(float), 1e-6)
+    size = t["size_mm"].astype(float)
+    for mesh, mark in (("coarse", "."), ("default", "o")):
+        for kind, solid, color in (("sections", False, "C0"), ("solids", True, "C1")):
+            which = (t["mesh"] == mesh) & ((t["domain"] == "solid") == solid)
+            if which.any():
+                left.loglog(size[which], share[which], color + mark, label=f"{kind}, {mesh} meshes")
+                right.step(np.sort(share[which]), np.linspace(0.0, 100.0, which.sum()), color + ("-", ":")[mark == "."],
+                           label=f"{kind}, {mesh} meshes")  # fmt: skip
+    left.axhline(1.0, color="k", lw=0.8, ls=":")
+    right.axvline(1.0, color="k", lw=0.8, ls=":")
+    left.set(xlabel="edge length at the contact (mm)", ylabel="largest penetration, % of the depth")
+    right.set(xlabel="largest penetration, % of the depth", ylabel="share of the scenes, %", xscale="log")
+    for axes in (left, right):
+        axes.legend(fontsize=7)
