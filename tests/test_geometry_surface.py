@@ -121,3 +121,9 @@ def test_equality_is_by_content() -> None:
     assert box(1, 2, 3) == box(1, 2, 3)
     assert box(1, 2, 3) != box(1, 2, 3.1)
     assert len({box(1, 2, 3), box(1, 2, 3)}) == 1
+
+
+def test_the_sharpest_edge_of_a_box_is_square_and_that_of_a_fine_ball_is_flat() -> None:
+    assert box(2, 3, 4).sharpest_edge == pytest.approx(np.pi / 2, rel=1e-12)
+    # facets of 180 / 40 = 4.5 degrees along the meridians
+    assert ball(3.0, 40, 80).sharpest_edge == pytest.approx(np.radians(4.5), rel=0.05)

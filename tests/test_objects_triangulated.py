@@ -49,3 +49,9 @@ def test_turning_a_mesh_object_and_its_slide_turns_the_result() -> None:
     b, _ = pressed(pad(design=square, mesh=options, object=MeshObject(0.2, -0.5, surface=turned), legs=across))
     assert b["normal_force_N"] == pytest.approx(a["normal_force_N"], rel=0.03)
     assert b["tangential_force_z_N"] == pytest.approx(-a["tangential_force_x_N"], rel=0.05)
+
+
+def test_a_ball_has_no_edges_where_contact_ends_and_a_box_has() -> None:
+    assert not MeshObject(surface=ball(5.0)).has_edges
+    assert MeshObject(surface=box(2.0, 3.0, 4.0)).has_edges
+    assert not Sphere(radius_mm=5.0).has_edges

@@ -41,7 +41,7 @@ from finger3d.scene.tables import MeshTable
 
 HEIGHT = 10.0
 SCENES, SCENES_QUICK = 320, 8
-RESOLVED, RESOLVED_QUICK = {2: 30, 3: 8}, {2: 2, 3: 0}
+RESOLVED, RESOLVED_QUICK = {2: 40, 3: 8}, {2: 2, 3: 0}
 GOAL = "goal of this project"
 ROBUST = "what a robust method does; REFERENCES.md, 8.2"
 RESOLVED_WIDTH = 5.0
@@ -282,6 +282,11 @@ def _penetration(found: dict[str, list[tuple[int, Model, Found]]]) -> list[Row]:
             rows.append(_bound(f"{here}, where finger and object are smooth", 0.01, smooth, "a hundredth", GOAL))
             rows.append(Row(here, GOAL, 0.01, max(f.penetration for f in of_kind), 0.0,
                             "singular at sharp edges of finger and object", "statement", "at most"))  # fmt: skip
+    ended = [f for *_, f in found["default"] if not f.settled]
+    here = f"{len(found['default'])} presses on default meshes"
+    rows.append(Row(f"{here}: share that ends early", GOAL, 0.02, len(ended) / len(found["default"]), 0.0,
+                    "the finer, the sooner sharp edges fold", "statement", "at most"))  # fmt: skip
+    rows.append(_bound(f"{here}: ends early without cause or cure", 0, sum(not _cured(f) for f in ended), "none"))
     return rows
 
 

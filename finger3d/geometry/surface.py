@@ -69,6 +69,13 @@ class Triangles:
         """Unit normals (m, 3); 0 for a triangle without area."""
         return _normalise(self.area_vectors)
 
+    @cached_property
+    def sharpest_edge(self) -> float:
+        """Largest angle (rad) between the normals of two triangles that share an edge."""
+        # the pseudonormal of an edge halves the angle
+        half = np.einsum("mek,mk->me", self._corner_normals[0], self.normals)
+        return 2.0 * float(np.arccos(np.clip(half.min(), -1.0, 1.0)))
+
     @property
     def volume(self) -> float:
         """Enclosed volume of a closed surface, mm3; negative if it is inside out."""

@@ -136,6 +136,11 @@ class RigidObject(ABC):
         return False
 
     @property
+    def has_edges(self) -> bool:
+        """Whether contact may end at sharp edges of the object."""
+        return False
+
+    @property
     def is_convex(self) -> bool:
         """Whether the body is convex."""
         return True

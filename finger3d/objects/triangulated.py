@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar, Literal
@@ -17,6 +18,9 @@ from finger3d.objects.rigid import RigidObject
 
 _LEVEL = 1e-6  # of the size: points this little above the lowest one count as lowest too (STL has single precision)
 _MOST = 2_000  # points that are compared with their mirror images
+
+_SMOOTH = math.radians(30.0)
+"""Largest angle between the normals of neighbouring triangles of a smooth surface; a circle of 12 edges has it."""
 
 
 @dataclass(frozen=True)
@@ -101,6 +105,11 @@ class MeshObject(RigidObject):
     def drawing(self, reach_mm: float) -> Triangles:
         """Return all triangles."""
         return self.triangles
+
+    @property
+    def has_edges(self) -> bool:
+        """Whether the surface is more than a smooth one in triangles."""
+        return self.surface.sharpest_edge > _SMOOTH
 
     @property
     def is_convex(self) -> bool:
