@@ -6,7 +6,8 @@ mm high; depths go to 40 % of the height, mu to 100, nu to 0.5.  A scene settles
 The meshes are coarse, 4 to 12 times as coarse as those a scene gets by default: that is harder to settle, and lets the
 object in between the contact points.  What of this is left on default meshes is seen in the presses (first legs) of the
 first scenes again, with the edge lengths of a scene that gives none; solids are cut to 5 mm of width, with the object
-above their middle, so that a quarter is meshed.  Blocks pressed deep may fold at their corners on these, and end
+above their middle, so that a quarter is meshed.  Most of these solids touch with their rims; balls in the middle of a
+block do not.  Blocks pressed deep may fold at their corners on these, and end
 earlier.  Penetration is the deepest place of the whole free surface in any increment, over the depth of the press.
 """
 
@@ -41,7 +42,10 @@ from finger3d.scene.tables import MeshTable
 
 HEIGHT = 10.0
 SCENES, SCENES_QUICK = 320, 8
-RESOLVED, RESOLVED_QUICK = {2: 40, 3: 8}, {2: 2, 3: 0}
+RESOLVED, RESOLVED_QUICK = {2: 40, 3: 6}, {2: 2, 3: 0}
+BALLS = ((5.0, 0.8), (8.0, 0.8), (15.0, 1.0))
+"""Radius and depth, mm, of balls that touch nothing but the middle of a block."""
+
 GOAL = "goal of this project"
 ROBUST = "what a robust method does; REFERENCES.md, 8.2"
 RESOLVED_WIDTH = 5.0
@@ -101,9 +105,23 @@ def resolved_scene(number: int) -> Model:
     if model.domain == "solid":
         design = replace(model.design, width_mm=min(model.design.width_mm, RESOLVED_WIDTH))  # type: ignore[type-var]
         model = replace(model, design=design, object=replace(model.object, x_mm=0.0))
-    model = replace(model, legs=model.legs[:1])
-    sizes = chosen(MeshTable(mesher="swept"), model.design, model.domain, model.object, contact_box(model))
-    return replace(model, mesh=sizes)
+    return _by_default(replace(model, legs=model.legs[:1]))
+
+
+def ball(radius_mm: float, depth_mm: float) -> Model:
+    """Return the press of a ball into the middle of a block on the mesh that is chosen by default."""
+    design = designs()["block"](half_length_mm=6.0, height_mm=HEIGHT, width_mm=12.0)
+    model = Model(
+        design, Isotropic(1.0, 0.45), MeshOptions(1.0, 1.0, "swept"), (Leg(depth_mm, steps=4),),
+        object=Sphere(radius_mm=radius_mm), friction=Coulomb(0.5),
+    )  # fmt: skip
+    return Effect().apply(_by_default(model))
+
+
+def _by_default(model: Model) -> Model:
+    """Return a model with the edge lengths of a scene that gives none."""
+    table = MeshTable(mesher="swept")
+    return replace(model, mesh=chosen(table, model.design, model.domain, model.object, contact_box(model)))
 
 
 def _finger(rng: np.random.Generator, width: float) -> Design:
@@ -226,11 +244,21 @@ def resolved(counts: dict[int, int]) -> Iterator[tuple[int, Model, Found]]:
         number += 1
 
 
+def balls(count: int) -> Iterator[tuple[int, Model, Found]]:
+    """Yield number, model and result of the presses of balls."""
+    for number, (radius, depth) in enumerate(BALLS[:count]):
+        model = ball(radius, depth)
+        found = solved(model)
+        assert found is not None
+        yield number, model, found
+
+
 def run(quick: bool) -> Result:
     """Solve the scenes on their coarse meshes, and some of them on those of default."""
     found = {
         "coarse": list(coarse(SCENES_QUICK if quick else SCENES)),
         "default": list(resolved(RESOLVED_QUICK if quick else RESOLVED)),
+        "balls": list(balls(1 if quick else len(BALLS))),
     }
     table = _table(found)
     rows = _settling([f for *_, f in found["coarse"]]) + _penetration(found)
@@ -268,20 +296,21 @@ def _cured(found: Found) -> bool:
 def _penetration(found: dict[str, list[tuple[int, Model, Found]]]) -> list[Row]:
     """How deep the object is between the contact points, over the depth."""
     rows = []
-    for mesh, scenes in found.items():
+    for mesh in ("coarse", "default"):
         for kind, solid in (("sections", False), ("solids", True)):
-            of_kind = [f for _, model, f in scenes if (model.domain == "solid") == solid]
-            if not of_kind:
-                continue
-            here = f"{len(of_kind)} {kind} on {mesh} meshes: largest penetration over the depth"
-            if mesh == "coarse":
-                rows.append(Row(here, GOAL, 0.01, max(f.penetration for f in of_kind), 0.0,
-                                "between points of coarse meshes", "statement", "at most"))  # fmt: skip
-                continue
-            smooth = max((f.penetration for f in of_kind if not f.at_sharp_edge), default=0.0)
-            rows.append(_bound(f"{here}, where finger and object are smooth", 0.01, smooth, "a hundredth", GOAL))
-            rows.append(Row(here, GOAL, 0.01, max(f.penetration for f in of_kind), 0.0,
-                            "singular at sharp edges of finger and object", "statement", "at most"))  # fmt: skip
+            here = [f for _, model, f in found[mesh] if (model.domain == "solid") == solid]
+            if here:
+                rows.append(Row(f"{len(here)} {kind} on {mesh} meshes: largest penetration over the depth", GOAL, 0.01,
+                                max(f.penetration for f in here), 0.0, "largest at sharp edges of finger and object",
+                                "statement", "at most"))  # fmt: skip
+    what = "on default meshes, deepest away from sharp edges: largest penetration over the depth"
+    for kind, some in (("sections", found["default"]), ("solids under balls", found["balls"])):
+        smooth = [
+            f for _, model, f in some if not f.at_sharp_edge and (model.domain == "solid") == (kind != "sections")
+        ]
+        if smooth:
+            rows.append(_bound(f"{len(smooth)} {kind} {what}", 0.01, max(f.penetration for f in smooth), "a hundredth",
+                               GOAL))  # fmt: skip
     ended = [f for *_, f in found["default"] if not f.settled]
     here = f"{len(found['default'])} presses on default meshes"
     rows.append(Row(f"{here}: share that ends early", GOAL, 0.02, len(ended) / len(found["default"]), 0.0,
@@ -297,7 +326,7 @@ def _table(found: dict[str, list[tuple[int, Model, Found]]]) -> dict[str, list[A
             "object": type(model.object).__name__.lower(), "nu": model.material.nu, "mu": model.friction.mu,
             "depth_mm": model.largest_depth_mm, "size_mm": model.mesh.size_mm, "settled": f.settled,
             "penetration_over_depth": f.penetration,
-            "at_sharp_edge": f.at_sharp_edge if mesh == "default" else "",  # coarse edges blur where it is
+            "at_sharp_edge": f.at_sharp_edge if mesh != "coarse" else "",  # coarse edges blur where it is
             "increments": f.increments, "factorizations": f.factorizations, "least_volume": f.least_volume,
         }
         for mesh, scenes in found.items()
@@ -311,13 +340,14 @@ def _draw(figure: Any, table: dict[str, list[Any]]) -> None:
     t = {key: np.array(values) for key, values in table.items()}
     share = 100.0 * np.maximum(t["penetration_over_depth"].astype(float), 1e-6)
     size = t["size_mm"].astype(float)
-    for mesh, mark in (("coarse", "."), ("default", "o")):
+    for mesh, mark in (("coarse", "."), ("default", "o"), ("balls", "^")):
         for kind, solid, color in (("sections", False, "C0"), ("solids", True, "C1")):
             which = (t["mesh"] == mesh) & ((t["domain"] == "solid") == solid)
             if which.any():
-                left.loglog(size[which], share[which], color + mark, label=f"{kind}, {mesh} meshes")
-                right.step(np.sort(share[which]), np.linspace(0.0, 100.0, which.sum()), color + ("-", ":")[mark == "."],
-                           label=f"{kind}, {mesh} meshes")  # fmt: skip
+                name = "balls, default meshes" if mesh == "balls" else f"{kind}, {mesh} meshes"
+                left.loglog(size[which], share[which], color + mark, label=name)
+                style = color + {"coarse": ":", "default": "-", "balls": "--"}[mesh]
+                right.step(np.sort(share[which]), np.linspace(0.0, 100.0, which.sum()), style, label=name)
     left.axhline(1.0, color="k", lw=0.8, ls=":")
     right.axvline(1.0, color="k", lw=0.8, ls=":")
     left.set(xlabel="edge length at the contact (mm)", ylabel="largest penetration, % of the depth")

@@ -26,8 +26,8 @@ _MOST_MARKERS = 20_000
 
 _ACROSS = 20.0
 """Edges across the overlap of a curved object, which is some 1.4 times as wide as the contact. Between the points at
-the edge of contact the object enters by 0.8 times (edges across)^-1.6 of the depth in the median of 38 presses of random
-solids, and by less than 1 % from 20 on, but at sharp tips and at rims of the finger (docs/troubleshooting.md)."""
+the edge of contact the object enters by 0.8 times (edges across)^-1.6 of the depth in the median of 38 presses of
+random solids, and by less than 1 % from 20 on, but at sharp tips and at rims of the finger."""
 
 _ACROSS_TO_EDGES = 12.0
 """The same where the overlap ends at edges of the finger or the object, between which contact fills it."""
