@@ -1,8 +1,9 @@
 """Companion of a press: the same scene on another mesh, from which the discretisation error is estimated.
 
 The companion has about twice the edge lengths, hence at best an eighth of the cells of a solid and a quarter of those
-of a section.  A mesh too small to be coarsened gets a finer companion.  An elastic object is meshed anew together with
-the finger, so that the estimate covers both.
+of a section.  A mesh too small to be coarsened gets a finer companion, and so does a mesh that was
+are halved.  An elastic object is meshed anew together with the finger, so
+that the estimate covers both.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from finger3d.mechanics.model import MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.symmetry import symmetry
 from finger3d.meshing.generate import mesh_solid
+from finger3d.meshing.given import GivenMesh
 from finger3d.meshing.swept import mesh_section
 
 Say = Callable[[str], None]
@@ -41,6 +43,12 @@ _LEAST_UNSTRUCTURED_UNKNOWNS = 15_000
 _FINITE_STRAIN_FACTOR = 2.5
 """Edge length of the companion of a section at finite strain, where every increment factorises the tangent: at `FACTOR`
 the companion would take half the time of the press."""
+
+_BISECTED_FACTORS = (0.5, 0.7)
+"""Edge lengths of a bisected companion over those of the mesh; the first with few enough unknowns is taken."""
+
+_LARGEST_BISECTED_UNKNOWNS = 250_000
+"""Largest number of unknowns of a bisected companion, which takes a minute."""
 
 LEAST_RATIO = 1.25
 """Smallest ratio of edge lengths from which an error is estimated."""
@@ -80,6 +88,8 @@ def companion(problem: Problem, say: Say = lambda text: None) -> Problem:
 
 def companions(model: Model, unknowns: float) -> tuple[list[MeshOptions], list[MeshOptions]]:
     """Return the candidate companions, coarser and finer, of a mesh of so many unknowns; the preferred one first."""
+    if isinstance(model.design, GivenMesh):
+        return [], [_bisected(model.mesh, unknowns)]
     own, enough = model.mesh, unknowns >= _LEAST_UNSTRUCTURED_UNKNOWNS
     costly = model.domain != "solid" and model.formulation.finite_strain
     longer = coarser(model, _FINITE_STRAIN_FACTOR if costly else FACTOR).mesh
@@ -92,6 +102,23 @@ def companions(model: Model, unknowns: float) -> tuple[list[MeshOptions], list[M
         for f in (_FINER_FACTOR, _FINER_FACTOR**2)
     ]
     return chosen, finer
+
+
+def _bisected(own: MeshOptions, unknowns: float) -> MeshOptions:
+    """Return the options of the companion of a mesh that was given: its cells are halved, and cannot be joined.
+
+    Raises
+    ------
+    Finger3dError
+        If the companion would have too many unknowns.
+    """
+    most = unknowns / _LARGEST_BISECTED_UNKNOWNS
+    factor = next((f for f in _BISECTED_FACTORS if most <= f**3), None)
+    if factor is None:
+        raise Finger3dError(
+            "the mesh was given, and is too large to be halved everywhere; press a coarser mesh of the body, too"
+        )
+    return replace(own, size_mm=factor * own.size_mm, base_size_mm=factor * own.base_size_mm)
 
 
 def _built_if(problem: Problem, model: Model, enough: Callable[[float], bool], say: Say) -> Problem | None:

@@ -16,6 +16,7 @@ from finger3d.mechanics.model import Model
 from finger3d.mechanics.path import AUTO_START
 from finger3d.mechanics.step_halving import automatic, condensation_s, contact_s, limits
 from finger3d.mechanics.symmetry import symmetry
+from finger3d.meshing.given import GivenMesh
 from finger3d.meshing.limits import check_memory, rows_gb
 
 _BASE_MB = 170.0
@@ -49,7 +50,7 @@ def forecast(model: Model) -> Tree:
     runs, free = _runs(model, size, d), sum(leg.steps == "auto" for leg in model.legs)
     fixed = sum(leg.steps for leg in model.legs if isinstance(leg.steps, int))
     marched = len(runs) * fixed + sum(runs) * free
-    tetwild = d == 3 and model.mesh.mesher == "ftetwild"
+    tetwild = d == 3 and model.mesh.mesher == "ftetwild" and not isinstance(model.design, GivenMesh)
     seconds = _seconds(size, d, marched, tetwild)
     seconds["assembly"] += len(model.gauges) * (_GAUGE_S + _GAUGE_CELL_S * size.cells)
     memory = max(_memory(size, d, len(model.gauges)), _TETWILD_MB if tetwild else 0.0)
@@ -117,7 +118,7 @@ def _size(model: Model, zone: tuple[float, float, float, float], axes: tuple[str
     from finger3d.meshing.swept import mesh_section
 
     h = model.mesh.size_mm
-    if model.domain != "solid" or model.mesh.mesher == "swept":
+    if model.domain != "solid" or model.mesh.mesher == "swept" or isinstance(model.design, GivenMesh):
         make = mesh_solid if model.domain == "solid" else mesh_section
         mesh, report = refined_at_gauges(model, *make(model.design, model.mesh, zone, axes), axes)
         d, vertices = mesh.dim, len(mesh.vertices)

@@ -40,6 +40,7 @@ from finger3d.mechanics.step_halving import (
     step_error,
     with_increments_of,
 )
+from finger3d.meshing.given import GivenMesh
 
 Measure = Callable[[Problem, StepResult], dict[str, float]]
 
@@ -234,7 +235,8 @@ def _unknowns(problem: Problem) -> int:
 def _on_mesh(beside: Problem, kind: str) -> str:
     """Return how the discretisation error was estimated, with the time of a mesh that was made for it."""
     options = beside.model.mesh
-    mesher = options.mesher if beside.dim == 3 else "structured"
+    given = isinstance(beside.model.design, GivenMesh)
+    mesher = "bisected" if given else options.mesher if beside.dim == 3 else "structured"
     sizes = f"{mesher}, {options.size_mm:.4g} and {options.base_size_mm:.4g} mm"
     sizes += ", of both bodies" if beside.model.object_compliance else ""
     text = f"mesh: {_unknowns(beside)} dofs ({sizes}) beside, {'finer, ' * (kind == 'finer')}order {ORDER}"

@@ -1,4 +1,4 @@
-"""Mesh of a design, by the mesher that the options name."""
+"""Mesh of a design, by the mesher that the options name; a finger that is a mesh already is not meshed."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from finger3d.fem.simplex import Mesh
 from finger3d.geometry.design import Design
+from finger3d.meshing.given import GivenMesh, mesh_given
 from finger3d.meshing.options import MeshSizes, Zone
 from finger3d.meshing.report import MeshReport
 from finger3d.meshing.swept import mesh_swept
@@ -33,6 +34,8 @@ def mesh_solid(
     mesh : quadratic, facets labelled contact, base, ends, walls, symmetry_x, symmetry_z
     report : size and quality
     """
+    if isinstance(design, GivenMesh):
+        return mesh_given(design, options, zone)
     if options.mesher == "swept":
         say("meshing (swept)")
         return mesh_swept(design, options, zone, symmetry)

@@ -11,6 +11,7 @@ from finger3d._ranges import LONGEST_SLIDE, at_least, at_most
 from finger3d._types import Float, Tree
 from finger3d.geometry.design import Design
 from finger3d.mechanics.model import Domain, MeshOptions
+from finger3d.meshing.given import GivenMesh
 from finger3d.objects import RigidObject
 from finger3d.scene.messages import dotted, shown
 from finger3d.scene.parts import check_parts
@@ -139,6 +140,8 @@ def smallest_mm(design: Design, solid: bool) -> float:
 
 
 def _sizes(mesh: MeshTable, design: Design, solid: bool) -> list[str]:
+    if isinstance(design, GivenMesh) and (line := _beside_a_mesh(mesh, design)):
+        return [line]
     for key in ("size_mm", "base_size_mm"):
         if mesh.tolerance is not None and (size := getattr(mesh, key)) is not None:
             return [
@@ -167,8 +170,29 @@ def _sizes(mesh: MeshTable, design: Design, solid: bool) -> list[str]:
     return []
 
 
+def _beside_a_mesh(mesh: MeshTable, design: GivenMesh) -> str:
+    """Return a line about a key that a finger that is a mesh cannot take; empty if there is none."""
+    if mesh.tolerance is not None:
+        return (
+            f"mesh.tolerance = {shown(mesh.tolerance)}: the mesh {design.name} is used as it is; take it out, and "
+            "lower mesh.size_mm, which halves cells at the contact, until the results agree"
+        )
+    for key, own in (("size_mm", design.size_mm), ("base_size_mm", design.base_size_mm)):
+        value = getattr(mesh, key)
+        if value is not None and value > own * (1.0 + 1e-9):
+            return (
+                f"mesh.{key} = {shown(value)}: the mesh {design.name} has edges of {shown(own)} mm and is not made "
+                f"coarser; must be at most {at_most(own)}, or be taken out"
+            )
+    return ""
+
+
 def chosen(mesh: MeshTable, design: Design, domain: Domain, obj: RigidObject, box: Box) -> MeshOptions:
     """Return the mesh options, with sizes chosen where they are absent, from all else and the box of contact."""
+    if isinstance(design, GivenMesh):
+        size = mesh.size_mm or design.size_mm
+        base = max(mesh.base_size_mm or design.base_size_mm, size)
+        return MeshOptions(size, base, mesh.mesher, gauge_refinement=mesh.gauge_refinement)
     solid = domain == "solid"
     share = design.height_mm * (1.0 if solid else 0.25)
     size, base = mesh.size_mm, mesh.base_size_mm

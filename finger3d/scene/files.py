@@ -9,17 +9,22 @@ from typing import TYPE_CHECKING
 from finger3d._types import Tree, TreeView
 from finger3d.geometry.design import Design
 from finger3d.geometry.files import SUFFIXES
+from finger3d.meshing.mesh_files import MESH_SUFFIXES
 from finger3d.objects import MeshObject, RigidObject
 
 if TYPE_CHECKING:
     from finger3d.geometry.imported import Imported
+    from finger3d.meshing.given import GivenMesh
+
+FINGER_SUFFIXES = (*SUFFIXES, *MESH_SUFFIXES)
+"""Files that may be a finger; an object is no mesh of tetrahedra."""
 
 _APART = 200.0  # sizes of object and finger that differ more than this are in different units, or cannot be meshed
 
 
 def is_file(geometry: object) -> bool:
     """Whether finger.geometry names a file and not a design."""
-    return isinstance(geometry, str) and geometry.lower().endswith(SUFFIXES)
+    return isinstance(geometry, str) and geometry.lower().endswith(FINGER_SUFFIXES)
 
 
 def absolute(given: TreeView, scene: Path | None) -> Tree:
@@ -33,8 +38,12 @@ def absolute(given: TreeView, scene: Path | None) -> Tree:
     return tree
 
 
-def finger(path: str) -> Imported:
+def finger(path: str) -> Imported | GivenMesh:
     """Return the finger in a file."""
+    if path.lower().endswith(MESH_SUFFIXES):
+        from finger3d.meshing.given import given_mesh
+
+        return given_mesh(path)
     from finger3d.geometry.imported import imported
 
     return imported(path)

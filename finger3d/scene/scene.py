@@ -357,7 +357,7 @@ def _named(
         found |= {p: t.replace("no such key", "no such key beside a file, take it out") for p, t in mistakes.items()}
         return value, table
     if name == "finger" and isinstance(value, str) and "." in value:
-        found[name, key] = f"{name}.{key} = {shown(value)}: a file must be named {listed(SUFFIXES)}"
+        found[name, key] = f"{name}.{key} = {shown(value)}: a file must be named {listed(files.FINGER_SUFFIXES)}"
     elif name == "object" and isinstance(value, str) and value.lower().endswith(SUFFIXES):
         found[name, key] = f'{name}.{key} = {shown(value)}: must be "mesh", and the file its path'
     elif not isinstance(value, str) or value not in known:

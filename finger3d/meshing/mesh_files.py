@@ -1,0 +1,239 @@
+"""Finite element meshes in files of Gmsh (.msh, format 4.1) and VTK (.vtu): tetrahedra, named facets and named parts.
+
+In a .msh file facets and parts are physical surfaces and volumes.  In a .vtu file they are the values of the cell data
+``label`` at triangles and ``part`` at tetrahedra: texts, or whole numbers k that stand for the k-th text, counted from
+0, of the field data ``label_names`` and ``part_names``; a negative number is no name.  The names of facets are compared
+in lower case.  meshio reads .msh and turns nodes into VTK's order; VTK reads .vtu, whose texts meshio does not know.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d._arrays import freeze_arrays
+from finger3d._ranges import printable
+from finger3d._types import Float, Int
+from finger3d.errors import Finger3dError
+
+MSH, VTU = ".msh", ".vtu"
+MESH_SUFFIXES = (MSH, VTU)
+
+LABEL, PART = "label", "part"
+"""Names of the cell data of a .vtu file; with "_names" those of its field data."""
+
+MSH_VERSION = "4.1"
+
+_TETS = {"tetra": 4, "tetra10": 10}
+_TRIANGLES = {"triangle": 3, "triangle6": 6}
+_IGNORED = ("vertex", "line", "line3", "empty")
+_VTK = {0: "empty", 1: "vertex", 3: "line", 21: "line3", 5: "triangle", 22: "triangle6", 10: "tetra", 24: "tetra10"}
+_HEAD = 4096  # bytes in which the format of a .msh file is looked for
+
+
+@dataclass(frozen=True)
+class MeshContents:
+    """What a mesh file holds.
+
+    Attributes
+    ----------
+    points : (n, 3) as in the file
+    cells : (e, 4 | 10) nodes of the tetrahedra in VTK's order
+    triangles : (m, 3) corners of the named triangles
+    label : (m,) name of each of them, lower case
+    part : (e,) name of the part of each tetrahedron; empty without one
+    """
+
+    points: Float
+    cells: Int
+    triangles: Int
+    label: NDArray[np.str_]
+    part: NDArray[np.str_]
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
+
+
+@dataclass(frozen=True)
+class _Block:
+    """Cells of one type: their nodes (k, nodes), and their names (k,)."""
+
+    kind: str
+    nodes: Int
+    names: NDArray[np.str_]
+
+
+def read_contents(path: Path) -> MeshContents:
+    """Read a mesh file.
+
+    Raises
+    ------
+    Finger3dError
+        If there is no such file, it is none of its format, or it holds other cells than tetrahedra of one order.
+    """
+    if not path.is_file():
+        raise Finger3dError(f"{path}: there is no such file")
+    points, blocks = _msh(path) if path.suffix.lower() == MSH else _vtu(path)
+    tets, triangles = (_of_kind(blocks, kinds) for kinds in (_TETS, _TRIANGLES))
+    _check_kinds(path, blocks)
+    if not tets:
+        hint = "; Gmsh saves what is in a physical group: make one of the volume" if path.suffix.lower() == MSH else ""
+        raise Finger3dError(f"{path}: holds no tetrahedra{hint}")
+    named = [b.nodes[b.names != ""][:, :3] for b in triangles]
+    labels = [np.char.lower(np.char.strip(b.names[b.names != ""])) for b in triangles]
+    contents = MeshContents(
+        points=points,
+        cells=np.concatenate([b.nodes for b in tets]),
+        triangles=np.concatenate([*named, np.zeros((0, 3), dtype=np.int64)]),
+        label=np.concatenate([*labels, np.zeros(0, dtype=str)]),
+        part=np.concatenate([b.names for b in tets]),
+    )
+    _check_arrays(path, contents)
+    return contents
+
+
+def _of_kind(blocks: Iterable[_Block], kinds: Iterable[str]) -> list[_Block]:
+    return [b for b in blocks if b.kind in kinds and len(b.nodes)]
+
+
+def _check_kinds(path: Path, blocks: Iterable[_Block]) -> None:
+    """Refuse cells of other types, and tetrahedra of both orders."""
+    count: dict[str, int] = {}
+    for block in blocks:
+        if len(block.nodes):
+            count[block.kind] = count.get(block.kind, 0) + len(block.nodes)
+    others = [f"{n} of type {kind}" for kind, n in count.items() if kind not in (*_TETS, *_TRIANGLES, *_IGNORED)]
+    if others:
+        raise Finger3dError(
+            f"{path}: holds cells of other types than tetrahedra: {', '.join(others)}; mesh the body with tetrahedra"
+        )
+    orders = [f"{count[kind]} of {nodes} nodes" for kind, nodes in _TETS.items() if kind in count]
+    if len(orders) > 1:
+        raise Finger3dError(
+            f"{path}: holds linear and quadratic tetrahedra, {' and '.join(orders)}; save all with one order"
+        )
+
+
+def _check_arrays(path: Path, contents: MeshContents) -> None:
+    """Refuse coordinates that are no numbers, and nodes that do not exist."""
+    nodes = np.concatenate([contents.cells.ravel(), contents.triangles.ravel()])
+    if len(nodes) and not 0 <= nodes.min() <= nodes.max() < len(contents.points):
+        raise Finger3dError(f"{path}: a cell names a node that does not exist; save the mesh again")
+    used = contents.points[np.unique(contents.cells)]
+    if not np.isfinite(used).all():
+        raise Finger3dError(f"{path}: a coordinate is no finite number; save the mesh again")
+
+
+# --- Gmsh ---------------------------------------------------------------------------------------------------------
+
+
+def _msh(path: Path) -> tuple[Float, list[_Block]]:
+    _check_msh_version(path)
+    import meshio
+
+    try:
+        mesh = meshio.gmsh.read(path)
+    except (meshio.ReadError, ValueError, KeyError, IndexError, TypeError, AttributeError, OverflowError, MemoryError):
+        raise Finger3dError(
+            f"{path}: this Gmsh file is damaged or incomplete, or its nodes are parametric; save it again, with "
+            "Mesh.SaveParametric = 0"
+        ) from None
+    blocks = []
+    for k, block in enumerate(mesh.cells):
+        names = [
+            name
+            for name, members in mesh.cell_sets.items()
+            if name in mesh.field_data and len(members[k]) and mesh.field_data[name][1] == block.dim
+        ]
+        own = names[0] if names else ""
+        blocks.append(_Block(block.type, np.asarray(block.data, dtype=np.int64), np.full(len(block.data), own)))
+    return np.asarray(mesh.points, dtype=float), blocks
+
+
+def _check_msh_version(path: Path) -> None:
+    """Refuse a file of another format or of another version of the format."""
+    with path.open("rb") as file:
+        lines = file.read(_HEAD).split(b"\n")
+    stripped = [line.strip() for line in lines]
+    if b"$MeshFormat" not in stripped[:-1]:
+        raise Finger3dError(f"{path}: this is no file of Gmsh; it has no $MeshFormat")
+    words = stripped[stripped.index(b"$MeshFormat") + 1].decode("ascii", errors="replace").split()
+    version = words[0] if words else ""
+    if version != MSH_VERSION:
+        raise Finger3dError(
+            f"{path}: Gmsh's format {printable(version)} is not read; save it as {MSH_VERSION}: gmsh -save -format msh41"
+        )
+
+
+# --- VTK ----------------------------------------------------------------------------------------------------------
+
+
+def _vtu(path: Path) -> tuple[Float, list[_Block]]:
+    with _silent_vtk():
+        from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
+
+        reader = vtkXMLUnstructuredGridReader()
+        reader.SetFileName(str(path))
+        errors: list[str] = []
+        reader.AddObserver("ErrorEvent", lambda *_: errors.append("error"))
+        readable = bool(reader.CanReadFile(str(path)))
+        if readable:
+            reader.Update()
+    if not readable or errors:
+        raise Finger3dError(f"{path}: this is no unstructured grid of VTK, or a damaged one; save it again")
+    import pyvista
+
+    grid = pyvista.wrap(reader.GetOutput())
+    types, offset = np.asarray(grid.celltypes), np.asarray(grid.offset)
+    nodes, count = np.asarray(grid.cell_connectivity, dtype=np.int64), len(types)
+    label, part = (_names(path, grid, key, count) for key in (LABEL, PART))
+    blocks = []
+    for number in np.unique(types).tolist():
+        kind, own = _VTK.get(number, f"{number} of VTK"), np.flatnonzero(types == number)
+        width = {**_TETS, **_TRIANGLES}.get(kind)
+        if width is None:
+            blocks.append(_Block(kind, np.zeros((len(own), 0), dtype=np.int64), np.full(len(own), "")))
+            continue
+        if (np.diff(offset)[own] != width).any():
+            raise Finger3dError(f"{path}: a cell has not the {width} nodes of its type; save the mesh again")
+        names = part if kind in _TETS else label
+        blocks.append(_Block(kind, nodes[offset[own][:, None] + np.arange(width)], names[own]))
+    return np.asarray(grid.points, dtype=float), blocks
+
+
+@contextmanager
+def _silent_vtk() -> Iterator[None]:
+    """Keep VTK from printing messages to the terminal."""
+    from vtkmodules.vtkCommonCore import vtkObject
+
+    shown = vtkObject.GetGlobalWarningDisplay()
+    vtkObject.GlobalWarningDisplayOff()
+    try:
+        yield
+    finally:
+        vtkObject.SetGlobalWarningDisplay(shown)
+
+
+def _names(path: Path, grid: Any, key: str, count: int) -> NDArray[np.str_]:
+    """Return the name (count,) of every cell from its cell data, empty without one."""
+    if key not in grid.cell_data:
+        return np.full(count, "")
+    values = np.asarray(grid.cell_data[key])
+    if values.dtype.kind in "US":
+        return values.astype(str)
+    where, names = f"{path}: cell data '{key}'", f"{key}_names"
+    if values.ndim != 1 or values.dtype.kind not in "iuf" or (values != np.round(values)).any():
+        raise Finger3dError(f"{where} must hold a text or a whole number for each cell")
+    if names not in grid.field_data:
+        raise Finger3dError(f"{where} holds numbers, and there is no field data '{names}' with the names they stand for")
+    known = np.asarray(grid.field_data[names]).astype(str).reshape(-1)
+    number = values.astype(np.int64)
+    if number.max(initial=-1) >= len(known):
+        raise Finger3dError(f"{where} has the number {number.max()}, and '{names}' has {len(known)} names, counted from 0")
+    return np.where(number < 0, "", np.append(known, "")[number])
