@@ -1,9 +1,8 @@
 """Companion of a press: the same scene on another mesh, from which the discretisation error is estimated.
 
 The companion has about twice the edge lengths, hence at best an eighth of the cells of a solid and a quarter of those
-of a section.  A mesh too small to be coarsened gets a finer companion, and so does a mesh that was
-are halved.  An elastic object is meshed anew together with the finger, so
-that the estimate covers both.
+of a section.  A mesh too small to be coarsened gets a finer companion, and so does one that was given: its cells are
+halved.  An elastic object is meshed anew together with the finger, so that the estimate covers both.
 """
 
 from __future__ import annotations
@@ -44,11 +43,12 @@ _FINITE_STRAIN_FACTOR = 2.5
 """Edge length of the companion of a section at finite strain, where every increment factorises the tangent: at `FACTOR`
 the companion would take half the time of the press."""
 
-_BISECTED_FACTORS = (0.5, 0.7)
-"""Edge lengths of a bisected companion over those of the mesh; the first with few enough unknowns is taken."""
+_BISECTIONS = ((0.5, 18.0), (0.75, 6.5))
+"""Edge lengths of a bisected companion over those of the mesh, and its unknowns over those of the mesh, measured; the
+first with few enough unknowns is taken."""
 
-_LARGEST_BISECTED_UNKNOWNS = 250_000
-"""Largest number of unknowns of a bisected companion, which takes a minute."""
+_LARGEST_BISECTED_UNKNOWNS = 200_000
+"""Largest number of unknowns of a bisected companion, which takes half a minute."""
 
 LEAST_RATIO = 1.25
 """Smallest ratio of edge lengths from which an error is estimated."""
@@ -112,11 +112,10 @@ def _bisected(own: MeshOptions, unknowns: float) -> MeshOptions:
     Finger3dError
         If the companion would have too many unknowns.
     """
-    most = unknowns / _LARGEST_BISECTED_UNKNOWNS
-    factor = next((f for f in _BISECTED_FACTORS if most <= f**3), None)
+    factor = next((f for f, growth in _BISECTIONS if growth * unknowns <= _LARGEST_BISECTED_UNKNOWNS), None)
     if factor is None:
         raise Finger3dError(
-            "the mesh was given, and is too large to be halved everywhere; press a coarser mesh of the body, too"
+            "the mesh was given, and is too large to be halved everywhere; press a coarser mesh of the body to compare"
         )
     return replace(own, size_mm=factor * own.size_mm, base_size_mm=factor * own.base_size_mm)
 

@@ -74,7 +74,7 @@ def build(model: Model, say: Say = lambda text: None, margin: float = MARGIN) ->
         If the object passes between the contact points.
     """
     contact, axes = initial_contact(model.contact_path), symmetry(model)
-    mesh, report = _mesh(model, contact.contact_box, axes, say)
+    mesh, report = mesh_part(model, contact.contact_box, axes, say)
     thickness = 1.0 if mesh.dim == 3 else model.design.width_mm
     free = free_surface(model, mesh, thickness)
     check(model, free, contact.first_contact_mm, contact.place, axes)
@@ -166,9 +166,16 @@ def with_object_compliance(problem: Problem, response: ObjectResponse) -> Proble
     )
 
 
-def _mesh(
-    model: Model, zone: tuple[float, float, float, float], axes: tuple[str, ...], say: Say
+def mesh_part(
+    model: Model, zone: tuple[float, float, float, float], axes: tuple[str, ...], say: Say = lambda text: None
 ) -> tuple[Mesh, MeshReport]:
+    """Mesh the part of the finger on one side of its symmetry planes.
+
+    Parameters
+    ----------
+    zone : (x_min, x_max, z_min, z_max) mm where contact is predicted
+    axes : normals of the symmetry planes, "x" and "z"
+    """
     if model.domain == "solid":
         mesh, report = mesh_solid(model.design, model.mesh, zone, axes, say)
     else:

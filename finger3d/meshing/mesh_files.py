@@ -190,8 +190,9 @@ def _vtu(path: Path) -> tuple[Float, list[_Block]]:
     import pyvista
 
     grid = pyvista.wrap(reader.GetOutput())
-    types, offset = np.asarray(grid.celltypes), np.asarray(grid.offset)
-    nodes, count = np.asarray(grid.cell_connectivity, dtype=np.int64), len(types)
+    types, count = np.asarray(grid.celltypes), grid.n_cells
+    offset = np.asarray(pyvista.convert_array(grid.GetCells().GetOffsetsArray()), dtype=np.int64)
+    nodes = np.asarray(grid.cell_connectivity, dtype=np.int64)
     label, part = (_names(path, grid, key, count) for key in (LABEL, PART))
     blocks = []
     for number in np.unique(types).tolist():

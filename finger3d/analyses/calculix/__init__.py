@@ -1,0 +1,1 @@
+"""Input decks of CalculiX: a press as its solver ccx reads it."""

@@ -1,0 +1,176 @@
+"""A press as an input deck of CalculiX: the same mesh, materials, object and path."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from finger3d.analyses.calculix.deck import Contact, Deck, Step
+from finger3d.analyses.calculix.laws import law_cards
+from finger3d.analyses.calculix.objects import object_elements
+from finger3d.contact.friction import Coulomb
+from finger3d.errors import Finger3dError
+from finger3d.fem.laws import IsochoricLaw
+from finger3d.fem.simplex import FREE_FACES, Mesh
+from finger3d.mechanics.build import mesh_part
+from finger3d.mechanics.finite_strain import FiniteStrain
+from finger3d.mechanics.model import Leg, Model
+from finger3d.mechanics.path import AUTO_START
+from finger3d.mechanics.symmetry import symmetry
+from finger3d.meshing.report import MeshReport
+from finger3d.objects import ObjectPose, PlacedObject, between, initial_contact
+
+PENALTY = 200.0
+"""Pressure over overlap, times the depth over Young's modulus: the surfaces overlap by less than a percent of the
+depth, which changes the force by less (validation/calculix_export.py); CalculiX diverges far above."""
+
+STICK_SHARE = 0.4
+"""Stiffness of sticking friction over the penalty, as in validation/calculix_all_faces.py."""
+
+_SAGITTA = 1e-3  # of the facets of the object, over the depth
+_MARGIN = 2.0  # around the finger at rest, in depths of the press: facets of the object beyond it are left out
+
+_EFFECTS = {
+    "relaxation": "viscosity",
+    "inclusions": "embedded_gauge",
+    "object_compliance": "elastic_object",
+}
+"""Slots of a model, and the effects that fill them, which a deck has no equal of."""
+
+
+@dataclass(frozen=True)
+class PressDeck:
+    """A deck with what belongs to it.
+
+    Attributes
+    ----------
+    deck : of the meshed part
+    report : size and quality of the mesh
+    multiple : forces on the whole finger over those on the part, for components along no mirrored axis
+    """
+
+    deck: Deck
+    report: MeshReport
+    multiple: int
+
+
+def press_deck(model: Model, title: str = "", say: Callable[[str], None] = lambda text: None) -> PressDeck:
+    """Mesh a model as a press does, and return it as a deck.
+
+    Raises
+    ------
+    Finger3dError
+        If CalculiX has no equal of an effect, a law, or a leg.
+    """
+    _check(model)
+    contact, axes = initial_contact(model.contact_path), symmetry(model)
+    mesh, report = mesh_part(model, contact.contact_box, axes, say)
+    finite = model.formulation.finite_strain
+    law = _law(model)
+    laws = tuple(law_cards(material, law) for material in model.materials(mesh.part_labels))
+    touch = contact.first_contact_mm
+    stretches = [stretch for leg, start in _legs(model) for stretch in _stretches(leg, start)]
+    placed = [PlacedObject.of(model.object, touch, pose) for pose in (ObjectPose(0.0), *(end for end, _ in stretches))]
+    depth = model.largest_depth_mm
+    low, high = _box(mesh, axes, _MARGIN * depth)
+    elements, motion = object_elements(placed, low, high, _SAGITTA * depth, mesh.dim)
+    moduli = [material.isotropic("--solver calculix").E_MPa for material in model.materials(())]
+    penalty = PENALTY * moduli[0] / depth
+    steps = tuple(
+        Step(_rigid(moved), increments) for moved, (_, increments) in zip(motion[1:], stretches, strict=True)
+    )
+    mu = model.friction.mu
+    deck = Deck(
+        mesh=mesh,
+        laws=laws,
+        object=elements,
+        steps=steps,
+        contact=Contact(penalty, STICK_SHARE * penalty, mu, FREE_FACES),
+        axes=axes,
+        finite=finite,
+        plane_stress=model.domain == "plane-stress",
+        thickness_mm=model.design.width_mm,
+        remarks=_remarks(title, axes, model),
+        fields=True,
+    )
+    return PressDeck(deck, report, 2 ** len(axes))
+
+
+def _check(model: Model) -> None:
+    """Refuse what CalculiX has no equal of, by the name of the effect or the key."""
+    for slot, effect in _EFFECTS.items():
+        if getattr(model, slot) is not None:
+            raise Finger3dError(f"--solver calculix: CalculiX has no equal of [effects.{effect}]; take it out")
+    if type(model.friction) is not Coulomb:
+        filled = dict(model.filled).get("friction", type(model.friction).__name__)
+        raise Finger3dError(f"--solver calculix: CalculiX has no equal of [effects.{filled}]; take it out")
+    if any(leg.force_N is not None for leg in model.legs):
+        raise Finger3dError(
+            "--solver calculix: force_N: a deck moves the object by depths; give depth_mm, for instance that which "
+            "`finger3d press` finds"
+        )
+    if model.held_ends:
+        raise Finger3dError("--solver calculix: ends that are held cannot be written")
+
+
+def _law(model: Model) -> IsochoricLaw | None:
+    measure = model.strain_measure
+    if not measure.finite_strain:
+        return None
+    assert isinstance(measure, FiniteStrain)
+    if model.domain == "plane-stress":
+        raise Finger3dError(
+            "--solver calculix: CalculiX has no equal of [effects.large_deformation] in plane stress; take it out, or "
+            "change model.domain"
+        )
+    return measure.law
+
+
+def _legs(model: Model) -> list[tuple[Leg, ObjectPose]]:
+    """Return the legs with the poses that they start from."""
+    found, at = [], ObjectPose(0.0)
+    for leg in model.legs:
+        found.append((leg, at))
+        at = leg.end(at)
+    return found
+
+
+def _stretches(leg: Leg, start: ObjectPose) -> list[tuple[ObjectPose, int]]:
+    """Return the ends and increments of the steps of a leg: one step, or one for each increment of a leg that turns.
+
+    Within a step CalculiX moves every node of the object along a straight line.
+    """
+    count, end = leg.steps if isinstance(leg.steps, int) else AUTO_START, leg.end(start)
+    if end.turns == start.turns:
+        return [(end, count)]
+    return [(between(start, end, k / count), 1) for k in range(1, count)] + [(end, 1)]
+
+
+def _rigid(moved: np.ndarray) -> np.ndarray:
+    """Return the displacement (3,) that all nodes (k, 3) share, or those of all nodes."""
+    return moved[0] if np.ptp(moved, axis=0).max() <= 1e-12 * (1.0 + np.abs(moved).max()) else moved
+
+
+def _box(mesh: Mesh, axes: tuple[str, ...], margin: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the corners (3,) of the box around the whole finger, with a margin."""
+    low, high = np.zeros(3), np.zeros(3)
+    low[: mesh.dim], high[: mesh.dim] = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    for axis in axes:
+        low["xyz".index(axis)] = -high["xyz".index(axis)]
+    return low - margin, high + margin
+
+
+def _remarks(title: str, axes: tuple[str, ...], model: Model) -> tuple[str, ...]:
+    lines = [f"{title or 'a press'}, written by finger3d; mm, N, MPa; run: ccx press"]
+    lines.append("press.dat: total force of set NOBJECT, that on the meshed finger; pressing forces have fy < 0")
+    if axes:
+        lines.append(
+            f"the part on one side of the symmetry planes normal to {' and '.join(axes)}: the force on the finger is "
+            f"{2 ** len(axes)} times fy, and 0 along {' and '.join(axes)}"
+        )
+    lines.append("a *STEP for each leg, or for each increment of a leg that turns the object")
+    if model.mixed:
+        lines.append("nu is near 1/2: C3D10 has no pressure of its own, as finger3d's mixed elements have")
+    return tuple(line.encode("ascii", errors="replace").decode() for line in lines)
