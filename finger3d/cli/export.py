@@ -8,9 +8,11 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from finger3d.analyses.export_model import Solver, export_deck, export_mesh
 from finger3d.cli.common import Json, Set, app, check_folder, job, load, print_json, print_rows
 from finger3d.errors import Finger3dError
 from finger3d.mold.options import MoldOptions
+from finger3d.scene import Scene
 
 
 @app.command
@@ -24,6 +26,12 @@ def export(
         bool, Parameter(name="--ascii", negative=(), help="Write STL files as text instead of binary.")
     ] = False,
     tolerance_mm: Annotated[float, Parameter(help="Largest distance between triangles and surface, in mm.")] = 0.05,
+    mesh: Annotated[
+        bool, Parameter(negative=(), help="Write the mesh as .vtu and .msh instead, with its facets and parts by name.")
+    ] = False,
+    solver: Annotated[
+        Solver | None, Parameter(help="Write the press as an input deck of this solver instead: calculix.")
+    ] = None,
     options: Annotated[MoldOptions | None, Parameter(name="*", group="Mold (with --mold)")] = None,
     set_: Set = None,
     json_: Json = False,
@@ -42,6 +50,11 @@ def export(
         raise Finger3dError("export: options of a mold need --mold")
     loaded = load(scene, set_)
     check_folder(out)
+    if mesh or solver:
+        if mold or (mesh and solver):
+            raise Finger3dError("export: --mold, --mesh and --solver write different things; give one of them")
+        _export_model(loaded, out, solver, json_)
+        return
     from finger3d.mold.export import export as run
 
     with job(json_, lambda _: f"the files in {out} are complete") as report:
@@ -59,5 +72,22 @@ def export(
     rows.append(("results", str(out)))
     rows += [("", file.name) for file in done.files]
     print_rows(loaded.title, rows)
+    for text in done.remarks:
+        print(f"remark: {text}")
+
+
+def _export_model(scene: Scene, out: Path, solver: Solver | None, json_: bool) -> None:
+    """Write the mesh, or the deck of a solver."""
+    with job(json_, lambda _: f"the files in {out} are complete") as report:
+        done = export_deck(scene, out, report) if solver else export_mesh(scene, out, report)
+    if json_:
+        print_json({"results": out, **asdict(done)})
+        return
+    rows = [("mesh", f"{done.cells} cells, {done.points} points")]
+    if done.multiple is not None:
+        rows.append(("force", f"{done.multiple:.12g} times the total force that ccx prints"))
+    rows.append(("results", str(out)))
+    rows += [("", file.name) for file in done.files]
+    print_rows(scene.title, rows)
     for text in done.remarks:
         print(f"remark: {text}")

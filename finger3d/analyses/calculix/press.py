@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger3d.analyses.calculix.deck import Contact, Deck, Step
+from finger3d.analyses.calculix.deck import OBJECT, Contact, Deck, Step
 from finger3d.analyses.calculix.laws import law_cards
 from finger3d.analyses.calculix.objects import object_elements
 from finger3d.contact.friction import Coulomb
@@ -53,11 +53,13 @@ class PressDeck:
     deck : of the meshed part
     report : size and quality of the mesh
     multiple : forces on the whole finger over those on the part, for components along no mirrored axis
+    remarks : where the deck is not the press to the letter, a line each
     """
 
     deck: Deck
     report: MeshReport
     multiple: float
+    remarks: tuple[str, ...]
 
 
 def press_deck(model: Model, title: str = "", say: Callable[[str], None] = lambda text: None) -> PressDeck:
@@ -97,10 +99,10 @@ def press_deck(model: Model, title: str = "", say: Callable[[str], None] = lambd
         finite=finite,
         plane_stress=model.domain == "plane-stress",
         thickness_mm=thickness,
-        remarks=_remarks(title, axes, multiple, model),
+        remarks=tuple(_ascii(line) for line in (*_head(title, axes, multiple), *_remarks(model))),
         fields=True,
     )
-    return PressDeck(deck, report, multiple)
+    return PressDeck(deck, report, multiple, _remarks(model))
 
 
 def _check(model: Model) -> None:
@@ -167,14 +169,24 @@ def _box(mesh: Mesh, axes: tuple[str, ...], margin: float) -> tuple[np.ndarray, 
     return low - margin, high + margin
 
 
-def _remarks(title: str, axes: tuple[str, ...], multiple: float, model: Model) -> tuple[str, ...]:
+def _head(title: str, axes: tuple[str, ...], multiple: float) -> list[str]:
     lines = [f"{title or 'a press'}, written by finger3d; mm, N, MPa; run: ccx press"]
-    lines.append("press.dat: total force of set NOBJECT, that on the meshed finger; pressing forces have fy < 0")
+    lines.append(f"press.dat: total force of the set {OBJECT} is that on the finger; pressing forces have fy < 0")
     if multiple != 1.0:
         lines.append(f"the force on the whole finger is {multiple:.12g} times that")
     if axes:
         lines.append(f"the mesh is the part on one side of the planes of symmetry normal to {' and '.join(axes)}")
-    lines.append("a *STEP for each leg, or for each increment of a leg that turns the object")
+    return [*lines, "a *STEP for each leg, or for each increment of a leg that turns the object"]
+
+
+def _remarks(model: Model) -> tuple[str, ...]:
+    lines = []
     if model.mixed:
-        lines.append("nu is near 1/2: C3D10 has no pressure of its own, as finger3d's mixed elements have")
-    return tuple(line.encode("ascii", errors="replace").decode() for line in lines)
+        lines.append("nu is near 1/2: CalculiX has no pressure unknown in C3D10, and is somewhat stiffer")
+    if any(leg.steps == "auto" for leg in model.legs):
+        lines.append(f'steps = "auto": {AUTO_START} increments for each leg; CalculiX does not choose them by their error')
+    return tuple(lines)
+
+
+def _ascii(text: str) -> str:
+    return text.encode("ascii", errors="replace").decode()

@@ -1,0 +1,90 @@
+"""Files of a scene's model for other programs: its mesh as .vtu and .msh, and the press as a deck of CalculiX."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from finger3d.errors import Finger3dError
+from finger3d.io import atomic, claimed
+from finger3d.progress import Progress
+
+if TYPE_CHECKING:
+    from finger3d.scene import Scene
+
+Solver = Literal["calculix"]
+
+MESH_FILES = ("finger.vtu", "finger.msh")
+DECK_FILE = "press.inp"
+
+
+@dataclass(frozen=True)
+class ModelFiles:
+    """Files of a model.
+
+    Attributes
+    ----------
+    files : paths of the files
+    points, cells : of the mesh that was written
+    multiple : forces on the whole finger over those that CalculiX prints; None without a deck
+    remarks : remarks for the user, a line each
+    """
+
+    files: tuple[Path, ...]
+    points: int
+    cells: int
+    multiple: float | None
+    remarks: tuple[str, ...]
+
+
+def export_mesh(scene: Scene, out: str | Path, report: Progress | None = None) -> ModelFiles:
+    """Write the mesh of the whole finger, its facets and its parts by name, as finger.vtu and finger.msh.
+
+    Both may be the finger of another scene.  Where symmetry halves the press, the mesh is unfolded.
+
+    Raises
+    ------
+    Finger3dError
+        If the scene is a section, or the folder holds the finger's own file.
+    """
+    from finger3d.fem.simplex import axis_numbers, unfold
+    from finger3d.mechanics.build import contact_box, mesh_part
+    from finger3d.mechanics.symmetry import symmetry
+    from finger3d.meshing.mesh_output import write_mesh_msh, write_mesh_vtu
+
+    out, report, model = Path(out), report or Progress(), scene.model()
+    if model.domain != "solid":
+        raise Finger3dError(f'--mesh: a section has no tetrahedra; set model.domain = "solid", not "{model.domain}"')
+    own = Path(getattr(scene.design, "path", "")).resolve()
+    if own in [(out / name).resolve() for name in MESH_FILES]:
+        raise Finger3dError(f"--out {out}: holds {own.name}, the finger's own file; name another folder")
+    report.stage("meshing")
+    axes = symmetry(model)
+    part, _ = mesh_part(model, contact_box(model), axes, report.say)
+    whole, _, _ = unfold(part, axis_numbers(axes))
+    with claimed(out):
+        write_mesh_vtu(out / MESH_FILES[0], whole)
+        write_mesh_msh(out / MESH_FILES[1], whole)
+    files = tuple(out / name for name in MESH_FILES)
+    return ModelFiles(files, len(whole.points), len(whole.cells), None, ())
+
+
+def export_deck(scene: Scene, out: str | Path, report: Progress | None = None) -> ModelFiles:
+    """Write press.inp, the same mesh, materials, object and path as an input deck of CalculiX.
+
+    Raises
+    ------
+    Finger3dError
+        If CalculiX has no equal of what the scene asks for; the line names it.
+    """
+    from finger3d.analyses.calculix.press import press_deck
+
+    out, report = Path(out), report or Progress()
+    report.stage("meshing")
+    made = press_deck(scene.model(), scene.title, report.say)
+    report.stage("writing the deck")
+    with claimed(out), atomic(out / DECK_FILE) as temporary:
+        temporary.write_text(made.deck.text(), encoding="ascii")
+    mesh = made.deck.mesh
+    return ModelFiles((out / DECK_FILE,), len(mesh.points), len(mesh.cells), made.multiple, made.remarks)
