@@ -185,8 +185,8 @@ def _vtu(path: Path) -> tuple[Float, list[_Block]]:
         readable = bool(reader.CanReadFile(str(path)))
         if readable:
             reader.Update()
-    if not readable or errors:
-        raise Finger3dError(f"{path}: this is no unstructured grid of VTK, or a damaged one; save it again")
+    if not readable or errors or not reader.GetOutput().GetNumberOfCells():
+        raise Finger3dError(f"{path}: this is no unstructured grid of VTK, or a damaged or empty one; save it again")
     import pyvista
 
     grid = pyvista.wrap(reader.GetOutput())
