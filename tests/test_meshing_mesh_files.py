@@ -91,7 +91,10 @@ def test_both_kinds_of_files_of_gmsh_are_read(name: str) -> None:
         ("", "no file of Gmsh"),
         (TET10[:-60], "damaged or incomplete"),
         (TET10.replace("3 1 11 1\n3 1 2 3 4 5 6 7 8 9 10", "3 1 5 1\n3 1 2 3 4 5 6 7 8"), "1 of type hexahedron"),
-        (TET10.replace("3 3 1 3\n", "2 2 1 2\n").split("3 1 11 1")[0] + "$EndElements\n", "holds no tetrahedra; Gmsh saves"),
+        (
+            TET10.replace("3 3 1 3\n", "2 2 1 2\n").split("3 1 11 1")[0] + "$EndElements\n",
+            "holds no tetrahedra; Gmsh saves",
+        ),
         (TET10.replace("0.5 0.5 0\n", "nan 0.5 0\n"), "no finite number"),
     ],
 )
@@ -117,7 +120,9 @@ def test_other_files_of_vtk_are_refused(tmp_path: Path) -> None:
     assert "no unstructured grid" in refused(lambda: read_contents(_file(tmp_path / "a.vtu", b"<VTKFile>")))
     whole = vtu_of(tmp_path / "b.vtu", mesh).read_bytes()
     assert "no unstructured grid" in refused(lambda: read_contents(_file(tmp_path / "c.vtu", whole[: len(whole) // 2])))
-    assert "'label_names'" in refused(lambda: read_contents(vtu_of(tmp_path / "d.vtu", mesh, numbers=True, names=False)))
+    assert "'label_names'" in refused(
+        lambda: read_contents(vtu_of(tmp_path / "d.vtu", mesh, numbers=True, names=False))
+    )
     assert "1 of type 12 of VTK" in refused(lambda: read_contents(vtu_of(tmp_path / "e.vtu", mesh, hexahedron=True)))
     assert "there is no such file" in refused(lambda: read_contents(tmp_path / "f.vtu"))
 

@@ -62,7 +62,9 @@ base_size_mm = 2.0
 """
 SECTION = ('model.domain="plane-strain"', "mesh.size_mm=0.4", "mesh.base_size_mm=1.0")
 CYLINDER = 'object={shape="cylinder",radius_mm=10.0}'
-SLIDE = "press={leg=[{depth_mm=1.0,steps=4},{depth_mm=1.0,slide_x_mm=0.5,steps=5},{depth_mm=0.5,slide_x_mm=0.5,steps=3}]}"
+SLIDE = (
+    "press={leg=[{depth_mm=1.0,steps=4},{depth_mm=1.0,slide_x_mm=0.5,steps=5},{depth_mm=0.5,slide_x_mm=0.5,steps=3}]}"
+)
 PRESS = "press={depth_mm=1.0,steps=5}"
 
 
@@ -85,7 +87,9 @@ class Case:
 
 CASES = (
     Case("plane strain, cylinder, pressed, slid and half released", (*SECTION, CYLINDER, SLIDE), 0.0),
-    Case("plane strain, rounded wedge", (*SECTION, PRESS, 'object={shape="wedge",angle_deg=20.0,tip_radius_mm=1.0}'), 0.0),
+    Case(
+        "plane strain, rounded wedge", (*SECTION, PRESS, 'object={shape="wedge",angle_deg=20.0,tip_radius_mm=1.0}'), 0.0
+    ),
     Case("plane strain, wave", (*SECTION, PRESS, 'object={shape="wave",wavelength_mm=6.0,amplitude_mm=0.5}'), 0.0),
     Case("plane strain, tilted plane", (*SECTION, PRESS, 'object={shape="plane",tilt_deg=3.0}'), 0.0),
     Case("plane stress, cylinder", ('model.domain="plane-stress"', *SECTION[1:], CYLINDER, PRESS), 0.0),
@@ -105,7 +109,11 @@ CASES = (
         0.0,
     ),
     Case("solid, cylinder", (CYLINDER, PRESS), 0.0),
-    Case("solid, ball, neo-Hookean", (PRESS, 'object={shape="sphere",radius_mm=10.0}', "effects.large_deformation={}"), 0.0),
+    Case(
+        "solid, ball, neo-Hookean",
+        (PRESS, 'object={shape="sphere",radius_mm=10.0}', "effects.large_deformation={}"),
+        0.0,
+    ),
     Case("solid with a skin and a core, plane, neo-Hookean", (PRESS, "effects.large_deformation={}"), 0.0, FINGERTIP),
 )
 
@@ -114,7 +122,9 @@ def run(quick: bool) -> Result:
     """Every case by this code, and by CalculiX where it is installed; quick: against the numbers kept."""
     runs = not quick and program() is not None
     if not quick and not runs:
-        print("calculix_export: ccx is not installed (apt install calculix-ccx); the numbers kept stay", file=sys.stderr)
+        print(
+            "calculix_export: ccx is not installed (apt install calculix-ccx); the numbers kept stay", file=sys.stderr
+        )
     source = f"CalculiX, deck of the scene, {'run for this' if runs else '2.20, number kept'}"
     rows: list[Row] = []
     table: dict[str, list[Any]] = {"case": [], "calculix_N": [], "finger3d_N": [], "calculix_s": [], "finger3d_s": []}

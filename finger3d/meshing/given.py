@@ -284,7 +284,10 @@ def _parts(contents: MeshContents) -> tuple[Int | None, tuple[str, ...]]:
 
 def _check_cells(path: Path, mesh: Mesh) -> None:
     """Refuse inverted cells: by the volume of the straight ones, and by the Jacobian of the curved ones."""
-    for determinants, what in ((signed_volumes(mesh), "flat or inverted"), (curved_jacobians(mesh), "folded by its nodes")):
+    for determinants, what in (
+        (signed_volumes(mesh), "flat or inverted"),
+        (curved_jacobians(mesh), "folded by its nodes"),
+    ):
         bad = np.flatnonzero(~(determinants > 0.0))
         if len(bad):
             at = mesh.points[mesh.cells[bad[0], :4]].mean(axis=0)

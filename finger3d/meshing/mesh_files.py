@@ -232,9 +232,13 @@ def _names(path: Path, grid: Any, key: str, count: int) -> NDArray[np.str_]:
     if values.ndim != 1 or values.dtype.kind not in "iuf" or (values != np.round(values)).any():
         raise Finger3dError(f"{where} must hold a text or a whole number for each cell")
     if names not in grid.field_data:
-        raise Finger3dError(f"{where} holds numbers, and there is no field data '{names}' with the names they stand for")
+        raise Finger3dError(
+            f"{where} holds numbers, and there is no field data '{names}' with the names they stand for"
+        )
     known = np.asarray(grid.field_data[names]).astype(str).reshape(-1)
     number = values.astype(np.int64)
     if number.max(initial=-1) >= len(known):
-        raise Finger3dError(f"{where} has the number {number.max()}, and '{names}' has {len(known)} names, counted from 0")
+        raise Finger3dError(
+            f"{where} has the number {number.max()}, and '{names}' has {len(known)} names, counted from 0"
+        )
     return np.where(number < 0, "", np.append(known, "")[number])

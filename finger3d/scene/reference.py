@@ -45,7 +45,10 @@ _Row = tuple[str, str, str, str]
 
 
 def _tables() -> Iterator[tuple[str, list[_Row]]]:
-    yield "[finger]", [("geometry", "a design's name, or the path of a .step, .stl, .msh or .vtu file", "", "what is pressed")]
+    yield (
+        "[finger]",
+        [("geometry", "a design's name, or the path of a .step, .stl, .msh or .vtu file", "", "what is pressed")],
+    )
     for name, design in designs().items():
         yield f'[finger] geometry = "{name}"', _rows(table_of(design), design)
     yield "[material]", _rows(MaterialTable)

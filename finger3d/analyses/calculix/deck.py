@@ -133,7 +133,11 @@ class Deck:
                 lines += [f"*ELEMENT, TYPE={kind}, ELSET=BODY{k}", *_cells(self.mesh.cells[own] + 1, own + 1)]
         first, count = len(self.mesh.points) + 1, len(self.mesh.cells)
         numbers = count + 1 + np.arange(len(self.object.elements))
-        return [*lines, f"*ELEMENT, TYPE={self.object.kind}, ELSET=OBJECT", *_cells(self.object.elements + first, numbers)]
+        return [
+            *lines,
+            f"*ELEMENT, TYPE={self.object.kind}, ELSET=OBJECT",
+            *_cells(self.object.elements + first, numbers),
+        ]
 
     def _materials(self) -> list[str]:
         section = [f"{self.thickness_mm:.12g}"] if self._dim == 2 else []

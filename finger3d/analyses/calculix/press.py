@@ -84,9 +84,7 @@ def press_deck(model: Model, title: str = "", say: Callable[[str], None] = lambd
     elements, motion = object_elements(placed, low, high, _SAGITTA * depth, mesh.dim)
     moduli = [material.isotropic("--solver calculix").E_MPa for material in model.materials(())]
     penalty = PENALTY * moduli[0] / depth
-    steps = tuple(
-        Step(_rigid(moved), increments) for moved, (_, increments) in zip(motion[1:], stretches, strict=True)
-    )
+    steps = tuple(Step(_rigid(moved), increments) for moved, (_, increments) in zip(motion[1:], stretches, strict=True))
     thickness = _SLICE * model.design.height_mm if model.domain == "plane-stress" else model.design.width_mm
     multiple = 2.0 ** len(axes) * (model.design.width_mm / thickness if mesh.dim == 2 else 1.0)
     deck = Deck(
@@ -184,7 +182,9 @@ def _remarks(model: Model) -> tuple[str, ...]:
     if model.mixed:
         lines.append("nu is near 1/2: CalculiX has no pressure unknown in C3D10, and is somewhat stiffer")
     if any(leg.steps == "auto" for leg in model.legs):
-        lines.append(f'steps = "auto": {AUTO_START} increments for each leg; CalculiX does not choose them by their error')
+        lines.append(
+            f'steps = "auto": {AUTO_START} increments for each leg; CalculiX does not choose them by their error'
+        )
     return tuple(lines)
 
 
