@@ -79,7 +79,10 @@ def test_parts_of_a_given_mesh_have_their_materials() -> None:
 @pytest.mark.parametrize(
     ("tables", "told"),
     [
-        ({"effects": {"viscosity": {"prony": [[0.3, 0.5]]}}, "press": {"depth_mm": 1.0, "duration_s": 1.0}}, "[effects.viscosity]"),
+        (
+            {"effects": {"viscosity": {"prony": [[0.3, 0.5]]}}, "press": {"depth_mm": 1.0, "duration_s": 1.0}},
+            "[effects.viscosity]",
+        ),
         ({"effects": {"kinetic_friction": {"ratio": 0.7}}}, "[effects.kinetic_friction]"),
         ({"effects": {"elastic_object": {"E_MPa": 10.0, "nu": 0.4}}}, "[effects.elastic_object]"),
         (

@@ -1,4 +1,4 @@
-"""Fingers that are meshes: kept as they are, put on their base, measured, refined by bisection; refused with a reason."""
+"""Fingers that are meshes: kept as they are, put on their base, measured, bisected; refused with a reason."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ def _tilted() -> Mesh:
         (_without("base"), "no facets are named 'base'"),
         (_inverted(), "1 of 48 tetrahedra are flat or inverted, the first is number 7, near ("),
         (_two_cubes(), "are 2 bodies that share no facets"),
-        (_tilted(), "are no level plane, they reach from y = -0.2 to 0.2 mm"),
+        (_tilted(), "are no level plane, but reach from y = -0.2 to 0.2 mm"),
         (replace(cube(), points=cube().points * [1.0, -1.0, -1.0]), "4 mm below the facets named 'base'"),
         (replace(cube(), points=1e-3 * cube().points), "mm large, allowed: a diagonal of 0.2 to 5000 mm"),
         (_with(cube(), symmetry_x=cube().facets["base"]), "'symmetry_x', but symmetry is not used"),

@@ -120,6 +120,10 @@ class GivenMesh:
         """Raise a Finger3dError: there is no CAD."""
         raise Finger3dError(f"{self.name}: a mesh of tetrahedra has no CAD solid; give the finger as a STEP file")
 
+    def solids(self) -> Mapping[str, Solid]:
+        """Raise a Finger3dError: there is no CAD."""
+        return {"": self.solid()}
+
     def tessellation(self) -> Tessellation | None:
         """Return None: the body is not meshed."""
         return None
@@ -188,7 +192,7 @@ def _wanted(design: GivenMesh, zone: Zone, finer: float, everywhere: float) -> C
 
     def wanted(points: Float) -> Float:
         own = longest[centroids.query(points)[1]]
-        return np.minimum(everywhere * own, finer * own + _RATE * touched.query(points)[0])
+        return np.asarray(np.minimum(everywhere * own, finer * own + _RATE * touched.query(points)[0]))
 
     return wanted
 
@@ -286,14 +290,14 @@ def _check_cells(path: Path, mesh: Mesh) -> None:
     """Refuse inverted cells: by the volume of the straight ones, and by the Jacobian of the curved ones."""
     for determinants, what in (
         (signed_volumes(mesh), "flat or inverted"),
-        (curved_jacobians(mesh), "folded by its nodes"),
+        (curved_jacobians(mesh), "folded"),
     ):
         bad = np.flatnonzero(~(determinants > 0.0))
         if len(bad):
             at = mesh.points[mesh.cells[bad[0], :4]].mean(axis=0)
             raise Finger3dError(
-                f"{path}: {len(bad)} of {len(mesh.cells)} tetrahedra are {what}, the first is number {bad[0] + 1}, near "
-                f"({at[0]:.4g}, {at[1]:.4g}, {at[2]:.4g}); mend the mesh where it was made"
+                f"{path}: {len(bad)} of {len(mesh.cells)} tetrahedra are {what}, the first is number {bad[0] + 1}, "
+                f"near ({at[0]:.4g}, {at[1]:.4g}, {at[2]:.4g}); mend the mesh where it was made"
             )
 
 
@@ -330,8 +334,8 @@ def _on_its_base(path: Path, mesh: Mesh) -> Mesh:
     y0, y1 = float(level.min()), float(level.max())
     if y1 - y0 > _LEVEL * size:
         raise Finger3dError(
-            f"{path}: the facets named 'base' are no level plane, they reach from y = {y0:.6g} to {y1:.6g} mm; turn the "
-            "mesh so that y is up, and name only its plane base so"
+            f"{path}: the facets named 'base' are no level plane, but reach from y = {y0:.6g} to {y1:.6g} mm; turn "
+            "the mesh so that y is up, and name only its plane base so"
         )
     if low[1] < y0 - _LEVEL * size:
         raise Finger3dError(

@@ -167,7 +167,7 @@ def _check_msh_version(path: Path) -> None:
     version = words[0] if words else ""
     if version != MSH_VERSION:
         raise Finger3dError(
-            f"{path}: Gmsh's format {printable(version)} is not read; save it as {MSH_VERSION}: gmsh -save -format msh41"
+            f"{path}: Gmsh's format {printable(version)} is not read; save it as {MSH_VERSION}: gmsh -format msh41"
         )
 
 

@@ -1,4 +1,4 @@
-"""Meshes written as .msh (Gmsh 4.1, ASCII) and .vtu, with the names by which `finger3d.meshing.mesh_files` reads them."""
+"""Meshes written as .msh (Gmsh 4.1, ASCII) and .vtu, with the names that `finger3d.meshing.mesh_files` reads."""
 
 from __future__ import annotations
 

@@ -190,9 +190,9 @@ def _beside_a_mesh(mesh: MeshTable, design: GivenMesh) -> str:
 def chosen(mesh: MeshTable, design: Design, domain: Domain, obj: RigidObject, box: Box) -> MeshOptions:
     """Return the mesh options, with sizes chosen where they are absent, from all else and the box of contact."""
     if isinstance(design, GivenMesh):
-        size = mesh.size_mm or design.size_mm
-        base = max(mesh.base_size_mm or design.base_size_mm, size)
-        return MeshOptions(size, base, mesh.mesher, gauge_refinement=mesh.gauge_refinement)
+        finest = mesh.size_mm or design.size_mm
+        longest = max(mesh.base_size_mm or design.base_size_mm, finest)
+        return MeshOptions(finest, longest, mesh.mesher, gauge_refinement=mesh.gauge_refinement)
     solid = domain == "solid"
     share = design.height_mm * (1.0 if solid else 0.25)
     size, base = mesh.size_mm, mesh.base_size_mm
