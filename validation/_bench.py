@@ -316,7 +316,7 @@ def _large_deformation(size: float, load: float) -> list[Row]:
 
 def _beside_calculix(quick: bool, load: float) -> list[Row]:
     """Return time of CalculiX over finger3d's on the finest meshes of beside_calculix.py; nothing without ccx."""
-    from validation._calculix import program
+    from finger3d.analyses.calculix.run import program
     from validation.beside_calculix import cases, measured, times
 
     if program() is None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-import shutil
 import subprocess
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d.analyses.calculix.deck import facet_lines
+from finger3d.analyses.calculix.run import program
 from finger3d.fem.simplex import Mesh
 
 Float = NDArray[np.float64]
@@ -17,12 +18,6 @@ Float = NDArray[np.float64]
 _PENALTY = 100.0  # MPa/mm: under 1 MPa the surfaces overlap by 0.01 mm, 1e-3 of the depth
 _STICK = 10.0  # MPa/mm: friction of 0.1 MPa takes 0.01 mm; ten times as stiff, CalculiX does not settle
 _PLATE = 4.0  # mm
-_FACES = {2: ((0, 1), (1, 2), (2, 0)), 3: ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0))}  # S1, S2, ... of CPE6, C3D10
-
-
-def program() -> str | None:
-    """CalculiX, if it is installed."""
-    return shutil.which("ccx")
 
 
 def deck(mesh: Mesh, E: float, nu: float, mu: float, depths: list[float], finite: bool) -> str:
@@ -42,7 +37,7 @@ def deck(mesh: Mesh, E: float, nu: float, mu: float, depths: list[float], finite
     lines += ["*NSET, NSET=BASE", *map(str, np.unique(mesh.facets["base"]) + 1)]
     lines += ["*NSET, NSET=MIDDLE", *map(str, np.unique(mesh.facets["symmetry_x"]) + 1)]
     lines += ["*NSET, NSET=PLATEN", *(str(n + k) for k in range(1, 5))]
-    lines += ["*SURFACE, NAME=DOME, TYPE=ELEMENT", *faces(mesh)]
+    lines += ["*SURFACE, NAME=DOME, TYPE=ELEMENT", *facet_lines(mesh, ("contact",))]
     lines += ["*SURFACE, NAME=FLAT, TYPE=ELEMENT", f"{count + 1}, S1"]
     shear, bulk = E / (2.0 * (1.0 + nu)), E / (3.0 * (1.0 - 2.0 * nu))
     law = (
@@ -59,17 +54,6 @@ def deck(mesh: Mesh, E: float, nu: float, mu: float, depths: list[float], finite
         lines += ["*BOUNDARY", "PLATEN, 1, 1, 0.", f"PLATEN, 2, 2, {-depth:.12g}"]
         lines += ["*NODE PRINT, NSET=BASE, TOTALS=ONLY, FREQUENCY=1000", "RF", "*END STEP"]
     return "\n".join(lines) + "\n"
-
-
-def faces(mesh: Mesh, labels: tuple[str, ...] = ("contact",)) -> list[str]:
-    """Lines `element, S<k>` of the facets with some labels."""
-    d = mesh.dim
-    key = {tuple(sorted(f[:d])) for label in labels for f in mesh.facets[label].tolist()}
-    found = []
-    for k, corners in enumerate(_FACES[d], start=1):
-        faces = np.sort(mesh.cells[:, list(corners)], axis=1)
-        found += [f"{i}, S{k}" for i, f in enumerate(map(tuple, faces.tolist()), start=1) if f in key]
-    return found
 
 
 def solve(text: str, folder: Path, seconds: float) -> Float:

@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d.analyses.calculix.deck import facet_lines
+from finger3d.analyses.calculix.run import program
 from finger3d.fem.simplex import Mesh
-
-from ._calculix import faces, program
 
 Int = NDArray[np.int64]
 
@@ -146,7 +146,7 @@ def deck(press: Pressed) -> str:
         "*MATERIAL, NAME=PLATE", "*ELASTIC", "1000., 0.",
         "*SOLID SECTION, ELSET=BODY, MATERIAL=RUBBER", *section,
         "*SOLID SECTION, ELSET=PLATE, MATERIAL=PLATE", *section,
-        "*SURFACE, NAME=FINGER, TYPE=ELEMENT", *faces(mesh, press.labels),
+        "*SURFACE, NAME=FINGER, TYPE=ELEMENT", *facet_lines(mesh, press.labels),
         "*SURFACE, NAME=UNDER, TYPE=ELEMENT", f"{e + 1}, S1",
         "*SURFACE INTERACTION, NAME=TOUCH",
         "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", f"{press.penalty:g}",

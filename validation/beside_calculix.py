@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from finger3d._machine import versions
+from finger3d.analyses.calculix.run import program
 from finger3d.analyses.study_rows import Result, Row
 from finger3d.errors import MissingError
 from finger3d.mechanics.build import contact_box
@@ -29,7 +30,6 @@ from finger3d.mechanics.symmetry import symmetry
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.swept import mesh_section
 
-from ._calculix import program
 from ._ccx import PENALTY, STICK_SLOPE, Answer, Pressed, version
 from ._ccx import run as run_calculix
 from ._child import Bench, best_of

@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from finger3d.analyses.calculix.run import program
 from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect
@@ -31,7 +32,6 @@ from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
 from finger3d.mechanics.solve import march
 
-from ._calculix import program
 from ._ccx import Answer, Pressed
 from ._ccx import run as run_calculix
 
