@@ -125,7 +125,7 @@ def no_solid(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("a.step", b"hello", "STEP"),
         ("a.step", b"ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\nENDSEC;\nEND-ISO-10303-21;\n", "STEP|solid"),
         ("face.step", None, "solid"),
-        ("two.step", None, "has 2 solids"),
+        ("two.step", None, "2 solids"),
         ("none.stl", None, "none.stl"),
     ],
     ids=["text", "empty", "a picture", "header only", "text step", "empty step", "face", "two", "absent"],

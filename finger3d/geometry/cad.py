@@ -126,14 +126,14 @@ def cut(solid: Solid, symmetry: tuple[str, ...]) -> Solid:
     return sound(_kept(solid, symmetry), solid.label) if symmetry else solid
 
 
-def cut_part(solid: Solid, symmetry: tuple[str, ...]) -> Compound:
+def cut_part(solid: Solid | Compound, symmetry: tuple[str, ...]) -> Compound:
     """Return the part x >= 0 and/or z >= 0 of a solid that need not be a whole body."""
     from build123d import Compound
 
     return Compound((_kept(solid, symmetry) if symmetry else solid).solids())
 
 
-def _kept(solid: Solid, symmetry: tuple[str, ...]) -> Shape:
+def _kept(solid: Solid | Compound, symmetry: tuple[str, ...]) -> Shape:
     from build123d import Align, Box
 
     box = solid.bounding_box()

@@ -16,7 +16,7 @@ from finger3d.geometry.rules import check_dimensions
 from finger3d.geometry.section import Section
 
 if TYPE_CHECKING:
-    from build123d import Solid
+    from build123d import Compound, Solid
 
     from finger3d.geometry.tessellate import Tessellation
 
@@ -69,7 +69,7 @@ class Design(Protocol):
     def solid(self) -> Solid:
         """Return the build123d solid of the whole body, its faces labelled."""
 
-    def solids(self) -> Mapping[str, Solid]:
+    def solids(self) -> Mapping[str, Solid | Compound]:
         """Return the build123d solids of the parts by their labels, "" the main body; together they are `solid()`."""
 
     def tessellation(self) -> Tessellation | None:
@@ -124,7 +124,7 @@ class ParametricDesign(ABC):
     def solid(self) -> Solid:
         """See :meth:`Design.solid`."""
 
-    def solids(self) -> Mapping[str, Solid]:
+    def solids(self) -> Mapping[str, Solid | Compound]:
         """Return the main body only."""
         return {"": self.solid()}
 
@@ -162,7 +162,7 @@ class ExtrudedDesign(ParametricDesign):
 
         return extruded(self.section(), self.width_mm, self.name)
 
-    def solids(self) -> Mapping[str, Solid]:
+    def solids(self) -> Mapping[str, Solid | Compound]:
         """Return the extruded solids of the parts."""
         from finger3d.geometry.cad import extruded_parts
 
@@ -204,7 +204,7 @@ class DesignSummary:
         """Raise a Finger3dError: the shape is not known."""
         raise Finger3dError("a reduced model has no solid; use the scene that it was made of")
 
-    def solids(self) -> Mapping[str, Solid]:
+    def solids(self) -> Mapping[str, Solid | Compound]:
         """Raise a Finger3dError: the shape is not known."""
         return {"": self.solid()}
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,7 +18,7 @@ from finger3d.geometry.surface import Triangles
 from finger3d.geometry.surface_checks import mistake
 
 if TYPE_CHECKING:
-    from build123d import Face, Solid
+    from build123d import Compound, Face, Shape, Solid
     from OCP.STEPControl import STEPControl_Reader
 
 
@@ -24,6 +27,9 @@ SUFFIXES = (*STL, *STEP)
 
 MOST_TRIANGLES = 300_000
 """Largest number of triangles of an STL file; the checks take about 25 us a triangle."""
+
+_NO_LABEL = re.compile(r"|COMPOUND|COMPSOLID|SOLID|SHELL|NONE|unnamed|Open_CASCADE.*|=>.*", re.IGNORECASE)
+"""Names that CAD programs give to solids without a name."""
 
 _CHORD_ERROR = 5e-5  # of the tessellation of a CAD solid, over its diagonal
 _FACET_ANGLE = 0.2  # radians, between facets of the tessellation
@@ -126,17 +132,42 @@ def _proper(faces: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def read_solid(path: Path) -> Solid:
-    """Return the only build123d solid of a STEP file, mm."""
-    return read_named(path)[0]
-
-
-def read_named(path: Path) -> tuple[Solid, dict[str, list[Face]]]:
-    """Return the only build123d solid of a STEP file, mm, and its faces by the names in the file, in lower case.
+    """Return the only build123d solid of a STEP file, mm.
 
     Raises
     ------
     Finger3dError
         If this is no STEP file, or does not hold exactly one valid solid.
+    """
+    solids = read_step(path).solids
+    if len(solids) != 1:
+        raise Finger3dError(f"{path}: the file has {len(solids)} solids; give one solid body")
+    return solids[0]
+
+
+@dataclass(frozen=True)
+class StepBody:
+    """Solids of a STEP file, mm.
+
+    Attributes
+    ----------
+    solids : in the order of the file
+    labels : name of each solid, or else of its product; "" for none or one that only says what it is, like SOLID
+    faces : by their names in the file, in lower case
+    """
+
+    solids: tuple[Solid, ...]
+    labels: tuple[str, ...]
+    faces: Mapping[str, list[Face]]
+
+
+def read_step(path: Path) -> StepBody:
+    """Read the solids of a STEP file and their names, in which blanks, dots and brackets become underscores.
+
+    Raises
+    ------
+    Finger3dError
+        If this is no STEP file, or holds no solid or an invalid one.
     """
     _bytes(path)
     from build123d import Compound
@@ -155,31 +186,56 @@ def read_named(path: Path) -> tuple[Solid, dict[str, list[Face]]]:
         shape = None
     if shape is None or shape.IsNull():
         raise Finger3dError(f"{path}: this is no STEP file that can be read")
-    solids = Compound(shape).solids()
-    if len(solids) != 1:
-        what = f"has {len(solids)} solids" if solids else "has no solid, only faces or curves"
-        raise Finger3dError(f"{path}: the file {what}; give one solid body")
-    if not solids[0].is_valid:
+    solids = tuple(Compound(shape).solids())
+    if not solids:
+        raise Finger3dError(f"{path}: the file has no solid, only faces or curves; give a solid body")
+    if not all(solid.is_valid for solid in solids):
         raise Finger3dError(f"{path}: CAD calls its solid invalid; mend it where it was drawn")
-    return solids[0], _named_faces(solids[0], reader)
+    faces: dict[str, list[Face]] = {}
+    for face in (face for solid in solids for face in solid.faces()):
+        if name := _entity_name(face, reader):
+            faces.setdefault(name.lower(), []).append(face)
+    labels = [_label(_entity_name(solid, reader)) for solid in solids]
+    if len(solids) > 1 and not all(labels):
+        labels = [own or product for own, product in zip(labels, _product_names(path, solids), strict=True)]
+    return StepBody(solids, tuple(labels), faces)
 
 
-def _named_faces(solid: Solid, reader: STEPControl_Reader) -> dict[str, list[Face]]:
-    """Return the faces by the name of their ADVANCED_FACE; XCAF and build123d keep the names of parts only."""
+def _entity_name(shape: Shape, reader: STEPControl_Reader) -> str:
+    """Return the name of the ADVANCED_FACE or MANIFOLD_SOLID_BREP that a shape was read from."""
     from OCP.StepRepr import StepRepr_RepresentationItem
     from OCP.TopLoc import TopLoc_Location
 
-    transferred = reader.WS().TransferReader()
-    found: dict[str, list[Face]] = {}
-    for face in solid.faces():
-        drawn = face.wrapped.Located(TopLoc_Location())  # the entity has no location of an assembly
-        entity = transferred.EntityFromShapeResult(drawn, 1)
-        if isinstance(entity, StepRepr_RepresentationItem) and entity.Name() is not None:
-            found.setdefault(entity.Name().ToCString().strip().lower(), []).append(face)
-    return found
+    drawn = shape.wrapped.Located(TopLoc_Location())  # the entity has no location of an assembly
+    entity = reader.WS().TransferReader().EntityFromShapeResult(drawn, 1)
+    named = isinstance(entity, StepRepr_RepresentationItem) and entity.Name() is not None
+    return str(entity.Name().ToCString()).strip() if named else ""
 
 
-def tessellated(solid: Solid) -> Triangles:
+def _product_names(path: Path, solids: tuple[Solid, ...]) -> list[str]:
+    """Return the label of the product that each solid belongs to."""
+    from build123d import import_step
+
+    known = []
+    waiting = [*import_step(str(path)).children]
+    while waiting:
+        shape = waiting.pop()
+        waiting += shape.children
+        if not shape.children:
+            known += [(solid, _label(shape.label)) for solid in shape.solids()]
+    if not known:
+        return [""] * len(solids)
+    nearest = [min(known, key=lambda item: (item[0].center() - solid.center()).length) for solid in solids]
+    return [label for _, label in nearest]
+
+
+def _label(name: str) -> str:
+    """Return the label that a name in a STEP file stands for."""
+    label = name.translate(str.maketrans(" .()[]", "______"))
+    return "" if _NO_LABEL.fullmatch(label) else label
+
+
+def tessellated(solid: Solid | Compound) -> Triangles:
     """Return a CAD solid as triangles, within 5e-5 of its diagonal."""
     from finger3d.geometry.tessellate import tessellate
 

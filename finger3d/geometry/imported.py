@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
-from finger3d.geometry.files import STEP, content, read_named, read_surface, tessellated
+from finger3d.geometry.files import STEP, StepBody, content, read_step, read_surface, tessellated
+from finger3d.geometry.parts import glue
 from finger3d.geometry.surface import Triangles
 from finger3d.geometry.surface_checks import crossings, mistake
 
 if TYPE_CHECKING:
-    from build123d import Face, Solid
+    from build123d import Compound, Face, Solid
 
     from finger3d.geometry.tessellate import Tessellation
 
@@ -49,6 +50,7 @@ class Imported:
     middle : (3,) middle of the base in the file's coordinates after the rotation, mm
     surface : closed triangles in the final position, mm
     cad : the build123d solid in the final position; None for STL
+    parts : build123d shapes of the parts in the final position, by their labels; empty for a body of one part
     """
 
     path: str = field(compare=False)
@@ -59,6 +61,7 @@ class Imported:
     middle: Float = field(compare=False, repr=False)
     surface: Triangles = field(compare=False, repr=False)
     cad: Solid | None = field(compare=False, repr=False)
+    parts: Mapping[str, Compound] = field(default_factory=dict, compare=False, repr=False)
 
     @property
     def name(self) -> str:
@@ -67,8 +70,8 @@ class Imported:
 
     @property
     def part_labels(self) -> tuple[str, ...]:
-        """See :attr:`Design.part_labels`."""
-        return ()
+        """Names of the solids in a STEP file of several."""
+        return tuple(label for label in self.parts if label)
 
     @property
     def cache_fields(self) -> Mapping[str, object]:
@@ -115,15 +118,15 @@ class Imported:
 
     @cached_property
     def _mirrors(self) -> tuple[str, ...]:
-        points = self.surface.points[np.unique(self.surface.faces)]
-        points = points[:: len(points) // _MAX_MIRRORED_POINTS + 1]
-        found = []
-        for axis, name in ((0, "x"), (2, "z")):
-            image = points.copy()
-            image[:, axis] *= -1.0
-            if np.abs(self.surface.signed_distance(image)[0]).max() <= _MIRROR_TOLERANCE * self.surface.size:
-                found.append(name)
-        return tuple(found)
+        surfaces = [self.surface, *(tessellated(part) for part in self.parts.values())]
+        return tuple(name for axis, name in ((0, "x"), (2, "z")) if all(self._mirrored(s, axis) for s in surfaces))
+
+    def _mirrored(self, surface: Triangles, axis: int) -> bool:
+        """Whether a surface is its own mirror image."""
+        points = surface.points[np.unique(surface.faces)]
+        image = points[:: len(points) // _MAX_MIRRORED_POINTS + 1].copy()
+        image[:, axis] *= -1.0
+        return bool(np.abs(surface.signed_distance(image)[0]).max() <= _MIRROR_TOLERANCE * self.surface.size)
 
     def solid(self) -> Solid:
         """Return the build123d solid, its faces labelled."""
@@ -133,9 +136,9 @@ class Imported:
             raise Finger3dError(f"{self.path}: an STL file has triangles, and no CAD solid; export it as STL again")
         return sound(self.cad, self.name)
 
-    def solids(self) -> Mapping[str, Solid]:
-        """Return the main body only."""
-        return {"": self.solid()}
+    def solids(self) -> Mapping[str, Solid | Compound]:
+        """Return the parts; the solids without a name are the main body."""
+        return self.parts or {"": self.solid()}
 
     def tessellation(self) -> Tessellation | None:
         """Return the triangles of an STL file in labelled patches; None for STEP, which is meshed from CAD."""
@@ -149,7 +152,9 @@ def imported(path: str | Path, upside_down: bool = False, scale: float = 1.0) ->
 
     Parameters
     ----------
-    path : .stl (mm) or .step; a plane face named "base" in a STEP file (the name of its ADVANCED_FACE) is turned down
+    path : .stl (mm) or .step
+        A plane face named "base" in a STEP file (the name of its ADVANCED_FACE) is turned down. Solids of a STEP file
+        are parts with their names as labels; those without a name are the main body. A body may be hollow.
     upside_down : turn it, so that its highest plane becomes the base
     scale : for STL only
 
@@ -166,18 +171,21 @@ def imported(path: str | Path, upside_down: bool = False, scale: float = 1.0) ->
     path = Path(path)
     solid = None
     base: list[Face] = []
+    parts: dict[str, list[Solid]] = {}
     if path.suffix.lower() in STEP:
-        solid, named = read_named(path)
-        if base := named.get(_BASE_NAME, []):
-            solid = _turned(path, solid, base)
+        read = read_step(path)
+        solid, parts = united(path, read)
+        moves: list[Callable[[Solid], Solid]] = []
+        if base := read.faces.get(_BASE_NAME, []):
+            moves.append(_turn(path, solid, base))
         if scale != 1.0:
-            solid = solid.scale(scale)
+            moves.append(lambda shape: shape.scale(scale))
         if upside_down and not base:
-            from build123d import Axis
-
-            solid = solid.rotate(Axis.Z, 180.0)
+            moves.append(_upside_down)
+        for move in moves:
+            solid, parts = move(solid), {label: [move(s) for s in found] for label, found in parts.items()}
         surface = tessellated(solid)
-        if reason := mistake(surface):
+        if reason := mistake(surface, may_be_hollow=True):
             raise Finger3dError(f"{path}: the body {reason}")
     else:
         surface = read_surface(path, scale)
@@ -185,7 +193,46 @@ def imported(path: str | Path, upside_down: bool = False, scale: float = 1.0) ->
         if upside_down:
             surface = Triangles(surface.points * [-1.0, -1.0, 1.0], surface.faces)
     found = _on_its_base(str(path), content(path), scale, upside_down, surface, solid)
-    return replace(found, named_base=True) if base else found
+    return replace(found, named_base=bool(base), parts=_moved(parts, found.middle))
+
+
+def united(path: Path, read: StepBody) -> tuple[Solid, dict[str, list[Solid]]]:
+    """Return the union of the solids of a STEP file, and the solids of each part; none if there is one part.
+
+    Raises
+    ------
+    Finger3dError
+        If solids overlap, or do not touch.
+    """
+    if len(read.solids) == 1:
+        return read.solids[0], {}
+    parts: dict[str, list[Solid]] = {}
+    for label, solid in zip(read.labels, read.solids, strict=True):
+        parts.setdefault(label, []).append(solid)
+    from build123d import Compound
+
+    glue({label: Compound(found) for label, found in parts.items()}, str(path))
+    whole = read.solids[0].fuse(*read.solids[1:]).clean().solids()
+    if len(whole) != 1:
+        raise Finger3dError(
+            f"{path}: the {len(read.solids)} solids do not touch: they make {len(whole)} bodies; give one body"
+        )
+    return whole[0], parts if len(parts) > 1 else {}
+
+
+def _moved(parts: Mapping[str, list[Solid]], middle: Float) -> dict[str, Compound]:
+    if not parts:
+        return {}
+    from build123d import Compound, Location
+
+    place = Location(tuple(float(-m) for m in middle))
+    return {label: Compound([solid.moved(place) for solid in found]) for label, found in parts.items()}
+
+
+def _upside_down(solid: Solid) -> Solid:
+    from build123d import Axis
+
+    return solid.rotate(Axis.Z, 180.0)
 
 
 def of_surface(surface: Triangles, name: str, upside_down: bool = False) -> Imported:
@@ -215,28 +262,32 @@ def _on_its_base(
     return Imported(path, digest, scale, upside_down, False, middle, moved, solid)
 
 
-def _turned(path: Path, solid: Solid, base: list[Face]) -> Solid:
-    """Return the solid rotated by the smallest angle (about z, if by 180 degrees) so that the named faces face down."""
+def _turn(path: Path, solid: Solid, base: list[Face]) -> Callable[[Solid], Solid]:
+    """Return the rotation by the smallest angle (about z, if by 180 degrees) that turns the named faces down."""
     normals = np.array([[*face.normal_at(face.center())] for face in base])
     out = normals[0]
     if not all(face.is_planar for face in base) or (normals @ out).min() < _DOWNWARD:
         raise Finger3dError(
             f"{path}: the {len(base)} faces named '{_BASE_NAME}' are not one plane; name one plane face so"
         )
-    if out[1] > -_DOWNWARD:
+
+    def turned(shape: Solid) -> Solid:
+        if out[1] <= -_DOWNWARD:
+            return shape
         from build123d import Axis
 
         around = np.cross(out, [0.0, -1.0, 0.0])
         axis = around / np.linalg.norm(around) if out[1] < _DOWNWARD else np.array([0.0, 0.0, 1.0])
-        solid = solid.rotate(Axis((0, 0, 0), tuple(axis)), float(np.degrees(np.arccos(np.clip(-out[1], -1.0, 1.0)))))
-    surface = tessellated(solid)
+        return shape.rotate(Axis((0, 0, 0), tuple(axis)), float(np.degrees(np.arccos(np.clip(-out[1], -1.0, 1.0)))))
+
+    surface = tessellated(turned(solid))
     level = -out @ np.array([*base[0].center()])
     if abs(surface.low[1] - level) > _BASE_FLATNESS * surface.size:
         raise Finger3dError(
             f"{path}: the body reaches {level - surface.low[1]:.4g} mm beyond the face named '{_BASE_NAME}'; the base "
             "must be its outermost plane"
         )
-    return solid
+    return turned
 
 
 def _check_size(path: str, surface: Triangles) -> None:

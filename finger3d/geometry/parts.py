@@ -11,7 +11,7 @@ from finger3d.errors import Finger3dError
 from finger3d.geometry.cad import label_face
 
 if TYPE_CHECKING:
-    from build123d import Compound, Face, Solid
+    from build123d import Compound, Face, Shape, Solid
 
 OUTSIDE = -1
 """Number that stands for the space around a body, where its parts are numbered from 0."""
@@ -46,7 +46,7 @@ class Glued:
     faces : those of the surface, labelled, and those between parts
     """
 
-    shape: Compound
+    shape: Shape
     labels: tuple[str, ...]
     volumes_mm3: tuple[float, ...]
     faces: tuple[GluedFace, ...]

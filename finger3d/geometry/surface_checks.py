@@ -11,8 +11,11 @@ from finger3d.geometry.surface import Triangles
 _FLAT = 1e-9  # thickness over length
 
 
-def mistake(surface: Triangles) -> str:
-    """Return the defect of a surface that is not one closed body with triangles facing outward; empty if it is."""
+def mistake(surface: Triangles, may_be_hollow: bool = False) -> str:
+    """Return the defect of a surface that is not one closed body with triangles facing outward; empty if it is.
+
+    A body that `may_be_hollow` has any number of closed inner surfaces, whose triangles face the voids.
+    """
     points, faces = surface.points, surface.faces
     if len(faces) < 4:
         return f"has {len(faces)} triangles, which enclose nothing"
@@ -39,8 +42,9 @@ def mistake(surface: Triangles) -> str:
             f"has flipped triangles: neighbours face opposite ways along {int((forward != 1).sum())} edges, the first "
             f"at {_place(points[first])}"
         )
-    pieces = _pieces(owner, number, len(faces))
-    if pieces > 1:
+    piece = _pieces(owner, number, len(faces))
+    pieces = int(piece.max()) + 1
+    if pieces > 1 and not (may_be_hollow and (_volumes(surface, piece) > 0.0).sum() == 1):
         return f"is in {pieces} pieces (or hollow); give one solid body"
     if surface.volume < 0.0:
         return "is inside out: its triangles face inward"
@@ -57,13 +61,21 @@ def _place(points: Float) -> str:
     return "({:.4g}, {:.4g}, {:.4g}) mm".format(*points.mean(axis=0))
 
 
-def _pieces(owner: Int, edge: Int, count: int) -> int:
+def _volumes(surface: Triangles, piece: Int) -> Float:
+    """Volume (p,) that each piece encloses, mm3; negative for the surface of a void."""
+    reach = surface.corners[:, 0] - 0.5 * (surface.low + surface.high)
+    return np.asarray(np.bincount(piece, np.einsum("ij,ij->i", reach, surface.area_vectors) / 3.0), dtype=float)
+
+
+def _pieces(owner: Int, edge: Int, count: int) -> Int:
+    """Return the number (m,) of the connected piece that each triangle belongs to."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
     order = np.argsort(edge, kind="stable")
     a, b = owner[order[0::2]], owner[order[1::2]]  # every edge has two owners here
-    return int(connected_components(coo_matrix((np.ones(len(a)), (a, b)), shape=(count, count)), directed=False)[0])
+    found: Int = connected_components(coo_matrix((np.ones(len(a)), (a, b)), shape=(count, count)), directed=False)[1]
+    return found
 
 
 def crossings(surface: Triangles) -> Int:

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finger3d._arrays import freeze_arrays
 from finger3d._types import Float, Int
@@ -16,10 +15,8 @@ from finger3d.geometry.parts import OUTSIDE, Glued, GluedFace
 from finger3d.geometry.surface import Triangles
 
 if TYPE_CHECKING:
-    from build123d import Face, Shape, Solid
+    from build123d import Compound, Face, Shape, Solid
 
-
-Bool = NDArray[np.bool_]
 
 _WELD = 1e-7  # mm
 
@@ -91,63 +88,62 @@ class Tessellation:
 
 
 def tessellate(
-    solid: Solid, tolerance_mm: float, angle: float = 0.5, exact: tuple[float, ...] = (0.0,)
+    solid: Solid | Compound,
+    tolerance_mm: float,
+    angle: float = 0.5,
+    exact: tuple[float, ...] = (0.0,),
+    voids: Triangles | None = None,
 ) -> Tessellation:
     """Tessellate a build123d solid within `tolerance_mm` (absolute) and `angle` radians between facets.
 
     build123d's own `tessellate` and `export_stl` take a relative tolerance and reuse what was tessellated before.
-    `exact` lists numbers (mm) that a plane's constant coordinate may stand for to the last bit.
+    `exact` lists numbers (mm) that a plane's constant coordinate may stand for to the last bit. `voids` are the inner
+    surfaces of the whole body, for a part of it on one side of a plane of symmetry, which may cut them open.
     """
     faces = tuple(GluedFace(face, 0, OUTSIDE) for face in labelled_faces(solid))
-    return _tessellation(solid, faces, (), tolerance_mm, angle, exact)
+    body = Glued(solid, ("",), (), faces)
+    return tessellate_parts(body, tolerance_mm, angle, exact, voids_of(solid, tolerance_mm) if voids is None else voids)
 
 
 def tessellate_parts(
-    body: Glued, tolerance_mm: float, angle: float = 0.5, exact: tuple[float, ...] = (0.0,)
+    body: Glued,
+    tolerance_mm: float,
+    angle: float = 0.5,
+    exact: tuple[float, ...] = (0.0,),
+    voids: Triangles | None = None,
 ) -> Tessellation:
     """Tessellate glued solids like :func:`tessellate`; faces between them have their triangles once."""
-    return _tessellation(body.shape, body.faces, body.labels[1:], tolerance_mm, angle, exact)
-
-
-def _tessellation(
-    shape: Shape,
-    faces: tuple[GluedFace, ...],
-    part_labels: tuple[str, ...],
-    tolerance_mm: float,
-    angle: float,
-    exact: tuple[float, ...],
-) -> Tessellation:
-    points, triangles, face = triangulated(shape, [f.face for f in faces], tolerance_mm, angle)
-    hollow = _in_cavities(points, triangles, np.array([f.outside == OUTSIDE for f in faces])[face])
+    points, triangles, face = triangulated(body.shape, [f.face for f in body.faces], tolerance_mm, angle)
     known = []
-    for i, f in enumerate(faces):
-        mine = face == i
-        found = _cad_face(f.face, points, triangles[mine], surface_of(f.face, exact))
+    for i, f in enumerate(body.faces):
+        found = _cad_face(f.face, points, triangles[face == i], surface_of(f.face, exact))
         label = found.label if f.outside == OUTSIDE else ""
-        known.append(
-            replace(found, label="cavity" if hollow[mine].all() else label, inside=f.inside, outside=f.outside)
-        )
+        if label and voids is not None and len(voids.faces):
+            middle = points[triangles[face == i][:1]].mean(axis=1)
+            label = "cavity" if np.linalg.norm(voids.closest(middle)[0] - middle) < 4.0 * tolerance_mm else label
+        known.append(replace(found, label=label, inside=f.inside, outside=f.outside))
     touching = np.unique(np.stack([triangles.ravel(), np.repeat(face, 3)], axis=1), axis=0)
     several = np.bincount(touching[:, 0], minlength=len(points)) >= 3
     many = np.flatnonzero(several & (_seams_at_points(triangles, face, len(points)) >= 3))
     sets = tuple(tuple(int(i) for i in touching[touching[:, 0] == v, 1]) for v in many)
-    return Tessellation(points, triangles, face, tuple(known), points[many], sets, part_labels)
+    return Tessellation(points, triangles, face, tuple(known), points[many], sets, body.labels[1:])
 
 
-def _in_cavities(points: Float, triangles: Int, free: Bool) -> Bool:
-    """Return which triangles (m,) belong to a closed piece of the free surface that encloses a void."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
+def voids_of(solid: Solid | Compound, tolerance_mm: float) -> Triangles:
+    """Return the triangles of the closed inner surfaces of a solid; none for a solid that is not hollow."""
+    from OCP.BRepClass3d import BRepClass3d
 
-    used = triangles[free]
-    ends = used[:, [[0, 1], [1, 2]]].reshape(-1, 2)
-    joined = coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(len(points), len(points)))
-    piece = connected_components(joined, directed=False)[1][used[:, 0]]
-    a, b, c = (points[used[:, i]] for i in range(3))
-    volume = np.bincount(piece, np.einsum("ij,ij->i", a, np.cross(b, c)))
-    out = np.zeros(len(triangles), dtype=bool)
-    out[free] = volume[piece] < 0.0
-    return out
+    inner = [
+        shell
+        for one in solid.solids()
+        for shell in one.shells()
+        if not shell.wrapped.IsSame(BRepClass3d.OuterShell_s(one.wrapped))
+    ]
+    if not inner:
+        return Triangles(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
+    faces = [face for shell in inner for face in shell.faces()]
+    points, triangles, _ = triangulated(solid, faces, tolerance_mm, 0.5)
+    return Triangles(points, triangles)
 
 
 def _seams_at_points(triangles: Int, face: Int, count: int) -> Int:

@@ -138,7 +138,7 @@ def _body(design: Design, symmetry: tuple[str, ...], field: Sizing) -> tuple[Tes
     from finger3d.geometry.faceted import coarser
     from finger3d.geometry.implicit import surface_of
     from finger3d.geometry.parts import glue
-    from finger3d.geometry.tessellate import tessellate, tessellate_parts
+    from finger3d.geometry.tessellate import tessellate, tessellate_parts, voids_of
 
     faceted = design.tessellation()
     glued = solid = None
@@ -165,9 +165,10 @@ def _body(design: Design, symmetry: tuple[str, ...], field: Sizing) -> tuple[Tes
     half_width, half_length = 0.5 * design.width_mm, design.half_length_mm
     exact = (0.0, half_width, -half_width, half_length, -half_length, design.height_mm)
     tolerance = _ENVELOPE_SHARE * epsilon * diagonal
+    voids = voids_of(design.solid(), tolerance)
     if glued:
-        return tessellate_parts(glued, tolerance, exact=exact), epsilon
-    return tessellate(solid, tolerance, exact=exact), epsilon
+        return tessellate_parts(glued, tolerance, exact=exact, voids=voids), epsilon
+    return tessellate(solid, tolerance, exact=exact, voids=voids), epsilon
 
 
 def _within_layers(design: Design, glued: Glued, epsilon: float, diagonal: float) -> float:
