@@ -14,7 +14,7 @@ from finger3d.fem.quality import curved_jacobians, curved_volume
 from finger3d.fem.simplex import Mesh, boundary, signed_volumes, unfold
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import MeshOptions
-from finger3d.meshing import tetwild
+from finger3d.meshing import solids, tetwild
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.snap import UnusableMeshError, check_closed
 from tests.bodies import CUBE, SIDES
@@ -134,4 +134,4 @@ def test_three_attempts_and_then_one_line(monkeypatch: pytest.MonkeyPatch, tmp_p
 )
 def test_tets_that_are_no_mesh_of_the_body_are_refused(tets: Any, volume: float, text: str) -> None:
     with pytest.raises(UnusableMeshError, match=text):
-        tetwild.check_tets(CUBE, tets, volume)
+        solids.check_tets(CUBE, tets, volume)

@@ -128,7 +128,7 @@ def _size(model: Model, zone: tuple[float, float, float, float], axes: tuple[str
     else:
         from finger3d.meshing.sizing import forecast as count_cells
         from finger3d.meshing.sizing import sizing
-        from finger3d.meshing.tetwild import box
+        from finger3d.meshing.solids import box
 
         low, high = box(model.design, axes)
         d, cells = 3, int(count_cells(model.design, sizing(model.design, model.mesh, zone, low, high)))

@@ -33,6 +33,7 @@ from finger3d.mechanics.model import MeshOptions, Model, ObjectResponse
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.symmetry import held_dofs
 from finger3d.meshing.generate import mesh_solid
+from finger3d.meshing.options import Mesher
 from finger3d.meshing.swept import mesh_section
 from finger3d.objects import HeldBody, PlacedObject, vertical_frame
 
@@ -123,12 +124,12 @@ class ObjectBody:
         held = self.model.object.held_body(self.model.design, self.model.domain == "solid")
         return (self._block(), False) if held is None else (self._held(held), held.is_whole)
 
-    def _made(self, design: Design, zone: Zone, mesher: str = "swept", axes: tuple[str, ...] | None = None) -> Mesh:
+    def _made(self, design: Design, zone: Zone, mesher: Mesher = "swept", axes: tuple[str, ...] | None = None) -> Mesh:
         """Return the mesh of a design with the edge lengths of the finger; its contact face is on top."""
         extents = [design.height_mm, design.half_length_mm]
         solid = self.model.domain == "solid"
         size = min([self.model.mesh.size_mm, *(0.5 * e for e in extents), *([0.5 * design.width_mm] if solid else [])])
-        options = MeshOptions(size, max(size, min(self.model.mesh.base_size_mm, *extents)), mesher)  # type: ignore[arg-type]
+        options = MeshOptions(size, max(size, min(self.model.mesh.base_size_mm, *extents)), mesher)
         axes = self.axes if axes is None else axes
         self.say("meshing the object")
         return (

@@ -24,6 +24,7 @@ from finger3d.mechanics.readings import Marker, Reading, Taxel
 from finger3d.mechanics.relaxation import Relaxation
 from finger3d.mechanics.small_strain import SmallStrain
 from finger3d.meshing.grading import Grading
+from finger3d.meshing.options import Mesher
 from finger3d.objects import ContactPath, ObjectPose, Plane, RigidObject, between
 
 if TYPE_CHECKING:
@@ -76,7 +77,7 @@ class MeshOptions:
 
     size_mm: float
     base_size_mm: float
-    mesher: Literal["ftetwild", "swept"] = "ftetwild"
+    mesher: Mesher = "ftetwild"
     layers: int = 2
     grading: Grading | None = None
     gauge_refinement: float = 1.0

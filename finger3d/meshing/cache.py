@@ -21,7 +21,7 @@ from finger3d.meshing.report import content_hash
 FORMAT = 1
 """Version of the stored meshes; a new number makes all cached meshes unused."""
 
-_PACKAGES = ("pytetwild", "build123d")
+_PACKAGES = {"ftetwild": ("pytetwild", "build123d"), "netgen": ("netgen-mesher", "build123d")}
 
 
 def folder() -> Path:
@@ -37,6 +37,7 @@ def key(design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...
         code = hashlib.sha256(Path(inspect.getfile(type(design))).read_bytes()).hexdigest()
     except (OSError, TypeError):  # a design typed at a prompt has no file
         code = ""
+    netgen = options.mesher == "netgen"
     text = json.dumps(
         {
             "format": FORMAT,
@@ -46,7 +47,7 @@ def key(design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...
             **({"grading": options.grading.key} if options.grading else {}),
             "zone": [repr(float(z)) for z in zone],
             "symmetry": sorted(symmetry),
-            "versions": {name: _version(name) for name in _PACKAGES},
+            "versions": {name: _version(name) for name in _PACKAGES["netgen" if netgen else "ftetwild"]},
         },
         sort_keys=True,
     )

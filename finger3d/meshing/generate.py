@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import importlib
+import time
 from collections.abc import Callable
 
 from finger3d.fem.simplex import Mesh
 from finger3d.geometry.design import Design
+from finger3d.meshing import cache
 from finger3d.meshing.given import GivenMesh, mesh_given
+from finger3d.meshing.limits import check_sizes
 from finger3d.meshing.options import MeshSizes, Zone
-from finger3d.meshing.report import MeshReport
+from finger3d.meshing.report import MeshReport, report
+from finger3d.meshing.sizing import rounded_zone
 from finger3d.meshing.swept import mesh_swept
 
 
@@ -39,6 +44,27 @@ def mesh_solid(
     if options.mesher == "swept":
         say("meshing (swept)")
         return mesh_swept(design, options, zone, symmetry)
-    from finger3d.meshing.tetwild import mesh_tetwild
+    return _mesh_unstructured(design, options, zone, symmetry, say)
 
-    return mesh_tetwild(design, options, zone, symmetry, say)
+
+def _mesh_unstructured(
+    design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...], say: Callable[[str], None]
+) -> tuple[Mesh, MeshReport]:
+    """Mesh a design by fTetWild or netgen, or read the mesh from the cache."""
+    check_sizes(design, options, 3)
+    zone = rounded_zone(design, options, zone)
+    path = cache.folder() / f"{cache.key(design, options, zone, symmetry)}.npz"
+    multiple = 2.0 ** len(symmetry)
+    start = time.perf_counter()
+    if (found := cache.load(path)) is not None:
+        mesh, volume = found
+        say(f"mesh from the cache, {path}")
+        seconds = {"cad": 0.0, "mesh": time.perf_counter() - start}
+        return mesh, report(mesh, multiple, volume, seconds, from_cache=True, cache_path=str(path))
+    mesher = importlib.import_module(f"finger3d.meshing.{'netgen' if options.mesher == 'netgen' else 'tetwild'}")
+    mesh, volume, cad_seconds = mesher.new_mesh(design, options, zone, symmetry, say)
+    stored = cache.save(path, mesh, volume)
+    if not stored:
+        say(f"the mesh could not be kept in {path.parent}; the next run will mesh again")
+    seconds = {"cad": cad_seconds, "mesh": time.perf_counter() - start - cad_seconds}
+    return mesh, report(mesh, multiple, volume, seconds, cache_path=str(path) if stored else None)

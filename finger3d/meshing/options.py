@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING, Literal, Protocol
 if TYPE_CHECKING:
     from finger3d.meshing.grading import Grading
 
+Mesher = Literal["ftetwild", "netgen", "swept"]
+"""Unstructured tetrahedra by fTetWild or netgen, or tetrahedra swept along z."""
+
 Zone = tuple[float, float, float, float]
 """x_min, x_max, z_min, z_max in mm: where contact is predicted."""
 
@@ -23,8 +26,8 @@ class MeshSizes(Protocol):
         """Edge length far from the contact zone."""
 
     @property
-    def mesher(self) -> Literal["ftetwild", "swept"]:
-        """Unstructured or swept tetrahedra."""
+    def mesher(self) -> Mesher:
+        """Mesher of solids."""
 
     @property
     def layers(self) -> int:

@@ -33,6 +33,7 @@ from finger3d._types import Tree
 from finger3d.contact.rules import RuleName
 from finger3d.materials.elastic import MODULUS_KEYS, ElasticConstants, elastic_constants
 from finger3d.mechanics.model import Domain
+from finger3d.meshing.options import Mesher
 
 Record = TypeVar("Record")
 Steps = Count | Literal["auto"]
@@ -166,7 +167,7 @@ class MeshTable(TomlTable):
     size_mm : edge length at the contact
     base_size_mm : edge length far from it
     gauge_refinement : edge length at the contact over that around gauges; 1: gauges do not change the mesh
-    mesher : fTetWild, or structured and the same on every run, for extruded designs
+    mesher : fTetWild; netgen, the same on every run, for CAD; or structured, for extruded designs
     tolerance : instead of sizes: refine until the estimated error of the goal is below it
     goal : with tolerance: the number that the mesh is refined for, such as gauge_g36; the normal force unless given
     max_seconds : with tolerance: stop refining then, with the best so far
@@ -175,7 +176,7 @@ class MeshTable(TomlTable):
     size_mm: Edge | None = None
     base_size_mm: Edge | None = None
     gauge_refinement: Annotated[float, Ge(1), Le(100)] = 1.0
-    mesher: Literal["ftetwild", "swept"] = "ftetwild"
+    mesher: Mesher = "ftetwild"
     tolerance: Annotated[float, Ge(1e-6), Lt(1)] | None = None
     goal: Name | None = None
     max_seconds: Annotated[float, Ge(1e-3), Le(1e7)] | None = None
