@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
-import plotly.graph_objects as go
-from dash import Dash, Input, Output, dcc, html
 
 from finger3d.app.live_body import LiveBody, Press, Reading
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.gauges import Gauge
 from finger3d.sensor.curve import NOISE
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+    from dash import Dash, html
 
 _COLOURS = {"open": "#c4c4c4", "stick": "#1f3f77", "slip": "#f28e2b"}
 _LARGEST_MU = 1.5
@@ -22,6 +25,9 @@ _MARGIN = {"l": 60, "r": 20, "t": 40, "b": 50}
 
 def page(body: LiveBody, mu: float) -> Dash:
     """Return the page of a body; `mu` is where its slider begins."""
+    import plotly.graph_objects as go
+    from dash import Dash, Input, Output, dcc, html
+
     app = Dash(__name__, title=f"finger3d: {body.title}", update_title="")
     design = body.problem.model.design
     deepest = body.largest_depth_mm
@@ -68,6 +74,8 @@ def page(body: LiveBody, mu: float) -> Dash:
 
 
 def _slider(name: str, label: str, low: float, high: float, step: float, value: float) -> html.Div:
+    from dash import dcc, html
+
     marks = {float(f"{at:.4g}"): f"{at:.3g}" for at in np.linspace(low, high, 5)}
     slider = dcc.Slider(
         low, high, step, value=round(value, 2), id=name, marks=marks, updatemode="drag", tooltip={"placement": "bottom"}
@@ -95,6 +103,8 @@ def text_of(reading: Reading) -> str:
 
 def traction_figure(press: Press, mu: float) -> go.Figure:
     """Return pressure, friction and its limit along the middle of the contact, with stick and slip."""
+    import plotly.graph_objects as go
+
     figure = go.Figure()
     figure.add_scatter(x=press.x_mm, y=press.pressure_MPa, name="pressure", mode="lines", line_color="#222222")
     limit = mu * press.pressure_MPa
@@ -116,6 +126,8 @@ def traction_figure(press: Press, mu: float) -> go.Figure:
 
 def section_figure(body: LiveBody, gauge: Gauge) -> go.Figure:
     """Return the outline of the middle section and the gauge."""
+    import plotly.graph_objects as go
+
     x, y = body.outline()
     along = 0.06 * float(np.ptp(x)) * gauge.direction
     ends = np.stack([gauge.middle - along, gauge.middle + along])
