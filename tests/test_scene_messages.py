@@ -81,7 +81,7 @@ MISTAKES = {
     "geometry of another kind": (
         "clipped_cylinder",
         "finger.obj",
-        ['finger.geometry = "finger.obj"', '".stl", ".step" or ".stp"'],
+        ['finger.geometry = "finger.obj"', '".stl", ".step", ".stp", ".msh" or ".vtu"'],
     ),
     "depth 0": ("depth_mm = 10.0", "depth_mm = 0.0", ["press.depth_mm = 0.0", "from 1e-6 to 1e6"]),
     "depth negative": ("depth_mm = 10.0", "depth_mm = -1.0", ["press.depth_mm = -1.0", "from 1e-6 to 1e6"]),
@@ -122,7 +122,7 @@ MISTAKES = {
     ),
     "tolerance of 100 %": ("size_mm = 2.0", "tolerance = 1.0", ["mesh.tolerance = 1.0", "and below 1"]),
     "mesh time": ("size_mm = 2.0", "max_seconds = 9", ["mesh.max_seconds = 9", "only with mesh.tolerance"]),
-    "mesher": ("size_mm = 2.0", 'mesher = "gmsh"', ['mesh.mesher = "gmsh"', '"ftetwild" or "swept"']),
+    "mesher": ("size_mm = 2.0", 'mesher = "gmsh"', ['mesh.mesher = "gmsh"', '"ftetwild", "netgen" or "swept"']),
     "domain": ("[mesh]", '[model]\ndomain = "planestrain"\n[mesh]', ['model.domain = "planestrain"', '"plane-strain"']),
     "rule": ("[mesh]", '[contact]\nrule = "papr"\n[mesh]', ['contact.rule = "papr"', '"projection" or "paper"']),
     "unknown shape": ('"plane"', '"spher"', ['object.shape = "spher"', '"sphere"']),
