@@ -52,10 +52,13 @@ def test_a_leg_that_does_nothing_is_refused(legs, text) -> None:
     ("thing", "size"),
     [
         ({"shape": "plane", "tilt_deg": 0.0}, 0.4),
-        ({"shape": "sphere", "radius_mm": 8.0}, 2 * 2.78388 / 30),  # the overlap, sqrt(d (2 R - d)) each way
+        ({"shape": "sphere", "radius_mm": 8.0}, 2 * 2.78388 / 600**0.5),  # sqrt(d (2 R - d)) each way, 600 points
         ({"shape": "cylinder", "radius_mm": 8.0, "axis": "z"}, 2 * 2.78388 / 30),
         ({"shape": "cylinder", "radius_mm": 100.0, "axis": "x"}, 4.0 / 12.0),  # as wide as the finger, no end inside
-        ({"shape": "wave", "wavelength_mm": 5.0, "amplitude_mm": 0.1}, 5.0 / 25.0),
+        (
+            {"shape": "wave", "wavelength_mm": 5.0, "amplitude_mm": 0.1},
+            4.0 / 12.0,
+        ),  # finer would be more than 600 points
         ({"shape": "sphere", "radius_mm": 0.4}, 0.2 * 0.4),  # the finest
     ],
 )
