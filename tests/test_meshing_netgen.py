@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -18,7 +20,8 @@ from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing import cache, netgen
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.sizing import sizing
-from finger3d.meshing.solids import box
+from finger3d.meshing.snap import UnusableMeshError
+from finger3d.meshing.solids import box, glued_solids
 from tests.bodies import box as box_of
 from tests.bodies import write_stl
 from tests.designs import FIG9, ZONE, make
@@ -50,6 +53,13 @@ def test_a_quarter_lies_on_the_cad_and_is_graded() -> None:
     base = mesh.points[mesh.facets["base"][:, :3]]
     assert 0.8 * OPTIONS.size_mm < top < 1.2 * OPTIONS.size_mm
     assert np.linalg.norm(base - np.roll(base, 1, axis=1), axis=2).mean() > 1.5 * top
+
+
+def test_the_same_mesh_comes_every_time() -> None:
+    field = field_of(FIG9, OPTIONS, ZONE, BOTH)
+    first, second = (netgen.run_child(glued_solids(FIG9, BOTH), field, 60.0) for _ in range(2))
+    for a, b in zip(first, second, strict=True):
+        np.testing.assert_array_equal(a, b)
 
 
 def test_parts_share_their_interfaces() -> None:
@@ -98,3 +108,15 @@ def test_without_the_package_a_line_names_it(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(netgen, "find_spec", lambda name: None)
     with pytest.raises(MissingError, match=r"pip install 'finger3d\[netgen\]'"):
         netgen.new_mesh(FIG9, OPTIONS, ZONE, BOTH, print)
+
+
+@pytest.mark.parametrize(
+    ("limit", "text"), [(0.01, "did not finish within 0 s"), (60.0, "netgen crashed .return code 1.: .*Error")]
+)
+def test_a_child_that_fails_is_told(monkeypatch: pytest.MonkeyPatch, limit: float, text: str) -> None:
+    if limit > 1.0:
+        monkeypatch.setattr(netgen, "size_points", lambda field: (np.zeros((1, 2)), np.ones(1)))  # two coordinates
+    body = SimpleNamespace(shape=glued_solids(FIG9, BOTH).shape)
+    with pytest.raises(UnusableMeshError, match=text):
+        netgen.run_child(body, field_of(FIG9, OPTIONS, ZONE, BOTH), limit)  # type: ignore[arg-type]
+    assert "netgen.occ" not in sys.modules
