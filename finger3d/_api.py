@@ -235,7 +235,7 @@ def export(
     out: str | Path,
     mold: MoldOptions | None = None,
     text: bool = False,
-    tolerance_mm: float = 0.05,
+    tolerance_mm: float | None = None,
     report: Progress | None = None,
 ) -> Exported:
     """Write the finger as STEP and STL and, if asked, the printable parts of a mold; all in mm.
@@ -246,7 +246,7 @@ def export(
     out : folder for the files
     mold : `finger3d.MoldOptions`; None: no mold
     text : whether the STL file is text instead of binary
-    tolerance_mm : largest distance of the triangles from the CAD surface
+    tolerance_mm : largest distance of the triangles from the CAD surface; None: 0.05 mm, or with a mold the printer's
     report : told about stages
     """
     from finger3d.mold.export import export as run

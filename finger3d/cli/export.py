@@ -25,7 +25,10 @@ def export(
     ascii_: Annotated[
         bool, Parameter(name="--ascii", negative=(), help="Write STL files as text instead of binary.")
     ] = False,
-    tolerance_mm: Annotated[float, Parameter(help="Largest distance between triangles and surface, in mm.")] = 0.05,
+    tolerance_mm: Annotated[
+        float | None,
+        Parameter(help="Largest distance between triangles and surface, in mm; 0.05, or with --mold the printer's."),
+    ] = None,
     mesh: Annotated[
         bool, Parameter(negative=(), help="Write the mesh as .vtu and .msh instead, with its facets and parts by name.")
     ] = False,

@@ -1,60 +1,200 @@
-"""Undercuts: whether the halves of a mold can be removed from the cast body."""
+"""Whether the halves of a mold can be removed from the cast body: undercuts and draft, in numbers.
+
+The draft of a place of the surface is the angle between the surface and the opening direction; walls without draft
+rub along the cast body over their whole length. An undercut is a place where the half cannot move along the opening
+direction without pressing into the body; its depth is the distance by which the half's material protrudes, across
+the opening direction, into the shadow of the body above it.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from finger3d._types import Float
+from finger3d.errors import Finger3dError
+from finger3d.geometry.surface import Triangles
+from finger3d.mold.body import Body
+from finger3d.mold.options import MoldOptions
+from finger3d.mold.regions import manifold, triangles
 
 if TYPE_CHECKING:
-    from build123d import Face, Shape, Solid
+    from build123d import Face, Solid
+    from manifold3d import CrossSection
 
 
 _ON_PLANE_MM = 1e-6  # distance at which a face lies on a plane
 _NORMAL_TOLERANCE = 1e-6  # component of a unit normal against the opening direction
+_FACET_UNDERCUT_MM = 0.02  # depth of undercuts that triangles of a smooth body have, below what a printer resolves
+_LEVELS = 24  # heights of a half at which its undercut is measured
+_DEPTH_TOLERANCE = 1e-3  # of the depth, relative
+_LITTLE_DRAFT = np.radians(1.0)
 
 
-def box(body: Shape) -> tuple[Float, Float]:
-    """Return the lowest and highest corner (3,), mm, of a build123d shape."""
-    found = body.bounding_box(optimal=True)
-    return np.array([*found.min]), np.array([*found.max])
+@dataclass(frozen=True)
+class Draft:
+    """How both halves come off the body.
+
+    Attributes
+    ----------
+    angle_deg : least angle between the walls and the opening direction; 0 if walls are parallel to it
+    wall_mm2 : area of the walls with less than 1 degree
+    wall_mm : largest length of these walls along the opening direction in one half
+    undercut_mm : depth of the deepest undercut; 0 without one
+    where : which half is locked, and near which point; empty without undercut
+    """
+
+    angle_deg: float
+    wall_mm2: float
+    wall_mm: float
+    undercut_mm: float
+    where: str
 
 
-def is_base(face: Face) -> bool:
-    """Return whether a face is the finger's base, which the lid covers."""
-    return bool(face.is_planar) and abs(face.center().Y) < _ON_PLANE_MM and face.normal_at(face.center()).Y < -0.5
+def check_opening(finger: Body, options: MoldOptions, may_turn: bool) -> Draft:
+    """Return how the halves come off.
+
+    Parameters
+    ----------
+    may_turn : whether halves that open along the other axis can be advised
+
+    Raises
+    ------
+    Finger3dError
+        If the body has an undercut deeper than `options.undercut_mm`.
+    """
+    found = draft(finger, options.split, options.split_mm)
+    if found.undercut_mm <= options.undercut_mm:
+        return found
+    other = "x" if options.split == "z" else "z"
+    free = (may_turn or other == "z") and not draft(finger, other, 0.0).undercut_mm
+    advice = f"--split {other} would do" if free else "a mold of two halves cannot be taken off; change the body"
+    raise Finger3dError(
+        f"--split {options.split} --split-mm {options.split_mm:g}: {found.where}, an undercut of "
+        f"{found.undercut_mm:.2g} mm; {advice}, or --undercut-mm {_rounded_up(found.undercut_mm)} if the silicone can "
+        "be stretched over it"
+    )
 
 
-def undercuts(solid: Solid, split: str, at_mm: float) -> str:
-    """Return a description of the worst undercut of a body whose halves open along an axis; empty without undercut.
+def _rounded_up(depth: float) -> str:
+    step = 10.0 ** (np.floor(np.log10(depth)) - 1.0)
+    return f"{np.ceil(depth / step) * step:.3g}"
+
+
+def draft(finger: Body, split: str, at_mm: float) -> Draft:
+    """Return draft and undercuts of a body whose halves open along the axis `split`, from the plane at `at_mm`."""
+    axis = 0 if split == "x" else 2
+    least, area, length, deepest, where = 90.0, 0.0, 0.0, 0.0, ""
+    for sign in (1.0, -1.0):
+        half = _half(finger.surface, axis, sign, at_mm)
+        walls = ~_cuts(half, axis, at_mm)
+        against = sign * half.normals[walls, axis]
+        locked = _locked(finger, axis, sign, at_mm)
+        depth = undercut_depth(half, axis, sign) if locked or finger.cad is None else 0.0
+        if depth > max(deepest, 0.0 if finger.cad is not None else _FACET_UNDERCUT_MM):
+            point = locked or half.corners[walls][int(np.argmin(against))].mean(axis=0)
+            side = f"{'+' if sign > 0 else '-'}{split}"
+            place = ", ".join(f"{c:.4g}" for c in point)
+            deepest, where = depth, f"the half on the {side} side is locked by the body near ({place}) mm"
+        angles = np.arcsin(np.clip(np.abs(against), 0.0, 1.0))
+        least = min(least, float(np.degrees(angles.min(initial=np.pi / 2.0))))
+        steep = angles < _LITTLE_DRAFT
+        areas = np.linalg.norm(half.area_vectors[walls], axis=1)
+        area += float(areas[steep].sum())
+        if steep.any():
+            ends = half.corners[walls][steep][:, :, axis]
+            length = max(length, float(np.ptp(ends)))
+    return Draft(round(least, 6), area, length, deepest, where)
+
+
+def _half(surface: Triangles, axis: int, sign: float, at_mm: float) -> Triangles:
+    normal = [0.0, 0.0, 0.0]
+    normal[axis] = sign
+    return triangles(manifold(surface).trim_by_plane(tuple(normal), sign * at_mm))
+
+
+def _cuts(half: Triangles, axis: int, at_mm: float) -> np.ndarray:
+    """Return the mask (m,) of the triangles on the split plane or on the base, which no half touches."""
+    corners = half.corners
+    on_split = (np.abs(corners[:, :, axis] - at_mm) < _ON_PLANE_MM).all(axis=1)
+    on_base = (np.abs(corners[:, :, 1]) < _ON_PLANE_MM).all(axis=1)
+    found: np.ndarray = on_split | on_base
+    return found
+
+
+def undercut_depth(half: Triangles, axis: int, sign: float) -> float:
+    """Return the depth (mm) of the deepest undercut of the part of a body inside one half.
+
+    At each height the shadow S is the outline of all that lies above, and U = S without the section the material of
+    the half that is locked below. The depth is the largest distance of a point of U from the outline of S.
+    """
+    from manifold3d import CrossSection, FillRule
+
+    order = {2: [0, 1, 2], 0: [1, 2, 0]}[axis]
+    turned = Triangles(half.points[:, order] * [1.0, 1.0, sign], half.faces if sign > 0 else half.faces[:, ::-1])
+    body = manifold(turned)
+    low, high = float(turned.low[2]), float(turned.high[2])
+    deepest = 0.0
+    for height in np.linspace(low, high, _LEVELS + 1)[:-1] + 1e-6 * (high - low):
+        above = body.trim_by_plane((0.0, 0.0, 1.0), float(height))
+        shadow = CrossSection(above.project().to_polygons(), FillRule.Positive)
+        locked = shadow - body.slice(float(height))
+        if locked.is_empty():
+            continue
+        deepest = max(deepest, _reach(shadow, locked, deepest))
+    return deepest
+
+
+def _reach(shadow: CrossSection, locked: CrossSection, known: float) -> float:
+    """Return the largest distance of the points of a region from the outline of another that holds it, mm."""
+
+    def reaches(distance: float) -> bool:
+        return float((shadow.offset(-distance) ^ locked).area()) > 1e-9 * float(shadow.area())
+
+    if not reaches(max(known, 1e-6)):
+        return known
+    x0, y0, x1, y1 = shadow.bounds()
+    low, high = max(known, 1e-6), 0.5 * max(x1 - x0, y1 - y0) + 1e-6
+    while high - low > _DEPTH_TOLERANCE * high:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if reaches(middle) else (low, middle)
+    return high
+
+
+def _locked(finger: Body, axis: int, sign: float, at_mm: float) -> tuple[float, ...] | None:
+    """Return the point (3,), mm, where a CAD body locks a half most; None without one, or without CAD.
 
     A half can be removed along d if the normals n of the body inside it satisfy n . d >= 0 everywhere but on the base.
     The normals are those of CAD at the points of a tessellation.
     """
+    if finger.cad is None:
+        return None
     from build123d import Axis, Box, Pos
 
-    low, high = box(solid)
-    axis = 0 if split == "x" else 2
-    direction = Axis.X if split == "x" else Axis.Z
+    low, high = finger.box
+    direction = Axis.X if axis == 0 else Axis.Z
     reach = 4.0 * float(np.linalg.norm(high - low))
-    for sign in (1.0, -1.0):
-        middle = np.zeros(3)
-        middle[axis] = at_mm + sign * reach / 2.0
-        for piece in (solid & Pos(*map(float, middle)) * Box(reach, reach, reach)).solids():
-            for face in piece.faces():
-                centre = np.array([*face.center()])
-                on_split = bool(face.is_planar) and abs(centre[axis] - at_mm) < _ON_PLANE_MM
-                if is_base(face) or (on_split and abs(face.normal_at(face.center()).dot(direction.direction)) > 0.5):
-                    continue
-                points, normals = _normals(face)
-                depth = sign * normals[:, axis]
-                if depth.min() < -_NORMAL_TOLERANCE:
-                    where = ", ".join(f"{c:.4g}" for c in points[int(np.argmin(depth))])
-                    side = f"{'+' if sign > 0 else '-'}{split}"
-                    return f"the half on the {side} side is locked by the body near ({where}) mm"
-    return ""
+    middle = np.zeros(3)
+    middle[axis] = at_mm + sign * reach / 2.0
+    worst, place = -_NORMAL_TOLERANCE, None
+    for piece in (finger.cad & Pos(*map(float, middle)) * Box(reach, reach, reach)).solids():
+        for face in piece.faces():
+            centre = np.array([*face.center()])
+            on_split = bool(face.is_planar) and abs(centre[axis] - at_mm) < _ON_PLANE_MM
+            if _is_base(face) or (on_split and abs(face.normal_at(face.center()).dot(direction.direction)) > 0.5):
+                continue
+            points, normals = _normals(face)
+            along = sign * normals[:, axis]
+            if along.min() < worst:
+                worst, place = float(along.min()), tuple(float(c) for c in points[int(np.argmin(along))])
+    return place
+
+
+def _is_base(face: Face) -> bool:
+    """Return whether a face is the finger's base, which the lid covers."""
+    return bool(face.is_planar) and abs(face.center().Y) < _ON_PLANE_MM and face.normal_at(face.center()).Y < -0.5
 
 
 def _normals(face: Face) -> tuple[Float, Float]:

@@ -16,11 +16,13 @@ if TYPE_CHECKING:
     from build123d import Solid
 
     from finger3d.geometry.design import Design
+    from finger3d.geometry.surface import Triangles
     from finger3d.mold.parts import Mold
     from finger3d.mold.shell import Shell
     from finger3d.scene import Scene
 
 
+_TOLERANCE_MM = 0.05  # without a mold
 _LEAST_TOLERANCE_MM = 1e-4
 _LARGEST_TOLERANCE = 0.2  # of the finger's height
 
@@ -52,7 +54,7 @@ def export(
     out: str | Path,
     mold: MoldOptions | None = None,
     text: bool = False,
-    tolerance_mm: float = 0.05,
+    tolerance_mm: float | None = None,
     report: Progress | None = None,
 ) -> Exported:
     """Write finger.step and finger.stl and, if asked, a mold's parts, plate, sheet and picture; all in mm.
@@ -61,7 +63,8 @@ def export(
     ----------
     mold : choices for a mold; None for the finger alone
     text : STL as text instead of binary
-    tolerance_mm : largest distance of triangles from the CAD surface; less where the volume asks for it
+    tolerance_mm : largest distance of triangles from the CAD surface; less where the volume asks for it; None for
+        0.05 mm, or with a mold the printer's
 
     Raises
     ------
@@ -86,7 +89,10 @@ def export(
 
     out, report, design = Path(out), report or Progress(), scene.design
     triangles = design.surface if isinstance(design, Imported) and design.cad is None else None
-    _check(design, out, tolerance_mm, may_mold=mold is None or triangles is None)
+    if tolerance_mm is None:
+        tolerance_mm = _TOLERANCE_MM if mold is None else mold.machine.tolerance_mm
+        tolerance_mm = min(tolerance_mm, _LARGEST_TOLERANCE * design.height_mm)
+    _check(design, out, tolerance_mm)
     report.stage("finger")
     if triangles is not None:
         body, solid = Shell(triangles, 0.0, 0.0), None
@@ -96,7 +102,7 @@ def export(
     made = None
     if mold is not None:
         report.stage("mold")
-        made = _mold(scene, solid, mold)
+        made = _mold(scene, triangles if solid is None else solid, mold)
     with claimed(out):
         _clear(out)
         files, remarks = [], []
@@ -120,17 +126,13 @@ def export(
     )
 
 
-def _check(design: Design, out: Path, tolerance_mm: float, may_mold: bool) -> None:
-    """Refuse a tolerance out of range, a mold of triangles, and a folder that holds the finger's own file."""
+def _check(design: Design, out: Path, tolerance_mm: float) -> None:
+    """Refuse a tolerance out of range, and a folder that holds the finger's own file."""
     largest = _LARGEST_TOLERANCE * design.height_mm
     if not _LEAST_TOLERANCE_MM <= tolerance_mm <= largest:
         raise Finger3dError(
             f"--tolerance-mm {tolerance_mm}: must be from {_LEAST_TOLERANCE_MM:g} to {largest:.4g}, "
             "a fifth of the finger's height"
-        )
-    if not may_mold:
-        raise Finger3dError(
-            f"--mold: {design.name} holds triangles, and a mold is cut from CAD; give the finger as a STEP file"
         )
     source = Path(design.path).resolve() if isinstance(design, Imported) else None
     if source is not None and source in ((out / "finger.step").resolve(), (out / "finger.stl").resolve()):
@@ -141,16 +143,20 @@ def _clear(out: Path) -> None:
     """Remove the files of an earlier export, which may be of another finger."""
     from finger3d.mold.output import FILES
 
-    for name in ("finger.step", "finger.stl", *FILES):
+    for name in ("finger.step", "finger.stl"):
         (out / name).unlink(missing_ok=True)
+    for pattern in FILES:
+        for path in out.glob(pattern):
+            path.unlink()
 
 
-def _mold(scene: Scene, solid: Solid, options: MoldOptions) -> Mold:
-    from finger3d.mold.parts import foils, mold
+def _mold(scene: Scene, shape: Solid | Triangles, options: MoldOptions) -> Mold:
+    from finger3d.mold.foils import foils
+    from finger3d.mold.parts import mold
 
     embedded = scene.effects.get("embedded_gauge")
     section = (embedded.thickness_mm, embedded.width_mm) if embedded else None
-    return mold(solid, foils(scene.model().gauges, options, section), options)
+    return mold(shape, foils(scene.model().gauges, options, section), options)
 
 
 def _volume(design: Design, solid: Solid | None, body: Shell) -> float:

@@ -8,9 +8,23 @@ from dataclasses import dataclass, fields
 from typing import Literal
 
 from finger3d.errors import Finger3dError
+from finger3d.mold.printers import PRINTERS, Printer, PrinterName
+from finger3d.mold.screws import SCREWS, Screw, ScrewName
 
-RIM_MM = 1.2
-"""Least wall around a peg, a hole or a slot: three lines of a 0.4 mm nozzle."""
+BAND_DEPTH_MM = 1.5
+"""Depth of the grooves for rubber bands."""
+
+TONGUE_MM = 2.0
+"""Width of the tongue along the parting faces."""
+
+TONGUE_HEIGHT_MM = 1.5
+"""Height of the tongue."""
+
+CORD_SQUEEZE, CORD_GROOVE = 0.8, 1.3
+"""Depth and width of the groove of a sealing cord over the cord's diameter, as for O-rings: a fifth is squeezed, and
+the groove is three quarters full."""
+
+_LEAST_WALL_MM = 8.0  # where nothing needs a thicker one
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,10 +33,12 @@ class MoldOptions:
 
     Parameters
     ----------
+    printer
+        Preset of clearance, least wall, chord tolerance, layer height and bed.
     wall_mm
-        Thickness of the mold around the sensor.
+        Thickness of the mold around the sensor; None chooses the least that holds pegs and seal, at least 8.
     clearance_mm
-        Gap all around a peg in its hole.
+        Gap all around a peg in its hole; None takes the printer's.
     shrinkage
         Relative shrinkage of lengths when the silicone cures, for instance 0.001; the cavity is larger by
         1 / (1 - shrinkage).
@@ -30,6 +46,8 @@ class MoldOptions:
         Axis of the finger along which the halves open. With gauges it must be z, the axis of their strips.
     split_mm
         Where along this axis the halves meet, in the finger's coordinates.
+    undercut_mm
+        Largest undercut that is accepted: soft silicone can be stretched over a small one.
     peg_mm
         Diameter and length of the pegs; one peg of each pattern is thinner, so that parts fit one way only.
     lid_mm
@@ -37,7 +55,42 @@ class MoldOptions:
     pour_mm
         Diameter of the pour hole at the sensor; None chooses 0.3 times the base's shorter side, at most 6.
     vent_mm
-        Diameter of the two vents; None chooses 0.1 times the base's shorter side, at most 2.
+        Diameter of the vents; None chooses 0.1 times the base's shorter side, at most 2.
+    riser
+        Volume of the riser, a cup on the lid from which silicone flows as bubbles rise, over that of the cavity.
+    fasten
+        Screws with nuts through the halves, grooves for rubber bands around them, or none.
+    screw
+        Size of the screws.
+    band_mm
+        Width of the rubber bands.
+    seal
+        Seal along the parting faces: a printed tongue in a groove, a groove for a cord of silicone, or none.
+    cord_mm
+        Diameter of the sealing cord.
+    plugs
+        Plugs that close the slots of the gauges' strips.
+    pry
+        Notches for a screwdriver that parts the halves and lifts the lid.
+    carrier
+        A printed carrier in place of the lid: silicone grips its holes, and it stays on the finger as its base.
+    carrier_mm
+        Thickness of the carrier.
+    key_mm
+        Diameter of the carrier's holes at the sensor; outside they are 1.7 times wider.
+    parts
+        A mold for each pour of a body of several solids.
+    pour_order
+        Labels of the solids in the order of their pours, such as skin,body,core; "body" is the unlabelled one. None
+        pours from the contact face towards the base.
+    inserts
+        Labels of solids that are printed and stay in the finger, such as core.
+    cavities
+        Number of fingers that one mold casts, side by side along the parting face.
+    coupon
+        Also a fit coupon: a peg, and holes with several clearances.
+    button
+        Also a mold of a test button, whose press tells E of the batch.
     foil_length_mm
         Length of a gauge's foil where the scene has length_mm = 0.
     foil_thickness_mm
@@ -47,51 +100,86 @@ class MoldOptions:
     slot_gap_mm
         Gap on either side of the strip that carries a foil, in its slot.
     bed
-        Size of the printer, length x width x height in mm.
+        Size of the printer, length x width x height in mm; None takes the preset's.
     """
 
-    wall_mm: float = 8.0
-    clearance_mm: float = 0.2
+    printer: PrinterName = "fdm-0.4"
+    wall_mm: float | None = None
+    clearance_mm: float | None = None
     shrinkage: float = 0.0
     split: Literal["z", "x"] = "z"
     split_mm: float = 0.0
+    undercut_mm: float = 0.0
     peg_mm: float = 4.0
     lid_mm: float = 4.0
     pour_mm: float | None = None
     vent_mm: float | None = None
+    riser: float = 0.04
+    fasten: Literal["screws", "bands", "none"] = "screws"
+    screw: ScrewName = "M3"
+    band_mm: float = 5.0
+    seal: Literal["tongue", "cord", "none"] = "tongue"
+    cord_mm: float = 2.0
+    plugs: bool = True
+    pry: bool = True
+    carrier: bool = False
+    carrier_mm: float = 5.0
+    key_mm: float = 3.0
+    parts: bool = False
+    pour_order: str | None = None
+    inserts: str | None = None
+    cavities: int = 1
+    coupon: bool = False
+    button: bool = False
     foil_length_mm: float = 5.0
     foil_thickness_mm: float = 0.1
     foil_width_mm: float = 3.0
     slot_gap_mm: float = 0.15
-    bed: str = "220x220x250"
+    bed: str | None = None
 
     def __post_init__(self) -> None:
         for f in fields(self):
             value = getattr(self, f.name)
             if isinstance(value, (int, float)) and not math.isfinite(value):
                 raise _refused(f.name, value, "a number")
-        for name in ("wall_mm", "peg_mm", "lid_mm", "foil_length_mm", "foil_thickness_mm", "foil_width_mm"):
-            self._within(name, 0.0, math.inf, "above 0", open_low=True)
-        for name in ("pour_mm", "vent_mm"):
+        for name, known in (("printer", PRINTERS), ("screw", SCREWS), ("split", "zx")):
+            if getattr(self, name) not in known:
+                raise _refused(name, getattr(self, name), " or ".join(known))
+        for name in ("wall_mm", "peg_mm", "lid_mm", "foil_length_mm", "foil_thickness_mm", "foil_width_mm",
+                     "pour_mm", "vent_mm", "band_mm", "cord_mm", "carrier_mm", "key_mm"):  # fmt: skip
             if getattr(self, name) is not None:
                 self._within(name, 0.0, math.inf, "above 0", open_low=True)
         if not 0.0 <= self.shrinkage < 0.2:
             raise _refused("shrinkage", self.shrinkage, "a share from 0 up to 0.2: 0.001 is a tenth of a percent")
+        self._within("riser", 0.0, 0.5, "a share of the cavity from 0 to 0.5; 0.03 to 0.05 is usual")
+        self._within("undercut_mm", 0.0, 10.0, "from 0 to 10")
+        self._within("cavities", 1, 20, "from 1 to 20")
         # With more clearance a full peg would fit the thin peg's hole.
-        self._within("clearance_mm", 0.0, self.peg_mm / 10.0, f"from 0 to a tenth of the peg, {self.peg_mm / 10:g}")
+        if self.clearance_mm is not None:
+            allowed = f"from 0 to a tenth of the peg, {self.peg_mm / 10:g}"
+            self._within("clearance_mm", 0.0, self.peg_mm / 10.0, allowed)
         self._within("slot_gap_mm", 0.0, 1.0, "from 0 to 1")
-        self._within("lid_mm", RIM_MM, math.inf, f"at least {RIM_MM:g}, or the lid bends")
-        if self.split not in ("z", "x"):
-            raise _refused("split", self.split, "z or x")
-        need = self.peg_mm + 2.0 * self.clearance_mm + 2.0 * RIM_MM
-        if self.wall_mm < need:
+        self._within("lid_mm", 2.0 * self.rim_mm, math.inf, f"at least {2.0 * self.rim_mm:g}, or the lid bends")
+        least = self.least_wall_mm
+        if self.wall_mm is not None and self.wall_mm < least - 1e-9:
             raise _refused(
                 "wall_mm",
                 self.wall_mm,
-                f"at least {need:g}, to hold a peg of {self.peg_mm:g} mm with {RIM_MM:g} mm around its hole; "
-                "or a thinner --peg-mm",
+                f"at least {least:g}, to hold a peg of {self.peg_mm:g} mm with {self.rim_mm:g} mm around its hole"
+                + ("" if self.seal == "none" else f" and the seal ({self.seal})")
+                + "; or a thinner --peg-mm",
             )
         _ = self.bed_mm
+        self._check_combinations()
+
+    def _check_combinations(self) -> None:
+        if self.carrier and self.carrier_mm < 4.0 * self.rim_mm:
+            raise _refused("carrier_mm", self.carrier_mm, f"at least {4.0 * self.rim_mm:g}, or its holes grip nothing")
+        if (self.pour_order or self.inserts) and not self.parts:
+            raise Finger3dError("--pour-order and --inserts: need --parts, a mold for each pour")
+        for other, chosen in (("--carrier", self.carrier), ("--cavities", self.cavities > 1)):
+            if self.parts and chosen:
+                raise Finger3dError(f"--parts {other}: are not made together; leave one of them out")
 
     def _within(self, name: str, low: float, high: float, allowed: str, open_low: bool = False) -> None:
         value = getattr(self, name)
@@ -99,12 +187,70 @@ class MoldOptions:
             raise _refused(name, value, allowed)
 
     @property
+    def machine(self) -> Printer:
+        """The printer's preset."""
+        return PRINTERS[self.printer]
+
+    @property
+    def rim_mm(self) -> float:
+        """Least wall around holes, grooves and slots."""
+        return self.machine.rim_mm
+
+    @property
+    def gap_mm(self) -> float:
+        """Clearance all around pegs, tongues and plugs."""
+        return min(self.machine.clearance_mm, self.peg_mm / 10.0) if self.clearance_mm is None else self.clearance_mm
+
+    @property
+    def screw_sizes(self) -> Screw:
+        """Dimensions of the screws."""
+        return SCREWS[self.screw]
+
+    @property
+    def groove_mm(self) -> tuple[float, float]:
+        """Width and depth of the groove of the seal; zeros without one."""
+        if self.seal == "tongue":
+            return TONGUE_MM + 2.0 * self.gap_mm, TONGUE_HEIGHT_MM + self.gap_mm
+        return (CORD_GROOVE * self.cord_mm, CORD_SQUEEZE * self.cord_mm) if self.seal == "cord" else (0.0, 0.0)
+
+    @property
+    def peg_hole_mm(self) -> float:
+        """Diameter of the hole of a full peg."""
+        return self.peg_mm + 2.0 * self.gap_mm
+
+    @property
+    def seal_reach_mm(self) -> float:
+        """Distance from the cavity to the outer side of the seal's groove."""
+        return self.rim_mm + self.groove_mm[0] if self.groove_mm[0] else 0.0
+
+    @property
+    def least_wall_mm(self) -> float:
+        """Least thickness of the wall."""
+        return round(self.seal_reach_mm + self.peg_hole_mm + 2.0 * self.rim_mm, 9)
+
+    @property
+    def around_mm(self) -> float:
+        """Thickness of the wall, without the grooves for bands."""
+        return max(self.least_wall_mm, _LEAST_WALL_MM) if self.wall_mm is None else self.wall_mm
+
+    @property
+    def band_depth_mm(self) -> float:
+        """Depth by which grooves for bands make the walls thicker."""
+        return 0.0 if self.fasten == "none" else BAND_DEPTH_MM
+
+    @property
+    def peg_distance_mm(self) -> float:
+        """Distance from the cavity to the axis of a peg."""
+        return self.around_mm - self.rim_mm - self.peg_hole_mm / 2.0
+
+    @property
     def bed_mm(self) -> tuple[float, float, float]:
         """Length, width and height of the printer."""
-        found = re.fullmatch(r"\s*(\d+(?:\.\d*)?)\s*[x*]\s*(\d+(?:\.\d*)?)\s*[x*]\s*(\d+(?:\.\d*)?)\s*", self.bed)
-        sizes = tuple(float(text) for text in found.groups()) if found else (0.0,)
+        text = self.machine.bed if self.bed is None else self.bed
+        found = re.fullmatch(r"\s*(\d+(?:\.\d*)?)\s*[x*]\s*(\d+(?:\.\d*)?)\s*[x*]\s*(\d+(?:\.\d*)?)\s*", text)
+        sizes = tuple(float(size) for size in found.groups()) if found else (0.0,)
         if min(sizes) <= 0.0:
-            raise _refused("bed", self.bed, "three sizes in mm, such as 220x220x250")
+            raise _refused("bed", text, "three sizes in mm, such as 220x220x250")
         return sizes[0], sizes[1], sizes[2]
 
     @property
@@ -115,7 +261,12 @@ class MoldOptions:
     @property
     def hole_depth_mm(self) -> float:
         """Depth of a peg's hole."""
-        return self.peg_mm + self.clearance_mm
+        return self.peg_mm + self.gap_mm
+
+    @property
+    def cover_mm(self) -> float:
+        """Thickness of the lid or the carrier."""
+        return self.carrier_mm if self.carrier else self.lid_mm
 
 
 def _refused(name: str, value: object, allowed: str) -> Finger3dError:

@@ -2,54 +2,39 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 
-from finger3d._types import Float
 from finger3d.io import atomic
 from finger3d.materials.silicones import Silicone
-from finger3d.mold.parts import Mold, strips
+from finger3d.mold.foils import strips
+from finger3d.mold.packing import as_printed, beds
+from finger3d.mold.parts import Mold
 from finger3d.mold.sheet import oversize, sheet
-from finger3d.mold.shell import Shell, shell, write_3mf, write_step, write_stl
-from finger3d.plotting.mold import picture
+from finger3d.mold.shell import ANGLE, Shell, shell, write_3mf, write_step, write_stl
+from finger3d.mold.slicer import check_print
+from finger3d.plotting.mold import kind, picture, separations
 from finger3d.progress import Progress
 
-GAP_MM = 8.0
-"""Distance between parts on the plate."""
+FILES = ("mold_*.stl", "mold*.3mf", "mold.step", "mold_exploded.step", "sheet.txt", "mold.png")
+"""Patterns of the files of a mold."""
 
-FILES = (
-    "mold_half_a.stl", "mold_half_b.stl", "mold_lid.stl", "mold.3mf", "mold.step", "sheet.txt", "mold.png",
-)  # fmt: skip
-"""Files of a mold."""
-
-_LYING = {
-    "half_a": np.diag([-1.0, 1.0, -1.0]),
-    "half_b": np.eye(3),
-    "lid": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
-}
-"""Rotation of each part onto the bed, its outer face down and z up."""
-
-
-def as_printed(parts: dict[str, Shell]) -> dict[str, Shell]:
-    """Return the parts as they lie on the bed, each with its lowest corner at the origin."""
-    lying = {name: part.moved(_LYING[name], np.zeros(3)) for name, part in parts.items()}
-    return {name: part.moved(np.eye(3), -part.surface.low) for name, part in lying.items()}
-
-
-def plate(printed: dict[str, Shell]) -> tuple[dict[str, Shell], Float]:
-    """Return the parts in a row along y, and the size (3,) of the row, mm."""
-    at, placed = 0.0, {}
-    for name, part in printed.items():
-        placed[name] = part.moved(np.eye(3), np.array([0.0, at, 0.0]))
-        at += float(part.extent[1]) + GAP_MM
-    extents = np.array([part.extent for part in printed.values()])
-    return placed, np.array([extents[:, 0].max(), at - GAP_MM, extents[:, 2].max()])
+_CHECKED_LAYER_MM = 0.5  # height of the layers in which islands are looked for
+_THICKNESS_TOLERANCE = 0.97  # chords and slanted rays make walls look thinner
 
 
 def write_mold(
-    title: str, made: Mold, body: Shell, out: Path, text: bool, report: Progress, silicone: Silicone | None = None
+    title: str,
+    made: Mold,
+    body: Shell,
+    out: Path,
+    text: bool,
+    report: Progress,
+    further: Mapping[str, Shell] | None = None,
+    silicone: Silicone | None = None,
 ) -> tuple[list[Path], list[str]]:
     """Write all files of a mold; returns them, and remarks for the user.
 
@@ -57,35 +42,90 @@ def write_mold(
     ----------
     body : the finger's shell; the cavity is made as finely
     text : STL as text
+    further : parts beside the mold, as they lie on the bed
     silicone : that the scene names, for the instructions
     """
-    from build123d import Compound
-
     report.stage("parts and picture")
-    shells = {name: shell(part, body.tolerance_mm, name, body.angle) for name, part in made.parts.items()}
-    printed = as_printed(shells)
-    placed, size = plate(printed)
+    # a finger of triangles has no tolerance of its own
+    fine = body.tolerance_mm or made.options.machine.tolerance_mm, body.angle or ANGLE
+    shells = {name: made.shell(name, *fine) for name in made.parts}
+    printed = {**as_printed(shells), **(further or {})}
+    packed = beds(printed, made.options.bed_mm)
+    files = [out / f"mold_{name}.stl" for name in printed]
     with ThreadPoolExecutor(1) as pool:  # PyVista renders in a process of its own for some seconds
         drawn = pool.submit(_picture, out / "mold.png", title, made, body, shells, printed)
-        for name, part in printed.items():
-            write_stl(out / f"mold_{name}.stl", part.surface, text)
-        write_3mf(out / "mold.3mf", placed)
-        write_step(out / "mold.step", Compound(label="mold", children=list(made.parts.values())))
+        for path, part in zip(files, printed.values(), strict=True):
+            write_stl(path, part.surface, text)
+        for i, bed in enumerate(packed):
+            files.append(out / ("mold.3mf" if i == 0 else f"mold_bed_{i + 1}.3mf"))
+            write_3mf(files[-1], bed.placed)
+        if made.body.cad is not None:
+            files += _write_steps(out, made)
+        extent = np.max([bed.extent for bed in packed], axis=0)
         with atomic(out / "sheet.txt") as temporary:
-            temporary.write_text(sheet(title, made, printed, size, silicone), encoding="utf-8")
+            temporary.write_text(sheet(title, made, printed, extent, silicone), encoding="utf-8")
         drawn.result()
     remarks = [f"mold_{n}: {why}" for n, part in printed.items() if (why := oversize(part, made.options.bed_mm))]
-    return [out / name for name in FILES], remarks
+    remarks += _print_remarks(printed, made.options.machine.thinnest_mm)
+    if len(packed) > 1:
+        remarks.append(f"the parts need {len(packed)} beds; mold.3mf is the first")
+    if made.body.cad is None:
+        remarks.append("no mold.step: the finger holds triangles, and so do the halves of its mold")
+    return [*files, out / "sheet.txt", out / "mold.png"], remarks
+
+
+def _write_steps(out: Path, made: Mold) -> list[Path]:
+    """Write the assembled mold, and the mold taken apart."""
+    from build123d import Compound, Pos
+
+    boxes = {}
+    for name, solid in made.parts.items():
+        found = solid.bounding_box()
+        boxes[name] = np.array([*found.min]), np.array([*found.max])
+    shifts = separations(boxes)
+    apart = []
+    for name, solid in made.parts.items():
+        moved = Pos(*map(float, shifts[name])) * solid
+        moved.label = name
+        apart.append(moved)
+    write_step(out / "mold.step", Compound(label="mold", children=list(made.parts.values())))
+    write_step(out / "mold_exploded.step", Compound(label="mold", children=apart))
+    return [out / "mold.step", out / "mold_exploded.step"]
+
+
+def _print_remarks(printed: Mapping[str, Shell], thinnest_mm: float) -> list[str]:
+    """Return what a slicer would find wrong with the parts."""
+    remarks = []
+    for name, part in printed.items():
+        found = check_print(part.surface, _CHECKED_LAYER_MM)
+        where = ", ".join(f"{c:.4g}" for c in found.thinnest)
+        if found.wall_mm < _THICKNESS_TOLERANCE * thinnest_mm:
+            remarks.append(
+                f"mold_{name}: a wall of {found.wall_mm:.2g} mm near ({where}) mm is thinner than the printer makes, "
+                f"{thinnest_mm:g} mm"
+            )
+        if len(found.islands):
+            where = ", ".join(f"{c:.4g}" for c in found.islands[0])
+            remarks.append(f"mold_{name}: begins in the air near ({where}) mm, and needs support there")
+    return remarks
 
 
 def _picture(
     path: Path, title: str, made: Mold, body: Shell, shells: dict[str, Shell], printed: dict[str, Shell]
 ) -> None:
     parts = {name: part.surface for name, part in shells.items()}
-    parts["sensor"] = shell(made.body, body.tolerance_mm, "sensor", body.angle).surface
-    sizes = {name: " x ".join(f"{e:.1f}" for e in part.extent) + " mm" for name, part in printed.items()}
-    sizes["sensor"] = f"{made.silicone_mm3 / 1e3:.3g} ml"
-    if (laid := strips(made)) is not None:
+    sensor = made.body
+    for i, x in enumerate(made.at.places, 1):
+        name = "sensor" if len(made.at.places) == 1 else f"sensor_{i}"
+        cast = sensor.at(x)
+        parts[name] = cast.surface if cast.cad is None else shell(cast.cad, body.tolerance_mm, name, body.angle).surface
+    labelled = {}
+    for name in printed.keys() & parts.keys():
+        if kind(name) not in {kind(other) for other in labelled}:  # one label for parts of a kind
+            labelled[name] = " x ".join(f"{e:.1f}" for e in printed[name].extent) + " mm"
+    first = "sensor" if len(made.at.places) == 1 else "sensor_1"
+    labelled[first] = f"{made.silicone_mm3 / len(made.at.places) / 1e3:.3g} ml"
+    if (laid := strips(made.foils, made.at, made.options)) is not None:
         parts["strips"] = laid
-        sizes["strips"] = "\n".join(name for foil in made.foils for name in foil.names)
-    picture(path, parts, f"Mold of {title}: as it is poured, taken apart", sizes)
+        labelled["strips"] = "\n".join(name for foil in made.foils for name in foil.names)
+    picture(path, parts, f"Mold of {title}: as it is poured, taken apart", labelled)

@@ -17,7 +17,7 @@ Sizes = tuple[float, float, float] | NDArray[np.float64]
 SPARE = 1.15
 """Ratio of the silicone to mix to the volume of cavity and openings."""
 
-NAMES = {"half_a": "half A (holes)", "half_b": "half B (pegs)", "lid": "lid"}
+NAMES = {"half_a": "half A (holes)", "half_b": "half B (pegs)"}
 
 
 def oversize(part: Shell, bed: Sizes) -> str:
@@ -35,11 +35,11 @@ def sheet(title: str, made: Mold, printed: Mapping[str, Shell], plate: Sizes, si
     Parameters
     ----------
     printed : the parts as they lie on the bed
-    plate : length, width and height of all parts side by side, as in the 3MF file
+    plate : length, width and height of all parts together, as in the 3MF file
     silicone : that the scene names; None if it names none
     """
     o = made.options
-    ports = sum(_port_volumes(made))
+    ports = made.openings_mm3
     cavity = made.silicone_mm3
     mixed_ml = SPARE * (cavity + ports) / 1e3
     hole = casting.PourHole(made.ports.pour_mm, made.ports.funnel_mm, o.lid_mm)
@@ -50,7 +50,7 @@ def sheet(title: str, made: Mold, printed: Mapping[str, Shell], plate: Sizes, si
         "",
         "SILICONE",
         f"  cavity              {cavity / 1e3:.2f} ml",
-        f"  pour hole and vents {ports / 1e3:.2f} ml",
+        f"  openings, riser     {ports / 1e3:.2f} ml",
         f"  mix about           {mixed_ml:.1f} ml ({100 * (SPARE - 1):.0f} % more than both)",
         f"  shrinkage allowed   {100 * o.shrinkage:g} % of every length: the cavity is the sensor times {o.scale:.6g}",
         *casting.silicone_lines(silicone, mixed_ml, hole, o.shrinkage),
@@ -59,16 +59,17 @@ def sheet(title: str, made: Mold, printed: Mapping[str, Shell], plate: Sizes, si
     ]
     for name, part in printed.items():
         why = oversize(part, o.bed_mm)
-        lines.append(f"  {NAMES[name]:<17} {_sizes(part.extent):<20} {f'mold_{name}.stl':<16} {why or 'fits the bed'}")
+        called = NAMES.get(name, name.replace("_", " "))
+        lines.append(f"  {called:<17} {_sizes(part.extent):<20} {f'mold_{name}.stl':<16} {why or 'fits the bed'}")
     fits = _fits(plate, o.bed_mm)
     lines += [
-        f"  all, in a row     {_sizes(plate):<20} {'mold.3mf':<16} "
-        + ("fit the bed together" if fits else "do not fit the bed together: print them one by one"),
+        f"  all, on the bed   {_sizes(plate):<20} {'mold.3mf':<16} "
+        + ("fit the bed together" if fits else "do not fit the bed: print them one by one"),
         f"  bed               {_sizes(o.bed_mm)}",
         "",
         "PRINT",
         "  The files lie as they should be printed: outer faces down, pegs up, no support needed.",
-        f"  Pegs of {o.peg_mm:g} mm have {o.clearance_mm:g} mm of room all around; one of each pattern is thinner, so",
+        f"  Pegs of {o.peg_mm:g} mm have {o.gap_mm:g} mm of room all around; one of each pattern is thinner, so",
         "  that no part fits the wrong way round.",
         "",
         *casting.surface_lines(o.split),
@@ -117,13 +118,6 @@ def _gauge_lines(made: Mold) -> list[str]:
                 f"slot {foil.length_mm + gap:.4g} x {foil.thickness_mm + gap:.4g}"
             )
     return [*lines, ""]
-
-
-def _port_volumes(made: Mold) -> tuple[float, float]:
-    """Return the volumes (mm3) of the funnel and of both vents."""
-    p, t = made.ports, made.options.lid_mm
-    a, b = p.pour_mm / 2.0, p.funnel_mm / 2.0
-    return np.pi * t / 3.0 * (a * a + a * b + b * b), 2.0 * np.pi * t * p.vent_mm**2 / 4.0
 
 
 def _fits(size: Sizes, bed: Sizes) -> bool:

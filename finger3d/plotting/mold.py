@@ -20,11 +20,24 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-COLOURS = {"half_a": "#9db4c8", "half_b": "#c9d9ee", "lid": "#8d8a84", "sensor": "#f28e2b", "strips": "#222222"}
+COLOURS = {
+    "half_a": "#9db4c8",
+    "half_b": "#c9d9ee",
+    "lid": "#8d8a84",
+    "carrier": "#59636e",
+    "riser": "#bdb7a9",
+    "plug": "#e0c341",
+    "pin": "#bdb7a9",
+    "insert": "#6f4e7c",
+    "sensor": "#f28e2b",
+    "strips": "#222222",
+}
+"""Colours of parts by their kind, the first word of their name."""
+
 OPACITY = {"half_b": 0.35}
 """Opacity of parts that are not opaque: the front half would hide its pegs, the gauge strips and the sensor."""
 
-LABELS = {"half_a": "half A", "half_b": "half B", "lid": "lid", "sensor": "sensor", "strips": "gauge strips"}
+LABELS = {"half_a": "half A", "half_b": "half B", "strips": "gauge strips"}
 
 _VIEW = np.array([0.55, 0.5, 1.0])  # direction towards the viewer
 _POURING_AXES = np.diag([1.0, -1.0, -1.0])  # orientation while pouring: dome down, lid on top
@@ -61,15 +74,47 @@ class Scenery:
         return (points - self.middle) @ self.axes[:2].T
 
 
+def kind(name: str) -> str:
+    """Return the kind of a part: half_a, half_b, or the first word of its name."""
+    return name if name in COLOURS else name.split("_")[0]
+
+
+def separations(sizes: Mapping[str, tuple[Float, Float]]) -> dict[str, Float]:
+    """Return the shift (3,), mm, of each part that takes an assembled mold apart, in the axes of the mold.
+
+    Halves and their plugs move along z, lids one above the other along -y, and cups and pins further than the lids.
+
+    Parameters
+    ----------
+    sizes : lowest and highest corner (3,) of each part
+    """
+    size = max(float((high - low).max()) for low, high in sizes.values())
+    halves = [sizes[name] for name in ("half_a", "half_b") if name in sizes]
+    thick = float(max(high[2] for _, high in halves) - min(low[2] for low, _ in halves)) if halves else 0.0
+    apart, above = max(_SEPARATION * size, 0.8 * thick), 0.9 * _SEPARATION * size
+    lids = [name for name in sizes if kind(name) in ("lid", "carrier")]
+    shifts = {}
+    for name in sizes:
+        what, shift = kind(name), np.zeros(3)
+        if what == "half_a" or (what == "plug" and name.endswith("a")):
+            shift[2] = apart * (1.3 if what == "plug" else 1.0)
+        elif what == "half_b" or (what == "plug" and name.endswith("b")):
+            shift[2] = -apart * (1.3 if what == "plug" else 1.0)
+        elif name in lids:
+            shift[1] = -above * (1.0 + lids.index(name))
+        elif what in ("riser", "pin"):
+            shift[1] = -above * (len(lids) + 0.4)
+        elif what == "insert":
+            shift[1] = -0.5 * above
+        shifts[name] = shift
+    return shifts
+
+
 def exploded(assembled: Mapping[str, Triangles]) -> Scenery:
     """Return the exploded view of an assembled mold: halves apart along z, the lid above, the sensor in place."""
-    size = max(float(np.ptp(part.points, axis=0).max()) for part in assembled.values())
-    thick = np.ptp(np.vstack([assembled["half_a"].points, assembled["half_b"].points])[:, 2])
-    step = max(_SEPARATION * size, 0.8 * float(thick))
-    shift = {"half_a": [0, 0, -step], "half_b": [0, 0, step], "lid": [0, 0.9 * _SEPARATION * size, 0]}
+    shifts = separations({name: (part.low, part.high) for name, part in assembled.items()})
     parts = {
-        name: Triangles(part.points @ _POURING_AXES.T + np.array(shift.get(name, [0, 0, 0]), dtype=float), part.faces)
-        for name, part in assembled.items()
+        name: Triangles((part.points + shifts[name]) @ _POURING_AXES.T, part.faces) for name, part in assembled.items()
     }
     axes = viewer_axes(_VIEW)
     seen = np.vstack([part.points for part in parts.values()]) @ axes.T
@@ -127,7 +172,7 @@ def _label(axes: Axes, scenery: Scenery, name: str, part: Triangles, remark: str
     shift = (-14, -4) if left else (30, -40) if low else (14, -4)
     line = {"arrowstyle": "-", "color": "#777777", "lw": 0.8}
     axes.annotate(
-        f"{LABELS[name]}\n{remark}".strip(),
+        f"{LABELS.get(name, name.replace('_', ' '))}\n{remark}".strip(),
         (float(at[0]), float(at[1])),
         shift,
         textcoords="offset points",
@@ -152,7 +197,7 @@ def _draw(axes: Axes, scenery: Scenery) -> None:
         corners, normals = part.corners[seen], part.normals[seen]
         far = np.argsort(corners.mean(axis=1) @ scenery.axes[2], kind="stable")
         shade = 0.6 + 0.4 * np.clip(normals @ light, 0.0, 1.0)
-        fill = np.clip(np.array(to_rgb(COLOURS[name])) * shade[:, None], 0.0, 1.0)[far]
+        fill = np.clip(np.array(to_rgb(COLOURS[kind(name)])) * shade[:, None], 0.0, 1.0)[far]
         alpha = OPACITY.get(name)
         # Edges in the colour of the face close fine seams; a transparent face would show them.
         edge = fill if alpha is None else "none"
@@ -166,7 +211,7 @@ def _rendered(scenery: Scenery) -> Image | None:
     width, height = scenery.half
     window = _PIXELS, max(int(_PIXELS * height / width), 1)
     parts = tuple(
-        Polygons(part.points, part.faces, COLOURS[name], OPACITY.get(name, 1.0), feature_edges=True)
+        Polygons(part.points, part.faces, COLOURS[kind(name)], OPACITY.get(name, 1.0), feature_edges=True)
         for name, part in scenery.parts.items()
     )
     images = render([Drawing(Camera(scenery.axes, scenery.middle, float(height), window), parts)])

@@ -1,0 +1,206 @@
+"""Openings of the lid: the pour hole, the vents, and the riser, a cup on the pour hole.
+
+Bubbles that rise from the silicone leave a void, which silicone from the riser fills. Where there is no air left to
+rise, the level of the riser shows that the cavity is full.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from finger3d.errors import Finger3dError
+from finger3d.mold.options import MoldOptions
+from finger3d.mold.regions import disc, footprint, inside, nearest, widened
+from finger3d.mold.solids import cone, cylinder, revolved
+
+if TYPE_CHECKING:
+    from build123d import Solid
+    from manifold3d import CrossSection
+
+    from finger3d.geometry.surface import Triangles
+
+_BASE_HEIGHT = 1e-4  # over the body's height: where its base is cut
+_LEVEL = 5e-3  # over the length of a base: corners as far out as the outermost, of a rounded end too
+_VENT_INSET = 0.6  # distance of a vent's middle from the edge of the base over its diameter
+_LEAST_POUR_MM = 1.0
+_LEAST_CUP_MM = 2.0  # height of a riser that its share does not need
+_SPIGOT = 0.5  # length of the riser's spigot, over the thickness of the lid
+
+
+@dataclass(frozen=True)
+class Riser:
+    """The riser's cup.
+
+    Attributes
+    ----------
+    radius_mm : inside
+    height_mm : above the lid
+    spigot_mm : length of the spigot that holds it in the lid
+    wall_mm : of the cup and of the spigot
+    volume_mm3 : of the cup, its spigot and the pour hole below
+    """
+
+    radius_mm: float
+    height_mm: float
+    spigot_mm: float
+    wall_mm: float
+    volume_mm3: float
+
+
+@dataclass(frozen=True)
+class Ports:
+    """Openings of the lid over one cavity, mm; places are (x, z).
+
+    Attributes
+    ----------
+    pour_mm, pour : diameter at the sensor and place of the pour hole
+    funnel_mm : diameter of the pour hole outside, without a riser
+    vent_mm, vents : diameter and places of the vents
+    riser : None without one
+    """
+
+    pour_mm: float
+    pour: tuple[float, float]
+    funnel_mm: float
+    vent_mm: float
+    vents: tuple[tuple[float, float], ...]
+    riser: Riser | None
+
+    def volume_mm3(self, cover_mm: float) -> float:
+        """Return the volume of the pour hole, the riser and the vents in a lid of this thickness."""
+        vents = len(self.vents) * math.pi * self.vent_mm**2 / 4.0 * cover_mm
+        if self.riser is not None:
+            return self.riser.volume_mm3 + vents
+        a, b = self.pour_mm / 2.0, self.funnel_mm / 2.0
+        return math.pi * cover_mm / 3.0 * (a * a + a * b + b * b) + vents
+
+
+def base_region(surface: Triangles) -> CrossSection:
+    """Return the region (x, z) of a body's base."""
+    return footprint(surface, _BASE_HEIGHT)
+
+
+def ports(
+    base: CrossSection,
+    cavity_mm3: float,
+    options: MoldOptions,
+    vented: bool = True,
+) -> Ports:
+    """Return the openings over a base, as large as it allows or as given.
+
+    Parameters
+    ----------
+    base : region (x, z) of the base
+    cavity_mm3 : volume of the cavity, of which the riser holds a share
+    vented : whether the lid has vents; the holes of a carrier serve as such
+
+    Raises
+    ------
+    Finger3dError
+        If a hole does not open into the cavity whole, or the holes do not leave a rim between them.
+    """
+    x0, z0, x1, z1 = base.bounds()
+    size = round(min(x1 - x0, z1 - z0), 2)  # the region is cut a little above the base
+    vent = min(2.0, 0.1 * size) if options.vent_mm is None else options.vent_mm
+    pour = min(6.0, 0.3 * size) if options.pour_mm is None else options.pour_mm
+    vents = _vents(base, vent) if vented else ()
+    allowed = _allowed(base, vents, vent, pour, options)
+    while options.pour_mm is None and allowed.is_empty() and pour > _LEAST_POUR_MM:
+        pour *= 0.95
+        allowed = _allowed(base, vents, vent, pour, options)
+    if allowed.is_empty() or (vented and not vents):
+        raise Finger3dError(
+            f"--pour-mm {pour:.3g} --vent-mm {vent:.3g}: do not fit on the base, {x1 - x0:.4g} x {z1 - z0:.4g} mm, "
+            f"with {options.rim_mm:g} mm between them; must be smaller"
+        )
+    at = nearest(allowed, (0.0, 0.0))
+    room = min([math.dist(at, v) - vent / 2.0 - options.rim_mm for v in vents] + [0.5 * (x1 - x0), 0.5 * size + 4.0])
+    # The funnel and the cup stand outside: they may be wider than the base, but must not cover a vent.
+    funnel = max(pour, min(2.0 * pour, 2.0 * room, size))
+    riser = _riser(pour, cavity_mm3, room, options) if options.riser else None
+    return Ports(pour, at, funnel, vent, vents, riser)
+
+
+def _allowed(
+    base: CrossSection, vents: tuple[tuple[float, float], ...], vent: float, pour: float, options: MoldOptions
+) -> CrossSection:
+    """Return where the middle of the pour hole may lie: its socket leaves a rim beside each vent."""
+    socket = pour + (2.0 * (options.rim_mm + options.gap_mm) if options.riser else 0.0)
+    allowed = widened(base, -pour / 2.0)
+    for place in vents:
+        allowed -= disc(place, vent + socket + 2.0 * options.rim_mm)
+    return allowed
+
+
+def _vents(base: CrossSection, vent: float) -> tuple[tuple[float, float], ...]:
+    """Return places at both ends of the base, and one on every other piece of it."""
+    allowed = widened(base, -_VENT_INSET * vent)
+    if allowed.is_empty():
+        return ()
+    x0, z0, x1, z1 = allowed.bounds()
+    along = 0 if x1 - x0 >= z1 - z0 else 1
+    places = []
+    for piece in allowed.decompose():
+        low, high = piece.bounds()[along], piece.bounds()[2 + along]
+        for sign, end in ((-1.0, low), (1.0, high)):
+            if abs(end - allowed.bounds()[along if sign < 0.0 else 2 + along]) < 1e-6:
+                places.append(_extreme(piece, along, sign))
+        if not any(inside(widened(piece, 1e-3), np.array([p]))[0] for p in places):
+            places.append(_extreme(piece, along, 1.0 if high + low > 0.0 else -1.0))
+    return tuple(sorted(places))
+
+
+def _extreme(piece: CrossSection, along: int, sign: float) -> tuple[float, float]:
+    """Return the middle of the outermost edge of a region."""
+    corners = np.vstack(piece.to_polygons())
+    outer = sign * corners[:, along]
+    ends = corners[outer > outer.max() - _LEVEL * float(np.ptp(corners[:, along]))]
+    middle = 0.5 * (ends.min(axis=0) + ends.max(axis=0))
+    x, z = nearest(piece, middle)
+    return round(x, 9), round(z, 9)
+
+
+def _riser(pour: float, cavity_mm3: float, room: float, options: MoldOptions) -> Riser:
+    """Return the cup: as high as its radius above the cone, narrower between vents, and never wider than its place."""
+    cover, wall, a = options.cover_mm, options.rim_mm, pour / 2.0
+    wanted = options.riser * cavity_mm3 - math.pi * a**2 * cover
+    radius = ((max(wanted, 0.0) + math.pi * a**3 / 3.0) / (4.0 * math.pi / 3.0)) ** (1.0 / 3.0)
+    radius = max(a, min(radius, room - wall))
+    slope = radius - a  # of 45 degrees, which prints without support
+    held = math.pi / 3.0 * (radius**3 - a**3)
+    above = max(_LEAST_CUP_MM, (wanted - held) / (math.pi * radius**2))
+    total = math.pi * a**2 * cover + held + math.pi * radius**2 * above
+    return Riser(radius, slope + above, _SPIGOT * cover, wall, total)
+
+
+def openings(found: Ports, x: float, options: MoldOptions) -> list[Solid]:
+    """Return the pour hole and the vents of the cavity at `x` as solids through the lid."""
+    cover = options.cover_mm
+    px, pz = found.pour[0] + x, found.pour[1]
+    cut = [cylinder((vx + x, -cover, vz), found.vent_mm, cover, "y") for vx, vz in found.vents]
+    if found.riser is None:
+        return [cone((px, -cover, pz), found.funnel_mm, found.pour_mm, cover, "y"), *cut]
+    socket = found.pour_mm + 2.0 * found.riser.wall_mm + 2.0 * options.gap_mm
+    return [
+        cylinder((px, -cover, pz), found.pour_mm, cover, "y"),
+        cylinder((px, -cover, pz), socket, found.riser.spigot_mm, "y"),
+        *cut,
+    ]
+
+
+def riser_cup(found: Ports, x: float, options: MoldOptions) -> Solid:
+    """Return the cup of the cavity at `x`, its spigot in the lid."""
+    r = found.riser
+    assert r is not None
+    a, outer, spigot = found.pour_mm / 2.0, r.radius_mm + r.wall_mm, found.pour_mm / 2.0 + r.wall_mm
+    # The collar rests on the lid; a tube without collar rests on the bottom of its socket.
+    length = r.spigot_mm - (options.gap_mm if outer > spigot + 1e-6 else 0.0)
+    profile = [(a, -length), (spigot, -length), (spigot, 0.0), (outer, 0.0), (outer, r.height_mm),
+               (r.radius_mm, r.height_mm), (r.radius_mm, r.radius_mm - a), (a, 0.0)]  # fmt: skip
+    profile = [p for i, p in enumerate(profile) if math.dist(p, profile[i - 1]) > 1e-6]
+    return revolved(profile, (found.pour[0] + x, -options.cover_mm, found.pour[1]), "-y")
+
