@@ -132,7 +132,7 @@ def undercut_depth(half: Triangles, axis: int, sign: float) -> float:
     """
     from manifold3d import CrossSection, FillRule
 
-    order = {2: [0, 1, 2], 0: [1, 2, 0]}[axis]
+    order = {0: [1, 2, 0], 1: [2, 0, 1], 2: [0, 1, 2]}[axis]
     turned = Triangles(half.points[:, order] * [1.0, 1.0, sign], half.faces if sign > 0 else half.faces[:, ::-1])
     body = manifold(turned)
     low, high = float(turned.low[2]), float(turned.high[2])

@@ -45,6 +45,8 @@ if TYPE_CHECKING:
 _OVERLAP_TOLERANCE = 1e-6  # relative volume that booleans leave between faces in contact
 _MESH_OVERLAP_TOLERANCE = 1e-3  # the same where one of two bodies is tessellated
 HALVES = ("half_a", "half_b")
+MAIN = "body"
+"""Name of the solid without a label."""
 
 
 @dataclass(frozen=True)
@@ -57,12 +59,21 @@ class Pour:
     lid : name of the part that closes the mold
     silicone_mm3 : volume of all cavities
     ports : openings of the lid over one cavity; None where silicone is poured before the lid is pushed on
+    cast : what lies in the cavities after this pour, in place
+    others : names of the parts that belong to this pour only: lid, riser, inserts
     """
 
     label: str
     lid: str
     silicone_mm3: float
     ports: Ports | None
+    cast: tuple[Body, ...]
+    others: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """Label, or "body" for the main body."""
+        return self.label or MAIN
 
 
 @dataclass(frozen=True)
@@ -113,10 +124,9 @@ class Mold:
 
     @property
     def ports(self) -> Ports:
-        """Openings of the lid of the last pour."""
-        found = self.pours[-1].ports
-        assert found is not None
-        return found
+        """Openings of the lid of the last pour that is poured through a lid."""
+        found = [pour.ports for pour in self.pours if pour.ports is not None]
+        return found[-1]
 
     @property
     def bolts(self) -> Bolts | None:
@@ -152,12 +162,12 @@ def mold(shape: Solid | Triangles, gauges: Sequence[FoilSlot], options: MoldOpti
             "x; use --split z, or a scene without gauges"
         )
     finger = Body.of(shape, options.machine.tolerance_mm)
-    _check_split(finger, options)
+    check_split(finger, options)
     draft = check_opening(finger, options, may_turn=not gauges)
     body = finger.scaled(options.scale).opening_along_z(options.split)
     check_foils(body, gauges, options)
     made = _assembled(body, tuple(gauges), options, draft)
-    _check_parts(made)
+    check_parts(made)
     return made
 
 
@@ -232,7 +242,16 @@ def _assembled(body: Body, foils: tuple[FoilSlot, ...], options: MoldOptions, dr
         body=body,
         at=at,
         parts=parts,
-        pours=(Pour("", name, body.volume_mm3 * len(at.places), found),),
+        pours=(
+            Pour(
+                "",
+                name,
+                body.volume_mm3 * len(at.places),
+                found,
+                tuple(body.at(x) for x in at.places),
+                tuple(part for part in parts if part not in HALVES),
+            ),
+        ),
         slots=slots,
         foils=foils,
         pegs=pegs,
@@ -249,7 +268,8 @@ def _numbered(name: str, i: int, at: Layout) -> str:
 # --- refusals ---------------------------------------------------------------------------------------------------------
 
 
-def _check_split(finger: Body, options: MoldOptions) -> None:
+def check_split(finger: Body, options: MoldOptions) -> None:
+    """Raise a Finger3dError if the split plane misses the finger."""
     low, high = finger.box
     axis = 0 if options.split == "x" else 2
     if not low[axis] < options.split_mm < high[axis]:
@@ -260,23 +280,31 @@ def _check_split(finger: Body, options: MoldOptions) -> None:
 
 
 def overlaps(made: Mold) -> dict[str, float]:
-    """Return the common volume (mm3) of each pair of parts in the assembled position, the cast bodies included."""
+    """Return the common volume (mm3) of each pair of parts in the assembled position, the cast bodies included.
+
+    Parts of different pours are never in the mold together.
+    """
     boxes = {}
     for name, solid in made.parts.items():
         found = solid.bounding_box()
         boxes[name] = np.array([*found.min]), np.array([*found.max])
-    shared = {}
-    for a, b in itertools.combinations(made.parts, 2):
-        apart = (boxes[a][0] > boxes[b][1]).any() or (boxes[b][0] > boxes[a][1]).any()
-        shared[f"{a}, {b}"] = 0.0 if apart else common(made.parts[a], made.parts[b])
-    for name, solid in made.parts.items():
-        if made.body.cad is None and name in HALVES:
-            continue  # cut from each other by a boolean of triangles
-        shared[f"{name}, sensor"] = sum(body.shared(solid) for body in made.bodies)
+    shared: dict[str, float] = {}
+    for pour in made.pours:
+        own = [name for name in made.parts if name in pour.others or not any(name in p.others for p in made.pours)]
+        for a, b in itertools.combinations(own, 2):
+            apart = (boxes[a][0] > boxes[b][1]).any() or (boxes[b][0] > boxes[a][1]).any()
+            if f"{a}, {b}" not in shared:
+                shared[f"{a}, {b}"] = 0.0 if apart else common(made.parts[a], made.parts[b])
+        for name in own:
+            if pour.cast[0].cad is None and name in HALVES:
+                continue  # cut from each other by a boolean of triangles
+            found = sum(body.shared(made.parts[name]) for body in pour.cast)
+            shared[f"{name}, sensor"] = max(found, shared.get(f"{name}, sensor", 0.0))
     return shared
 
 
-def _check_parts(made: Mold) -> None:
+def check_parts(made: Mold) -> None:
+    """Raise a Finger3dError if two parts overlap, or a part and what is cast."""
     tolerance = _OVERLAP_TOLERANCE if made.body.cad is not None else _MESH_OVERLAP_TOLERANCE
     bad = {pair: v for pair, v in overlaps(made).items() if v > tolerance * made.silicone_mm3}
     if bad:
