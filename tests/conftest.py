@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import signal
+from collections.abc import Mapping
 from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
@@ -124,13 +125,26 @@ def paper_finger() -> Design:
 
 @pytest.fixture(scope="session")
 def paper_mold(paper_finger: Design) -> Mold:
-    """The mold of the Fig. 9 finger with slots for `GAUGES`."""
+    """The mold of the Fig. 9 finger with slots for `GAUGES`, and all that a mold has by default."""
+    from finger3d.mold.foils import foils
     from finger3d.mold.options import MoldOptions
-    from finger3d.mold.parts import foils, mold
+    from finger3d.mold.parts import mold
     from tests.mold_cases import GAUGES
 
     options = MoldOptions(shrinkage=0.01)
     return mold(paper_finger.solid(), foils(GAUGES, options, None), options)
+
+
+@pytest.fixture(scope="session")
+def molds(paper_mold: Mold) -> Mapping[str, Mold]:
+    """Molds that together have every feature, by a name that says which; each is made when it is asked for."""
+    from tests.mold_cases import FEW, made
+
+    class Molds(dict[str, "Mold"]):
+        def __missing__(self, name: str) -> Mold:
+            return self.setdefault(name, made(*FEW[name]))
+
+    return Molds({"tongue, screws, plugs": paper_mold})
 
 
 @pytest.fixture(scope="session")

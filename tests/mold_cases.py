@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import math
 
+from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import Gauge
+from finger3d.mold.options import MoldOptions
+from finger3d.mold.parts import Mold, mold
+from finger3d.mold.pours import poured
+from finger3d.mold.shell import shell
 from finger3d.scene import parse
 
 BODIES = {
@@ -12,7 +17,11 @@ BODIES = {
     "half_cylinder": {"radius_mm": 5.0, "width_mm": 10.0},
     "block": {"half_length_mm": 20.0, "height_mm": 20.0, "width_mm": 20.0},
     "hemisphere": {"radius_mm": 8.0},
-}
+    "fingertip": {
+        "radius_mm": 20.0, "half_length_mm": 15.0, "edge_height_mm": 12.0, "width_mm": 16.0,
+        "skin_mm": 1.5, "core_half_length_mm": 5.0, "core_height_mm": 8.0,
+    },
+}  # fmt: skip
 
 
 GAUGES = (
@@ -31,3 +40,25 @@ def scene_of(name: str, **more):
             **more,
         }
     )
+
+
+FEW: dict[str, tuple[str, dict]] = {
+    "cord, bands, two cavities": ("half_cylinder", {"seal": "cord", "fasten": "bands", "cavities": 2}),
+    "carrier": ("block", {"carrier": True}),
+    "plain, sla": (
+        "hemisphere", {"printer": "sla", "seal": "none", "fasten": "none", "pry": False, "riser": 0.0}
+    ),
+    "pours": ("fingertip", {"parts": True}),
+    "insert": ("fingertip", {"parts": True, "inserts": "core"}),
+    "triangles": ("clipped_cylinder as STL", {}),
+}  # fmt: skip
+"""A design and options for each feature."""
+
+
+def made(name: str, options: dict) -> Mold:
+    """The mold of a design, of its solids, or of its triangles."""
+    name, _, kind = name.partition(" as ")
+    design, chosen = designs()[name](**BODIES[name]), MoldOptions(**options)
+    if chosen.parts:
+        return poured(design.solid(), design.solids(), (), chosen)
+    return mold(shell(design.solid(), 0.1, name).surface if kind else design.solid(), (), chosen)

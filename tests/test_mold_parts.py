@@ -9,63 +9,66 @@ import numpy as np
 import pytest
 
 from finger3d.errors import Finger3dError
+from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import Gauge
+from finger3d.mold.foils import foils
 from finger3d.mold.options import MoldOptions
-from finger3d.mold.parts import THIN, foils, mold, overlaps
+from finger3d.mold.parts import mold, overlaps
+from finger3d.mold.pegs import THIN
 from finger3d.mold.shell import shell
-from tests.mold_cases import GAUGES
+from tests.mold_cases import BODIES, GAUGES, made
 
 
 def test_no_part_overlaps_another(paper_mold) -> None:
     """Faces that touch share no volume; 1e-6 of the cavity is what booleans leave."""
     shared = overlaps(paper_mold)
-    assert len(shared) == 6
+    assert {"half_a, half_b", "half_a, lid", "lid, riser", "half_a, plug_1a", "riser, sensor"} <= set(shared)
     assert max(shared.values()) <= 1e-6 * paper_mold.silicone_mm3
 
 
-def test_block_minus_finger_minus_slots_is_the_cavity(paper_mold) -> None:
-    """Volumes of both halves against the block's, in closed form where there is one."""
-    low, high = paper_mold.outline
+def test_block_minus_finger_is_the_cavity() -> None:
+    """Volumes of both halves without seal, screws and notches against the block's, in closed form."""
+    found = made("half_cylinder", {"seal": "none", "fasten": "none", "pry": False, "shrinkage": 0.01})
+    low, high = found.outline
     block = float(np.prod(high - low))
-    slots = sum(float((slot - paper_mold.body).volume) for slot in paper_mold.slots)
-    pegs = sum(float(peg.volume) for peg in paper_mold.pegs)
-    holes = sum(float(hole.volume) for hole in (*paper_mold.holes, *paper_mold.lid_holes))
-    halves = paper_mold.parts["half_a"].volume + paper_mold.parts["half_b"].volume
-    assert halves == pytest.approx(block - paper_mold.silicone_mm3 - slots + pegs - holes, rel=1e-6)
-    assert block - halves - slots + pegs - holes == pytest.approx(paper_mold.silicone_mm3, rel=1e-6)
-    meshed = sum(shell(paper_mold.parts[name], 0.02, name).surface.volume for name in ("half_a", "half_b"))
-    assert block - meshed - slots + pegs - holes == pytest.approx(paper_mold.silicone_mm3, rel=1e-3)
+    pegs = sum(float(peg.volume) for peg in found.pegs.pegs)
+    holes = sum(float(hole.volume) for hole in (*found.pegs.holes, *found.lid_pegs.holes))
+    halves = found.parts["half_a"].volume + found.parts["half_b"].volume
+    assert halves == pytest.approx(block - found.silicone_mm3 + pegs - holes, rel=1e-6)
+    meshed = sum(shell(found.parts[name], 0.02, name).surface.volume for name in ("half_a", "half_b"))
+    assert block - meshed + pegs - holes == pytest.approx(found.silicone_mm3, rel=5e-3)
 
 
 def test_the_cavity_is_larger_by_the_shrinkage(paper_mold, paper_finger) -> None:
     assert paper_mold.silicone_mm3 == pytest.approx(paper_finger.volume_mm3 / (1.0 - 0.01) ** 3, rel=1e-9)
-    sizes = paper_mold.body.bounding_box(optimal=True).size
-    assert [sizes.X, sizes.Z] == pytest.approx([100.0 / 0.99, 20.0 / 0.99], rel=1e-6)
+    low, high = paper_mold.body.box
+    assert list((high - low)[[0, 2]]) == pytest.approx([100.0 / 0.99, 20.0 / 0.99], rel=1e-6)
 
 
-def test_every_slot_is_at_its_gauges_place_and_angle(paper_mold) -> None:
-    """The strip's section: centre times the scale, the foil with its gaps along the gauge and across."""
-    assert len(paper_mold.slots) == 2  # two gauges share a strip
-    for slot, gauge, length in zip(paper_mold.slots, GAUGES, (5.0, 4.0), strict=False):
-        np.testing.assert_allclose([*slot.center()][:2], gauge.middle[:2] / 0.99, rtol=1e-9)
-        corners = np.array([[*v] for v in slot.vertices()]) - [*slot.center()]
-        across = np.array([-gauge.direction[1], gauge.direction[0], 0.0])
-        assert np.ptp(corners @ gauge.direction) == pytest.approx(length + 0.3, rel=1e-9)
-        assert np.ptp(corners @ across) == pytest.approx(0.1 + 0.3, rel=1e-9)
-    # and it is open through both walls: nothing of the halves is left in it
-    for slot in paper_mold.slots:
-        assert all(
-            (slot & paper_mold.parts[name]) is None or (slot & paper_mold.parts[name]).volume == 0
-            for name in paper_mold.parts
-        )
+def test_a_mold_of_triangles_is_that_of_cad(molds) -> None:
+    """The same halves, but for chords of 0.1 mm on the arc: their area is some percent of 91 ml's surface."""
+    found, exact = molds["triangles"], made("clipped_cylinder", {})
+    assert list(found.parts) == list(exact.parts)
+    for name in ("half_a", "half_b"):
+        volumes = found.shell(name, 0.05, 0.2).surface.volume, exact.parts[name].volume
+        assert volumes[0] == pytest.approx(volumes[1], rel=2e-3)
+
+
+def test_a_row_of_cavities_casts_that_many_fingers(molds) -> None:
+    found = molds["cord, bands, two cavities"]
+    design = designs()["half_cylinder"](**BODIES["half_cylinder"])
+    assert found.silicone_mm3 == pytest.approx(2.0 * design.volume_mm3, rel=1e-9)
+    (_, right), (left, _) = (body.box for body in found.bodies)
+    # between them at least a rim and both grooves of the seal
+    assert left[0] - right[0] >= 2.0 * found.options.seal_reach_mm + found.options.rim_mm - 1e-6
+    assert sum(name.startswith("riser") for name in found.parts) == 2
 
 
 def test_pegs_fit_with_the_clearance_and_only_one_way(paper_mold) -> None:
     from build123d import Pos, Rot
 
-    for peg, hole in zip(
-        (*paper_mold.pegs, *paper_mold.lid_pegs), (*paper_mold.holes, *paper_mold.lid_holes), strict=True
-    ):
+    pegs, holes = paper_mold.pegs, paper_mold.lid_pegs
+    for peg, hole in zip((*pegs.pegs, *holes.pegs), (*pegs.holes, *holes.holes), strict=True):
         radii = [max(face.radius or 0.0 for face in solid.faces()) for solid in (peg, hole)]
         assert radii[1] - radii[0] == pytest.approx(0.2, rel=1e-9)
     low, high = paper_mold.outline
@@ -74,24 +77,30 @@ def test_pegs_fit_with_the_clearance_and_only_one_way(paper_mold) -> None:
     def turned(part, about):
         return Pos(*map(float, middle)) * Rot(*(180.0 * a for a in about)) * Pos(*map(float, -middle)) * part
 
-    # half A upside down; lid turned end for end: a peg of full size meets the thin peg's hole
+    # half A upside down; lid turned end for end: a peg of full size meets the thin peg's hole. The chamfer of the tip
+    # takes away a ninth of the ring that is shared.
     thick = math.pi * 2.0**2 * 4.0 - math.pi * (2.0 * THIN + 0.2) ** 2 * 4.0
     for part, about in (("half_a", (0, 0, 1)), ("lid", (0, 1, 0))):
         shared = turned(paper_mold.parts[part], about) & paper_mold.parts["half_b"]
-        assert shared.volume >= 0.9 * thick
+        assert sum(solid.volume for solid in shared.solids()) >= 0.8 * thick
 
 
 @pytest.mark.parametrize(
     ("gauges", "options", "told"),
     [
-        ((), {"split_mm": 10.0}, "split"),
-        ((), {"pour_mm": 96.0}, "base"),
-        ((), {"pour_mm": 24.0}, "--pour-mm 24: "),
-        (GAUGES[:1], {"split": "x"}, "lock .* x"),
-        (GAUGES[:1], {"foil_length_mm": 12.0}, 'gauge "g36": .* 12 x 3 x 0.1 mm'),
-        ((Gauge("out", 60.0, 10.0),), {}, 'gauge "out": '),
-        ((Gauge("edge", 0.0, 20.0, z_mm=9.5),), {}, 'gauge "edge": '),
-        ((GAUGES[0], replace(GAUGES[0], name="near", y_mm=39.0)), {}, 'gauge "near": '),
+        ((), {"split_mm": 10.0}, "the split plane misses the finger"),
+        ((), {"pour_mm": 96.0}, "do not fit on the base"),
+        ((), {"pour_mm": 24.0}, "--pour-mm 24 .* do not fit on the base"),
+        (GAUGES[:1], {"split": "x"}, "would lock halves that open along x"),
+        (GAUGES[:1], {"foil_length_mm": 12.0}, 'gauge "g36": its foil, 12 x 3 x 0.1 mm, is not in the silicone'),
+        ((Gauge("out", 60.0, 10.0),), {}, 'gauge "out": its foil, .* is not in the silicone'),
+        ((Gauge("edge", 0.0, 20.0, z_mm=9.5),), {}, 'gauge "edge": its foil, .* is not in the silicone'),
+        ((GAUGES[0], replace(GAUGES[0], name="near", y_mm=36.0)), {}, 'gauge "near": its plug is .*--no-plugs'),
+        (
+            (GAUGES[0], replace(GAUGES[0], name="near", y_mm=39.0)),
+            {"plugs": False},
+            'gauge "near": its strip is .* from that of',
+        ),
     ],
 )
 def test_molds_that_cannot_be(gauges, options, told, paper_finger) -> None:

@@ -119,9 +119,7 @@ def key_solids(found: Keys, x: float, options: MoldOptions) -> list[Solid]:
     return made
 
 
-def finger_on_carrier(
-    solid: Solid, carrier: Solid, rods: Sequence[Solid], cover_mm: float
-) -> Mapping[str, Solid]:
+def finger_on_carrier(solid: Solid, carrier: Solid, rods: Sequence[Solid], cover_mm: float) -> Mapping[str, Solid]:
     """Return the solids of a finger on its carrier by their labels, the carrier's outer face on y = 0.
 
     Parameters

@@ -21,7 +21,7 @@ from finger3d.mold.options import MoldOptions
 from finger3d.mold.regions import manifold, triangles
 
 if TYPE_CHECKING:
-    from build123d import Face, Solid
+    from build123d import Face
     from manifold3d import CrossSection
 
 

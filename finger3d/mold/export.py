@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from finger3d.errors import Finger3dError
 from finger3d.geometry.imported import Imported
+from finger3d.geometry.surface import Triangles
 from finger3d.materials.silicones import silicone_named
 from finger3d.mold.options import MoldOptions
 from finger3d.progress import Progress
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
     from build123d import Solid
 
     from finger3d.geometry.design import Design
-    from finger3d.geometry.surface import Triangles
     from finger3d.mold.parts import Mold
     from finger3d.mold.shell import Shell
     from finger3d.scene import Scene
@@ -115,12 +115,17 @@ def export(
         files.append(out / "finger.stl")
         silicone = None
         if made is not None:
+            from finger3d.mold.extras import extra_parts, write_extras
             from finger3d.mold.output import write_mold
 
             name = scene.tables.material.silicone
             named = silicone_named(name) if name else None
-            written, told = write_mold(scene.title, made, body, out, text, report, named)
-            files, remarks, silicone = files + written, remarks + told, made.silicone_mm3 / 1e3
+            extras = extra_parts(scene, made, out)
+            written, told = write_mold(scene.title, made, body, out, text, report, extras.parts, named)
+            more, also = write_extras(scene, made, solid, out)
+            files += written + more
+            remarks += [*told, *extras.remarks, *also]
+            silicone = made.silicone_mm3 / 1e3
     return Exported(
         tuple(files), _volume(design, solid, body), body.surface.volume, body.tolerance_mm, silicone, tuple(remarks)
     )
@@ -141,11 +146,12 @@ def _check(design: Design, out: Path, tolerance_mm: float) -> None:
 
 def _clear(out: Path) -> None:
     """Remove the files of an earlier export, which may be of another finger."""
+    from finger3d.mold.extras import EXTRA_FILES
     from finger3d.mold.output import FILES
 
     for name in ("finger.step", "finger.stl"):
         (out / name).unlink(missing_ok=True)
-    for pattern in FILES:
+    for pattern in (*FILES, *EXTRA_FILES):
         for path in out.glob(pattern):
             path.unlink()
 
@@ -153,10 +159,16 @@ def _clear(out: Path) -> None:
 def _mold(scene: Scene, shape: Solid | Triangles, options: MoldOptions) -> Mold:
     from finger3d.mold.foils import foils
     from finger3d.mold.parts import mold
+    from finger3d.mold.pours import poured
 
     embedded = scene.effects.get("embedded_gauge")
     section = (embedded.thickness_mm, embedded.width_mm) if embedded else None
-    return mold(shape, foils(scene.model().gauges, options, section), options)
+    slots = foils(scene.model().gauges, options, section)
+    if not options.parts:
+        return mold(shape, slots, options)
+    if isinstance(shape, Triangles):
+        raise Finger3dError(f"--parts: {scene.design.name} holds triangles; solids are told apart in CAD only")
+    return poured(shape, scene.design.solids(), slots, options)
 
 
 def _volume(design: Design, solid: Solid | None, body: Shell) -> float:

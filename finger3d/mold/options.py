@@ -142,7 +142,11 @@ class MoldOptions:
             value = getattr(self, f.name)
             if isinstance(value, (int, float)) and not math.isfinite(value):
                 raise _refused(f.name, value, "a number")
-        for name, known in (("printer", PRINTERS), ("screw", SCREWS), ("split", "zx")):
+        choices = {
+            "printer": PRINTERS, "screw": SCREWS, "split": "zx",
+            "seal": ("tongue", "cord", "none"), "fasten": ("screws", "bands", "none"),
+        }  # fmt: skip
+        for name, known in choices.items():
             if getattr(self, name) not in known:
                 raise _refused(name, getattr(self, name), " or ".join(known))
         for name in ("wall_mm", "peg_mm", "lid_mm", "foil_length_mm", "foil_thickness_mm", "foil_width_mm",
@@ -177,6 +181,8 @@ class MoldOptions:
             raise _refused("carrier_mm", self.carrier_mm, f"at least {4.0 * self.rim_mm:g}, or its holes grip nothing")
         if (self.pour_order or self.inserts) and not self.parts:
             raise Finger3dError("--pour-order and --inserts: need --parts, a mold for each pour")
+        if self.carrier and self.cavities > 1:
+            raise Finger3dError("--carrier --cavities: a carrier holds one finger; leave one of them out")
         for other, chosen in (("--carrier", self.carrier), ("--cavities", self.cavities > 1)):
             if self.parts and chosen:
                 raise Finger3dError(f"--parts {other}: are not made together; leave one of them out")

@@ -203,4 +203,3 @@ def riser_cup(found: Ports, x: float, options: MoldOptions) -> Solid:
                (r.radius_mm, r.height_mm), (r.radius_mm, r.radius_mm - a), (a, 0.0)]  # fmt: skip
     profile = [p for i, p in enumerate(profile) if math.dist(p, profile[i - 1]) > 1e-6]
     return revolved(profile, (found.pour[0] + x, -options.cover_mm, found.pour[1]), "-y")
-

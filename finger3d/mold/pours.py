@@ -48,9 +48,7 @@ _CHANNEL_INSET = 0.3  # distance of a channel's axis from the side of the positi
 _SHARED_TOLERANCE = 1e-6  # relative volume that booleans leave
 
 
-def poured(
-    whole: Solid, solids: Mapping[str, Solid], gauges: Sequence[FoilSlot], options: MoldOptions
-) -> Mold:
+def poured(whole: Solid, solids: Mapping[str, Solid], gauges: Sequence[FoilSlot], options: MoldOptions) -> Mold:
     """Build a mold with a lid for each pour of a body of several solids.
 
     Parameters
@@ -92,9 +90,7 @@ def poured(
         own, found = _lid(label, cast[label], positive, [(name, cast[name]) for name in placed], at, features, options)
         _check_strips(gauges, cast, label, positive, at, options)
         parts.update(own)
-        pours.append(
-            Pour(label, f"lid_{label or MAIN}", cast[label].volume_mm3, found, tuple(filled), tuple(own))
-        )
+        pours.append(Pour(label, f"lid_{label or MAIN}", cast[label].volume_mm3, found, tuple(filled), tuple(own)))
     for feature in features:
         parts.update(feature.own)
     for name, solid in parts.items():

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 CIRCLE_SEGMENTS = 64
 """Segments of a full circle where a region is widened."""
 
-_SIMPLIFY_MM = 0.02  # deviation of the outlines of widened regions: below what a printer resolves
+_SIMPLIFY_MM = 0.04  # deviation of the outlines of widened regions, below half of any clearance
 _ORDER = {"x": (1, 2, 0), "y": (2, 0, 1), "z": (0, 1, 2)}  # right-handed axes with the normal of a section last
 
 
@@ -35,7 +35,9 @@ def manifold(surface: Triangles) -> Manifold:
 
     made = Manifold(
         # copies: the library refuses arrays that are read-only
-        Mesh64(np.array(surface.points, dtype=np.float64, order="C"), np.array(surface.faces, dtype=np.uint64, order="C"))
+        Mesh64(
+            np.array(surface.points, dtype=np.float64, order="C"), np.array(surface.faces, dtype=np.uint64, order="C")
+        )
     )
     if made.status() != Error.NoError or made.is_empty():
         raise Finger3dError("mold: the triangles of the body are not closed; mend it where it was drawn")
@@ -45,9 +47,7 @@ def manifold(surface: Triangles) -> Manifold:
 def triangles(solid: Manifold) -> Triangles:
     """Return the surface of a solid of the library."""
     mesh = solid.to_mesh64()
-    return Triangles(
-        np.array(mesh.vert_properties[:, :3], dtype=np.float64), np.array(mesh.tri_verts, dtype=np.int64)
-    )
+    return Triangles(np.array(mesh.vert_properties[:, :3], dtype=np.float64), np.array(mesh.tri_verts, dtype=np.int64))
 
 
 def section(surface: Triangles, axis: Literal["x", "y", "z"], at: float) -> CrossSection:
@@ -160,4 +160,3 @@ def difference(body: Triangles, tools: Sequence[Triangles]) -> Triangles:
 def common(a: Triangles, b: Triangles) -> float:
     """Return the common volume of two bodies, mm3."""
     return float((manifold(a) ^ manifold(b)).volume())
-

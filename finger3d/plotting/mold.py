@@ -103,7 +103,9 @@ def separations(sizes: Mapping[str, tuple[Float, Float]]) -> dict[str, Float]:
         elif name in lids:
             shift[1] = -above * (1.0 + lids.index(name))
         elif what in ("riser", "pin"):
-            shift[1] = -above * (len(lids) + 0.4)
+            below = name.replace("riser", "lid")  # a riser of one of several lids
+            level = 1.0 + lids.index(below) if below in lids else float(len(lids))
+            shift[1] = -above * (level + 0.4)
         elif what == "insert":
             shift[1] = -0.5 * above
         shifts[name] = shift

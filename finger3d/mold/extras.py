@@ -1,0 +1,107 @@
+"""Files beside the mold: a fit coupon, a test button with its scene, and a finger on its carrier."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from finger3d.io import atomic
+from finger3d.mold.button import button_for, button_parts, button_scene, button_solid, identify_command
+from finger3d.mold.carrier import finger_on_carrier, key_solids
+from finger3d.mold.coupon import coupon, coupon_clearances
+from finger3d.mold.parts import Mold
+from finger3d.mold.ports import openings
+from finger3d.mold.shell import Shell, shell, write_step
+from finger3d.mold.solids import cylinder
+from finger3d.scene import tree
+
+if TYPE_CHECKING:
+    from build123d import Solid
+
+    from finger3d.scene import Scene
+
+EXTRA_FILES = ("button.step", "button.toml", "finger_on_carrier.step")
+"""Files that may lie beside those of a mold."""
+
+_ANGLE = 0.2  # radians between facets of round parts
+
+
+@dataclass(frozen=True)
+class Extras:
+    """Parts beside a mold, as they lie on the bed, and remarks about them."""
+
+    parts: dict[str, Shell]
+    remarks: tuple[str, ...]
+
+
+def extra_parts(scene: Scene, made: Mold, out: Path) -> Extras:
+    """Return the coupon and the mold of the button, if the options ask for them."""
+    o, solids, remarks = made.options, {}, []
+    if o.coupon:
+        solids |= coupon(o)
+        gaps = ", ".join(f"{gap:g}" for gap in coupon_clearances(o))
+        remarks.append(
+            f"coupon: holes with 1, 2, ... notches have gaps of {gaps} mm; give the least that fits as --clearance-mm"
+        )
+    if o.button:
+        button = button_for(made.silicone_mm3)
+        solids |= button_parts(button, o)
+        E = scene.tables.material.E_MPa
+        remarks.append(
+            f"button: {button.diameter_mm:g} x {button.height_mm:g} mm, {button.volume_mm3 / 1e3:.2f} ml more; press "
+            f"it, write depth_mm and normal_force_N to button.csv, and run: {identify_command(str(out), E)}"
+        )
+    tolerance = o.machine.tolerance_mm
+    return Extras({name: shell(solid, tolerance, name, _ANGLE) for name, solid in solids.items()}, tuple(remarks))
+
+
+def write_extras(scene: Scene, made: Mold, solid: Solid | None, out: Path) -> tuple[list[Path], list[str]]:
+    """Write the button's STEP file and scene, and the finger on its carrier; returns files and remarks.
+
+    Parameters
+    ----------
+    solid : the finger by CAD; None for a finger of triangles
+    """
+    files, remarks = [], []
+    if made.options.button:
+        button, material = button_for(made.silicone_mm3), scene.tables.material
+        write_step(out / "button.step", button_solid(button))
+        with atomic(out / "button.toml") as temporary:
+            text = tree.written(button_scene(button, scene.title, material.E_MPa, material.nu))
+            temporary.write_text(text, encoding="utf-8")
+        files += [out / "button.step", out / "button.toml"]
+    if made.options.carrier and solid is not None:
+        path = out / "finger_on_carrier.step"
+        write_step(path, _labelled(made, solid))
+        files.append(path)
+        remarks.append(
+            f"{path.name}: the finger on its carrier, label carrier ([parts.carrier] rigid = true); y is "
+            f"{made.options.carrier_mm:g} mm larger than in the scene"
+        )
+    return files, remarks
+
+
+def _labelled(made: Mold, solid: Solid):  # type: ignore[no-untyped-def]  # a build123d compound
+    """Return silicone and carrier as one labelled compound, in the axes of the finger."""
+    from build123d import Compound, Rot
+
+    back = Rot(0, 90 if made.options.split == "x" else 0, 0)
+    rods = [back * rod for rod in _silicone_in_carrier(made)]
+    found = finger_on_carrier(solid, back * made.parts["carrier"], rods, made.options.carrier_mm)
+    children = []
+    for label, one in found.items():
+        one.label = label or "silicone"
+        children.append(one)
+    return Compound(label="finger on carrier", children=children)
+
+
+def _silicone_in_carrier(made: Mold) -> Sequence[Solid]:
+    """Return the silicone in the keyed holes and in the pour hole; the riser is cut off."""
+    assert made.keys is not None
+    keyed = key_solids(made.keys, 0.0, made.options)
+    if made.ports.riser is None:
+        return [*keyed, *openings(made.ports, 0.0, made.options)]
+    x, z = made.ports.pour
+    return [*keyed, cylinder((x, -made.options.carrier_mm, z), made.ports.pour_mm, made.options.carrier_mm, "y")]

@@ -1,0 +1,37 @@
+"""Pegs and pins."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from finger3d.mold.layout import layout
+from finger3d.mold.options import MoldOptions
+from finger3d.mold.pegs import THIN, carrier_pins, half_pegs, lid_pegs
+from finger3d.mold.solids import LEAD_IN
+
+AT = layout(np.array([-20.0, 0.0, -10.0]), np.array([20.0, 30.0, 10.0]), MoldOptions())
+
+
+def test_one_peg_is_thin_and_all_have_a_lead_in() -> None:
+    """Volume of a cylinder whose tip is a frustum of 0.7 times the diameter, 0.15 diameters high."""
+    for found in (half_pegs(AT, MoldOptions()), lid_pegs(AT, MoldOptions())):
+        sizes = [4.0 * THIN, 4.0, 4.0, 4.0]
+        for peg, d in zip(found.pegs, sizes, strict=True):
+            tip = LEAD_IN * d
+            r, end = d / 2.0, 0.35 * d
+            wanted = math.pi * (r**2 * (4.0 - tip) + tip / 3.0 * (r**2 + r * end + end**2))
+            assert peg.volume == pytest.approx(wanted, rel=1e-9)
+
+
+def test_pins_reach_through_the_carrier_as_far_as_pegs() -> None:
+    o = MoldOptions(carrier=True)
+    found = carrier_pins(AT, o)
+    assert len(found.own) == 4
+    for pin in found.own.values():
+        box = pin.bounding_box()
+        assert box.max.Y == pytest.approx(o.peg_mm)
+        assert box.min.Y == pytest.approx(-o.carrier_mm - 2.0 * o.rim_mm)
+    assert len(found.cut["lid"]) == len(found.cut["half_a"]) == 4
