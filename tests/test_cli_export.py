@@ -26,14 +26,15 @@ def test_the_command_writes_a_mold(scene_file, tmp_path, capsys, monkeypatch) ->
     printed, err = capsys.readouterr()
     assert err == ""
     names = {"finger.step", "finger.stl", "mold.3mf", "mold.step", "mold.png", "sheet.txt"}
-    names |= {f"mold_{part}.stl" for part in ("half_a", "half_b", "lid")}
+    names |= {f"mold_{part}.stl" for part in ("half_a", "half_b", "lid", "riser", "plug_1a", "plug_1b")}
+    names |= {"mold_exploded.step"} | {f"mold_bed_{i}.3mf" for i in range(2, 5)}
     assert {f.name for f in out.glob("[!.]*")} == names
     text = (out / "sheet.txt").read_text(encoding="utf-8")
     volume = load(scene_file).design.volume_mm3 / 0.998**3 / 1e3
     assert f"cavity              {volume:.2f} ml" in text
     assert "100 x 100 x 100 mm" in text
     assert "g36" in text
-    assert "remark: mold_half_a: 116" in printed
+    assert "remark: mold_half_a: 142.3" in printed
     assert max(len(line) for line in text.splitlines()) <= 120
     from matplotlib.image import imread
 

@@ -13,20 +13,20 @@ from finger3d.mold.ports import ports
 from finger3d.mold.regions import rectangle
 
 BASE = rectangle((-20.0, -10.0), (20.0, 10.0))
-O = MoldOptions(carrier=True)
+OPTIONS = MoldOptions(carrier=True)
 
 
 def test_holes_grip_and_are_open_to_the_air() -> None:
     """Each is narrower at the sensor than outside, runs through the carrier, and keeps a rim from its neighbours."""
-    found = keys(BASE, ports(BASE, 9600.0, O, vented=False), O)
+    found = keys(BASE, ports(BASE, 9600.0, OPTIONS, vented=False), OPTIONS)
     assert found.head_mm == pytest.approx(1.7 * found.neck_mm)
     assert len(found.places) >= 4
     for i, a in enumerate(found.places):
         assert (-a[0], a[1]) in found.places  # symmetric
         for b in found.places[:i]:
-            assert math.dist(a, b) >= found.head_mm + 2.0 * O.rim_mm - 1e-9
-    held = sum(solid.volume for solid in key_solids(found, 0.0, O))
-    assert held == pytest.approx(found.volume_mm3(O.carrier_mm), rel=1e-9)
+            assert math.dist(a, b) >= found.head_mm + 2.0 * OPTIONS.rim_mm - 1e-9
+    held = sum(solid.volume for solid in key_solids(found, 0.0, OPTIONS))
+    assert held == pytest.approx(found.volume_mm3(OPTIONS.carrier_mm), rel=1e-9)
     assert found.neck_area_mm2 == pytest.approx(len(found.places) * math.pi * 1.5**2)
 
 
@@ -51,4 +51,4 @@ def test_the_silicone_cannot_be_pulled_out(molds) -> None:
 def test_a_base_without_room_is_refused() -> None:
     small = rectangle((-4.0, -4.0), (4.0, 4.0))
     with pytest.raises(Finger3dError, match="--carrier --key-mm 3: 0 keyed holes fit on the base, 8 x 8 mm"):
-        keys(small, ports(small, 500.0, O, vented=False), O)
+        keys(small, ports(small, 500.0, OPTIONS, vented=False), OPTIONS)

@@ -57,9 +57,22 @@ def test_an_imported_stl_is_written_as_it_is(tmp_path: Path) -> None:
     with pytest.raises(Finger3dError, match="finger.stl"):
         export(scene, tmp_path / "first")
     assert (tmp_path / "first" / "finger.stl").read_bytes() == before
-    with pytest.raises(Finger3dError, match="STEP"):
-        export(scene, tmp_path / "third", MoldOptions())
+    with pytest.raises(Finger3dError, match="--parts"):
+        export(scene, tmp_path / "third", MoldOptions(parts=True))
     assert not (tmp_path / "third").exists()
+
+
+def test_a_step_file_away_from_the_origin_is_enlarged_about_its_base(tmp_path: Path) -> None:
+    """A block drawn elsewhere: its cavity is larger by the shrinkage, and its base stays on y = 0."""
+    from build123d import Box, Pos, export_step
+
+    from finger3d.mold.parts import mold
+
+    export_step(Pos(30.0, 50.0, 10.0) * Box(20.0, 8.0, 12.0), str(tmp_path / "away.step"))
+    found = mold(imported(tmp_path / "away.step").solid(), (), MoldOptions(shrinkage=0.1))
+    low, high = found.body.box
+    np.testing.assert_allclose(low * 0.9, [-10.0, 0.0, -6.0], atol=1e-5)
+    np.testing.assert_allclose(high * 0.9, [10.0, 8.0, 6.0], atol=1e-5)
 
 
 @pytest.mark.slow
@@ -89,7 +102,7 @@ def test_a_step_file_with_splines_has_the_right_volume_and_a_mold(tmp_path: Path
 
 
 def test_an_export_leaves_nothing_of_an_older_one(tmp_path: Path) -> None:
-    for name in ("mold.3mf", "sheet.txt", "mine.txt"):
+    for name in ("mold.3mf", "mold_bed_2.3mf", "mold_plug_1a.stl", "button.toml", "sheet.txt", "mine.txt"):
         (tmp_path / name).write_text("older")
     export(scene_of("block"), tmp_path)
     assert {f.name for f in tmp_path.glob("[!.]*")} == {"finger.step", "finger.stl", "mine.txt"}

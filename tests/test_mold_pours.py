@@ -43,7 +43,7 @@ def test_each_lid_leaves_room_for_its_pour(molds) -> None:
 def test_an_insert_stands_on_pegs_and_fills_the_core(molds) -> None:
     made = molds["insert"]
     assert [pour.name for pour in made.pours] == ["skin", "body"]
-    core = {label: solid for label, solid in TIP.solids().items()}["core"]
+    core = TIP.solids()["core"]
     holes = core.volume - made.parts["insert_core"].volume
     assert 0.0 < holes < 0.2 * core.volume
     shared = made.parts["insert_core"] & made.parts["lid_body"]

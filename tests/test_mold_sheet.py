@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from finger3d.materials.silicones import silicone_named
-from finger3d.mold.output import as_printed
+from finger3d.mold.packing import as_printed
 from finger3d.mold.sheet import oversize, sheet
 from finger3d.mold.shell import shell
 

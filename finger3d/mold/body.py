@@ -38,6 +38,12 @@ class Body:
         return cls(shell(shape, tolerance_mm, name).surface, shape)
 
     @property
+    def solid(self) -> Solid:
+        """The CAD solid of a body that has one."""
+        assert self.cad is not None
+        return self.cad
+
+    @property
     def volume_mm3(self) -> float:
         """Volume, by CAD where there is CAD."""
         return self.surface.volume if self.cad is None else volume(self.cad)
@@ -54,7 +60,7 @@ class Body:
         """Return the body enlarged about the middle of its base."""
         if factor == 1.0:
             return self
-        cad = None if self.cad is None else self.cad.scale(factor)
+        cad = None if self.cad is None else _enlarged(self.cad, factor)
         return Body(Triangles(self.surface.points * factor, self.surface.faces), cad)
 
     def opening_along_z(self, split: str) -> Body:
@@ -89,6 +95,18 @@ class Body:
         from finger3d.mold.regions import difference
 
         return Shell(difference(part.surface, [self.surface]), part.tolerance_mm, part.angle)
+
+
+def _enlarged(solid: Solid, factor: float) -> Solid:
+    """Return a solid enlarged about the origin; build123d's `scale` enlarges about the solid's own location."""
+    from build123d import Shape as CadShape
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
+    from OCP.gp import gp_Pnt, gp_Trsf
+
+    enlarge = gp_Trsf()
+    enlarge.SetScale(gp_Pnt(0.0, 0.0, 0.0), factor)
+    whole = CadShape.cast(BRepBuilderAPI_Transform(solid.wrapped, enlarge, True).Shape())
+    return whole.solids()[0]
 
 
 def _triangles(solid: Solid, tolerance_mm: float) -> Triangles:

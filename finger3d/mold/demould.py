@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
@@ -115,12 +116,12 @@ def _half(surface: Triangles, axis: int, sign: float, at_mm: float) -> Triangles
     return triangles(manifold(surface).trim_by_plane(tuple(normal), sign * at_mm))
 
 
-def _cuts(half: Triangles, axis: int, at_mm: float) -> np.ndarray:
+def _cuts(half: Triangles, axis: int, at_mm: float) -> NDArray[np.bool_]:
     """Return the mask (m,) of the triangles on the split plane or on the base, which no half touches."""
     corners = half.corners
     on_split = (np.abs(corners[:, :, axis] - at_mm) < _ON_PLANE_MM).all(axis=1)
     on_base = (np.abs(corners[:, :, 1]) < _ON_PLANE_MM).all(axis=1)
-    found: np.ndarray = on_split | on_base
+    found: NDArray[np.bool_] = np.asarray(on_split | on_base)
     return found
 
 
@@ -156,7 +157,7 @@ def _reach(shadow: CrossSection, locked: CrossSection, known: float) -> float:
     if not reaches(max(known, 1e-6)):
         return known
     x0, y0, x1, y1 = shadow.bounds()
-    low, high = max(known, 1e-6), 0.5 * max(x1 - x0, y1 - y0) + 1e-6
+    low, high = max(known, 1e-6), 0.5 * float(max(x1 - x0, y1 - y0)) + 1e-6
     while high - low > _DEPTH_TOLERANCE * high:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if reaches(middle) else (low, middle)

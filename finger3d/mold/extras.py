@@ -38,7 +38,8 @@ class Extras:
 
 def extra_parts(scene: Scene, made: Mold, out: Path) -> Extras:
     """Return the coupon and the mold of the button, if the options ask for them."""
-    o, solids, remarks = made.options, {}, []
+    o, remarks = made.options, []
+    solids: dict[str, Solid] = {}
     if o.coupon:
         solids |= coupon(o)
         gaps = ", ".join(f"{gap:g}" for gap in coupon_clearances(o))

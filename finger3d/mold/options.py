@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Collection
 from dataclasses import dataclass, fields
 from typing import Literal
 
@@ -142,7 +143,7 @@ class MoldOptions:
             value = getattr(self, f.name)
             if isinstance(value, (int, float)) and not math.isfinite(value):
                 raise _refused(f.name, value, "a number")
-        choices = {
+        choices: dict[str, Collection[str]] = {
             "printer": PRINTERS, "screw": SCREWS, "split": "zx",
             "seal": ("tongue", "cord", "none"), "fasten": ("screws", "bands", "none"),
         }  # fmt: skip

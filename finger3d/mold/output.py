@@ -119,7 +119,7 @@ def _picture(
         name = "sensor" if len(made.at.places) == 1 else f"sensor_{i}"
         cast = sensor.at(x)
         parts[name] = cast.surface if cast.cad is None else shell(cast.cad, body.tolerance_mm, name, body.angle).surface
-    labelled = {}
+    labelled: dict[str, str] = {}
     for name in printed.keys() & parts.keys():
         if kind(name) not in {kind(other) for other in labelled}:  # one label for parts of a kind
             labelled[name] = " x ".join(f"{e:.1f}" for e in printed[name].extent) + " mm"

@@ -142,7 +142,7 @@ def pour_order(solids: Mapping[str, Solid], options: MoldOptions) -> tuple[list[
 
 
 def _positive(later: list[Body], body: Body, at: Layout, options: MoldOptions, label: str) -> Solid | None:
-    """Return the solids poured later as one positive with a clearance from the walls of the cavity; None without any."""
+    """Return the solids poured later as one positive, clear of the walls of the cavity; None without any."""
     if not later:
         return None
     from build123d import Pos
@@ -150,11 +150,11 @@ def _positive(later: list[Body], body: Body, at: Layout, options: MoldOptions, l
     gap = options.gap_mm
     name = f"the positive of lid_{label or MAIN}"
     advice = "choose another --pour-order, or --inserts"
-    whole = later[0].cad
+    whole = later[0].solid
     for other in later[1:]:
-        whole = whole + other.cad
+        whole = whole + other.solid
     for shift in ((gap, 0), (-gap, 0), (0, gap), (0, -gap)):
-        whole = whole & (Pos(float(shift[0]), 0, float(shift[1])) * body.cad)
+        whole = whole & (Pos(float(shift[0]), 0, float(shift[1])) * body.solid)
     found = one(whole, name, advice)
     surface = Body.of(found, options.machine.tolerance_mm, name).surface
     if surface.low[1] > _TOUCHING * body.box[1][1]:
@@ -186,7 +186,7 @@ def _lid(
     for insert, solid in placed:
         pins, holes = _insert_pegs(insert, solid, options)
         adds += pins
-        own[f"insert_{insert or MAIN}"] = one(solid.cad - holes, insert or MAIN)
+        own[f"insert_{insert or MAIN}"] = one(solid.solid - holes, insert or MAIN)
     lid = part("lid", cover(at, options), [*features, Feature(add={"lid": adds}, cut={"lid": tools})], name)
     made = {name: lid}
     if found is not None and found.riser is not None:

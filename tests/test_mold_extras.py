@@ -1,0 +1,46 @@
+"""Files beside the mold."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from finger3d.mold.export import export
+from finger3d.mold.options import MoldOptions
+from finger3d.scene import load
+from tests.mold_cases import scene_of
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    """The block on a carrier, with a coupon and a button."""
+    out = tmp_path_factory.mktemp("extras")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("FINGER3D_RENDERER", "matplotlib")
+        done = export(scene_of("block"), out, MoldOptions(carrier=True, coupon=True, button=True))
+    (out / "remarks.txt").write_text("\n".join(done.remarks))
+    return out
+
+
+def test_the_buttons_scene_loads_beside_its_body(folder) -> None:
+    scene = load(folder / "button.toml")
+    assert scene.tables.material.E_MPa == 1.0
+    assert scene.design.height_mm == pytest.approx(12.5, abs=1e-3)
+    told = (folder / "remarks.txt").read_text()
+    assert f"finger3d identify {folder}/button.toml --measured {folder}/button.csv --free material.E_MPa=0.2:5" in told
+
+
+def test_the_parts_beside_the_mold_are_printed_with_it(folder) -> None:
+    names = {path.stem for path in folder.glob("mold_*.stl")}
+    assert {"mold_carrier", "mold_coupon_peg", "mold_coupon_holes", "mold_button_ring", "mold_button_floor"} <= names
+    assert "holes with 1, 2, ... notches have gaps of 0.05, 0.1, " in (folder / "remarks.txt").read_text()
+
+
+def test_the_finger_on_its_carrier_has_a_labelled_carrier(folder) -> None:
+    from build123d import import_step
+
+    silicone, carrier = import_step(str(folder / "finger_on_carrier.step")).children
+    assert (silicone.label, carrier.label) == ("silicone", "carrier")
+    assert carrier.bounding_box().max.Y == pytest.approx(5.0, abs=1e-6)
+    assert silicone.bounding_box().max.Y == pytest.approx(25.0, abs=1e-6)
