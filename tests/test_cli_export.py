@@ -12,6 +12,9 @@ from finger3d.scene import load
 from tests.scenes import BLOCK, written
 
 
+STEPS = ("1_print", "2_prepare", "3_gauges", "4_close", "5_pour", "6_open")
+
+
 @pytest.fixture
 def scene_file(tmp_path) -> Path:
     path = tmp_path / "scene.toml"
@@ -27,6 +30,7 @@ def test_the_command_writes_a_mold(scene_file, tmp_path, capsys, monkeypatch) ->
     assert err == ""
     names = {"finger.step", "finger.stl", "mold.3mf", "mold.step", "mold.png", "sheet.txt"}
     names |= {f"mold_{part}.stl" for part in ("half_a", "half_b", "lid", "riser", "plug_1a", "plug_1b")}
+    names |= {"mold.html"} | {f"mold_step_{step}.png" for step in STEPS}
     names |= {"mold_exploded.step"} | {f"mold_bed_{i}.3mf" for i in range(2, 5)}
     assert {f.name for f in out.glob("[!.]*")} == names
     text = (out / "sheet.txt").read_text(encoding="utf-8")

@@ -12,6 +12,7 @@ from finger3d.io import atomic
 from finger3d.materials.silicones import Silicone
 from finger3d.mold.foils import strips
 from finger3d.mold.packing import as_printed, beds
+from finger3d.mold.page import PAGE, mold_page
 from finger3d.mold.parts import Mold
 from finger3d.mold.sheet import oversize, sheet
 from finger3d.mold.shell import ANGLE, Shell, shell, write_3mf, write_step, write_stl
@@ -19,7 +20,8 @@ from finger3d.mold.slicer import check_print
 from finger3d.plotting.mold import kind, picture, separations
 from finger3d.progress import Progress
 
-FILES = ("mold_*.stl", "mold*.3mf", "mold.step", "mold_exploded.step", "sheet.txt", "mold.png")
+FILES = ("mold_*.stl", "mold*.3mf", "mold.step", "mold_exploded.step", "sheet.txt", "mold.png", PAGE,
+         "mold_step_*.png")  # fmt: skip
 """Patterns of the files of a mold."""
 
 _CHECKED_LAYER_MM = 0.5  # height of the layers in which islands are looked for
@@ -62,8 +64,9 @@ def write_mold(
         if made.body.cad is not None:
             files += _write_steps(out, made)
         extent = np.max([bed.extent for bed in packed], axis=0)
+        instructions = sheet(title, made, printed, extent, silicone)
         with atomic(out / "sheet.txt") as temporary:
-            temporary.write_text(sheet(title, made, printed, extent, silicone), encoding="utf-8")
+            temporary.write_text(instructions, encoding="utf-8")
         drawn.result()
     remarks = [f"mold_{n}: {why}" for n, part in printed.items() if (why := oversize(part, made.options.bed_mm))]
     remarks += _print_remarks(printed, made.options.machine.thinnest_mm)
@@ -71,7 +74,8 @@ def write_mold(
         remarks.append(f"the parts need {len(packed)} beds; mold.3mf is the first")
     if made.body.cad is None:
         remarks.append("no mold.step: the finger holds triangles, and so do the halves of its mold")
-    return [*files, out / "sheet.txt", out / "mold.png"], remarks
+    files += [out / "sheet.txt", out / "mold.png"]
+    return files + mold_page(title, made, shells, printed, packed, out, instructions, remarks), remarks
 
 
 def _write_steps(out: Path, made: Mold) -> list[Path]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -31,6 +31,10 @@ COLOURS = {
     "insert": "#6f4e7c",
     "sensor": "#f28e2b",
     "strips": "#222222",
+    "bed": "#e9e9e4",
+    "silicone": "#f28e2b",
+    "silicone_2": "#e15759",
+    "silicone_3": "#4e79a7",
 }
 """Colours of parts by their kind, the first word of their name."""
 
@@ -79,6 +83,11 @@ def kind(name: str) -> str:
     return name if name in COLOURS else name.split("_")[0]
 
 
+def colour(name: str) -> str:
+    """Return the colour of a part; grey if it has none of its own."""
+    return COLOURS.get(name, COLOURS.get(kind(name), "#a8a8a8"))
+
+
 def separations(sizes: Mapping[str, tuple[Float, Float]]) -> dict[str, Float]:
     """Return the shift (3,), mm, of each part that takes an assembled mold apart, in the axes of the mold.
 
@@ -118,10 +127,25 @@ def exploded(assembled: Mapping[str, Triangles]) -> Scenery:
     parts = {
         name: Triangles((part.points + shifts[name]) @ _POURING_AXES.T, part.faces) for name, part in assembled.items()
     }
-    axes = viewer_axes(_VIEW)
+    return scenery(parts)
+
+
+def standing(assembled: Mapping[str, Triangles]) -> dict[str, Triangles]:
+    """Return the parts in the orientation in which the mold is poured."""
+    return {name: Triangles(part.points @ _POURING_AXES.T, part.faces) for name, part in assembled.items()}
+
+
+def scenery(parts: Mapping[str, Triangles], towards: Float = _VIEW) -> Scenery:
+    """Return parts as they are with a camera that shows them all.
+
+    Parameters
+    ----------
+    towards : (3,) direction to the viewer
+    """
+    axes = viewer_axes(towards)
     seen = np.vstack([part.points for part in parts.values()]) @ axes.T
     low, high = seen.min(axis=0), seen.max(axis=0)
-    return Scenery(parts, axes, 0.5 * (low + high) @ axes, _MARGIN * 0.5 * (high - low)[:2])
+    return Scenery(dict(parts), axes, 0.5 * (low + high) @ axes, _MARGIN * 0.5 * (high - low)[:2])
 
 
 def picture(path: Path, assembled: Mapping[str, Triangles], title: str, sizes: Mapping[str, str]) -> str:
@@ -144,19 +168,20 @@ def picture(path: Path, assembled: Mapping[str, Triangles], title: str, sizes: M
     MissingError
         If FINGER3D_RENDERER is ``pyvista`` and PyVista cannot render.
     """
-    scenery = exploded(assembled)
-    image = _rendered(scenery)
-    width, height = scenery.half
+    view = exploded(assembled)
+    images = rendered([view])
+    image = None if images is None else images[0]
+    width, height = view.half
     high = _WIDTH * height / (_LABEL_FACTOR * width) + _TITLE_HEIGHT
     figure = blank(_WIDTH, high)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0 - _TITLE_HEIGHT / high))
     if image is None:
-        _draw(axes, scenery)
+        draw(axes, view)
     else:
         axes.imshow(image, extent=(-width, width, -height, height), interpolation="nearest")
-    for name, part in scenery.parts.items():
+    for name, part in view.parts.items():
         if name in sizes:
-            _label(axes, scenery, name, part, sizes[name])
+            _label(axes, view, name, part, sizes[name])
     axes.set(xlim=(-_LABEL_FACTOR * width, _LABEL_FACTOR * width), ylim=(-height, height), aspect="equal")
     axes.set_axis_off()
     figure.text(0.5, 1.0 - 0.5 * _TITLE_HEIGHT / high, title, fontsize=11, ha="center", va="center")
@@ -165,9 +190,9 @@ def picture(path: Path, assembled: Mapping[str, Triangles], title: str, sizes: M
     return "matplotlib" if image is None else "pyvista"
 
 
-def _label(axes: Axes, scenery: Scenery, name: str, part: Triangles, remark: str) -> None:
+def _label(axes: Axes, view: Scenery, name: str, part: Triangles, remark: str) -> None:
     """Write the name of a part and a remark next to the part: half B at its left, the other parts at their right."""
-    seen = scenery.flat(part.points)
+    seen = view.flat(part.points)
     left = name == "half_b"
     low = name == "strips"  # their front end is not hidden by other parts
     at = seen[np.argmin(seen[:, 1] if low else seen[:, 0]) if left or low else np.argmax(seen[:, 0])]
@@ -186,35 +211,37 @@ def _label(axes: Axes, scenery: Scenery, name: str, part: Triangles, remark: str
     )
 
 
-def _draw(axes: Axes, scenery: Scenery) -> None:
+def draw(axes: Axes, view: Scenery) -> None:
     """Draw the parts with matplotlib from back to front, and likewise the triangles of each part."""
     from matplotlib.collections import PolyCollection
     from matplotlib.colors import to_rgb
 
-    order = sorted(scenery.parts, key=lambda n: float((scenery.parts[n].points @ scenery.axes[2]).mean()))
+    order = sorted(view.parts, key=lambda n: float((view.parts[n].points @ view.axes[2]).mean()))
     light = np.array([0.2, 0.9, 0.5]) / np.linalg.norm([0.2, 0.9, 0.5])
     for layer, name in enumerate(order):
-        part = scenery.parts[name]
-        seen = part.normals @ scenery.axes[2] > 0.0
+        part = view.parts[name]
+        seen = part.normals @ view.axes[2] > 0.0
         corners, normals = part.corners[seen], part.normals[seen]
-        far = np.argsort(corners.mean(axis=1) @ scenery.axes[2], kind="stable")
+        far = np.argsort(corners.mean(axis=1) @ view.axes[2], kind="stable")
         shade = 0.6 + 0.4 * np.clip(normals @ light, 0.0, 1.0)
-        fill = np.clip(np.array(to_rgb(COLOURS[kind(name)])) * shade[:, None], 0.0, 1.0)[far]
+        fill = np.clip(np.array(to_rgb(colour(name))) * shade[:, None], 0.0, 1.0)[far]
         alpha = OPACITY.get(name)
         # Edges in the colour of the face close fine seams; a transparent face would show them.
         edge = fill if alpha is None else "none"
-        faces = PolyCollection(list(scenery.flat(corners)[far]), facecolors=fill, edgecolors=edge, lw=0.3, alpha=alpha)
+        faces = PolyCollection(list(view.flat(corners)[far]), facecolors=fill, edgecolors=edge, lw=0.3, alpha=alpha)
         faces.set(zorder=2 + layer, antialiased=alpha is None)
         axes.add_collection(faces)
 
 
-def _rendered(scenery: Scenery) -> Image | None:
-    """Return the image (h, w, 3) by PyVista, or None if PyVista does not render."""
-    width, height = scenery.half
-    window = _PIXELS, max(int(_PIXELS * height / width), 1)
-    parts = tuple(
-        Polygons(part.points, part.faces, COLOURS[kind(name)], OPACITY.get(name, 1.0), feature_edges=True)
-        for name, part in scenery.parts.items()
-    )
-    images = render([Drawing(Camera(scenery.axes, scenery.middle, float(height), window), parts)])
-    return None if images is None else images[0]
+def rendered(views: Sequence[Scenery]) -> list[Image] | None:
+    """Return the images (h, w, 3) by PyVista, or None if PyVista does not render."""
+    drawings = []
+    for view in views:
+        width, height = view.half
+        window = _PIXELS, max(int(_PIXELS * height / width), 1)
+        parts = tuple(
+            Polygons(part.points, part.faces, colour(name), OPACITY.get(name, 1.0), feature_edges=True)
+            for name, part in view.parts.items()
+        )
+        drawings.append(Drawing(Camera(view.axes, view.middle, float(height), window), parts))
+    return render(drawings)

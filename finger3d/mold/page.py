@@ -1,0 +1,250 @@
+"""Page of a mold, mold.html: a picture and a few lines for each step of casting."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from finger3d.geometry.surface import Triangles
+from finger3d.mold.foils import strips
+from finger3d.mold.packing import Bed
+from finger3d.mold.parts import HALVES, Mold, Pour
+from finger3d.mold.shell import Shell
+from finger3d.plotting.mold import kind, separations, standing
+from finger3d.plotting.mold_steps import StepPicture, step_pictures
+from finger3d.report.build import Code, Figure, HeadlineRow, PageSection, Table, write_page
+
+PAGE = "mold.html"
+
+_BED_THICKNESS_MM = 2.0
+
+
+@dataclass(frozen=True)
+class Step:
+    """Step of casting: the word in its file's name, its title, its lines, and the parts of its picture."""
+
+    word: str
+    title: str
+    lines: Sequence[str]
+    parts: Mapping[str, Triangles]
+    on_bed: bool = False
+
+
+def mold_page(
+    title: str,
+    made: Mold,
+    shells: Mapping[str, Shell],
+    printed: Mapping[str, Shell],
+    packed: Sequence[Bed],
+    out: Path,
+    instructions: str,
+    remarks: Sequence[str],
+) -> list[Path]:
+    """Write mold.html and the pictures of its steps; returns the files.
+
+    Parameters
+    ----------
+    shells : parts in the assembled position
+    printed : parts as they lie on the bed
+    packed : beds with parts in their places
+    instructions : text of sheet.txt, repeated at the end
+    remarks : warnings, shown at the top
+    """
+    steps = _steps(made, shells, packed)
+    pictures = [
+        StepPicture(out / f"mold_step_{i}_{step.word}.png", step.parts, step.on_bed) for i, step in enumerate(steps, 1)
+    ]
+    step_pictures(pictures)
+    sections = [
+        PageSection(f"{i}. {step.title}", [*step.lines, Figure(picture.path.name, step.title)])
+        for i, (step, picture) in enumerate(zip(steps, pictures, strict=True), 1)
+    ]
+    sections += [
+        PageSection("Parts", [_table(printed)]),
+        PageSection("Opening", _opening(made)),
+        PageSection("sheet.txt", [Code(instructions)], folded=True),
+    ]
+    page = write_page(
+        out,
+        f"Mold of {title}",
+        _headline(made),
+        sections,
+        [Figure("mold.png", "As it is poured, taken apart")],
+        command="export --mold",
+        outcome=f"{len(printed)} parts, {len(packed)} bed{'s' if len(packed) > 1 else ''}",
+        notes=remarks,
+        file=PAGE,
+    )
+    return [page, *(picture.path for picture in pictures)]
+
+
+def _headline(made: Mold) -> list[HeadlineRow]:
+    rows = [HeadlineRow("silicone in the cavities", round(made.silicone_mm3 / 1e3, 2), "ml")]
+    for pour in made.pours:
+        if pour.ports is not None and pour.ports.riser is not None:
+            share = 100.0 * pour.ports.riser.volume_mm3 * len(made.at.places) / pour.silicone_mm3
+            named = f" of {pour.name}" if len(made.pours) > 1 else ""
+            rows.append(HeadlineRow(f"riser{named} and its hole", f"{share:.3g} % of the cavity"))
+    if (found := made.bolts) is not None:
+        rows.append(HeadlineRow("screws with nuts", f"{found.number} {made.options.screw} x {found.length_mm:g}"))
+    return rows
+
+
+def _steps(made: Mold, shells: Mapping[str, Shell], packed: Sequence[Bed]) -> list[Step]:
+    surfaces = {name: part.surface for name, part in shells.items()}
+    halves = {name: surfaces[name] for name in HALVES}
+    steps = [_printing(made, bed, len(packed)) for bed in packed[:1]]
+    steps.append(_preparing(made, halves))
+    closed = dict(halves)
+    if made.foils:
+        steps.append(_threading(made, halves, surfaces))
+        closed |= {name: part for name, part in surfaces.items() if kind(name) == "plug"}
+    steps.append(Step("close", "Close the halves", _closing_lines(made), standing(closed)))
+    for i, pour in enumerate(made.pours):
+        steps.append(_pouring(made, i, pour, closed, surfaces))
+    steps.append(_opening_step(made, surfaces))
+    return steps
+
+
+def _printing(made: Mold, bed: Bed, beds: int) -> Step:
+    o, parts = made.options, {name: part.surface for name, part in bed.placed.items()}
+    size = o.bed_mm
+    parts["bed"] = _box((0.0, 0.0, -_BED_THICKNESS_MM), (size[0], size[1], 0.0))
+    lines = [
+        f"mold.3mf has all parts as they should be printed, outer faces down, without support: layers of "
+        f"{o.machine.layer_mm:g} mm or less."
+    ]
+    if beds > 1:
+        lines.append(f"The parts need {beds} beds: mold.3mf, then mold_bed_2.3mf and so on.")
+    if o.coupon:
+        lines.append("Print the coupon first: the least clearance that the peg enters by hand is that of the mold.")
+    return Step("print", "Print the parts", lines, parts, on_bed=True)
+
+
+def _preparing(made: Mold, halves: Mapping[str, Triangles]) -> Step:
+    o = made.options
+    lines = ["Spray every face that silicone touches with a release agent."]
+    if o.seal == "cord":
+        lines.append(
+            f"Lay a silicone cord of {o.cord_mm:g} mm into the groove of half A and into that under the "
+            f"{'carrier' if o.carrier else 'lid'}; let it end at the lid's groove."
+        )
+    if (found := made.bolts) is not None:
+        lines.append(f"Push {found.number} {o.screw} nuts into the traps of half A, {found.trap_mm:.3g} mm deep.")
+    shifts = separations({name: (part.low, part.high) for name, part in halves.items()})
+    apart = {name: Triangles(part.points + shifts[name], part.faces) for name, part in halves.items()}
+    return Step("prepare", "Prepare the halves", lines, standing(apart))
+
+
+def _threading(made: Mold, halves: Mapping[str, Triangles], surfaces: Mapping[str, Triangles]) -> Step:
+    laid = strips(made.foils, made.at, made.options)
+    assert laid is not None
+    plugs = {name: part for name, part in surfaces.items() if kind(name) == "plug"}
+    parts = {"half_b": halves["half_b"], **{n: p for n, p in plugs.items() if n.endswith("b")}, "strips": laid}
+    lines = [
+        "Thread each strip through half B, then half A over it, and stretch it. sheet.txt has the places of foils."
+    ]
+    if plugs:
+        lines.append("Push the plugs over the strips from their slits' open ends, and into the pockets of both halves.")
+    else:
+        lines.append("Close the slots with tape.")
+    return Step("gauges", "Thread the strips of the gauges", lines, standing(parts))
+
+
+def _closing_lines(made: Mold) -> list[str]:
+    o, lines = made.options, ["Push half A onto the pegs of half B: one peg is thinner, so that it fits one way only."]
+    if (found := made.bolts) is not None:
+        lines.append(f"Tighten {found.number} screws {o.screw} x {found.length_mm:g} from half B, by hand.")
+    if o.fasten == "bands":
+        lines.append(f"Put rubber bands up to {o.band_mm:g} mm wide into the grooves around the halves.")
+    return lines
+
+
+def _pouring(
+    made: Mold, i: int, pour: Pour, closed: Mapping[str, Triangles], surfaces: Mapping[str, Triangles]
+) -> Step:
+    several = len(made.pours) > 1
+    own = {name: surfaces[name] for name in pour.others if name in surfaces}
+    high = max(float(part.high[1] - part.low[1]) for part in closed.values())
+    parts: dict[str, Triangles] = dict(closed)
+    for k, body in enumerate(pour.cast):
+        level = k if several else 0
+        parts[f"silicone_{level + 1}" if level else "silicone"] = body.surface
+        if not several:
+            parts.update({f"sensor_{j}": b.surface for j, b in enumerate(pour.cast[1:], 2)})
+            break
+    if pour.ports is None:  # the lid is pushed in after the silicone
+        own = {n: Triangles(p.points - [0.0, 0.8 * high, 0.0], p.faces) for n, p in own.items()}
+    parts |= own
+    lid = "carrier" if made.options.carrier else "lid"
+    what = f"{pour.silicone_mm3 / 1e3:.2f} ml"
+    if pour.ports is None:
+        lines = [
+            f"Stand the mold with the open side up, pour {what} of the silicone for {pour.name}, and push {pour.lid} in "
+            "slowly: surplus and air leave through the channels at its ends. Let it cure, and pull the lid off."
+        ]
+    else:
+        riser = ", put the riser into it," if pour.ports.riser is not None else ""
+        bands = " Rubber bands across it hold it." if made.options.fasten != "none" else ""
+        lines = [
+            f"Stand the mold with the open side up, push the {lid if not several else pour.lid} on{riser} and keep it "
+            f"level.{bands}",
+            f"Pour {what} and what the riser takes through the hole of {pour.ports.pour_mm:.3g} mm, until silicone "
+            f"stands in {'every hole of the carrier' if made.options.carrier else 'all vents'} and in the riser.",
+        ]
+    if any(kind(name) == "insert" for name in own):
+        lines.insert(0, "Push the inserts onto the pegs of the lid: they stay in the finger.")
+    named = f" {i + 1} of {len(made.pours)}: {pour.name}" if several else ""
+    return Step(f"pour_{pour.name}" if several else "pour", f"Pour{named}", lines, standing(parts))
+
+
+def _opening_step(made: Mold, surfaces: Mapping[str, Triangles]) -> Step:
+    last = made.pours[-1]
+    names = [*HALVES, *last.others] if len(made.pours) > 1 else list(surfaces)
+    parts = {name: surfaces[name] for name in names if name in surfaces}
+    for i, body in enumerate(made.bodies):
+        parts["sensor" if i == 0 else f"sensor_{i + 1}"] = body.surface
+    shifts = separations({name: (part.low, part.high) for name, part in parts.items()})
+    apart = {name: Triangles(part.points + shifts[name], part.faces) for name, part in parts.items()}
+    lines = ["Cut the silicone between riser and lid, and in the vents."]
+    if made.options.carrier:
+        lines = ["Cut the silicone below the riser, pull the riser and the pins out. The carrier stays on the finger."]
+        for name in ("carrier",):
+            apart[name] = parts[name]
+    lines.append(
+        f"Turn a screwdriver in the notches to part the mold, and slide the halves apart along {made.options.split}."
+        if made.options.pry
+        else f"Slide the halves apart along {made.options.split}."
+    )
+    return Step("open", "Open the mold", lines, standing(apart))
+
+
+def _opening(made: Mold) -> list[str | Table]:
+    d = made.draft
+    lines: list[str | Table] = [
+        Table(
+            ("least draft", "walls below 1 degree", "their length along the opening", "deepest undercut"),
+            [(f"{d.angle_deg:.3g} deg", f"{d.wall_mm2:.3g} mm2", f"{d.wall_mm:.3g} mm", f"{d.undercut_mm:.2g} mm")],
+        )
+    ]
+    if d.wall_mm2:
+        lines.append("Walls without draft rub along the silicone: release agent matters there.")
+    if d.undercut_mm:
+        lines.append(f"{d.where[0].upper()}{d.where[1:]}: stretch the silicone over it.")
+    return lines
+
+
+def _table(printed: Mapping[str, Shell]) -> Table:
+    rows = [(name, " x ".join(f"{e:.1f}" for e in part.extent), f"mold_{name}.stl") for name, part in printed.items()]
+    return Table(("part", "size on the bed, mm", "file"), rows)
+
+
+def _box(low: Sequence[float], high: Sequence[float]) -> Triangles:
+    from itertools import product
+
+    points = np.array(list(product(*zip(low, high, strict=True))))
+    sides = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    return Triangles(points, np.array([t for a, b, c, d in sides for t in ([a, b, c], [a, c, d])]))
