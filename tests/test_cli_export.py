@@ -11,7 +11,6 @@ from finger3d.cli import main
 from finger3d.scene import load
 from tests.scenes import BLOCK, written
 
-
 STEPS = ("1_print", "2_prepare", "3_gauges", "4_close", "5_pour", "6_open")
 
 

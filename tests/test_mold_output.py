@@ -10,8 +10,9 @@ import trimesh
 
 from finger3d.mold.output import write_mold
 from finger3d.mold.packing import as_printed, beds
-from finger3d.mold.shell import shell
+from finger3d.mold.shell import Shell, shell
 from finger3d.progress import Progress
+from tests.bodies import box
 
 
 def test_parts_and_plate_load_again_in_mm(paper_mold, tmp_path: Path) -> None:
@@ -50,15 +51,17 @@ def test_parts_and_plate_load_again_in_mm(paper_mold, tmp_path: Path) -> None:
 
 
 def test_the_step_files_hold_the_parts_together_and_apart(molds, tmp_path: Path, monkeypatch) -> None:
-    """Parts are moved apart by whole steps: none keeps its place but the pins' and cups' common direction."""
+    """Beside a mold that prints, a plate that is too thin, of which the user is told."""
     from build123d import import_step
 
     monkeypatch.setenv("FINGER3D_RENDERER", "matplotlib")
     made = molds["plain, sla"]
-    body = shell(made.body.cad, 0.2, "body")
-    files, remarks = write_mold("a ball", made, body, tmp_path, False, Progress())
+    body = Shell(made.body.surface, 0.5, 0.8)
+    thin = {"coupon_thin": Shell(box(20.0, 10.0, 0.3, (10.0, 5.0, 0.15)), 0.0, 0.0)}
+    files, (told,) = write_mold("a ball", made, body, tmp_path, False, Progress(), thin)
     assert {path.name for path in files} == {path.name for path in tmp_path.glob("[!.]*")}
-    assert remarks == []
+    assert told.startswith("mold_coupon_thin: a wall of 0.3 mm near (")
+    assert told.endswith("is thinner than the printer makes, 0.6 mm")
     together, apart = (import_step(str(tmp_path / f"mold{end}.step")) for end in ("", "_exploded"))
     assert [part.label for part in apart.children] == list(made.parts)
     for name, a, b in zip(made.parts, together.children, apart.children, strict=True):
@@ -67,21 +70,3 @@ def test_the_step_files_hold_the_parts_together_and_apart(molds, tmp_path: Path,
     for i, a in enumerate(apart.children):
         assert all(a.distance_to(b) > 5.0 for b in apart.children[:i])
     assert "half A" in (tmp_path / "sheet.txt").read_text()
-
-
-def test_a_wall_that_does_not_print_is_told(molds, tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setenv("FINGER3D_RENDERER", "matplotlib")
-    made = molds["plain, sla"]
-    from tests.bodies import box
-
-    thin = {"coupon_thin": shell_of(box(20.0, 10.0, 0.3, (10.0, 5.0, 0.15)))}
-    _, remarks = write_mold("a ball", made, shell(made.body.cad, 0.2, "body"), tmp_path, False, Progress(), thin)
-    (told,) = remarks
-    assert told.startswith("mold_coupon_thin: a wall of 0.3 mm near (")
-    assert told.endswith("is thinner than the printer makes, 0.6 mm")
-
-
-def shell_of(surface):
-    from finger3d.mold.shell import Shell
-
-    return Shell(surface, 0.0, 0.0)

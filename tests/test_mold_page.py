@@ -7,39 +7,46 @@ from pathlib import Path
 
 import pytest
 
-from finger3d.mold.output import write_mold
-from finger3d.mold.shell import shell
-from finger3d.progress import Progress
+from finger3d.mold.packing import as_printed, beds
+from finger3d.mold.page import mold_page
+from finger3d.mold.parts import Mold
 
 
-@pytest.fixture
-def page(molds, tmp_path: Path, monkeypatch):
+def write(made: Mold, out: Path) -> str:
+    shells = {name: made.shell(name, 0.5, 0.8) for name in made.parts}
+    printed = as_printed(shells)
+    packed = beds(printed, made.options.bed_mm)
+    mold_page("a finger", made, shells, printed, packed, out, "the sheet", ["a remark"])
+    return (out / "mold.html").read_text(encoding="utf-8")
+
+
+def test_every_step_has_its_picture(molds, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("FINGER3D_RENDERER", "matplotlib")
-
-    def written(name: str) -> str:
-        made = molds[name]
-        write_mold("a finger", made, shell(made.body.cad, 0.2, "body", 0.4), tmp_path, False, Progress())
-        return (tmp_path / "mold.html").read_text(encoding="utf-8")
-
-    return written
-
-
-def test_every_step_has_its_picture(page, molds, tmp_path: Path) -> None:
-    text = page("tongue, screws, plugs")
-    titles = re.findall(r"<h2[^>]*>(\d\. [^<]+)<", text) or re.findall(r">(\d\. [A-Z][^<]+)<", text)
-    assert [title.split(". ")[1] for title in titles] == [
+    made = molds["tongue, screws, plugs"]
+    text = write(made, tmp_path)
+    titles = re.findall(r">(\d)\. ([A-Z][^<]+)<", text)
+    assert [title for _, title in titles] == [
         "Print the parts", "Prepare the halves", "Thread the strips of the gauges", "Close the halves", "Pour",
         "Open the mold",
     ]  # fmt: skip
     assert len(list(tmp_path.glob("mold_step_*.png"))) == 6
-    assert text.count("data:image/png") == 7
-    found = molds["tongue, screws, plugs"].bolts
-    assert f"{found.number} M3 x {found.length_mm:g}" in text
+    assert text.count("data:image/png") == 6
+    assert f"{made.bolts.number} M3 x {made.bolts.length_mm:g}" in text
     assert "4 % of the cavity" in text
+    assert "a remark" in text
+    assert "the sheet" in text
 
 
-def test_every_pour_has_a_step(page) -> None:
-    text = page("pours")
+def test_every_pour_has_a_step(molds, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the parts that are in the mold then: the lid of that pour, and all that was cast so far."""
+    drawn = {}
+    monkeypatch.setattr(
+        "finger3d.mold.page.step_pictures", lambda pictures: drawn.update((p.path.stem, set(p.parts)) for p in pictures)
+    )
+    text = write(molds["pours"], tmp_path)
     for i, name in enumerate(("skin", "body", "core"), 1):
         assert f"Pour {i} of 3: {name}" in text
+        (parts,) = (parts for stem, parts in drawn.items() if stem.endswith(f"pour_{name}"))
+        assert f"lid_{name}" in parts
+        assert sum(part.startswith("silicone") for part in parts) == i
     assert "push lid_skin in slowly" in text

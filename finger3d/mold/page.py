@@ -183,8 +183,8 @@ def _pouring(
     what = f"{pour.silicone_mm3 / 1e3:.2f} ml"
     if pour.ports is None:
         lines = [
-            f"Stand the mold with the open side up, pour {what} of the silicone for {pour.name}, and push {pour.lid} in "
-            "slowly: surplus and air leave through the channels at its ends. Let it cure, and pull the lid off."
+            f"Stand the mold with the open side up, pour {what} of the silicone for {pour.name}, and push {pour.lid} "
+            "in slowly: surplus and air leave through the channels at its ends. Let it cure, and pull the lid off."
         ]
     else:
         riser = ", put the riser into it," if pour.ports.riser is not None else ""
@@ -212,8 +212,7 @@ def _opening_step(made: Mold, surfaces: Mapping[str, Triangles]) -> Step:
     lines = ["Cut the silicone between riser and lid, and in the vents."]
     if made.options.carrier:
         lines = ["Cut the silicone below the riser, pull the riser and the pins out. The carrier stays on the finger."]
-        for name in ("carrier",):
-            apart[name] = parts[name]
+        apart["carrier"] = parts["carrier"]
     lines.append(
         f"Turn a screwdriver in the notches to part the mold, and slide the halves apart along {made.options.split}."
         if made.options.pry

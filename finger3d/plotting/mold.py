@@ -66,12 +66,18 @@ class Scenery:
         Centre of the picture.
     half : (2,) array, mm
         Half the width and half the height of the picture.
+    opaque : whether no part is drawn transparent
     """
 
     parts: dict[str, Triangles]
     axes: Float
     middle: Float
     half: Float
+    opaque: bool = False
+
+    def opacity(self, name: str) -> float:
+        """Return the opacity of a part."""
+        return 1.0 if self.opaque else OPACITY.get(name, 1.0)
 
     def flat(self, points: Float) -> Float:
         """Project points, shape (..., 3), onto the picture plane, shape (..., 2), mm from the centre."""
@@ -135,17 +141,18 @@ def standing(assembled: Mapping[str, Triangles]) -> dict[str, Triangles]:
     return {name: Triangles(part.points @ _POURING_AXES.T, part.faces) for name, part in assembled.items()}
 
 
-def scenery(parts: Mapping[str, Triangles], towards: Float = _VIEW) -> Scenery:
+def scenery(parts: Mapping[str, Triangles], towards: Float = _VIEW, opaque: bool = False) -> Scenery:
     """Return parts as they are with a camera that shows them all.
 
     Parameters
     ----------
     towards : (3,) direction to the viewer
+    opaque : whether no part is drawn transparent
     """
     axes = viewer_axes(towards)
     seen = np.vstack([part.points for part in parts.values()]) @ axes.T
     low, high = seen.min(axis=0), seen.max(axis=0)
-    return Scenery(dict(parts), axes, 0.5 * (low + high) @ axes, _MARGIN * 0.5 * (high - low)[:2])
+    return Scenery(dict(parts), axes, 0.5 * (low + high) @ axes, _MARGIN * 0.5 * (high - low)[:2], opaque)
 
 
 def picture(path: Path, assembled: Mapping[str, Triangles], title: str, sizes: Mapping[str, str]) -> str:
@@ -225,7 +232,7 @@ def draw(axes: Axes, view: Scenery) -> None:
         far = np.argsort(corners.mean(axis=1) @ view.axes[2], kind="stable")
         shade = 0.6 + 0.4 * np.clip(normals @ light, 0.0, 1.0)
         fill = np.clip(np.array(to_rgb(colour(name))) * shade[:, None], 0.0, 1.0)[far]
-        alpha = OPACITY.get(name)
+        alpha = view.opacity(name) if view.opacity(name) < 1.0 else None
         # Edges in the colour of the face close fine seams; a transparent face would show them.
         edge = fill if alpha is None else "none"
         faces = PolyCollection(list(view.flat(corners)[far]), facecolors=fill, edgecolors=edge, lw=0.3, alpha=alpha)
@@ -240,7 +247,7 @@ def rendered(views: Sequence[Scenery]) -> list[Image] | None:
         width, height = view.half
         window = _PIXELS, max(int(_PIXELS * height / width), 1)
         parts = tuple(
-            Polygons(part.points, part.faces, colour(name), OPACITY.get(name, 1.0), feature_edges=True)
+            Polygons(part.points, part.faces, colour(name), view.opacity(name), feature_edges=True)
             for name, part in view.parts.items()
         )
         drawings.append(Drawing(Camera(view.axes, view.middle, float(height), window), parts))

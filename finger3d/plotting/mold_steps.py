@@ -14,7 +14,7 @@ from finger3d.plotting.layout import blank
 from finger3d.plotting.mold import draw, rendered, scenery
 
 _STANDING = np.array([0.55, 0.5, 1.0])  # direction towards the viewer, y up
-_LYING = np.array([0.35, 1.0, 0.6])  # of parts on the bed, from above
+_LYING = np.array([0.1, 1.0, 0.7])  # of parts on the bed, from above
 
 _WIDTH, _DPI = 6.0, 110  # inches, pixels per inch
 
@@ -37,7 +37,7 @@ class StepPicture:
 
 def step_pictures(pictures: Sequence[StepPicture]) -> str:
     """Write the pictures of all steps, in one run of the renderer; returns the renderer."""
-    views = [scenery(_y_up(p), _LYING) if p.on_bed else scenery(p.parts, _STANDING) for p in pictures]
+    views = [scenery(_y_up(p), _LYING, opaque=True) if p.on_bed else scenery(p.parts, _STANDING) for p in pictures]
     images = rendered(views)
     for i, (one, view) in enumerate(zip(pictures, views, strict=True)):
         width, height = view.half
