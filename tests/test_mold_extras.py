@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from finger3d.mold.export import export
+from finger3d.mold.extras import carrier_scene
 from finger3d.mold.options import MoldOptions
 from finger3d.scene import load
 from tests.mold_cases import scene_of
@@ -41,6 +42,23 @@ def test_the_finger_on_its_carrier_has_a_labelled_carrier(folder) -> None:
     from build123d import import_step
 
     silicone, carrier = import_step(str(folder / "finger_on_carrier.step")).children
-    assert (silicone.label, carrier.label) == ("silicone", "carrier")
+    assert (silicone.label, carrier.label) == ("SOLID", "carrier")
     assert carrier.bounding_box().max.Y == pytest.approx(5.0, abs=1e-6)
     assert silicone.bounding_box().max.Y == pytest.approx(25.0, abs=1e-6)
+
+
+def test_readings_move_up_with_the_silicone(folder) -> None:
+    given = {
+        "finger": {"geometry": "block"},
+        "gauge": [{"name": "g", "x_mm": 1.0, "y_mm": 2.0}],
+        "marker": ({"name": "m", "x_mm": 1.0, "y_mm": 9.0},),
+        "mesh": {"mesher": "swept", "size_mm": 1.0},
+        "parts": {"core": {"E_MPa": 2.0, "nu": 0.4}},
+    }
+    made = carrier_scene(given, 5.0)
+    assert made["finger"] == {"geometry": "finger_on_carrier.step"}
+    assert (made["gauge"][0]["y_mm"], made["marker"][0]["y_mm"]) == (7.0, 14.0)
+    assert made["parts"] == {"core": {"E_MPa": 2.0, "nu": 0.4}, "carrier": {"rigid": True}}
+    assert made["mesh"] == {"size_mm": 1.0}
+    assert given["gauge"][0]["y_mm"] == 2.0
+    assert "[parts.carrier]" in (folder / "finger_on_carrier.toml").read_text()

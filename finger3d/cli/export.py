@@ -21,7 +21,9 @@ def export(
     /,
     *,
     out: Annotated[Path, Parameter(help="Folder for the files.")],
-    mold: Annotated[bool, Parameter(negative=(), help="Also write a printable mold: two halves and a lid.")] = False,
+    mold: Annotated[
+        bool, Parameter(negative=(), help="Also write a printable mold: halves, a lid, a riser and more.")
+    ] = False,
     ascii_: Annotated[
         bool, Parameter(name="--ascii", negative=(), help="Write STL files as text instead of binary.")
     ] = False,
@@ -39,7 +41,7 @@ def export(
     set_: Set = None,
     json_: Json = False,
 ) -> None:
-    """Write the finger as STEP and STL, and with --mold also the parts of a mold, instructions and a picture.
+    """Write the finger as STEP and STL, and with --mold also the parts of a mold, instructions and pictures.
 
     Example: finger3d export scene.toml --out print --mold --shrinkage 0.001 --bed 180x180x180
 

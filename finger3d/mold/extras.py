@@ -7,8 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from finger3d._types import Tree, TreeView
 from finger3d.io import atomic
 from finger3d.mold.button import button_for, button_parts, button_scene, button_solid, identify_command
+from finger3d.mold.carrier import LABEL as CARRIER
 from finger3d.mold.carrier import finger_on_carrier, key_solids
 from finger3d.mold.coupon import coupon, coupon_clearances
 from finger3d.mold.parts import Mold
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
 
     from finger3d.scene import Scene
 
-EXTRA_FILES = ("button.step", "button.toml", "finger_on_carrier.step")
+EXTRA_FILES = ("button.step", "button.toml", "finger_on_carrier.step", "finger_on_carrier.toml")
 """Files that may lie beside those of a mold."""
 
 _ANGLE = 0.2  # radians between facets of round parts
@@ -76,12 +78,35 @@ def write_extras(scene: Scene, made: Mold, solid: Solid | None, out: Path) -> tu
     if made.options.carrier and solid is not None:
         path = out / "finger_on_carrier.step"
         write_step(path, _labelled(made, solid))
-        files.append(path)
+        with atomic(out / "finger_on_carrier.toml") as temporary:
+            text = tree.written(carrier_scene(scene.given, made.options.carrier_mm))
+            temporary.write_text(text, encoding="utf-8")
+        files += [path, out / "finger_on_carrier.toml"]
         remarks.append(
-            f"{path.name}: the finger on its carrier, label carrier ([parts.carrier] rigid = true); y is "
-            f"{made.options.carrier_mm:g} mm larger than in the scene"
+            f"finger_on_carrier.toml: the scene with the finger on its carrier, which is rigid; y of gauges and markers "
+            f"is {made.options.carrier_mm:g} mm larger there"
         )
     return files, remarks
+
+
+def carrier_scene(given: TreeView, cover_mm: float) -> Tree:
+    """Return a scene whose finger stands on its rigid carrier, readings moved up with the silicone.
+
+    Parameters
+    ----------
+    given : the scene, as the user wrote it
+    cover_mm : thickness of the carrier
+    """
+    made = tree.plain(given)
+    made["finger"] = {"geometry": "finger_on_carrier.step"}
+    for kind in ("gauge", "marker"):
+        made[kind] = [{**one, "y_mm": one["y_mm"] + cover_mm} for one in made.get(kind, [])]
+        if not made[kind]:
+            del made[kind]
+    made["parts"] = {**made.get("parts", {}), CARRIER: {"rigid": True}}
+    if "mesh" in made:  # a STEP file has no structured mesh
+        made["mesh"] = {key: value for key, value in made["mesh"].items() if key != "mesher"}
+    return made
 
 
 def _labelled(made: Mold, solid: Solid):  # type: ignore[no-untyped-def]  # a build123d compound
@@ -93,7 +118,7 @@ def _labelled(made: Mold, solid: Solid):  # type: ignore[no-untyped-def]  # a bu
     found = finger_on_carrier(solid, back * made.parts["carrier"], rods, made.options.carrier_mm)
     children = []
     for label, one in found.items():
-        one.label = label or "silicone"
+        one.label = label or "SOLID"  # which names nothing: the main body
         children.append(one)
     return Compound(label="finger on carrier", children=children)
 
