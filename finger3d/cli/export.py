@@ -21,9 +21,7 @@ def export(
     /,
     *,
     out: Annotated[Path, Parameter(help="Folder for the files.")],
-    mold: Annotated[
-        bool, Parameter(negative=(), help="Also write a printable mold: halves, a lid, a riser and more.")
-    ] = False,
+    mold: Annotated[bool, Parameter(negative=(), help="Also write a printable mold.")] = False,
     ascii_: Annotated[
         bool, Parameter(name="--ascii", negative=(), help="Write STL files as text instead of binary.")
     ] = False,

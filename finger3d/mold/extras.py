@@ -83,7 +83,7 @@ def write_extras(scene: Scene, made: Mold, solid: Solid | None, out: Path) -> tu
             temporary.write_text(text, encoding="utf-8")
         files += [path, out / "finger_on_carrier.toml"]
         remarks.append(
-            f"finger_on_carrier.toml: the scene with the finger on its carrier, which is rigid; y of gauges and markers "
+            "finger_on_carrier.toml: the scene with the finger on its carrier, which is rigid; y of gauges and markers "
             f"is {made.options.carrier_mm:g} mm larger there"
         )
     return files, remarks
