@@ -67,7 +67,11 @@ def beds(printed: Mapping[str, Shell], bed_mm: tuple[float, float, float]) -> li
             del left[name]
         high = np.max([part.surface.high for part in chosen.values()], axis=0)
         low = np.min([part.surface.low for part in chosen.values()], axis=0)
-        found.append(Bed(chosen, high - low, fits and bool(high[2] <= bed_mm[2])))
+        fits = fits and bool(high[2] <= bed_mm[2])
+        if fits:
+            middle = np.array([*(0.5 * (np.array(bed_mm[:2]) - high[:2] - low[:2])), 0.0])
+            chosen = {name: part.moved(np.eye(3), middle) for name, part in chosen.items()}
+        found.append(Bed(chosen, high - low, fits))
     return found
 
 

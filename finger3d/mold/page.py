@@ -209,6 +209,7 @@ def _opening_step(made: Mold, surfaces: Mapping[str, Triangles]) -> Step:
         parts["sensor" if i == 0 else f"sensor_{i + 1}"] = body.surface
     shifts = separations({name: (part.low, part.high) for name, part in parts.items()})
     apart = {name: Triangles(part.points + shifts[name], part.faces) for name, part in parts.items()}
+    apart.update({name: part for name, part in parts.items() if kind(name) == "insert"})  # they stay in the finger
     lines = ["Cut the silicone between riser and lid, and in the vents."]
     if made.options.carrier:
         lines = ["Cut the silicone below the riser, pull the riser and the pins out. The carrier stays on the finger."]
