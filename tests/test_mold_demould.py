@@ -70,11 +70,11 @@ def test_a_groove_is_as_deep_as_it_was_cut(axis) -> None:
 
 def test_a_body_that_would_be_locked_is_refused_with_the_split_that_does() -> None:
     ball = body("hemisphere")
-    told = r"an undercut of 0.06\d mm; --split x would do, or --undercut-mm 0.06\d"
+    told = r"0.06\d mm.*--split x.*--undercut-mm 0.06\d"
     with pytest.raises(Finger3dError, match=told):
         check_opening(ball, MoldOptions(split_mm=1.0), may_turn=True)
     assert check_opening(ball, MoldOptions(split_mm=1.0, undercut_mm=0.07), may_turn=True).undercut_mm > 0.06
-    with pytest.raises(Finger3dError, match="locked by the body near .*--split z would do"):
+    with pytest.raises(Finger3dError, match="--split x .*--split z"):
         check_opening(body("half_cylinder"), MoldOptions(split="x", split_mm=1.0), may_turn=True)
 
 
@@ -94,5 +94,5 @@ def test_a_mushroom_is_refused_whatever_the_split() -> None:
     # bored along a slant, so that both halves are hooked
     shape = Rot(-90, 0, 0) * (stem + Pos(0, 0, 10) * ring)
     shape -= Pos(0, 8, 0) * Rot(0, 45, 0) * Cylinder(1.5, 40)
-    with pytest.raises(Finger3dError, match="a mold of two halves cannot be taken off"):
+    with pytest.raises(Finger3dError, match="halves"):
         mold(shape.solids()[0], (), MoldOptions())

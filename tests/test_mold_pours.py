@@ -54,11 +54,11 @@ def test_an_insert_stands_on_pegs_and_fills_the_core(molds) -> None:
 @pytest.mark.parametrize(
     ("options", "told"),
     [
-        ({"pour_order": "skin,core"}, "--pour-order skin,core: must name each once: body, "),
-        ({"pour_order": "skin,bone,body"}, "there is no solid bone; the finger has "),
-        ({"pour_order": "body,skin,core"}, "the positive of lid_body .* choose another --pour-order, or --inserts"),
-        ({"inserts": "skin"}, "--inserts skin: skin must stand on the base"),
-        ({"inserts": "skin,body,core"}, "leaves nothing to pour"),
+        ({"pour_order": "skin,core"}, "--pour-order skin,core: .*body"),
+        ({"pour_order": "skin,bone,body"}, "bone.*body"),
+        ({"pour_order": "body,skin,core"}, "lid_body.*--pour-order.*--inserts"),
+        ({"inserts": "skin"}, "--inserts skin"),
+        ({"inserts": "skin,body,core"}, "--inserts skin,body,core"),
     ],
 )
 def test_orders_that_cannot_be(options, told) -> None:
@@ -68,7 +68,7 @@ def test_orders_that_cannot_be(options, told) -> None:
 
 
 def test_one_solid_needs_no_parts() -> None:
-    with pytest.raises(Finger3dError, match="the finger is one solid"):
+    with pytest.raises(Finger3dError, match="--parts"):
         pour_order({"": TIP.solid()}, MoldOptions(parts=True))
 
 
@@ -76,5 +76,5 @@ def test_a_strip_through_a_positive_is_refused() -> None:
     """A gauge in the body whose strip is long enough to reach into the core."""
     o = MoldOptions(parts=True, foil_length_mm=5.0)
     gauge = Gauge("through", 6.5, 4.0)
-    with pytest.raises(Finger3dError, match='gauge "through": its strip runs through the positive of lid_body'):
+    with pytest.raises(Finger3dError, match='gauge "through".*lid_body'):
         poured(TIP.solid(), TIP.solids(), foils((gauge,), o, None), o)

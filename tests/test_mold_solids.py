@@ -34,5 +34,5 @@ def test_volumes() -> None:
 
 
 def test_pieces_are_refused() -> None:
-    with pytest.raises(Finger3dError, match="mold: lid falls into 2 pieces; choose"):
+    with pytest.raises(Finger3dError, match="lid.*2 pieces"):
         one(between((0, 0, 0), (1, 1, 1)) + between((2, 2, 2), (3, 3, 3)), "lid")

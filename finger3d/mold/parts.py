@@ -112,8 +112,8 @@ class Mold:
 
     @property
     def silicone_mm3(self) -> float:
-        """Volume of all cavities."""
-        return self.body.volume_mm3 * len(self.at.places)
+        """Volume of silicone in all cavities, after all pours, without inserts."""
+        return sum(pour.silicone_mm3 for pour in self.pours)
 
     @property
     def openings_mm3(self) -> float:
