@@ -19,6 +19,7 @@ def folder(tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp("extras")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("FINGER3D_RENDERER", "matplotlib")
+        patch.setattr("finger3d.mold.page.step_pictures", lambda pictures: None)  # drawn in tests of the page
         done = export(scene_of("block"), out, MoldOptions(carrier=True, coupon=True, button=True))
     (out / "remarks.txt").write_text("\n".join(done.remarks))
     return out

@@ -24,7 +24,11 @@ ALL = [
 ]
 """Options that together hold every value of each."""
 
-NAMES = ["tongue, screws, plugs", *FEW]
+NAMES = [
+    "tongue, screws, plugs",
+    *(name for name in FEW if name != "insert"),
+    pytest.param("insert", marks=pytest.mark.slow),
+]
 
 
 def check(found: Mold, layer: float = 0.5) -> None:
