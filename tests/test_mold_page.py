@@ -49,4 +49,4 @@ def test_every_pour_has_a_step(molds, tmp_path: Path, monkeypatch: pytest.Monkey
         (parts,) = (parts for stem, parts in drawn.items() if stem.endswith(f"pour_{name}"))
         assert f"lid_{name}" in parts
         assert sum(part.startswith("silicone") for part in parts) == i
-    assert "push lid_skin in slowly" in text
+    assert "lid_skin in slowly" in text

@@ -51,7 +51,7 @@ def extra_parts(scene: Scene, made: Mold, out: Path) -> Extras:
     if o.button:
         button = button_for(made.silicone_mm3)
         solids |= button_parts(button, o)
-        E = scene.tables.material.E_MPa
+        E = scene.constants.E_MPa
         remarks.append(
             f"button: {button.diameter_mm:g} x {button.height_mm:g} mm, {button.volume_mm3 / 1e3:.2f} ml more; press "
             f"it, write depth_mm and normal_force_N to button.csv, and run: {identify_command(str(out), E)}"
@@ -69,7 +69,7 @@ def write_extras(scene: Scene, made: Mold, solid: Solid | None, out: Path) -> tu
     """
     files, remarks = [], []
     if made.options.button:
-        button, material = button_for(made.silicone_mm3), scene.tables.material
+        button, material = button_for(made.silicone_mm3), scene.constants
         write_step(out / "button.step", button_solid(button))
         with atomic(out / "button.toml") as temporary:
             text = tree.written(button_scene(button, scene.title, material.E_MPa, material.nu))

@@ -13,6 +13,7 @@ from finger3d.mold.foils import strips
 from finger3d.mold.packing import Bed
 from finger3d.mold.parts import HALVES, Mold, Pour
 from finger3d.mold.shell import Shell
+from finger3d.mold.steps import close_lines, open_lines, pour_lines, prepare_lines, thread_lines
 from finger3d.plotting.mold import kind, separations, standing
 from finger3d.plotting.mold_steps import StepPicture, step_pictures
 from finger3d.report.build import Code, Figure, HeadlineRow, PageSection, Table, write_page
@@ -102,7 +103,7 @@ def _steps(made: Mold, shells: Mapping[str, Shell], packed: Sequence[Bed]) -> li
     if made.foils:
         steps.append(_threading(made, halves, surfaces))
         closed |= {name: part for name, part in surfaces.items() if kind(name) == "plug"}
-    steps.append(Step("close", "Close the halves", _closing_lines(made), standing(closed)))
+    steps.append(Step("close", "Close the halves", close_lines(made), standing(closed)))
     for i, pour in enumerate(made.pours):
         steps.append(_pouring(made, i, pour, closed, surfaces))
     steps.append(_opening_step(made, surfaces))
@@ -125,18 +126,9 @@ def _printing(made: Mold, bed: Bed, beds: int) -> Step:
 
 
 def _preparing(made: Mold, halves: Mapping[str, Triangles]) -> Step:
-    o = made.options
-    lines = ["Spray every face that silicone touches with a release agent."]
-    if o.seal == "cord":
-        lines.append(
-            f"Lay a silicone cord of {o.cord_mm:g} mm into the groove of half A and into that under the "
-            f"{'carrier' if o.carrier else 'lid'}; let it end at the lid's groove."
-        )
-    if (found := made.bolts) is not None:
-        lines.append(f"Push {found.number} {o.screw} nuts into the traps of half A, {found.trap_mm:.3g} mm deep.")
     shifts = separations({name: (part.low, part.high) for name, part in halves.items()})
     apart = {name: Triangles(part.points + shifts[name], part.faces) for name, part in halves.items()}
-    return Step("prepare", "Prepare the halves", lines, standing(apart))
+    return Step("prepare", "Prepare the halves", prepare_lines(made), standing(apart))
 
 
 def _threading(made: Mold, halves: Mapping[str, Triangles], surfaces: Mapping[str, Triangles]) -> Step:
@@ -144,23 +136,7 @@ def _threading(made: Mold, halves: Mapping[str, Triangles], surfaces: Mapping[st
     assert laid is not None
     plugs = {name: part for name, part in surfaces.items() if kind(name) == "plug"}
     parts = {"half_b": halves["half_b"], **{n: p for n, p in plugs.items() if n.endswith("b")}, "strips": laid}
-    lines = [
-        "Thread each strip through half B, then half A over it, and stretch it. sheet.txt has the places of foils."
-    ]
-    if plugs:
-        lines.append("Push the plugs over the strips from their slits' open ends, and into the pockets of both halves.")
-    else:
-        lines.append("Close the slots with tape.")
-    return Step("gauges", "Thread the strips of the gauges", lines, standing(parts))
-
-
-def _closing_lines(made: Mold) -> list[str]:
-    o, lines = made.options, ["Push half A onto the pegs of half B: one peg is thinner, so that it fits one way only."]
-    if (found := made.bolts) is not None:
-        lines.append(f"Tighten {found.number} screws {o.screw} x {found.length_mm:g} from half B, by hand.")
-    if o.fasten == "bands":
-        lines.append(f"Put rubber bands up to {o.band_mm:g} mm wide into the grooves around the halves.")
-    return lines
+    return Step("gauges", "Thread the strips of the gauges", thread_lines(made), standing(parts))
 
 
 def _pouring(
@@ -179,26 +155,8 @@ def _pouring(
     if pour.ports is None:  # the lid is pushed in after the silicone
         own = {n: Triangles(p.points - [0.0, 0.8 * high, 0.0], p.faces) for n, p in own.items()}
     parts |= own
-    lid = "carrier" if made.options.carrier else "lid"
-    what = f"{pour.silicone_mm3 / 1e3:.2f} ml"
-    if pour.ports is None:
-        lines = [
-            f"Stand the mold with the open side up, pour {what} of the silicone for {pour.name}, and push {pour.lid} "
-            "in slowly: surplus and air leave through the channels at its ends. Let it cure, and pull the lid off."
-        ]
-    else:
-        riser = ", put the riser into it," if pour.ports.riser is not None else ""
-        bands = " Rubber bands across it hold it." if made.options.fasten != "none" else ""
-        lines = [
-            f"Stand the mold with the open side up, push the {lid if not several else pour.lid} on{riser} and keep it "
-            f"level.{bands}",
-            f"Pour {what} and what the riser takes through the hole of {pour.ports.pour_mm:.3g} mm, until silicone "
-            f"stands in {'every hole of the carrier' if made.options.carrier else 'all vents'} and in the riser.",
-        ]
-    if any(kind(name) == "insert" for name in own):
-        lines.insert(0, "Push the inserts onto the pegs of the lid: they stay in the finger.")
     named = f" {i + 1} of {len(made.pours)}: {pour.name}" if several else ""
-    return Step(f"pour_{pour.name}" if several else "pour", f"Pour{named}", lines, standing(parts))
+    return Step(f"pour_{pour.name}" if several else "pour", f"Pour{named}", pour_lines(made, pour), standing(parts))
 
 
 def _opening_step(made: Mold, surfaces: Mapping[str, Triangles]) -> Step:
@@ -210,16 +168,9 @@ def _opening_step(made: Mold, surfaces: Mapping[str, Triangles]) -> Step:
     shifts = separations({name: (part.low, part.high) for name, part in parts.items()})
     apart = {name: Triangles(part.points + shifts[name], part.faces) for name, part in parts.items()}
     apart.update({name: part for name, part in parts.items() if kind(name) == "insert"})  # they stay in the finger
-    lines = ["Cut the silicone between riser and lid, and in the vents."]
     if made.options.carrier:
-        lines = ["Cut the silicone below the riser, pull the riser and the pins out. The carrier stays on the finger."]
         apart["carrier"] = parts["carrier"]
-    lines.append(
-        f"Turn a screwdriver in the notches to part the mold, and slide the halves apart along {made.options.split}."
-        if made.options.pry
-        else f"Slide the halves apart along {made.options.split}."
-    )
-    return Step("open", "Open the mold", lines, standing(apart))
+    return Step("open", "Open the mold", open_lines(made), standing(apart))
 
 
 def _opening(made: Mold) -> list[str | Table]:

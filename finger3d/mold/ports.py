@@ -70,6 +70,11 @@ class Ports:
     vents: tuple[tuple[float, float], ...]
     riser: Riser | None
 
+    @property
+    def outside_mm(self) -> float:
+        """Diameter of the pour hole at the outer face of the lid, or below the riser."""
+        return self.funnel_mm if self.riser is None else self.pour_mm
+
     def volume_mm3(self, cover_mm: float) -> float:
         """Return the volume of the pour hole, the riser and the vents in a lid of this thickness."""
         vents = len(self.vents) * math.pi * self.vent_mm**2 / 4.0 * cover_mm

@@ -91,6 +91,8 @@ def poured(whole: Solid, solids: Mapping[str, Solid], gauges: Sequence[FoilSlot]
         _check_strips(gauges, cast, label, positive, at, options)
         parts.update(own)
         pours.append(Pour(label, f"lid_{label or MAIN}", cast[label].volume_mm3, found, tuple(filled), tuple(own)))
+    if pours[-1].ports is None:
+        raise Finger3dError(f"mold: {pours[-1].name} has no base to pour it through; choose another --pour-order")
     for feature in features:
         parts.update(feature.own)
     for name, solid in parts.items():

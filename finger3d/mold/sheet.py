@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from textwrap import wrap
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +12,14 @@ from finger3d.materials.silicones import Silicone
 from finger3d.mold import casting
 from finger3d.mold.parts import Mold
 from finger3d.mold.shell import Shell
+from finger3d.mold.steps import close_lines, open_lines, pour_lines, prepare_lines, thread_lines
 
 Sizes = tuple[float, float, float] | NDArray[np.float64]
 
 SPARE = 1.15
 """Ratio of the silicone to mix to the volume of cavity and openings."""
+
+_WIDTH = 112  # of a line, in characters
 
 NAMES = {"half_a": "half A (holes)", "half_b": "half B (pegs)"}
 
@@ -42,7 +46,7 @@ def sheet(title: str, made: Mold, printed: Mapping[str, Shell], plate: Sizes, si
     ports = made.openings_mm3
     cavity = made.silicone_mm3
     mixed_ml = SPARE * (cavity + ports) / 1e3
-    hole = casting.PourHole(made.ports.pour_mm, made.ports.funnel_mm, o.lid_mm)
+    hole = casting.PourHole(made.ports.pour_mm, made.ports.outside_mm, o.cover_mm)
     lines = [
         f"Mold of {title}",
         "",
@@ -77,26 +81,26 @@ def sheet(title: str, made: Mold, printed: Mapping[str, Shell], plate: Sizes, si
         *_gauge_lines(made),
         *casting.mixing_lines(),
         "POUR",
-        "  1. Spray the halves and the lid with a release agent that is safe for platinum silicones.",
-        *_closing(made),
-        "  3. Stand the mold with the open side, the sensor's base, up. Push the lid on; it holds the halves together.",
-        f"  4. Pour the degassed silicone through the middle hole ({made.ports.pour_mm:.3g} mm) until it stands in",
-        f"     both vents ({made.ports.vent_mm:.3g} mm). Air leaves along the lid; keep the mold level.",
-        "  5. After curing cut the sprues, pull the lid off,"
-        + (" cut the strips outside the mold," if made.foils else "")
-        + f" and slide the halves apart along {o.split}.",
+        *_numbered(
+            [
+                *prepare_lines(made),
+                *thread_lines(made),
+                *close_lines(made),
+                *(line for pour in made.pours for line in pour_lines(made, pour)),
+                *open_lines(made),
+            ]
+        ),
         "",
     ]  # fmt: skip
     return "\n".join(lines)
 
 
-def _closing(made: Mold) -> list[str]:
-    if not made.foils:
-        return ["  2. Push half A onto half B's pegs."]
-    return [
-        "  2. Thread the strips through half B, push half A over them and onto the pegs, stretch the strips, and seal",
-        "     the slots with tape.",
-    ]
+def _numbered(steps: Sequence[str]) -> list[str]:
+    """Return steps with numbers, in lines of the width of a sheet of paper."""
+    lines = []
+    for i, step in enumerate(steps, 1):
+        lines += wrap(step, _WIDTH, initial_indent=f"{i:>3}. ", subsequent_indent="     ")
+    return lines
 
 
 def _gauge_lines(made: Mold) -> list[str]:

@@ -1,0 +1,36 @@
+"""Text of the steps of casting."""
+
+from __future__ import annotations
+
+from finger3d.mold.steps import close_lines, open_lines, pour_lines, prepare_lines, thread_lines
+
+
+def test_the_steps_name_what_the_mold_has(molds) -> None:
+    """Screws with their size, the strips and plugs, the hole that is poured through."""
+    made = molds["tongue, screws, plugs"]
+    assert f"{made.bolts.number} screws M3 x {made.bolts.length_mm:g}" in " ".join(close_lines(made))
+    assert f"{made.bolts.number} M3 nuts" in " ".join(prepare_lines(made))
+    assert "plugs" in " ".join(thread_lines(made))
+    told = " ".join(pour_lines(made, made.pours[0]))
+    assert f"{made.silicone_mm3 / 1e3:.2f} ml" in told
+    assert "6 mm" in told
+    assert "along z" in " ".join(open_lines(made))
+
+
+def test_a_carrier_is_poured_through_its_holes_and_stays(molds) -> None:
+    made = molds["carrier"]
+    assert thread_lines(made) == []
+    assert "every hole of the carrier" in " ".join(pour_lines(made, made.pours[0]))
+    assert "carrier stays" in " ".join(open_lines(made))
+
+
+def test_a_skin_is_poured_before_its_lid(molds) -> None:
+    skin, body, _ = molds["pours"].pours
+    assert "lid_skin in slowly" in " ".join(pour_lines(molds["pours"], skin))
+    assert "lid_body" in " ".join(pour_lines(molds["pours"], body))
+
+
+def test_a_cord_and_bands_are_laid(molds) -> None:
+    made = molds["cord, bands, two cavities"]
+    assert "cord of 2 mm" in " ".join(prepare_lines(made))
+    assert "5 mm wide" in " ".join(close_lines(made))
