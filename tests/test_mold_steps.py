@@ -10,7 +10,8 @@ def test_the_steps_name_what_the_mold_has(molds) -> None:
     made = molds["tongue, screws, plugs"]
     assert f"{made.bolts.number} screws M3 x {made.bolts.length_mm:g}" in " ".join(close_lines(made))
     assert f"{made.bolts.number} M3 nuts" in " ".join(prepare_lines(made))
-    assert "plugs" in " ".join(thread_lines(made))
+    assert "half B" in " ".join(thread_lines(made))
+    assert "plugs" in " ".join(close_lines(made))
     told = " ".join(pour_lines(made, made.pours[0]))
     assert f"{made.silicone_mm3 / 1e3:.2f} ml" in told
     assert "6 mm" in told

@@ -20,18 +20,19 @@ def thread_lines(made: Mold) -> list[str]:
     """Return how the strips of gauges come into the mold; nothing without gauges."""
     if not made.foils:
         return []
-    lines = ["Thread the strips through half B and then through half A, and stretch them."]
-    if made.options.plugs:
-        lines.append("Push the plugs over the strips from the open ends of their slits, and into both pockets.")
-    else:
-        lines.append("Seal the slots with tape.")
-    return lines
+    return ["Thread the strips through half B and then through half A."]
 
 
 def close_lines(made: Mold) -> list[str]:
     """Return how the halves are joined."""
     o = made.options
     lines = ["Push half A onto the pegs of half B: one peg is thinner, so that it fits one way only."]
+    if made.foils and o.plugs:
+        lines.append(
+            "Stretch the strips. Push the plugs over them, open ends of the slits first, and into the pockets."
+        )
+    elif made.foils:
+        lines.append("Stretch the strips, and seal the slots with tape.")
     if (found := made.bolts) is not None:
         lines.append(f"Tighten {found.number} screws {o.screw} x {found.length_mm:g} from half B, by hand.")
     if o.fasten == "bands":
