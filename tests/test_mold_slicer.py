@@ -19,7 +19,7 @@ ALL = [
     {"seal": "cord", "fasten": "bands", "printer": "fdm-0.4", "riser": 0.03, "shrinkage": 0.01},
     {"seal": "none", "fasten": "none", "printer": "sla", "pry": False},
     {"seal": "cord", "fasten": "none", "printer": "fdm-0.4", "cavities": 2},
-    {"seal": "tongue", "carrier": True, "key_mm": 1.5, "pour_mm": 2.0, "riser": 0.0},
+    {"seal": "tongue", "carrier": True, "key_mm": 1.5, "pour_mm": 1.5, "riser": 0.0},
     {"seal": "cord", "carrier": True, "key_mm": 1.5, "pour_mm": 2.0, "riser": 0.0, "printer": "sla"},
 ]
 """Options that together hold every value of each."""

@@ -28,9 +28,7 @@ def close_lines(made: Mold) -> list[str]:
     o = made.options
     lines = ["Push half A onto the pegs of half B: one peg is thinner, so that it fits one way only."]
     if made.foils and o.plugs:
-        lines.append(
-            "Stretch the strips. Push the plugs over them, open ends of the slits first, and into the pockets."
-        )
+        lines.append("Stretch the strips. Push the plugs over them, open ends of the slits first, into the pockets.")
     elif made.foils:
         lines.append("Stretch the strips, and seal the slots with tape.")
     if (found := made.bolts) is not None:
