@@ -63,3 +63,11 @@ def test_readings_move_up_with_the_silicone(folder) -> None:
     assert made["mesh"] == {"size_mm": 1.0}
     assert given["gauge"][0]["y_mm"] == 2.0
     assert "[parts.carrier]" in (folder / "finger_on_carrier.toml").read_text()
+
+
+def test_the_scene_of_the_finger_on_its_carrier_loads(folder) -> None:
+    """The block, 20 mm high, stands on 5 mm of rigid carrier."""
+    scene = load(folder / "finger_on_carrier.toml")
+    assert scene.design.part_labels == ("carrier",)
+    assert scene.design.height_mm == pytest.approx(25.0, abs=1e-3)
+    assert scene.model().parts
