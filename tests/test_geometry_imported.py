@@ -177,3 +177,18 @@ def test_a_bad_file_ends_the_command_with_one_line_and_code_2(tmp_path: Path, ca
     assert f"{scene}: object.path: " in said
     assert "STL" in said
     assert not (tmp_path / "out").exists()
+
+
+def test_solids_away_from_the_origin_are_scaled_together(tmp_path: Path) -> None:
+    # build123d's `scale` enlarges every solid about its own location.
+    from build123d import Box, Compound, Pos, export_step
+
+    solids = [Pos(30.0, 1.0, 0.0) * Box(4.0, 2.0, 4.0), Pos(30.0, 2.5, 0.0) * Box(4.0, 1.0, 4.0)]
+    solids[1].label = "skin"
+    path = tmp_path / "two.step"
+    export_step(Compound(children=solids), path)
+    half = imported(path, scale=0.5)
+    assert half.volume_mm3 == pytest.approx((2.0 + 1.0) * 16.0 / 8.0)
+    skin = half.solids()["skin"].bounding_box()
+    assert (skin.min.Y, skin.max.Y) == pytest.approx((1.0, 1.5))
+    assert (skin.min.X, skin.max.X) == pytest.approx((-1.0, 1.0))

@@ -121,6 +121,18 @@ def _label(centre: np.ndarray, normal: np.ndarray, planar: bool) -> str:
     return "contact" if normal[1] > _LEAST_UPWARD_NORMAL else "walls"
 
 
+def enlarged(solid: Solid, factor: float) -> Solid:
+    """Return a solid enlarged about the origin; build123d's `scale` enlarges about the solid's own location."""
+    from build123d import Shape as CadShape
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
+    from OCP.gp import gp_Pnt, gp_Trsf
+
+    enlarge = gp_Trsf()
+    enlarge.SetScale(gp_Pnt(0.0, 0.0, 0.0), factor)
+    whole = CadShape.cast(BRepBuilderAPI_Transform(solid.wrapped, enlarge, True).Shape())
+    return whole.solids()[0]
+
+
 def cut(solid: Solid, symmetry: tuple[str, ...]) -> Solid:
     """Return the part x >= 0 and/or z >= 0 of a solid."""
     return sound(_kept(solid, symmetry), solid.label) if symmetry else solid

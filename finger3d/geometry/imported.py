@@ -173,13 +173,15 @@ def imported(path: str | Path, upside_down: bool = False, scale: float = 1.0) ->
     base: list[Face] = []
     parts: dict[str, list[Solid]] = {}
     if path.suffix.lower() in STEP:
+        from finger3d.geometry.cad import enlarged
+
         read = read_step(path)
         solid, parts = united(path, read)
         moves: list[Callable[[Solid], Solid]] = []
         if base := read.faces.get(_BASE_NAME, []):
             moves.append(_turn(path, solid, base))
         if scale != 1.0:
-            moves.append(lambda shape: shape.scale(scale))
+            moves.append(lambda shape: enlarged(shape, scale))
         if upside_down and not base:
             moves.append(_upside_down)
         for move in moves:

@@ -60,7 +60,9 @@ class Body:
         """Return the body enlarged about the middle of its base."""
         if factor == 1.0:
             return self
-        cad = None if self.cad is None else _enlarged(self.cad, factor)
+        from finger3d.geometry.cad import enlarged
+
+        cad = None if self.cad is None else enlarged(self.cad, factor)
         return Body(Triangles(self.surface.points * factor, self.surface.faces), cad)
 
     def opening_along_z(self, split: str) -> Body:
@@ -95,18 +97,6 @@ class Body:
         from finger3d.mold.regions import difference
 
         return Shell(difference(part.surface, [self.surface]), part.tolerance_mm, part.angle)
-
-
-def _enlarged(solid: Solid, factor: float) -> Solid:
-    """Return a solid enlarged about the origin; build123d's `scale` enlarges about the solid's own location."""
-    from build123d import Shape as CadShape
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
-    from OCP.gp import gp_Pnt, gp_Trsf
-
-    enlarge = gp_Trsf()
-    enlarge.SetScale(gp_Pnt(0.0, 0.0, 0.0), factor)
-    whole = CadShape.cast(BRepBuilderAPI_Transform(solid.wrapped, enlarge, True).Shape())
-    return whole.solids()[0]
 
 
 def _triangles(solid: Solid, tolerance_mm: float) -> Triangles:

@@ -116,8 +116,8 @@ def _pouring(silicone: Silicone, volume_ml: float, hole: PourHole) -> list[str]:
     flow = hole.flow_ml_min(silicone)
     if flow is None:
         return lines
-    minutes = volume_ml / flow
-    lines.append(f"  flow                {flow:.2g} ml a minute through the hole by its own weight: {minutes:.2g} min")
+    minutes = float(f"{volume_ml / flow:.2g}")
+    lines.append(f"  flow                {flow:.2g} ml a minute through the hole by its own weight: {minutes:g} min")
     if minutes > 0.5 * left:
         lines.append(
             "                      too slow: press it in through the hole with a syringe, until it stands in the vents,"
