@@ -20,6 +20,7 @@ from finger3d.cli import (  # noqa: F401
     optimise,
     plan,
     press,
+    schema,
     show,
     sweep,
     validate,

@@ -74,7 +74,7 @@ def _tables() -> Iterator[tuple[str, list[_Row]]]:
 
 def _rows(table: type[TomlTable], documented: type | None = None) -> list[_Row]:
     hints = typing.get_type_hints(table, include_extras=True)
-    said = _said(documented or table)
+    said = descriptions(documented or table)
     return [
         (
             name,
@@ -92,7 +92,7 @@ def _default(field: typing.Any) -> str:
     return "" if field.default is None else f"`{shown(field.default)}`"
 
 
-def _said(documented: type) -> dict[str, str]:
+def descriptions(documented: type) -> dict[str, str]:
     """Return the description of each key in the docstrings of a class and its bases."""
     found: dict[str, str] = {}
     for base in reversed(documented.__mro__):

@@ -245,7 +245,22 @@ class TaxelTable(TomlTable):
 
 
 class SceneTable(TomlTable):
-    """The whole file. Tables whose keys depend on a name are checked afterwards, against that name's own table."""
+    """The whole file. Tables whose keys depend on a name are checked afterwards, against that name's own table.
+
+    Attributes
+    ----------
+    title : name of the scene in results; the file's name unless given
+    material : elastic constants of the finger
+    parts : other materials of solids of the finger, by their labels
+    friction : Coulomb friction; absent: none
+    contact : how stick and slip are settled
+    model : the body, or its section
+    mesh : edge lengths and mesher; chosen from the scene unless given
+    gauge : strain gauges
+    marker : material points whose displacement is read
+    marker_grid : markers all over the contact face
+    taxel : pressure cells on the base
+    """
 
     title: Title | None = None
     finger: Tree
