@@ -4,7 +4,7 @@ PYTHON ?= $(shell for p in python3.11 python3 python3.12 python3.13; do \
 	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet install --constraint constraints.txt
 
-.PHONY: install demo bench test test-all test-browser lint clean
+.PHONY: install demo docs bench test test-all test-browser lint clean
 
 install: .venv/.installed
 
@@ -24,17 +24,27 @@ demo: install
 	$(BIN)/finger3d press geometries/fig9.toml --out out/demo
 	@echo "open out/demo/report.html; pictures:"; ls out/demo/*.png
 
+# Sphinx and its extensions, which only the site needs.
+.venv/.docs: .venv/.installed
+	@$(PIP) --no-build-isolation --editable '.[docs]'
+	@touch $@
+
+# Executes the tutorials; their outputs are kept until their text changes. Warnings, such as dead links, are errors.
+docs: install .venv/.docs
+	OMP_NUM_THREADS=1 $(BIN)/python -m sphinx -b html -W --keep-going --quiet docs docs/_build/html
+	@echo "open docs/_build/html/index.html"
+
 # Two workers, each on one thread: as many as the smallest machine has cores.
 PYTEST := OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 2 --dist worksteal
 
 test: install
 	$(PYTEST) -m "not slow and not browser"
 
-test-all: install
+test-all: install .venv/.docs
 	$(PYTEST)
 
 # Needs /usr/bin/chromium: apt install chromium.
-test-browser: install
+test-browser: install .venv/.docs
 	$(BIN)/python -m pytest -q -m browser
 
 # Takes both cores and some minutes; the table says how busy the machine was.
@@ -48,4 +58,4 @@ lint: install
 	$(BIN)/lint-imports
 
 clean:
-	rm -rf .venv out dist build .pytest_cache .hypothesis .ruff_cache .mypy_cache .import_linter_cache
+	rm -rf .venv out dist build docs/_build docs/_generated docs/tutorials/*.ipynb .pytest_cache .hypothesis .ruff_cache .mypy_cache .import_linter_cache

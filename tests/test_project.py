@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import re
 import subprocess
 import sys
@@ -29,7 +30,7 @@ HEAVY = {
 }
 TOP_LEVEL = {
     "pyproject.toml", "finger3d", "geometries", "tests", "validation", "docs", "README.md", "LICENSE", "CITATION.cff",
-    "Makefile", "CHANGELOG.md", "CONTRIBUTING.md", "constraints.txt",
+    "Makefile", "CHANGELOG.md", "CONTRIBUTING.md", "constraints.txt", "codemeta.json", "paper",
 }  # fmt: skip
 
 
@@ -89,7 +90,8 @@ def test_every_dependency_is_pinned(root: Path) -> None:
     lines = [x for x in (root / "constraints.txt").read_text().splitlines() if x and not x.startswith("#")]
     assert all(re.fullmatch(r"[a-z0-9-]+==[\w.+]+", line) for line in lines)
     pinned = {line.split("==")[0] for line in lines}
-    wanted = project(root)["dependencies"] + project(root)["optional-dependencies"]["dev"]
+    extras = project(root)["optional-dependencies"]
+    wanted = project(root)["dependencies"] + extras["dev"] + extras["docs"]
     assert {name_of(r) for r in wanted} <= pinned
     assert "cadquery" not in pinned  # its OCP wheel clashes with VTK
 
@@ -98,6 +100,14 @@ def test_versions_agree(root: Path) -> None:
     version = project(root)["version"]
     assert f"\nversion: {version}\n" in (root / "CITATION.cff").read_text()
     assert f"## {version}" in (root / "CHANGELOG.md").read_text()
+    assert json.loads((root / "codemeta.json").read_text())["version"] == version
+
+
+def test_every_reference_of_the_paper_is_cited_and_every_citation_has_one(root: Path) -> None:
+    entries = re.findall(r"^@\w+\{(\w+),", (root / "paper" / "paper.bib").read_text(), flags=re.MULTILINE)
+    text = (root / "paper" / "paper.md").read_text().split("---", 2)[2]
+    assert len(entries) == len(set(entries)) > 10
+    assert set(re.findall(r"@(\w+)", text)) == set(entries)
 
 
 def test_the_readmes_first_screen_has_a_sentence_the_picture_and_the_two_commands(root: Path) -> None:

@@ -1,0 +1,133 @@
+"""The site: its tables are complete; in a browser, its pages open, and its links lead somewhere."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, urlsplit
+
+import pytest
+
+import finger3d
+from tests.scenes import SECTION
+
+TUTORIALS = ("section", "objects", "friction", "mold", "accuracy")
+
+
+def rows(page: str, heading: str) -> set[str]:
+    """Names in the first column of the first table under a heading."""
+    part = page.split(f"## {heading}\n", 1)[1].split("\n#", 1)[0]
+    cells = re.findall(r"^\| (`[^|]*) \|", part, flags=re.MULTILINE)
+    return {name for cell in cells for name in re.findall(r"`([^`]+)`", cell)}
+
+
+def test_the_page_of_outputs_names_every_number_column_and_field(root: Path, tmp_path: Path) -> None:
+    page = (root / "docs" / "reference" / "outputs.md").read_text(encoding="utf-8")
+    (tmp_path / "scene.toml").write_text(SECTION, encoding="utf-8")
+    result = finger3d.press(tmp_path / "scene.toml", tmp_path / "out", figures=False)
+    assert rows(page, "summary.json") == set(result.summary())
+    assert rows(page, "contact.csv") == set(result.to_dataframe("contact").columns)
+    assert rows(page, "fields.vtu") == {*result.to_pyvista().array_names, "part"}
+    files = {path.name for path in (tmp_path / "out").iterdir() if not path.name.startswith(".")}
+    assert files <= rows(page.replace("# Outputs of a press", "## Outputs of a press"), "Outputs of a press")
+
+
+class _Links(HTMLParser):
+    """Targets of the links, pictures, scripts and styles of a page, and the names that links may lead to."""
+
+    def __init__(self, page: Path) -> None:
+        super().__init__()
+        self.targets: list[str] = []
+        self.names = {""}
+        self.feed(page.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        found = dict(attrs)
+        self.names.update(found[key] or "" for key in ("id", "name") if key in found)
+        target = found.get("src") or (found.get("href") if tag in ("a", "link") else None)
+        if target:
+            self.targets.append(target)
+
+
+@pytest.fixture(scope="module")
+def site(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The site, built as `make docs` does, with the outputs of tutorials that it has kept."""
+    out = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "sphinx", "-b", "html", "-W", "--keep-going", "--quiet", "docs", str(out)]
+    environment = os.environ | {"PYTHONPATH": str(root), "OMP_NUM_THREADS": "1"}
+    done = subprocess.run(command, cwd=root, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return out
+
+
+@pytest.mark.browser
+@pytest.mark.timeout(1200)
+def test_no_link_is_dead_and_nothing_is_loaded_from_elsewhere(site: Path) -> None:
+    pages = {page.resolve(): _Links(page) for page in site.rglob("*.html")}
+    assert len(pages) > 25
+    dead = []
+    for page, links in pages.items():
+        for target in links.targets:
+            parts = urlsplit(target)
+            if parts.scheme or parts.netloc:
+                continue
+            leads_to = (page.parent / unquote(parts.path)).resolve() if parts.path else page
+            known = pages.get(leads_to)
+            if not leads_to.exists() or (known and unquote(parts.fragment) not in known.names):
+                dead.append((page.name, target))
+    assert dead == []
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        launched = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=["--no-sandbox"])
+        yield launched
+        launched.close()
+
+
+@pytest.mark.browser
+@pytest.mark.timeout(1200)
+@pytest.mark.parametrize("width", [1280, 400])
+def test_pages_open_without_complaint_request_or_sideways_scrolling(site: Path, browser: Any, width: int) -> None:
+    page = browser.new_page(viewport={"width": width, "height": 900})
+    complaints: list[str] = []
+    requests: list[str] = []
+    page.on("console", lambda m: complaints.append(m.text) if m.type == "error" else None)
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on("request", lambda request: requests.append(request.url))
+    names = ["index", "start", "scenes", "gallery", "verification", "reference/keys", "reference/python"]
+    for name in [*names, "theory/errors", *(f"tutorials/{tutorial}" for tutorial in TUTORIALS)]:
+        page.goto((site / f"{name}.html").as_uri())
+        assert page.evaluate("document.documentElement.scrollWidth") <= width, name
+        broken = (
+            "[...document.images].filter((i) => i.loading !== 'lazy' && !(i.complete && i.naturalWidth > 0)).length"
+        )
+        assert page.evaluate(broken) == 0, name
+    assert complaints == []
+    assert [url for url in requests if not url.startswith(("file:", "data:"))] == []
+    page.close()
+
+
+@pytest.mark.browser
+@pytest.mark.timeout(1200)
+def test_tutorials_show_what_they_computed_and_can_be_downloaded(site: Path, browser: Any) -> None:
+    page = browser.new_page()
+    for tutorial in TUTORIALS:
+        page.goto((site / "tutorials" / f"{tutorial}.html").as_uri())
+        assert page.locator(".cell_output img").count() >= 1, tutorial
+        download = page.locator(f"a.download[href$='/{tutorial}.py']").first.get_attribute("href")
+        script = (site / "tutorials" / download).resolve().read_text(encoding="utf-8")
+        compile(script, tutorial, "exec")
+    page.goto((site / "theory" / "contact.html").as_uri())
+    assert page.locator("math").count() > 10
+    assert page.locator("math").first.bounding_box()["height"] > 10.0
+    page.close()
