@@ -83,7 +83,7 @@ def _scene_tables(schema: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]
         if name == "press":
             legs = node["oneOf"][1]["properties"]["leg"]["items"]
             yield "[press] or [[press.leg]]", legs
-        elif "oneOf" in node:
+        elif "oneOf" in node and "properties" not in node:
             for choice in node["oneOf"]:
                 kind = next(iter(choice["properties"]))
                 told = choice["properties"][kind].get("const", choice.get("title"))

@@ -40,6 +40,8 @@ def test_every_shipped_scene_and_the_template_are_valid(valid: Callable[[dict[st
     [
         {},
         {"finger": {"geometry": "thumb.STEP"}},
+        {"finger": {"geometry": "thumb.msh"}},
+        {"material": {"shore_A": 20.0}},
         {"object": {"tilt_deg": 3.0}},
         {"object": {"shape": "sphere", "radius_mm": 4}},
         {"press": {"force_N": 3.0, "steps": "auto"}},
@@ -60,6 +62,8 @@ def test_what_a_scene_takes_is_valid(valid: Callable[[dict[str, Any]], bool], ch
         {"finger": {"geometry": "half_cylinder", "radius_mm": 5.0, "width_mm": 2.0, "height_mm": 3.0}},
         {"finger": {"geometry": "thumb.obj"}},
         {"material": {"E_MPa": 1.0, "nu": 0.6}},
+        {"material": {"E_MPa": 1.0}},
+        {"material": {"E_MPa": 1.0, "nu": 0.49, "shore_A": 20.0}},
         {"object": {"shape": "plane", "radius_mm": 4.0}},
         {"object": {"shape": "sphere"}},
         {"press": {"depth_mm": 0.5, "force_N": 3.0}},

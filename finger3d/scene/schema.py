@@ -10,10 +10,11 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from finger3d._types import Tree
-from finger3d.geometry.files import SUFFIXES
 from finger3d.geometry.registry import designs
+from finger3d.materials.elastic import MODULUS_KEYS
 from finger3d.objects import OBJECTS
 from finger3d.scene import tables
+from finger3d.scene.files import FINGER_SUFFIXES
 from finger3d.scene.reference import descriptions
 from finger3d.scene.registry import effect_names, effect_type
 from finger3d.scene.tables import LegsTable, LegTable, PressTable, SceneTable, TomlTable, table_of
@@ -38,6 +39,7 @@ def schema() -> Tree:
     plane["required"].remove("shape")  # [object] without a shape is a plane
     keys["object"] = _one_of("what the finger is pressed on; without it a rigid plane", shapes)
     keys["press"] = _one_of("the motion of the object", [_press(), _legs()])
+    keys["material"] |= _one_modulus()
     effects = {name: _documented(effect_type(name)) for name in effect_names()}
     keys["effects"] = {"type": "object", "additionalProperties": False, "properties": effects}
     for name, description in descriptions(SceneTable).items():
@@ -64,7 +66,7 @@ def _named(key: str, name: str, table: type[TomlTable], documented: type) -> Tre
 
 
 def _file() -> Tree:
-    suffixes = "|".join(suffix.removeprefix(".") for suffix in SUFFIXES)
+    suffixes = "|".join(suffix.removeprefix(".") for suffix in FINGER_SUFFIXES)
     path = {"type": "string", "pattern": rf"\.({_any_case(suffixes)})$", "description": "path from the scene's folder"}
     return {
         "title": "file",
@@ -78,6 +80,10 @@ def _file() -> Tree:
 def _any_case(text: str) -> str:
     """Return a regular expression that matches a text in capitals too; JSON Schema has no flag for it."""
     return "".join(f"[{c}{c.upper()}]" if c.isalpha() else c for c in text)
+
+
+def _one_modulus() -> Tree:
+    return {"oneOf": [{"required": [key]} for key in MODULUS_KEYS], "dependentRequired": {"E_MPa": ["nu"]}}
 
 
 def _press() -> Tree:
