@@ -110,6 +110,20 @@ def test_every_reference_of_the_paper_is_cited_and_every_citation_has_one(root: 
     assert set(re.findall(r"@(\w+)", text)) == set(entries)
 
 
+def test_what_the_paper_says_of_the_studies_is_true(root: Path) -> None:
+    text = " ".join((root / "paper" / "paper.md").read_text().split())
+    assert "more than 60 studies with more than 900 comparisons" in text
+    assert "Some 400 statements" in text
+    index = (root / "validation" / "README.md").read_text()
+    found = re.search(r"^(\d+) of (\d+) rows pass, (\d+) of (\d+) statements hold; (\d+) studies", index, re.MULTILINE)
+    assert found is not None
+    passing, rows, holding, statements, studies = map(int, found.groups())
+    assert passing == rows > 900
+    assert studies > 60
+    assert statements == pytest.approx(400, abs=50)
+    assert 0.5 < holding / statements < 0.6
+
+
 def test_the_readmes_first_screen_has_a_sentence_the_picture_and_the_two_commands(root: Path) -> None:
     first_screen = "\n".join((root / "README.md").read_text().splitlines()[:25])
     assert "](validation/figures/fig9.png)" in first_screen
