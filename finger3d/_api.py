@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from finger3d._extras import require
 from finger3d.progress import Progress
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ class SweepResult:
 
     Attributes
     ----------
-    out : folder of results.csv, results.parquet and report.html
+    out : folder of results.csv, report.html and, with pyarrow, results.parquet
     columns : name -> a value for each point: the varied keys, the numbers of the last step with their units in the
         name, gauges, outcome
     failed : number of points without results
@@ -59,6 +60,7 @@ class SweepResult:
 
     def to_dataframe(self) -> pandas.DataFrame:
         """Return the columns as pandas has them, a row a point."""
+        require("to_dataframe()", "pandas")
         import pandas
 
         return pandas.DataFrame(dict(self.columns))

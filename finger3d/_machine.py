@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import os
 import platform
+import sys
 from functools import cache
 from importlib import metadata
 
@@ -20,7 +22,6 @@ PACKAGES = (
     "pyvista",
     "vtk",
     "matplotlib",
-    "plotly",
     "pydantic",
 )
 """Names on PyPI of finger3d and of every package that shapes numbers or pictures."""
@@ -54,3 +55,13 @@ def memory_bytes() -> tuple[int, int] | None:
         return page * os.sysconf("SC_PHYS_PAGES"), page * os.sysconf("SC_AVPHYS_PAGES")
     except (ValueError, OSError, AttributeError):
         return None
+
+
+def peak_memory_MB() -> float:
+    """Return the largest memory that this process has held; NaN where the system does not report it, as on Windows."""
+    try:
+        import resource
+    except ModuleNotFoundError:  # Windows
+        return math.nan
+    unit = 1 if sys.platform == "darwin" else 1024  # bytes on macOS, KiB elsewhere
+    return float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit) / 2**20

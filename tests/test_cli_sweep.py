@@ -71,7 +71,7 @@ def test_a_cluster_that_cannot_be_used_is_told_in_one_line(
 
 
 def test_one_body_is_swept_without_workers_and_its_points_are_shown(paper_scene, tmp_path, capsys, monkeypatch) -> None:
-    monkeypatch.setattr("finger3d.analyses.sweep.cluster.local", lambda *a: pytest.fail("workers were started"))
+    monkeypatch.setattr("finger3d.analyses.sweep.local.press", lambda *a: pytest.fail("workers were started"))
     vary = ["--vary", "friction.mu=0.1,0.2,0.3,0.4,0.5,0.6", "--vary", "gauge.g36.angle_deg=15,30"]
     assert main(["sweep", str(paper_scene), *COARSE, *vary, "--out", str(tmp_path)]) == 0
     told = capsys.readouterr().out

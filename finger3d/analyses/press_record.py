@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import resource
 import time
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from finger3d._machine import versions
+from finger3d._machine import peak_memory_MB, versions
 from finger3d._types import Tree
 from finger3d.contact.friction import OPEN
 from finger3d.mechanics.history import History, StepResult, measure
@@ -158,7 +157,7 @@ def _cost(record: PressRecord) -> Tree:
     return {
         "seconds": {**record.seconds, "total": time.perf_counter() - record.started},
         "factorizations": record.all_factorizations,
-        "peak_memory_MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0,
+        "peak_memory_MB": peak_memory_MB(),
         "solver": record.problem.part.condensed.solver,
         "perturbed_pivots": record.problem.part.condensed.perturbed_pivots,
     }

@@ -7,6 +7,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Literal
 
+from finger3d._extras import require
 from finger3d._types import Tree
 from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.analyses.press_files import history_table
@@ -106,6 +107,7 @@ class PressResult:
         table : ``"history"``, a row a step, as in history.csv; or ``"contact"``, a row a contact point in the last
             good step, as in contact.csv
         """
+        require("to_dataframe()", "pandas")
         import pandas
 
         if table == "contact":

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 
 from cyclopts import CycloptsError
 
 # Importing a module registers its command.
 import finger3d.cli.app  # noqa: F401
+from finger3d._extras import absent, message
 from finger3d.cli import (  # noqa: F401
     calibrate,
     compare,
@@ -59,6 +61,10 @@ def _run(arguments: Sequence[str] | None) -> int:
     except ImportError as error:
         if out_of_memory(error):
             complain(OUT_OF_MEMORY)
+            return MissingError.exit_code
+        if (module := absent(error)) is not None:
+            words = sys.argv[1:] if arguments is None else arguments
+            complain(message(next(iter(words), "finger3d"), module))
             return MissingError.exit_code
         # The loaders of OCP and VTK turn a KeyboardInterrupt into an ImportError.
         if not isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):

@@ -127,6 +127,5 @@ def _rows(store: ResultStore, out: Path) -> list[tuple[str, str]]:
         ("bodies", f"{len(store.sweep.bodies)}, each condensed once"),
         ("time of workers", f"{sum(built.values()):.1f} s meshing and condensing, {seconds:.1f} s contact"),
         ("results", str(out / "results.csv")),
-        ("", str(out / "results.parquet")),
-        ("", str(out / "report.html")),
+        *[("", str(out / name)) for name in ("results.parquet", "report.html") if (out / name).exists()],
     ]

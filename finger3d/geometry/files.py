@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._extras import require
 from finger3d._ranges import number
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
@@ -170,6 +171,7 @@ def read_step(path: Path) -> StepBody:
         If this is no STEP file, or holds no solid or an invalid one.
     """
     _bytes(path)
+    require(f"{path}: a STEP file", "build123d")
     from build123d import Compound
     from OCP.IFSelect import IFSelect_RetDone
     from OCP.Message import Message, Message_PrinterOStream

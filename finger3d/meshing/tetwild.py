@@ -13,15 +13,15 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from finger3d._extras import require
 from finger3d._process import child_environment
 from finger3d._ranges import at_least
 from finger3d._types import Float, Int
-from finger3d.errors import Finger3dError, MissingError
+from finger3d.errors import Finger3dError
 from finger3d.fem.simplex import Mesh
 from finger3d.geometry.design import Design
 from finger3d.meshing.limits import MAX_TETS, check_count
@@ -52,8 +52,7 @@ def new_mesh(
     """Return the mesh, the volume (mm3) of the whole body, and the seconds spent on CAD."""
     from finger3d.meshing.snap import UnusableMeshError
 
-    if find_spec("pytetwild") is None:
-        raise MissingError("mesh.mesher = 'ftetwild' needs the package pytetwild; install it, or use mesher = 'swept'")
+    require('mesh.mesher = "ftetwild"', "build123d", "pytetwild", instead='set mesh.mesher = "swept"')
     start = time.perf_counter()
     low, high = box(design, symmetry)
     field = sizing(design, options, zone, low, high)

@@ -119,7 +119,10 @@ def write_step(path: Path, shape: Shape) -> None:
 
 def write_3mf(path: Path, shells: Mapping[str, Shell]) -> None:
     """Write named closed surfaces as one 3MF file, mm, each an object of its own on the plate."""
-    from lib3mf import Lib3MF
+    try:
+        from lib3mf import Lib3MF
+    except ModuleNotFoundError:  # on Linux for ARM build123d brings it under the other name
+        from py_lib3mf import Lib3MF
 
     library = Path(Lib3MF.__file__).with_name("lib3mf")
     wrapper = Lib3MF.Wrapper(str(library))

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._extras import available, require
 from finger3d._process import child_environment
 from finger3d._types import Float, Int
 from finger3d.errors import MissingError
@@ -158,7 +159,7 @@ def render(drawings: Sequence[Drawing]) -> list[Image] | None:
     Returns
     -------
     list of (h, w, 3) arrays, or None
-        None if PyVista cannot render, or if matplotlib is asked for.
+        None if PyVista is not installed or cannot render, or if matplotlib is asked for.
 
     Raises
     ------
@@ -166,7 +167,9 @@ def render(drawings: Sequence[Drawing]) -> list[Image] | None:
         If PyVista is asked for and cannot render.
     """
     wanted = os.environ.get("FINGER3D_RENDERER", "")
-    if wanted == "matplotlib":
+    if wanted == "pyvista":
+        require("FINGER3D_RENDERER=pyvista", "pyvista")
+    if wanted == "matplotlib" or not available("pyvista"):
         return None
     if not FAILURES:
         with tempfile.TemporaryDirectory(prefix="finger3d-") as folder:
@@ -196,7 +199,9 @@ def run_child(command: list[str], window: bool = False) -> str | None:
         Why it failed, in one line; None if it succeeded.
     """
     # EGL needs no display; choosing it avoids VTK's warning about a missing X server.
-    hidden = {} if window else {"VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow"}
+    hidden = (
+        {} if window or not sys.platform.startswith("linux") else {"VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow"}
+    )
     env = {**hidden, **child_environment()}
     limit = None if window else _TIME_LIMIT_S
     try:

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from finger3d._extras import require
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.mechanics.gauges import Gauge
 from finger3d.results.states import States, load_states
@@ -91,6 +92,7 @@ def show_window(folder: str | Path) -> None:
     from finger3d.plotting.renderer import run_child
 
     found(folder)
+    require("show: a window", "pyvista", instead="add --png FILE for a picture")
     linux = sys.platform.startswith("linux")
     if linux and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         raise MissingError("show: there is no display here; add --png FILE for a picture, or --gif FILE for the steps")

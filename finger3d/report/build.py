@@ -170,10 +170,8 @@ def number(value: object, error: float | None = None) -> str:
 
 
 def _plotly() -> bytes:
-    """Return plotly.js, as distributed with plotly, with "</script" escaped, which would end the script element."""
-    from plotly.offline import get_plotlyjs
-
-    return str(get_plotlyjs()).encode().replace(b"</script", b"<\\/script")
+    """Return plotly.js, its edition of lines and 3D, with "</script" escaped, which would end the script element."""
+    return asset("plotly/plotly-gl3d.min.js").encode().replace(b"</script", b"<\\/script")
 
 
 def _card(row: HeadlineRow) -> str:

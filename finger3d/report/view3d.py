@@ -15,7 +15,7 @@ from finger3d.plotting.gauges import marks_of
 from finger3d.report.html import asset, embedded
 from finger3d.results.states import States, chosen, label
 
-_MOST_BYTES = 1_500_000  # of the data of a view; plotly.js has 5 MB
+_MOST_BYTES = 1_500_000  # of the data of a view; plotly.js has 1.8 MB
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from finger3d._extras import require
 from finger3d._types import Array
 from finger3d.errors import Finger3dError
 from finger3d.fem.simplex import Mesh
@@ -117,6 +118,7 @@ def grid(folder: str | Path, step: int | None = None) -> pyvista.UnstructuredGri
     Finger3dError
         If the folder holds no fields, or not that step.
     """
+    require("to_pyvista()", "pyvista", instead="read fields.vtu with ParaView")
     import pyvista
 
     from finger3d.results.states import load_states

@@ -1,70 +1,41 @@
-"""Clusters for sweeps: worker processes of this machine, or an existing Dask cluster."""
+"""Sweeps on an existing Dask cluster."""
 
 from __future__ import annotations
 
 import asyncio
 import logging
-import signal
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+import time
+from collections import deque
+from collections.abc import Iterator, Sequence
+from concurrent.futures import CancelledError
+from contextlib import contextmanager
 from importlib.metadata import version
-from multiprocessing import resource_tracker
+from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
 
-from finger3d._machine import cores
+from finger3d import _extras
+from finger3d.analyses.sweep import worker
+from finger3d.analyses.sweep.progress import BodyPoints, SweepProgress
 from finger3d.errors import Finger3dError, MissingError
+from finger3d.results.journal import Row
 
 if TYPE_CHECKING:
-    from distributed import Client
+    from distributed import Client, Future
 
 CONNECT_S = 10.0
 """Time limit to reach a scheduler, and for the first worker to be there."""
 
+WAIT_S = 60.0
+"""Time limit without any worker on a cluster."""
 
-@contextmanager
-def local(workers: int) -> Iterator[Client]:
-    """Yield the client of a Dask cluster of `workers` processes on this machine, with one thread each.
-
-    Raises
-    ------
-    MissingError
-        If no process could be started.
-    """
-    from distributed import Client, LocalCluster
-
-    with ExitStack() as stack:
-        try:
-            with _interrupts_deferred():
-                cluster = LocalCluster(
-                    n_workers=workers,
-                    threads_per_worker=1,
-                    host="127.0.0.1",
-                    dashboard_address="127.0.0.1:0",
-                    silence_logs=logging.CRITICAL,
-                )
-                client = stack.enter_context(Client(stack.enter_context(cluster)))
-        except (OSError, RuntimeError, TimeoutError) as error:
-            raise MissingError(f"sweep: no worker could be started on this machine: {error}") from None
-        yield client
-
-
-@contextmanager
-def _interrupts_deferred() -> Iterator[None]:
-    """Deliver Ctrl-C after the block, and never to processes and threads that the block starts.
-
-    A terminal sends it to every process; this one stops the workers.
-    """
-    resource_tracker.ensure_running()  # which would unblock the signal when it is started
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+_POLL_S = 0.5
+"""Interval at which the connection to the cluster is checked."""
 
 
 @contextmanager
 def remote(address: str) -> Iterator[Client]:
     """Client of the cluster whose scheduler is at `address`, which has workers with this version of finger3d."""
+    _extras.require("sweep --scheduler", "distributed", instead="leave out --scheduler for processes on this machine")
     from distributed import Client
 
     if ":" not in address.removeprefix("tcp://").removeprefix("tls://"):
@@ -106,9 +77,9 @@ def _ready(client: Client, address: str) -> None:
             f"--scheduler {address}: has no worker; start some with `dask worker {address} --nthreads 1`"
         ) from None
     here = version_here()
-    for worker, there in client.run(version_here).items():
+    for place, there in client.run(version_here).items():
         if there != here:
-            raise MissingError(f"--scheduler {address}: the worker {worker} has finger3d {there}; install {here} there")
+            raise MissingError(f"--scheduler {address}: the worker {place} has finger3d {there}; install {here} there")
 
 
 def version_here() -> str:
@@ -116,6 +87,105 @@ def version_here() -> str:
     return version("finger3d")
 
 
-def default_workers(bodies: int) -> int:
-    """Return the number of cores, or of bodies if these are fewer."""
-    return max(1, min(cores(), bodies))
+class Cluster:
+    """Presses on a Dask cluster: as many bodies at a time as there are workers, one batch of points after another."""
+
+    def __init__(self, client: Client, progress: SweepProgress) -> None:
+        self.client, self.progress = client, progress
+        self._running: dict[Future[list[Row]], BodyPoints] = {}
+        self._finished: SimpleQueue[Future[list[Row]]] = SimpleQueue()
+        self._seen = time.monotonic()
+
+    def press(self, bodies: Sequence[BodyPoints]) -> None:
+        """Press all points of some bodies.
+
+        Raises
+        ------
+        MissingError
+            If the scheduler cannot be reached any more, or no worker is left.
+        """
+        self.progress.report.stage("pressing")
+        waiting = deque(bodies)
+        try:
+            while waiting or self._running:
+                while waiting and len(self._running) < max(1, self._workers()):
+                    self._submit(waiting.popleft())
+                self._receive()
+        except (OSError, CancelledError):  # of the connection; a file that cannot be written raises a Finger3dError
+            raise self._lost("scheduler") from None
+        finally:
+            if self._running and self.client.status == "running":
+                self.client.cancel(list(self._running), force=True)
+
+    def _submit(self, body: BodyPoints, address: str | None = None) -> None:
+        """Send the next batch of a body, to the worker that has condensed it if that is still there."""
+        future = self.client.submit(
+            worker.batch,
+            body.spec,
+            body.left,
+            body.size,
+            pure=False,
+            workers=address and [address],
+            allow_other_workers=address is not None,
+        )
+        self._running[future] = body
+        future.add_done_callback(self._finished.put)
+
+    def _receive(self) -> None:
+        """Store the rows of one batch, and send the next one of its body."""
+        if self.client.status != "running":  # which cancels every future
+            raise self._lost("scheduler")
+        try:
+            future = self._finished.get(timeout=_POLL_S)
+        except Empty:
+            self._workers()
+            return
+        body = self._running.pop(future)
+        if future.status != "finished":
+            self._give_up(body, _reason(future))
+            return
+        address = next(iter(self.client.who_has([future]).get(future.key, ())), None)
+        rows: list[Row] = future.result()
+        for row in rows:
+            self.progress.add(row)
+        body.advance(rows)
+        if body.left:
+            self._submit(body, address)
+
+    def _give_up(self, body: BodyPoints, reason: str) -> None:
+        if self.client.status != "running":  # a lost connection cancels every future
+            raise self._lost("scheduler")
+        self.progress.give_up(body, reason)
+
+    def _workers(self) -> int:
+        """Return the number of workers.
+
+        Raises
+        ------
+        MissingError
+            If there has been none for `WAIT_S`.
+        """
+        count, now = len(self.client.nthreads()), time.monotonic()
+        if count:
+            self._seen = now
+        elif now - self._seen > WAIT_S:
+            raise self._lost("worker")
+        return count
+
+    def _lost(self, what: str) -> MissingError:
+        return MissingError(f"sweep: no {what} is left; {self.progress.store.said()}; run the same command again")
+
+
+def _reason(future: Future[list[Row]]) -> str:
+    """Return in one line why a batch has no result."""
+    from distributed import KilledWorker
+
+    error = future.exception() if future.status == "error" else None
+    if isinstance(error, KilledWorker):
+        return (
+            "every worker that was given this body died, perhaps for lack of memory; "
+            "try a coarser mesh or fewer --workers; the same command tries it again"
+        )
+    if error is None:
+        return "its task was cancelled; the same command tries it again"
+    return f"{type(error).__name__}: {' '.join(str(error).split())}"

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from finger3d import _extras
 from finger3d.analyses.sweep.points import Point, Sweep
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.io import atomic, claimed, write_csv
@@ -15,6 +16,7 @@ from finger3d.results.journal import Journal, Row, journal_rows, number_in, open
 from finger3d.scene.messages import shown
 
 JOURNAL, TASK = "points.jsonl", "sweep.json"
+CSV, PARQUET = "results.csv", "results.parquet"
 _TEXTS = ("body", "outcome")
 _LAST = ("outcome", "residual", "seconds", "build_seconds", "body")
 
@@ -24,7 +26,7 @@ Column = list[int] | list[float] | list[str] | list[bool]
 class ResultStore:
     """The rows of a sweep.
 
-    Every finished point is a line of points.jsonl at once.  results.parquet and results.csv are written from these.
+    Every finished point is a line of points.jsonl at once.  results.csv and results.parquet are written from these.
 
     Attributes
     ----------
@@ -99,22 +101,24 @@ class ResultStore:
         return [point for point in self.sweep.points if point.number not in self.rows]
 
     def write(self) -> None:
-        """Write results.parquet and results.csv.
+        """Write results.csv, and results.parquet if pyarrow is installed.
 
         Raises
         ------
         MissingError
             If they cannot be written.
         """
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
         columns = self.columns()
-        if columns["point"]:
-            with self.room("results.parquet"):
-                with atomic(self.folder / "results.parquet") as temporary:
-                    pq.write_table(pa.table(columns), temporary)
-                write_csv(self.folder / "results.csv", columns)
+        if not columns["point"]:
+            return
+        with self.room(CSV):
+            write_csv(self.folder / CSV, columns)
+        if _extras.available("pyarrow"):
+            import pyarrow as pa
+            import pyarrow.parquet as pq
+
+            with self.room(PARQUET), atomic(self.folder / PARQUET) as temporary:
+                pq.write_table(pa.table(columns), temporary)
 
     def columns(self) -> dict[str, Column]:
         """Return the table by column: point, varied keys, numbers of the last step, gauges, outcome and times."""

@@ -1,4 +1,4 @@
-"""Presses of the points of a sweep that share a body, in this process or in a Dask worker."""
+"""Presses of the points of a sweep that share a body, in this process or in a worker."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def rows(spec: BodySpec, points: Sequence[Point]) -> Iterator[Row]:
 
 
 def batch(spec: BodySpec, points: Sequence[Point], size: int) -> list[Row]:
-    """Press the first `size` points with one thread; called on a Dask worker.
+    """Press the first `size` points with one thread; called in a worker.
 
     The body is kept for the next batch. If it cannot be built, every point gets a row that says why.
     """
