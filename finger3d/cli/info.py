@@ -13,17 +13,24 @@ def info(*, json_: Json = False) -> None:
     """
     import platform
 
+    import sys
+    from pathlib import Path
+
     from finger3d._machine import cores, memory_bytes, versions
+    from finger3d._slim import environment_bytes
     from finger3d.fem import pardiso
     from finger3d.meshing.cache import folder
 
-    memory = memory_bytes()
+    memory, isolated = memory_bytes(), sys.prefix != sys.base_prefix
+    size = environment_bytes(Path(sys.prefix)) if isolated else None
     if json_:
         machine = {
             "platform": platform.platform(),
             "cores": cores(),
             "memory_bytes": memory[0] if memory else None,
             "mesh_cache": folder(),
+            "environment": sys.prefix,
+            "environment_bytes": size,
             "pardiso": pardiso.available(),
         }
         print_json({"versions": versions(), "machine": machine})
@@ -36,6 +43,7 @@ def info(*, json_: Json = False) -> None:
             ("cores", cores()),
             ("memory", f"{memory[0] / 1e9:.1f} GB" if memory else "unknown"),
             ("mesh cache", folder()),
+            ("environment", f"{sys.prefix}, {size / 1e9:.2f} GB" if size is not None else f"{sys.prefix}, shared"),
             ("PARDISO", "available" if pardiso.available() else "not available; SuperLU is used, which is slower"),
         ],
     )

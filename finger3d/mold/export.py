@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from finger3d._extras import require
 from finger3d.errors import Finger3dError
 from finger3d.geometry.imported import Imported
 from finger3d.geometry.surface import Triangles
@@ -93,6 +94,8 @@ def export(
         tolerance_mm = _TOLERANCE_MM if mold is None else mold.machine.tolerance_mm
         tolerance_mm = min(tolerance_mm, _LARGEST_TOLERANCE * design.height_mm)
     _check(design, out, tolerance_mm)
+    if triangles is None or mold is not None:
+        require("export", "build123d")
     report.stage("finger")
     if triangles is not None:
         body, solid = Shell(triangles, 0.0, 0.0), None

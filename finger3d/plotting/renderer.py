@@ -199,9 +199,8 @@ def run_child(command: list[str], window: bool = False) -> str | None:
         Why it failed, in one line; None if it succeeded.
     """
     # EGL needs no display; choosing it avoids VTK's warning about a missing X server.
-    hidden = (
-        {} if window or not sys.platform.startswith("linux") else {"VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow"}
-    )
+    egl = {"VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow"}
+    hidden = egl if sys.platform.startswith("linux") and not window else {}
     env = {**hidden, **child_environment()}
     limit = None if window else _TIME_LIMIT_S
     try:

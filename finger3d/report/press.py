@@ -94,7 +94,7 @@ class CostSummary(TypedDict):
     seconds: Mapping[str, float]
     factorizations: int
     solver: NotRequired[str]
-    peak_memory_MB: float
+    peak_memory_MB: float | None
 
 
 def press_page(folder: str | Path) -> Path:
@@ -286,6 +286,6 @@ def _cost(cost: CostSummary) -> Table:
     rows: list[tuple[str, object]] = [(stage, f"{s:.2f} s") for stage, s in seconds.items()]
     rows += [
         ("factorisations", f"{cost['factorizations']}, by {cost.get('solver', 'unknown')}"),
-        ("peak memory", f"{cost['peak_memory_MB']:.0f} MB"),
+        ("peak memory", "unknown" if cost["peak_memory_MB"] is None else f"{cost['peak_memory_MB']:.0f} MB"),
     ]
     return Table(("cost", ""), rows)

@@ -1,0 +1,60 @@
+"""Files of the MKL and OpenMP wheels that PARDISO never loads: python -m finger3d._slim removes them.
+
+PARDISO loads libmkl_rt, the interface lp64, the threads of Intel's OpenMP, the core and the kernels of the processor at
+hand. Interfaces for 64-bit indices, other threads, vector mathematics, clusters and offloading to a GPU come in the same
+wheels, which pip can only install whole. No other package of finger3d loads MKL. Where another one in the same
+environment does, leave the files alone; `pip install --force-reinstall mkl intel-openmp` brings them back.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from importlib import metadata
+from pathlib import Path
+
+_NEVER_LOADED = (
+    "libmkl_*_ilp64.so*", "libmkl_gnu_thread.so*", "libmkl_tbb_thread.so*", "libmkl_sequential.so*", "libmkl_vml_*.so*",
+    "libmkl_blacs_*.so*", "libmkl_scalapack_*.so*", "libmkl_cdft_core.so*", "libomptarget*", "libompstubs5.*",
+    "libarcher*", "libiomp5.a", "libiomp5.dbg", "libiomp5_db.so", "libur_*.so*", "libumf.so*", "libtcm*.so*",
+    "libtbb*.so*",
+)  # fmt: skip
+_WHEELS = ("mkl", "intel-openmp", "intel-cmplr-lib-ur", "umf", "tcmlib", "tbb")
+
+
+def unused(prefix: Path) -> Iterator[Path]:
+    """Yield the files in the environment `prefix` that these wheels installed and PARDISO never loads; Linux only."""
+    for name in _WHEELS:
+        try:
+            files = metadata.distribution(name).files or []
+        except metadata.PackageNotFoundError:
+            continue
+        for file in files:
+            path = Path(str(file.locate())).resolve()
+            if path.parent == (prefix / "lib").resolve() and any(map(path.match, _NEVER_LOADED)) and path.is_file():
+                yield path
+
+
+def environment_bytes(prefix: Path) -> int:
+    """Return the bytes on disk of all files in an environment; a file with several names counts once."""
+    found: dict[tuple[int, int], int] = {}
+    for path in prefix.rglob("*"):
+        if path.is_file() and not path.is_symlink():
+            status = path.stat()
+            found[status.st_dev, status.st_ino] = getattr(status, "st_blocks", -(-status.st_size // 512)) * 512
+    return sum(found.values())
+
+
+def main() -> None:
+    """Remove the files and print how much they took."""
+    if sys.prefix == sys.base_prefix:
+        sys.exit("this Python is no virtual environment; nothing was removed")
+    paths = list(unused(Path(sys.prefix)))
+    size = sum(path.stat().st_size for path in paths)
+    for path in paths:
+        path.unlink()
+    print(f"{size / 1e6:.0f} MB of MKL that PARDISO never loads were removed from {sys.prefix}")
+
+
+if __name__ == "__main__":
+    main()
