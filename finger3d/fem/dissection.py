@@ -137,4 +137,3 @@ def _cover(graph: sp.csr_matrix, near: NDArray[np.bool_]) -> NDArray[np.bool_]:
     cover[ours[(match >= 0) & ~seen]] = True
     cover[theirs[seen_there]] = True
     return cover
-

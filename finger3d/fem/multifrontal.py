@@ -22,6 +22,10 @@ _MOST_RUNS = 24
 """Runs of consecutive places up to which a block is added run by run, and not entry by entry."""
 
 
+_RESIDUAL = 1e-11
+"""Largest residual of a solution over the size of its terms; 1e-14 was measured on rubber, nu = 0.49."""
+
+
 class NotQuasiDefiniteError(ArithmeticError):
     """The matrix is not symmetric quasi-definite: without pivoting it has no factor."""
 
@@ -106,7 +110,7 @@ class Multifrontal:
     Raises
     ------
     NotQuasiDefiniteError
-        If K has no factor without pivoting.
+        If K has no factor without pivoting, or no accurate one.
     """
 
     def __init__(self, plan: Plan, upper: sp.csr_matrix, rows: sp.csr_matrix) -> None:
@@ -125,6 +129,17 @@ class Multifrontal:
         for number, rest in complements.items():
             places = plan.fronts[number].boundary - self._n
             self.schur[np.ix_(places, places)] += np.tril(rest) + np.tril(rest, -1).T
+        self._verify(upper)
+
+    def _verify(self, upper: sp.csr_matrix) -> None:
+        """Raise a NotQuasiDefiniteError if a solution leaves a residual: growth of round-off without pivoting."""
+        load = np.random.default_rng(0).standard_normal((self._n, 1))
+        x = self.substituted(self.eliminated(load)[0], np.zeros((self._r, 1)))
+        magnitude = abs(upper)
+        left = upper @ x + upper.T @ x - upper.diagonal()[:, None] * x - load
+        size = magnitude @ abs(x) + magnitude.T @ abs(x) + abs(load)
+        if not np.abs(left).max() <= _RESIDUAL * size.max():
+            raise NotQuasiDefiniteError("round-off grows without pivoting")
 
     def eliminated(self, load: Float) -> tuple[Float, Float]:
         """Forward substitution of loads (n, m): what `substituted` needs of it, and ``R K^-1 load`` (r, m)."""
