@@ -19,6 +19,8 @@ EXTRAS = {
     "vtkmodules": "view",
     "distributed": "cluster",
     "dask": "cluster",
+    "netgen": "netgen",
+    "dash": "app",
     "pandas": "table",
     "pyarrow": "table",
 }

@@ -1,8 +1,8 @@
 """Files of the MKL and OpenMP wheels that PARDISO never loads: python -m finger3d._slim removes them.
 
 PARDISO loads libmkl_rt, the interface lp64, the threads of Intel's OpenMP, the core and the kernels of the processor at
-hand. Interfaces for 64-bit indices, other threads, vector mathematics, clusters and offloading to a GPU come in the same
-wheels, which pip can only install whole. No other package of finger3d loads MKL. Where another one in the same
+hand. Interfaces for 64-bit indices, other threads, vector mathematics, clusters and offloading to a GPU come in the
+same wheels, which pip can only install whole. No other package of finger3d loads MKL. Where another one in the same
 environment does, leave the files alone; `pip install --force-reinstall mkl intel-openmp` brings them back.
 """
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import webbrowser
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
+from finger3d._extras import require
 from finger3d.cli.common import Set, app, job, load
-from finger3d.errors import MissingError
 
 
 @app.command(name="app")
@@ -33,8 +32,7 @@ def app_(
     scene
         The scene file (TOML).
     """
-    if find_spec("dash") is None:
-        raise MissingError('app: needs the package dash; install it with pip install "finger3d[app]"')
+    require("app", "dash")
     loaded = load(scene, set_)
     from finger3d.app.live_body import LiveBody
     from finger3d.app.page import page

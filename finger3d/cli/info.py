@@ -12,7 +12,6 @@ def info(*, json_: Json = False) -> None:
     Example: finger3d info --json
     """
     import platform
-
     import sys
     from pathlib import Path
 

@@ -1,8 +1,8 @@
 """Condensation of a body to some rows of its displacements: one factorisation, and a dense compliance.
 
 PARDISO returns ``R K^-1 R^T`` as a Schur complement at about the cost of factoring K, and so does the multifrontal
-factor that replaces it without MKL, in twice the time.  SuperLU, which pivots, factors what that one refuses, and solves
-for every row.
+factor that replaces it without MKL, in twice the time.  SuperLU, which pivots, factors what that one refuses, and
+solves for every row.
 """
 
 from __future__ import annotations

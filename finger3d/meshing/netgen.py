@@ -12,15 +12,15 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from finger3d._extras import require
 from finger3d._process import child_environment
 from finger3d._types import Float, Int
-from finger3d.errors import Finger3dError, MissingError
+from finger3d.errors import Finger3dError
 from finger3d.fem.simplex import Mesh
 from finger3d.geometry.design import Design
 from finger3d.meshing.limits import MAX_TETS, check_count
@@ -43,11 +43,7 @@ def new_mesh(
     """Return the mesh, the volume (mm3) of the whole body, and the seconds spent on CAD."""
     from finger3d.meshing.snap import UnusableMeshError
 
-    if find_spec("netgen") is None:
-        raise MissingError(
-            "mesh.mesher = 'netgen' needs the package netgen-mesher: pip install 'finger3d[netgen]', or use mesher = "
-            "'ftetwild'"
-        )
+    require('mesh.mesher = "netgen"', "build123d", "netgen", instead='set mesh.mesher = "swept"')
     if design.tessellation() is not None:
         raise Finger3dError(f"{design.name}: mesh.mesher = 'netgen' needs CAD, and this is STL; use 'ftetwild'")
     start = time.perf_counter()
