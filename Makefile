@@ -4,20 +4,29 @@ PYTHON ?= $(shell for p in python3.11 python3 python3.12 python3.13; do \
 	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet install --constraint constraints.txt
 
-.PHONY: install demo docs bench test test-all test-browser lint clean
+.PHONY: install install-dev demo docs bench test test-all test-browser test-wheel coverage lint clean
 
+# What a press needs, and what developers need besides. The stamps are younger than what they were made from, so nothing
+# is installed twice.
 install: .venv/.installed
+install-dev: .venv/.installed-dev
 
-# The stamp is younger than what it was made from, so nothing is installed twice. The build tools come first and
-# from the same pins: pip would otherwise fetch whatever is newest for its isolated build.
+# The build tools come first and from the same pins: pip would otherwise fetch whatever is newest for its isolated build.
+# MKL's wheels hold 0.5 GB that PARDISO never loads; _slim removes it.
 .venv/.installed: pyproject.toml constraints.txt
 	@test -n "$(PYTHON)" || { echo "finger3d needs Python 3.11 or newer; none found (set PYTHON=/path/to/python3)"; exit 1; }
 	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { echo "$(PYTHON) has no venv module: apt install python3-venv"; exit 1; }
 	@test -x $(BIN)/python || $(PYTHON) -m venv .venv
-	@echo "installing finger3d and its packages into .venv (once; some minutes, 3 GB)"
+	@echo "installing finger3d and its packages into .venv (once; some minutes, 2.3 GB)"
 	@$(PIP) hatchling editables
-	@$(PIP) --no-build-isolation --editable '.[dev]'
+	@$(PIP) --no-build-isolation --editable '.[full]'
+	@$(BIN)/python -m finger3d._slim
 	@$(BIN)/python -c 'import OCP.gp' 2>/dev/null || { echo "build123d cannot be loaded; it needs libGL and libX11: apt install libgl1"; exit 1; }
+	@touch $@
+
+.venv/.installed-dev: .venv/.installed
+	@echo "installing what developers need into .venv (once; some minutes, 1 GB)"
+	@$(PIP) --no-build-isolation --editable '.[dev]'
 	@touch $@
 
 demo: install
@@ -37,25 +46,33 @@ docs: install .venv/.docs
 # Two workers, each on one thread: as many as the smallest machine has cores.
 PYTEST := OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 2 --dist worksteal
 
-test: install
+test: install-dev
 	$(PYTEST) -m "not slow and not browser"
 
-test-all: install .venv/.docs
+test-all: install-dev .venv/.docs
 	$(PYTEST)
 
 # Needs /usr/bin/chromium: apt install chromium.
-test-browser: install .venv/.docs
+test-browser: install-dev .venv/.docs
 	$(BIN)/python -m pytest -q -m browser
 
+# The wheel and the sdist in empty environments outside this folder; takes minutes and pip's packages.
+test-wheel: install-dev
+	$(BIN)/python -m pytest -q tests/test_wheel.py
+
+# Lines of the package that the quick tests run, child processes included.
+coverage: install-dev
+	$(PYTEST) -m "not slow and not browser" --cov --cov-report=term:skip-covered
+
 # Takes both cores and some minutes; the table says how busy the machine was.
-bench: install
+bench: install-dev
 	$(BIN)/python -m validation._bench
 
-lint: install
+lint: install-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
 clean:
-	rm -rf .venv out dist build docs/_build docs/_generated docs/tutorials/*.ipynb .pytest_cache .hypothesis .ruff_cache .mypy_cache .import_linter_cache
+	rm -rf .venv .coverage out dist build docs/_build docs/_generated docs/tutorials/*.ipynb .pytest_cache .hypothesis .ruff_cache .mypy_cache .import_linter_cache

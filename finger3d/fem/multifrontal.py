@@ -3,8 +3,8 @@
 A stiffness is positive definite; that of displacements and pressures is quasi-definite, ``[[A, B^T], [B, -C]]`` with A
 and C positive definite, and has a factor ``L D L^T`` with D = diag(+-1) in every order of elimination, without pivoting
 (Vanderbei 1995, Symmetric quasidefinite matrices, SIAM J. Optim. 5). The unknowns of a separator are eliminated
-together from a dense front (Duff and Reid 1983), whose Schur complement is added to the front of the parent. The rows R of
-``[[K, R^T], [R, 0]]`` are never eliminated: what is left for them at the end is ``-R K^-1 R^T``.
+together from a dense front (Duff and Reid 1983), whose Schur complement is added to the front of the parent. The rows R
+of ``[[K, R^T], [R, 0]]`` are never eliminated: what is left for them at the end is ``-R K^-1 R^T``.
 """
 
 from __future__ import annotations
