@@ -124,8 +124,10 @@ def test_a_thousand_points_survive_kill_9(root, paper_scene, tmp_path) -> None:
 
 
 @contextmanager
-def dask(workers: int, env: dict[str, str], where: Path) -> Iterator[tuple[str, subprocess.Popen]]:
-    """Address and process of a scheduler with some workers."""
+def dask(
+    workers: int, env: dict[str, str], where: Path
+) -> Iterator[tuple[str, subprocess.Popen, list[subprocess.Popen]]]:
+    """Address and process of a scheduler, and the processes of its workers."""
     port = free_port()
     address = f"tcp://127.0.0.1:{port}"
     here = [sys.executable, "-m"]
@@ -133,14 +135,13 @@ def dask(workers: int, env: dict[str, str], where: Path) -> Iterator[tuple[str, 
     worker = ["distributed.cli.dask_worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard"]
     with ExitStack() as running:
         process = running.enter_context(started([*here, *scheduler], env, where, where / "scheduler.log"))
-        for i in range(workers):
-            running.enter_context(started([*here, *worker], env, where, where / f"worker{i}.log"))
-        yield address, process
+        logs = [where / f"worker{i}.log" for i in range(workers)]
+        yield address, process, [running.enter_context(started([*here, *worker], env, where, log)) for log in logs]
 
 
 def test_a_scheduler_and_two_workers_of_their_own(root, paper_scene, tmp_path) -> None:
     env, out = environment(root, str(tmp_path)), tmp_path / "out"
-    with dask(2, env, tmp_path) as (address, _):
+    with dask(2, env, tmp_path) as (address, *_):
         command = sweeping(paper_scene, out, 3, 4, "--scheduler", address)
         # the scheduler may still be on its way: the time limit is there for that, too
         done = subprocess.run(command, env=env, cwd=tmp_path, capture_output=True, text=True, timeout=120)
@@ -150,10 +151,25 @@ def test_a_scheduler_and_two_workers_of_their_own(root, paper_scene, tmp_path) -
     assert {row["body"] for row in lines(out)} == {p.body for p in load_points(paper_scene)}
 
 
+@pytest.mark.slow
+def test_a_sweep_on_a_scheduler_survives_kill_9_of_a_worker(root, paper_scene, tmp_path) -> None:
+    env, out = environment(root, str(tmp_path)), tmp_path / "out"
+    with dask(2, env, tmp_path) as (address, _, workers):
+        command = sweeping(paper_scene, out, 30, 4, "--scheduler", address, *SLOW)
+        with started(command, env, tmp_path, tmp_path / "log") as parent:
+            until(lambda: len(lines(out)) >= 12, "a tenth of the points")
+            workers[0].kill()
+            before = len(lines(out))
+            assert before < 120
+            assert parent.wait(timeout=280) == 0, (tmp_path / "log").read_text()
+        assert workers[1].poll() is None
+    assert_nothing_repeated_or_lost(out, 120)
+
+
 @pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGTERM])
 def test_a_scheduler_that_dies_ends_a_sweep_with_3_and_one_line(sent, root, paper_scene, tmp_path) -> None:
     env, out = environment(root, str(tmp_path)), tmp_path / "out"
-    with dask(1, env, tmp_path) as (address, scheduler):
+    with dask(1, env, tmp_path) as (address, scheduler, _):
         command = sweeping(paper_scene, out, 60, 2, "--scheduler", address, *SLOW)
         with started(command, env, tmp_path, tmp_path / "log") as parent:
             until(lambda: len(lines(out)) >= 5, "five points")

@@ -68,7 +68,11 @@ def test_the_wheel_carries_the_designs_and_nothing_by_accident(root: Path, wheel
     for source in sources(root):
         inside = source.relative_to(root).as_posix()
         assert (f"finger3d/{inside}" if inside.startswith("geometries/") else inside) in names
-    assert "finger3d/geometries/fig9.toml" in names
+    for data in (
+        "geometries/fig9.toml", "geometries/gear.stl", "py.typed", "new_scene.toml", "report/style.css",
+        "report/view3d.js", "report/plotly/plotly-gl3d.min.js", "report/plotly/LICENSE", "materials/silicones.toml",
+    ):  # fmt: skip
+        assert f"finger3d/{data}" in names
     assert {name.split("/")[0] for name in names} == {"finger3d", f"finger3d-{project(root)['version']}.dist-info"}
     assert not [name for name in names if "__pycache__" in name]
 
@@ -90,8 +94,8 @@ def test_every_dependency_is_pinned(root: Path) -> None:
     lines = [x for x in (root / "constraints.txt").read_text().splitlines() if x and not x.startswith("#")]
     assert all(re.fullmatch(r"[a-z0-9-]+==[\w.+]+", line) for line in lines)
     pinned = {line.split("==")[0] for line in lines}
-    extras = project(root)["optional-dependencies"]
-    wanted = project(root)["dependencies"] + extras["dev"] + extras["docs"]
+    wanted = project(root)["dependencies"] + [r for rs in project(root)["optional-dependencies"].values() for r in rs]
+    wanted = [requirement for requirement in wanted if not requirement.startswith("finger3d[")]
     assert {name_of(r) for r in wanted} <= pinned
     assert "cadquery" not in pinned  # its OCP wheel clashes with VTK
 
@@ -130,7 +134,9 @@ def test_the_readmes_first_screen_has_a_sentence_the_picture_and_the_two_command
     targets = re.findall(r"^make (\w+)", first_screen, flags=re.MULTILINE)
     assert targets == ["demo", "test"]
     makefile = (root / "Makefile").read_text()
-    assert all(re.search(rf"^{target}: install$", makefile, flags=re.MULTILINE) for target in targets)
+    # a demo needs no developer's tools
+    assert re.search(r"^demo: install$", makefile, flags=re.MULTILINE)
+    assert re.search(r"^test: install-dev$", makefile, flags=re.MULTILINE)
 
 
 def test_what_the_readme_shows_of_the_command_line_exists(root: Path) -> None:

@@ -25,8 +25,8 @@ def test_plotly_comes_once_and_only_with_charts(tmp_path: Path) -> None:
     page = write_page(tmp_path, "t", charts=[chart, chart])
     text = page.read_text(encoding="utf-8")
     assert text.count('class="chart"') == 2
-    assert text.count("plotly.js v") == 1
-    assert 4_000_000 < page.stat().st_size < 6_000_000
+    assert text.count("* plotly.js (gl3d") == 1
+    assert 1_500_000 < page.stat().st_size < 3_000_000
     assert [line["y"] for found in data_of(page) for line in found["lines"]] == [[None, 2.0]] * 2
     assert "3 more" in text
     assert write_page(tmp_path, "t").stat().st_size < 20_000

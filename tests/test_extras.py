@@ -1,0 +1,86 @@
+"""Optional packages: every one has an extra that brings it, and whoever lacks it reads one line."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import tomllib
+from importlib.metadata import packages_distributions
+from pathlib import Path
+
+import pytest
+
+from finger3d import _extras
+from finger3d.errors import MissingError
+
+WITHOUT = """
+import sys
+from importlib.abc import MetaPathFinder
+names = {names!r}
+class Refuse(MetaPathFinder):
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in names:
+            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+sys.meta_path.insert(0, Refuse())
+import importlib.util
+found = importlib.util.find_spec
+importlib.util.find_spec = lambda name, package=None: None if name.split(".")[0] in names else found(name, package)
+from finger3d.cli import main
+sys.exit(main(sys.argv[1:]))
+"""
+"""The command line as if some packages were not installed."""
+
+
+def run_without(names: set[str], *words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    code = WITHOUT.format(names=names)
+    return subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, cwd=cwd, timeout=120)
+
+
+def test_every_optional_module_comes_with_its_extra(root: Path) -> None:
+    extras = tomllib.loads((root / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    assert set(_extras.EXTRAS.values()) <= set(extras)
+    owners = packages_distributions()
+    direct = {"pypardiso", "build123d", "pytetwild", "pyvista", "distributed", "pandas", "pyarrow", "netgen", "dash"}
+    for module in direct & set(owners):
+        named = {re.match(r"[\w-]+", requirement)[0] for requirement in extras[_extras.EXTRAS[module]]}
+        assert named & {name.replace("_", "-") for name in owners[module]}, module
+
+
+def test_a_requirement_names_command_extra_and_a_way_around(monkeypatch: pytest.MonkeyPatch) -> None:
+    _extras.require("here", "pyvista")
+    monkeypatch.setattr(_extras, "find_spec", lambda module: None)
+    with pytest.raises(MissingError, match=r'^show needs pyvista: pip install "finger3d\[view\]", or add --png FILE$'):
+        _extras.require("show", "pyvista", instead="add --png FILE")
+
+
+def test_an_import_that_fails_inside_an_installed_package_is_no_missing_extra() -> None:
+    assert _extras.absent(ModuleNotFoundError("No module named 'pyvista.odd'", name="pyvista.odd")) is None
+    assert _extras.absent(ModuleNotFoundError("No module named 'other'", name="other")) is None
+    assert _extras.absent(ImportError("cannot load", name="pyvista")) is None
+
+
+@pytest.mark.parametrize(
+    ("words", "extra"),
+    [
+        (["press", "{scene}", "--out", "o", "--set", "mesh.mesher=ftetwild"], "cad"),
+        (["press", "{scene}", "--out", "o", "--set", "mesh.mesher=netgen"], "cad"),
+        (["export", "{scene}", "--out", "o"], "cad"),
+        (["sweep", "{scene}", "--vary", "friction.mu=1", "--out", "o", "--scheduler", "tcp://127.0.0.1:1"], "cluster"),
+        (["app", "{scene}"], "app"),
+    ],
+)
+def test_a_command_that_lacks_its_extra_ends_with_one_line(words, extra, paper_scene, tmp_path) -> None:
+    done = run_without(set(_extras.EXTRAS), *(w.format(scene=paper_scene) for w in words), cwd=tmp_path)
+    assert done.returncode == 3, done.stderr
+    assert f'pip install "finger3d[{extra}]"' in done.stderr.splitlines()[-1]
+    assert "Traceback" not in done.stderr
+
+
+def test_a_solid_is_pressed_and_drawn_without_any_extra(paper_scene, tmp_path) -> None:
+    words = ["press", str(paper_scene), "--out", "o", "--set", "mesh.mesher=swept", "--set", "mesh.size_mm=8"]
+    done = run_without(set(_extras.EXTRAS), *words, "--set", "mesh.base_size_mm=16", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    names = {path.name for path in (tmp_path / "o").iterdir()}
+    assert {"report.html", "finger.png", "fields.vtu", "summary.json"} <= names
+    assert '"solver": "multifrontal"' in (tmp_path / "o" / "summary.json").read_text()
