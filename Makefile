@@ -12,7 +12,7 @@ install: .venv/.installed
 install-dev: .venv/.installed-dev
 
 # The build tools come first and from the same pins: pip would otherwise fetch whatever is newest for its isolated build.
-# MKL's wheels hold 0.5 GB that PARDISO never loads; _slim removes it.
+# MKL's wheels hold 0.5 GB that PARDISO does without; _slim removes it.
 .venv/.installed: pyproject.toml constraints.txt
 	@test -n "$(PYTHON)" || { echo "finger3d needs Python 3.11 or newer; none found (set PYTHON=/path/to/python3)"; exit 1; }
 	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { echo "$(PYTHON) has no venv module: apt install python3-venv"; exit 1; }

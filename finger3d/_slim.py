@@ -1,9 +1,10 @@
-"""Files of the MKL and OpenMP wheels that PARDISO never loads: python -m finger3d._slim removes them.
+"""Files of the MKL and OpenMP wheels that PARDISO does without: python -m finger3d._slim removes them.
 
-PARDISO loads libmkl_rt, the interface lp64, the threads of Intel's OpenMP, the core and the kernels of the processor at
-hand. Interfaces for 64-bit indices, other threads, vector mathematics, clusters and offloading to a GPU come in the
-same wheels, which pip can only install whole. No other package of finger3d loads MKL. Where another one in the same
-environment does, leave the files alone; `pip install --force-reinstall mkl intel-openmp` brings them back.
+PARDISO needs libmkl_rt, the interface lp64, the threads of Intel's OpenMP, the core and the kernels of the processor at
+hand. Interfaces for 64-bit indices, other threads, clusters and offloading to a GPU come in the same wheels, which pip
+can only install whole, and are never loaded; vector mathematics and the allocator of TBB are loaded where they are
+found, and never called. No other package of finger3d loads MKL. Where another one in the same environment does, leave
+the files alone; `pip install --force-reinstall mkl intel-openmp` brings them back.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from collections.abc import Iterator
 from importlib import metadata
 from pathlib import Path
 
-_NEVER_LOADED = (
+_NOT_NEEDED = (
     "libmkl_*_ilp64.so*", "libmkl_gnu_thread.so*", "libmkl_tbb_thread.so*", "libmkl_sequential.so*", "libmkl_vml_*.so*",
     "libmkl_blacs_*.so*", "libmkl_scalapack_*.so*", "libmkl_cdft_core.so*", "libomptarget*", "libompstubs5.*",
     "libarcher*", "libiomp5.a", "libiomp5.dbg", "libiomp5_db.so", "libur_*.so*", "libumf.so*", "libtcm*.so*",
@@ -23,7 +24,7 @@ _WHEELS = ("mkl", "intel-openmp", "intel-cmplr-lib-ur", "umf", "tcmlib", "tbb")
 
 
 def unused(prefix: Path) -> Iterator[Path]:
-    """Yield the files in the environment `prefix` that these wheels installed and PARDISO never loads; Linux only."""
+    """Yield the files in the environment `prefix` that these wheels installed and PARDISO does without; Linux only."""
     for name in _WHEELS:
         try:
             files = metadata.distribution(name).files or []
@@ -31,7 +32,7 @@ def unused(prefix: Path) -> Iterator[Path]:
             continue
         for file in files:
             path = Path(str(file.locate())).resolve()
-            if path.parent == (prefix / "lib").resolve() and any(map(path.match, _NEVER_LOADED)) and path.is_file():
+            if path.parent == (prefix / "lib").resolve() and any(map(path.match, _NOT_NEEDED)) and path.is_file():
                 yield path
 
 
@@ -53,7 +54,7 @@ def main() -> None:
     size = sum(path.stat().st_size for path in paths)
     for path in paths:
         path.unlink()
-    print(f"{size / 1e6:.0f} MB of MKL that PARDISO never loads were removed from {sys.prefix}")
+    print(f"{size / 1e6:.0f} MB of MKL that PARDISO does without were removed from {sys.prefix}")
 
 
 if __name__ == "__main__":

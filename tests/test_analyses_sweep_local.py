@@ -23,8 +23,8 @@ def test_a_worker_returns_the_rows_of_a_press_here_and_its_death_is_told(paper_s
         rows = process.batch(body, sweep.points, 2)
         here = pressed_here(sweep)
         assert [row["normal_force_N"] for row in rows] == [row["normal_force_N"] for row in here]
-        with pytest.raises(RuntimeError, match="TypeError"):
-            process.batch(body, sweep.points, None)
+        with pytest.raises(RuntimeError, match="AttributeError: 'NoneType'"):
+            process.batch(None, sweep.points, 1)
         os.kill(process._process.pid, signal.SIGKILL)
         with pytest.raises(EOFError):
             process.batch(body, sweep.points, 1)
