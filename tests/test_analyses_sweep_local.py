@@ -16,7 +16,7 @@ from tests.sweep_cases import points_of, pressed_here
 
 
 def test_a_worker_returns_the_rows_of_a_press_here_and_its_death_is_told(paper_scene) -> None:
-    sweep = points_of(paper_scene, "friction.mu=0.06,1")
+    sweep = points_of(paper_scene, "friction.mu=0.06,0.1")
     (body,) = sweep.bodies.values()
     process = local.WorkerProcess()
     try:

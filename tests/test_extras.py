@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sys
@@ -26,15 +27,22 @@ sys.meta_path.insert(0, Refuse())
 import importlib.util
 found = importlib.util.find_spec
 importlib.util.find_spec = lambda name, package=None: None if name.split(".")[0] in names else found(name, package)
+import json
 from finger3d.cli import main
-sys.exit(main(sys.argv[1:]))
+for words in json.loads(sys.argv[1]):
+    sys.stderr.write(f"exit code {{main(words)}}\\n")
 """
-"""The command line as if some packages were not installed."""
+"""Runs commands, one after another, as if some packages were not installed."""
 
 
-def run_without(names: set[str], *words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+def run_without(names: set[str], *commands: list[str], cwd: Path) -> list[str]:
+    """Return what each command writes on standard error, with its exit code in the last line."""
     code = WITHOUT.format(names=names)
-    return subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, cwd=cwd, timeout=120)
+    done = subprocess.run(
+        [sys.executable, "-c", code, json.dumps(commands)], capture_output=True, text=True, cwd=cwd, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    return re.findall(r"(.*?exit code \d+)\n", done.stderr, flags=re.DOTALL)
 
 
 def test_every_optional_module_comes_with_its_extra(root: Path) -> None:
@@ -60,27 +68,30 @@ def test_an_import_that_fails_inside_an_installed_package_is_no_missing_extra() 
     assert _extras.absent(ImportError("cannot load", name="pyvista")) is None
 
 
-@pytest.mark.parametrize(
-    ("words", "extra"),
-    [
-        (["press", "{scene}", "--out", "o", "--set", "mesh.mesher=ftetwild"], "cad"),
-        (["press", "{scene}", "--out", "o", "--set", "mesh.mesher=netgen"], "cad"),
-        (["export", "{scene}", "--out", "o"], "cad"),
-        (["sweep", "{scene}", "--vary", "friction.mu=1", "--out", "o", "--scheduler", "tcp://127.0.0.1:1"], "cluster"),
-        (["app", "{scene}"], "app"),
-    ],
-)
-def test_a_command_that_lacks_its_extra_ends_with_one_line(words, extra, paper_scene, tmp_path) -> None:
-    done = run_without(set(_extras.EXTRAS), *(w.format(scene=paper_scene) for w in words), cwd=tmp_path)
-    assert done.returncode == 3, done.stderr
-    assert f'pip install "finger3d[{extra}]"' in done.stderr.splitlines()[-1]
-    assert "Traceback" not in done.stderr
+def test_a_command_that_lacks_its_extra_ends_with_one_line(paper_scene, tmp_path) -> None:
+    scene = str(paper_scene)
+    cases = [
+        (["press", scene, "--out", "o", "--set", "mesh.mesher=ftetwild"], "cad"),
+        (["press", scene, "--out", "o", "--set", "mesh.mesher=netgen"], "cad"),
+        (["export", scene, "--out", "o"], "cad"),
+        (["sweep", scene, "--vary", "friction.mu=1", "--out", "o", "--scheduler", "tcp://127.0.0.1:1"], "cluster"),
+        (["app", scene], "app"),
+    ]
+    said = run_without(set(_extras.EXTRAS), *(words for words, _ in cases), cwd=tmp_path)
+    assert len(said) == len(cases)
+    for (words, extra), text in zip(cases, said, strict=True):
+        *_, line, code = text.splitlines()
+        assert code == "exit code 3", (words, text)
+        assert line.startswith("finger3d: ")
+        assert f'pip install "finger3d[{extra}]"' in line
+        assert "Traceback" not in text
 
 
 def test_a_solid_is_pressed_and_drawn_without_any_extra(paper_scene, tmp_path) -> None:
     words = ["press", str(paper_scene), "--out", "o", "--set", "mesh.mesher=swept", "--set", "mesh.size_mm=8"]
-    done = run_without(set(_extras.EXTRAS), *words, "--set", "mesh.base_size_mm=16", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    words += ["--set", "mesh.base_size_mm=16", "--set", "press.steps=2"]
+    (said,) = run_without(set(_extras.EXTRAS), words, cwd=tmp_path)
+    assert said.endswith("exit code 0"), said
     names = {path.name for path in (tmp_path / "o").iterdir()}
     assert {"report.html", "finger.png", "fields.vtu", "summary.json"} <= names
     assert '"solver": "multifrontal"' in (tmp_path / "o" / "summary.json").read_text()
