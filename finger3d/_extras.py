@@ -12,6 +12,7 @@ EXTRAS = {
     "OCP": "cad",
     "ocp_gordon": "cad",
     "lib3mf": "cad",
+    "manifold3d": "cad",
     "py_lib3mf": "cad",
     "pytetwild": "cad",
     "pyvista": "view",
