@@ -13,7 +13,6 @@ EXTRAS = {
     "ocp_gordon": "cad",
     "lib3mf": "cad",
     "manifold3d": "cad",
-    "py_lib3mf": "cad",
     "pytetwild": "cad",
     "pyvista": "view",
     "vtk": "view",

@@ -93,9 +93,7 @@ def export(
     if tolerance_mm is None:
         tolerance_mm = _TOLERANCE_MM if mold is None else mold.machine.tolerance_mm
         tolerance_mm = min(tolerance_mm, _LARGEST_TOLERANCE * design.height_mm)
-    _check(design, out, tolerance_mm)
-    if triangles is None or mold is not None:
-        require("export", "build123d")
+    _check(design, out, tolerance_mm, needs_cad=triangles is None or mold is not None)
     report.stage("finger")
     if triangles is not None:
         body, solid = Shell(triangles, 0.0, 0.0), None
@@ -134,8 +132,10 @@ def export(
     )
 
 
-def _check(design: Design, out: Path, tolerance_mm: float) -> None:
-    """Refuse a tolerance out of range, and a folder that holds the finger's own file."""
+def _check(design: Design, out: Path, tolerance_mm: float, needs_cad: bool) -> None:
+    """Refuse an export without CAD, a tolerance out of range, and a folder that holds the finger's own file."""
+    if needs_cad:
+        require("export", "build123d")
     largest = _LARGEST_TOLERANCE * design.height_mm
     if not _LEAST_TOLERANCE_MM <= tolerance_mm <= largest:
         raise Finger3dError(

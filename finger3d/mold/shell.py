@@ -119,10 +119,7 @@ def write_step(path: Path, shape: Shape) -> None:
 
 def write_3mf(path: Path, shells: Mapping[str, Shell]) -> None:
     """Write named closed surfaces as one 3MF file, mm, each an object of its own on the plate."""
-    try:
-        from lib3mf import Lib3MF
-    except ModuleNotFoundError:  # on Linux for ARM build123d brings it under the other name
-        from py_lib3mf import Lib3MF
+    from lib3mf import Lib3MF  # on Linux for ARM build123d brings it as py-lib3mf
 
     library = Path(Lib3MF.__file__).with_name("lib3mf")
     wrapper = Lib3MF.Wrapper(str(library))
