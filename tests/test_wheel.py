@@ -66,8 +66,8 @@ def test_the_core_is_small_and_presses_calibrates_and_exports_from_an_empty_fold
     assert json.loads((work / "calibration" / "calibration.json").read_text())
     run(finger3d, "sweep", "scene.toml", *flat, "--vary", "material.nu=0.3,0.45", "--out", "sweep", cwd=work)
     assert (work / "sweep" / "results.csv").exists()
-    run(finger3d, "export", "scene.toml", *coarse, "--mesh", "--out", "export", cwd=work)
-    assert list((work / "export").glob("*.msh"))
+    run(finger3d, "export", "scene.toml", *coarse, "--solver", "calculix", "--out", "export", cwd=work)
+    assert list((work / "export").glob("*.inp"))
     found = json.loads(run(finger3d, "info", "--json", cwd=work))
     assert found["machine"]["environment_bytes"] < MOST_CORE_BYTES
     assert "vtk" not in found["versions"]
