@@ -4,63 +4,61 @@ from __future__ import annotations
 
 import os
 import signal
+from pathlib import Path
+from typing import Any
 
 import pytest
 
-from finger3d.analyses.sweep import local
+from finger3d.analyses.sweep import local, worker
+from finger3d.analyses.sweep.points import Sweep
 from finger3d.analyses.sweep.progress import BodyPoints, SweepProgress
 from finger3d.analyses.sweep.store import ResultStore
-from finger3d.errors import MissingError
 from finger3d.progress import Progress
 from tests.sweep_cases import points_of, pressed_here
 
 
-def test_a_worker_returns_the_rows_of_a_press_here_and_its_death_is_told(paper_scene) -> None:
-    sweep = points_of(paper_scene, "friction.mu=0.06,0.1")
-    (body,) = sweep.bodies.values()
-    process = local.WorkerProcess()
-    try:
-        rows = process.batch(body, sweep.points, 2)
-        here = pressed_here(sweep)
-        assert [row["normal_force_N"] for row in rows] == [row["normal_force_N"] for row in here]
-        with pytest.raises(RuntimeError, match="AttributeError: 'NoneType'"):
-            process.batch(None, sweep.points, 1)
-        os.kill(process._process.pid, signal.SIGKILL)
-        with pytest.raises(EOFError):
-            process.batch(body, sweep.points, 1)
-        assert process.death() == "signal SIGKILL"
-    finally:
-        process.end()
+def pressed(sweep: Sweep, folder: Path, workers: int) -> ResultStore:
+    with ResultStore(sweep, folder).open() as store:
+        bodies = [BodyPoints(spec, [p for p in sweep.points if p.body == key]) for key, spec in sweep.bodies.items()]
+        local.press(bodies, SweepProgress(store, Progress()), workers)
+        return store
 
 
-def test_a_body_that_kills_every_worker_is_given_up_and_others_are_pressed(paper_scene, tmp_path, monkeypatch) -> None:
-    sweep = points_of(paper_scene, "material.nu=0.3,0.4")
-    deadly, started = sweep.points[0].body, []
-    real = local.WorkerProcess.batch
-
-    class Worker(local.WorkerProcess):
-        def __init__(self) -> None:
-            started.append(self)
-            super().__init__()
-
-        def batch(self, spec, points, size):
-            if points[0].body == deadly:
-                self._process.kill()
-            return real(self, spec, points, size)
-
-    monkeypatch.setattr(local, "WorkerProcess", Worker)
-    with ResultStore(sweep, tmp_path).open() as store:
-        bodies = [BodyPoints(sweep.bodies[point.body], [point]) for point in sweep.points]
-        local.press(bodies, SweepProgress(store, Progress()), 1)
-        assert list(store.rows) == [1]
-        assert "every worker that was given this body died (signal SIGKILL)" in store.lost[0]["outcome"]
-    assert len(started) == local.ATTEMPTS + 1
+def test_workers_return_the_rows_of_a_press_here(paper_scene: Path, tmp_path: Path) -> None:
+    sweep = points_of(paper_scene, "friction.mu=0.06,0.1", "material.nu=0.3,0.4")
+    store = pressed(sweep, tmp_path, 2)
+    here = {row["point"]: row["normal_force_N"] for row in pressed_here(sweep)}
+    assert {number: row["normal_force_N"] for number, row in store.rows.items()} == here
 
 
-def test_a_worker_that_cannot_be_started_is_one_line(paper_scene, tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(local.sys, "executable", str(tmp_path / "none"))
-    sweep = points_of(paper_scene, "material.nu=0.3,0.4")
-    with ResultStore(sweep, tmp_path / "out").open() as store:
-        bodies = [BodyPoints(sweep.bodies[point.body], [point]) for point in sweep.points]
-        with pytest.raises(MissingError, match="no worker could be started"):
-            local.press(bodies, SweepProgress(store, Progress()), 2)
+def killed_by(nu: str) -> Any:
+    """A batch that kills its process if the body has this Poisson's ratio."""
+    real = worker.batch
+
+    def batch(spec: Any, points: Any, size: int) -> Any:
+        if spec.given["material"]["nu"] == float(nu):
+            os.kill(os.getpid(), signal.SIGKILL)
+        return real(spec, points, size)
+
+    return batch
+
+
+def test_a_body_that_kills_every_worker_is_given_up_and_others_are_pressed(
+    paper_scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(local.worker, "batch", killed_by("0.3"))
+    store = pressed(points_of(paper_scene, "material.nu=0.3,0.4"), tmp_path, 2)
+    assert list(store.rows) == [1]
+    assert "SIGKILL" in store.lost[0]["outcome"]
+
+
+def test_what_a_worker_raises_is_told_with_the_points_that_are_lost(
+    paper_scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def batch(spec: Any, points: Any, size: int) -> Any:
+        raise LookupError("no such body")
+
+    monkeypatch.setattr(local.worker, "batch", batch)
+    store = pressed(points_of(paper_scene, "material.nu=0.3,0.4"), tmp_path, 1)
+    assert not store.rows
+    assert all(row["outcome"] == "LookupError: no such body" for row in store.lost.values())

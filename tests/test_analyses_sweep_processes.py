@@ -84,7 +84,7 @@ def children(pid: int) -> list[int]:
 
 def workers_of(pid: int) -> list[int]:
     """Worker processes of a sweep on this machine."""
-    return [n for n in children(pid) if "sweep._child" in Path(f"/proc/{n}/cmdline").read_text()]
+    return [n for n in children(pid) if "popen_loky" in Path(f"/proc/{n}/cmdline").read_text()]
 
 
 def killed_and_resumed(command: list[str], out: Path, total: int, env: dict[str, str], where: Path) -> None:

@@ -94,4 +94,4 @@ def test_a_solid_is_pressed_and_drawn_without_any_extra(paper_scene, tmp_path) -
     assert said.endswith("exit code 0"), said
     names = {path.name for path in (tmp_path / "o").iterdir()}
     assert {"report.html", "finger.png", "fields.vtu", "summary.json"} <= names
-    assert '"solver": "multifrontal"' in (tmp_path / "o" / "summary.json").read_text()
+    assert '"solver": "superlu"' in (tmp_path / "o" / "summary.json").read_text()

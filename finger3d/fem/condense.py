@@ -1,8 +1,7 @@
 """Condensation of a body to some rows of its displacements: one factorisation, and a dense compliance.
 
-PARDISO returns ``R K^-1 R^T`` as a Schur complement at about the cost of factoring K, and so does the multifrontal
-factor that replaces it without MKL, in twice the time.  SuperLU, which pivots, factors what that one refuses, and
-solves for every row.
+PARDISO returns ``R K^-1 R^T`` as a Schur complement at about the cost of factoring K.  Without MKL, SuperLU factors K
+and solves for every row.
 """
 
 from __future__ import annotations
@@ -25,7 +24,6 @@ from finger3d.fem.assembly import Stiffness
 if TYPE_CHECKING:
     from scipy.sparse.linalg import SuperLU
 
-    from finger3d.fem.multifrontal import Multifrontal
     from finger3d.fem.pardiso import SchurFactor
 
 
@@ -143,10 +141,9 @@ def condense(
     fixed : numbers of the unknowns held at zero
     rows : (r, n d) sparse
         What is read: row displacement = rows @ u; row forces act through the transpose.
-    solver : "pardiso", "multifrontal" or "superlu"; default FINGER3D_SOLVER, else PARDISO where it is installed, else
-        multifrontal, with SuperLU for matrices that are not quasi-definite
+    solver : "pardiso" or "superlu"; default FINGER3D_SOLVER, else PARDISO where it is installed
     replaced : a condensed body that is no longer needed
-        If it has the same sparsity pattern, its ordering is kept. PARDISO overwrites its factor: that body keeps its
+        If it has the same sparsity pattern, PARDISO keeps its ordering and overwrites its factor; that body keeps its
         compliance, but can no longer solve.
     """
     start = time.perf_counter()
@@ -165,19 +162,11 @@ def condense(
     entries = padded.data / np.repeat(units, np.diff(padded.indptr))
     read = sp.csr_matrix((entries, padded.indices, padded.indptr), shape=padded.shape)
     factor: _Factor
-    before = replaced._factor if replaced else None
-    if solver == "multifrontal":
-        from finger3d.fem.multifrontal import NotQuasiDefiniteError
-
-        try:
-            front = _multifrontal(scaled[free][:, free].tocsr(), read[:, free].tocsr(), before)
-            factor, schur, perturbed = front, front.schur, 0
-        except NotQuasiDefiniteError:
-            solver = "superlu"
     if solver == "pardiso":
+        before = replaced._factor if replaced else None
         factor = _Pardiso.of(scaled, free, read, before if isinstance(before, _Pardiso) else None)
         schur, perturbed = factor.factor.schur, factor.factor.perturbed
-    elif solver == "superlu":
+    else:
         factor = _SuperLU.of(scaled[free][:, free], read[:, free].tocsr())
         schur, perturbed = -factor.compliance(), 0
     compliance = schur + schur.T  # scaled in place: with 10 000 rows each copy takes 0.8 GB
@@ -228,16 +217,7 @@ def stiffened(compliance: Float, springs: Float) -> Float:
 def _default_solver() -> str:
     from finger3d.fem.pardiso import available
 
-    return "pardiso" if available() else "multifrontal"
-
-
-def _multifrontal(upper: sp.csr_matrix, rows: sp.csr_matrix, replaced: _Factor | None) -> Multifrontal:
-    """Factor a matrix without pivoting; the order of elimination of an earlier one with the same pattern is kept."""
-    from finger3d.fem.multifrontal import Multifrontal, Plan
-
-    if isinstance(replaced, Multifrontal) and replaced.plan.fits(upper, rows):
-        return Multifrontal(replaced.plan, upper, rows)
-    return Multifrontal(Plan(upper, rows), upper, rows)
+    return "pardiso" if available() else "superlu"
 
 
 @dataclass(frozen=True)
