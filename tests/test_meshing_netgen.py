@@ -105,8 +105,8 @@ def test_stl_is_left_to_ftetwild(tmp_path: Path) -> None:
 
 
 def test_without_the_package_a_line_names_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(netgen, "find_spec", lambda name: None)
-    with pytest.raises(MissingError, match=r"pip install 'finger3d\[netgen\]'"):
+    monkeypatch.setattr("finger3d._extras.available", lambda module: module != "netgen")
+    with pytest.raises(MissingError, match=r'pip install "finger3d\[netgen\]", or set mesh.mesher = "swept"'):
         netgen.new_mesh(FIG9, OPTIONS, ZONE, BOTH, print)
 
 
