@@ -34,12 +34,12 @@ demo: install
 	@echo "open out/demo/report.html; pictures:"; ls out/demo/*.png
 
 # Sphinx and its extensions, which only the site needs.
-.venv/.docs: .venv/.installed
+.venv/.docs: .venv/.installed-dev
 	@$(PIP) --no-build-isolation --editable '.[docs]'
 	@touch $@
 
 # Executes the tutorials; their outputs are kept until their text changes. Warnings, such as dead links, are errors.
-docs: install .venv/.docs
+docs: install-dev .venv/.docs
 	OMP_NUM_THREADS=1 $(BIN)/python -m sphinx -b html -W --keep-going --quiet docs docs/_build/html
 	@echo "open docs/_build/html/index.html"
 
