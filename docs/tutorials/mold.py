@@ -60,8 +60,8 @@ print(
 print(*sorted(file.name for file in made.files), sep="\n")
 
 # %% [markdown]
-# The two halves, the lid with its pour hole and vents, and all parts on one plate (`mold.3mf`) are ready for a
-# slicer.
+# Each part has an STL file, and `mold.3mf` has all of them as they should be printed. `mold.html` shows the steps of
+# casting; [Molds](../molds.md) has the options.
 
 # %%
 fig, ax = plt.subplots(figsize=(7, 6), layout="constrained")
