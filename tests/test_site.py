@@ -129,5 +129,6 @@ def test_tutorials_show_what_they_computed_and_can_be_downloaded(site: Path, bro
         compile(script, tutorial, "exec")
     page.goto((site / "theory" / "contact.html").as_uri())
     assert page.locator("math").count() > 10
-    assert page.locator("math").first.bounding_box()["height"] > 10.0
+    letters = page.locator("div.math math").first.bounding_box()
+    assert letters["width"] > 3.0 * letters["height"] > 24.0  # w = W r + q is set in a line
     page.close()
