@@ -38,6 +38,12 @@ def test_the_page_of_outputs_names_every_number_column_and_field(root: Path, tmp
     assert files <= rows(page.replace("# Outputs of a press", "## Outputs of a press"), "Outputs of a press")
 
 
+def test_the_python_page_has_every_public_name(root: Path) -> None:
+    page = (root / "docs" / "reference" / "python.md").read_text(encoding="utf-8")
+    shown = set(re.findall(r"^\.\. auto(?:function|class):: finger3d\.(\w+)$", page, flags=re.MULTILINE))
+    assert shown == set(finger3d.__all__) - {"__version__"}
+
+
 class _Links(HTMLParser):
     """Targets of the links, pictures, scripts and styles of a page, and the names that links may lead to."""
 
