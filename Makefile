@@ -38,7 +38,7 @@ demo: install
 	@$(PIP) --no-build-isolation --editable '.[docs]'
 	@touch $@
 
-# Executes the tutorials; their outputs are kept until their text changes. Warnings, such as dead links, are errors.
+# Executes the tutorials; their outputs are kept until they or the package change. Warnings, such as dead links, are errors.
 docs: install-dev .venv/.docs
 	OMP_NUM_THREADS=1 $(BIN)/python -m sphinx -b html -W --keep-going --quiet docs docs/_build/html
 	@echo "open docs/_build/html/index.html"

@@ -7,6 +7,7 @@ index from validation/.  A formula becomes MathML, which browsers set without a 
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import os
 import re
 from collections.abc import Iterator
@@ -28,6 +29,14 @@ UNITS = {
 def unit(key: str) -> str:
     """Return the unit that the name of a key ends in."""
     return next((text for suffix, text in UNITS.items() if key.endswith(suffix)), "")
+
+
+def digest() -> str:
+    """Return 16 digits that change with any source of the package or the designs."""
+    found = hashlib.sha256()
+    for path in sorted(path for folder in ("finger3d", "geometries") for path in (ROOT / folder).rglob("*.py")):
+        found.update(path.read_bytes())
+    return found.hexdigest()[:16]
 
 
 def write_generated(docs: Path) -> None:

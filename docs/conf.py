@@ -8,7 +8,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from _site import MathML, ProjectLinks, descriptions_below, write_generated, write_notebooks
+from _site import MathML, ProjectLinks, descriptions_below, digest, write_generated, write_notebooks
 
 import finger3d
 
@@ -25,7 +25,8 @@ nitpick_ignore_regex = [("py:.*", ".*")]
 myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence", "deflist"]
 myst_heading_anchors = 3
 nb_execution_mode = "cache"
-nb_execution_cache_path = str(Path(__file__).parent / "_build" / ".executed")
+# Outputs are kept until a tutorial or the package changes.
+nb_execution_cache_path = str(Path(__file__).parent / "_build" / f".executed-{digest()}")
 nb_execution_in_temp = True
 nb_execution_raise_on_error = True
 nb_execution_timeout = 300
