@@ -50,3 +50,14 @@ def test_a_file_with_two_names_counts_once(tmp_path: Path) -> None:
 
 def test_only_files_of_the_environment_itself_are_named(tmp_path: Path) -> None:
     assert list(_slim.unused(tmp_path)) == []
+
+
+@pytest.mark.parametrize("code", [0, 1])
+def test_files_are_removed_only_if_the_program_succeeds_without_them(code: int, tmp_path: Path) -> None:
+    aside, path = tmp_path / "aside", tmp_path / "libmkl_a.so"
+    aside.mkdir()
+    path.write_text("kept")
+    program = f"import os, sys; sys.exit({code} + 2 * os.path.exists({str(path)!r}))"
+    assert _slim.remove([path], aside, [sys.executable, "-c", program]) == (code == 0)
+    assert path.exists() == (code == 1)
+    assert list(aside.iterdir()) == []
