@@ -43,6 +43,6 @@ def info(*, json_: Json = False) -> None:
             ("memory", f"{memory[0] / 1e9:.1f} GB" if memory else "unknown"),
             ("mesh cache", folder()),
             ("environment", f"{sys.prefix}, {size / 1e9:.2f} GB" if size is not None else f"{sys.prefix}, shared"),
-            ("PARDISO", "available" if pardiso.available() else "not available; factors take twice as long without it"),
+            ("PARDISO", "available" if pardiso.available() else "not available; SuperLU is used, which is much slower"),
         ],
     )
