@@ -43,12 +43,13 @@ def killed_by(nu: str) -> Any:
     return batch
 
 
+@pytest.mark.slow
 def test_a_body_that_kills_every_worker_is_given_up_and_others_are_pressed(
     paper_scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(local.worker, "batch", killed_by("0.3"))
     store = pressed(points_of(paper_scene, "material.nu=0.3,0.4"), tmp_path, 2)
-    assert list(store.rows) == [1]
+    assert list(store.rows) == [1], store.lost
     assert "SIGKILL" in store.lost[0]["outcome"]
 
 

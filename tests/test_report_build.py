@@ -19,10 +19,10 @@ def test_a_page_asks_no_machine_for_anything(section: Path, solid: Path) -> None
         assert not re.search("https?://", own)
 
 
-def test_a_section_carries_no_plotting_library_and_a_solid_stays_below_8_mb(section: Path, solid: Path) -> None:
+def test_a_section_carries_no_plotting_library_and_a_solid_stays_below_4_mb(section: Path, solid: Path) -> None:
     assert (section / "report.html").stat().st_size < 1_000_000
     assert "Plotly" not in (section / "report.html").read_text(encoding="utf-8")
-    assert 4_000_000 < (solid / "report.html").stat().st_size < 8_000_000
+    assert 1_700_000 < (solid / "report.html").stat().st_size < 4_000_000  # with plotly.js
 
 
 def test_the_builder_takes_what_calibrate_and_sweep_have(tmp_path: Path) -> None:

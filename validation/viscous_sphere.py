@@ -80,7 +80,7 @@ class StandIn:
         material = Isotropic(1.0, self.nu)
         return SimpleNamespace(
             rule="projection", friction=Coulomb(0.0), legs=(Leg(DEPTH),), domain="solid", gauges=(), material=material,
-            object=Plane(),
+            materials=lambda labels: (material,), object=Plane(),
         )  # fmt: skip
 
     @property

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from finger3d.errors import Finger3dError
 from finger3d.io import atomic, claimed
@@ -12,8 +12,6 @@ from finger3d.progress import Progress
 
 if TYPE_CHECKING:
     from finger3d.scene import Scene
-
-Solver = Literal["calculix"]
 
 MESH_FILES = ("finger.vtu", "finger.msh")
 DECK_FILE = "press.inp"

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from finger3d.analyses.export_model import Solver, export_deck, export_mesh
 from finger3d.cli.common import Json, Set, app, check_folder, job, load, print_json, print_rows
 from finger3d.errors import Finger3dError
 from finger3d.mold.options import MoldOptions
-from finger3d.scene import Scene
+
+if TYPE_CHECKING:
+    from finger3d.scene import Scene
 
 
 @app.command
@@ -33,7 +34,7 @@ def export(
         bool, Parameter(negative=(), help="Write the mesh as .vtu and .msh instead, with its facets and parts by name.")
     ] = False,
     solver: Annotated[
-        Solver | None, Parameter(help="Write the press as an input deck of this solver instead: calculix.")
+        Literal["calculix"] | None, Parameter(help="Write the press as an input deck of this solver instead: calculix.")
     ] = None,
     options: Annotated[MoldOptions | None, Parameter(name="*", group="Mold (with --mold)")] = None,
     set_: Set = None,
@@ -56,7 +57,7 @@ def export(
     if mesh or solver:
         if mold or (mesh and solver):
             raise Finger3dError("export: --mold, --mesh and --solver write different things; give one of them")
-        _export_model(loaded, out, solver, json_)
+        _export_model(loaded, out, solver is not None, json_)
         return
     from finger3d.mold.export import export as run
 
@@ -79,10 +80,12 @@ def export(
         print(f"remark: {text}")
 
 
-def _export_model(scene: Scene, out: Path, solver: Solver | None, json_: bool) -> None:
-    """Write the mesh, or the deck of a solver."""
+def _export_model(scene: Scene, out: Path, deck: bool, json_: bool) -> None:
+    """Write the mesh, or the press as a deck."""
+    from finger3d.analyses.export_model import export_deck, export_mesh
+
     with job(json_, lambda _: f"the files in {out} are complete") as report:
-        done = export_deck(scene, out, report) if solver else export_mesh(scene, out, report)
+        done = export_deck(scene, out, report) if deck else export_mesh(scene, out, report)
     if json_:
         print_json({"results": out, **asdict(done)})
         return

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
-
-import numpy as np
 
 ScrewName = Literal["M2", "M2.5", "M3", "M4", "M5"]
 
@@ -33,7 +32,7 @@ class Screw:
     @property
     def corners_mm(self) -> float:
         """Width across the corners of the nut."""
-        return float(self.flats_mm / np.cos(np.pi / 6.0))
+        return self.flats_mm / math.cos(math.pi / 6.0)
 
 
 SCREWS: dict[str, Screw] = {
