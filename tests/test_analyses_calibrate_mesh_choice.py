@@ -68,6 +68,7 @@ def test_a_mesh_that_cannot_be_made_leaves_the_calibration_before() -> None:
         choose_mesh(SECTION, True, Fake(fails_below=9.0), pytest.fail)
 
 
+@pytest.mark.slow
 def test_the_mesh_that_was_chosen_is_that_of_the_results(tmp_path: Path) -> None:
     only = {**NONE, "mesh": 1.0}
     chosen = calibrate(scene(mesh={"mesher": "swept"}), "g36", tmp_path / "own", FEW, tolerances=only)

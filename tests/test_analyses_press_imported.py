@@ -54,6 +54,7 @@ def pressed(file: Path, scene: Path, obj: str, depth: float, sizes: tuple[float,
 BALL = 'shape = "sphere"\nradius_mm = 15.0'
 
 
+@pytest.mark.slow
 def test_a_finger_drawn_outside_can_be_pressed(strange: Path, tmp_path: Path) -> None:
     """Lofted sides, a crown and its rounded rim run into each other smoothly: such meshes were hard to snap."""
     problem, frames = pressed(strange / "tip.step", tmp_path / "scene.toml", BALL, 0.8, (1.2, 3.0))

@@ -56,6 +56,7 @@ def test_fig9_as_a_solid_and_with_held_ends() -> None:
     assert held["normal_force_N"] == pytest.approx(section["normal_force_N"], rel=0.005)
 
 
+@pytest.mark.slow
 def test_swept_and_pytetwild_meshes_agree_within_one_percent() -> None:
     swept, tetwild = last(fig9()), last(fig9(mesh=MeshOptions(2.0, 8.0, "ftetwild")))
     assert tetwild["normal_force_N"] == pytest.approx(swept["normal_force_N"], rel=0.01)

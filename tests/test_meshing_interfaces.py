@@ -60,6 +60,7 @@ def test_a_real_mesh_of_parts_is_conforming_and_on_its_interfaces() -> None:
     np.testing.assert_array_equal(again.part, mesh.part)
 
 
+@pytest.mark.slow
 def test_a_step_file_with_a_core_and_a_cavity_is_meshed(tmp_path: Path) -> None:
     from build123d import Box, Pos, Sphere
 

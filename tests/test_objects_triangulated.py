@@ -37,6 +37,7 @@ def test_a_triangulated_ball_presses_like_the_exact_one() -> None:
     assert abs(meshed["tangential_force_x_N"]) < 1e-10  # symmetric, so the quarter is solved
 
 
+@pytest.mark.slow
 def test_turning_a_mesh_object_and_its_slide_turns_the_result() -> None:
     # A quarter turn about y of a square pad: x becomes z. The mesh is not its own image, so to its accuracy only.
     square = designs()["block"](half_length_mm=3.0, height_mm=3.0, width_mm=6.0)

@@ -25,8 +25,13 @@ COARSE = {
 
 
 def commands(root: Path) -> list[str]:
-    """Every command that the README and the pages of docs/ show, once."""
-    text = "\n".join(page.read_text(encoding="utf-8") for page in [root / "README.md", *sorted(root.glob("docs/*.md"))])
+    """Every command that the README and the pages of docs/ show, once; those of docs/molds.md are tested apart."""
+    return commands_of([root / "README.md", *sorted(set(root.glob("docs/*.md")) - {root / "docs" / "molds.md"})])
+
+
+def commands_of(pages: list[Path]) -> list[str]:
+    """Every command that some pages show, once."""
+    text = "\n".join(page.read_text(encoding="utf-8") for page in pages)
     blocks = re.findall(r"```sh\n(.*?)```", text, flags=re.DOTALL)
     lines = [line.split("  #")[0].strip() for block in blocks for line in block.splitlines()]
     return list(dict.fromkeys(line for line in lines if line.startswith("finger3d ")))
@@ -66,6 +71,15 @@ def test_every_command_is_run(root: Path, folder: Path, capsys: pytest.CaptureFi
             lines = [f"{row['depth_mm']},{row['normal_force_N']}" for row in rows]
             Path("bench.csv").write_text("\n".join(["depth_mm,normal_force_N", *lines]) + "\n")
         assert main(words) == 0, f"{command}: {capsys.readouterr().err}"
+
+
+@pytest.mark.slow
+def test_every_mold_is_exported(root: Path, folder: Path, capsys: pytest.CaptureFixture) -> None:
+    assert main(["new", "scene.toml"]) == 0
+    for command in commands_of([root / "docs" / "molds.md"]):
+        words = shlex.split(command)[1:]
+        if words[0] == "export":
+            assert main(words) == 0, f"{command}: {capsys.readouterr().err}"
 
 
 def test_the_python_example_runs(root: Path, folder: Path) -> None:

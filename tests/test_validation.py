@@ -16,8 +16,10 @@ SLOW = (
     "fig11_shear_mu", "fig07_strains_mu", "gallery", "triangulated_objects", "twisted_sphere", "increment_size",
     "object_curvature", "turned_scene", "hard_cases", "foil_at_large_deformation",
     "embedded_gauge_study", "design_search", "action_reaction", "rolling_cylinder", "hard_large_deformation",
+    "meshers", "readings_within_tolerances", "friction_in_3d", "scaling", "advice_against_truth", "cost_of_accuracy",
+    "hertz_line", "bonded_layer",
 )  # fmt: skip
-"""Studies that take about seven seconds or more in their quick form; `make test-all` runs them."""
+"""Studies that take about four seconds or more in their quick form; `make test-all` runs them."""
 
 
 def _cases() -> list[Any]:
