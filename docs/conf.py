@@ -17,7 +17,7 @@ author = "The finger3d authors"
 copyright = author
 version = release = finger3d.__version__
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton"]
-exclude_patterns = ["_build", "_generated", "**/.ipynb_checkpoints"]
+exclude_patterns = ["_build", "_generated", "paper", "**/.ipynb_checkpoints"]
 nitpicky = True
 # Types in signatures are text; only what the pages themselves refer to has to lead somewhere.
 nitpick_ignore_regex = [("py:.*", ".*")]

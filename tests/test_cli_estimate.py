@@ -90,9 +90,9 @@ def test_the_command_takes_readings_by_name(tmp_path: Path, joint: JointCalibrat
     ("options", "told"),
     [
         (("--strain", "0.05"), "--strain a=0.05"),
-        (("--strain", "c=0.05"), "c "),
+        (("--strain", "c=0.05"), "--strain c=0.05: c "),
         (("--strain", "a=much"), "NAME=NUMBER"),
-        (("--strain", "a=0.05", "--strain", "a=0.06"), "a "),
+        (("--strain", "a=0.05", "--strain", "a=0.06"), "--strain a=0.06: a "),
         (("--strain", "a=nan", "--strain", "b=0.05"), "a = nan"),
         (("--strain", "a=0.05", "--std", "b=-1"), "std"),
     ],
@@ -119,7 +119,7 @@ def test_a_file_has_a_column_for_every_reading(tmp_path: Path, joint: JointCalib
     assert "2 of 2 readings" in capsys.readouterr().out
     readings.write_text("time,b\n0,0.05\n")
     assert run("estimate", kept, "--csv", readings) == 2
-    assert " a" in capsys.readouterr().err
+    assert "named a " in capsys.readouterr().err
 
 
 def follow(*arguments: object, **options: object) -> subprocess.Popen:

@@ -30,7 +30,7 @@ HEAVY = {
 }
 TOP_LEVEL = {
     "pyproject.toml", "finger3d", "geometries", "tests", "validation", "docs", "README.md", "LICENSE", "CITATION.cff",
-    "Makefile", "CHANGELOG.md", "CONTRIBUTING.md", "constraints.txt", "codemeta.json", "paper",
+    "Makefile", "CHANGELOG.md", "CONTRIBUTING.md", "constraints.txt", "codemeta.json",
 }  # fmt: skip
 
 
@@ -108,14 +108,14 @@ def test_versions_agree(root: Path) -> None:
 
 
 def test_every_reference_of_the_paper_is_cited_and_every_citation_has_one(root: Path) -> None:
-    entries = re.findall(r"^@\w+\{(\w+),", (root / "paper" / "paper.bib").read_text(), flags=re.MULTILINE)
-    text = (root / "paper" / "paper.md").read_text().split("---", 2)[2]
+    entries = re.findall(r"^@\w+\{(\w+),", (root / "docs" / "paper" / "paper.bib").read_text(), flags=re.MULTILINE)
+    text = (root / "docs" / "paper" / "paper.md").read_text().split("---", 2)[2]
     assert len(entries) == len(set(entries)) > 10
     assert set(re.findall(r"@(\w+)", text)) == set(entries)
 
 
 def test_what_the_paper_says_of_the_studies_is_true(root: Path) -> None:
-    text = " ".join((root / "paper" / "paper.md").read_text().split())
+    text = " ".join((root / "docs" / "paper" / "paper.md").read_text().split())
     assert "more than 60 studies with more than 900 comparisons" in text
     assert "Some 400 statements" in text
     index = (root / "validation" / "README.md").read_text()

@@ -22,6 +22,9 @@ EDGES = {
 }
 """Vertices of the edges of a simplex of dimension 1, 2, 3."""
 
+TRIANGLES = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
+"""Nodes of the four triangles that a quadratic triangle is drawn as."""
+
 
 @dataclass(frozen=True)
 class Element:

@@ -34,8 +34,53 @@ _MIRROR_TOLERANCE = 2e-4  # over the size: a few times the error of the tessella
 _MAX_MIRRORED_POINTS = 2_000  # that are compared with their mirror images
 
 
+class FileDesign:
+    """Base of the bodies that are read from files, whose extent is that of their surface.
+
+    Attributes
+    ----------
+    path : the file
+    surface : closed triangles, mm
+    """
+
+    path: str
+    surface: Triangles
+
+    @property
+    def name(self) -> str:
+        """Name of the file."""
+        return Path(self.path).name
+
+    @property
+    def height_mm(self) -> float:
+        """Height above the base."""
+        return float(self.surface.high[1])
+
+    @property
+    def half_length_mm(self) -> float:
+        """Largest abs(x)."""
+        return float(max(-self.surface.low[0], self.surface.high[0]))
+
+    @property
+    def width_mm(self) -> float:
+        """Twice the largest abs(z)."""
+        return 2.0 * float(max(-self.surface.low[2], self.surface.high[2]))
+
+    def section(self) -> None:
+        """Return None: no constant section is known of a file."""
+
+    def top(self, x: Float, z: Float) -> Float:
+        """Return the height y (n,) of the highest point at x, z (n,), mm; nan outside the body."""
+        return self.surface.height(x, z, lowest=False)
+
+    def landmarks(self) -> Float:
+        """Return the corners (k, 2), x and z in mm, of the triangles that face up; one of them may touch first."""
+        up = self.surface.normals[:, 1] > 0.0
+        return self.surface.points[np.unique(self.surface.faces[up])][:, ::2]
+
+
 @dataclass(frozen=True)
-class Imported:
+class Imported(FileDesign):
     """A body from a STEP or STL file, y up, with the middle of its base at the origin.
 
     The base is the lowest plane, or the plane of the face named "base" in a STEP file, rotated to face down.
@@ -64,11 +109,6 @@ class Imported:
     parts: Mapping[str, Compound] = field(default_factory=dict, compare=False, repr=False)
 
     @property
-    def name(self) -> str:
-        """Name of the file."""
-        return Path(self.path).name
-
-    @property
     def part_labels(self) -> tuple[str, ...]:
         """Names of the solids in a STEP file of several."""
         return tuple(label for label in self.parts if label)
@@ -81,36 +121,9 @@ class Imported:
         return {"design": "imported", "dimensions": {**dimensions, **turned}}
 
     @property
-    def height_mm(self) -> float:
-        """Height above the base."""
-        return float(self.surface.high[1])
-
-    @property
-    def half_length_mm(self) -> float:
-        """Largest abs(x)."""
-        return float(max(-self.surface.low[0], self.surface.high[0]))
-
-    @property
-    def width_mm(self) -> float:
-        """Twice the largest abs(z)."""
-        return 2.0 * float(max(-self.surface.low[2], self.surface.high[2]))
-
-    @property
     def volume_mm3(self) -> float:
         """Volume inside the triangles."""
         return self.surface.volume
-
-    def section(self) -> None:
-        """Return None: no constant section is known of a file."""
-
-    def top(self, x: Float, z: Float) -> Float:
-        """Return the height y (n,) of the highest point at x, z (n,), mm; nan outside the body."""
-        return self.surface.height(x, z, lowest=False)
-
-    def landmarks(self) -> Float:
-        """Return the corners (k, 2), x and z in mm, of the triangles that face up; one of them may touch first."""
-        up = self.surface.normals[:, 1] > 0.0
-        return self.surface.points[np.unique(self.surface.faces[up])][:, ::2]
 
     def mirrors(self) -> tuple[str, ...]:
         """Return the axes normal to planes of symmetry; none for STL, which cannot be cut exactly."""

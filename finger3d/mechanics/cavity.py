@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from finger3d._types import Float
+from finger3d.fem.elements import TRIANGLES
 from finger3d.fem.simplex import Mesh
 
 CAVITY = "cavity"
 """Label of the facets of inner surfaces."""
-
-_FOUR = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])  # triangles of a quadratic facet
 
 
 def cavity_warnings(mesh: Mesh, displacement: Float) -> list[str]:
@@ -27,7 +26,7 @@ def cavity_warnings(mesh: Mesh, displacement: Float) -> list[str]:
     from finger3d.geometry.surface import Triangles
     from finger3d.geometry.surface_checks import crossings
 
-    triangles = facets[:, _FOUR].reshape(-1, 3) if facets.shape[1] == 6 else facets
+    triangles = facets[:, TRIANGLES].reshape(-1, 3) if facets.shape[1] == 6 else facets
     nodes, faces = np.unique(triangles, return_inverse=True)
     found = crossings(Triangles((mesh.points + displacement)[nodes], faces.reshape(-1, 3)))
     if not len(found):

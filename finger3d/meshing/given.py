@@ -16,7 +16,7 @@ from finger3d.fem.elements import EDGES
 from finger3d.fem.quality import curved_jacobians, curved_volume
 from finger3d.fem.simplex import FACETS, Mesh, quadratic, signed_volumes
 from finger3d.geometry.files import content, welded
-from finger3d.geometry.imported import LARGEST_MM, SMALLEST_MM
+from finger3d.geometry.imported import LARGEST_MM, SMALLEST_MM, FileDesign
 from finger3d.geometry.surface import Triangles
 from finger3d.meshing.bisection import refined
 from finger3d.meshing.limits import check_count
@@ -46,7 +46,7 @@ _SAME = 1e-3  # relative difference of edge lengths that are the same; scenes ke
 
 
 @dataclass(frozen=True, eq=False)
-class GivenMesh:
+class GivenMesh(FileDesign):
     """A finger in a mesh file, moved so that the middle of its base is the origin.
 
     Attributes
@@ -54,16 +54,13 @@ class GivenMesh:
     path : the file
     content : SHA-256 of the file
     mesh : quadratic, facets labelled contact, base, walls and ends, cells with their part; mm
+    surface : its boundary, a curved facet as sixteen triangles
     """
 
     path: str
     content: str
     mesh: Mesh = field(repr=False)
-
-    @property
-    def name(self) -> str:
-        """Name of the file."""
-        return Path(self.path).name
+    surface: Triangles = field(repr=False)
 
     @property
     def part_labels(self) -> tuple[str, ...]:
@@ -76,41 +73,9 @@ class GivenMesh:
         return {"design": "mesh", "dimensions": {"content": self.content}}
 
     @cached_property
-    def surface(self) -> Triangles:
-        """The boundary as closed triangles; a curved facet counts as sixteen."""
-        return _surface(self.mesh)
-
-    @property
-    def height_mm(self) -> float:
-        """Height above the base."""
-        return float(self.surface.high[1])
-
-    @property
-    def half_length_mm(self) -> float:
-        """Largest abs(x)."""
-        return float(max(-self.surface.low[0], self.surface.high[0]))
-
-    @property
-    def width_mm(self) -> float:
-        """Twice the largest abs(z)."""
-        return 2.0 * float(max(-self.surface.low[2], self.surface.high[2]))
-
-    @cached_property
     def volume_mm3(self) -> float:
         """Volume of the curved cells."""
         return curved_volume(self.mesh)
-
-    def section(self) -> None:
-        """Return None: no constant section is known of a file."""
-
-    def top(self, x: Float, z: Float) -> Float:
-        """Return the height y (n,) of the highest point at x, z (n,), mm; nan outside the body."""
-        return self.surface.height(x, z, lowest=False)
-
-    def landmarks(self) -> Float:
-        """Return the corners (k, 2), x and z in mm, of the triangles that face up; one of them may touch first."""
-        up = self.surface.normals[:, 1] > 0.0
-        return self.surface.points[np.unique(self.surface.faces[up])][:, ::2]
 
     def mirrors(self) -> tuple[str, ...]:
         """Return no axes: the mesh is used whole."""
@@ -153,7 +118,8 @@ def given_mesh(path: str | Path) -> GivenMesh:
     mesh = _labelled(path, contents)
     _check_cells(path, mesh)
     _check_connected(path, mesh)
-    return GivenMesh(str(path), content(path), _on_its_base(path, mesh))
+    mesh = _on_its_base(path, mesh)
+    return GivenMesh(str(path), content(path), mesh, _surface(mesh))
 
 
 def mesh_given(design: GivenMesh, options: MeshSizes, zone: Zone) -> tuple[Mesh, MeshReport]:

@@ -5,10 +5,6 @@ netgen brings an OpenCASCADE of its own and runs in a child process, which reads
 
 from __future__ import annotations
 
-import io
-import os
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -18,7 +14,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from finger3d._extras import require
-from finger3d._process import child_environment
 from finger3d._types import Float, Int
 from finger3d.errors import Finger3dError
 from finger3d.fem.simplex import Mesh
@@ -26,7 +21,15 @@ from finger3d.geometry.design import Design
 from finger3d.meshing.limits import MAX_TETS, check_count
 from finger3d.meshing.options import MeshSizes, Zone
 from finger3d.meshing.sizing import RATE, Sizing, forecast, sizing
-from finger3d.meshing.solids import box, check_volume, finer_in_layers, glued_solids, on_cad, tessellated
+from finger3d.meshing.solids import (
+    box,
+    check_volume,
+    finer_in_layers,
+    glued_solids,
+    on_cad,
+    run_mesher,
+    tessellated,
+)
 
 if TYPE_CHECKING:
     from finger3d.geometry.parts import Glued
@@ -94,24 +97,17 @@ def run_child(glued: Glued, field: Sizing, limit: float) -> tuple[Float, Int]:
     """Run netgen in a child process; return points (n, 3), mm, and tets (t, 4)."""
     from build123d import Compound, export_step
 
-    from finger3d.meshing.snap import UnusableMeshError
-
     with tempfile.TemporaryDirectory(prefix="finger3d_") as folder:
         path = Path(folder) / "body.step"
         export_step(Compound(glued.shape.solids()), path)
         step = np.frombuffer(path.read_bytes(), dtype=np.uint8)
     points, sizes = size_points(field)
-    given = io.BytesIO()
-    np.savez(given, step=step, rate=RATE, largest=_EDGE_SHARE * field.base_mm, points=points, sizes=_EDGE_SHARE * sizes)
-    command = [sys.executable, "-P", "-m", "finger3d.meshing._netgen_child", str(os.getpid())]
-    try:
-        done = subprocess.run(
-            command, env=child_environment(), input=given.getbuffer(), timeout=limit, capture_output=True, check=False
-        )
-    except subprocess.TimeoutExpired as error:
-        raise UnusableMeshError(f"netgen did not finish within {limit:.0f} s") from error
-    if done.returncode != 0:
-        said = (done.stderr.decode(errors="replace").strip().splitlines() or ["no message"])[-1]
-        raise UnusableMeshError(f"netgen crashed (return code {done.returncode}): {said}")
-    with np.load(io.BytesIO(done.stdout), allow_pickle=False) as result:
-        return result["points"], result["tets"]
+    return run_mesher(
+        "netgen",
+        limit,
+        step=step,
+        rate=RATE,
+        largest=_EDGE_SHARE * field.base_mm,
+        points=points,
+        sizes=_EDGE_SHARE * sizes,
+    )

@@ -6,11 +6,7 @@ in a child process under a time limit, up to three times.
 
 from __future__ import annotations
 
-import io
 import math
-import os
-import subprocess
-import sys
 import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
@@ -18,7 +14,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from finger3d._extras import require
-from finger3d._process import child_environment
 from finger3d._ranges import at_least
 from finger3d._types import Float, Int
 from finger3d.errors import Finger3dError
@@ -27,7 +22,15 @@ from finger3d.geometry.design import Design
 from finger3d.meshing.limits import MAX_TETS, check_count
 from finger3d.meshing.options import MeshSizes, Zone
 from finger3d.meshing.sizing import Sizing, forecast, sizing
-from finger3d.meshing.solids import box, check_volume, finer_in_layers, glued_solids, on_cad, tessellated
+from finger3d.meshing.solids import (
+    box,
+    check_volume,
+    finer_in_layers,
+    glued_solids,
+    on_cad,
+    run_mesher,
+    tessellated,
+)
 
 if TYPE_CHECKING:
     from finger3d.geometry.parts import Glued
@@ -171,13 +174,11 @@ def run_child(
 
     With triangles inside the body pytetwild could not tell inside and outside, which it does by winding numbers.
     """
-    from finger3d.meshing.snap import UnusableMeshError
-
     extent = np.ptp(points, axis=0)
     bg_points, bg_tets, bg_values = field.background()
-    given = io.BytesIO()
-    np.savez(
-        given,
+    return run_mesher(
+        "pytetwild",
+        limit,
         points=points,
         triangles=triangles,
         edge_length=min(field.base_mm, float(extent.min())),  # an edge longer than the body hangs it
@@ -188,15 +189,3 @@ def run_child(
         bg_tets=bg_tets,
         bg_values=bg_values,
     )
-    command = [sys.executable, "-P", "-m", "finger3d.meshing._tetwild_child", str(os.getpid())]
-    try:
-        done = subprocess.run(
-            command, env=child_environment(), input=given.getbuffer(), timeout=limit, capture_output=True, check=False
-        )
-    except subprocess.TimeoutExpired as error:
-        raise UnusableMeshError(f"pytetwild did not finish within {limit:.0f} s") from error
-    if done.returncode != 0:
-        said = (done.stderr.decode(errors="replace").strip().splitlines() or ["no message"])[-1]
-        raise UnusableMeshError(f"pytetwild crashed (return code {done.returncode}): {said}")
-    with np.load(io.BytesIO(done.stdout), allow_pickle=False) as result:
-        return result["points"], result["tets"]

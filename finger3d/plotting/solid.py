@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from finger3d._arrays import freeze_arrays
 from finger3d._types import Float, Int
 from finger3d.contact.friction import OPEN, SLIP, STICK
-from finger3d.fem.elements import TRI3, TRI6
+from finger3d.fem.elements import TRI3, TRI6, TRIANGLES
 from finger3d.fem.simplex import CONTACT, FREE_FACES, Mesh, part_of_facets
 from finger3d.plotting.camera import AXES, WINDOW, flat, framed, half_height
 from finger3d.plotting.renderer import Arrows, Camera, Drawing, Image, Polygons, Polylines, render, unshared
@@ -36,7 +36,6 @@ _ARROW_COUNT = 100.0  # approximate number of arrows
 _SIX = np.array([[0, 3, 6], [3, 1, 6], [1, 4, 6], [4, 2, 6], [2, 5, 6], [5, 0, 6]])
 _OWNER = np.array([0, 1, 1, 2, 2, 0])
 _RING = np.array([0, 3, 1, 4, 2, 5])
-_FOUR = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
 _SIDES = np.array([[0, 3, 1], [1, 4, 2], [2, 5, 0]])
 
 
@@ -336,7 +335,7 @@ def _common_frame(skins: Sequence[Skin]) -> tuple[Float, Float]:
 def _parts(skin: Skin, colours: Float, arrows: bool) -> tuple[Polygons | Polylines | Arrows, ...]:
     """Return what the renderer draws of a solid; for the parameters see `render_solids`."""
     surfaces = (
-        (skin.body[:, _FOUR].reshape(-1, 3, 3), BODY),
+        (skin.body[:, TRIANGLES].reshape(-1, 3, 3), BODY),
         (skin.contact, np.round(255.0 * colours.reshape(-1, 3)).astype(np.uint8)),
     )
     lines = (

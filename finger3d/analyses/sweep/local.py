@@ -28,11 +28,17 @@ _POLL_S = 0.5
 """Longest time without an answer to Ctrl-C, which Windows delivers between waits only."""
 
 
+def _pool() -> ProcessPoolExecutor:
+    from loky import ProcessPoolExecutor
+
+    return ProcessPoolExecutor(1, initializer=_begin, initargs=(os.getpid(),))
+
+
 @dataclass
 class _Worker:
     """A pool of one process, which keeps the body of its last batch; a new one takes the place of one that died."""
 
-    pool: ProcessPoolExecutor = field(default_factory=lambda: _pool())
+    pool: ProcessPoolExecutor = field(default_factory=_pool)
 
     def submit(self, body: BodyPoints) -> Future[list[Row]]:
         """Press the next batch of a body."""
@@ -47,12 +53,6 @@ class _Worker:
     def end(self) -> None:
         """Kill the process."""
         self.pool.shutdown(wait=True, kill_workers=True)
-
-
-def _pool() -> ProcessPoolExecutor:
-    from loky import ProcessPoolExecutor
-
-    return ProcessPoolExecutor(1, initializer=_begin, initargs=(os.getpid(),))
 
 
 def _begin(parent: int) -> None:
