@@ -8,6 +8,8 @@ from finger3d.errors import MissingError
 
 EXTRAS = {
     "pypardiso": "mkl",
+    "casadi": "mumps",
+    "cffi": "mumps",
     "build123d": "cad",
     "OCP": "cad",
     "ocp_gordon": "cad",

@@ -15,6 +15,7 @@ PACKAGES = (
     "scipy",
     "pypardiso",
     "mkl",
+    "casadi",
     "build123d",
     "cadquery-ocp-novtk",
     "pytetwild",

@@ -49,7 +49,8 @@ def test_every_optional_module_comes_with_its_extra(root: Path) -> None:
     extras = tomllib.loads((root / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     assert set(_extras.EXTRAS.values()) <= set(extras)
     owners = packages_distributions()
-    direct = {"pypardiso", "build123d", "pytetwild", "pyvista", "distributed", "pandas", "pyarrow", "netgen", "dash"}
+    direct = {"pypardiso", "casadi", "cffi", "build123d", "pytetwild", "pyvista"}
+    direct |= {"distributed", "pandas", "pyarrow", "netgen", "dash"}
     for module in direct & set(owners):
         named = {re.match(r"[\w-]+", requirement)[0] for requirement in extras[_extras.EXTRAS[module]]}
         assert named & {name.replace("_", "-") for name in owners[module]}, module

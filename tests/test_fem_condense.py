@@ -9,12 +9,11 @@ import pytest
 import scipy.sparse as sp
 
 from finger3d.fem.condense import condense
-from finger3d.fem.pardiso import available
-from tests.meshes import held_cube
+from tests.meshes import SOLVERS, held_cube
 
 
 @pytest.mark.parametrize("nu", [0.3, 0.49, 0.5])
-@pytest.mark.parametrize("solver", ["superlu", *(["pardiso"] if available() else [])])
+@pytest.mark.parametrize("solver", SOLVERS)
 def test_compliance_equals_a_dense_inverse(nu: float, solver: str) -> None:
     mesh, matrix, fixed, rows = held_cube(nu)
     full = (matrix.upper + sp.triu(matrix.upper, 1).T).toarray()
@@ -28,7 +27,7 @@ def test_compliance_equals_a_dense_inverse(nu: float, solver: str) -> None:
     assert np.abs(found.compliance - want).max() < (1e-12 if nu < 0.5 else 1e-9) * np.abs(want).max()
 
 
-@pytest.mark.parametrize("solver", ["superlu", *(["pardiso"] if available() else [])])
+@pytest.mark.parametrize("solver", SOLVERS)
 def test_field_follows_from_the_same_factor(solver: str) -> None:
     mesh, matrix, fixed, rows = held_cube(0.3)
     found = condense(matrix, fixed, rows, solver)
@@ -39,7 +38,7 @@ def test_field_follows_from_the_same_factor(solver: str) -> None:
 
 
 @pytest.mark.parametrize("columns", [(), (3,)])
-@pytest.mark.parametrize("solver", ["superlu", *(["pardiso"] if available() else [])])
+@pytest.mark.parametrize("solver", SOLVERS)
 def test_elimination_gives_the_rows_before_their_forces_are_known(solver: str, columns: tuple[int, ...]) -> None:
     """Against one solution with loads and row forces together, with a modulus that scales the matrix."""
     mesh, matrix, fixed, rows = held_cube(0.49)

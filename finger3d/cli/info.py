@@ -4,6 +4,12 @@ from __future__ import annotations
 
 from finger3d.cli.common import Json, app, print_json, print_rows
 
+_SOLVERS = {
+    "pardiso": "PARDISO of MKL",
+    "mumps": "MUMPS",
+    "superlu": 'SuperLU, dozens of times slower in solids; pip install "finger3d[mkl]" or "finger3d[mumps]"',
+}
+
 
 @app.command
 def info(*, json_: Json = False) -> None:
@@ -17,7 +23,7 @@ def info(*, json_: Json = False) -> None:
 
     from finger3d._machine import cores, memory_bytes, versions
     from finger3d._slim import environment_bytes
-    from finger3d.fem import pardiso
+    from finger3d.fem import condense
     from finger3d.meshing.cache import folder
 
     memory, isolated = memory_bytes(), sys.prefix != sys.base_prefix
@@ -30,7 +36,7 @@ def info(*, json_: Json = False) -> None:
             "mesh_cache": folder(),
             "environment": sys.prefix,
             "environment_bytes": size,
-            "pardiso": pardiso.available(),
+            "factorisation": condense.default_solver(),
         }
         print_json({"versions": versions(), "machine": machine})
         return
@@ -43,6 +49,6 @@ def info(*, json_: Json = False) -> None:
             ("memory", f"{memory[0] / 1e9:.1f} GB" if memory else "unknown"),
             ("mesh cache", folder()),
             ("environment", f"{sys.prefix}, {size / 1e9:.2f} GB" if size is not None else f"{sys.prefix}, shared"),
-            ("PARDISO", "available" if pardiso.available() else "not available; SuperLU is used, which is much slower"),
+            ("factorisation", _SOLVERS[condense.default_solver()]),
         ],
     )

@@ -1,7 +1,7 @@
 """Condensation of a body to some rows of its displacements: one factorisation, and a dense compliance.
 
-PARDISO returns ``R K^-1 R^T`` as a Schur complement at about the cost of factoring K.  Without MKL, SuperLU factors K
-and solves for every row.
+PARDISO and MUMPS return ``R K^-1 R^T`` as a Schur complement at about the cost of factoring K.  Where neither is
+installed, SuperLU factors K and solves for every row.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from finger3d.fem.assembly import Stiffness
 if TYPE_CHECKING:
     from scipy.sparse.linalg import SuperLU
 
-    from finger3d.fem.pardiso import SchurFactor
+    from finger3d.fem import mumps, pardiso
 
 
 _SOLVE_CHUNK = 64
@@ -141,16 +141,16 @@ def condense(
     fixed : numbers of the unknowns held at zero
     rows : (r, n d) sparse
         What is read: row displacement = rows @ u; row forces act through the transpose.
-    solver : "pardiso" or "superlu"; default FINGER3D_SOLVER, else PARDISO where it is installed
+    solver : "pardiso", "mumps" or "superlu"; default FINGER3D_SOLVER, else the first of them that is installed
     replaced : a condensed body that is no longer needed
-        If it has the same sparsity pattern, PARDISO keeps its ordering and overwrites its factor; that body keeps its
+        If it has the same sparsity pattern, its ordering is kept and its factor overwritten; that body keeps its
         compliance, but can no longer solve.
     """
     start = time.perf_counter()
     upper, size = stiffness.upper, stiffness.upper.shape[0]
     if not upper.has_sorted_indices:
         upper = upper.sorted_indices()
-    solver = solver or os.environ.get("FINGER3D_SOLVER") or _default_solver()
+    solver = solver or os.environ.get("FINGER3D_SOLVER") or default_solver()
     keep = np.ones(size, dtype=bool)
     keep[fixed] = False
     free = np.flatnonzero(keep)
@@ -162,9 +162,9 @@ def condense(
     entries = padded.data / np.repeat(units, np.diff(padded.indptr))
     read = sp.csr_matrix((entries, padded.indices, padded.indptr), shape=padded.shape)
     factor: _Factor
-    if solver == "pardiso":
-        before = replaced._factor if replaced else None
-        factor = _Pardiso.of(scaled, free, read, before if isinstance(before, _Pardiso) else None)
+    if solver in ("pardiso", "mumps"):
+        before = replaced._factor if replaced and replaced.solver == solver else None
+        factor = _Augmented.of(solver, scaled, free, read, before if isinstance(before, _Augmented) else None)
         schur, perturbed = factor.factor.schur, factor.factor.perturbed
     else:
         factor = _SuperLU.of(scaled[free][:, free], read[:, free].tocsr())
@@ -214,21 +214,22 @@ def stiffened(compliance: Float, springs: Float) -> Float:
     return 0.5 * (found + found.T)
 
 
-def _default_solver() -> str:
-    from finger3d.fem.pardiso import available
+def default_solver() -> str:
+    """Return the first solver that is installed: "pardiso", "mumps" or "superlu"."""
+    from finger3d.fem import mumps, pardiso
 
-    return "pardiso" if available() else "superlu"
+    return "pardiso" if pardiso.available() else "mumps" if mumps.available() else "superlu"
 
 
 @dataclass(frozen=True)
 class _Pattern:
-    """Sparsity pattern of PARDISO's matrix ``[[K, R^T], [R, 0]]`` of the free unknowns.
+    """Sparsity pattern of the augmented matrix ``[[K, R^T], [R, 0]]`` of the free unknowns.
 
     Attributes
     ----------
     key : index arrays of stiffness and rows; the same arrays give the same pattern
     is_kept : (nnz of the stiffness,) whether both unknowns of an entry are free
-    is_stiffness : (nnz of PARDISO's matrix,) whether an entry is one of the stiffness
+    is_stiffness : (nnz of the augmented matrix,) whether an entry is one of the stiffness
     row_places, row_entries : places of the entries of the rows, and which entries these are
     """
 
@@ -239,7 +240,7 @@ class _Pattern:
     row_entries: Int
 
     def values(self, upper: sp.csr_matrix, rows: sp.csr_matrix) -> Float:
-        """Return the entries (nnz,) of PARDISO's matrix."""
+        """Return the entries (nnz,) of the augmented matrix."""
         found = np.zeros(len(self.is_stiffness))
         found[self.is_stiffness] = upper.data[self.is_kept]
         found[self.row_places] = rows.data[self.row_entries]
@@ -247,14 +248,14 @@ class _Pattern:
 
 
 @dataclass(frozen=True)
-class _Pardiso:
-    """PARDISO's factor of one matrix; a later matrix of the same pattern may overwrite it.
+class _Augmented:
+    """Factor of one augmented matrix by PARDISO or MUMPS; a later matrix of the same pattern may overwrite it.
 
     `number` counts the matrices that this factor has been computed for.
     """
 
     pattern: _Pattern
-    factor: SchurFactor
+    factor: pardiso.SchurFactor | mumps.SchurFactor
     number: int = 1
 
     @property
@@ -270,22 +271,25 @@ class _Pardiso:
         """See `_Factor`."""
         return self._current().substituted(eliminated, force)
 
-    def _current(self) -> SchurFactor:
+    def _current(self) -> pardiso.SchurFactor | mumps.SchurFactor:
         if not self.is_current:
             raise RuntimeError("the factor of this condensed body was overwritten by a later one; condense it again")
         return self.factor
 
     @classmethod
-    def of(cls, upper: sp.csr_matrix, free: Int, rows: sp.csr_matrix, replaced: _Pardiso | None) -> _Pardiso:
+    def of(
+        cls, solver: str, upper: sp.csr_matrix, free: Int, rows: sp.csr_matrix, replaced: _Augmented | None
+    ) -> _Augmented:
         """Factor the matrix of the free unknowns and the rows, reusing an earlier factor of the same pattern."""
-        from finger3d.fem.pardiso import SchurFactor
+        from finger3d.fem import mumps, pardiso
 
         key = (upper.indptr, upper.indices, free, rows.indptr, rows.indices)
         if replaced and replaced.is_current and all(map(np.array_equal, key, replaced.pattern.key)):
             replaced.factor.renew(replaced.pattern.values(upper, rows))
             return cls(replaced.pattern, replaced.factor, replaced.factor.factorizations)
         pattern, matrix = _augmented(upper, free, rows)
-        return cls(pattern, SchurFactor(matrix, rows.shape[0]))
+        factor = mumps.SchurFactor if solver == "mumps" else pardiso.SchurFactor
+        return cls(pattern, factor(matrix, rows.shape[0]))
 
 
 def _augmented(upper: sp.csr_matrix, free: Int, rows: sp.csr_matrix) -> tuple[_Pattern, sp.csr_matrix]:

@@ -115,7 +115,6 @@ class SchurFactor:
         self._phase(22, np.zeros(1), schur, 1)
         self.schur = np.asarray(schur)
         self.perturbed = int(self._iparm[13])
-        self.memory_mb = float(max(self._iparm[14], self._iparm[15] + self._iparm[16])) / 1024.0
 
     def _phase(self, phase: int, b: Float, x: Float, nrhs: int) -> None:
         _run(self._call, self._pt, phase, self._n, self._a, self._ia, self._ja, self._perm, nrhs, self._iparm, b, x)
