@@ -83,7 +83,7 @@ def test_a_cached_mesh_without_its_companion_gets_one_and_pays_once(made: list[s
     monkeypatch.setattr(companions, "_LEAST_UNSTRUCTURED_UNKNOWNS", 0)
     run(unstructured())
     problem, frames = run(unstructured())
-    assert problem.part.report.from_cache
+    assert problem.body.report.from_cache
     assert made == ["lump"]
     found = companion(problem)
     assert (found.model.mesh.size_mm, found.model.mesh.base_size_mm) == (0.8, 2.0)

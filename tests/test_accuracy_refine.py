@@ -62,7 +62,7 @@ def test_it_refines_until_the_estimate_is_met_and_says_every_round() -> None:
     assert found.rounds[-1].dofs > found.rounds[0].dofs
     assert found.mesh.grading is not None
     assert found.problem is not None
-    assert found.problem.part.stiffness.upper.shape[0] == found.rounds[-1].dofs
+    assert found.problem.body.stiffness.upper.shape[0] == found.rounds[-1].dofs
     # and it is true, within twice the tolerance
     truth = build(replace(section(0.4), mesh=MeshOptions(0.02, 0.1, "swept")))
     force = [-f.state.force[:, 0].sum() for p in (found.problem, truth) for f in [list(march(p))[-1]]]
@@ -109,7 +109,7 @@ def test_a_graded_mesh_is_forecast_by_its_cells() -> None:
     problem = build(section(0.5))
     short, steps = short_press(problem)
     bars = adjoint_bars(short, steps)
-    force = -steps[-1].part.force[:, 0].sum() * 2.0
+    force = -steps[-1].meshed_state.force[:, 0].sum() * 2.0
     growth = cell_growth(short, graded_sizes(short, bars, "normal_force_N", 0.9 * 1e-4 * abs(force)))
     # prescribed lengths grow with the distance, and rows of the structured mesh are as fine as their finest place
     assert 0.5 * growth < second.dofs / first.dofs < 4.0 * growth

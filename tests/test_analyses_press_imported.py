@@ -61,7 +61,7 @@ def test_a_finger_drawn_outside_can_be_pressed(strange: Path, tmp_path: Path) ->
     force = [float(f.state.force[:, 0].sum()) for f in frames]
     assert (np.diff(force, prepend=0.0) > 0.0).all()
     body = imported(strange / "tip.step")
-    assert problem.part.report.volume_mm3 == pytest.approx(body.volume_mm3, rel=2e-3)
+    assert problem.body.report.volume_mm3 == pytest.approx(body.volume_mm3, rel=2e-3)
     assert (problem.mesh.points[np.unique(problem.mesh.facets["base"]), 1] == 0.0).all()
     surface = problem.mesh.points[np.unique(np.vstack(list(problem.mesh.facets.values())))]
     inside = np.zeros(len(surface), dtype=bool)

@@ -98,7 +98,7 @@ def test_loading_and_pressing_need_no_mesher_cad_or_factorisation(tmp_path: Path
 def test_fields_are_refused() -> None:
     reduced = ReducedModel.of(build(small_section()))
     with pytest.raises(Finger3dError, match="mesh"):
-        reduced.problem.part.condensed.solve(np.zeros(0))
+        reduced.problem.body.condensed.solve(np.zeros(0))
 
 
 @pytest.mark.parametrize(

@@ -188,11 +188,11 @@ def test_several_presses_are_proved_as_each_on_its_own(effect) -> None:
         )[-1]
         for mu, depth in ((0.1, 0.3), (0.5, 0.2), (1.0, 0.1))
     ]
-    face = surface(problem.mesh, "contact", problem.part.thickness)
+    face = surface(problem.mesh, "contact", problem.body.thickness)
     kinematics = model.formulation
-    together = kinematics.all_unknowns(problem, [f.part for f in ends])
+    together = kinematics.all_unknowns(problem, [f.meshed_state for f in ends])
     for frame, unknowns in zip(ends, together, strict=True):
-        alone = kinematics.unknowns(problem, frame.part)
+        alone = kinematics.unknowns(problem, frame.meshed_state)
         found, expected = (
             kinematics.gap(problem, displacement(problem.mesh, x), frame.target, face)[0] for x in (unknowns, alone)
         )
@@ -209,8 +209,8 @@ def test_one_solver_proves_as_the_other(monkeypatch) -> None:
     ends = [list(march(problem))[-1]] * 3
     monkeypatch.setenv("FINGER3D_SOLVER", "superlu")
     other = build(scene().model())
-    assert other.part.condensed.solver == "superlu"
-    forces = [f.part.force for f in ends]
+    assert other.body.condensed.solver == "superlu"
+    forces = [f.meshed_state.force for f in ends]
     for a, b in zip(problem.unknowns_of(forces), other.unknowns_of(forces), strict=True):
         assert np.abs(a - b).max() <= 1e-12 * np.abs(b).max()
 
@@ -254,7 +254,7 @@ def test_presses_together_are_the_presses_alone(threads, monkeypatch) -> None:
     assert [p.seconds > 0.0 for p in together] == [True, True, True, False]
     # frames speak of the body as it is in the end
     again = SharedBody(models[1], variants)
-    assert {f[-1].part.force.shape for f in again.frames(variants)} == {(len(again.problem.surface.nodes), 2)}
+    assert {f[-1].meshed_state.force.shape for f in again.frames(variants)} == {(len(again.problem.surface.nodes), 2)}
 
 
 @pytest.mark.parametrize("threads", [False, True], ids=["in turn", "at once"])

@@ -67,14 +67,14 @@ def test_condensed_foils_are_foils_in_the_stiffness(domain: str, nu: float) -> N
     assert problem.factorizations == 1
     inlay = model.inclusions.discretise(model, problem.mesh, problem.axes)
     added = sp.csr_matrix(inlay.rows.T @ sp.diags_array(inlay.bar_stiffness) @ inlay.rows)
-    added.resize(problem.part.stiffness.upper.shape)
+    added.resize(problem.body.stiffness.upper.shape)
     stiffer = Stiffness(
-        sp.csr_matrix(problem.part.stiffness.upper + sp.triu(added)), problem.part.stiffness.pressure_vertices,
-        problem.part.stiffness.pressure_scale,
+        sp.csr_matrix(problem.body.stiffness.upper + sp.triu(added)), problem.body.stiffness.pressure_vertices,
+        problem.body.stiffness.pressure_scale,
     )  # fmt: skip
-    rows = problem.part.condensed.rows[: len(problem.system.active_dofs) + 2, : problem.mesh.points.size]
-    direct = condense(stiffer, problem.part.fixed_dofs, rows).compliance
-    r, mesh_alone = len(problem.system.active_dofs), problem.part.condensed.compliance.copy()
+    rows = problem.body.condensed.rows[: len(problem.system.active_dofs) + 2, : problem.mesh.points.size]
+    direct = condense(stiffer, problem.body.fixed_dofs, rows).compliance
+    r, mesh_alone = len(problem.system.active_dofs), problem.body.condensed.compliance.copy()
     mesh_alone[r:, r:] -= problem.inclusions.subgrid_compliance
     found = stiffened(mesh_alone, problem.inclusions.bar_stiffness)[: r + 2, : r + 2]
     assert found == pytest.approx(direct, abs=1e-8 * direct.max())
@@ -84,7 +84,7 @@ def test_the_rows_of_gauges_are_means_of_their_bars() -> None:
     model = FOIL.apply(block(domain="plane-strain", gauges=(MIDDLE, ASIDE)))
     problem = build(model)
     inlay = model.inclusions.discretise(model, problem.mesh, problem.axes)
-    whole, r = problem.part.condensed.compliance, len(problem.system.active_dofs)
+    whole, r = problem.body.condensed.compliance, len(problem.system.active_dofs)
     assert inlay.gauge_weights.sum(axis=1) == pytest.approx(1.0)
     assert whole[r : r + 2] == pytest.approx(inlay.gauge_weights @ whole[r + 2 :], abs=1e-12 * whole.max())
     assert (
@@ -238,7 +238,9 @@ def test_a_foil_in_a_relaxing_body_does_not_relax(bulk: bool) -> None:
     close = 1e-6 if bulk else 0.01  # the foil's neighbourhood relaxes as if nu were constant
     assert slow.gauges["g"] == pytest.approx(wanted.gauges["g"], rel=close)
     assert slow.gauges["g_free"] == pytest.approx(wanted.gauges["g_free"], rel=close)
-    assert slow.part.force == pytest.approx(wanted.part.force, abs=close * wanted.part.force.max())
+    assert slow.meshed_state.force == pytest.approx(
+        wanted.meshed_state.force, abs=close * wanted.meshed_state.force.max()
+    )
 
 
 def test_viscosity_with_and_without_bulk_agree_around_a_foil_in_an_incompressible_body() -> None:
@@ -246,7 +248,7 @@ def test_viscosity_with_and_without_bulk_agree_around_a_foil_in_an_incompressibl
     problem = build(model)
     prony = ((0.5, 1.0), (0.2, 0.1))
     a, b = (marched(replace(problem, model=Viscosity(prony, bulk).apply(model)))[-1] for bulk in (True, False))
-    assert a.part.force == pytest.approx(b.part.force, abs=1e-6 * a.part.force.max())
+    assert a.meshed_state.force == pytest.approx(b.meshed_state.force, abs=1e-6 * a.meshed_state.force.max())
     for name in ("g", "g_free"):
         assert a.gauges[name] == pytest.approx(b.gauges[name], rel=1e-5)
 

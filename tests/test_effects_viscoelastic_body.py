@@ -22,11 +22,11 @@ def test_in_an_incompressible_body_both_kinds_are_one() -> None:
     # two ways to the same numbers: row forces over the compliance, and displacements over new factors
     problem = build(block(material=Isotropic(1.0, 0.5)))
     a, b = (marched(viscous(problem, TWO, bulk)) for bulk in (True, False))
-    largest = max(np.abs(f.part.force).max() for f in a)
+    largest = max(np.abs(f.meshed_state.force).max() for f in a)
     for f, g in zip(a, b, strict=True):
-        assert np.abs(f.part.force - g.part.force).max() <= 1e-6 * largest
+        assert np.abs(f.meshed_state.force - g.meshed_state.force).max() <= 1e-6 * largest
         assert f.gauges["g"] == pytest.approx(g.gauges["g"], rel=1e-6)
-    stresses = [p.model.formulation.fields(p, f[9].part)[2] for p, f in
+    stresses = [p.model.formulation.fields(p, f[9].meshed_state)[2] for p, f in
                 ((viscous(problem), a), (viscous(problem, TWO, False), b))]  # fmt: skip
     assert np.abs(stresses[0] - stresses[1]).max() <= 1e-5 * np.abs(stresses[0]).max()
 
@@ -40,7 +40,7 @@ def test_the_compliance_of_a_step_is_the_difference_quotient_of_its_response(
     problem = build(block(domain=domain, material=Isotropic(1.0, nu), legs=RAMP))
     body = kind(problem)
     rng = np.random.default_rng(0)
-    rows = len(problem.part.condensed.compliance)
+    rows = len(problem.body.condensed.compliance)
     memory = InternalVariables(np.zeros(body.size), np.zeros((2, body.size)))
     workspace = RelaxationWorkspace()
     for seconds in (0.3, 0.7):  # so that there is a past

@@ -45,11 +45,13 @@ def test_a_growing_contact_is_the_convolution_of_the_elastic_one_to_round_off(mu
     problem = build(dome(legs=RAMP_AND_HOLD, friction=Coulomb(mu)))
     elastic, slow = marched(problem), marched(viscous(problem))
     t = np.array([0.0] + [f.target.time_s for f in elastic])
-    rates = np.diff(np.array([np.zeros_like(elastic[0].part.force)] + [f.part.force for f in elastic]), axis=0)
+    rates = np.diff(
+        np.array([np.zeros_like(elastic[0].meshed_state.force)] + [f.meshed_state.force for f in elastic]), axis=0
+    )
     for n, frame in enumerate(slow, start=1):
         weight = mean_relaxation(TWO, t[n] - t[1 : n + 1], t[n] - t[:n])
         wanted = np.einsum("k,kcd->cd", weight, rates[:n])
-        assert np.abs(frame.part.force - wanted).max() <= 1e-12 * np.abs(wanted).max()
+        assert np.abs(frame.meshed_state.force - wanted).max() <= 1e-12 * np.abs(wanted).max()
 
 
 def test_the_error_of_the_step_falls_with_its_square() -> None:
@@ -68,7 +70,7 @@ def test_the_error_of_the_step_falls_with_its_square() -> None:
 def test_a_hold_is_exact_in_one_step() -> None:
     problem = build(dome(legs=RAMP_AND_HOLD, friction=Coulomb(0.0)))
     many, one = marched(viscous(problem)), marched(viscous(problem, legs=(*RAMP, replace(RAMP_AND_HOLD[1], steps=1))))
-    assert one[-1].part.force == pytest.approx(many[-1].part.force, abs=1e-12)
+    assert one[-1].meshed_state.force == pytest.approx(many[-1].meshed_state.force, abs=1e-12)
 
 
 @pytest.mark.parametrize("bulk", [True, False])
@@ -88,10 +90,12 @@ def test_quick_presses_are_instantaneous_and_slow_ones_relaxed(nu: float, bulk: 
     for legs, material in ((quick, model.material), (slow, soft)):
         wanted = build(replace(model, legs=legs, material=material))
         # one form for all: mixed and displacement elements differ by their mesh error
-        assert wanted.part.elastic.mixed == problem.part.elastic.mixed or not bulk
+        assert wanted.body.elastic.mixed == problem.body.elastic.mixed or not bulk
         got, elastic = marched(viscous(problem, TWO, bulk, legs=legs))[-1], marched(wanted)[-1]
-        close = 1e-7 if wanted.part.elastic.mixed == problem.part.elastic.mixed else 0.01
-        assert got.part.force == pytest.approx(elastic.part.force, abs=close * elastic.part.force.max())
+        close = 1e-7 if wanted.body.elastic.mixed == problem.body.elastic.mixed else 0.01
+        assert got.meshed_state.force == pytest.approx(
+            elastic.meshed_state.force, abs=close * elastic.meshed_state.force.max()
+        )
         assert got.gauges["g"] == pytest.approx(elastic.gauges["g"], rel=close)
 
 
@@ -105,10 +109,10 @@ def test_stress_carries_the_force(domain: str, nu: float, bulk: bool) -> None:
                           legs=RAMP_AND_HOLD))  # fmt: skip
     held = viscous(problem, TWO, bulk)
     frame = marched(held)[-1]
-    sigma = held.model.formulation.fields(held, frame.part)[2]
+    sigma = held.model.formulation.fields(held, frame.meshed_state)[2]
     assert sigma.shape[1:] == (3, 3)
     parts = 2 ** len(problem.axes)
-    volume = _nodal_volume(problem) * problem.part.thickness * parts
+    volume = _nodal_volume(problem) * problem.body.thickness * parts
     force = measure(problem.points, frame)["normal_force_N"]
     assert -float(volume @ sigma[:, 1, 1]) == pytest.approx(3.0 * force, rel=0.01)
     if domain == "plane-strain" and not bulk:
@@ -142,7 +146,7 @@ def test_a_finger_let_go_creeps_back_and_is_met_later(bulk: bool) -> None:
     problem = build(block())
     frames = marched(viscous(problem, TWO, bulk, legs=again))
     free = frames[11:17]  # out of contact before the object is back at first touch
-    assert all((f.part.status == OPEN).all() and not f.part.force.any() for f in frames[14:17])
+    assert all((f.meshed_state.status == OPEN).all() and not f.meshed_state.force.any() for f in frames[14:17])
     strains = np.array([f.gauges["g"] for f in free])
     assert (strains > 0.0).all()
     assert (np.diff(strains) < 0.0).all()
@@ -150,7 +154,7 @@ def test_a_finger_let_go_creeps_back_and_is_met_later(bulk: bool) -> None:
     assert (later < first).all()  # the dent is not yet filled
     long = marched(viscous(problem, TWO, bulk, legs=(*UP_AND_DOWN, Leg(0.0, steps=1, duration_s=1e6))))[-1]
     assert abs(long.gauges["g"]) < 1e-6
-    assert np.abs(long.part.gap - problem.gap(problem.origin)).max() < 1e-6
+    assert np.abs(long.meshed_state.gap - problem.gap(problem.origin)).max() < 1e-6
 
 
 @pytest.mark.parametrize("bulk", [True, False])
@@ -174,7 +178,7 @@ def test_an_increment_cut_in_two_starts_from_the_state_restored(monkeypatch: pyt
     assert seen.calls == 9
     two = marched(viscous(problem, TWO, bulk, legs=(*RAMP, Leg(0.0, steps=2, duration_s=0.5))))[-1]
     assert cut.method == "cut back"
-    assert np.array_equal(cut.part.force, two.part.force)
+    assert np.array_equal(cut.meshed_state.force, two.meshed_state.force)
     assert cut.gauges == two.gauges
 
 
@@ -283,7 +287,7 @@ def test_what_is_elastic_beside_the_body_stays_elastic() -> None:
         strain, stress[n] = e, new
     for frame in frames:
         wanted = np.interp(frame.target.time_s, t, stress)
-        assert frame.part.force[:, 0] / problem.surface.area == pytest.approx(wanted, rel=2e-3)
+        assert frame.meshed_state.force[:, 0] / problem.surface.area == pytest.approx(wanted, rel=2e-3)
 
 
 def test_an_elastic_object_does_not_relax_with_the_finger() -> None:

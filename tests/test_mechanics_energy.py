@@ -20,7 +20,7 @@ from tests.models import block, fig9
 
 def stored(problem: Problem, frame: StepResult) -> float:
     """Elastic energy (mJ), f C f / 2, summed over the whole finger's points."""
-    force = problem.upright_force(frame.part)
+    force = problem.upright_force(frame.meshed_state)
     each = 0.5 * np.einsum("id,idje,je->i", force, problem.delassus, force)
     return float((each[problem.symmetry.image_of] * problem.symmetry.multiplicity).sum())
 
@@ -68,7 +68,7 @@ def test_work_at_large_deformation_is_the_energy_stored_and_dissipated() -> None
         end = list(march(problem, workspace=workspace))[-1]
         assert end.outcome.ok
         solid = workspace.bodies[False].solid
-        energy = 2 ** len(problem.axes) * solid.energy(problem.model.formulation.unknowns(problem, end.part))
+        energy = 2 ** len(problem.axes) * solid.energy(problem.model.formulation.unknowns(problem, end.meshed_state))
         excess.append(abs(end.external_work_mJ - energy - end.dissipation_mJ) / end.external_work_mJ)
     assert excess[1] < 1e-3
     assert excess[2] < 0.4 * excess[0]

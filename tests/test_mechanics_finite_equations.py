@@ -30,7 +30,7 @@ def solved() -> tuple[FiniteIncrement, DeformedState]:
 def test_a_solution_is_in_balance_and_a_displaced_one_is_not(solved: tuple[FiniteIncrement, DeformedState]) -> None:
     increment, state = solved
     force = np.abs(state.force).max()
-    free = np.setdiff1d(np.arange(len(state.unknowns)), increment.problem.part.fixed_dofs)
+    free = np.setdiff1d(np.arange(len(state.unknowns)), increment.problem.body.fixed_dofs)
     at_rest, displaced = (
         np.abs(increment.out_of_balance(increment.at(share * state.unknowns), state.force)[free]).max()
         for share in (1.0, 1.001)

@@ -56,5 +56,5 @@ def test_a_state_with_a_cell_folded_at_a_sharp_corner_is_refused_by_its_place() 
     assert y < 1.0
     for frame in frames[:-1]:
         assert frame.outcome.ok
-        u = displacement(problem.mesh, model.formulation.unknowns(problem, frame.part))
+        u = displacement(problem.mesh, model.formulation.unknowns(problem, frame.meshed_state))
         assert curved_jacobians(replace(problem.mesh, points=problem.mesh.points + u)).min() > 0.0

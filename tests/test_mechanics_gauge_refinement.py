@@ -51,11 +51,11 @@ def test_the_slope_of_a_gauge_near_the_edge_of_contact_is_several_times_as_accur
 def test_without_a_gauge_or_at_factor_one_the_mesh_stays_as_it_is(changes: dict[str, Any]) -> None:
     usual = build(model(8.0, 1.0, gauges=()))
     same = build(model(8.0, 4.0 if changes else 1.0, **changes))
-    assert same.part.report.hash == usual.part.report.hash
+    assert same.body.report.hash == usual.body.report.hash
 
 
 def test_the_report_describes_the_refined_mesh() -> None:
-    usual, finer = build(model(8.0, 1.0)).part.report, build(model(8.0, 4.0)).part.report
+    usual, finer = build(model(8.0, 1.0)).body.report, build(model(8.0, 4.0)).body.report
     assert finer.cells > 2 * usual.cells
     assert finer.volume_mm3 == pytest.approx(usual.volume_mm3, rel=1e-12)
     assert finer.hash != usual.hash
@@ -93,5 +93,5 @@ def test_the_key_of_a_scene_reaches_the_mesh_and_is_written_with_it() -> None:
 def test_a_forecast_counts_the_cells_around_gauges() -> None:
     finer = model(2.0, 4.0)
     expected, built = forecast(finer), build(finer)
-    assert expected["cells"] == built.part.report.cells
-    assert expected["dofs"] == built.part.stiffness.upper.shape[0]
+    assert expected["cells"] == built.body.report.cells
+    assert expected["dofs"] == built.body.stiffness.upper.shape[0]

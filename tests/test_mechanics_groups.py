@@ -52,7 +52,7 @@ def assert_same(steps: list[StepResult], wanted: list[StepResult]) -> None:
     for a, b in zip(steps, wanted, strict=True):
         assert a.outcome.ok
         assert a.residual <= TOLERANCE
-        assert np.abs(a.part.force - b.part.force).max() <= 1e-6 * np.abs(b.part.force).max()
+        assert np.abs(a.meshed_state.force - b.meshed_state.force).max() <= 1e-6 * np.abs(b.meshed_state.force).max()
         assert a.external_work_mJ == pytest.approx(b.external_work_mJ, rel=1e-6)
 
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
+from finger3d._types import Float
+from finger3d.accuracy.adjoint_bars import adjoint_bars
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.effects.elastic_object import Effect as ElasticObject
 from finger3d.effects.embedded_gauge import Effect as Foil
@@ -17,10 +21,10 @@ from finger3d.fem.material import Isotropic
 from finger3d.fem.recover import displacement
 from finger3d.fem.traces import displacement_row
 from finger3d.mechanics.gauges import Gauge
-from finger3d.mechanics.history import StepResult, measure
+from finger3d.mechanics.history import StepResult, flat_readings, measure
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.readings import Marker, Taxel
+from finger3d.mechanics.readings import Marker, MeshedBody, Taxel
 from finger3d.objects import Plane
 from tests.models import block, run
 
@@ -48,7 +52,7 @@ def base_force(problem: Problem, frame: StepResult) -> float:
 def test_a_marker_moves_with_the_field_on_both_sides_of_a_symmetry_plane() -> None:
     at = (0.93, 1.41, 0.57)
     problem, frames = pressed(markers=(Marker("m", *at), Marker("image", -at[0], at[1], -at[2])))
-    u = displacement(problem.mesh, problem.unknowns(problem.upright_force(frames[-1].part)))
+    u = displacement(problem.mesh, problem.unknowns(problem.upright_force(frames[-1].meshed_state)))
     rows = [displacement_row(problem.mesh, np.array(at), axis) for axis in np.eye(3)]
     assert frames[-1].markers["m"] == pytest.approx([(row @ u.ravel())[0] for row in rows], rel=1e-9)
     assert frames[-1].markers["image"] == pytest.approx(np.multiply(frames[-1].markers["m"], [-1, 1, -1]), rel=1e-12)
@@ -141,3 +145,44 @@ def test_a_reduced_model_reads_what_the_press_reads(tmp_path) -> None:
     assert last.markers["m"] == pytest.approx(frames[-1].markers["m"], rel=1e-9)
     assert last.taxels == pytest.approx(frames[-1].taxels, rel=1e-9)
     assert last.gauges == pytest.approx(frames[-1].gauges, rel=1e-9)
+
+
+@dataclass(frozen=True)
+class Elongation:
+    """Change of the distance between two markers that share x and z, as a draw wire reads it; one number, mm."""
+
+    name: str
+    low: Marker
+    high: Marker
+    kind: ClassVar[str] = "elongation"
+
+    def columns(self, dim: int) -> tuple[str, ...]:
+        return (self.name,)
+
+    def mirrored(self, name: str) -> tuple[Elongation, tuple[float, ...]]:
+        return replace(self, name=name, low=self.low.mirrored("")[0], high=self.high.mirrored("")[0]), (1.0,)
+
+    def rows(self, body: MeshedBody) -> sp.csr_matrix:
+        return self.high.rows(body)[1] - self.low.rows(body)[1]
+
+    def at_finite_strain(self, body: MeshedBody, u: Float, forces: Float) -> Float:
+        low, high = (m.place[: body.mesh.dim] + m.at_finite_strain(body, u, forces) for m in (self.low, self.high))
+        return np.array([np.linalg.norm(high - low) - (self.high.y_mm - self.low.y_mm)])
+
+
+@pytest.mark.parametrize("effect", [None, LargeDeformation(), Viscosity(((0.3, 1.0),))])
+def test_a_reading_of_another_kind_needs_a_class_and_nothing_else(effect: object) -> None:
+    """Its column stands in summary.json and has an error bar; it agrees with the two markers that it is made of."""
+    ends = Marker("low", 0.5, 0.4, 0.3), Marker("high", 0.5, 1.6, 0.3)
+    legs = (Leg(0.3, steps=3, duration_s=1.0),)
+    model = block(object=Plane(), legs=legs, markers=ends, other_readings=(Elongation("wire", *ends),))
+    problem, frames = run(effect.apply(model) if effect else model)
+    low, high = (np.array(frames[-1].markers[m.name]) + m.place for m in ends)
+    along = high[1] - low[1] if not isinstance(effect, LargeDeformation) else np.linalg.norm(high - low)
+    assert frames[-1].other_readings["wire"] == pytest.approx(along - 1.2, rel=1e-9)
+    entry = measure(problem.points, frames[-1])
+    assert entry["other_readings"] == frames[-1].other_readings
+    assert flat_readings(entry)["reading_wire"] == frames[-1].readings["wire"]
+    if effect is None:
+        bar = adjoint_bars(problem, frames).bars["reading_wire"]
+        assert 0.0 < bar < abs(frames[-1].other_readings["wire"])

@@ -20,7 +20,7 @@ def test_fields_of_uniaxial_compression_are_uniform(domain: str) -> None:
     """With nu = 0 a flat press without friction is uniaxial: strain depth over height, stress E times that."""
     flat = {"object": Plane(), "material": Isotropic(2.0, 0.0), "friction": Coulomb(0.0), "domain": domain}
     problem, frames = run(block(mesh=COARSE, legs=(Leg(0.3, steps=1),), **flat))
-    u, strain, stress = problem.model.formulation.fields(problem, frames[-1].part)
+    u, strain, stress = problem.model.formulation.fields(problem, frames[-1].meshed_state)
     assert u[:, 1] == pytest.approx(-0.1 * problem.mesh.points[:, 1], abs=1e-9)
     uniform = np.zeros((3, 3))
     uniform[1, 1] = -0.1
@@ -30,11 +30,11 @@ def test_fields_of_uniaxial_compression_are_uniform(domain: str) -> None:
 
 def test_the_work_of_one_proportional_press_is_the_strain_energy() -> None:
     problem, frames = run(block(mesh=COARSE, legs=(Leg(0.2, steps=1),)))
-    formulation, state = problem.model.formulation, frames[-1].part
+    formulation, state = problem.model.formulation, frames[-1].meshed_state
     start = formulation.start(problem)
     work = formulation.work_on_body(problem, start, state, problem.origin, frames[-1].target)
     x = formulation.unknowns(problem, state)
-    upper = problem.part.stiffness.upper
+    upper = problem.body.stiffness.upper
     energy = 0.5 * x @ ((upper + sp.triu(upper, 1).T) @ x)
     assert work == pytest.approx(energy, rel=1e-9)
     # the moment on a quarter: its force along y at the centroids of its points

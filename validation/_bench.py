@@ -103,9 +103,9 @@ def measured(size: float) -> dict[str, float]:
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
     del problem  # frees the memory of its factor
     problem, again = _pressed(size)
-    free = np.setdiff1d(np.arange(problem.part.stiffness.upper.shape[0]), problem.part.fixed_dofs)
-    upper = problem.part.stiffness.upper[free][:, free]
-    other = condense(problem.part.stiffness, problem.part.fixed_dofs, problem.part.condensed.rows, "mumps").seconds
+    free = np.setdiff1d(np.arange(problem.body.stiffness.upper.shape[0]), problem.body.fixed_dofs)
+    upper = problem.body.stiffness.upper[free][:, free]
+    other = condense(problem.body.stiffness, problem.body.fixed_dofs, problem.body.condensed.rows, "mumps").seconds
     del problem
     return _least([found, again]) | {"peak_MB": peak, "factorisation": _plain(upper), "mumps": other}
 
@@ -114,7 +114,7 @@ def _pressed(size: float) -> tuple[Problem, dict[str, float]]:
     """The finger condensed, and pressed in ten increments, under one mu and all; seconds by stage, unknowns, rows."""
     problem = build(fig9(size))
     found = {k: problem.seconds[k] for k in ("assembly", "condensation")}
-    found |= {"dofs": problem.part.stiffness.upper.shape[0], "rows": len(problem.system.active_dofs)}
+    found |= {"dofs": problem.body.stiffness.upper.shape[0], "rows": len(problem.system.active_dofs)}
     begin = time.perf_counter()
     *_, frame = march(replace(problem, model=replace(problem.model, friction=Coulomb(MU))))
     if not frame.outcome.ok:
@@ -299,10 +299,10 @@ def _large_deformation(size: float, load: float) -> list[Row]:
     if not all(step.outcome.ok for step in march(problem, workspace=workspace)):
         raise AssertionError("large deformation did not settle")
     one = time.perf_counter() - begin
-    body = f"large deformation, {problem.part.stiffness.upper.shape[0]} unknowns, 10 increments"
+    body = f"large deformation, {problem.body.stiffness.upper.shape[0]} unknowns, 10 increments"
     rows = [
         _row(f"{body}: factorisations", 15.0, workspace.factorizations, load),
-        _row(f"{body}: time over that of one condensation", 20.0, one / problem.part.condensed.seconds, load),
+        _row(f"{body}: time over that of one condensation", 20.0, one / problem.body.condensed.seconds, load),
     ]
     mus = np.linspace(0.05, 1.25, 3 if size == QUICK else 25)
     begin = time.perf_counter()
@@ -314,7 +314,7 @@ def _large_deformation(size: float, load: float) -> list[Row]:
     if not all(step.outcome.ok for step in march(section)):
         raise AssertionError("large deformation of the section did not settle")
     seconds = time.perf_counter() - begin
-    what = f"large deformation of the section, {section.part.stiffness.upper.shape[0]} unknowns, 10 increments, s"
+    what = f"large deformation of the section, {section.body.stiffness.upper.shape[0]} unknowns, 10 increments, s"
     return [*rows, _row(what, 1.0, seconds, load)]
 
 

@@ -27,7 +27,7 @@ from finger3d.mechanics.build import MARGIN, candidate_points, contact_rows
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.history import ContactPoints, StepResult, measure
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.problem import ContactSystem, Part, Problem, free_surface
+from finger3d.mechanics.problem import CondensedBody, ContactSystem, Problem, free_surface
 from finger3d.mechanics.solve import march
 from finger3d.mechanics.symmetry import active_dofs, held_dofs, symmetry, unfold_points
 from finger3d.meshing.generate import mesh_solid
@@ -155,7 +155,7 @@ def condensed(parts: Parts, solver: str | None = None) -> Problem:
     mirrored, points = unfold_points(parts.model, parts.mesh, parts.surface, parts.axes)
     return Problem(
         model=parts.model,
-        body=Part(
+        condensed_body=CondensedBody(
             mesh=parts.mesh,
             report=parts.report,
             elastic=parts.elastic,

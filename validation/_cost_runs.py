@@ -50,10 +50,10 @@ def measured(given: dict[str, Any]) -> dict[str, Any]:
         seconds |= {"condensation": 0.0, f"contact {case.counts[0]}": time.perf_counter() - begin}
         return {**answer, "seconds": seconds, "numbers": {str(case.counts[0]): values}, "factorizations": press.solves}
     problem = condensed(parts, case.solver)
-    seconds["condensation"] = problem.part.condensed.seconds
+    seconds["condensation"] = problem.body.condensed.seconds
     answer |= {
-        "rows": len(problem.part.condensed.compliance),
-        "perturbed_pivots": problem.part.condensed.perturbed_pivots,
+        "rows": len(problem.body.condensed.compliance),
+        "perturbed_pivots": problem.body.condensed.perturbed_pivots,
     }
     found, iterations, factorizations = {}, {}, {}
     for count in case.counts:
@@ -94,7 +94,7 @@ def single(given: dict[str, Any]) -> dict[str, Any]:
     frames = [
         in_steps(p, count)[-1] for p in (problem, replace(problem, system=replace(problem.system, delassus=rounded)))
     ]
-    state = frames[1].part
+    state = frames[1].meshed_state
     c, d = state.force.shape
     # the state found with the rounded compliance, held against the true one; position is the change from the start
     moved = free_motion(problem, frames[1].target) + np.einsum("aibj,bj->ai", problem.delassus, state.force)

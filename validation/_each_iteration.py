@@ -64,7 +64,7 @@ class EachIteration:
             active_dofs=parts.active_dofs,
             first_contact_mm=parts.first_contact_mm,
         )
-        shell = Problem(model=parts.model, body=None, symmetry=symmetry, system=system)
+        shell = Problem(model=parts.model, condensed_body=None, symmetry=symmetry, system=system)
         state = ContactState.at_rest(np.maximum(shell.gap(targets(legs)[0]), 0.0), d)
         for target in targets(legs):
             free = free_motion(shell, target)

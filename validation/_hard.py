@@ -126,8 +126,8 @@ def touch(quick: bool) -> Iterator[Row]:
     )  # fmt: skip
     yield _is("no point touches: settled, without force", 0, np.abs(apart.state.force).max() + (not apart.outcome.ok))
     tiny = list(march(_block(0.3, (Leg(0.05, steps=40 if quick else 100), Leg(1.0, steps=2)), arch)))
-    counts = [int((f.part.status != OPEN).sum()) for f in tiny]
-    before = sum(float(np.abs(f.part.force).sum()) for f, n in zip(tiny, counts, strict=True) if not n)
+    counts = [int((f.meshed_state.status != OPEN).sum()) for f in tiny]
+    before = sum(float(np.abs(f.meshed_state.force).sum()) for f, n in zip(tiny, counts, strict=True) if not n)
     yield _is("approach in small steps: force before the first point touches, N", 0, before)
     yield _is("approach in small steps: points that touch first", 1, next(n for n in counts if n))
     yield _is("approach in small steps, then 1 mm: unsettled", 0, sum(not f.outcome.ok for f in tiny))

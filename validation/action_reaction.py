@@ -61,8 +61,8 @@ class Balance:
 
 def balance(problem: Problem, frame: StepResult) -> Balance:
     """Compare contact forces with K u, and work with what is stored and lost."""
-    upper, n, d = problem.part.stiffness.upper, problem.mesh.points.size, problem.dim
-    unknowns = problem.unknowns(frame.part.force)
+    upper, n, d = problem.body.stiffness.upper, problem.mesh.points.size, problem.dim
+    unknowns = problem.unknowns(frame.meshed_state.force)
     inner = (upper + sparse.triu(upper, 1).T) @ unknowns
     nodal = inner[:n].reshape(-1, d)
     base = np.unique(problem.mesh.facets["base"])
@@ -85,7 +85,9 @@ def balance(problem: Problem, frame: StepResult) -> Balance:
 def least_loss(frames: list[StepResult]) -> float:
     """Smallest energy lost by friction at any point in any increment, over the largest."""
     lost = [
-        -np.sum(b.part.force[:, 1:] * (b.part.accumulated_slip - a.part.accumulated_slip), axis=1)
+        -np.sum(
+            b.meshed_state.force[:, 1:] * (b.meshed_state.accumulated_slip - a.meshed_state.accumulated_slip), axis=1
+        )
         for a, b in zip(frames, frames[1:], strict=False)
     ]
     return float(np.min(lost) / np.max(lost))

@@ -123,7 +123,7 @@ def by_large_deformation(name: str, model: Model) -> Iterator[Judged]:
     """Yield the changes by large deformation where a press estimates them."""
     problem = build(model)
     step = last(problem)
-    strain = problem.model.formulation.fields(problem, step.part)[1]
+    strain = problem.model.formulation.fields(problem, step.meshed_state)[1]
     if largest_principal_strain(strain) < LEAST_STRAIN:
         return
     estimate = large_deformation(problem, step, sum(int(leg.steps) for leg in model.legs))

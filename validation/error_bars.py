@@ -215,7 +215,7 @@ def _by_mesh(case: Case) -> list[Judged]:
     found = []
     for size in case.sizes:
         problem = build(case.at(size))
-        dofs = problem.part.stiffness.upper.shape[0]
+        dofs = problem.body.stiffness.upper.shape[0]
         for (mu, depth, told, bars), exact in zip(_estimated(problem, case.mus), truth, strict=True):
             right = {**exact, **_hertz(case, exact)}
             found += [
@@ -283,7 +283,7 @@ def _by_steps(name: str, model: Model, counts: tuple[int, ...], true_count: int)
         for k, value in numbers.items():
             if k == "dissipation_mJ" and exact[k] < exact.get("floor", 0.0):
                 continue
-            dofs = problem.part.stiffness.upper.shape[0]
+            dofs = problem.body.stiffness.upper.shape[0]
             depth = model.legs[0].depth_mm
             yield Judged(
                 name, part, dofs, model.friction.mu, depth, k, value, bars[k], abs(value - exact[k])

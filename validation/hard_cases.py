@@ -93,7 +93,7 @@ def finger(dim: int, nu: float, size: float) -> Problem:
 
 def violation(problem: Problem, before: Any, frame: StepResult) -> float:
     """Largest violation of the conditions: lengths over DEPTH, forces over the largest; from compliance and forces."""
-    mu, state = problem.model.friction.mu, frame.part
+    mu, state = problem.model.friction.mu, frame.meshed_state
     force, status = state.force, state.status
     moved = free_motion(problem, frame.target) + np.einsum("idje,je->id", problem.delassus, force)
     gap, change = moved[:, 0], moved[:, 1:] - before.tangential_displacement
@@ -124,7 +124,7 @@ def case(problem: Problem, mu: float, steps: int) -> Iterator[tuple[Any, ...]]:
     before, found = problem.model.formulation.start(problem), []
     for frame in march(problem):
         found.append((frame, violation(problem, before, frame) if frame.outcome.ok else np.inf))
-        before = frame.part
+        before = frame.meshed_state
     outcomes = _literal(replace(problem, model=replace(model, rule="paper")))
     for k, name in enumerate(LEGS):
         leg = slice(k * steps, (k + 1) * steps)

@@ -214,7 +214,7 @@ def _found(problem: Problem, steps: list[StepResult], checks: list[SurfaceCheck]
 def _least_volume(problem: Problem, step: StepResult) -> float:
     """Smallest determinant of the deformation gradient at the nodes of all cells, in the plane of a section."""
     mesh = problem.mesh
-    u: Float = displacement(mesh, problem.model.formulation.unknowns(problem, step.part))
+    u: Float = displacement(mesh, problem.model.formulation.unknowns(problem, step.meshed_state))
     gradients, _ = mesh.element.physical_gradients(mesh.points[mesh.cells], mesh.element.nodes)
     slope = np.einsum("eki,eqkj->eqij", u[mesh.cells], gradients, optimize=True)
     return float(np.linalg.det(slope + np.eye(mesh.dim)).min())

@@ -92,7 +92,7 @@ def pressed(problem: Problem) -> ContactState:
     """The state after the press."""
     *_, frame = march(replace(problem, model=replace(problem.model, legs=problem.model.legs[:1])))
     assert frame.outcome.ok
-    return frame.part
+    return frame.meshed_state
 
 
 def travel(problem: Problem, state: ContactState, way: float, turn: float, steps: int) -> Travel:
@@ -180,7 +180,7 @@ def _by_legs(problem: Problem) -> list[Row]:
     *_, frame = march(replace(problem, model=replace(problem.model, legs=(*problem.model.legs[:1], *path))))
     assert frame.outcome.ok
     one = travel(problem, pressed(problem), way, -way / R, steps)
-    legs = sums(problem, frame.part, BEGIN + way)
+    legs = sums(problem, frame.meshed_state, BEGIN + way)
     away = max(abs(legs[0] - one.normal[-1]), abs(legs[1] - one.tangential[-1]), abs(legs[-1] - one.torque[-1]) / R)
     return [
         Row("difference of forces over P between legs and increments from the lowest point", "kinematics", 0.0,

@@ -94,7 +94,7 @@ def partial(problem: Problem, shares: tuple[float, ...]) -> list[tuple[float, fl
     """
     smooth = replace(problem.model, friction=Coulomb(0.0), legs=(Leg(DEPTH, steps=3),))
     *_, frame = march(replace(problem, model=smooth))
-    state, start = frame.part, ObjectPose(DEPTH)
+    state, start = frame.meshed_state, ObjectPose(DEPTH)
     force = float(state.force[:, 0].sum())
     a = radius_of(force)
     unit = MU * 1.5 * force / (math.pi * a**2) / SHEAR

@@ -187,7 +187,7 @@ def _third_law_rows() -> list[Row]:
     problem = build(model)
     *_, frame = march(problem)
     assert frame.outcome.ok
-    forces = problem.upright_force(frame.part)
+    forces = problem.upright_force(frame.meshed_state)
     force = forces.ravel()
     other, _ = ObjectBody(model, 5.0, contact_box(model), (), lambda text: None).mesh()
     axes = vertical_frame(2)
@@ -199,7 +199,7 @@ def _third_law_rows() -> list[Row]:
         load = (rows.T @ force).reshape(-1, 2)
         found = solve(mesh, Elasticity.of(modulus, nu), held_at(mesh, {"base": (0, 1)}), load=load)
         ends.append(found.reaction.sum(axis=0))
-        moved += rows @ found.u.ravel() / problem.part.thickness
+        moved += rows @ found.u.ravel() / problem.body.thickness
     total = np.abs(ends[0]).max()
     c = len(problem.surface.nodes)
     condensed = np.einsum("idje,je->id", problem.delassus, forces).ravel()

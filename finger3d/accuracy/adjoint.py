@@ -129,7 +129,7 @@ def adjoint_loads(problem: Problem, steps: Sequence[StepResult], goals: Sequence
 
 def forces_of(problem: Problem, steps: Sequence[StepResult]) -> Float:
     """Return the contact forces (c d, N) of increments, in the directions of an upright object."""
-    return np.stack([problem.upright_force(step.part).ravel() for step in steps], axis=1)
+    return np.stack([problem.upright_force(step.meshed_state).ravel() for step in steps], axis=1)
 
 
 def press_goals(problem: Problem, steps: Sequence[StepResult]) -> list[Goal]:
@@ -166,14 +166,14 @@ def _reading_columns(problem: Problem) -> list[str]:
                     "gauge": f"gauge_{reading.name}",
                     "marker": f"marker_{reading.name}_{axis}_mm",
                     "taxel": f"taxel_{reading.name}_MPa",
-                }[reading.kind]
+                }.get(reading.kind, f"reading_{column}")
             )
     return columns
 
 
 def _states(problem: Problem, steps: Sequence[StepResult]) -> list[LinearState]:
     """Return the states of the meshed part, that at first touch before the others."""
-    states = [problem.model.formulation.start(problem), *(step.part for step in steps)]
+    states = [problem.model.formulation.start(problem), *(step.meshed_state for step in steps)]
     assert all(isinstance(state, LinearState) for state in states)
     return cast("list[LinearState]", states)
 

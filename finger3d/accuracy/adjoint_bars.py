@@ -57,6 +57,7 @@ _SHARES = {
     Kind.DISPLACEMENT: _Shares(change=2.0, points=0.003),
     # recovery is poor where a taxel ends, and at the corners of the base
     Kind.BASE_PRESSURE: _Shares(change=2.0, body=(1.5, 1.5), points=0.01),
+    Kind.OTHER_READING: _Shares(change=2.0, body=(1.5, 1.5), points=0.01),
 }
 """Found in the sections of validation/error_bars.py; the force changes too little with the multipliers to tell."""
 

@@ -146,6 +146,6 @@ def check_kind(model: Model) -> None:
 
 def budget_s(problem: Problem, increments: int) -> float:
     """Return the modelled seconds that an estimate may take, from the modelled cost of a press in small strain."""
-    unknowns, points = problem.part.stiffness.upper.shape[0], len(problem.surface.nodes)
+    unknowns, points = problem.body.stiffness.upper.shape[0], len(problem.surface.nodes)
     press = condensation_s(unknowns, problem.dim) + increments * contact_s(points, problem.dim)
     return max(_SHARE * press, _SECONDS)

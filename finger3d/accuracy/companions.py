@@ -139,7 +139,7 @@ def _built_if(problem: Problem, model: Model, enough: Callable[[float], bool], s
 
 def built_like(problem: Problem, model: Model, say: Say = lambda text: None) -> Problem:
     """Return another model condensed, onto its whole contact face if the problem keeps its whole contact face."""
-    face = surface(problem.mesh, "contact", problem.part.thickness)
+    face = surface(problem.mesh, "contact", problem.body.thickness)
     everything = len(face.nodes) == len(contact_face(problem.surface).nodes)
     return build(model, say, margin=math.inf) if everything else build(model, say)
 
@@ -164,7 +164,7 @@ def _unknowns(problem: Problem) -> int:
     """Return the number of unknowns of a mesh, of the displacements only if it was refined around gauges since."""
     model = problem.model
     if model.mesh.gauge_refinement == 1.0 or not model.gauges:
-        return int(problem.part.stiffness.upper.shape[0])
+        return int(problem.body.stiffness.upper.shape[0])
     made = mesh_solid if model.domain == "solid" else mesh_section
     return int(made(model.design, model.mesh, contact_box(model), symmetry(model))[0].points.size)
 

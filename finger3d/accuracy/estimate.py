@@ -229,7 +229,7 @@ def _budget(problem: Problem) -> float:
 
 
 def _unknowns(problem: Problem) -> int:
-    return int(problem.part.stiffness.upper.shape[0])
+    return int(problem.body.stiffness.upper.shape[0])
 
 
 def _on_mesh(beside: Problem, kind: str) -> str:

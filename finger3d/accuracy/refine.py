@@ -189,7 +189,7 @@ def _graded_round(model: Model, tolerance: float, goal: str) -> tuple[Problem, R
     error = relative_error(numbers, goal, bars.bars[goal])
     scale = bars.bars[goal] / error if error > 0.0 else 0.0
     sizes = graded_sizes(short, bars, goal, _SAFETY * tolerance * scale) if error > tolerance else model.mesh
-    dofs = int(problem.part.stiffness.upper.shape[0])
+    dofs = int(problem.body.stiffness.upper.shape[0])
     seconds = time.perf_counter() - start
     return problem, Round(model.mesh.size_mm, model.mesh.base_size_mm, dofs, error, goal, seconds), sizes
 
@@ -208,7 +208,7 @@ def _run_round(model: Model, tolerance: float, goal: str) -> tuple[Problem, Roun
     sizes = _next_sizes(problem, goal, error, tolerance, numbers, coarse)
     seconds = time.perf_counter() - start
     options = model.mesh
-    dofs = int(problem.part.stiffness.upper.shape[0])
+    dofs = int(problem.body.stiffness.upper.shape[0])
     return problem, Round(options.size_mm, options.base_size_mm, dofs, error, goal, seconds), sizes
 
 

@@ -41,6 +41,7 @@ class Kind(Enum):
     STRAIN = auto()
     DISPLACEMENT = auto()
     BASE_PRESSURE = auto()
+    OTHER_READING = auto()
     HALF_LENGTH = auto()
     LENGTH = auto()
     AREA = auto()
@@ -72,7 +73,12 @@ _KINDS = {
     "stick_area_mm2": Kind.AREA,
 }
 
-_READINGS = {"gauge": Kind.STRAIN, "marker": Kind.DISPLACEMENT, "taxel": Kind.BASE_PRESSURE}
+_READINGS = {
+    "gauge": Kind.STRAIN,
+    "marker": Kind.DISPLACEMENT,
+    "taxel": Kind.BASE_PRESSURE,
+    "reading": Kind.OTHER_READING,
+}
 
 
 @dataclass(frozen=True)

@@ -111,7 +111,7 @@ def _rows(problem: Problem) -> int:
 
 def _errors(problem: Problem, modes: Float, basis: Float) -> RecoveredErrors:
     """Return the errors of the fields under the modes of the forces, the adjoint loads' basis, and the readings."""
-    part, active, rows = problem.part, problem.system.active_dofs, _rows(problem)
+    part, active, rows = problem.body, problem.system.active_dofs, _rows(problem)
     forces = np.zeros((len(part.condensed.compliance), modes.shape[1] + basis.shape[1] + rows))
     forces[: len(active), : forces.shape[1] - rows] = np.concatenate([modes, basis], axis=1)[active]
     forces[len(active) + np.arange(rows), forces.shape[1] - rows + np.arange(rows)] = 1.0

@@ -216,7 +216,7 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fie
     report.stage("writing fields")
     fields, good, problem = None, record.converged_steps, record.problem
     if good:
-        u, strain, stress = problem.model.formulation.fields(problem, good[-1].part)
+        u, strain, stress = problem.model.formulation.fields(problem, good[-1].meshed_state)
         record.warnings += penetration_warnings(problem, record.surface_checks)
         record.largest_strain = largest_principal_strain(strain)
         _advise(record)

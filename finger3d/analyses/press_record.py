@@ -136,11 +136,11 @@ class PressRecord:
 
 
 def _mesh(problem: Problem) -> Tree:
-    report = problem.part.report
+    report = problem.body.report
     return {
         "points": report.points,
         "cells": report.cells,
-        "dofs": int(problem.part.stiffness.upper.shape[0]),
+        "dofs": int(problem.body.stiffness.upper.shape[0]),
         "contact_points": len(problem.surface.nodes),
         "min_dihedral_deg": report.min_dihedral_deg,
         "volume_mm3": report.volume_mm3,
@@ -149,7 +149,7 @@ def _mesh(problem: Problem) -> Tree:
         "from_cache": report.from_cache,
         "cache_path": report.cache_path,
         "symmetry": list(problem.axes),
-        "formulation": "mixed quadratic/linear" if problem.part.elastic.mixed else "quadratic displacement",
+        "formulation": "mixed quadratic/linear" if problem.body.elastic.mixed else "quadratic displacement",
     }
 
 
@@ -158,8 +158,8 @@ def _cost(record: PressRecord) -> Tree:
         "seconds": {**record.seconds, "total": time.perf_counter() - record.started},
         "factorizations": record.all_factorizations,
         "peak_memory_MB": peak_memory_MB(),
-        "solver": record.problem.part.condensed.solver,
-        "perturbed_pivots": record.problem.part.condensed.perturbed_pivots,
+        "solver": record.problem.body.condensed.solver,
+        "perturbed_pivots": record.problem.body.condensed.perturbed_pivots,
     }
 
 

@@ -76,8 +76,8 @@ class ReducedModel:
         others = beyond_candidates(problem)
         about = {
             "versions": versions(),
-            "mesh_hash": problem.part.report.hash,
-            "dofs": int(problem.part.stiffness.upper.shape[0]),
+            "mesh_hash": problem.body.report.hash,
+            "dofs": int(problem.body.stiffness.upper.shape[0]),
             "effects": sorted({effect for _, effect in model.filled}),
         }
         size = DesignSummary(float(model.design.height_mm), float(model.design.width_mm))

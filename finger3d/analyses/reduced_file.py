@@ -185,7 +185,7 @@ def assembled(model: Model, arrays: TreeView, touch_mm: float, axes: tuple[str, 
         object_share=arrays.get("object_share"),
     )
     symmetry = Symmetry(axes=axes, image_of=arrays["parent"], mirror_sign=arrays["sign"], multiplicity=arrays["share"])
-    problem = Problem(model=model, body=None, symmetry=symmetry, system=system)
+    problem = Problem(model=model, condensed_body=None, symmetry=symmetry, system=system)
     if "bare_compliance" not in arrays:
         return problem
     without = replace(

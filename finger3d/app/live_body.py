@@ -176,7 +176,7 @@ def _pressed(body: LiveBody, mu: float, depth_mm: float) -> Press:
     on = np.flatnonzero(top & (distance <= max(problem.points.band_mm, distance[top].min() + _LINE_MM)))
     on = on[np.argsort(np.asarray(table["x_mm"])[on], kind="stable")]
     shear = np.hypot(np.asarray(table["shear_x_MPa"]), np.asarray(table["shear_z_MPa"]))
-    unknowns = problem.model.formulation.unknowns(problem, steps[-1].part)
+    unknowns = problem.model.formulation.unknowns(problem, steps[-1].meshed_state)
     return Press(
         numbers={name: measured[name] for name in _NUMBERS},
         x_mm=np.asarray(table["x_mm"])[on],

@@ -99,21 +99,21 @@ class ConstantPoissonRatio:
     @property
     def size(self) -> int:
         """Number of condensed rows."""
-        return len(self.problem.part.condensed.compliance)
+        return len(self.problem.body.condensed.compliance)
 
     def respond(self, step: Step, memory: InternalVariables, workspace: RelaxationWorkspace) -> Response:
         """The instantaneous compliance over alpha."""
         past, alpha = step.history_load(memory), step.alpha
-        compliance = self.problem.part.condensed.compliance / alpha
+        compliance = self.problem.body.condensed.compliance / alpha
         return Response(compliance, compliance @ past, lambda rows: (rows + past) / alpha)
 
     def unknowns(self, now: Float) -> Float:
         """Return the unknowns by a back-substitution."""
-        return self.problem.part.condensed.unknowns(now)
+        return self.problem.body.condensed.unknowns(now)
 
     def read(self, now: Float) -> Float:
         """Return the row displacements by the compliance."""
-        return self.problem.part.condensed.compliance @ now
+        return self.problem.body.condensed.compliance @ now
 
     def stress(self, prony: Prony, memory: InternalVariables) -> Float:
         """Return the stress of the elastic body under the relaxed forces."""
@@ -122,7 +122,7 @@ class ConstantPoissonRatio:
     def nodal_forces(self, prony: Prony, memory: InternalVariables) -> Float:
         """Return the nodal forces of the elastic body under the relaxed row forces."""
         mesh = self.problem.mesh
-        forces = times(self.problem.part.stiffness.upper, self.unknowns(relaxed(prony, memory)))
+        forces = times(self.problem.body.stiffness.upper, self.unknowns(relaxed(prony, memory)))
         return forces[: mesh.points.size].reshape(-1, mesh.dim)
 
 
@@ -137,7 +137,7 @@ class ConstantBulkModulus:
 
     @property
     def _own(self) -> int:
-        return int(self.problem.part.stiffness.upper.shape[0])
+        return int(self.problem.body.stiffness.upper.shape[0])
 
     @property
     def size(self) -> int:
@@ -149,7 +149,7 @@ class ConstantBulkModulus:
         """Laws of the parts by their number."""
         problem = self.problem
         materials = problem.model.materials(problem.mesh.part_labels)
-        user, mixed = "effects.viscosity.bulk = false", problem.part.elastic.mixed
+        user, mixed = "effects.viscosity.bulk = false", problem.body.elastic.mixed
         return [material.isotropic(user).elasticity(mixed=mixed) for material in materials]
 
     @cached_property
@@ -172,7 +172,7 @@ class ConstantBulkModulus:
         # steps of one length differ by round-off of their ends
         alpha = Step(step.prony, float(f"{step.seconds:.12g}")).alpha
         problem = self.problem
-        body = workspace.condensation(alpha, lambda: problem.part.condensed.again(self._stiffness(alpha, workspace)))
+        body = workspace.condensation(alpha, lambda: problem.body.condensed.again(self._stiffness(alpha, workspace)))
         past, first = step.history_load(memory), len(body.compliance) - len(problem.inclusions.subgrid_compliance)
         settled = body.solve(self._shear_force(past[: self._own], workspace))
         compliance, moved = body.compliance.copy(), body.read(settled)
@@ -181,8 +181,8 @@ class ConstantBulkModulus:
 
         def shape(rows: Float) -> Float:
             found = settled + body.unknowns(rows)
-            if problem.part.elastic.mixed:
-                found[problem.mesh.points.size :] *= problem.part.stiffness.pressure_scale / self._lame(alpha)
+            if problem.body.elastic.mixed:
+                found[problem.mesh.points.size :] *= problem.body.stiffness.pressure_scale / self._lame(alpha)
             return np.concatenate([found, (rows[first:] + past[self._own :]) / alpha])
 
         return Response(compliance, moved, shape)
@@ -193,14 +193,14 @@ class ConstantBulkModulus:
             problem, mesh = self.problem, self.problem.mesh
             laws = tuple(Elasticity(law.shear, -2.0 / 3.0 * law.shear, False) for law in self._laws)
             deviatoric = laws[0] if mesh.part is None else ElasticityByPart(laws, mesh.part)
-            workspace.shear_part = stiffness(mesh, deviatoric, problem.part.thickness).upper
+            workspace.shear_part = stiffness(mesh, deviatoric, problem.body.thickness).upper
         return workspace.shear_part
 
     def _stiffness(self, alpha: float, workspace: RelaxationWorkspace) -> Stiffness:
         """Return K_b + alpha K_s; in the mixed form every block has a factor of its own."""
         problem = self.problem
-        whole: Stiffness = problem.part.stiffness
-        if not problem.part.elastic.mixed:
+        whole: Stiffness = problem.body.stiffness
+        if not problem.body.elastic.mixed:
             return Stiffness(whole.upper - (1.0 - alpha) * self._shear_part(workspace), whole.pressure_vertices, 1.0)
         upper, n = whole.upper.copy(), problem.mesh.points.size
         row = np.repeat(np.arange(upper.shape[0]), np.diff(upper.indptr))
@@ -212,11 +212,11 @@ class ConstantBulkModulus:
     def _shear_force(self, shape: Float, workspace: RelaxationWorkspace) -> Float:
         """Return the loads (N,), K_s times a shape (N,)."""
         problem, n = self.problem, self.problem.mesh.points.size
-        if not problem.part.elastic.mixed:
+        if not problem.body.elastic.mixed:
             return times(self._shear_part(workspace), shape)
         deviator = shape.copy()
-        deviator[n:] *= -2.0 / 3.0 * self._of_pressures[0] / problem.part.stiffness.pressure_scale
-        load = times(problem.part.stiffness.upper, deviator)
+        deviator[n:] *= -2.0 / 3.0 * self._of_pressures[0] / problem.body.stiffness.pressure_scale
+        load = times(problem.body.stiffness.upper, deviator)
         load[n:] = 0.0
         return load
 
@@ -224,13 +224,13 @@ class ConstantBulkModulus:
         """Return the displacements, which are the shape."""
         n = self.problem.mesh.points.size
         out = now[: self._own].copy()
-        if self.problem.part.elastic.mixed:
-            out[n:] *= self._of_pressures[1] / self.problem.part.stiffness.pressure_scale
+        if self.problem.body.elastic.mixed:
+            out[n:] *= self._of_pressures[1] / self.problem.body.stiffness.pressure_scale
         return out
 
     def read(self, now: Float) -> Float:
         """Return the row displacements, with the compliance that the mesh lacks."""
-        rows, beyond = self.problem.part.condensed.read(now[: self._own]), self.problem.inclusions.subgrid_compliance
+        rows, beyond = self.problem.body.condensed.read(now[: self._own]), self.problem.inclusions.subgrid_compliance
         rows[len(rows) - len(beyond) :] += beyond @ now[self._own :]
         return rows
 
@@ -253,7 +253,7 @@ class ConstantBulkModulus:
     def nodal_forces(self, prony: Prony, memory: InternalVariables) -> Float:
         """Return the instantaneous nodal forces, less the part of the shear stress that has relaxed."""
         mesh, lost = self.problem.mesh, memory.elastic - relaxed(prony, memory)
-        forces = times(self.problem.part.stiffness.upper, self.unknowns(memory.elastic))
+        forces = times(self.problem.body.stiffness.upper, self.unknowns(memory.elastic))
         forces -= self._shear_force(lost[: self._own], RelaxationWorkspace())
         return forces[: mesh.points.size].reshape(-1, mesh.dim)
 
@@ -261,6 +261,6 @@ class ConstantBulkModulus:
         """Return strain (n', d, d) and dilatation (n',) of a shape at the nodes of a part."""
         mesh = self.problem.mesh
         strain = nodal_strain(part.mesh, displacement(mesh, shape)[part.nodes])
-        if not self.problem.part.elastic.mixed:
+        if not self.problem.body.elastic.mixed:
             return strain, np.trace(strain, axis1=1, axis2=2)
         return strain, nodal_pressure(part.mesh, shape[mesh.points.size :][part.corners])

@@ -83,7 +83,7 @@ class SoftObject:
             rows, images = _all_images(problem, mesh, frame), 2 ** len(axes)
         elastic = Isotropic(self.E_MPa, self.nu).elasticity(model.domain == "plane-stress")
         say(f"condensing the object's {mesh.points.size} unknowns")
-        matrix = stiffness(mesh, elastic, problem.part.thickness)
+        matrix = stiffness(mesh, elastic, problem.body.thickness)
         held = held_dofs(mesh, () if whole else axes, model.held_ends)
         condensed = condense(matrix, held, rows[problem.system.active_dofs])
         c = len(problem.surface.nodes)

@@ -123,7 +123,7 @@ class Viscoelastic(SmallStrain):
         past[problem.system.active_dofs] = moved[: len(problem.system.active_dofs)]
         # an elastic object does not relax
         rest = problem.delassus - scatter_to_points(
-            stiffened(problem.part.condensed.compliance, springs), problem.system.active_dofs, c, d
+            stiffened(problem.body.condensed.compliance, springs), problem.system.active_dofs, c, d
         )
         compliance = scatter_to_points(stiffened(own, springs), problem.system.active_dofs, c, d) + rest
         found = solve_increment(problem, state, a, b, LinearBody(compliance, past.reshape(c, d)), guess, workspace)

@@ -24,8 +24,8 @@ from finger3d.mechanics.model import EmbeddedBars, Leg, Model, ObjectResponse
 from finger3d.mechanics.path import targets
 from finger3d.mechanics.problem import (
     AddedStiffness,
+    CondensedBody,
     ContactSystem,
-    Part,
     Problem,
     free_surface,
     object_share,
@@ -98,7 +98,7 @@ def build(model: Model, say: Say = lambda text: None, margin: float = MARGIN) ->
     mirrored, points = unfold_points(model, mesh, candidates, axes)
     problem = Problem(
         model=model,
-        body=Part(
+        condensed_body=CondensedBody(
             mesh=mesh,
             report=report,
             elastic=elastic,
@@ -126,7 +126,7 @@ def build(model: Model, say: Say = lambda text: None, margin: float = MARGIN) ->
 
 def with_bars(problem: Problem, bars: EmbeddedBars) -> Problem:
     """Return the problem with the stiffness of its inclusions added to the condensed rows."""
-    condensed, active, count = problem.part.condensed, problem.system.active_dofs, len(bars.bar_stiffness)
+    condensed, active, count = problem.body.condensed, problem.system.active_dofs, len(bars.bar_stiffness)
     readings = len(condensed.compliance) - len(active) - count
     compliance = condensed.compliance.copy()
     subgrid = bars.subgrid_compliance(compliance[-count:, -count:])
@@ -137,7 +137,7 @@ def with_bars(problem: Problem, bars: EmbeddedBars) -> Problem:
     )
     return replace(
         problem,
-        body=replace(problem.part, condensed=replace(condensed, compliance=compliance)),
+        condensed_body=replace(problem.body, condensed=replace(condensed, compliance=compliance)),
         system=replace(problem.system, delassus=delassus, reading_rows=reading_rows),
         inclusions=AddedStiffness(
             bars=bars.at_finite_strain(subgrid[-count:, -count:]),

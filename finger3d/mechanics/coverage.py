@@ -120,19 +120,19 @@ def _penetration(problem: Problem, checks: Sequence[SurfaceCheck], above: float,
 
 def _displacements(problem: Problem, steps: Sequence[StepResult]) -> Iterator[Float]:
     """Yield the nodal displacement (n, d) mm after each step."""
-    for unknowns in problem.model.formulation.all_unknowns(problem, [step.part for step in steps]):
+    for unknowns in problem.model.formulation.all_unknowns(problem, [step.meshed_state for step in steps]):
         yield displacement(problem.mesh, unknowns)
 
 
 def beyond_candidates(problem: Problem, free: BoundarySurface | None = None) -> BoundarySurface:
     """Return the points of the free surface that are no candidates."""
-    free = free or free_surface(problem.model, problem.part.mesh, problem.part.thickness)
+    free = free or free_surface(problem.model, problem.body.mesh, problem.body.thickness)
     return restrict(free, np.flatnonzero(~np.isin(_key(free), _key(problem.system.surface))))
 
 
 def _surfaces(problem: Problem, steps: Sequence[StepResult]) -> tuple[BoundarySurface, BoundarySurface]:
     """Return the free surface, and those of its points that are no candidates and could touch after some step."""
-    free = free_surface(problem.model, problem.part.mesh, problem.part.thickness)
+    free = free_surface(problem.model, problem.body.mesh, problem.body.thickness)
     others = beyond_candidates(problem, free)
     if problem.model.object.is_flat and steps:  # its normal is known everywhere
         normals = [problem.placed(step.target).distance(others.points)[1] for step in steps]

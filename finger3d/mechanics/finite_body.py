@@ -47,7 +47,7 @@ class FiniteBody:
             first, second = bars.coupled_nodes
             linked = np.concatenate([linked[0], first]), np.concatenate([linked[1], second])
         pattern = Pattern.of(problem.mesh, material.mixed, linked)
-        return cls(TotalLagrangian(problem.mesh, material, problem.part.thickness, pattern), bars, rows)
+        return cls(TotalLagrangian(problem.mesh, material, problem.body.thickness, pattern), bars, rows)
 
     def over(self, relaxation: Relaxation, memory: InternalVariables, seconds: float) -> FiniteBody:
         """Return the body over an increment of time that begins with these internal variables."""

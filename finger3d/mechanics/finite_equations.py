@@ -199,10 +199,10 @@ class IncrementEquations:
         tangent = self.body.tangent(now.x).less(moving)
         if damping:
             n = problem.mesh.points.size
-            tangent = tangent.less(-damping * problem.part.stiffness.upper[:n, :n])
+            tangent = tangent.less(-damping * problem.body.stiffness.upper[:n, :n])
         last = self.workspace.linearisations.pop(self._has_inclusions, None)
         replaced = last.condensation if last else None
-        condensed = condense(tangent, problem.part.fixed_dofs, rows, replaced=replaced)
+        condensed = condense(tangent, problem.body.fixed_dofs, rows, replaced=replaced)
         self.workspace.factorizations += condensed.factorizations
         delassus = scatter_to_points(condensed.compliance, active, *force.shape)
         found = Linearisation(condensed, now.contact.bases, delassus, reusable=not damping)
@@ -280,12 +280,12 @@ class IncrementEquations:
         normal, tangential = force[:, 0], np.linalg.norm(force[:, 1:], axis=1)
         mu = tangential / np.where(normal > 0.0, normal, 1.0)
         unbalanced = out_of_balance.copy()
-        unbalanced[problem.part.fixed_dofs] = 0.0
+        unbalanced[problem.body.fixed_dofs] = 0.0
         equilibrium = float(np.abs(unbalanced[:n]).max()) / max(
             float(np.linalg.norm(force, axis=1).max()), self._least_force
         )
         volume = float(np.abs(np.linalg.det(np.diff(mesh.points[mesh.cells[:, : mesh.dim + 1]], axis=1))).mean())
-        volume *= problem.part.thickness / math.factorial(mesh.dim) * self.body.solid.pressure_scale
+        volume *= problem.body.thickness / math.factorial(mesh.dim) * self.body.solid.pressure_scale
         dilatation = float(np.abs(unbalanced[n:]).max(initial=0.0)) / volume
         moved = self._relative_displacement(now, force)
         return max(residual(force, moved, solution.status, mu, self._length_scale), equilibrium, dilatation)

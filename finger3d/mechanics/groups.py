@@ -106,7 +106,7 @@ class _Presses:
 
     def _start(self, number: int, increment: int) -> tuple[ContactState, Float | None]:
         """Return the state at the start of an increment, and the contact forces expected at its end."""
-        states = [self._rest, *(step.part for step in self.steps[number])]
+        states = [self._rest, *(step.meshed_state for step in self.steps[number])]
         if not increment:
             return states[0], None
         before, a, b = self._poses[increment - 1 : increment + 2]

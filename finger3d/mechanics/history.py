@@ -109,16 +109,16 @@ class ContactPoints:
 class StepResult:
     """Result of an increment: contact state of the whole finger (m points), readings, work and convergence.
 
-    `part` is the state of the meshed part (c points), from which fields are recovered; `moment` (3,), N mm, is that of
-    all contact forces on the finger about the middle of the base; `penetration_mm` is how deep the deepest contact
-    point is inside the object, or the deepest place of the free surface (`finger3d.mechanics.coverage`); `detail` is
-    what else is known of a failure.  `gauges` are strains, `markers` displacements (d,) in mm, `taxels`
+    `meshed_state` is the state of the meshed part (c points), from which fields are recovered; `moment` (3,), N mm,
+    is that of all contact forces on the finger about the middle of the base; `penetration_mm` is how deep the deepest
+    contact point is inside the object, or the deepest place of the free surface (`finger3d.mechanics.coverage`);
+    `detail` is what else is known of a failure. `gauges` are strains, `markers` displacements (d,) in mm, `taxels`
     pressures in MPa, all by name.
     """
 
     target: ObjectPose
     state: ContactState
-    part: ContactState
+    meshed_state: ContactState
     lowest: tuple[float, float]
     moment: Float
     gauges: dict[str, float]
@@ -132,6 +132,7 @@ class StepResult:
     detail: str = ""
     markers: dict[str, tuple[float, ...]] = field(default_factory=dict)
     taxels: dict[str, float] = field(default_factory=dict)
+    other_readings: dict[str, float] = field(default_factory=dict)
 
     @property
     def readings(self) -> dict[str, float]:
@@ -141,7 +142,7 @@ class StepResult:
             for name, displacement in self.markers.items()
             for axis, value in zip("xyz", displacement, strict=False)
         }
-        return {**moved, **self.taxels, **self.gauges}
+        return {**moved, **self.taxels, **self.other_readings, **self.gauges}
 
 
 @dataclass(frozen=True, repr=False)
@@ -206,6 +207,7 @@ def measure(points: ContactPoints, step: StepResult) -> Tree:
         "gauges": dict(step.gauges),
         "markers": {name: [*moved, *[0.0] * (3 - len(moved))] for name, moved in step.markers.items()},
         "taxels": dict(step.taxels),
+        **({"other_readings": dict(step.other_readings)} if step.other_readings else {}),
         "iterations": step.iterations,
         "residual": step.residual,
         "method": step.method,
@@ -216,7 +218,8 @@ def measure(points: ContactPoints, step: StepResult) -> Tree:
 def flat_readings(entry: TreeView) -> dict[str, float]:
     """Return the readings of an entry of `steps` by the names of columns.
 
-    These are ``gauge_<name>``, ``marker_<name>_x_mm``, ``_y_mm``, ``_z_mm`` and ``taxel_<name>_MPa``.
+    These are ``gauge_<name>``, ``marker_<name>_x_mm``, ``_y_mm``, ``_z_mm`` and ``taxel_<name>_MPa``; for readings of
+    other kinds ``reading_<column>``.
     """
     moved = {
         f"marker_{name}_{axis}_mm": value
@@ -224,12 +227,13 @@ def flat_readings(entry: TreeView) -> dict[str, float]:
         for axis, value in zip("xyz", displacement, strict=True)
     }
     pressures = {f"taxel_{name}_MPa": pressure for name, pressure in entry["taxels"].items()}
-    return {f"gauge_{name}": strain for name, strain in entry["gauges"].items()} | moved | pressures
+    others = {f"reading_{name}": value for name, value in entry.get("other_readings", {}).items()}
+    return {f"gauge_{name}": strain for name, strain in entry["gauges"].items()} | moved | pressures | others
 
 
 def without_readings(entry: TreeView) -> Tree:
     """Return an entry of `steps` without its readings."""
-    return {key: value for key, value in entry.items() if key not in ("gauges", "markers", "taxels")}
+    return {key: value for key, value in entry.items() if key not in ("gauges", "markers", "taxels", "other_readings")}
 
 
 def contact_table(points: ContactPoints, state: ContactState) -> Tree:

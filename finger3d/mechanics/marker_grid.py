@@ -70,7 +70,7 @@ def marker_table(problem: Problem, steps: Sequence[StepResult], spacing_mm: floa
     count = len(at) - len(named)
     moved = [np.array([step.markers[m.name] for m in named]).reshape(-1, problem.dim) for step in steps]
     if grid is not None:
-        unknowns = problem.model.formulation.all_unknowns(problem, [step.part for step in steps])
+        unknowns = problem.model.formulation.all_unknowns(problem, [step.meshed_state for step in steps])
         fields = (grid.displacements(displacement(problem.mesh, x)) for x in unknowns)
         moved = [np.vstack(pair) for pair in zip(moved, fields, strict=True)]
     columns: Tree = {

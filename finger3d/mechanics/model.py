@@ -217,6 +217,7 @@ class Model:
     gauges: tuple[Gauge, ...] = ()
     markers: tuple[Marker, ...] = ()
     taxels: tuple[Taxel, ...] = ()
+    other_readings: tuple[Reading, ...] = ()
     inclusions: Inclusions | None = None
     object_compliance: ObjectCompliance | None = None
     domain: Domain = "solid"
@@ -245,8 +246,8 @@ class Model:
 
     @property
     def readings(self) -> tuple[Reading, ...]:
-        """Markers, taxels and gauges, in the order of their rows; inclusions read the gauges, the last."""
-        return (*self.markers, *self.taxels, *self.gauges)
+        """All readings, in the order of their rows; inclusions read the gauges, the last."""
+        return (*self.markers, *self.taxels, *self.other_readings, *self.gauges)
 
     @property
     def reading_names(self) -> tuple[str, ...]:

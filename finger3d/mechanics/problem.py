@@ -33,7 +33,7 @@ _AT_ONCE = 8_000_000  # unknowns solved for at once: 64 MB, and a few times as m
 
 
 @dataclass(frozen=True, kw_only=True)
-class Part:
+class CondensedBody:
     """Meshed part of the finger, assembled and condensed to its contact points, readings and inclusions.
 
     Attributes
@@ -117,14 +117,14 @@ class Problem:
 
     Attributes
     ----------
-    body : the meshed part; None in a reduced model, which knows the contact system only
+    condensed_body : the meshed part; None in a reduced model, which knows the contact system only
     inclusions : stiffness that inclusions add; empty without
     seconds : time of each stage of the build by name
     without_inclusions : the same problem without inclusions, if there are any
     """
 
     model: Model
-    body: Part | None
+    condensed_body: CondensedBody | None
     symmetry: Symmetry
     system: ContactSystem
     inclusions: AddedStiffness = field(default_factory=AddedStiffness)
@@ -132,22 +132,22 @@ class Problem:
     without_inclusions: Problem | None = None
 
     @property
-    def part(self) -> Part:
-        """The meshed part.
+    def body(self) -> CondensedBody:
+        """The meshed part of the finger, condensed.
 
         Raises
         ------
         Finger3dError
             If the problem is a reduced model.
         """
-        if self.body is None:
+        if self.condensed_body is None:
             raise Finger3dError("a reduced model has no mesh: fields need the scene itself (finger3d press)")
-        return self.body
+        return self.condensed_body
 
     @property
     def mesh(self) -> Mesh:
         """Mesh of the part."""
-        return self.part.mesh
+        return self.body.mesh
 
     @property
     def surface(self) -> BoundarySurface:
@@ -172,7 +172,7 @@ class Problem:
     @property
     def factorizations(self) -> int:
         """Number of factorisations of the build; a press counts its own in its workspace."""
-        return self.part.condensed.factorizations + self.system.object_factorizations
+        return self.body.condensed.factorizations + self.system.object_factorizations
 
     @property
     def origin(self) -> ObjectPose:
@@ -226,7 +226,7 @@ class Problem:
 
     def strain_and_stress(self, unknowns: Float) -> tuple[Float, Float]:
         """Linear strain and elastic stress (n, 3, 3), MPa, at the nodes of the part, from all unknowns (N,)."""
-        part, plane_strain = self.part, self.model.domain == "plane-strain"
+        part, plane_strain = self.body, self.model.domain == "plane-strain"
         materials = self.model.materials(self.mesh.part_labels)
         laws = [material.elasticity(self.model.domain == "plane-stress", part.elastic.mixed) for material in materials]
         across = None if self.dim == 3 else [partial(m.across, plane_strain=plane_strain) for m in materials]
@@ -235,11 +235,11 @@ class Problem:
     @property
     def meshed_body(self) -> MeshedBody:
         """The meshed part as readings see it."""
-        return MeshedBody(self.mesh, self.axes, self.part.stiffness, self.part.thickness)
+        return MeshedBody(self.mesh, self.axes, self.body.stiffness, self.body.thickness)
 
     def row_forces(self, force: Float) -> Float:
         """Forces on the condensed rows from contact forces (c, d); none on the rows of readings and inclusions."""
-        rows = np.zeros(len(self.part.condensed.compliance))
+        rows = np.zeros(len(self.body.condensed.compliance))
         rows[: len(self.system.active_dofs)] = force.ravel()[self.system.active_dofs]
         return rows
 
@@ -249,14 +249,14 @@ class Problem:
 
     def unknowns_of(self, forces: Sequence[Float], block: int = _AT_ONCE) -> Iterator[Float]:
         """All unknowns (N,) for each of several forces (c, d), by solutions for about `block` unknowns at once."""
-        at_once = max(1, block // self.part.stiffness.upper.shape[0])
+        at_once = max(1, block // self.body.stiffness.upper.shape[0])
         for first in range(0, len(forces), at_once):
             rows = np.stack([self.row_forces(force) for force in forces[first : first + at_once]], axis=1)
             yield from self._unknowns(rows).T
 
     def _unknowns(self, rows: Float) -> Float:
         """All unknowns (N, ...) under forces (r, ...) on the condensed rows; springs add theirs."""
-        condensed, bars = self.part.condensed, self.inclusions.bar_stiffness
+        condensed, bars = self.body.condensed, self.inclusions.bar_stiffness
         if len(bars):
             rows[-len(bars) :] = spring_forces(condensed.compliance, bars, condensed.compliance @ rows)
         return condensed.unknowns(rows)

@@ -44,8 +44,8 @@ class Reading(Protocol):
         ...
 
     @property
-    def kind(self) -> Literal["gauge", "marker", "taxel"]:
-        """What kind of sensor it is."""
+    def kind(self) -> str:
+        """What kind of sensor it is: "gauge", "marker", "taxel", or another word."""
         ...
 
     def columns(self, dim: int) -> tuple[str, ...]:

@@ -152,7 +152,7 @@ def refine(
     arguments of `march`.
     """
     workspace = workspace or problem.model.formulation.workspace()
-    steps, last = limits(problem.model, problem.part.stiffness.upper.shape[0], len(problem.surface.nodes))
+    steps, last = limits(problem.model, problem.body.stiffness.upper.shape[0], len(problem.surface.nodes))
     levels: list[tuple[int, tuple[StepResult, ...]]] = []
     failed: tuple[StepResult, ...] = ()
     while steps <= last:

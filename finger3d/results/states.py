@@ -132,7 +132,7 @@ def states_of(
 
     kept = chosen(len(frames))
     u = np.empty((len(kept), *mesh.points.shape), dtype=np.float32)
-    parts = [frames[number].part for number in kept[:-1]]
+    parts = [frames[number].meshed_state for number in kept[:-1]]
     for k, unknowns in enumerate(problem.model.formulation.all_unknowns(problem, parts)):
         u[k] = displacement(problem.mesh, unknowns)[parent] * sign
     u[-1] = last

@@ -124,7 +124,7 @@ class StrainMap:
         reader = Reader.at(problem.mesh, points, problem.axes)
         mus = np.array(sorted(frames))
         fields = []
-        for unknowns in problem.model.formulation.all_unknowns(problem, [frames[float(mu)].part for mu in mus]):
+        for unknowns in problem.model.formulation.all_unknowns(problem, [frames[float(mu)].meshed_state for mu in mus]):
             fields.append(reader.strain(displacement(problem.mesh, unknowns)).reshape(len(y), len(x), 3))
         return cls(mus, x, y, z_mm, np.array(fields))
 

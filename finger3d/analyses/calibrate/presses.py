@@ -60,7 +60,7 @@ def press(
     workspace = workspace or problem.model.formulation.workspace()
     before = workspace.factorizations
     for frame in march(replace(problem, model=replace(problem.model, friction=law)), start, workspace, cancel):
-        forces.append(frame.part.force)
+        forces.append(frame.meshed_state.force)
     assert frame is not None  # a path has an increment
     return Press(mu, frame, tuple(forces), workspace.factorizations - before)
 
@@ -87,7 +87,7 @@ def _together(problem: Problem, mus: Sequence[float]) -> Iterator[Press]:
     problems = [replace(problem, model=replace(model, friction=model.friction.with_mu(mu))) for mu in mus]
     for number, steps in march_in_groups(problems, workspace, Event()):
         new, counted = workspace.factorizations - counted, workspace.factorizations
-        yield Press(mus[number], steps[-1], tuple(step.part.force for step in steps), new)
+        yield Press(mus[number], steps[-1], tuple(step.meshed_state.force for step in steps), new)
 
 
 def _start(problem: Problem, mu: float, near: Sequence[Press]) -> list[Float]:

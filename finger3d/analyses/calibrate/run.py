@@ -337,9 +337,9 @@ def _about(scene: Scene, curve: CurvePoints) -> dict[str, object]:
     return {
         "domain": problem.model.domain,
         "effects": list(scene.effects),
-        "dofs": int(problem.part.stiffness.upper.shape[0]),
+        "dofs": int(problem.body.stiffness.upper.shape[0]),
         "contact_points": len(problem.surface.nodes),
-        "mesh_hash": problem.part.report.hash,
+        "mesh_hash": problem.body.report.hash,
         "factorizations": curve.factorizations,
         "versions": versions(),
         "increments": curve.increments.as_dict(),

@@ -11,7 +11,9 @@ import numpy as np
 from finger3d._ranges import number
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
+from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.model import Model
+from finger3d.mechanics.readings import Marker, Taxel
 from finger3d.sensor.curve import FEWEST, LARGEST_STRAIN, Kind
 
 _LARGEST_MU = 1e6
@@ -87,7 +89,8 @@ class CalibrationSettings:
 def found_readings(model: Model, names: Sequence[str], noises: Mapping[Kind, float]) -> tuple[CalibratedReading, ...]:
     """Return the readings of these names; an unknown name is refused with the nearest one."""
     dim = 3 if model.domain == "solid" else 2
-    known: dict[str, Kind] = {name: reading.kind for reading in model.readings for name in reading.columns(dim)}
+    calibrated: tuple[Marker | Taxel | Gauge, ...] = (*model.markers, *model.taxels, *model.gauges)
+    known: dict[str, Kind] = {name: reading.kind for reading in calibrated for name in reading.columns(dim)}
     if not names:
         raise Finger3dError("--gauge: no name is given")
     if not known:

@@ -38,10 +38,10 @@ def with_modulus(problem: Problem, factor: float) -> Problem:
     c, d = problem.delassus.shape[:2]
 
     def scaled(one: Problem) -> Problem:
-        own = stiffened(one.part.condensed.compliance, one.inclusions.bar_stiffness)
+        own = stiffened(one.body.condensed.compliance, one.inclusions.bar_stiffness)
         active, readings = one.system.active_dofs, len(one.system.reading_rows)
         of_object = one.delassus - scatter_to_points(own, active, c, d)
-        changed = stiffened(one.part.condensed.compliance / factor, one.inclusions.bar_stiffness)
+        changed = stiffened(one.body.condensed.compliance / factor, one.inclusions.bar_stiffness)
         rows = np.zeros_like(one.system.reading_rows)
         rows[:, active] = changed[len(active) : len(active) + readings, : len(active)]
         rows[len(rows) - len(model.gauges) - len(model.taxels) : len(rows) - len(model.gauges)] *= factor  # of forces

@@ -59,7 +59,7 @@ class StrainField:
         for mu, frame in zip(mus, frames, strict=True):
             if not frame.outcome.ok:
                 raise Finger3dError(f"optimise: mu = {mu:g}: at depth {frame.target.depth_mm:.4g} mm: {frame.outcome}")
-        unknowns = problem.model.formulation.all_unknowns(problem, [f.part for f in frames])
+        unknowns = problem.model.formulation.all_unknowns(problem, [f.meshed_state for f in frames])
         return cls(problem, np.array([displacement(problem.mesh, x) for x in unknowns]))
 
     def strain(self, points: Float, angles: Float) -> Float:

@@ -93,7 +93,7 @@ class _DesignBody:
             strains = [body.strains(variant, frame.gauges) for frame in ends]
             return lambda g: np.array([strain[g.name] for strain in strains])
         mesh, axes = body.problem.mesh, body.problem.axes
-        fields = body.problem.model.formulation.all_unknowns(body.problem, [f.part for f in ends])
+        fields = body.problem.model.formulation.all_unknowns(body.problem, [f.meshed_state for f in ends])
         u = np.array([x[: mesh.points.size] for x in fields])
         return lambda g: np.asarray(g.row(mesh, axes)[:, : mesh.points.size] @ u.T).ravel()
 
