@@ -50,4 +50,4 @@ def test_every_pour_has_a_step(molds, tmp_path: Path, monkeypatch: pytest.Monkey
         (parts,) = (parts for stem, parts in drawn.items() if stem.endswith(f"pour_{name}"))
         assert f"lid_{name}" in parts
         assert sum(part.startswith("silicone") for part in parts) == i
-    assert all(escape(line) in text for line in pour_lines(made, made.pours[0]))
+    assert all(escape(line) in text for pour in made.pours for line in pour_lines(made, pour))
