@@ -36,7 +36,7 @@ def test_the_deck_of_a_symmetric_press_is_a_quarter() -> None:
     assert made.deck.object.nodes[:, 1].min() == pytest.approx(8.0)
     text = made.deck.text()
     assert text.isascii()
-    assert "the force on the whole finger is 4 times that" in text
+    assert " 4 times " in text
     assert "2, 0.4" in text
 
 
@@ -52,7 +52,8 @@ def test_every_leg_is_a_step_and_every_increment_of_one_that_turns() -> None:
     assert [step.motion.ndim for step in made.deck.steps] == [1, 1, 2, 2, 2]
     np.testing.assert_allclose(made.deck.steps[1].motion, [0.5, -1.0, 0.0], atol=1e-12)
     assert made.multiple == 1.0
-    assert made.remarks == ('steps = "auto": 10 increments for each leg; CalculiX does not choose them by their error',)
+    (remark,) = made.remarks
+    assert remark.startswith('steps = "auto": 10 increments ')
 
 
 def test_a_section_has_its_thickness() -> None:
@@ -92,9 +93,9 @@ def test_parts_of_a_given_mesh_have_their_materials() -> None:
             },
             "[effects.embedded_gauge]",
         ),
-        ({"press": {"force_N": 2.0}}, "force_N: a deck moves the object by depths"),
-        ({"material": {"E_MPa": 1.0, "nu": 0.5}}, "no elements for nu = 0.5"),
-        ({"model": {"domain": "plane-stress"}, "effects": {"large_deformation": {}}}, "in plane stress"),
+        ({"press": {"force_N": 2.0}}, "force_N: "),
+        ({"material": {"E_MPa": 1.0, "nu": 0.5}}, " nu = 0.5"),
+        ({"model": {"domain": "plane-stress"}, "effects": {"large_deformation": {}}}, "[effects.large_deformation]"),
     ],
 )  # fmt: skip
 def test_what_calculix_lacks_is_refused_by_name(tables: dict[str, Any], told: str) -> None:
@@ -105,4 +106,6 @@ def test_what_calculix_lacks_is_refused_by_name(tables: dict[str, Any], told: st
 
 def test_nearly_incompressible_materials_are_told() -> None:
     made = press_deck(scene(material={"E_MPa": 1.0, "nu": 0.49}).model())
-    assert "nu is near 1/2" in made.remarks[0]
+    (remark,) = made.remarks
+    assert remark.startswith("nu ")
+    assert "C3D10" in remark

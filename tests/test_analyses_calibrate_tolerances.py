@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import Any
 
@@ -11,13 +10,14 @@ import pytest
 
 from finger3d.accuracy.companions import companion
 from finger3d.analyses.calibrate import run as runs
-from finger3d.analyses.calibrate import tolerances as slopes
 from finger3d.analyses.calibrate.run import calibrate, calibrated
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
+from finger3d.analyses.calibrate.tolerances import with_defaults
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.contact.friction import Coulomb
 from finger3d.mechanics.build import build
 from finger3d.mechanics.model import Leg
+from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
 from tests.sensor_cases import FEW, NONE, SCENE, scene
 
@@ -57,10 +57,10 @@ def test_every_tolerance_is_the_difference_of_two_scenes() -> None:
 
 def test_the_spread_of_a_silicone_is_the_tolerance_of_its_modulus() -> None:
     """Unless another is given, and not where the scene gives E_MPa."""
-    assert slopes.with_defaults(None)["E_percent"] == TOLERANCES["E_percent"][0]
-    assert slopes.with_defaults(None, 0.3)["E_percent"] == pytest.approx(30.0)
-    assert slopes.with_defaults({"E_percent": 2.0}, 0.3)["E_percent"] == 2.0
-    assert "E_percent" not in slopes.with_defaults({"E_percent": 0.0}, 0.3)
+    assert with_defaults(None)["E_percent"] == TOLERANCES["E_percent"][0]
+    assert with_defaults(None, 0.3)["E_percent"] == pytest.approx(30.0)
+    assert with_defaults({"E_percent": 2.0}, 0.3)["E_percent"] == 2.0
+    assert "E_percent" not in with_defaults({"E_percent": 0.0}, 0.3)
     silicone = scene(material={"silicone": "Ecoflex 00-30", "nu": 0.45})
     few = NONE | {"depth_mm": 0.1}
     del few["E_percent"]
@@ -71,30 +71,40 @@ def test_the_spread_of_a_silicone_is_the_tolerance_of_its_modulus() -> None:
     }
 
 
-def test_slopes_between_the_few_mu_that_are_tried(monkeypatch: Any) -> None:
+def test_slopes_between_the_few_mu_that_are_tried() -> None:
     """Within a fifth of the largest, about what a tolerance is known to; where all of the contact begins to stick,
     the effect of nu turns between two of them.
     """
     fine, mus = scene(mesh={"size_mm": 0.6, "base_size_mm": 4.0}), runs.MUS[::2]
     told = {**NONE, "depth_mm": 0.1, "nu": 0.003, "tilt_deg": 0.5}
+    assert len(mus) == 13
     few = calibrate(fine, "g36", mus=mus, tolerances=told)
-    monkeypatch.setattr(runs, "_SLOPES", {True: len(mus)})
-    for a, b in zip(few.tolerances, calibrate(fine, "g36", mus=mus, tolerances=told).tolerances, strict=True):
-        assert a.name == b.name
-        assert a.slope[::2] == pytest.approx(b.slope[::2], rel=1e-6)
-        assert 0.0 < np.abs(a.slope - b.slope).max() <= 0.2 * np.abs(b.slope).max(), a.name
-        assert np.abs(a.spread - b.spread).max() <= 0.2 * b.spread.max(), a.name
+    # so few mu are all tried
+    tried, between = (calibrate(fine, "g36", mus=mus[first::2], tolerances=told) for first in (0, 1))
+    for a, b, c in zip(few.tolerances, tried.tolerances, between.tolerances, strict=True):
+        assert a.name == b.name == c.name
+        assert a.slope[::2] == pytest.approx(b.slope, rel=1e-6)
+        assert 0.0 < np.abs(a.slope[1::2] - c.slope).max() <= 0.2 * np.abs(b.slope).max(), a.name
+        assert np.abs(a.spread[1::2] - c.spread).max() <= 0.2 * b.spread.max(), a.name
 
 
-def test_a_fine_body_leaves_its_differences_to_the_coarser_one_beside_it(monkeypatch: Any) -> None:
+def test_a_fine_body_leaves_its_differences_to_the_coarser_one_beside_it() -> None:
     """Which is what a calibration of that coarser body finds itself, and within a fifth of the largest slope."""
     told = {**NONE, "depth_mm": 0.1, "nu": 0.003}
-    fine = scene(mesh={"size_mm": 0.3, "base_size_mm": 4.0}, press={"depth_mm": 10.0, "steps": 10})
+    settings = {"mesh": {"size_mm": 0.3, "base_size_mm": 4.0}, "press": {"depth_mm": 10.0, "steps": 10}}
+    fine = scene(**settings)
     found = calibrate(fine, "g36", mus=FEW, tolerances=told)
-    beside, _ = calibrated(companion(build(fine.model())).model, "g36", mus=FEW, tolerances=told)
-    monkeypatch.setattr(slopes, "_LEAST_POINTS", {2: math.inf})
-    own = calibrate(fine, "g36", mus=FEW, tolerances=told)
-    assert found.reading == pytest.approx(own.reading, abs=0.0)
-    for a, b, c in zip(found.tolerances, own.tolerances, beside.tolerances, strict=True):
-        assert a.slope == pytest.approx(c.slope, rel=1e-6, abs=1e-9), a.name
-        assert 0.0 < np.abs(a.slope - b.slope).max() < 0.2 * np.abs(b.slope).max(), a.name
+    body = build(fine.model())
+    beside, _ = calibrated(companion(body).model, "g36", mus=FEW, tolerances=told)
+
+    def strains(problem: Problem, depth_mm: float = 10.0) -> Any:
+        reduced = ReducedModel.of(problem)
+        return np.array([reduced.press(mu, [Leg(depth_mm, steps=10)]).steps[-1].gauges["g36"] for mu in FEW])
+
+    at, softer = strains(body), build(scene(**settings, material={"E_MPa": 1.0, "nu": 0.447}).model())
+    assert found.reading == pytest.approx(at, rel=1e-9)
+    own = {"depth_mm": (strains(body, 10.1) - strains(body, 9.9)) / 0.2, "nu": (at - strains(softer)) / 0.003}
+    assert [a.name for a in found.tolerances] == list(own)
+    for a, b in zip(found.tolerances, beside.tolerances, strict=True):
+        assert a.slope == pytest.approx(b.slope, rel=1e-6, abs=1e-9), a.name
+        assert 0.0 < np.abs(a.slope - own[a.name]).max() < 0.2 * np.abs(own[a.name]).max(), a.name

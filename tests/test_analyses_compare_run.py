@@ -46,13 +46,13 @@ def test_held_ends_make_plane_strain_of_a_narrow_solid(compared) -> None:
 
 
 def test_the_verdict_of_the_papers_finger(compared) -> None:
-    text = " ".join(compared.verdict)
-    (percent,) = re.findall(r"At width/height 0.4 .* plane strain overstates the force by (\d+) %", text)
+    text = "\n".join(compared.verdict)
+    (percent,) = re.findall(r"width/height 0\.4 .* plane strain overstates\D* (\d+) %", text)
     assert 70 <= int(percent) <= 78
     assert "plane stress understates" in text
-    (width,) = re.findall(r"Plane strain is within 5 % .* from a width of (\d+) mm", text)
+    (width,) = re.findall(r"^Plane strain .*\b5 % .* (\d+) mm", text, re.MULTILINE)
     assert 700 <= int(width) <= 1000
-    assert "Gauge g36: solid" in text
+    assert "g36: solid" in text
     assert compared.outcome.ok
 
 

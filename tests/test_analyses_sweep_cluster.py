@@ -10,7 +10,9 @@ import pytest
 
 from finger3d.analyses.sweep import run as running
 from finger3d.analyses.sweep import worker
+from finger3d.analyses.sweep.points import combinations
 from finger3d.errors import MissingError
+from tests.scenes import HALF_CYLINDER, written
 from tests.sweep_cases import points_of
 
 
@@ -27,7 +29,7 @@ def test_a_scheduler_that_does_not_answer_is_left_after_the_time_limit(paper_sce
 
 
 @pytest.mark.parametrize("threads", [1, None], ids=["a worker", "here"])
-def test_workers_gain_no_threads(threads, paper_scene, monkeypatch) -> None:
+def test_workers_gain_no_threads(threads, tmp_path, monkeypatch) -> None:
     """Two workers on two cores are as many as there is room for; a body pressed by this process takes them all."""
     pools = []
 
@@ -37,9 +39,9 @@ def test_workers_gain_no_threads(threads, paper_scene, monkeypatch) -> None:
             super().__init__(most, **settings)
 
     monkeypatch.setattr("finger3d.mechanics.parallel.ThreadPoolExecutor", Pool)
-    monkeypatch.setattr("finger3d.mechanics.parallel._ROWS_FOR_THREADS", 1)
     monkeypatch.setattr("finger3d.mechanics.parallel.cores", lambda: 2)
-    sweep = points_of(paper_scene, "friction.mu=0.06,0.3,1")
+    # from 1000 contact rows on presses run at once
+    sweep = combinations(written(tmp_path, HALF_CYLINDER), ["mesh.size_mm=0.0045"], ["friction.mu=0.06,0.3,1"])
     (body,) = sweep.bodies.values()
     rows = worker.batch(body, sweep.points, 3) if threads else list(worker.rows(body, sweep.points))
     assert [row["point"] for row in rows] == [0, 1, 2]

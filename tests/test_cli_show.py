@@ -59,7 +59,7 @@ def test_a_solid_with_and_without_opengl(
         (["nothing", "--png", "a.png"], 2, "nothing"),
         (["empty", "--png", "a.png"], 2, "empty"),
         (["cut", "--png", "a.png"], 3, "incomplete"),
-        (["whole"], 3, "add --png FILE"),
+        (["whole"], 3, "--png FILE"),
         (["whole", "--step", "1"], 2, "--step"),
         (["whole", "--png", "a.jpg"], 2, ".png"),
         (["whole", "--png", "a.png", "--step", "9"], 2, "step 9 "),

@@ -54,7 +54,7 @@ def test_glued_parts_share_their_faces(symmetry: tuple[str, ...]) -> None:
 def test_solids_that_overlap_are_refused() -> None:
     from build123d import Box, Pos
 
-    with pytest.raises(Finger3dError, match="two: the solids overlap; cut one by the other"):
+    with pytest.raises(Finger3dError, match="^two: .*overlap"):
         glue({"": Box(4.0, 4.0, 4.0), "core": Pos(1.0, 0.0, 0.0) * Box(4.0, 4.0, 4.0)}, "two")
 
 
@@ -85,9 +85,7 @@ def test_a_part_off_the_middle_leaves_no_symmetry(tmp_path: Path) -> None:
     assert imported(path).mirrors() == ("z",)
 
 
-@pytest.mark.parametrize(
-    ("shift", "text"), [(9.0, "the 2 solids do not touch: they make 2 bodies"), (3.0, "the solids overlap")]
-)
+@pytest.mark.parametrize(("shift", "text"), [(9.0, "2 solids .*2 bodies"), (3.0, "two.step: .*overlap")])
 def test_step_files_of_solids_that_do_not_fit_together(tmp_path: Path, shift: float, text: str) -> None:
     from build123d import Box, Pos
 

@@ -23,17 +23,14 @@ def test_dimensions_that_do_not_fit_together_name_key_value_and_limit(changes: d
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"skin_mm": 8.0}, r"skin_mm = 8: the skin does not end on the walls; allowed: 0, or below 2 mm"),
-        ({"half_length_mm": 10.0}, r"skin_mm = 1: the skin does not .* 0, or half_length_mm below radius_mm"),
-        (
-            {"edge_height_mm": 0.2, "skin_mm": 1.0},
-            r"skin_mm = 1: the skin does not end on the walls; allowed: 0, or below 0\.1",
-        ),
-        ({"core_height_mm": 0.0}, r"core_height_mm = 0, but core_half_length_mm is not"),
-        ({"core_half_length_mm": 0.0}, r"core_half_length_mm = 0, but core_height_mm is not"),
-        ({"core_half_length_mm": 8.5}, r"core_half_length_mm = 8\.5 is too long; allowed: at most 8 mm"),
-        ({"core_height_mm": 10.9}, r"core_height_mm = 10\.9: the core runs into the skin; allowed: below 10\.4"),
-        ({"core_height_mm": 11.9, "skin_mm": 0.0}, r"core_height_mm = 11\.9: the core reaches the contact face"),
+        ({"skin_mm": 8.0}, r"skin_mm = 8: .*below 2 mm"),
+        ({"half_length_mm": 10.0}, r"skin_mm = 1: .*half_length_mm .*radius_mm"),
+        ({"edge_height_mm": 0.2, "skin_mm": 1.0}, r"skin_mm = 1: .*below 0\.1"),
+        ({"core_height_mm": 0.0}, r"core_height_mm = 0, .*core_half_length_mm"),
+        ({"core_half_length_mm": 0.0}, r"core_half_length_mm = 0, .*core_height_mm"),
+        ({"core_half_length_mm": 8.5}, r"core_half_length_mm = 8\.5 .*at most 8 mm"),
+        ({"core_height_mm": 10.9}, r"core_height_mm = 10\.9: .*below 10\.4"),
+        ({"core_height_mm": 11.9, "skin_mm": 0.0}, r"core_height_mm = 11\.9: "),
     ],
 )
 def test_parts_that_overlap_are_refused_in_one_line(changes: dict[str, float], text: str) -> None:
@@ -43,5 +40,5 @@ def test_parts_that_overlap_are_refused_in_one_line(changes: dict[str, float], t
 
 
 def test_a_skin_leaves_something_of_a_block() -> None:
-    with pytest.raises(Finger3dError, match=r"block: skin_mm = 15: the skin reaches the base; allowed: .*below 15 mm"):
+    with pytest.raises(Finger3dError, match=r"block: skin_mm = 15: .*below 15 mm"):
         make("block", skin_mm=15.0)

@@ -49,7 +49,7 @@ def test_one_estimate_is_the_middle_of_its_bounds() -> None:
     low = 100.0 * 6.894757e-3
     assert found.E_MPa == pytest.approx(math.sqrt(low * 12.0 / 7.0 * low))
     assert found.spread == pytest.approx(math.hypot(BATCH, math.log(12.0 / 7.0) / math.sqrt(12.0)))
-    assert found.origin == "mine, 100 % modulus of the data sheet"
+    assert found.origin.startswith("mine, 100 %")
     by_law = youngs_modulus(made(modulus_fit_MPa=0.5))
     assert (by_law.E_MPa, by_law.spread) == (pytest.approx(0.5), pytest.approx(BATCH))
     by_range = youngs_modulus(made(modulus_range_MPa=(1.0, 4.0)))
@@ -61,7 +61,7 @@ def test_several_estimates_meet_in_their_geometric_mean() -> None:
     assert found.E_MPa == pytest.approx(0.2)
     # standard error of two logarithms that are log 4 apart: half of it
     assert found.spread == pytest.approx(math.hypot(BATCH, 0.5 * math.log(4.0)))
-    assert found.origin == "mine, a compression test and a published hyperelastic law"
+    assert all(source in found.origin for source in ("mine", "compression test", "hyperelastic law"))
 
 
 def test_without_a_measurement_the_hardness_decides() -> None:

@@ -49,9 +49,9 @@ def test_case_spaces_and_speed_do_not_matter(name: str) -> None:
 
 
 def test_an_unknown_name_is_answered_with_the_nearest() -> None:
-    with pytest.raises(Finger3dError, match='did you mean "Ecoflex 00-30"'):
+    with pytest.raises(Finger3dError, match='"Ecoflex 00-30"'):
         silicone_named("Eco-flx 0030")
-    with pytest.raises(Finger3dError, match="^must be one of Ecoflex 00-10, .* Sylgard 184; or give shore_A"):
+    with pytest.raises(Finger3dError, match="Ecoflex 00-10, .* Sylgard 184; .*shore_A"):
         silicone_named("butter")
 
 

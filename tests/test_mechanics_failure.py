@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -24,7 +25,7 @@ def test_a_tip_that_the_points_do_not_resolve_is_the_cause() -> None:
     problem = build(replace(MODEL, object=Wedge(angle=0.4, tip_radius_mm=1.2)))
     said = cause_of_failure(problem, np.zeros(problem.mesh.points.shape))
     assert said.startswith("object.tip_radius_mm = 1.2: ")
-    assert said.endswith("mesh.size_mm = 0.6 resolves it")
+    assert "mesh.size_mm = 0.6 " in said
 
 
 def test_a_cell_that_folds_at_a_sharp_edge_of_the_finger_is_named() -> None:
@@ -33,9 +34,9 @@ def test_a_cell_that_folds_at_a_sharp_edge_of_the_finger_is_named() -> None:
     assert not cause_of_failure(problem, np.zeros(points.shape))
     near = np.exp(-((points - [7.0, 10.0]) ** 2).sum(axis=1))[:, None]
     said = cause_of_failure(problem, -0.6 * near * (points - [7.0, 10.0]) * [0.0, 1.0])
-    assert "compressed to 0." in said
-    assert "sharp edge of the finger" in said
+    assert re.search(r" 0\.\d+ of its volume", said)
+    assert re.search(r"fillet of [\d.]+ mm", said)
     middle = np.exp(-((points - [0.0, 5.0]) ** 2).sum(axis=1))[:, None]
     said = cause_of_failure(problem, -0.6 * middle * (points - [0.0, 5.0]) * [0.0, 1.0])
-    assert "compressed to 0." in said
-    assert "sharp edge" not in said
+    assert re.search(r" 0\.\d+ of its volume", said)
+    assert "fillet" not in said

@@ -15,7 +15,6 @@ from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics import finite_together
 from finger3d.mechanics.build import build
 from finger3d.mechanics.groups import march_in_groups
 from finger3d.mechanics.history import StepResult
@@ -70,8 +69,7 @@ def test_presses_in_groups_are_those_pressed_alone_with_fewer_factorisations(vis
     assert shared.factorizations < 0.5 * factorizations
 
 
-def test_presses_that_wait_for_a_nearer_tangent_lose_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(finite_together, "_TOO_SLOW", 3)
+def test_presses_that_wait_for_a_nearer_tangent_lose_nothing() -> None:
     several = problems(DEEP, mus=FAR_APART)
     groups = list(march_in_groups(several, several[0].model.formulation.workspace(), Event()))
     assert [number for number, _ in groups] != sorted(number for number, _ in groups)

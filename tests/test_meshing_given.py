@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -65,7 +66,7 @@ def test_linear_cells_become_quadratic_with_straight_edges(tmp_path: Path) -> No
     assert body.top(np.array([0.3]), np.array([-1.0]))[0] == pytest.approx(4.0, abs=1e-12)
     assert body.part_labels == ()
     assert body.mirrors() == ()
-    assert "no CAD solid" in refused(body.solid)
+    assert "STEP" in refused(body.solid)
 
 
 def test_the_middle_of_the_base_becomes_the_origin(tmp_path: Path) -> None:
@@ -94,7 +95,7 @@ def test_edges_are_halved_where_shorter_ones_are_asked_for() -> None:
         assert curved_volume(finer) == pytest.approx(body.volume_mm3, rel=1e-12)
         assert set(np.unique(finer.part)) == {0, 1}
     coarser = MeshOptions(2.0 * body.size_mm, 2.0 * body.base_size_mm)
-    assert "not made coarser" in refused(lambda: mesh_solid(body, coarser, EVERYWHERE))
+    assert f" {body.size_mm:g} mm" in refused(lambda: mesh_solid(body, coarser, EVERYWHERE))
 
 
 def _with(mesh: Mesh, **facets: np.ndarray) -> Mesh:
@@ -127,17 +128,17 @@ def _tilted() -> Mesh:
 @pytest.mark.parametrize(
     ("mesh", "told"),
     [
-        (_without("contact"), "no facets are named 'contact' (a value of the cell data 'label'); named are: 'base'"),
-        (_without("base"), "no facets are named 'base'"),
-        (_inverted(), "1 of 48 tetrahedra are flat or inverted, the first is number 7, near ("),
-        (_two_cubes(), "are 2 bodies that share no facets"),
-        (_tilted(), "are no level plane, but reach from y = -0.2 to 0.2 mm"),
-        (replace(cube(), points=cube().points * [1.0, -1.0, -1.0]), "4 mm below the facets named 'base'"),
-        (replace(cube(), points=1e-3 * cube().points), "mm large, allowed: a diagonal of 0.2 to 5000 mm"),
-        (_with(cube(), symmetry_x=cube().facets["base"]), "'symmetry_x', but symmetry is not used"),
-        (_with(cube(), contact=cube().facets["base"]), "named both '"),
-        (_with(cube(), contact=cube().cells[:1, :3] * 0 + [[0, 13, 26]]), "'contact', lies on no outer face"),
+        (_without("contact"), r"'contact' .*'label'.* 'base'"),
+        (_without("base"), r"'base' .*'label'.* 'contact'"),
+        (_inverted(), r"1 of 48 tetrahedra .* 7, near \("),
+        (_two_cubes(), "2 bodies"),
+        (_tilted(), r"y = -0\.2 to 0\.2 mm"),
+        (replace(cube(), points=cube().points * [1.0, -1.0, -1.0]), "4 mm below .*'base'"),
+        (replace(cube(), points=1e-3 * cube().points), r" 0\.2 to 5000 mm"),
+        (_with(cube(), symmetry_x=cube().facets["base"]), "'symmetry_x'"),
+        (_with(cube(), contact=cube().facets["base"]), "'base' and 'contact'|'contact' and 'base'"),
+        (_with(cube(), contact=cube().cells[:1, :3] * 0 + [[0, 13, 26]]), r"facet \d+ .*'contact'"),
     ],
 )
 def test_a_mesh_that_is_no_finger_is_refused(mesh: Mesh, told: str, tmp_path: Path) -> None:
-    assert told in refused(lambda: made(tmp_path, mesh))
+    assert re.search(told, refused(lambda: made(tmp_path, mesh)))

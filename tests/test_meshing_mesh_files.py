@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -85,23 +86,23 @@ def test_both_kinds_of_files_of_gmsh_are_read(name: str) -> None:
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        (TET10.replace("4.1 0 8", "2.2 0 8"), "format 2.2 is not read; save it as 4.1"),
-        (TET10.replace("4.1 0 8", "5 0 8"), "format 5 is not read"),
-        ("solid x\n", "no file of Gmsh"),
-        ("", "no file of Gmsh"),
-        (TET10[:-60], "damaged or incomplete"),
+        (TET10.replace("4.1 0 8", "2.2 0 8"), r" 2\.2 .*4\.1: gmsh -format msh41"),
+        (TET10.replace("4.1 0 8", "5 0 8"), r" 5 .*4\.1: gmsh -format msh41"),
+        ("solid x\n", r"\$MeshFormat"),
+        ("", r"\$MeshFormat"),
+        (TET10[:-60], "Mesh.SaveParametric = 0"),
         (TET10.replace("3 1 11 1\n3 1 2 3 4 5 6 7 8 9 10", "3 1 5 1\n3 1 2 3 4 5 6 7 8"), "1 of type hexahedron"),
         (
             TET10.replace("3 3 1 3\n", "2 2 1 2\n").split("3 1 11 1")[0] + "$EndElements\n",
-            "holds no tetrahedra; Gmsh saves",
+            "no tetrahedra; .*physical group",
         ),
-        (TET10.replace("0.5 0.5 0\n", "nan 0.5 0\n"), "no finite number"),
+        (TET10.replace("0.5 0.5 0\n", "nan 0.5 0\n"), "coordinate .*finite"),
     ],
 )
 def test_other_files_of_gmsh_are_refused(text: str, told: str, tmp_path: Path) -> None:
     path = tmp_path / "body.msh"
     path.write_text(text, encoding="ascii")
-    assert told in refused(lambda: read_contents(path))
+    assert re.search(told, refused(lambda: read_contents(path)))
 
 
 def test_names_are_texts_or_numbers_of_field_data(tmp_path: Path) -> None:
@@ -117,9 +118,9 @@ def test_names_are_texts_or_numbers_of_field_data(tmp_path: Path) -> None:
 
 def test_other_files_of_vtk_are_refused(tmp_path: Path) -> None:
     mesh = cube(1)
-    assert "no unstructured grid" in refused(lambda: read_contents(_file(tmp_path / "a.vtu", b"<VTKFile>")))
+    assert "unstructured grid" in refused(lambda: read_contents(_file(tmp_path / "a.vtu", b"<VTKFile>")))
     whole = vtu_of(tmp_path / "b.vtu", mesh).read_bytes()
-    assert "no unstructured grid" in refused(lambda: read_contents(_file(tmp_path / "c.vtu", whole[: len(whole) // 2])))
+    assert "unstructured grid" in refused(lambda: read_contents(_file(tmp_path / "c.vtu", whole[: len(whole) // 2])))
     assert "'label_names'" in refused(
         lambda: read_contents(vtu_of(tmp_path / "d.vtu", mesh, numbers=True, names=False))
     )

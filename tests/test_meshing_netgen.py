@@ -100,19 +100,17 @@ def test_meshes_of_the_two_meshers_are_kept_apart() -> None:
 
 def test_stl_is_left_to_ftetwild(tmp_path: Path) -> None:
     body = imported(write_stl(tmp_path / "body.stl", box_of(10.0, 8.0, 6.0)))
-    with pytest.raises(Finger3dError, match=r"'netgen' needs CAD, and this is STL; use 'ftetwild'"):
+    with pytest.raises(Finger3dError, match=r"'netgen' .*STL.*'ftetwild'"):
         mesh_solid(body, MeshOptions(2.0, 3.0, "netgen"), (-1.0, 1.0, -1.0, 1.0))
 
 
 def test_without_the_package_a_line_names_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("finger3d._extras.available", lambda module: module != "netgen")
-    with pytest.raises(MissingError, match=r'pip install "finger3d\[netgen\]", or set mesh.mesher = "swept"'):
+    with pytest.raises(MissingError, match=r'pip install "finger3d\[netgen\]".*mesh.mesher = "swept"'):
         netgen.new_mesh(FIG9, OPTIONS, ZONE, BOTH, print)
 
 
-@pytest.mark.parametrize(
-    ("limit", "text"), [(0.01, "did not finish within 0 s"), (60.0, "netgen crashed .return code 1.: .*Error")]
-)
+@pytest.mark.parametrize(("limit", "text"), [(0.01, " within 0 s"), (60.0, "netgen .*return code 1.: .*Error")])
 def test_a_child_that_fails_is_told(monkeypatch: pytest.MonkeyPatch, limit: float, text: str) -> None:
     if limit > 1.0:
         monkeypatch.setattr(netgen, "size_points", lambda field: (np.zeros((1, 2)), np.ones(1)))  # two coordinates

@@ -38,45 +38,44 @@ def test_a_cylinder_flows_as_poiseuille_says() -> None:
 
 def test_grams_of_each_component_for_the_volume() -> None:
     text = sheet("Dragon Skin 20")
-    assert "108.0 g in all: 54.0 g of A and 54.0 g of B (1 A : 1 B by weight or volume)" in text
+    assert re.search(r" 108\.0 g .* 54\.0 g of A and 54\.0 g of B \(1 A : 1 B ", text)
     grams = [
         float(g)
-        for g in re.search(
-            r"weigh +([\d.]+) g in all.*: ([\d.]+) g of A and ([\d.]+) g", sheet("Smooth-Sil 950")
-        ).groups()
+        for g in re.search(r"weigh +([\d.]+) g .*: ([\d.]+) g of A and ([\d.]+) g", sheet("Smooth-Sil 950")).groups()
     ]
     assert grams[1] / grams[2] == pytest.approx(10.0, rel=0.01)
     # no density is known: the largest one of the table, so that there is enough
     assert grams[0] == pytest.approx(100.0 * max(s.density_g_ml or 0.0 for s in silicones().values()))
     assert grams[1] + grams[2] == pytest.approx(grams[0], abs=0.11)
-    assert "50.0 ml of A and 50.0 ml of B (1 A : 1 B by volume)" in sheet("Mold Star 16")
-    assert "mix ratio: see the data sheet" in sheet("Elastosil M4601")
+    assert "50.0 ml of A and 50.0 ml of B (1 A : 1 B " in sheet("Mold Star 16")
+    assert re.search(r"weigh .*mix ratio.*data sheet", sheet("Elastosil M4601"))
     text = "\n".join(silicone_lines(made(mix=Mix(2.0, 1.0, "volume")), 90.0, HOLE, 0.0))
     assert "60.0 ml of A and 30.0 ml of B" in text
 
 
 def test_the_cup_holds_five_times_the_volume() -> None:
-    assert "at least 500 ml" in sheet("Dragon Skin 20")
-    assert "at least 500 ml" in "\n".join(silicone_lines(None, 100.0, HOLE, 0.0))
+    assert " 500 ml" in sheet("Dragon Skin 20")
+    assert " 500 ml" in "\n".join(silicone_lines(None, 100.0, HOLE, 0.0))
 
 
 def test_pot_life_against_pouring() -> None:
     slow = sheet("Dragon Skin 20", 200.0)
     assert "25 min" in slow
-    assert "17 min are left" in slow
-    assert "with a syringe" in slow
+    assert re.search(r"degas 5 min.* 17 min ", slow)
+    assert "syringe" in slow
     assert "syringe" not in sheet("Ecoflex 00-30", 50.0, PourHole(10.0, 20.0, 4.0))
-    assert "no time to degas" in sheet("Mold Star 16")
-    assert "pot life            see the data sheet" in sheet("Smooth-Sil 960")
+    assert "degas 5 min" not in sheet("Mold Star 16")
+    assert re.search(r"pot life .*data sheet", sheet("Smooth-Sil 960"))
 
 
 def test_cure_shrinkage_and_notes() -> None:
     text = sheet("Dragon Skin 10")
-    assert "after 5 h at 23 degrees" in text
+    assert " 5 h at 23 degrees" in text
     assert "below 0.1 %" in text
     assert "MEDIUM" in text
-    assert "the mold allows for more" in sheet("Dragon Skin 10", shrinkage=0.005)
-    assert "after 0.5 h (30 min)" in sheet("Mold Star 16")
+    (more,) = set(sheet("Dragon Skin 10", shrinkage=0.005).splitlines()) - set(text.splitlines())
+    assert re.search(r"shrinkage .* 0\.1 % .*mold", more)
+    assert " 0.5 h (30 min)" in sheet("Mold Star 16")
     assert "60 min at 90 degrees" in sheet("Elastosil M4601")
     assert "data sheet" in sheet("Smooth-Sil 940")
 
@@ -100,5 +99,5 @@ def test_the_order_of_mixing_and_what_stops_the_cure() -> None:
 
 
 def test_ribs_run_across_the_axis_of_the_split() -> None:
-    assert "printed with z up: ribs run along x" in "\n".join(surface_lines("z"))
-    assert "printed with x up: ribs run along z" in "\n".join(surface_lines("x"))
+    assert re.search(r"\bz up\b.* along x\b.* along z\b", "\n".join(surface_lines("z")))
+    assert re.search(r"\bx up\b.* along z\b.* along x\b", "\n".join(surface_lines("x")))

@@ -32,7 +32,7 @@ def test_pyvista_draws_a_solid_or_tells_that_opengl_is_missing(
         assert finger_picture(tmp_path / "f.png", mesh, **result, title="Fig. 9", thing=OBJECT) == "pyvista"
         assert_shows_the_zones(tmp_path / "f.png")
     else:
-        with pytest.raises(MissingError, match="PyVista cannot render here"):
+        with pytest.raises(MissingError, match="PyVista.*FINGER3D_RENDERER"):
             finger_picture(tmp_path / "f.png", mesh, **result)
 
 
@@ -50,7 +50,7 @@ def test_a_crash_of_the_renderer_is_survived_and_remembered(
         assert_shows_the_zones(tmp_path / name)
     assert (tmp_path / "tried").read_text() == "x"
     monkeypatch.setenv("FINGER3D_RENDERER", "pyvista")
-    with pytest.raises(MissingError, match="crashed .signal 6.*unset FINGER3D_RENDERER"):
+    with pytest.raises(MissingError, match="signal 6.*FINGER3D_RENDERER"):
         finger_picture(tmp_path / "three.png", mesh, **result)
 
 

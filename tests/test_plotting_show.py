@@ -44,4 +44,4 @@ def test_a_display_that_cannot_be_opened_is_one_line(section: Path) -> None:
     done = subprocess.run(command, env=env, capture_output=True, text=True, check=False, timeout=120)
     assert done.returncode == 3
     assert len(done.stderr.splitlines()) == 1
-    assert "add --png FILE" in done.stderr
+    assert "--png FILE" in done.stderr

@@ -116,15 +116,16 @@ def test_every_reference_of_the_paper_is_cited_and_every_citation_has_one(root: 
 
 def test_what_the_paper_says_of_the_studies_is_true(root: Path) -> None:
     text = " ".join((root / "docs" / "paper" / "paper.md").read_text().split())
-    assert "more than 60 studies with more than 900 comparisons" in text
-    assert "Some 400 statements" in text
+    told = re.search(r"(\d+) studies\b[^.]*?(\d+) comparisons\b.*?(\d+) statements\b", text)
+    assert told is not None
+    told_studies, told_rows, told_statements = map(int, told.groups())
     index = (root / "validation" / "README.md").read_text()
     found = re.search(r"^(\d+) of (\d+) rows pass, (\d+) of (\d+) statements hold; (\d+) studies", index, re.MULTILINE)
     assert found is not None
     passing, rows, holding, statements, studies = map(int, found.groups())
-    assert passing == rows > 900
-    assert studies > 60
-    assert statements == pytest.approx(400, abs=50)
+    assert told_rows < passing == rows
+    assert told_studies < studies
+    assert statements == pytest.approx(told_statements, abs=50)
     assert 0.5 < holding / statements < 0.6
 
 

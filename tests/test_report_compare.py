@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 from finger3d.report.compare import compare_page
+from finger3d.results.summary import title_of
 from tests.scenes import words
 
 
@@ -27,8 +28,8 @@ def test_a_comparison_tells_its_verdict_and_every_case(tmp_path: Path) -> None:
     assert "<t>: " in text
     del data["scene"]["title"]
     (tmp_path / "compare.json").write_text(json.dumps(data), encoding="utf-8")
-    assert "block on a plane" in words(compare_page(tmp_path))
-    assert "force per width, solid 15.20 ± 0.10 N/mm" in text
-    assert "force per width, plane strain 26.4 N/mm" in text
+    assert title_of(data["scene"]) in words(compare_page(tmp_path))
+    assert "solid 15.20 ± 0.10 N/mm" in text
+    assert "plane strain 26.4 N/mm" in text
     assert data["verdict"][0] in text
     assert "99 2 1 it failed" in text

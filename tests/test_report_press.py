@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from finger3d.errors import Finger3dError
+from finger3d.errors import Finger3dError, Outcome
 from finger3d.report.build import CITE
 from finger3d.report.press import press_page
 from finger3d.results.states import load_states
@@ -24,12 +24,12 @@ def copied(source: Path, target: Path, **changes: object) -> Path:
 def test_a_press_tells_its_numbers_proof_cost_versions_and_how_to_cite(section: Path) -> None:
     summary = json.loads((section / "summary.json").read_text(encoding="utf-8"))
     last, text = summary["steps"][-1], words(section / "report.html")
-    assert f"normal force {last['normal_force_N']:.5g} N" in text
-    assert f"contact length at z = 0 {2 * last['contact_half_length_mm']:.5g} mm" in text
-    assert f"strain of gauge <g> {last['gauges']['<g>']:.5g}" in text
+    assert f" {last['normal_force_N']:.5g} N " in text
+    assert f" {2 * last['contact_half_length_mm']:.5g} mm " in text
+    assert f"<g> {last['gauges']['<g>']:.5g} " in text
     assert f"{max(s['residual'] for s in summary['steps']):.1e}" in text
     assert all(f"{step['residual']:.1e} yes" in text for step in summary["steps"])
-    assert "finger geometry = half_cylinder, radius_mm = 5, width_mm = 2" in text
+    assert "geometry = half_cylinder, radius_mm = 5, width_mm = 2" in text
     assert f"condensation {summary['cost']['seconds']['condensation']:.2f} s" in text
     assert f"scipy {summary['versions']['scipy']}" in text
     assert CITE in text
@@ -52,22 +52,25 @@ def test_errors_are_shown_with_their_numbers(section: Path, tmp_path: Path) -> N
         "method": "companion", "seconds": 0.1,
     }  # fmt: skip
     text = words(press_page(copied(section, tmp_path, error_estimate=estimate)))
-    assert f"normal force {last['normal_force_N']:.3f} ± 0.030 N" in text
-    assert f"contact length at z = 0 {2 * last['contact_half_length_mm']:.2f} ± 0.20 mm" in text
-    assert f"strain of gauge <g> {last['gauges']['<g>']:.4f} ± 0.0030" in text
+    assert f" {last['normal_force_N']:.3f} ± 0.030 N " in text
+    assert f" {2 * last['contact_half_length_mm']:.2f} ± 0.20 mm " in text
+    assert f"<g> {last['gauges']['<g>']:.4f} ± 0.0030 " in text
     assert "normal_force_N 0.02 0.01" in text
     assert "±" not in words(press_page(copied(section, tmp_path, error_estimate=None)))
 
 
 def test_a_failed_or_empty_press_says_so(section: Path, tmp_path: Path) -> None:
     steps = json.loads((section / "summary.json").read_text(encoding="utf-8"))["steps"]
-    steps[-1] |= {"outcome": "contact did not settle", "residual": None}
-    page = press_page(copied(section, tmp_path, outcome="contact did not settle", steps=steps))
-    assert 'class="bad">contact did not settle' in page.read_text(encoding="utf-8")
+    failed = str(Outcome.NO_CONVERGENCE)
+    steps[-1] |= {"outcome": failed, "residual": None}
+    page = press_page(copied(section, tmp_path, outcome=failed, steps=steps))
+    assert f'class="bad">{failed}' in page.read_text(encoding="utf-8")
+    assert 'class="headline"' in page.read_text(encoding="utf-8")
     text = words(page)
-    assert f"normal force {steps[-2]['normal_force_N']:.5g} N" in text  # the last good step
+    assert f" {steps[-2]['normal_force_N']:.5g} N " in text  # the last good step
     assert "none NO" in text
-    assert "normal force" not in words(press_page(copied(section, tmp_path, outcome="incomplete", steps=[])))
+    empty = press_page(copied(section, tmp_path, outcome="incomplete", steps=[]))
+    assert 'class="headline"' not in empty.read_text(encoding="utf-8")
     with pytest.raises(Finger3dError, match="summary.json"):
         press_page(tmp_path / "nothing")
 

