@@ -51,9 +51,9 @@ def environment_bytes(prefix: Path) -> int:
 
 _PROBE = """
 import numpy as np, scipy.sparse as sp
-from finger3d.fem.pardiso import SchurFactor
+from finger3d.fem.pardiso import PardisoFactor
 full = sp.diags_array([-1.0, 2.5, -1.0], offsets=[-1, 0, 1], shape=(4000, 4000)).tocsr()
-factor, load = SchurFactor(sp.csr_matrix(sp.triu(full)), 4), np.ones((3996, 2))
+factor, load = PardisoFactor(sp.csr_matrix(sp.triu(full)), 4), np.ones((3996, 2))
 found = factor.substituted(factor.eliminated(load)[0], np.zeros((4, 2)))
 assert np.abs(full[:3996, :3996] @ found - load).max() < 1e-12
 """

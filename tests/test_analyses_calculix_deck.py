@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from finger3d.analyses.calculix.deck import Contact, Deck, ObjectElements, Step, facet_lines
+from finger3d.analyses.calculix.deck import Contact, Deck, DeckStep, ObjectElements, facet_lines
 from finger3d.fem.simplex import FACETS, quadratic
 from tests.given_meshes import cube
 
@@ -20,7 +20,7 @@ LINEAR = ("*ELASTIC", "1, 0.3")
 
 def deck(**options: object) -> Deck:
     """A cube under a plate."""
-    steps = (Step(np.array([0.0, -1.0, 0.0]), 4), Step(np.tile([0.5, -1.0, 0.0], (8, 1)), 1))
+    steps = (DeckStep(np.array([0.0, -1.0, 0.0]), 4), DeckStep(np.tile([0.5, -1.0, 0.0], (8, 1)), 1))
     made = Deck(quadratic(cube()), (LINEAR,), PLATE, steps, Contact(200.0, 80.0, 0.25), remarks=("a cube",))
     return replace(made, **options)  # type: ignore[arg-type]
 

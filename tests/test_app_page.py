@@ -8,14 +8,14 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from finger3d.app.live_body import LiveBody, Press, Reading
+from finger3d.app.live_body import LiveBody, LivePress, LiveReading
 from finger3d.app.page import numbers_of, page, section_figure, text_of, traction_figure
 from finger3d.app.server import LocalServer, local_server
 from finger3d.mechanics.gauges import Gauge
 from finger3d.scene.scene import parse
 from tests.test_app_live_body import SCENE
 
-PRESS = Press(
+PRESS = LivePress(
     {"normal_force_N": 2.0, "friction_sum_N": 0.5, "contact_half_length_mm": 1.5, "stick_half_length_mm": 0.5},
     np.array([-1.0, 0.0, 1.0]), np.array([0.1, 0.3, 0.1]), np.array([0.03, 0.0, 0.03]),
     np.array(["slip", "stick", "slip"]), np.zeros((1, 2)),
@@ -24,8 +24,8 @@ PRESS = Press(
 
 def test_lines_give_lengths_in_full_and_say_when_mu_cannot_be_told() -> None:
     assert all(number in numbers_of(PRESS) for number in ("2 N", "0.5 N", "3 mm", "1 mm"))
-    assert "0.05" in text_of(Reading(0.01, 0.1, 5e-3, 0.05))
-    assert "inf" not in text_of(Reading(0.01, 0.0, 5e-3, np.inf))
+    assert "0.05" in text_of(LiveReading(0.01, 0.1, 5e-3, 0.05))
+    assert "inf" not in text_of(LiveReading(0.01, 0.0, 5e-3, np.inf))
 
 
 def test_figures_have_units_and_the_data() -> None:

@@ -26,7 +26,7 @@ def random_matrix(n: int, seed: int) -> np.ndarray:
 def test_the_schur_complement_of_an_indefinite_matrix_is_that_of_its_inverse() -> None:
     stiffness, rows = random_matrix(40, 0), np.random.default_rng(1).normal(size=(7, 40))
     augmented = np.block([[stiffness, rows.T], [rows, np.zeros((7, 7))]])
-    factor = mumps.SchurFactor(sp.csr_matrix(np.triu(augmented)), 7)
+    factor = mumps.MumpsFactor(sp.csr_matrix(np.triu(augmented)), 7)
     assert factor.schur == pytest.approx(-rows @ np.linalg.solve(stiffness, rows.T), rel=1e-10, abs=1e-12)
     load, force = np.random.default_rng(2).normal(size=(40, 100)), np.random.default_rng(3).normal(size=(7, 100))
     found = factor.substituted(factor.eliminated(load)[0], force)
@@ -35,10 +35,10 @@ def test_the_schur_complement_of_an_indefinite_matrix_is_that_of_its_inverse() -
 
 def test_a_renewed_factor_is_that_of_the_new_matrix() -> None:
     first, second = (sp.csr_matrix(np.triu(random_matrix(20, seed))) for seed in (0, 1))
-    factor = mumps.SchurFactor(first, 4)
+    factor = mumps.MumpsFactor(first, 4)
     factor.renew(second.data)
     assert factor.factorizations == 2
-    fresh = mumps.SchurFactor(second, 4)
+    fresh = mumps.MumpsFactor(second, 4)
     assert np.array_equal(factor.schur, fresh.schur)
     force = np.arange(1.0, 5.0)[:, None]
     assert np.array_equal(factor.substituted(None, force), fresh.substituted(None, force))
@@ -51,7 +51,7 @@ def test_a_body_that_is_not_held_has_a_perturbed_pivot_for_every_rigid_motion() 
 
 def test_what_mumps_refuses_is_told_with_the_number_of_the_error() -> None:
     with pytest.raises(mumps.MumpsError, match=r"error -\d+"):
-        mumps.SchurFactor(sp.csr_matrix(np.eye(3)), 3)  # nothing is left to eliminate
+        mumps.MumpsFactor(sp.csr_matrix(np.eye(3)), 3)  # nothing is left to eliminate
 
 
 def test_bodies_that_share_the_library_do_not_disturb_each_other() -> None:

@@ -22,7 +22,7 @@ def test_a_factor_without_memory_is_a_lack_of_memory(monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr(pardiso, "_library", lambda: refuses)
     with pytest.raises(MemoryError):
-        pardiso.SchurFactor(sp.csr_matrix(np.eye(3)), 1)
+        pardiso.PardisoFactor(sp.csr_matrix(np.eye(3)), 1)
 
 
 @pytest.mark.parametrize("solver", SOLVERS)

@@ -25,9 +25,9 @@ def test_pardiso_solves_with_the_files_that_are_left(tmp_path: Path) -> None:
             except OSError:  # another file system
                 shutil.copy(path, tmp_path)
     code = (
-        "import numpy as np, scipy.sparse as sp\nfrom finger3d.fem.pardiso import SchurFactor\n"
+        "import numpy as np, scipy.sparse as sp\nfrom finger3d.fem.pardiso import PardisoFactor\n"
         "full = sp.diags_array([-1.0, 2.5, -1.0], offsets=[-1, 0, 1], shape=(400, 400)).tocsr()\n"
-        "factor = SchurFactor(sp.csr_matrix(sp.triu(full)), 4)\nload = np.ones((396, 2))\n"
+        "factor = PardisoFactor(sp.csr_matrix(sp.triu(full)), 4)\nload = np.ones((396, 2))\n"
         "x = factor.substituted(factor.eliminated(load)[0], np.zeros((4, 2)))\n"
         "assert np.abs(full[:396, :396] @ x - load).max() < 1e-12\n"
         "print(*{line.split()[-1] for line in open('/proc/self/maps') if '.so' in line}, sep='\\n')"

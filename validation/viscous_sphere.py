@@ -84,7 +84,7 @@ class StandIn:
         )  # fmt: skip
 
     @property
-    def part(self) -> StandIn:
+    def body(self) -> StandIn:
         return self
 
     @property

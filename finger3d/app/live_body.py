@@ -39,7 +39,7 @@ _NUMBERS = ("normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick
 
 
 @dataclass(frozen=True)
-class Press:
+class LivePress:
     """End of a press.
 
     Attributes
@@ -62,7 +62,7 @@ class Press:
 
 
 @dataclass(frozen=True)
-class Reading:
+class LiveReading:
     """What a gauge reads, and how well it tells the coefficient of friction.
 
     Attributes
@@ -114,7 +114,7 @@ class LiveBody:
         """Depth that the body is condensed for, that of the scene."""
         return self.problem.model.largest_depth_mm
 
-    def press(self, mu: float, depth_mm: float) -> Press:
+    def press(self, mu: float, depth_mm: float) -> LivePress:
         """Press with a coefficient of friction to a depth; the last presses are kept.
 
         Raises
@@ -124,7 +124,7 @@ class LiveBody:
         """
         return _pressed(self, round(mu, 6), round(depth_mm, 6))
 
-    def read(self, gauge: Gauge, mu: float, depth_mm: float, noise: float) -> Reading:
+    def read(self, gauge: Gauge, mu: float, depth_mm: float, noise: float) -> LiveReading:
         """Read a gauge.
 
         Parameters
@@ -139,7 +139,7 @@ class LiveBody:
         mesh, axes = self.problem.mesh, self.problem.axes
         low, middle, high = (self.press(m, depth_mm) for m in (max(mu - MU_STEP, 0.0), mu, mu + MU_STEP))
 
-        def strain(place: Gauge, press: Press) -> float:
+        def strain(place: Gauge, press: LivePress) -> float:
             return float((place.row(mesh, axes) @ press.displacement.ravel())[0])
 
         spread = [noise]
@@ -150,7 +150,7 @@ class LiveBody:
         slope = (strain(gauge, high) - strain(gauge, low)) / (mu + MU_STEP - max(mu - MU_STEP, 0.0))
         strain_sd = float(np.linalg.norm(spread))
         mu_sd = strain_sd / abs(slope) if slope else math.inf
-        return Reading(strain(gauge, middle), slope, strain_sd, mu_sd)
+        return LiveReading(strain(gauge, middle), slope, strain_sd, mu_sd)
 
     def outline(self) -> tuple[Float, Float]:
         """Return x and y (k,), mm, of the contact curve at z = 0 and the base: the outline of the middle section."""
@@ -161,7 +161,7 @@ class LiveBody:
 
 
 @lru_cache(maxsize=_KEPT)
-def _pressed(body: LiveBody, mu: float, depth_mm: float) -> Press:
+def _pressed(body: LiveBody, mu: float, depth_mm: float) -> LivePress:
     problem = body.problem
     friction = problem.model.friction.with_mu(mu)
     legs = (Leg(depth_mm, steps=STEPS),)
@@ -177,7 +177,7 @@ def _pressed(body: LiveBody, mu: float, depth_mm: float) -> Press:
     on = on[np.argsort(np.asarray(table["x_mm"])[on], kind="stable")]
     shear = np.hypot(np.asarray(table["shear_x_MPa"]), np.asarray(table["shear_z_MPa"]))
     unknowns = problem.model.formulation.unknowns(problem, steps[-1].meshed_state)
-    return Press(
+    return LivePress(
         numbers={name: measured[name] for name in _NUMBERS},
         x_mm=np.asarray(table["x_mm"])[on],
         pressure_MPa=np.asarray(table["pressure_MPa"])[on],

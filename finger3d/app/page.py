@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from finger3d.app.live_body import LiveBody, Press, Reading
+from finger3d.app.live_body import LiveBody, LivePress, LiveReading
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.gauges import Gauge
 from finger3d.sensor.curve import NOISE
@@ -83,7 +83,7 @@ def _slider(name: str, label: str, low: float, high: float, step: float, value: 
     return html.Div([html.Label(label, htmlFor=name), slider], style={"marginBottom": "0.5rem"})
 
 
-def numbers_of(press: Press) -> str:
+def numbers_of(press: LivePress) -> str:
     """Return forces and lengths in one line."""
     n = press.numbers
     return (
@@ -92,7 +92,7 @@ def numbers_of(press: Press) -> str:
     )
 
 
-def text_of(reading: Reading) -> str:
+def text_of(reading: LiveReading) -> str:
     """Return strain, its standard deviation, and what follows for mu in one line."""
     mu = "cannot be told" if reading.mu_sd > _LARGEST_MU else f"is told to +- {reading.mu_sd:.2g}"
     return (
@@ -101,7 +101,7 @@ def text_of(reading: Reading) -> str:
     )
 
 
-def traction_figure(press: Press, mu: float) -> go.Figure:
+def traction_figure(press: LivePress, mu: float) -> go.Figure:
     """Return pressure, friction and its limit along the middle of the contact, with stick and slip."""
     import plotly.graph_objects as go
 

@@ -255,7 +255,7 @@ class _Augmented:
     """
 
     pattern: _Pattern
-    factor: pardiso.SchurFactor | mumps.SchurFactor
+    factor: pardiso.PardisoFactor | mumps.MumpsFactor
     number: int = 1
 
     @property
@@ -271,7 +271,7 @@ class _Augmented:
         """See `_Factor`."""
         return self._current().substituted(eliminated, force)
 
-    def _current(self) -> pardiso.SchurFactor | mumps.SchurFactor:
+    def _current(self) -> pardiso.PardisoFactor | mumps.MumpsFactor:
         if not self.is_current:
             raise RuntimeError("the factor of this condensed body was overwritten by a later one; condense it again")
         return self.factor
@@ -288,7 +288,7 @@ class _Augmented:
             replaced.factor.renew(replaced.pattern.values(upper, rows))
             return cls(replaced.pattern, replaced.factor, replaced.factor.factorizations)
         pattern, matrix = _augmented(upper, free, rows)
-        factor = mumps.SchurFactor if solver == "mumps" else pardiso.SchurFactor
+        factor = mumps.MumpsFactor if solver == "mumps" else pardiso.PardisoFactor
         return cls(pattern, factor(matrix, rows.shape[0]))
 
 

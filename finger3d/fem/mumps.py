@@ -78,10 +78,10 @@ def _declarations(header: str) -> str:
     )
 
 
-class SchurFactor:
+class MumpsFactor:
     """Factor of ``[[K, R^T], [R, 0]]`` that stops before the last rows, and their Schur complement.
 
-    Parameters and attributes are those of `finger3d.fem.pardiso.SchurFactor`.
+    Parameters and attributes are those of `finger3d.fem.pardiso.PardisoFactor`.
 
     Attributes
     ----------

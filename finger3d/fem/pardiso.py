@@ -60,7 +60,7 @@ class PardisoError(MissingError):
     """PARDISO refused the matrix; carries its error number."""
 
 
-class SchurFactor:
+class PardisoFactor:
     """Factor of ``[[K, R^T], [R, 0]]`` that stops before the last rows, and their Schur complement.
 
     Parameters

@@ -79,7 +79,7 @@ class Strip:
 
 
 @dataclass(frozen=True)
-class Layout:
+class GridLayout:
     """Points on rows.
 
     Attributes
@@ -110,7 +110,7 @@ class Grid:
     points : (n, 2) mm
     cells : (m, 3) counter-clockwise
     facets : label -> (k, 2) edges, outward
-    curves : see :class:`Layout`
+    curves : see :class:`GridLayout`
     part : (m,) number of the part of each triangle
     """
 
@@ -149,7 +149,7 @@ class _Place:
 
 
 @dataclass(frozen=True)
-class Row:
+class GridRow:
     """Numbers and parameters of the nodes on a row, each (n,), and the points (n, 2), mm."""
 
     nodes: Int
@@ -162,7 +162,7 @@ class Row:
         return self.nodes[inside], self.u[inside]
 
 
-def rows(section: Section, sizes: Sizes) -> Layout:
+def rows(section: Section, sizes: Sizes) -> GridLayout:
     """Lay out the rows and the points on them."""
     found = bands(section)
     sizes = _with_thin_places(section, sizes)
@@ -188,7 +188,7 @@ def rows(section: Section, sizes: Sizes) -> Layout:
     for k, at in enumerate(places):
         params = _on_row(section, sizes, u, at, first=k == 0)
         points = at[-1].band.at(params, at[-1].share)
-        laid.append(Row(count + np.arange(len(params)), params, points))
+        laid.append(GridRow(count + np.arange(len(params)), params, points))
         count += len(params)
     return _joined(section, sizes, found, places, laid)
 
@@ -270,7 +270,9 @@ def _longest(sizes: Sizes, band: Band, u: Float, length: float) -> Callable[[Flo
     return lambda depth: np.interp(depth, stations, least)
 
 
-def _joined(section: Section, sizes: Sizes, found: Bands, places: list[list[_Place]], laid: list[Row]) -> Layout:
+def _joined(
+    section: Section, sizes: Sizes, found: Bands, places: list[list[_Place]], laid: list[GridRow]
+) -> GridLayout:
     """Return the strips between the rows, the boundary, and the curves."""
     strips: list[Strip] = []
     ends: dict[str, list[int]] = {}
@@ -319,7 +321,7 @@ def _joined(section: Section, sizes: Sizes, found: Bands, places: list[list[_Pla
         param = np.full(len(points), np.nan)
         param[nodes] = u
         curves.append((owner.contact, param))
-    return Layout(points, tuple(strips), facets, tuple(curves))
+    return GridLayout(points, tuple(strips), facets, tuple(curves))
 
 
 _NO_EDGES = np.zeros((0, 2), dtype=np.int64)
@@ -330,12 +332,12 @@ def _edges(nodes: Int) -> Int:
     return np.stack([nodes[:-1], nodes[1:]], axis=1)
 
 
-def _core_rows(section: Section, sizes: Sizes, core: Core, around: Row) -> list[Row]:
+def _core_rows(section: Section, sizes: Sizes, core: Core, around: GridRow) -> list[GridRow]:
     """Return the rows of a core, from the one on its upper side to the base, with the nodes on its vertical side."""
     x, y = around.points.T
     on_top, beside = y == core.height_mm, x == core.half_length_mm
     side, heights = around.nodes[beside], y[beside]
-    found = [Row(around.nodes[on_top], x[on_top] / core.half_length_mm, around.points[on_top])]
+    found = [GridRow(around.nodes[on_top], x[on_top] / core.half_length_mm, around.points[on_top])]
     count = int(around.nodes[-1]) + 1
     u = np.linspace(0.0, 1.0, _STATIONS + 1)
     for k in range(1, len(side)):
@@ -345,7 +347,7 @@ def _core_rows(section: Section, sizes: Sizes, core: Core, around: Row) -> list[
         nodes = np.append(count + np.arange(len(params) - 1), side[k])
         count += len(params) - 1
         points = np.stack([core.half_length_mm * params, np.full_like(params, heights[k])], axis=1)
-        found.append(Row(nodes, params, points))
+        found.append(GridRow(nodes, params, points))
     return found
 
 
@@ -360,7 +362,7 @@ def _zip(upper: Int, lower: Int, at_upper: Float, at_lower: Float) -> Int:
     return np.vstack([down, up])
 
 
-def triangulate(layout: Layout) -> Grid:
+def triangulate(layout: GridLayout) -> Grid:
     """Turn rows into triangles with labelled edges."""
     cells = [_zip(s.upper, s.lower, s.at_upper, s.at_lower) for s in layout.strips]
     part = np.repeat([s.part for s in layout.strips], [len(c) for c in cells])

@@ -24,7 +24,7 @@ _BED_THICKNESS_MM = 2.0
 
 
 @dataclass(frozen=True)
-class Step:
+class CastingStep:
     """Step of casting: the word in its file's name, its title, its lines, and the parts of its picture."""
 
     word: str
@@ -94,7 +94,7 @@ def _headline(made: Mold) -> list[HeadlineRow]:
     return rows
 
 
-def _steps(made: Mold, shells: Mapping[str, Shell], packed: Sequence[Bed]) -> list[Step]:
+def _steps(made: Mold, shells: Mapping[str, Shell], packed: Sequence[Bed]) -> list[CastingStep]:
     surfaces = {name: part.surface for name, part in shells.items()}
     halves = {name: surfaces[name] for name in HALVES}
     steps = [_printing(made, bed, len(packed)) for bed in packed[:1]]
@@ -103,14 +103,14 @@ def _steps(made: Mold, shells: Mapping[str, Shell], packed: Sequence[Bed]) -> li
     if made.foils:
         steps.append(_threading(made, halves, surfaces))
         closed |= {name: part for name, part in surfaces.items() if kind(name) == "plug"}
-    steps.append(Step("close", "Close the halves", close_lines(made), standing(closed)))
+    steps.append(CastingStep("close", "Close the halves", close_lines(made), standing(closed)))
     for i, pour in enumerate(made.pours):
         steps.append(_pouring(made, i, pour, closed, surfaces))
     steps.append(_opening_step(made, surfaces))
     return steps
 
 
-def _printing(made: Mold, bed: Bed, beds: int) -> Step:
+def _printing(made: Mold, bed: Bed, beds: int) -> CastingStep:
     o, parts = made.options, {name: part.surface for name, part in bed.placed.items()}
     size = o.bed_mm
     parts["bed"] = _box((0.0, 0.0, -_BED_THICKNESS_MM), (size[0], size[1], 0.0))
@@ -122,26 +122,26 @@ def _printing(made: Mold, bed: Bed, beds: int) -> Step:
         lines.append(f"The parts need {beds} beds: mold.3mf, then mold_bed_2.3mf and so on.")
     if o.coupon:
         lines.append("Print the coupon first: the least clearance that the peg enters by hand is that of the mold.")
-    return Step("print", "Print the parts", lines, parts, on_bed=True)
+    return CastingStep("print", "Print the parts", lines, parts, on_bed=True)
 
 
-def _preparing(made: Mold, halves: Mapping[str, Triangles]) -> Step:
+def _preparing(made: Mold, halves: Mapping[str, Triangles]) -> CastingStep:
     shifts = separations({name: (part.low, part.high) for name, part in halves.items()})
     apart = {name: Triangles(part.points + shifts[name], part.faces) for name, part in halves.items()}
-    return Step("prepare", "Prepare the halves", prepare_lines(made), standing(apart))
+    return CastingStep("prepare", "Prepare the halves", prepare_lines(made), standing(apart))
 
 
-def _threading(made: Mold, halves: Mapping[str, Triangles], surfaces: Mapping[str, Triangles]) -> Step:
+def _threading(made: Mold, halves: Mapping[str, Triangles], surfaces: Mapping[str, Triangles]) -> CastingStep:
     laid = strips(made.foils, made.at, made.options)
     assert laid is not None
     plugs = {name: part for name, part in surfaces.items() if kind(name) == "plug"}
     parts = {"half_b": halves["half_b"], **{n: p for n, p in plugs.items() if n.endswith("b")}, "strips": laid}
-    return Step("gauges", "Thread the strips of the gauges", thread_lines(made), standing(parts))
+    return CastingStep("gauges", "Thread the strips of the gauges", thread_lines(made), standing(parts))
 
 
 def _pouring(
     made: Mold, i: int, pour: Pour, closed: Mapping[str, Triangles], surfaces: Mapping[str, Triangles]
-) -> Step:
+) -> CastingStep:
     several = len(made.pours) > 1
     own = {name: surfaces[name] for name in pour.others if name in surfaces}
     high = max(float(part.high[1] - part.low[1]) for part in closed.values())
@@ -156,10 +156,12 @@ def _pouring(
         own = {n: Triangles(p.points - [0.0, 0.8 * high, 0.0], p.faces) for n, p in own.items()}
     parts |= own
     named = f" {i + 1} of {len(made.pours)}: {pour.name}" if several else ""
-    return Step(f"pour_{pour.name}" if several else "pour", f"Pour{named}", pour_lines(made, pour), standing(parts))
+    return CastingStep(
+        f"pour_{pour.name}" if several else "pour", f"Pour{named}", pour_lines(made, pour), standing(parts)
+    )
 
 
-def _opening_step(made: Mold, surfaces: Mapping[str, Triangles]) -> Step:
+def _opening_step(made: Mold, surfaces: Mapping[str, Triangles]) -> CastingStep:
     last = made.pours[-1]
     names = [*HALVES, *last.others] if len(made.pours) > 1 else list(surfaces)
     parts = {name: surfaces[name] for name in names if name in surfaces}
@@ -170,7 +172,7 @@ def _opening_step(made: Mold, surfaces: Mapping[str, Triangles]) -> Step:
     apart.update({name: part for name, part in parts.items() if kind(name) == "insert"})  # they stay in the finger
     if made.options.carrier:
         apart["carrier"] = parts["carrier"]
-    return Step("open", "Open the mold", open_lines(made), standing(apart))
+    return CastingStep("open", "Open the mold", open_lines(made), standing(apart))
 
 
 def _opening(made: Mold) -> list[str | Table]:

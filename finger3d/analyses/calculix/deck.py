@@ -42,7 +42,7 @@ class ObjectElements:
 
 
 @dataclass(frozen=True)
-class Step:
+class DeckStep:
     """A step of the path.
 
     Attributes
@@ -95,7 +95,7 @@ class Deck:
     mesh: Mesh
     laws: tuple[tuple[str, ...], ...]
     object: ObjectElements
-    steps: tuple[Step, ...]
+    steps: tuple[DeckStep, ...]
     contact: Contact
     axes: tuple[str, ...] = ()
     finite: bool = False
@@ -182,7 +182,7 @@ class Deck:
             for k, value in enumerate(row, start=1)
         ]
 
-    def _step(self, step: Step, moved: list[str]) -> list[str]:
+    def _step(self, step: DeckStep, moved: list[str]) -> list[str]:
         share = 1.0 / step.increments
         lines = [f"*STEP, INC={1000 + 10 * step.increments}" + ", NLGEOM" * self.finite]
         lines += ["*STATIC", f"{share:.12g}, 1., 1e-5, {share:.12g}", "*BOUNDARY", *moved]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger3d.analyses.calculix.deck import OBJECT, Contact, Deck, Step
+from finger3d.analyses.calculix.deck import OBJECT, Contact, Deck, DeckStep
 from finger3d.analyses.calculix.laws import law_cards
 from finger3d.analyses.calculix.objects import object_elements
 from finger3d.contact.friction import Coulomb
@@ -84,7 +84,9 @@ def press_deck(model: Model, title: str = "", say: Callable[[str], None] = lambd
     elements, motion = object_elements(placed, low, high, _SAGITTA * depth, mesh.dim)
     moduli = [material.isotropic("--solver calculix").E_MPa for material in model.materials(())]
     penalty = PENALTY * moduli[0] / depth
-    steps = tuple(Step(_rigid(moved), increments) for moved, (_, increments) in zip(motion[1:], stretches, strict=True))
+    steps = tuple(
+        DeckStep(_rigid(moved), increments) for moved, (_, increments) in zip(motion[1:], stretches, strict=True)
+    )
     thickness = _SLICE * model.design.height_mm if model.domain == "plane-stress" else model.design.width_mm
     multiple = 2.0 ** len(axes) * (model.design.width_mm / thickness if mesh.dim == 2 else 1.0)
     deck = Deck(
