@@ -173,6 +173,7 @@ def cases(quick: bool) -> list[Case]:
     out += [_coarsest(half, plane, near) for plane in planes]
     return [
         *out, Case("sphere on a block", model, (1.0, 0.7, 0.5), 0.3, 4.0), _line(block),
+        *_round_objects(half, fig9, near, far),
         Case("sphere on a block, solid pytetwild", wild, (0.7, 0.5), 0.3, 10.0), _soft(),
     ]  # fmt: skip
 
@@ -196,6 +197,21 @@ def _line(block: Any) -> Case:
     wide = replace(block, half_length_mm=40.0, height_mm=40.0, width_mm=1.0)
     model = _model(wide, 0.4, "plane-strain", 0.2, (), Cylinder(radius_mm=10.0, axis="z"))
     return Case("Hertz, a line", model, (0.2, 0.14, 0.1, 0.07), 0.02, 100.0)
+
+
+def _round_objects(half: Any, fig9: Any, near: tuple[Gauge, ...], far: tuple[Gauge, ...]) -> list[Case]:
+    """Fingers on round bars and on a ball."""
+    bar, small, large = (Cylinder(radius_mm=radius, axis="z") for radius in (40.0, 3.0, 8.0))
+    return [
+        Case("Fig. 9 on a bar", _model(fig9, 0.49, "plane-strain", 8.0, far, bar), (2.8, 2.0, 1.4, 1.0), 0.3, 4.0),
+        Case(
+            "half cylinder on a bar", _model(half, 0.4, "plane-strain", 0.8, near, small), (0.4, 0.28, 0.2), 0.025, 5.0
+        ),
+        Case(
+            "half cylinder, wide bar", _model(half, 0.3, "plane-stress", 0.8, near, large), (0.4, 0.28, 0.2), 0.025, 5.0
+        ),
+        Case("Fig. 9 on a ball", _model(fig9, 0.4, "solid", 6.0, far, Sphere(radius_mm=40.0)), (2.8, 2.0), 1.1, 4.0),
+    ]
 
 
 def _runs(problem: Problem, mus: tuple[float, ...] = MUS) -> Iterator[tuple[float, float, Problem]]:

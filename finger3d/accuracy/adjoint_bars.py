@@ -96,13 +96,11 @@ class AdjointBars:
 def applies(model: Model) -> bool:
     """Whether the error bars of a model follow from its own condensed body.
 
-    The body must be linear elastic without inclusions, the object rigid and flat, and every leg given by its depth.
-    Under a curved object presses with fewer multipliers take as long as the press itself, since distances are sampled
-    at the same places, and may not settle at details of the object.
+    The body must be linear elastic without inclusions, the object rigid, and every leg given by its depth.
     """
     plain = model.formulation.is_linear_elastic and model.inclusions is None and model.object_compliance is None
     as_given = model.rule == "projection" and all(leg.force_N is None for leg in model.legs)
-    return plain and model.object.is_flat and as_given
+    return plain and as_given
 
 
 def adjoint_bars(problem: Problem, steps: Sequence[StepResult]) -> AdjointBars:
@@ -120,7 +118,7 @@ def adjoint_bars(problem: Problem, steps: Sequence[StepResult]) -> AdjointBars:
     """
     short, few = _with_few_increments(problem, steps)
     numbers, body = _numbers(short, few[-1]), body_errors(short, few)
-    presses = list(with_coarse_multipliers(short))
+    presses = list(with_coarse_multipliers(short, few))
     changes: dict[str, list[float]] = {name: [] for name in numbers}
     for press in presses:
         *_, last = march(press)

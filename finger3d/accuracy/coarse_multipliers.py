@@ -6,21 +6,33 @@ that are kept, with weights t_ij, so that the forces of the kept points, s_j, an
     r_i = sum_j T_ij s_j,   T_ij = A_i t_ij / A'_j,   A'_j = sum_i A_i t_ij
 
 with the tributary areas A_i.  Gaps, displacements and the Delassus operator follow by the transpose: ``W' = T^T W T``.
-No mesh is made and nothing is factored.
+No mesh is made and nothing is factored.  Under an object that is not flat, gaps and normals are those of the press
+itself, linearised about its increments and averaged, so that no distance is computed and every increment takes one
+solution.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from finger3d._types import Float
+from finger3d.contact.state import ContactSolution, ContactState
+from finger3d.errors import Outcome
+from finger3d.fem.directions import bases_of
+from finger3d.fem.simplex import axis_numbers
 from finger3d.fem.traces import BoundarySurface
+from finger3d.mechanics.contact_geometry import ContactGeometry
+from finger3d.mechanics.formulation import Workspace
+from finger3d.mechanics.history import StepResult
+from finger3d.mechanics.linear_contact import LinearBody, LinearState, solve_linearised
 from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.small_strain import SmallStrain
+from finger3d.objects import ObjectPose
 
 _LEAST_POINTS = 4
 """Points of a face that are all kept: fewer leave nothing to interpolate between."""
@@ -29,17 +41,46 @@ _FLAT = 1e-9
 """Extent of a face across its plane, over that along it, that is round-off."""
 
 
-def with_coarse_multipliers(problem: Problem) -> Iterator[Problem]:
-    """Yield the press with every second multiplier, and with the others; first points of rows are kept in both."""
+@dataclass(frozen=True)
+class _LinearisedContact(SmallStrain):
+    """Small strain with known contact geometry: of each pose, the gaps linearised at a displacement (c, d) mm."""
+
+    known: Mapping[ObjectPose, tuple[ContactGeometry, Float]]
+
+    def increment(
+        self,
+        problem: Problem,
+        state: ContactState,
+        a: ObjectPose,
+        b: ObjectPose,
+        guess: Float | None,
+        workspace: Workspace,
+    ) -> ContactSolution:
+        """Solve contact once; a pose between two known ones is none."""
+        assert isinstance(state, LinearState)
+        if b not in self.known:
+            return ContactSolution(state, Outcome.NO_CONVERGENCE, np.inf, 0, "none")
+        body = LinearBody(problem.delassus, np.zeros_like(state.displacement))
+        return solve_linearised(problem, state, a, b, body, guess, *self.known[b])
+
+
+def with_coarse_multipliers(problem: Problem, steps: Sequence[StepResult]) -> Iterator[Problem]:
+    """Yield the press with every second multiplier, and with the others; first points of rows are kept in both.
+
+    Parameters
+    ----------
+    steps : all increments of the press, converged
+    """
     for first in (0, 1):
-        yield _coarsened(problem, first)
+        yield _coarsened(problem, steps, first)
 
 
-def _coarsened(problem: Problem, first: int) -> Problem:
+def _coarsened(problem: Problem, steps: Sequence[StepResult], first: int) -> Problem:
     system, (c, d) = problem.system, problem.delassus.shape[:2]
     weights, kept = _weights(system.surface, first)
     area = system.surface.area
     coarse_area = np.asarray(weights.T @ area)
+    mean = sp.csr_array(sp.diags_array(1.0 / coarse_area) @ weights.T @ sp.diags_array(area))
     spread = sp.csr_array(sp.diags_array(area) @ weights @ sp.diags_array(1.0 / coarse_area))
     both = sp.csr_array(sp.kron(spread, sp.eye_array(d)))
     delassus = np.asarray(both.T @ (both.T @ system.delassus.reshape(c * d, c * d)).T)
@@ -64,18 +105,38 @@ def _coarsened(problem: Problem, first: int) -> Problem:
     active = np.isin(np.arange(c * d), system.active_dofs).reshape(c, d)[kept]
     coarse = replace(
         system,
-        surface=_surface(system.surface, kept, weights, coarse_area),
+        surface=_surface(system.surface, kept, weights, mean, coarse_area),
         points=points,
         delassus=delassus.reshape(count, d, count, d),
         reading_rows=system.reading_rows @ both,
         active_dofs=np.flatnonzero(active.ravel()),
     )
-    return replace(problem, symmetry=symmetric, system=coarse)
+    model = problem.model
+    if not model.object.is_flat:
+        known = {step.target: _geometry(problem, step, mean, kept) for step in steps}
+        model = replace(model, strain_measure=_LinearisedContact(known))
+    return replace(problem, model=model, symmetry=symmetric, system=coarse)
 
 
-def _surface(fine: BoundarySurface, kept: NDArray[np.intp], weights: sp.csr_array, area: Float) -> BoundarySurface:
+def _geometry(
+    problem: Problem, step: StepResult, mean: sp.csr_array, kept: NDArray[np.intp]
+) -> tuple[ContactGeometry, Float]:
+    """Return the mean contact geometry (c') of the coarse multipliers after an increment, and their displacement."""
+    state = step.meshed_state
+    assert isinstance(state, LinearState)
+    assert state.bases is not None
+    normal = np.asarray(mean @ state.bases[:, 0])
+    for k in axis_numbers(problem.axes):
+        normal[problem.surface.points[kept, k] == 0.0, k] = 0.0
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    gap = np.asarray(mean @ state.gap)
+    return ContactGeometry(gap, np.ones_like(gap), np.zeros_like(normal), bases_of(normal)), mean @ state.displacement
+
+
+def _surface(
+    fine: BoundarySurface, kept: NDArray[np.intp], weights: sp.csr_array, mean: sp.csr_array, area: Float
+) -> BoundarySurface:
     """Return the surface with the hats of the coarse multipliers."""
-    mean = sp.csr_array(sp.diags_array(1.0 / area) @ weights.T @ sp.diags_array(fine.area))
     normals = mean @ fine.normals
     return replace(
         fine,

@@ -1,8 +1,8 @@
 """Error estimate of a press: the discretisation error, and that of the increments from other counts.
 
-In small strain under a flat object the discretisation error follows from the condensed body itself
-(`finger3d.accuracy.adjoint_bars`).  Under other objects, at large deformation, with viscosity, inclusions or an elastic
-object, and under a prescribed force it is taken from a companion mesh (`finger3d.accuracy.companions`).
+In small strain under a rigid object the discretisation error follows from the condensed body itself
+(`finger3d.accuracy.adjoint_bars`).  At large deformation, with viscosity, inclusions or an elastic object, and under a
+prescribed force it is taken from a companion mesh (`finger3d.accuracy.companions`).
 
 Which counts of increments are solved, and on which mesh, follows from the numbers of increments, unknowns and contact
 points.  Two identical presses hence have identical error bars, whatever the load of the machine.

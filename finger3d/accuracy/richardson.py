@@ -25,6 +25,9 @@ _RESOLUTION_FLOOR = 0.1
 """Points of distance h at the edge of a contact of half-length a leave a relative error of about this times (h/a)^2 in
 the normal force, and of this times h/a in friction and strains (validation/error_bars.py)."""
 
+_SMOOTHER_FLOORS = 0.03, 0.01
+"""The same for displacements and pressures on the base, far from the edge of contact, and for the external work."""
+
 _UNRESOLVED = 2e-4
 """Dissipation that points of distance h leave unresolved over the external work times h/a: few of them slip."""
 
@@ -71,6 +74,12 @@ _KINDS = {
     "stick_length_mm": Kind.LENGTH,
     "contact_area_mm2": Kind.AREA,
     "stick_area_mm2": Kind.AREA,
+}
+
+_FLOORS = {
+    Kind.DISPLACEMENT: _SMOOTHER_FLOORS[0],
+    Kind.BASE_PRESSURE: _SMOOTHER_FLOORS[0],
+    Kind.WORK: _SMOOTHER_FLOORS[1],
 }
 
 _READINGS = {
@@ -141,7 +150,7 @@ def mesh_error(
             if own.alone and kind is Kind.FRICTION_SUM:
                 scale = max(scale, normal_force)
             power = 2 if kind is Kind.NORMAL_FORCE else 1
-            bound = max(bound, _RESOLUTION_FLOOR * own.share**power * scale)
+            bound = max(bound, _FLOORS.get(kind, _RESOLUTION_FLOOR) * own.share**power * scale)
         if kind is Kind.DISSIPATION:
             bound = max(bound, _UNRESOLVED * own.share * largest(numbers, Kind.WORK))
         found[name] = max(change / gain(ratio), bound)

@@ -149,6 +149,25 @@ def solve_increment(
     return replace(solution, state=after_state, residual=max(solution.residual, error), iterations=spent)
 
 
+def solve_linearised(
+    problem: Problem,
+    state: LinearState,
+    a: ObjectPose,
+    b: ObjectPose,
+    body: LinearBody,
+    guess: Float | None,
+    geometry: ContactGeometry,
+    at: Float,
+) -> ContactSolution:
+    """Advance a state from pose a to pose b with gaps linearised at a displacement `at` (c, d) mm, by one solution."""
+    increment = _Increment(problem, state, a, b, body, DistanceTracker())
+    solution = increment.solve(geometry, at, guess)
+    if not solution.outcome.ok:
+        return replace(solution, state=state)
+    displacement = body.displacement(solution.state.force, geometry.bases)
+    return replace(solution, state=increment.reached(geometry, at, displacement, solution.state, None))
+
+
 def _extrapolated(tried: list[Float], found: list[Float]) -> Float:
     """Return the next displacement from those tried and those found from them, by Anderson's method."""
     if len(tried) == 1:
