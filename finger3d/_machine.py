@@ -1,13 +1,18 @@
-"""Versions of the packages, number of cores and memory of this machine."""
+"""Versions of the packages, cores and memory of this machine, and child processes that end with their parent."""
 
 from __future__ import annotations
 
+import ctypes
 import math
 import os
 import platform
+import signal
 import sys
 from functools import cache
 from importlib import metadata
+from pathlib import Path
+
+_PR_SET_PDEATHSIG = 1  # linux/prctl.h
 
 PACKAGES = (
     "finger3d",
@@ -69,3 +74,25 @@ def peak_memory_MB() -> float:
         return math.nan
     unit = 1 if sys.platform == "darwin" else 1024  # bytes on macOS, KiB elsewhere
     return float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit) / 2**20
+
+
+def child_environment() -> dict[str, str]:
+    """Return the environment of this process, changed so that a child imports this same package."""
+    here = str(Path(__file__).resolve().parent.parent)
+    path = os.pathsep.join(p for p in (here, os.environ.get("PYTHONPATH")) if p)
+    return {**os.environ, "PYTHONPATH": path}
+
+
+def end_with(parent: int) -> None:
+    """Let the kernel kill this process when its parent ends for whatever reason; Linux only.
+
+    A thread could not watch the parent: meshing holds Python's global interpreter lock.
+
+    Parameters
+    ----------
+    parent : process id of the parent
+    """
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        if os.getppid() != parent:  # the parent ended before the call
+            os._exit(1)

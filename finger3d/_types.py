@@ -1,12 +1,16 @@
-"""Types that many modules share."""
+"""Types that many modules share, and read-only arrays of frozen dataclasses."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, TypeAlias
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 Float: TypeAlias = NDArray[np.float64]
 Int: TypeAlias = NDArray[np.int64]
@@ -18,3 +22,23 @@ Tree: TypeAlias = dict[str, Any]
 
 TreeView: TypeAlias = Mapping[str, Any]
 """The same, read-only."""
+
+
+def freeze_arrays(record: DataclassInstance) -> None:
+    """Replace every array of a dataclass, and every array in its mappings, by a read-only view.
+
+    A frozen dataclass calls it in ``__post_init__``. The arrays that were passed stay writable for their owner.
+    """
+    for field in fields(record):
+        value = getattr(record, field.name)
+        if isinstance(value, np.ndarray):
+            object.__setattr__(record, field.name, _view(value))
+        elif isinstance(value, Mapping):
+            views = {key: _view(v) if isinstance(v, np.ndarray) else v for key, v in value.items()}
+            object.__setattr__(record, field.name, views)
+
+
+def _view(array: np.ndarray) -> np.ndarray:
+    view = array.view()
+    view.setflags(write=False)
+    return view

@@ -1,14 +1,19 @@
-"""Versions, cores and memory."""
+"""Versions, cores and memory; child processes: what they import, and that they end with their parent."""
 
 from __future__ import annotations
 
 import os
 import platform
+import subprocess
+import sys
+import time
 from importlib import metadata
+from pathlib import Path
 
 import pytest
 
-from finger3d._machine import PACKAGES, cores, memory_bytes, versions
+import finger3d
+from finger3d._machine import PACKAGES, child_environment, cores, memory_bytes, versions
 
 
 def test_versions_are_those_installed_and_absent_packages_are_left_out() -> None:
@@ -36,3 +41,38 @@ def test_only_cores_that_may_be_used_count() -> None:
 def test_available_memory_is_part_of_all() -> None:
     found = memory_bytes()
     assert found is None or 0 < found[1] <= found[0]
+
+
+def test_a_child_imports_the_same_package(tmp_path: Path) -> None:
+    command = [sys.executable, "-P", "-c", "import finger3d; print(finger3d.__file__)"]
+    done = subprocess.run(command, env=child_environment(), cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert Path(done.stdout.strip()) == Path(finger3d.__file__)
+
+
+def test_an_existing_path_is_kept_behind_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTHONPATH", "/elsewhere")
+    assert child_environment()["PYTHONPATH"].endswith(":/elsewhere")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only the Linux kernel ends a child with its parent")
+def test_a_child_ends_with_a_parent_that_is_killed() -> None:
+    child = "import os, time; from finger3d._machine import end_with; end_with(os.getppid()); print(1); time.sleep(60)"
+    parent = (
+        "import subprocess, sys; child = subprocess.Popen([sys.executable, '-c', sys.argv[1]], stdout=subprocess.PIPE);"
+        "child.stdout.readline(); print(child.pid, flush=True); child.wait()"
+    )
+    with subprocess.Popen([sys.executable, "-c", parent, child], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        pid = int(process.stdout.readline())
+        process.kill()
+    deadline = time.monotonic() + 10.0
+    while _runs(pid):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+def _runs(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False

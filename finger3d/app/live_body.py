@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from finger3d._arrays import freeze_arrays
-from finger3d._types import Array, Float
+from finger3d._types import Array, Float, freeze_arrays
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.errors import Finger3dError
 from finger3d.fem.recover import displacement

@@ -114,13 +114,21 @@ def traction_figure(press: LivePress, mu: float) -> go.Figure:
     for status in ("stick", "slip"):
         on = press.status == status
         figure.add_scatter(
-            x=press.x_mm[on], y=press.shear_MPa[on], name=f"friction, {status}", mode="markers",
+            x=press.x_mm[on],
+            y=press.shear_MPa[on],
+            name=f"friction, {status}",
+            mode="markers",
             marker={"color": _COLOURS[status], "size": 6},
-        )  # fmt: skip
+        )
     figure.update_layout(
-        title="traction on the finger at z = 0", xaxis_title="x at rest (mm)", yaxis_title="traction (MPa)",
-        template="plotly_white", margin=_MARGIN, height=360, uirevision="kept",
-    )  # fmt: skip
+        title="traction on the finger at z = 0",
+        xaxis_title="x at rest (mm)",
+        yaxis_title="traction (MPa)",
+        template="plotly_white",
+        margin=_MARGIN,
+        height=360,
+        uirevision="kept",
+    )
     return figure
 
 
@@ -137,8 +145,13 @@ def section_figure(body: LiveBody, gauge: Gauge) -> go.Figure:
         x=ends[:, 0], y=ends[:, 1], mode="lines+markers", line={"color": _GAUGE, "width": 3}, name="gauge"
     )
     figure.update_layout(
-        title="gauge in the middle section, at rest", xaxis_title="x (mm)", yaxis_title="y (mm)",
-        template="plotly_white", margin=_MARGIN, height=360, uirevision="kept",
-    )  # fmt: skip
+        title="gauge in the middle section, at rest",
+        xaxis_title="x (mm)",
+        yaxis_title="y (mm)",
+        template="plotly_white",
+        margin=_MARGIN,
+        height=360,
+        uirevision="kept",
+    )
     figure.update_yaxes(scaleanchor="x", scaleratio=1.0)
     return figure

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from finger3d._arrays import freeze_arrays
-from finger3d._types import Float, Int
+from finger3d._types import Float, Int, freeze_arrays
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from finger3d._arrays import freeze_arrays
-from finger3d._types import Float, Int
+from finger3d._types import Float, Int, freeze_arrays
 from finger3d.fem.assembly import Pattern, Stiffness, cell_parts, pressure_scale
 from finger3d.fem.elements import quadrature
 from finger3d.fem.laws import IsochoricLaw

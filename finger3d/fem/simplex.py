@@ -12,8 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from finger3d._arrays import freeze_arrays
-from finger3d._types import Float, Int
+from finger3d._types import Float, Int, freeze_arrays
 from finger3d.fem.elements import EDGES, Element, element_of
 
 FACETS = {

@@ -14,8 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from finger3d._arrays import freeze_arrays
-from finger3d._types import Float, Int
+from finger3d._types import Float, Int, freeze_arrays
 from finger3d.errors import Finger3dError
 from finger3d.fem.elements import quadrature
 from finger3d.fem.locate import cells_at

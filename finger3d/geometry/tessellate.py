@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from finger3d._arrays import freeze_arrays
-from finger3d._types import Float, Int
+from finger3d._types import Float, Int, freeze_arrays
 from finger3d.geometry.cad import labelled_faces
 from finger3d.geometry.implicit import ImplicitSurface, surface_of
 from finger3d.geometry.parts import OUTSIDE, Glued, GluedFace

@@ -17,8 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d._arrays import freeze_arrays
-from finger3d._types import Float
+from finger3d._types import Float, freeze_arrays
 from finger3d.fem.directions import bases_of
 from finger3d.fem.simplex import CONTACT, axis_numbers
 from finger3d.fem.traces import BoundarySurface

@@ -8,8 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d._arrays import freeze_arrays
-from finger3d._types import Float, Tree, TreeView
+from finger3d._types import Float, Tree, TreeView, freeze_arrays
 from finger3d.contact.friction import OPEN, STATUS_NAMES, STICK
 from finger3d.contact.state import ContactState
 from finger3d.errors import Outcome

@@ -9,8 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d._arrays import freeze_arrays
-from finger3d._types import Float
+from finger3d._types import Float, freeze_arrays
 from finger3d.contact.newton import uniqueness
 from finger3d.contact.state import ContactState
 from finger3d.errors import Finger3dError

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from scipy.special import exprel
 
-from finger3d._arrays import freeze_arrays
-from finger3d._types import Float
+from finger3d._types import Float, freeze_arrays
 
 if TYPE_CHECKING:
     from finger3d.mechanics.formulation import Formulation

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d._arrays import freeze_arrays
-from finger3d._types import Float
+from finger3d._types import Float, freeze_arrays
 from finger3d.contact.state import ContactState
 from finger3d.fem.simplex import FREE_FACES, Mesh, axis_numbers, reflect_into_part, unfold
 from finger3d.fem.traces import BoundarySurface

@@ -14,7 +14,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from finger3d._process import end_with
+from finger3d._machine import end_with
 
 
 def main() -> None:

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger3d._arrays import freeze_arrays
-from finger3d._types import Float
+from finger3d._types import Float, freeze_arrays
 
 _CLASSES_PER_DOUBLING = 2
 """Size classes in which points are looked up; a class errs by less than half a class, 19 % of the edge length."""

@@ -17,9 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d._arrays import freeze_arrays
 from finger3d._ranges import printable
-from finger3d._types import Float, Int
+from finger3d._types import Float, Int, freeze_arrays
 from finger3d.errors import Finger3dError
 
 MSH, VTU = ".msh", ".vtu"

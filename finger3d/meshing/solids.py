@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from finger3d._process import child_environment
+from finger3d._machine import child_environment
 from finger3d._types import Float, Int
 from finger3d.errors import Finger3dError
 from finger3d.fem.quality import curved_volume

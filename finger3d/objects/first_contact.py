@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger3d._arrays import freeze_arrays
-from finger3d._types import Float
+from finger3d._types import Float, freeze_arrays
 from finger3d.errors import Finger3dError
 from finger3d.objects.placed import PlacedObject
 from finger3d.objects.pose import ObjectPose, between

@@ -7,8 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from finger3d._arrays import freeze_arrays
-from finger3d._types import Float
+from finger3d._types import Float, freeze_arrays
 from finger3d.geometry.design import Design
 
 UPSIDE_DOWN = np.diag([1.0, -1.0, 1.0])

@@ -7,8 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from finger3d._arrays import freeze_arrays
-from finger3d._types import Float
+from finger3d._types import Float, freeze_arrays
 from finger3d.geometry.surface import Triangles
 from finger3d.objects.pose import ObjectPose
 from finger3d.objects.rigid import RigidObject

@@ -51,9 +51,15 @@ def draw(path: Path, mus: Sequence[float], mu_sd: Float, maps: Sequence[GaugeMap
     low, high = float(every.min()), float(np.quantile(every, _HIGHEST))
     for i, (one, axes) in enumerate(zip(maps, made.axes, strict=False)):
         drawn = axes.scatter(
-            one.places[:, 0], one.places[:, 1], c=one.mean_mu_sd, s=14, marker="s", cmap="viridis_r", vmin=low,
+            one.places[:, 0],
+            one.places[:, 1],
+            c=one.mean_mu_sd,
+            s=14,
+            marker="s",
+            cmap="viridis_r",
+            vmin=low,
             vmax=max(high, 1.001 * low),
-        )  # fmt: skip
+        )
         label = "mean standard deviation of mu"
         made.figure.colorbar(drawn, ax=axes, label=label, location="bottom", shrink=0.8, aspect=35)
         _outline(axes, design)

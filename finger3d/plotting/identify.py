@@ -48,9 +48,16 @@ def draw(path: Path, index: str, at: Float, curve_at: Float, panels: Sequence[Pa
         curve = PchipInterpolator(curve_at, panel.curve)(fine)
         axes.plot(fine, curve, color=_SIMULATED, lw=1.6, label="simulated")
         axes.errorbar(
-            at, panel.measured, 2.0 * panel.std, fmt="o", ms=3.5, lw=1.0, capsize=2.0, color=_MEASURED,
+            at,
+            panel.measured,
+            2.0 * panel.std,
+            fmt="o",
+            ms=3.5,
+            lw=1.0,
+            capsize=2.0,
+            color=_MEASURED,
             label="measured, ±2 sd",
-        )  # fmt: skip
+        )
         axes.set_xlabel(index)
         axes.set_ylabel(panel.name)
         axes.legend(frameon=False, fontsize=9)

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._extras import available, require
-from finger3d._process import child_environment
+from finger3d._machine import child_environment
 from finger3d._types import Float, Int
 from finger3d.errors import MissingError
 

@@ -33,11 +33,18 @@ def gauge_places_page(folder: str | Path) -> Path:
     each = Table(
         ("gauge", "x (mm)", "y (mm)", "z (mm)", "angle (degree)", "mean sd of mu alone", "with those before"),
         [
-            (g["name"], g["x_mm"], g["y_mm"], g["z_mm"], g["angle_deg"], g["mean_mu_sd_alone"],
-             g["mean_mu_sd_with_those_before"])
+            (
+                g["name"],
+                g["x_mm"],
+                g["y_mm"],
+                g["z_mm"],
+                g["angle_deg"],
+                g["mean_mu_sd_alone"],
+                g["mean_mu_sd_with_those_before"],
+            )
             for g in gauges
         ],
-    )  # fmt: skip
+    )
     spread = Table(("mu", "sd of mu"), list(zip(data["mu"], data["mu_sd"], strict=True)))
     best = folder / "best.toml"
     return write_page(

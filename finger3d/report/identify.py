@@ -34,9 +34,11 @@ def identify_page(folder: str | Path) -> Path:
     )
     columns = Table(
         ("measured column", "residual, rms", "standard deviation, rms", "from"),
-        [(n, rms, data["std_of_columns"][n]["rms"], data["std_of_columns"][n]["from"])
-         for n, rms in data["residual_rms"].items()],
-    )  # fmt: skip
+        [
+            (n, rms, data["std_of_columns"][n]["rms"], data["std_of_columns"][n]["from"])
+            for n, rms in data["residual_rms"].items()
+        ],
+    )
     scene = folder / "identified.toml"
     return write_page(
         folder,

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from finger3d._arrays import freeze_arrays
-from finger3d._types import Array
+from finger3d._types import Array, freeze_arrays
 from finger3d.errors import Finger3dError
 from finger3d.fem.simplex import CONTACT, FREE_FACES, Mesh, middles
 from finger3d.geometry.surface import Triangles

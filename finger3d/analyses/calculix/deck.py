@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger3d._arrays import freeze_arrays
-from finger3d._types import Float, Int
+from finger3d._types import Float, Int, freeze_arrays
 from finger3d.fem.simplex import Mesh
 
 OBJECT = "NOBJECT"

@@ -163,8 +163,10 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
         {n: min(m[n] for m in magnitudes) for n in data.columns},
         {n: max(m[n] for m in magnitudes) for n in data.columns},
     )
-    stds = {n: data.stds.get(n, np.full(len(data.at), _SHARE * float(np.abs(v).max()) or _SHARPEST))
-            for n, v in data.columns.items()}  # fmt: skip
+    stds = {
+        n: data.stds.get(n, np.full(len(data.at), _SHARE * float(np.abs(v).max()) or _SHARPEST))
+        for n, v in data.columns.items()
+    }
 
     def residuals(values: Float) -> Float:
         simulated = simulation.at(values, data)

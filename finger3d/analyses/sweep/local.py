@@ -11,8 +11,7 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from finger3d._machine import cores
-from finger3d._process import end_with
+from finger3d._machine import cores, end_with
 from finger3d.analyses.sweep import worker
 from finger3d.analyses.sweep.progress import BodyPoints, SweepProgress
 from finger3d.errors import MissingError
