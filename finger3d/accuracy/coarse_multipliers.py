@@ -56,7 +56,7 @@ class _LinearisedContact(SmallStrain):
         guess: Float | None,
         workspace: Workspace,
     ) -> ContactSolution:
-        """Solve contact once; a pose between two known ones is none."""
+        """Solve contact once; an increment to a pose that is not known does not converge."""
         assert isinstance(state, LinearState)
         if b not in self.known:
             return ContactSolution(state, Outcome.NO_CONVERGENCE, np.inf, 0, "none")
