@@ -7,9 +7,12 @@ from dataclasses import replace
 
 import pytest
 
-from finger3d.accuracy.adjoint_bars import adjoint_bars, applies, short_press
+from finger3d.accuracy.adjoint_bars import NoAdjointBarsError, adjoint_bars, applies, short_press
+from finger3d.accuracy.estimate import discretisation
 from finger3d.effects.elastic_object import Effect as ElasticObject
 from finger3d.effects.large_deformation import Effect as LargeDeformation
+from finger3d.errors import Outcome
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Leg
 from tests.models import half_cylinder, run
 
@@ -41,3 +44,18 @@ def test_errors_of_body_and_contact_add_as_squares_and_many_increments_are_not_r
     short, steps = short_press(long)
     assert len(steps) == 10
     assert [leg.depth_mm for leg in short.model.legs] == [leg.depth_mm for leg in long.model.legs]
+
+
+def test_without_a_press_of_fewer_multipliers_a_companion_mesh_tells_the_bars(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem, frames = run(half_cylinder(0.4, 4))
+
+    def unsettled(press: object) -> list[StepResult]:
+        return [replace(frames[-1], outcome=Outcome.NO_CONVERGENCE)]
+
+    monkeypatch.setattr("finger3d.accuracy.adjoint_bars.march", unsettled)
+    with pytest.raises(NoAdjointBarsError):
+        adjoint_bars(problem, frames)
+    found, beside, _ = discretisation(problem, frames)
+    assert found.body is None
+    assert beside.body.mesh is not problem.body.mesh
+    assert found.discretisation["normal_force_N"] > 0.0

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finger3d.accuracy.adjoint_bars import adjoint_bars, short_press
+from finger3d.accuracy.adjoint_bars import NoAdjointBarsError, adjoint_bars, short_press
 from finger3d.accuracy.graded import cell_growth, graded_sizes
 from finger3d.accuracy.refine import Refinement, Round, _affordable, refine_mesh
 from finger3d.cli import main
@@ -92,6 +92,16 @@ def test_a_graded_solid_needs_a_fraction_of_the_unknowns() -> None:
     step = list(march(found.problem))[-1]
     assert measure(found.problem.points, step)["normal_force_N"] == pytest.approx(303.52, rel=1e-3)
     assert found.rounds[-1].dofs < 79_290 / 2
+
+
+def test_a_press_without_adjoint_bars_is_refined_by_a_companion(monkeypatch: pytest.MonkeyPatch) -> None:
+    def unknown(*_: object) -> None:
+        raise NoAdjointBarsError("the contact forces are not unique")
+
+    monkeypatch.setattr("finger3d.accuracy.refine.adjoint_bars", unknown)
+    found = refine_mesh(section(1.0), 1e-2)
+    assert found.met
+    assert found.mesh.grading is None
 
 
 def test_the_time_stops_it_with_the_best_so_far() -> None:

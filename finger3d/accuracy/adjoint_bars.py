@@ -22,6 +22,7 @@ from finger3d.accuracy.coarse_multipliers import with_coarse_multipliers
 from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.accuracy.richardson import Kind, Quantity, largest_readings
 from finger3d.accuracy.weighted_residuals import BodyErrors, body_errors
+from finger3d.errors import Finger3dError
 from finger3d.mechanics.history import StepResult, flat_readings, measure
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
@@ -93,6 +94,10 @@ class AdjointBars:
         return _SHARES[Quantity.of(name).kind].power
 
 
+class NoAdjointBarsError(Finger3dError):
+    """The error bars do not follow from the condensed body; a companion mesh must tell them."""
+
+
 def applies(model: Model) -> bool:
     """Whether the error bars of a model follow from its own condensed body.
 
@@ -113,17 +118,23 @@ def adjoint_bars(problem: Problem, steps: Sequence[StepResult]) -> AdjointBars:
 
     Raises
     ------
-    numpy.linalg.LinAlgError
-        If the active set of an increment is singular.
+    NoAdjointBarsError
+        If the active set of an increment is singular, so that the contact forces are not unique, or if no press with
+        fewer multipliers settles.
     """
     short, few = _with_few_increments(problem, steps)
-    numbers, body = _numbers(short, few[-1]), body_errors(short, few)
+    try:
+        numbers, body = _numbers(short, few[-1]), body_errors(short, few)
+    except np.linalg.LinAlgError as error:
+        raise NoAdjointBarsError(f"the contact forces are not unique: {error}") from error
     presses = list(with_coarse_multipliers(short, few))
     changes: dict[str, list[float]] = {name: [] for name in numbers}
-    for press in presses:
-        *_, last = march(press)
-        if last.outcome.ok:
-            for name, value in _numbers(press, last).items():
+    ends = [(press, list(march(press))[-1]) for press in presses]
+    if not any(end.outcome.ok for _, end in ends):
+        raise NoAdjointBarsError(f"no press with fewer multipliers settles: {ends[0][1].outcome}")
+    for press, end in ends:
+        if end.outcome.ok:
+            for name, value in _numbers(press, end).items():
                 changes[name].append(abs(value - numbers[name]))
     resolution = PointResolution.of(problem, steps[-1])
     scales = largest_readings(numbers)
@@ -137,7 +148,7 @@ def adjoint_bars(problem: Problem, steps: Sequence[StepResult]) -> AdjointBars:
         if resolution.alone and kind is Kind.FRICTION_SUM:
             scale = max(scale, abs(numbers["normal_force_N"]))
         relative = shares.points * spacing**shares.power * scale
-        contact = math.hypot(max(changes[name], default=0.0) / shares.change, relative)
+        contact = math.hypot(max(changes[name]) / shares.change, relative)
         parts[name] = shares.body[problem.dim - 2] * body.bar(name), contact
     bars = {name: math.hypot(*both) for name, both in parts.items()}
     for name, relative in _unresolved_by_base(problem):

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from finger3d._types import Float, Tree
-from finger3d.accuracy.adjoint_bars import AdjointBars, adjoint_bars, applies
+from finger3d.accuracy.adjoint_bars import AdjointBars, NoAdjointBarsError, adjoint_bars, applies
 from finger3d.accuracy.companions import Say, companion, edge_ratio, is_unstructured
 from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.accuracy.point_resolution import PointResolution
@@ -207,7 +207,7 @@ def _own_bars(own: Problem, frames: Sequence[StepResult]) -> AdjointBars | None:
     """Return the error bars from the condensed body itself; None where a companion mesh must tell them."""
     try:
         return adjoint_bars(own, frames) if applies(own.model) else None
-    except np.linalg.LinAlgError:  # the contact forces are not unique, and then the adjoint is not
+    except NoAdjointBarsError:
         return None
 
 

@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 
 from finger3d._types import Tree
-from finger3d.accuracy.adjoint_bars import adjoint_bars, applies, short_press
+from finger3d.accuracy.adjoint_bars import NoAdjointBarsError, adjoint_bars, applies, short_press
 from finger3d.accuracy.companions import FACTOR, companion
 from finger3d.accuracy.estimate import compared, press_numbers
 from finger3d.accuracy.graded import cell_growth, graded_sizes
@@ -185,7 +185,11 @@ def _graded_round(model: Model, tolerance: float, goal: str) -> tuple[Problem, R
     short, steps = short_press(problem)
     if not steps[-1].outcome.ok:
         raise Finger3dError(f"the press did not converge on this mesh: {steps[-1].outcome}")
-    bars, numbers = adjoint_bars(short, steps), press_numbers(short, steps[-1])
+    try:
+        bars = adjoint_bars(short, steps)
+    except NoAdjointBarsError:
+        return _run_round(model, tolerance, goal)
+    numbers = press_numbers(short, steps[-1])
     error = relative_error(numbers, goal, bars.bars[goal])
     scale = bars.bars[goal] / error if error > 0.0 else 0.0
     sizes = graded_sizes(short, bars, goal, _SAFETY * tolerance * scale) if error > tolerance else model.mesh

@@ -25,9 +25,6 @@ _RESOLUTION_FLOOR = 0.1
 """Points of distance h at the edge of a contact of half-length a leave a relative error of about this times (h/a)^2 in
 the normal force, and of this times h/a in friction and strains (validation/error_bars.py)."""
 
-_SMOOTHER_FLOORS = 0.03, 0.01
-"""The same for displacements and pressures on the base, far from the edge of contact, and for the external work."""
-
 _UNRESOLVED = 2e-4
 """Dissipation that points of distance h leave unresolved over the external work times h/a: few of them slip."""
 
@@ -76,11 +73,8 @@ _KINDS = {
     "stick_area_mm2": Kind.AREA,
 }
 
-_FLOORS = {
-    Kind.DISPLACEMENT: _SMOOTHER_FLOORS[0],
-    Kind.BASE_PRESSURE: _SMOOTHER_FLOORS[0],
-    Kind.WORK: _SMOOTHER_FLOORS[1],
-}
+_FLOORS = {Kind.DISPLACEMENT: 0.03, Kind.BASE_PRESSURE: 0.03, Kind.WORK: 0.01}
+"""What takes the place of `_RESOLUTION_FLOOR` for numbers that depend less on the edge of contact."""
 
 _READINGS = {
     "gauge": Kind.STRAIN,

@@ -20,7 +20,12 @@ _COLOURS = {"open": "#c4c4c4", "stick": "#1f3f77", "slip": "#f28e2b"}
 _LARGEST_MU = 1.5
 _LEAST_DEPTH_SHARE = 0.05
 _GAUGE = "#b0006e"
-_MARGIN = {"l": 60, "r": 20, "t": 40, "b": 50}
+_LAYOUT = {
+    "template": "plotly_white",
+    "margin": {"l": 60, "r": 20, "t": 40, "b": 50},
+    "height": 360,
+    "uirevision": "kept",
+}
 
 
 def page(body: LiveBody, mu: float) -> Dash:
@@ -120,15 +125,8 @@ def traction_figure(press: LivePress, mu: float) -> go.Figure:
             mode="markers",
             marker={"color": _COLOURS[status], "size": 6},
         )
-    figure.update_layout(
-        title="traction on the finger at z = 0",
-        xaxis_title="x at rest (mm)",
-        yaxis_title="traction (MPa)",
-        template="plotly_white",
-        margin=_MARGIN,
-        height=360,
-        uirevision="kept",
-    )
+    title, x, y = "traction on the finger at z = 0", "x at rest (mm)", "traction (MPa)"
+    figure.update_layout(_LAYOUT, title=title, xaxis_title=x, yaxis_title=y)
     return figure
 
 
@@ -144,14 +142,7 @@ def section_figure(body: LiveBody, gauge: Gauge) -> go.Figure:
     figure.add_scatter(
         x=ends[:, 0], y=ends[:, 1], mode="lines+markers", line={"color": _GAUGE, "width": 3}, name="gauge"
     )
-    figure.update_layout(
-        title="gauge in the middle section, at rest",
-        xaxis_title="x (mm)",
-        yaxis_title="y (mm)",
-        template="plotly_white",
-        margin=_MARGIN,
-        height=360,
-        uirevision="kept",
-    )
+    title = "gauge in the middle section, at rest"
+    figure.update_layout(_LAYOUT, title=title, xaxis_title="x (mm)", yaxis_title="y (mm)")
     figure.update_yaxes(scaleanchor="x", scaleratio=1.0)
     return figure

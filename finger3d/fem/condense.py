@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from finger3d._types import Float, Int, freeze_arrays
 from finger3d.fem.assembly import Stiffness
+from finger3d.fem.whole_solutions import WholeSolutions
 
 if TYPE_CHECKING:
     from scipy.sparse.linalg import SuperLU
@@ -318,7 +319,7 @@ def _augmented(upper: sp.csr_matrix, free: Int, rows: sp.csr_matrix) -> tuple[_P
 
 
 @dataclass(frozen=True)
-class _SuperLU:
+class _SuperLU(WholeSolutions):
     """SuperLU's factor of a stiffness, and rows."""
 
     factor: SuperLU
@@ -331,22 +332,14 @@ class _SuperLU:
         full = (upper + sp.triu(upper, 1).T).tocsc()
         return cls(splu(full, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}), rows)
 
+    def solve(self, load: Float) -> Float:
+        """See `WholeSolutions`."""
+        return np.asarray(self.factor.solve(load))
+
     def compliance(self) -> Float:
         """Return ``R K^-1 R^T`` (r, r)."""
         found = np.empty((self.rows.shape[0], self.rows.shape[0]))
         for start in range(0, len(found), _SOLVE_CHUNK):
             part = slice(start, start + _SOLVE_CHUNK)
-            found[:, part] = self.rows @ self.factor.solve(self.rows[part].T.toarray())
+            found[:, part] = self.rows @ self.solve(self.rows[part].T.toarray())
         return found
-
-    def eliminated(self, load: Float) -> tuple[Float, Float]:
-        """See `_Factor`."""
-        found = self.factor.solve(load)
-        return found, self.rows @ found
-
-    def substituted(self, eliminated: Float | None, force: Float) -> Float:
-        """See `_Factor`."""
-        if eliminated is not None and not force.any():
-            return eliminated
-        found: Float = self.factor.solve(self.rows.T @ force)
-        return found if eliminated is None else eliminated + found

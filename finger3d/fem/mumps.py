@@ -22,6 +22,7 @@ import scipy.sparse as sp
 
 from finger3d._types import Array, Float
 from finger3d.errors import MissingError
+from finger3d.fem.whole_solutions import WholeSolutions
 
 _SYMMETRIC, _HOST_WORKS, _NO_MPI = 2, 1, -987654
 _START, _END, _ANALYSE, _FACTORIZE, _SOLVE = -1, -2, 1, 2, 3  # values of job
@@ -31,6 +32,7 @@ _TOO_SMALL = (-8, -9, -14, -15, -17, -20)  # values of infog(1) that more worksp
 _NO_MEMORY = (-7, -13, -19, -22)
 _SMALLEST_PIVOT = 1e-13  # of a matrix that MUMPS has scaled to entries of order 1
 _SPACES = 35, 100, 300, 1000  # icntl(14): workspace beyond what the analysis foretells, %
+_AT_ONCE = 64  # right-hand sides
 _LOCK = threading.Lock()  # MUMPS keeps data in global variables
 
 
@@ -78,7 +80,7 @@ def _declarations(header: str) -> str:
     )
 
 
-class MumpsFactor:
+class MumpsFactor(WholeSolutions):
     """Factor of ``[[K, R^T], [R, 0]]`` that stops before the last rows, and their Schur complement.
 
     Parameters and attributes are those of `finger3d.fem.pardiso.PardisoFactor`.
@@ -95,7 +97,7 @@ class MumpsFactor:
 
     def __init__(self, upper: sp.csr_matrix, rows: int) -> None:
         self._ffi, self._lib = _library()
-        self._upper, self._rows, self._n = upper.tocsr(), rows, upper.shape[0] - rows
+        self._upper, self._n = upper.tocsr(), upper.shape[0] - rows
         places = self._upper.tocoo()
         self._i, self._j = (np.array(part + 1, dtype=np.int32) for part in (places.row, places.col))
         self._take(self._upper.data)
@@ -125,7 +127,7 @@ class MumpsFactor:
     def _take(self, data: Float) -> None:
         self._a = np.array(data, dtype=np.float64)
         matrix = sp.csr_matrix((self._a, self._upper.indices, self._upper.indptr), shape=self._upper.shape)
-        self._transposed = matrix[: self._n, self._n :]  # R^T
+        self.rows = matrix[: self._n, self._n :].T.tocsr()
 
     def _factorize(self) -> None:
         self.factorizations += 1  # before the call, which may fail and yet overwrite
@@ -137,24 +139,12 @@ class MumpsFactor:
         # One triangle is computed, the other one is left as it was.
         self.schur = np.tril(self._schur) + np.tril(self._schur, -1).T
 
-    def eliminated(self, load: Float) -> tuple[Float, Float]:
-        """Solve under loads (n, m): ``K^-1 load`` (n, m) and ``R K^-1 load`` (r, m)."""
-        found = self._solved(load)
-        return found, self._transposed.T @ found
-
-    def substituted(self, eliminated: Float | None, force: Float) -> Float:
-        """Return ``K^-1 (load + R^T force)`` (n, m) for loads eliminated, if any, and forces (r, m)."""
-        if eliminated is not None and not force.any():
-            return eliminated
-        found = self._solved(self._transposed @ force)
-        return found if eliminated is None else eliminated + found
-
-    def _solved(self, load: Float) -> Float:
-        """Return ``K^-1 load`` (n, m)."""
-        whole = np.zeros((self._n + self._rows, load.shape[1]), order="F")
+    def solve(self, load: Float) -> Float:
+        """Return ``K^-1 load`` (n, m) of loads (n, m)."""
+        whole = np.zeros((self._n + len(self._kept), load.shape[1]), order="F")
         whole[: self._n] = load
         self._call.nrhs, self._call.lrhs = load.shape[1], len(whole)
-        self._call.icntl[26] = min(load.shape[1], 64)  # right-hand sides that are solved at once
+        self._call.icntl[26] = min(load.shape[1], _AT_ONCE)
         self._run(_SOLVE, rhs=whole)
         return whole[: self._n]
 

@@ -1,0 +1,31 @@
+"""Elimination of loads by whole solutions, for a factor without separate forward and backward substitutions."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import scipy.sparse as sp
+
+from finger3d._types import Float
+
+
+class WholeSolutions(ABC):
+    """Factor of a stiffness K (n, n) with rows R (r, n), which solves and does no more."""
+
+    rows: sp.csr_matrix
+
+    @abstractmethod
+    def solve(self, load: Float) -> Float:
+        """Return ``K^-1 load`` (n, m)."""
+
+    def eliminated(self, load: Float) -> tuple[Float, Float]:
+        """Return ``K^-1 load`` (n, m) and ``R K^-1 load`` (r, m) of loads (n, m)."""
+        found = self.solve(load)
+        return found, self.rows @ found
+
+    def substituted(self, eliminated: Float | None, force: Float) -> Float:
+        """Return ``K^-1 (load + R^T force)`` (n, m) for loads eliminated, if any, and forces (r, m)."""
+        if eliminated is not None and not force.any():
+            return eliminated
+        found = self.solve(self.rows.T @ force)
+        return found if eliminated is None else eliminated + found
