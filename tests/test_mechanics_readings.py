@@ -26,6 +26,7 @@ from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.readings import Marker, MeshedBody, Taxel
 from finger3d.objects import Plane
+from finger3d.results.summary import steps_of
 from tests.models import block, run
 
 WHOLE = Taxel("whole", 0.0, 0.0, 8.0, 4.0)
@@ -183,6 +184,8 @@ def test_a_reading_of_another_kind_needs_a_class_and_nothing_else(effect: object
     entry = measure(problem.points, frames[-1])
     assert entry["other_readings"] == frames[-1].other_readings
     assert flat_readings(entry)["reading_wire"] == frames[-1].readings["wire"]
+    (step,) = steps_of({"steps": [entry]})
+    assert step.other_readings == {"wire": frames[-1].readings["wire"]}
     if effect is None:
         bar = adjoint_bars(problem, frames).bars["reading_wire"]
         assert 0.0 < bar < abs(frames[-1].other_readings["wire"])

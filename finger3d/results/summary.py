@@ -39,6 +39,7 @@ class PressStep:
     gauges : strain by the name of the gauge, dimensionless; None if it is unknown
     markers : displacement along x, y and z by the name of the marker, mm
     taxels : pressure by the name of the taxel, MPa
+    other_readings : numbers of readings of other kinds by their columns; absent without any
     iterations : of the contact solver
     residual : largest violation of the contact conditions, dimensionless; None if it is not finite
     method : the algorithm that solved the increment
@@ -79,6 +80,7 @@ class PressStep:
     contact_half_length_end_mm: float | None = None
     markers: Mapping[str, Sequence[float]] = field(default_factory=dict)
     taxels: Mapping[str, float] = field(default_factory=dict)
+    other_readings: Mapping[str, float] = field(default_factory=dict)
 
 
 def steps_of(summary: TreeView) -> tuple[PressStep, ...]:
