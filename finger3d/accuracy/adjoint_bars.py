@@ -20,14 +20,13 @@ import numpy as np
 
 from finger3d.accuracy.coarse_multipliers import with_coarse_multipliers
 from finger3d.accuracy.point_resolution import PointResolution
-from finger3d.accuracy.richardson import Kind, Quantity, largest_readings
+from finger3d.accuracy.richardson import UNRESOLVED_DISSIPATION, Kind, Quantity, largest_readings
 from finger3d.accuracy.weighted_residuals import BodyErrors, body_errors
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.history import StepResult, flat_readings, measure
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
-from finger3d.mechanics.step_halving import FLOOR
 
 
 @dataclass(frozen=True)
@@ -51,9 +50,9 @@ class _Shares:
 _SHARES = {
     # on coarse meshes recovery underestimates the error at bonded corners, by a factor of 2 to 4
     Kind.NORMAL_FORCE: _Shares(body=(2.0, 1.5), points=0.07, power=2),
-    Kind.FRICTION_SUM: _Shares(change=1.2, points=0.1),
+    Kind.FRICTION_SUM: _Shares(change=1.5, points=0.1),
     Kind.WORK: _Shares(change=2.0, body=(1.5, 1.5), points=0.03, power=2),
-    Kind.DISSIPATION: _Shares(change=1.35, points=0.11),
+    Kind.DISSIPATION: _Shares(change=2.5, points=0.07),
     Kind.STRAIN: _Shares(change=2.0),
     Kind.DISPLACEMENT: _Shares(change=2.0, points=0.003),
     # recovery is poor where a taxel ends, and at the corners of the base
@@ -153,7 +152,7 @@ def adjoint_bars(problem: Problem, steps: Sequence[StepResult]) -> AdjointBars:
     bars = {name: math.hypot(*both) for name, both in parts.items()}
     for name, relative in _unresolved_by_base(problem):
         bars[name] = math.hypot(bars[name], relative * numbers[name])
-    unresolved = FLOOR * resolution.share * abs(numbers["external_work_mJ"])
+    unresolved = UNRESOLVED_DISSIPATION * resolution.share * abs(numbers["external_work_mJ"])
     bars["dissipation_mJ"] = math.hypot(bars["dissipation_mJ"], unresolved)
     reach = measure(problem.points, steps[-1])["contact_half_length_mm"]
     return AdjointBars(bars | resolution.zone_bars, parts, body, presses[0], float(reach))

@@ -22,7 +22,7 @@ from finger3d.accuracy.adjoint_bars import AdjointBars, NoAdjointBarsError, adjo
 from finger3d.accuracy.companions import Say, companion, edge_ratio, is_unstructured
 from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.accuracy.point_resolution import PointResolution
-from finger3d.accuracy.richardson import ORDER, mesh_error
+from finger3d.accuracy.richardson import ORDER, ORDERS, mesh_error
 from finger3d.accuracy.weighted_residuals import BodyErrors
 from finger3d.errors import Finger3dError
 from finger3d.io import AREAS, MAIN
@@ -239,7 +239,8 @@ def _on_mesh(beside: Problem, kind: str) -> str:
     mesher = "bisected" if given else options.mesher if beside.dim == 3 else "structured"
     sizes = f"{mesher}, {options.size_mm:.4g} and {options.base_size_mm:.4g} mm"
     sizes += ", of both bodies" if beside.model.object_compliance else ""
-    text = f"mesh: {_unknowns(beside)} dofs ({sizes}) beside, {'finer, ' * (kind == 'finer')}order {ORDER}"
+    text = f"mesh: {_unknowns(beside)} dofs ({sizes}) beside, {'finer, ' * (kind == 'finer')}"
+    text += f"orders {ORDER:g} to {max(ORDERS.values()):g}"
     made = beside.seconds["cad"] + beside.seconds["mesh"] + beside.seconds.get("object_mesh", 0.0)
     if is_unstructured(beside.model) and made > _MESHED_S:
         text += f" (meshing took {made:.1f} s; kept in the cache, it is paid once)"

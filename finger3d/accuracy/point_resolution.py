@@ -33,7 +33,7 @@ class PointResolution:
     the contact and of their distance along z over the half width.
 
     `along`: the distance of points along x over the half-length of contact.
-    `alone`: contact with friction has no length, so that it tells nothing of the friction.
+    `alone`: contact with friction is no longer than the spacing, so that it tells nothing of the friction.
     `least`: by name, lower bounds of the error bars of lengths, areas and friction; see `least_bars`.
     """
 
@@ -52,13 +52,14 @@ class PointResolution:
     def of(cls, problem: Problem, frame: StepResult) -> PointResolution:
         """Return the resolution of an increment; medians over the points in contact."""
         points, reach = problem.points, measure(problem.points, frame)["contact_half_length_mm"]
-        alone = reach == 0.0 and problem.model.friction.largest > 0.0
+        has_friction = problem.model.friction.largest > 0.0
         half_width = points.half_width_mm
         if points.dim == 3 and problem.model.mesh.mesher != "swept":
             step = float(np.sqrt(np.median(points.area)))
             along_z = _edge_length(points, frame.state.status != OPEN)
             least = least_bars(points, frame, along_z)
-            return cls(step, _share(step, reach, step, half_width), alone, least, _along(step, reach))
+            share = _share(step, reach, step, half_width)
+            return cls(step, share, has_friction and reach <= step, least, _along(step, reach))
         at = np.round(points.points, 9)
         line = np.unique(at[at[:, 2] == 0.0, 0])
         near = line[np.abs(line - frame.lowest[0]) <= 1.2 * reach]
@@ -74,7 +75,7 @@ class PointResolution:
             )
             least["friction_sum_N"] = _IN_SECTIONS * share * friction
             least["friction_sum_N_per_mm"] = least["friction_sum_N"] / (2.0 * half_width)
-        return cls(step, share, alone, least, _along(step, reach))
+        return cls(step, share, has_friction and reach <= step, least, _along(step, reach))
 
 
 def _along(along: float, reach: float) -> float:

@@ -4,9 +4,10 @@ If the error of a number x falls as h^p with the edge length h, the number x' on
 
     error of x = |x - x'| / |r^p - 1|
 
-The order p is that of quadratic elements at a bonded corner, p = 2 lambda, where displacements go as distance^lambda
-(Williams 1952).  Lengths and areas are resolved no better than the distance of contact points.
-``validation/error_bars.py`` measures how often the true error lies within twice the estimate.
+The order p of forces is that of quadratic elements at a bonded corner, p = 2 lambda, where displacements go as
+distance^lambda (Williams 1952).  Numbers that depend less on the corners have a higher order.  Lengths and areas are
+resolved no better than the distance of contact points.  ``validation/error_bars.py`` measures how often the true error
+lies within twice the estimate.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ _RESOLUTION_FLOOR = 0.1
 """Points of distance h at the edge of a contact of half-length a leave a relative error of about this times (h/a)^2 in
 the normal force, and of this times h/a in friction and strains (validation/error_bars.py)."""
 
-_UNRESOLVED = 2e-4
+UNRESOLVED_DISSIPATION = 2e-4
 """Dissipation that points of distance h leave unresolved over the external work times h/a: few of them slip."""
 
 
@@ -73,7 +74,10 @@ _KINDS = {
     "stick_area_mm2": Kind.AREA,
 }
 
-_FLOORS = {Kind.DISPLACEMENT: 0.03, Kind.BASE_PRESSURE: 0.03, Kind.WORK: 0.01}
+ORDERS = {Kind.FRICTION_SUM: 1.5, Kind.STRAIN: 1.5, Kind.DISPLACEMENT: 2.0}
+"""Orders of numbers that depend more on the contact than on the bonded corners; of the others `ORDER`."""
+
+_FLOORS = {Kind.DISPLACEMENT: 0.01, Kind.BASE_PRESSURE: 0.03, Kind.WORK: 0.01}
 """What takes the place of `_RESOLUTION_FLOOR` for numbers that depend less on the edge of contact."""
 
 _READINGS = {
@@ -107,9 +111,9 @@ def largest_readings(numbers: Mapping[str, float]) -> dict[Kind, float]:
     return {kind: largest(numbers, kind) for kind in _READINGS.values()}
 
 
-def gain(ratio: float) -> float:
+def gain(ratio: float, order: float = ORDER) -> float:
     """Return the change of a number to the companion over its error; `ratio` of edge lengths, companion over mesh."""
-    return abs(math.pow(ratio, ORDER) - 1.0)
+    return abs(math.pow(ratio, order) - 1.0)
 
 
 def mesh_error(
@@ -146,6 +150,6 @@ def mesh_error(
             power = 2 if kind is Kind.NORMAL_FORCE else 1
             bound = max(bound, _FLOORS.get(kind, _RESOLUTION_FLOOR) * own.share**power * scale)
         if kind is Kind.DISSIPATION:
-            bound = max(bound, _UNRESOLVED * own.share * largest(numbers, Kind.WORK))
-        found[name] = max(change / gain(ratio), bound)
+            bound = max(bound, UNRESOLVED_DISSIPATION * own.share * largest(numbers, Kind.WORK))
+        found[name] = max(change / gain(ratio, ORDERS.get(kind, ORDER)), bound)
     return {name: float(error) for name, error in found.items() if math.isfinite(error)}
