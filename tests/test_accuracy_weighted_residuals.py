@@ -10,7 +10,7 @@ from tests.models import half_cylinder, run
 
 
 def test_a_gauges_own_cells_add_as_squares() -> None:
-    errors = BodyErrors({"normal_force_N": -0.3, "gauge_g": 0.03}, {"gauge_g": 0.04}, {})
+    errors = BodyErrors({"normal_force_N": -0.3, "gauge_g": 0.03}, {"gauge_g": 0.04}, {}, {})
     assert errors.bar("normal_force_N") == 0.3
     assert errors.bar("gauge_g") == pytest.approx(0.05)
 

@@ -42,14 +42,15 @@ CASES: dict[str, tuple[Domain, Literal["swept", "ftetwild"]]] = {
     WILD: ("solid", "ftetwild"),
 }
 PLAIN, REFINED = 1.0, 2.0
-SIZES = {SECTION: (4.0, 2.0, 1.0, 0.5, 0.25), SWEPT: (4.0, 2.8, 2.0, 1.4), WILD: (4.0, 2.8, 2.0, 1.4)}
+SIZES = {SECTION: (4.0, 2.0, 1.0, 0.5, 0.25), SWEPT: (4.0, 2.8, 2.0, 1.4, 1.0, 0.7), WILD: (4.0, 2.8, 2.0, 1.4)}
 QUICK = {SECTION: (1.0, 0.5)}
 ENDS = np.linspace(0.05, 1.05, 11)
 MUS = 0.5 * (ENDS[1:] + ENDS[:-1])
 STEPS, QUICK_STEPS = 40, 10
 ALLOWED = 0.05
 SHADES = {
-    4.0: "#fdbe85", 2.8: "#fd8d3c", 2.0: "#d94701", 1.4: "#9ecae1", 1.0: "#3182bd", 0.5: "#08519c", 0.25: "#222222",
+    4.0: "#fdbe85", 2.8: "#fd8d3c", 2.0: "#d94701", 1.4: "#9ecae1", 1.0: "#3182bd", 0.7: "#2171b5", 0.5: "#08519c",
+    0.25: "#222222",
 }  # fmt: skip
 
 

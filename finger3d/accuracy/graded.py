@@ -4,6 +4,9 @@ A cell of edge length h has the share s of the error.  It falls as h^p, and the 
 the fewest cells for a given error have equal shares: the wanted length is ``h (C / s)^(1 / (p + d))``, with C from the
 error that is allowed (Becker and Rannacher 2001).  The edge length at the contact follows from the error of the
 contact discretisation alone.
+
+The strain at a gauge has two errors more: that of the cells which hold the gauge, and that of the contact close to it.
+Both call for short edges around the gauge only, hence for `mesh.gauge_refinement`.
 """
 
 from __future__ import annotations
@@ -13,19 +16,32 @@ from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from finger3d._types import Float
 from finger3d.accuracy.adjoint_bars import AdjointBars
 from finger3d.fem.simplex import Mesh, signed_volumes
+from finger3d.mechanics.gauge_refinement import edge_lengths_at_gauges
 from finger3d.mechanics.model import MeshOptions
 from finger3d.mechanics.problem import Problem
 from finger3d.meshing.grading import Grading
+from finger3d.meshing.grid import RATE
 
 _POWER = 3.0
 """Order p of a share: 4 where the solution is smooth, 2 lambda = 1.2 at the bonded corners."""
 
 _BODY_SHARE = 0.85
 """Error of the body over the whole error that is allowed; errors add as squares, which leaves half for the contact."""
+
+_LOCAL_SHARE = 0.6
+"""Of the error of a strain that is allowed, the parts of the cells around the gauge and of the others; errors add as
+squares."""
+
+_LOCAL_ORDER = 2.0
+"""Order of the strain in the cells around a gauge, away from its singularities."""
+
+_LARGEST_REFINEMENT = 8.0
+"""Largest edge length at the contact over that around a gauge."""
 
 _FACTORS = (0.5, 2.0)
 """Least and largest change of an edge length in one round."""
@@ -45,29 +61,74 @@ def graded_sizes(problem: Problem, bars: AdjointBars, goal: str, allowed: float)
     goal : name of the number
     allowed : its error, in its own unit
     """
+    if goal in bars.body.local:
+        return _for_gauge(problem, bars, goal, allowed)
     body, contact = bars.parts[goal]
-    mesh, options = problem.mesh, problem.model.mesh
-    length = _edge_lengths(mesh)
-    share = _smoothed(mesh, np.abs(bars.body.shares[goal]))
-    factors = _factors(share, _BODY_SHARE * allowed / body if body > 0.0 else math.inf, mesh.dim)
-    largest = 0.5 * min(problem.model.design.height_mm, 2.0 * problem.model.design.half_length_mm)
-    sizes = np.minimum(factors * length, largest)
-    corners = mesh.points[mesh.cells[:, : mesh.dim + 1]].mean(axis=1)
-    points = np.zeros((len(corners), 3))
-    points[:, : mesh.dim] = np.abs(corners)
-    at_contact = options.size_mm * _contact_factor(bars, goal, math.sqrt(1.0 - _BODY_SHARE**2) * allowed, contact)
-    at_contact = min(at_contact, largest, bars.contact_half_length_mm / _FEWEST_POINTS)
-    if mesh.dim == 3:
-        at_contact = min(at_contact, 0.25 * problem.model.design.width_mm)
+    grading = _grading(
+        problem, np.abs(bars.body.shares[goal]), _BODY_SHARE * allowed / body if body > 0.0 else math.inf
+    )
+    factor = _contact_factor(bars, goal, math.sqrt(1.0 - _BODY_SHARE**2) * allowed, contact)
+    return _options(problem, bars, grading, factor)
+
+
+def _for_gauge(problem: Problem, bars: AdjointBars, goal: str, allowed: float) -> MeshOptions:
+    """Return the mesh for a gauge: graded away from it, and refined around it.
+
+    Most of the contact's error comes from the points close to the gauge.  The edges of the whole contact face hence
+    stay as long as they are, unless those around the gauge would become shorter by more than a factor.
+    """
+    options, body, around = problem.model.mesh, bars.body, bars.body.around[goal]
+    if options.gauge_refinement > 1.0:
+        size = edge_lengths_at_gauges(problem.model, problem.mesh, problem.axes)
+        around = around | (size(_centroids(problem)) < options.size_mm)
+    share = np.where(around, 0.0, np.abs(body.shares[goal]))
+    signed, local = abs(body.signed[goal]), body.local[goal]
+    wanted = _LOCAL_SHARE * allowed / signed if signed > 0.0 else math.inf
+    grading = _grading(problem, share, wanted, ~around)
+    left = math.sqrt(1.0 - 2.0 * _LOCAL_SHARE**2) * allowed
+    contact = _contact_factor(bars, goal, left, bars.parts[goal][1])
+    nearby = _factor(_LOCAL_SHARE * allowed, local, _LOCAL_ORDER)
+    shortest = min(contact, nearby) * options.size_mm / options.gauge_refinement
+    graded = _options(problem, bars, grading, min(1.0, _LARGEST_REFINEMENT * shortest / options.size_mm))
+    return replace(graded, gauge_refinement=max(1.0, graded.size_mm / shortest))
+
+
+def _grading(problem: Problem, share: Float, wanted: float, chosen: NDArray[np.bool_] | slice = slice(None)) -> Grading:
+    """Return the lengths in the chosen cells that multiply the sum of the shares (e,) by `wanted`."""
+    mesh, design = problem.mesh, problem.model.design
+    factors = _factors(_smoothed(mesh, share)[chosen], wanted, mesh.dim)
+    largest = 0.5 * min(design.height_mm, 2.0 * design.half_length_mm)
+    points = np.zeros((len(factors), 3))
+    points[:, : mesh.dim] = np.abs(_centroids(problem)[chosen])
+    return Grading(points, np.minimum(factors * _edge_lengths(mesh)[chosen], largest))
+
+
+def _options(problem: Problem, bars: AdjointBars, grading: Grading, contact_factor: float) -> MeshOptions:
+    """Return the options of a graded mesh whose edges at the contact change by a factor."""
+    design, options = problem.model.design, problem.model.mesh
+    largest = 0.5 * min(design.height_mm, 2.0 * design.half_length_mm)
+    at_contact = min(options.size_mm * contact_factor, largest, bars.contact_half_length_mm / _FEWEST_POINTS)
+    if problem.dim == 3:
+        at_contact = min(at_contact, 0.25 * design.width_mm)
     at_contact = max(at_contact, _FACTORS[0] * options.size_mm)
-    base = max(at_contact, float(sizes.max()))
-    return replace(options, size_mm=at_contact, base_size_mm=base, grading=Grading(points, sizes))
+    base = max(at_contact, float(grading.sizes.max()))
+    return replace(options, size_mm=at_contact, base_size_mm=base, grading=grading)
 
 
 def cell_growth(problem: Problem, options: MeshOptions) -> float:
-    """Return the number of cells that the grading of options asks for, over that of the mesh that it was made from."""
+    """Return the number of cells that options with a grading ask for, over that of the mesh it was made from."""
     assert options.grading is not None
-    return float(np.mean((_edge_lengths(problem.mesh) / options.grading.sizes) ** problem.dim))
+    wanted = options.grading.at(_centroids(problem), RATE)
+    model = replace(problem.model, mesh=options)
+    if options.gauge_refinement > 1.0:
+        wanted = np.minimum(wanted, edge_lengths_at_gauges(model, problem.mesh, problem.axes)(_centroids(problem)))
+    return float(np.mean((_edge_lengths(problem.mesh) / wanted) ** problem.dim))
+
+
+def _centroids(problem: Problem) -> Float:
+    """Return the centroids (e, d) mm of the cells."""
+    mesh = problem.mesh
+    return np.asarray(mesh.points[mesh.cells[:, : mesh.dim + 1]].mean(axis=1))
 
 
 def _edge_lengths(mesh: Mesh) -> Float:
@@ -77,9 +138,12 @@ def _edge_lengths(mesh: Mesh) -> Float:
 
 def _contact_factor(bars: AdjointBars, goal: str, allowed: float, contact: float) -> float:
     """Return the change of the edge length at the contact that leaves an allowed error of the contact."""
-    if contact <= 0.0:
-        return _FACTORS[1]
-    return float(np.clip((allowed / contact) ** (1.0 / bars.contact_order(goal)), *_FACTORS))
+    return _factor(allowed, contact, bars.contact_order(goal))
+
+
+def _factor(allowed: float, error: float, order: float) -> float:
+    """Return the change of an edge length, within its bounds, that leaves an allowed error of a given order."""
+    return float(np.clip((allowed / error) ** (1.0 / order), *_FACTORS)) if error > 0.0 else _FACTORS[1]
 
 
 def _factors(share: Float, wanted: float, dim: int) -> Float:

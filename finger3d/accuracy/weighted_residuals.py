@@ -44,11 +44,13 @@ class BodyErrors:
     signed : by name, in the unit of the number; of a gauge without the cells around it
     local : by name, for gauges: the error of the strain in the cells that hold the gauge, not signed
     shares : by name, (e,) shares of the cells
+    around : by name, for gauges: which cells (e,) hold the gauge or touch those that do
     """
 
     signed: Mapping[str, float]
     local: Mapping[str, float]
     shares: Mapping[str, Float]
+    around: Mapping[str, NDArray[np.bool_]]
 
     def bar(self, name: str) -> float:
         """Return the magnitude of the error of a number."""
@@ -76,20 +78,20 @@ def body_errors(problem: Problem, steps: Sequence[StepResult]) -> BodyErrors:
     errors = _errors(problem, modes, basis)
     m, q = modes.shape[1], basis.shape[1]
     products = errors.products(slice(0, m), slice(m, None))
-    signed, local, shares = {}, {}, {}
+    signed, local, shares, around = {}, {}, {}, {}
     for g, goal in enumerate(goals):
         share = -np.einsum("emq,qm->e", products[:, :, :q], coefficients[:, g])
         if goal.row is not None:
             share -= products[:, :, q + goal.row] @ weights[:, -1]
         if goal.name.startswith("gauge_"):
             error, near = _at_gauge(problem, goal, errors, np.append(weights[:, -1], np.zeros(q + _rows(problem))))
-            local[goal.name] = error
+            local[goal.name], around[goal.name] = error, near
             share[near] = np.sign(share[near]) * error / max(np.count_nonzero(near), 1)
             signed[goal.name] = float(share[~near].sum())
         else:
             signed[goal.name] = float(share.sum())
         shares[goal.name] = share
-    return BodyErrors(signed, local, shares)
+    return BodyErrors(signed, local, shares, around)
 
 
 def _compressed(vectors: Float) -> tuple[Float, Float]:
