@@ -11,6 +11,7 @@ from finger3d.accuracy.companions import companion, edge_ratio
 from finger3d.accuracy.cost import forecast
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.material import Isotropic
+from finger3d.fem.simplex import CONTACT
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
@@ -45,6 +46,20 @@ def test_the_slope_of_a_gauge_near_the_edge_of_contact_is_several_times_as_accur
     assert error > 0.2
     assert error_finer < 0.1
     assert error_finer < 0.3 * error
+
+
+def test_the_contact_face_is_refined_close_to_the_gauge_and_the_body_below_it_is_not() -> None:
+    usual, finer = build(model(4.0, 1.0)), build(model(4.0, 4.0))
+    # the gauge lies 3.4 mm below the face, whose edges are shortest up to 2.5 times that distance from it
+    x = np.unique(finer.surface.points[finer.surface.face == CONTACT, 0])
+    near = np.abs(x[1:] - 36.0) < 6.0
+    assert np.diff(x)[near].max() < 0.4 * 4.0
+    far = x[x < 20.0]
+    assert far == pytest.approx(np.unique(usual.surface.points[usual.surface.face == CONTACT, 0])[: len(far)], abs=1e-9)
+    # 15 mm below the gauge edges are as long as they were
+    below = np.abs(finer.mesh.points - [36.0, 25.0]).max(axis=1) < 4.0
+    before = np.abs(usual.mesh.points - [36.0, 25.0]).max(axis=1) < 4.0
+    assert np.count_nonzero(below) <= 1.5 * np.count_nonzero(before)
 
 
 @pytest.mark.parametrize("changes", [{"gauges": ()}, {}], ids=["no gauge", "factor 1"])

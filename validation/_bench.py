@@ -44,6 +44,7 @@ from finger3d.mechanics.solve import march
 from finger3d.mechanics.symmetry import symmetry
 from finger3d.meshing.generate import mesh_solid
 from finger3d.objects import MeshObject, Plane, RigidObject, Sphere
+from finger3d.progress import Progress
 
 LARGE, MIDDLE, QUICK = 1.1, 1.25, 3.0  # mm: 150 000, 47 000 and 8 000 unknowns
 MUS = (0.06, 0.125, 0.25, 0.5, 1.0)
@@ -215,14 +216,17 @@ def _warm_cache(size: float) -> tuple[float, float]:
     return seconds[0], seconds[1]
 
 
-def run(quick: bool) -> tuple[Row, ...]:
+def run(quick: bool, report: Progress) -> tuple[Row, ...]:
     """Every ratio once; quick: on a small mesh, where they mean nothing, and without pytetwild."""
     load = os.getloadavg()[0]
     sizes = (QUICK,) if quick else (MIDDLE, LARGE)
+    report.stage("presses beside one factorisation")
     runs = {size: [_child(size)] for size in sizes}
     repeats = 1 if quick else 3
+    report.stage("finger3d press of a section")
     overhead = _press_overhead(repeats)
     pairs = 1 if quick else 7
+    report.stage("sweeps of five values of mu")
     bodies = {"section": SECTION}
     if not quick:
         bodies[f"solid, {runs[MIDDLE][0]['dofs']:.0f} unknowns"] = SOLID
@@ -231,6 +235,7 @@ def run(quick: bool) -> tuple[Row, ...]:
     if not quick:
         for body, scene in bodies.items():
             swept[body, chosen] = _five_against_one(scene.replace("steps = 10\n", ""), 3)
+    report.stage("the cache of meshes, and the presses again")
     made = None if quick else _warm_cache(2.0)
     if not quick:
         for size in sizes:
@@ -252,8 +257,11 @@ def run(quick: bool) -> tuple[Row, ...]:
     if made:
         what = f"pytetwild on a warm cache against a cold one ({made[0]:.1f} s)"
         rows.append(_row(what, 0.02, made[1] / made[0], load, "0: only reading the file is left"))
+    report.stage("objects that are not flat")
     rows += _objects(5.0 if quick else 2.5, load, repeats)
+    report.stage("large deformation")
     rows += _large_deformation(QUICK if quick else MIDDLE, load)
+    report.stage("CalculiX")
     rows += _beside_calculix(quick, load)
     for size, most in zip(sizes, (2.0,) if quick else (2.0, 5.0), strict=True):
         peak = max(r["peak_MB"] for r in runs[size]) / 1024.0
@@ -354,12 +362,12 @@ def main(arguments: Sequence[str]) -> None:
         print(json.dumps(measured(json.loads(arguments[0]))))
         return
     from finger3d.analyses.study_rows import table
-    from finger3d.cli.common import print_columns
+    from finger3d.cli.common import job, print_columns
 
     begin = time.perf_counter()
-    print_columns(
-        "bench what kind reference wanted got error tolerance verdict".split(), table({"": run("--quick" in arguments)})
-    )
+    with job(False, lambda done: "nothing is kept") as report:
+        rows = run("--quick" in arguments, report)
+    print_columns("bench what kind reference wanted got error tolerance verdict".split(), table({"": rows}))
     print(f"{time.perf_counter() - begin:.0f} s")
 
 

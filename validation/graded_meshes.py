@@ -4,8 +4,8 @@ The Fig. 9 finger (nu = 0.49, mu = 0.25, 10 mm) as a section and as a 20 mm wide
 the cells in the error of the goal (Becker and Rannacher 2001; `mesh.tolerance` with `mesh.goal`) beside meshes
 whose edges are four times as long far from the contact as at it, from the results of cost_of_accuracy.  Truth is
 extrapolated from the four finest of those with the order that fits them; for the gauge of the section, whose values do
-not fall monotonically, it is the finest.  For the gauge of the solid they are too coarse: there, meshes with equal edges
-everywhere are compared, and truth has edges of 0.5 mm around the gauge and at the contact close to it.
+not fall monotonically, it is the finest.  For the gauge of the solid they are too coarse: there, meshes with equal
+edges everywhere are compared, and truth has edges of 0.5 mm around the gauge and at the contact close to it.
 """
 
 from __future__ import annotations
