@@ -156,10 +156,12 @@ def _rows(found: list[Mesh]) -> Iterator[Row]:
 
 def _draw(figure: Any, found: list[Mesh]) -> None:
     pairs = list(dict.fromkeys((mesh.domain, mesh.goal) for mesh in found))
-    figure.set_size_inches(4.6 * len(pairs), 4.4)
+    across = min(len(pairs), 2)
+    down = -(-len(pairs) // across)
+    figure.set_size_inches(5.4 * across, 4.2 * down)
     figure.set_layout_engine("constrained")
-    panels = np.atleast_1d(figure.subplots(1, len(pairs)))
-    titles = {GOAL: "normal force", GAUGE: "strain of the gauge at x = 36 mm"}
+    panels = np.ravel(figure.subplots(down, across, squeeze=False))
+    titles = {GOAL: "normal force", GAUGE: "strain of the gauge"}
     for axes, (domain, goal) in zip(panels, pairs, strict=True):
         for way, (colour, marker, label) in WAYS.items():
             some = [mesh for mesh in found if (mesh.domain, mesh.goal, mesh.way) == (domain, goal, way)]
@@ -170,7 +172,7 @@ def _draw(figure: Any, found: list[Mesh]) -> None:
         axes.loglog([m.dofs for m in told], [100.0 * m.told for m in told], "s", mfc="none", color="#c0392b",
                     label="its estimated error")  # fmt: skip
         axes.set(title=f"{titles[goal]}, {'section' if domain != 'solid' else 'solid 20 mm wide'}")
-        axes.set(xlabel="unknowns", ylabel="true error, %")
+        axes.set(xlabel="unknowns", ylabel="true error, %", xlim=(3e2, 6e5))
         axes.grid(True, which="major", lw=0.4)
     for axes in (panels[0], panels[-1]):
         axes.legend(fontsize=8)
