@@ -44,6 +44,7 @@ def test_a_gauge_asks_for_short_edges_around_it_and_leaves_the_contact_face_as_i
     assert rough.gauge_refinement == 1.0
     assert fine.size_mm == pytest.approx(own.size_mm, rel=1e-12)
     assert fine.gauge_refinement == pytest.approx(2.0, rel=1e-12)  # the most of one round
+    assert fine.refined_gauges == ("g",)
     # cells that the refinement is for do not make the rest of the mesh finer: none of them lies at the gauge
     assert fine.grading is not None
     assert np.linalg.norm(fine.grading.points[:, :2] - [1.5, 4.0], axis=1).min() > 0.5 * own.size_mm

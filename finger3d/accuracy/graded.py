@@ -64,9 +64,8 @@ def graded_sizes(problem: Problem, bars: AdjointBars, goal: str, allowed: float)
     if goal in bars.body.local:
         return _for_gauge(problem, bars, goal, allowed)
     body, contact = bars.parts[goal]
-    grading = _grading(
-        problem, np.abs(bars.body.shares[goal]), _BODY_SHARE * allowed / body if body > 0.0 else math.inf
-    )
+    wanted = _BODY_SHARE * allowed / body if body > 0.0 else math.inf
+    grading = _grading(problem, np.abs(bars.body.shares[goal]), wanted)
     factor = _contact_factor(bars, goal, math.sqrt(1.0 - _BODY_SHARE**2) * allowed, contact)
     return _options(problem, bars, grading, factor)
 
@@ -75,7 +74,8 @@ def _for_gauge(problem: Problem, bars: AdjointBars, goal: str, allowed: float) -
     """Return the mesh for a gauge: graded away from it, and refined around it.
 
     Most of the contact's error comes from the points close to the gauge.  The edges of the whole contact face hence
-    stay as long as they are, unless those around the gauge would become shorter by more than a factor.
+    stay as long as they are, unless those around the gauge would become shorter by more than a factor.  Edges around
+    the gauge never become longer.
     """
     options, body, around = problem.model.mesh, bars.body, bars.body.around[goal]
     if options.gauge_refinement > 1.0:
@@ -88,31 +88,36 @@ def _for_gauge(problem: Problem, bars: AdjointBars, goal: str, allowed: float) -
     left = math.sqrt(1.0 - 2.0 * _LOCAL_SHARE**2) * allowed
     contact = _contact_factor(bars, goal, left, bars.parts[goal][1])
     nearby = _factor(_LOCAL_SHARE * allowed, local, _LOCAL_ORDER)
-    shortest = min(contact, nearby) * options.size_mm / options.gauge_refinement
+    shortest = min(1.0, contact, nearby) * options.size_mm / options.gauge_refinement
     graded = _options(problem, bars, grading, min(1.0, _LARGEST_REFINEMENT * shortest / options.size_mm))
-    return replace(graded, gauge_refinement=max(1.0, graded.size_mm / shortest))
+    alone = options.refined_gauges if options.gauge_refinement > 1.0 else (goal.removeprefix("gauge_"),)
+    return replace(graded, gauge_refinement=max(1.0, graded.size_mm / shortest), refined_gauges=alone)
 
 
 def _grading(problem: Problem, share: Float, wanted: float, chosen: NDArray[np.bool_] | slice = slice(None)) -> Grading:
     """Return the lengths in the chosen cells that multiply the sum of the shares (e,) by `wanted`."""
-    mesh, design = problem.mesh, problem.model.design
+    mesh = problem.mesh
     factors = _factors(_smoothed(mesh, share)[chosen], wanted, mesh.dim)
-    largest = 0.5 * min(design.height_mm, 2.0 * design.half_length_mm)
     points = np.zeros((len(factors), 3))
     points[:, : mesh.dim] = np.abs(_centroids(problem)[chosen])
-    return Grading(points, np.minimum(factors * _edge_lengths(mesh)[chosen], largest))
+    return Grading(points, np.minimum(factors * _edge_lengths(mesh)[chosen], _largest(problem)))
 
 
 def _options(problem: Problem, bars: AdjointBars, grading: Grading, contact_factor: float) -> MeshOptions:
     """Return the options of a graded mesh whose edges at the contact change by a factor."""
-    design, options = problem.model.design, problem.model.mesh
-    largest = 0.5 * min(design.height_mm, 2.0 * design.half_length_mm)
-    at_contact = min(options.size_mm * contact_factor, largest, bars.contact_half_length_mm / _FEWEST_POINTS)
+    options = problem.model.mesh
+    at_contact = min(options.size_mm * contact_factor, _largest(problem), bars.contact_half_length_mm / _FEWEST_POINTS)
     if problem.dim == 3:
-        at_contact = min(at_contact, 0.25 * design.width_mm)
+        at_contact = min(at_contact, 0.25 * problem.model.design.width_mm)
     at_contact = max(at_contact, _FACTORS[0] * options.size_mm)
     base = max(at_contact, float(grading.sizes.max()))
     return replace(options, size_mm=at_contact, base_size_mm=base, grading=grading)
+
+
+def _largest(problem: Problem) -> float:
+    """Return the longest edge, mm: half of the body."""
+    design = problem.model.design
+    return 0.5 * min(design.height_mm, 2.0 * design.half_length_mm)
 
 
 def cell_growth(problem: Problem, options: MeshOptions) -> float:

@@ -38,7 +38,7 @@ _RATE = 0.7
 def refined_at_gauges(
     model: Model, mesh: Mesh, made: MeshReport, axes: tuple[str, ...] = ()
 ) -> tuple[Mesh, MeshReport]:
-    """Return mesh and report with edges of ``mesh.size_mm / mesh.gauge_refinement`` around every gauge.
+    """Return mesh and report with edges of ``mesh.size_mm / mesh.gauge_refinement`` around the gauges.
 
     Raises
     ------
@@ -56,10 +56,11 @@ def refined_at_gauges(
 
 def edge_lengths_at_gauges(model: Model, mesh: Mesh, axes: tuple[str, ...] = ()) -> Callable[[Float], Float]:
     """Return the function of points (n, d) that gives the longest edges (n,) mm which the gauges of a model allow."""
+    names = model.mesh.refined_gauges
     shortest = model.mesh.size_mm / model.mesh.gauge_refinement
     face = mesh.points[np.unique(mesh.facets["contact"])]
     lines, near = [], np.zeros(len(face), dtype=bool)
-    for gauge in model.gauges:
+    for gauge in (g for g in model.gauges if not names or g.name in names):
         start, end = (reflect_into_part(place, gauge.direction, axes, mesh.dim)[0] for place in gauge.ends)
         away = _distance(face, start, end)
         near |= away <= np.clip(_REACH * away.min(), _LEAST_REACH * shortest, _LARGEST_REACH * shortest)

@@ -72,6 +72,7 @@ class MeshOptions:
     `layers` is the least number of layers of a swept mesh over half the width; one layer cannot follow the bulge of a
     free end.  `grading` prescribes edge lengths inside the body, as a refinement towards a goal finds them.
     `gauge_refinement` is the edge length at the contact over that around gauges; at 1 they change no mesh.
+    `refined_gauges` names those that it is for; empty: all.
     """
 
     size_mm: float
@@ -80,6 +81,7 @@ class MeshOptions:
     layers: int = 2
     grading: Grading | None = None
     gauge_refinement: float = 1.0
+    refined_gauges: tuple[str, ...] = ()
 
     def as_table(self) -> dict[str, float | str]:
         """The keys of ``[mesh]`` in a scene."""
