@@ -67,6 +67,26 @@ def test_the_forecast_of_cells_counts_those_around_a_gauge() -> None:
     growth = len(made.cells) / len(problem.mesh.cells)
     assert growth > 1.5
     assert cell_growth(problem, wanted) == pytest.approx(growth, rel=0.5)
+    assert cell_growth(problem, replace(wanted, gauge_refinement=1.0)) < 0.9 * cell_growth(problem, wanted)
+
+
+def test_cells_that_are_refined_around_a_gauge_do_not_grade_the_rest() -> None:
+    model = half_cylinder(0.3, 3)
+    problem, frames = run(replace(model, mesh=replace(model.mesh, gauge_refinement=4.0)))
+    bars = adjoint_bars(problem, frames)
+    wanted = graded_sizes(problem, bars, "gauge_g", 0.5 * bars.bars["gauge_g"])
+    assert wanted.grading is not None
+    # without them no cell is wanted much shorter than half of what it would be without a refinement
+    assert wanted.grading.sizes.min() > 0.2 * model.mesh.size_mm
+    assert problem.mesh.points.shape[0] > 1.2 * run(model)[0].mesh.points.shape[0]
+
+
+def test_a_factor_without_gauges_changes_no_mesh() -> None:
+    model = replace(half_cylinder(0.3, 3), gauges=())
+    model = replace(model, mesh=replace(model.mesh, gauge_refinement=2.0))
+    found = refine_mesh(model, 2e-3, max_seconds=60.0)
+    assert found.met
+    assert len(found.rounds) > 1
 
 
 def test_a_gauge_of_a_solid_is_known_to_a_per_cent_with_few_unknowns() -> None:

@@ -1,6 +1,7 @@
 """Refinement around gauges: what it changes, and what the slope of a gauge against friction gains."""
 
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -74,6 +75,18 @@ def test_the_report_describes_the_refined_mesh() -> None:
     assert finer.cells > 2 * usual.cells
     assert finer.volume_mm3 == pytest.approx(usual.volume_mm3, rel=1e-12)
     assert finer.hash != usual.hash
+
+
+@pytest.mark.parametrize("y", [40.0, 33.0])
+def test_a_larger_factor_makes_no_edge_of_the_contact_face_longer(y: float) -> None:
+    longest = []
+    for refinement in (1.0, 2.0, 4.0, 8.0, 16.0):
+        surface = build(model(4.0, refinement, gauges=(Gauge("g", 36.0, y),))).surface
+        x = np.unique(surface.points[surface.face == CONTACT, 0])
+        longest.append(np.diff(x)[np.abs(x[1:] - 36.0) < 6.0].max())
+    assert all(finer <= coarser + 1e-9 for coarser, finer in pairwise(longest))
+    # the gauge lies 3.4 or 10.4 mm under the face, whose edges are an eighth of that at least
+    assert longest[-1] < 0.5 * longest[0]
 
 
 def test_the_gauges_to_refine_around_may_be_named() -> None:

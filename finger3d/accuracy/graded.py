@@ -34,8 +34,8 @@ _BODY_SHARE = 0.85
 """Error of the body over the whole error that is allowed; errors add as squares, which leaves half for the contact."""
 
 _LOCAL_SHARE = 0.6
-"""Of the error of a strain that is allowed, the parts of the cells around the gauge and of the others; errors add as
-squares."""
+"""Error that the cells around a gauge may leave, and that the others may, over the error of its strain that is allowed;
+errors add as squares."""
 
 _LOCAL_ORDER = 2.0
 """Order of the strain in the cells around a gauge, away from its singularities."""
@@ -74,22 +74,26 @@ def _for_gauge(problem: Problem, bars: AdjointBars, goal: str, allowed: float) -
     """Return the mesh for a gauge: graded away from it, and refined around it.
 
     Most of the contact's error comes from the points close to the gauge.  The edges of the whole contact face hence
-    stay as long as they are, unless those around the gauge would become shorter by more than a factor.  Edges around
-    the gauge never become longer.
+    become shorter only where `gauge_refinement` would exceed `_LARGEST_REFINEMENT`.  Those around the gauge never
+    become longer.
     """
-    options, body, around = problem.model.mesh, bars.body, bars.body.around[goal]
+    options, shares, own = problem.model.mesh, bars.body.shares[goal], bars.body.around[goal]
+    around = own
     if options.gauge_refinement > 1.0:
         size = edge_lengths_at_gauges(problem.model, problem.mesh, problem.axes)
-        around = around | (size(_centroids(problem)) < options.size_mm)
-    share = np.where(around, 0.0, np.abs(body.shares[goal]))
-    signed, local = abs(body.signed[goal]), body.local[goal]
-    wanted = _LOCAL_SHARE * allowed / signed if signed > 0.0 else math.inf
-    grading = _grading(problem, share, wanted, ~around)
+        around = own | (size(_centroids(problem)) < options.size_mm)
+    if around.all():  # gauges everywhere
+        around = np.zeros_like(own)
+    local = math.hypot(bars.body.local[goal], shares[around & ~own].sum())
+    far = abs(float(shares[~around].sum()))
+    wanted = _LOCAL_SHARE * allowed / far if far > 0.0 else math.inf
+    grading = _grading(problem, np.where(around, 0.0, np.abs(shares)), wanted, ~around)
     left = math.sqrt(1.0 - 2.0 * _LOCAL_SHARE**2) * allowed
     contact = _contact_factor(bars, goal, left, bars.parts[goal][1])
     nearby = _factor(_LOCAL_SHARE * allowed, local, _LOCAL_ORDER)
     shortest = min(1.0, contact, nearby) * options.size_mm / options.gauge_refinement
-    graded = _options(problem, bars, grading, min(1.0, _LARGEST_REFINEMENT * shortest / options.size_mm))
+    largest = max(_LARGEST_REFINEMENT, options.gauge_refinement)
+    graded = _options(problem, bars, grading, min(1.0, largest * shortest / options.size_mm))
     alone = options.refined_gauges if options.gauge_refinement > 1.0 else (goal.removeprefix("gauge_"),)
     return replace(graded, gauge_refinement=max(1.0, graded.size_mm / shortest), refined_gauges=alone)
 
@@ -123,10 +127,10 @@ def _largest(problem: Problem) -> float:
 def cell_growth(problem: Problem, options: MeshOptions) -> float:
     """Return the number of cells that options with a grading ask for, over that of the mesh it was made from."""
     assert options.grading is not None
-    wanted = options.grading.at(_centroids(problem), RATE)
-    model = replace(problem.model, mesh=options)
+    places, model = _centroids(problem), replace(problem.model, mesh=options)
+    wanted = options.grading.at(places, RATE)
     if options.gauge_refinement > 1.0:
-        wanted = np.minimum(wanted, edge_lengths_at_gauges(model, problem.mesh, problem.axes)(_centroids(problem)))
+        wanted = np.minimum(wanted, edge_lengths_at_gauges(model, problem.mesh, problem.axes)(places))
     return float(np.mean((_edge_lengths(problem.mesh) / wanted) ** problem.dim))
 
 

@@ -18,7 +18,7 @@ from finger3d.accuracy.adjoint_bars import NoAdjointBarsError, adjoint_bars, app
 from finger3d.accuracy.companions import FACTOR, companion
 from finger3d.accuracy.estimate import compared, press_numbers
 from finger3d.accuracy.graded import cell_growth, graded_sizes
-from finger3d.accuracy.richardson import ORDER, Quantity, largest_readings
+from finger3d.accuracy.richardson import ORDER, ORDERS, Quantity, largest_readings
 from finger3d.errors import Finger3dError, UnresolvedError
 from finger3d.mechanics.build import build
 from finger3d.mechanics.model import MeshOptions, Model
@@ -42,6 +42,7 @@ class Round:
 
     Attributes
     ----------
+    gauge_refinement : edge length at the contact over that around gauges
     error, number : estimated error of the goal, relative (see `relative_error`), and its name
     seconds : of this round, estimate included
     """
@@ -52,11 +53,13 @@ class Round:
     error: float
     number: str
     seconds: float
+    gauge_refinement: float = 1.0
 
     def line(self, count: int) -> str:
         """Return the round as one line of text."""
+        finer = "" if self.gauge_refinement == 1.0 else f"{self.size_mm / self.gauge_refinement:.4g} mm at the gauge, "
         return (
-            f"round {count}: size {self.size_mm:.4g} mm, base {self.base_size_mm:.4g} mm, {self.dofs} dofs, "
+            f"round {count}: size {self.size_mm:.4g} mm, {finer}base {self.base_size_mm:.4g} mm, {self.dofs} dofs, "
             f"error {100 * self.error:.2g} % ({self.number}), {self.seconds:.1f} s"
         )
 
@@ -195,7 +198,7 @@ def _graded_round(model: Model, tolerance: float, goal: str) -> tuple[Problem, R
     sizes = graded_sizes(short, bars, goal, _SAFETY * tolerance * scale) if error > tolerance else model.mesh
     dofs = int(problem.body.stiffness.upper.shape[0])
     seconds = time.perf_counter() - start
-    return problem, Round(model.mesh.size_mm, model.mesh.base_size_mm, dofs, error, goal, seconds), sizes
+    return problem, _round(model.mesh, dofs, error, goal, seconds), sizes
 
 
 def _run_round(model: Model, tolerance: float, goal: str) -> tuple[Problem, Round, MeshOptions]:
@@ -211,9 +214,13 @@ def _run_round(model: Model, tolerance: float, goal: str) -> tuple[Problem, Roun
     coarse = press_numbers(other, last) if other.model.mesh.base_size_mm >= model.mesh.base_size_mm else None
     sizes = _next_sizes(problem, goal, error, tolerance, numbers, coarse)
     seconds = time.perf_counter() - start
-    options = model.mesh
     dofs = int(problem.body.stiffness.upper.shape[0])
-    return problem, Round(options.size_mm, options.base_size_mm, dofs, error, goal, seconds), sizes
+    return problem, _round(model.mesh, dofs, error, goal, seconds), sizes
+
+
+def _round(mesh: MeshOptions, dofs: int, error: float, goal: str, seconds: float) -> Round:
+    """Return what is told of a round on a mesh."""
+    return Round(mesh.size_mm, mesh.base_size_mm, dofs, error, goal, seconds, mesh.gauge_refinement)
 
 
 def _next_sizes(
@@ -228,9 +235,10 @@ def _next_sizes(
     options = problem.model.mesh
     if error <= tolerance:
         return options
-    is_length = Quantity.of(number).kind.is_length
+    kind = Quantity.of(number).kind
+    is_length = kind.is_length
     shares = (1.0, 0.0) if is_length else _error_shares(problem, number, fine, coarse)
-    power = 1.0 if is_length else ORDER
+    power = 1.0 if is_length else ORDERS.get(kind, ORDER)
     factor = min(max((_SAFETY * tolerance / error) ** (1.0 / power), _FACTOR_RANGE[0]), _FACTOR_RANGE[1])
     size = options.size_mm * (factor if shares[0] >= _MIN_SHARE else 1.0)
     base = options.base_size_mm * (factor if shares[1] >= _MIN_SHARE else 1.0)

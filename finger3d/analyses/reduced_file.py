@@ -32,6 +32,9 @@ from finger3d.objects import OBJECTS, MeshObject, RigidObject, vertical_frame
 
 FORMAT, VERSION = "finger3d condensed body", 5
 _SHAPES: dict[str, type[RigidObject]] = {r.__name__: r for r in OBJECTS.values()} | {"MeshObject": MeshObject}
+_OF_MESH = ("size_mm", "base_size_mm", "mesher", "layers", "gauge_refinement")
+"""What a file tells of the mesh; a reduced model has none, so that its grading does not matter."""
+
 _MAX_STEPS = 1_000_000
 """Largest number of increments of a leg in a file."""
 
@@ -203,7 +206,7 @@ def _header(problem: Problem) -> Tree:
     return {
         "body": asdict(model.design),
         "material": asdict(model.material.isotropic("a reduced model")),
-        "mesh": asdict(model.mesh),
+        "mesh": {name: getattr(model.mesh, name) for name in _OF_MESH},
         "legs": [asdict(leg) for leg in model.legs],
         "object": {"kind": type(thing).__name__, **placed},
         "friction": {"kind": type(model.friction).__name__, **asdict(model.friction)},

@@ -8,8 +8,10 @@ face is refined around it, and the body only close to that part of the face and 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -17,16 +19,20 @@ from scipy.spatial import cKDTree
 from finger3d._types import Float
 from finger3d.fem.quality import curved_volume
 from finger3d.fem.simplex import Mesh, reflect_into_part
+from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.model import Model
 from finger3d.meshing.bisection import refined
 from finger3d.meshing.limits import check_count
 from finger3d.meshing.report import MeshReport, report
 
 _REACH = 2.5
-"""Distance from a gauge up to which edges of the contact face are shortest, over its distance from that face."""
+"""Distance from a gauge up to which the contact face is refined, over the depth of the gauge under it."""
 
-_LEAST_REACH, _LARGEST_REACH = 4.0, 12.0
-"""Bounds of that distance, over the length of the shortest edges; the upper one bounds the number of cells."""
+_LEAST_REACH = 4.0
+"""Least distance up to which it is refined, over the length of the shortest edges."""
+
+_EDGES_PER_DEPTH = 8.0
+"""Depth of a gauge over the edges of the face that resolve the tractions well enough for its strain."""
 
 _AROUND_GAUGE = 2.0
 """Distance from a gauge up to which edges are shortest, over their length."""
@@ -55,30 +61,48 @@ def refined_at_gauges(
 
 
 def edge_lengths_at_gauges(model: Model, mesh: Mesh, axes: tuple[str, ...] = ()) -> Callable[[Float], Float]:
-    """Return the function of points (n, d) that gives the longest edges (n,) mm which the gauges of a model allow."""
-    names = model.mesh.refined_gauges
-    shortest = model.mesh.size_mm / model.mesh.gauge_refinement
-    face = mesh.points[np.unique(mesh.facets["contact"])]
-    lines, near = [], np.zeros(len(face), dtype=bool)
-    for gauge in (g for g in model.gauges if not names or g.name in names):
-        start, end = (reflect_into_part(place, gauge.direction, axes, mesh.dim)[0] for place in gauge.ends)
-        away = _distance(face, start, end)
-        near |= away <= np.clip(_REACH * away.min(), _LEAST_REACH * shortest, _LARGEST_REACH * shortest)
-        lines.append((start, end))
-    part_of_face = cKDTree(face[near]) if near.any() else None
+    """Return the longest edges (n,) mm that the gauges of a model allow at points (n, d), as a function of these."""
+    options = model.mesh
+    shortest = options.size_mm / options.gauge_refinement
+    zones: list[
+        tuple[cKDTree, float, float]
+    ] = []  # places, the edge length there, and the distance up to which it holds
+    for gauge in model.gauges:
+        if not options.refined_gauges or gauge.name in options.refined_gauges:
+            line = cKDTree(_places_along(gauge, shortest, axes, mesh.dim))
+            places, edge = _places_on_face(mesh, line, shortest)
+            zones += [(line, shortest, _AROUND_GAUGE * shortest), (cKDTree(places), edge, edge)]
 
     def size(points: Float) -> Float:
-        beyond = np.min([_distance(points, *line) for line in lines], axis=0) - _AROUND_GAUGE * shortest
-        if part_of_face is not None:
-            beyond = np.minimum(beyond, part_of_face.query(points)[0] - shortest)
-        return np.asarray(shortest + _RATE * np.maximum(beyond, 0.0))
+        out = np.full(len(points), np.inf)
+        for tree, edge, reach in zones:
+            out = np.minimum(out, edge + _RATE * np.maximum(tree.query(points)[0] - reach, 0.0))
+        return out
 
     return size
 
 
-def _distance(points: Float, start: Float, end: Float) -> Float:
-    """Return the distances (n,) of points (n, d) from the line between two ends (d,)."""
-    along = end - start
-    length2 = float(along @ along)
-    share = np.clip((points - start) @ along / length2, 0.0, 1.0) if length2 > 0.0 else np.zeros(len(points))
-    return np.asarray(np.linalg.norm(points - start - share[:, None] * along, axis=1))
+def _places_along(gauge: Gauge, spacing: float, axes: tuple[str, ...], dim: int) -> Float:
+    """Return places (k, d) along a gauge, or their mirror images in the part that is meshed."""
+    start, end = gauge.ends
+    shares = np.linspace(0.0, 1.0, math.ceil(np.linalg.norm(end - start) / spacing) + 1)
+    return np.array([reflect_into_part(start + s * (end - start), gauge.direction, axes, dim)[0] for s in shares])
+
+
+def _places_on_face(mesh: Mesh, gauge: cKDTree, shortest: float) -> tuple[Float, float]:
+    """Return places (k, d) of the contact face close to a gauge, and the edge length there."""
+    facets = mesh.points[mesh.facets["contact"]]
+    away = gauge.query(facets)[0].min(axis=1)
+    depth = float(away.min())
+    reach, edge = max(_REACH * depth, _LEAST_REACH * shortest), max(shortest, depth / _EDGES_PER_DEPTH)
+    facets = facets[away <= reach]
+    diameter = float(np.linalg.norm(np.ptp(facets, axis=1), axis=1).max())
+    places = mesh.facet_element.shape(_lattice(mesh.dim, math.ceil(diameter / edge))) @ facets
+    places = places.reshape(-1, mesh.dim)
+    return places[gauge.query(places)[0] <= reach], edge
+
+
+def _lattice(corners: int, count: int) -> Float:
+    """Return the barycentric coordinates (k, corners) of a lattice that divides the edges of a simplex into `count`."""
+    steps = [s for s in product(range(count + 1), repeat=corners - 1) if sum(s) <= count]
+    return np.array([(count - sum(s), *s) for s in steps]) / count

@@ -14,7 +14,7 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.accuracy.companions import built_like, companion, edge_ratio
-from finger3d.accuracy.richardson import gain
+from finger3d.accuracy.richardson import ORDERS, Kind, gain
 from finger3d.analyses.calibrate.presses import presses
 from finger3d.analyses.calibrate.variations import deeper, poisson_step, tilted_mesh, with_modulus
 from finger3d.errors import Finger3dError
@@ -112,7 +112,7 @@ class GaugeFields:
         if "mesh" in tolerances:
             say("tolerance mesh")
             beside = companion(problem)
-            coarse, ratio = StrainField.of(beside, mus), gain(edge_ratio(problem, beside))
+            coarse, ratio = StrainField.of(beside, mus), gain(edge_ratio(problem, beside), ORDERS[Kind.STRAIN])
         return cls(nominal, tuple(mus), noise, tolerances, shared, coarse, ratio)
 
     def effects(self, points: Float, angles: Float) -> ReadingEffects:
