@@ -142,7 +142,7 @@ def _rows(found: list[Mesh]) -> Iterator[Row]:
                 f"true error over the estimate: {name}", "claim of finger3d for its error bars", 2.0,
                 mesh.error / mesh.told, 0.0, "two error bars", measure="at most",
             )  # fmt: skip
-            # an error may be small by chance: of the graded mesh the bar counts, and no finer mesh may have a larger one
+            # an error may be small by chance: the bar of the graded mesh counts, and no finer mesh may exceed it
             large = [other.dofs for other in equal if other.error > max(mesh.error, mesh.told)]
             enough = [other.dofs for other in equal if other.dofs > max(large, default=0)]
             ratio = min(enough, default=equal[-1].dofs) / mesh.dofs

@@ -36,7 +36,7 @@ class _Shares:
     Attributes
     ----------
     change : change of the number with every second multiplier, over the error of the contact discretisation
-    body : error of the body's mesh over its estimate, in sections and in solids
+    body : error of the body's mesh over its estimate, in sections and in solids; without the cells around a gauge
     points : relative error over (h/a)^power, h the distance of points and a the half-length of contact; readings are
         relative to the largest of their kind
     """
@@ -53,7 +53,7 @@ _SHARES = {
     Kind.FRICTION_SUM: _Shares(change=1.5, points=0.1),
     Kind.WORK: _Shares(change=2.0, body=(1.5, 1.5), points=0.03, power=2),
     Kind.DISSIPATION: _Shares(change=2.75, points=0.05),
-    Kind.STRAIN: _Shares(change=2.0),
+    Kind.STRAIN: _Shares(change=2.0, body=(1.5, 1.5)),
     Kind.DISPLACEMENT: _Shares(change=2.0, points=0.003),
     # recovery is poor where a taxel ends, and at the corners of the base
     Kind.BASE_PRESSURE: _Shares(change=2.0, body=(1.5, 1.5), points=0.01),
@@ -86,6 +86,11 @@ class AdjointBars:
     body: BodyErrors
     coarse: Problem
     contact_half_length_mm: float
+
+    @staticmethod
+    def body_share(name: str, dim: int) -> float:
+        """Return the error of the body's mesh over its estimate, without the cells around a gauge."""
+        return _SHARES[Quantity.of(name).kind].body[dim - 2]
 
     @staticmethod
     def contact_order(name: str) -> int:
@@ -148,7 +153,7 @@ def adjoint_bars(problem: Problem, steps: Sequence[StepResult]) -> AdjointBars:
             scale = max(scale, abs(numbers["normal_force_N"]))
         relative = shares.points * spacing**shares.power * scale
         contact = math.hypot(max(changes[name]) / shares.change, relative)
-        parts[name] = shares.body[problem.dim - 2] * body.bar(name), contact
+        parts[name] = body.bar(name, shares.body[problem.dim - 2]), contact
     bars = {name: math.hypot(*both) for name, both in parts.items()}
     for name, relative in _unresolved_by_base(problem):
         bars[name] = math.hypot(bars[name], relative * numbers[name])

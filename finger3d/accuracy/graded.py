@@ -85,7 +85,7 @@ def _for_gauge(problem: Problem, bars: AdjointBars, goal: str, allowed: float) -
     if around.all():  # gauges everywhere
         around = np.zeros_like(own)
     local = math.hypot(bars.body.local[goal], shares[around & ~own].sum())
-    far = abs(float(shares[~around].sum()))
+    far = bars.body_share(goal, problem.dim) * abs(float(shares[~around].sum()))
     wanted = _LOCAL_SHARE * allowed / far if far > 0.0 else math.inf
     grading = _grading(problem, np.where(around, 0.0, np.abs(shares)), wanted, ~around)
     left = math.sqrt(1.0 - 2.0 * _LOCAL_SHARE**2) * allowed

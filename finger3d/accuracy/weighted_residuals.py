@@ -52,9 +52,9 @@ class BodyErrors:
     shares: Mapping[str, Float]
     around: Mapping[str, NDArray[np.bool_]]
 
-    def bar(self, name: str) -> float:
-        """Return the magnitude of the error of a number."""
-        return float(np.hypot(self.signed[name], self.local.get(name, 0.0)))
+    def bar(self, name: str, share: float = 1.0) -> float:
+        """Return the magnitude of the error of a number, if its signed part is `share` times its estimate."""
+        return float(np.hypot(share * self.signed[name], self.local.get(name, 0.0)))
 
 
 def body_errors(problem: Problem, steps: Sequence[StepResult]) -> BodyErrors:
