@@ -7,10 +7,10 @@ one twice as fine as the other, shall agree within 5 % of the largest slope: of 
 solid 20 mm wide with structured and with unstructured meshes.  They are meshed as `size_mm` says, and refined around
 the gauge by ``mesh.gauge_refinement``.
 
-Without refinement a cell at the gauge is as large as its distance from the edge of the contact: that is most of the
-difference.  The rest is contact: its edge, and that of the stick zone, lie between two points.  It counts in the wide
-finger, whose strain moves with mu by a tenth of what it does in the section, since the effects of normal and tangential
-tractions nearly cancel.
+Without refinement a cell at the gauge, and an edge of the contact face above it, is as long as the distance of the
+gauge from the edge of the contact: that is most of the difference.  The rest is contact far from the gauge: its edge,
+and that of the stick zone, lie between two points.  It counts in the wide finger, whose strain moves with mu by a tenth
+of what it does in the section, since the effects of normal and tangential tractions nearly cancel.
 """
 
 from __future__ import annotations

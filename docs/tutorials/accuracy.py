@@ -78,8 +78,8 @@ for size, (force, bar, dofs, seconds) in found.items():
 
 # %% [markdown]
 # The true error is the difference from a mesh with edges of 0.1 mm. Error bars are estimates from the solution
-# itself; they are about twice the true error in the median of many cases, and hold in nine of ten ([Accuracy and
-# cost](../accuracy.md)).
+# itself; they are at most 2.5 times the true error in the median of many cases, and hold in nine of ten ([Accuracy
+# and cost](../accuracy.md)).
 
 # %%
 unknowns = [found[size][2] for size in sizes]

@@ -33,7 +33,7 @@ class PointResolution:
     the contact and of their distance along z over the half width.
 
     `along`: the distance of points along x over the half-length of contact.
-    `alone`: contact with friction is no longer than the spacing, so that it tells nothing of the friction.
+    `alone`: contact with friction has a half-length no longer than the spacing, and tells nothing of the friction.
     `least`: by name, lower bounds of the error bars of lengths, areas and friction; see `least_bars`.
     """
 

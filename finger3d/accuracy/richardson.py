@@ -75,7 +75,7 @@ _KINDS = {
 }
 
 ORDERS = {Kind.FRICTION_SUM: 1.5, Kind.STRAIN: 1.5, Kind.DISPLACEMENT: 2.0}
-"""Orders of numbers that depend more on the contact than on the bonded corners; of the others `ORDER`."""
+"""Orders of numbers that depend less on the bonded corners than forces do; of the others `ORDER`."""
 
 _FLOORS = {Kind.DISPLACEMENT: 0.01, Kind.BASE_PRESSURE: 0.03, Kind.WORK: 0.01}
 """What takes the place of `_RESOLUTION_FLOOR` for numbers that depend less on the edge of contact."""

@@ -71,7 +71,8 @@ class MeshOptions:
 
     `layers` is the least number of layers of a swept mesh over half the width; one layer cannot follow the bulge of a
     free end.  `grading` prescribes edge lengths inside the body, as a refinement towards a goal finds them.
-    `gauge_refinement` is the edge length at the contact over that around gauges; at 1 they change no mesh.
+    `gauge_refinement` is the edge length at the contact over that around gauges and on the contact face close to them;
+    at 1 they change no mesh.
     `refined_gauges` names those that it is for; empty: all.
     """
 

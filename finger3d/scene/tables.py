@@ -166,7 +166,8 @@ class MeshTable(TomlTable):
     ----------
     size_mm : edge length at the contact
     base_size_mm : edge length far from it
-    gauge_refinement : edge length at the contact over that around gauges; 1: gauges do not change the mesh
+    gauge_refinement : edge length at the contact over that around gauges and on the contact face close to them; 1:
+        gauges do not change the mesh
     mesher : fTetWild; netgen, the same on every run, for CAD; or structured, for extruded designs
     tolerance : instead of sizes: refine until the estimated error of the goal is below it
     goal : with tolerance: the number that the mesh is refined for, such as gauge_g36; the normal force unless given
