@@ -64,7 +64,7 @@ test-wheel: install-dev
 coverage: install-dev
 	$(PYTEST) -m "not slow and not browser" --cov --cov-report=term:skip-covered
 
-# Takes both cores and some minutes; the table says how busy the machine was.
+# Takes both cores and a quarter of an hour; every row says how busy the machine was.
 bench: install-dev
 	$(BIN)/python -m validation._bench
 

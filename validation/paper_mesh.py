@@ -41,7 +41,7 @@ def linear_mesh(nodes: int) -> Mesh:
     section = designs()["half_cylinder"](radius_mm=5.0, width_mm=1.0).section()
     found = []
     for size in np.linspace(0.3, 2.0, 171):
-        grid = triangulate(section, rows(section, Sizes(size, size, 0.0, 5.0)))
+        grid = triangulate(rows(section, Sizes(size, size, 0.0, 5.0)))
         found.append(unfold(Mesh(grid.points, grid.cells, grid.facets), (0,))[0])
     return min(found, key=lambda mesh: abs(len(mesh.points) - nodes))
 
