@@ -24,7 +24,7 @@ def test_a_length_is_never_better_than_its_ends_are_resolved() -> None:
 
 @pytest.mark.parametrize(("mu", "least"), [(0.25, 0.1), (0.0, 0.0)])
 @pytest.mark.parametrize("size", [3.0, 2.5])
-def test_a_contact_no_longer_than_the_distance_of_its_points_tells_nothing_of_friction(size: float, mu: float, least: float) -> None:
+def test_a_contact_no_longer_than_the_spacing_tells_nothing_of_friction(size: float, mu: float, least: float) -> None:
     # on the plane of symmetry it has none, on the companion either; with friction on, "0 +- 0" would be a lie
     model = replace(half_cylinder(3.0), mesh=MeshOptions(size, 5.0 * size / 3.0, "swept"), legs=(Leg(0.6, steps=10),))
     problem, frames = run(replace(model, friction=Coulomb(mu)))

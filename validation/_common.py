@@ -235,7 +235,11 @@ def convergence(
         axes.loglog(sizes, np.abs(errors), marker + "-", label=label, markersize=4.5)
     last = max(abs(errors[int(np.argmin(sizes))]) for errors in curves.values())
     axes.loglog(
-        sizes, 1.6 * last * (sizes / sizes.min()) ** slope, "k--", linewidth=1.0, label=f"slope {slope:.3g} (theory)"
+        sizes,
+        1.6 * last * (sizes / sizes.min()) ** slope,  # type: ignore[attr-defined]
+        "k--",
+        linewidth=1.0,
+        label=f"slope {slope:.3g} (theory)",
     )
     axes.xaxis.set_major_locator(FixedLocator(list(sizes)))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.3g}"))

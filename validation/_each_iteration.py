@@ -43,7 +43,7 @@ class EachIteration:
         self.read = (place @ self._columns(parts.rows)).tocsr()
         self.locked = np.setdiff1d(np.arange(c * d), parts.active_dofs)
         # any positive weight will do: a column of the finger below each point
-        spring = parts.model.material.E_MPa * parts.surface.area / parts.model.mesh.size_mm
+        spring = parts.model.material.E_MPa * parts.surface.area / parts.model.mesh.size_mm  # type: ignore[attr-defined]
         self.rho = np.repeat(spring[:, None], d, axis=1)
 
     def _columns(self, rows: sp.csr_matrix) -> sp.csr_matrix:

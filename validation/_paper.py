@@ -122,7 +122,7 @@ class Profile:
         along = np.zeros((len(points.points), points.dim))
         along[:, 1:] = frame.state.tangential_displacement
         columns = [np.asarray(table[k])[on] for k in ("x_mm", "area_mm2", "pressure_MPa", "shear_x_MPa")]
-        return cls(*columns, frame.state.status[on], points.to_global(along)[on, 0])
+        return cls(*columns, frame.state.status[on], points.to_global(along)[on, 0])  # type: ignore[call-arg]
 
     @property
     def force(self) -> float:

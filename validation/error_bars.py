@@ -268,7 +268,7 @@ def _hertz(case: Case, exact: dict[str, float]) -> dict[str, float]:
     if not case.name.startswith("Hertz"):
         return {}
     radius = case.model.object.radius_mm  # type: ignore[attr-defined]
-    compliance = (1.0 - case.model.material.nu**2) / case.model.material.E_MPa
+    compliance = (1.0 - case.model.material.nu**2) / case.model.material.E_MPa  # type: ignore[attr-defined]
     force = exact["normal_force_N"] / case.model.design.width_mm
     return {"contact_half_length_mm": math.sqrt(4.0 * force * radius * compliance / math.pi)}
 

@@ -134,7 +134,7 @@ def case(problem: Problem, mu: float, steps: int) -> Iterator[tuple[Any, ...]]:
         last = frames[-1].state.status if frames else np.zeros(1)
         slipping = float((last == SLIP).sum() / max((last != OPEN).sum(), 1))
         yield (
-            problem.dim, model.material.nu, mu, steps, len(problem.points.nodes), name,
+            problem.dim, model.material.nu, mu, steps, len(problem.points.nodes), name,  # type: ignore[attr-defined]
             sum(f.outcome.ok for f in frames), max((f.residual for f in frames), default=np.inf),
             max((v for _, v in here), default=np.inf), float(np.median(counts)), max(counts),
             sum(f.method != "newton" for f in frames), sum(f.method == "cut back" for f in frames), slipping,

@@ -323,7 +323,7 @@ def _table(found: dict[str, list[tuple[int, Model, Found]]]) -> dict[str, list[A
     rows = [
         {
             "mesh": mesh, "scene": number, "domain": model.domain, "finger": model.design.name,
-            "object": type(model.object).__name__.lower(), "nu": model.material.nu, "mu": model.friction.mu,
+            "object": type(model.object).__name__.lower(), "nu": model.material.nu, "mu": model.friction.mu,  # type: ignore[attr-defined]
             "depth_mm": model.largest_depth_mm, "size_mm": model.mesh.size_mm, "settled": f.settled,
             "penetration_over_depth": f.penetration,
             "at_sharp_edge": f.at_sharp_edge if mesh != "coarse" else "",  # coarse edges blur where it is
