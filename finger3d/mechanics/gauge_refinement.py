@@ -64,9 +64,8 @@ def edge_lengths_at_gauges(model: Model, mesh: Mesh, axes: tuple[str, ...] = ())
     """Return the longest edges (n,) mm that the gauges of a model allow at points (n, d), as a function of these."""
     options = model.mesh
     shortest = options.size_mm / options.gauge_refinement
-    zones: list[
-        tuple[cKDTree, float, float]
-    ] = []  # places, the edge length there, and the distance up to which it holds
+    # places, the edge length there, and the distance up to which it holds
+    zones: list[tuple[cKDTree, float, float]] = []
     for gauge in model.gauges:
         if not options.refined_gauges or gauge.name in options.refined_gauges:
             line = cKDTree(_places_along(gauge, shortest, axes, mesh.dim))
