@@ -156,9 +156,10 @@ def chord_iterations(problem: ContactProblem, system: ActiveSetSystem, found: It
         if best.at_roundoff(problem) or (best.status != found.status).any():
             break
         candidate = Iterate.of(problem, chord_step(system, best.force, best.force - best.projected))
-        if not candidate.mismatch <= _CHORD_RATIO * best.mismatch:
+        stalls = not candidate.mismatch <= _CHORD_RATIO * best.mismatch
+        best = min(best, candidate, key=lambda iterate: iterate.mismatch)
+        if stalls:
             break
-        best = candidate
     return min(found, best, key=lambda iterate: iterate.mismatch)
 
 

@@ -34,7 +34,7 @@ _STALLED = 1e-3
 """Relative decrease of the residual required of full steps when an active set comes back."""
 
 _ROUND_OFF = 1e-13
-"""Residual of the projection over the forces that is round-off."""
+"""Residual of the projection that is round-off: over the forces, and as a gap or slip over the length scale."""
 
 _DIVERGED = 1e9
 """Forces over those of the start at which Gauss-Seidel has diverged."""
@@ -84,9 +84,9 @@ class Iterate(NamedTuple):
         return cls(force, displacement, projected, status, augmented, float(np.linalg.norm(force - projected)))
 
     def at_roundoff(self, problem: ContactProblem) -> bool:
-        """Whether the mismatch of the forces, and of the gaps that it stands for, is round-off."""
-        gaps = _CONDITIONS_TOLERANCE * problem.length_scale * float(problem.augmentation.min(initial=np.inf))
-        return self.mismatch <= min(_ROUND_OFF * float(np.linalg.norm(self.force)), gaps)
+        """Whether the mismatch of the forces, and of the gaps and slips that it stands for, is round-off."""
+        lengths_as_forces = problem.length_scale * float(problem.augmentation.min(initial=np.inf))
+        return self.mismatch <= _ROUND_OFF * min(float(np.linalg.norm(self.force)), lengths_as_forces)
 
     def satisfies(self, problem: ContactProblem, status: NDArray[np.int8]) -> bool:
         """Whether the contact conditions hold with this active set."""
