@@ -16,8 +16,6 @@ from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import OPEN, SLIP, STICK
 
 _PIVOT = 1e-11
-LARGEST = 2000
-"""Largest number of rows of the tableau; beyond it halving the increment is cheaper."""
 
 
 def directions(tangents: int, facets: int = 8) -> Float:
@@ -64,12 +62,17 @@ def lemke(matrix: Float, q: Float, limit: int) -> Float | None:
     return None
 
 
-def friction_start(problem: ContactProblem, points: NDArray[np.int64]) -> tuple[NDArray[np.int8], Float] | None:
-    """Return status (c,) and slip directions (c, d - 1) of the polygonal problem over `points`, or None."""
+def friction_start(
+    problem: ContactProblem, points: NDArray[np.int64], largest: int
+) -> tuple[NDArray[np.int8], Float] | None:
+    """Return status (c,) and slip directions (c, d - 1) of the polygonal problem over `points`.
+
+    None if there is no solution, or if the tableau would have more than `largest` rows.
+    """
     c, d = problem.free_motion.shape
     span = directions(d - 1)
     k, p = len(span), len(points)
-    if p == 0 or p * (k + 2) > LARGEST:
+    if p == 0 or p * (k + 2) > largest:
         return None
     dof = (points[:, None] * d + np.arange(d)).ravel()
     stiff = 1.0 / np.diagonal(problem.delassus)[dof].mean()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,8 +23,25 @@ _FRICTION_UPDATES = 50
 _FRICTION_TOLERANCE = 1e-10
 """Change of the friction coefficients, over the largest, at which they have converged; well below `TOLERANCE`."""
 
-_SWEEPS = (20, 50, 100, 200, 400, 800)
-"""Gauss-Seidel sweeps before each of the last Newton attempts."""
+
+class _Limits(NamedTuple):
+    """Limits of the attempts made when Newton's method fails.
+
+    Attributes
+    ----------
+    lemke_rows : int
+        Largest number of rows of the tableau of Lemke's method: 500 take 1 s, 2000 some 40 s.
+    sweeps : tuple of int
+        Gauss-Seidel sweeps before each of the last Newton attempts.
+    """
+
+    lemke_rows: int
+    sweeps: tuple[int, ...]
+
+
+_SMALL_STRAIN = _Limits(2000, (20, 50, 100, 200, 400, 800))
+_FINITE_STRAIN = _Limits(500, (20, 100))
+"""At finite strain another linearisation, or half the increment, is cheaper than a long attempt."""
 
 _FRICTION_CAPS = (np.inf, 1e4, 1e3, 1e2)
 """Bounds of mu tried with Lemke's method: a mu of 1e6 can cost its pivots their digits, and the active set is the same
@@ -76,9 +94,9 @@ def solve_increment(
     with threads_for(free.size):
         problem = ContactProblem.of(previous, free, compliance, law, length_scale, weights, area)
         start = previous.force if guess is None else guess
-        sweeps, total = _SWEEPS if weights is None else _SWEEPS[:1], 0
+        limits, total = _SMALL_STRAIN if weights is None else _FINITE_STRAIN, 0
         for _ in range(_FRICTION_UPDATES + len(free)):
-            method, found, error, spent = _solve_once(problem, start, guess is None, sweeps)
+            method, found, error, spent = _solve_once(problem, start, guess is None, limits)
             total += spent
             if found is None:
                 break
@@ -91,11 +109,11 @@ def solve_increment(
 
 
 def _solve_once(
-    problem: ContactProblem, start: Float, path_turns: bool, sweeps: tuple[int, ...]
+    problem: ContactProblem, start: Float, path_turns: bool, limits: _Limits
 ) -> tuple[str, NewtonResult | None, float, int]:
     """Return method, solution, residual and iterations; None and the least residual if all attempts fail."""
     spent, least = 0, np.inf
-    for method, attempt in _attempts(problem, start, path_turns, sweeps):
+    for method, attempt in _attempts(problem, start, path_turns, limits):
         spent += attempt.iterations
         if not attempt.solved:
             continue
@@ -109,7 +127,7 @@ def _solve_once(
 
 
 def _attempts(
-    problem: ContactProblem, start: Float, path_turns: bool, sweeps: tuple[int, ...]
+    problem: ContactProblem, start: Float, path_turns: bool, limits: _Limits
 ) -> Iterator[tuple[str, NewtonResult]]:
     """Yield attempts from the fastest to the most robust; each is made only if the one before failed.
 
@@ -122,15 +140,15 @@ def _attempts(
         yield "newton", accelerated_newton(problem, start, 30, damped=False)
         yield "damped", newton(problem, start, 60, damped=True)
     yield "ramp", _friction_continuation(problem, start)
-    yield "pivots", _lemke_start(problem, start)
+    yield "pivots", _lemke_start(problem, start, limits.lemke_rows)
     force = start
-    for count in sweeps:
+    for count in limits.sweeps:
         force = block_gauss_seidel(problem, force, count)
         attempt = newton(problem, force, 30, damped=True)
         yield "sweeps", replace(attempt, iterations=attempt.iterations + count)
 
 
-def _lemke_start(problem: ContactProblem, start: Float) -> NewtonResult:
+def _lemke_start(problem: ContactProblem, start: Float, rows: int) -> NewtonResult:
     """Apply Newton's method from the active set of Lemke's method; points that then penetrate join, and it repeats."""
     spent = 0
     for cap in _FRICTION_CAPS:
@@ -139,7 +157,7 @@ def _lemke_start(problem: ContactProblem, start: Float) -> NewtonResult:
         capped = replace(problem, friction=np.minimum(problem.friction, cap))
         candidates = (problem.free_motion[:, 0] < 0.0) | (start[:, 0] > 0.0)
         for _ in range(5):
-            found = friction_start(capped, np.flatnonzero(candidates))
+            found = friction_start(capped, np.flatnonzero(candidates), rows)
             if found is None:
                 break
             status, direction = found
