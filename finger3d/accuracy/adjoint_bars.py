@@ -22,6 +22,7 @@ from finger3d.accuracy.coarse_multipliers import with_coarse_multipliers
 from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.accuracy.richardson import UNRESOLVED_DISSIPATION, Kind, Quantity, largest_readings
 from finger3d.accuracy.weighted_residuals import BodyErrors, body_errors
+from finger3d.contact.acceleration import threads_for
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.history import StepResult, flat_readings, measure
 from finger3d.mechanics.model import Model
@@ -126,6 +127,12 @@ def adjoint_bars(problem: Problem, steps: Sequence[StepResult]) -> AdjointBars:
         If the active set of an increment is singular, so that the contact forces are not unique, or if no press with
         fewer multipliers settles.
     """
+    c, d = problem.delassus.shape[:2]
+    with threads_for(c * d):
+        return _bars(problem, steps)
+
+
+def _bars(problem: Problem, steps: Sequence[StepResult]) -> AdjointBars:
     short, few = _with_few_increments(problem, steps)
     try:
         numbers, body = _numbers(short, few[-1]), body_errors(short, few)
