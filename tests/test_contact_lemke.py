@@ -31,7 +31,9 @@ def test_without_a_solution_there_is_none() -> None:
 @pytest.mark.parametrize("seed", range(12))
 def test_in_two_dimensions_the_active_set_is_that_of_the_solution(seed: int) -> None:
     problem, force = random_problem(2, seed)
-    found = friction_start(problem, np.arange(len(force)), 2000)
+    points = np.arange(len(force))
+    assert friction_start(problem, points, 4 * len(points) - 1) is None
+    found = friction_start(problem, points, 4 * len(points))
     solution = newton(problem, np.zeros_like(force), 60, damped=True)
     assert found is not None
     assert solution.solved
