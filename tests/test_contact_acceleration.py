@@ -179,5 +179,5 @@ def test_points_of_a_nearly_floating_body_stick_to_round_off() -> None:
     assert found.solved
     slip = np.linalg.norm(found.relative_displacement[found.status == STICK, 1:], axis=1)
     assert 0.0 < len(slip)
-    # round-off of a force on the springs is 6e-14; a residual of the projection that is round-off leaves 2e-12
+    # forces at round-off alone would leave slips of 2e-12; their own round-off times this compliance is 6e-14
     assert slip.max() <= 5e-13

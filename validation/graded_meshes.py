@@ -190,7 +190,7 @@ def _draw(figure: Any, found: list[Mesh]) -> None:
                 axes.loglog([m.dofs for m in told], [100.0 * m.told for m in told], marker[0], mfc="none", color=colour,
                             label="its error bar")  # fmt: skip
         axes.set(title=f"{titles[goal]}, {'section' if domain != 'solid' else 'solid 20 mm wide'}")
-        axes.set(xlabel="unknowns", ylabel="true error, %", xlim=(3e2, 6e5))
+        axes.set(xlabel="unknowns", ylabel="error, %", xlim=(3e2, 6e5))
         axes.grid(True, which="major", lw=0.4)
     for axes in (panels[0], panels[-1]):
         axes.legend(fontsize=8)

@@ -37,7 +37,7 @@ from ._paper import columns
 Float = NDArray[np.float64]
 
 SECTION, SWEPT, WILD = "section", "20 mm wide, swept", "20 mm wide, fTetWild"
-EVEN = "20 mm wide, swept, edges twice as long at the base"
+EVEN = "20 mm wide, swept, base edges twice as long"
 CASES: dict[str, tuple[Domain, Literal["swept", "ftetwild"], float]] = {
     SECTION: ("plane-strain", "swept", 4.0),
     SWEPT: ("solid", "swept", 4.0),
@@ -196,7 +196,7 @@ def _draw(figure: Any, found: Curves) -> None:
                 row[1].set_ylabel("d strain / d mu, 1e-3")
                 continue
             kind = "no refinement" if refinement == PLAIN else f"gauge_refinement = {refinement:g}"
-            axes.set_title(f"{case}: {kind}", fontsize=10)
+            axes.set_title(f"{case}: {kind}", fontsize=9)
             axes.grid(alpha=0.3)
             axes.legend(fontsize=8, frameon=False)
     for axes in panels[-1]:
