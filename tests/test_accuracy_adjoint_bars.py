@@ -42,8 +42,17 @@ def test_errors_of_body_and_contact_add_as_squares_and_many_increments_are_not_r
     assert len(found.coarse.surface.nodes) < len(problem.surface.nodes)
     long = replace(problem, model=half_cylinder(0.3, 40))
     short, steps = short_press(long)
-    assert len(steps) == 10
+    assert len(steps) == 5
     assert [leg.depth_mm for leg in short.model.legs] == [leg.depth_mm for leg in long.model.legs]
+
+
+def test_the_first_run_of_automatic_increments_is_not_solved_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem, frames = run(half_cylinder(0.4, 10))
+    _, few = short_press(problem)
+    expected = adjoint_bars(problem, frames).bars
+    monkeypatch.setattr("finger3d.accuracy.adjoint_bars.short_press", None)
+    runs = [(5, tuple(few)), (10, tuple(frames))]
+    assert adjoint_bars(problem, frames, runs).bars == expected
 
 
 def test_without_a_press_of_fewer_multipliers_a_companion_mesh_tells_the_bars(monkeypatch: pytest.MonkeyPatch) -> None:

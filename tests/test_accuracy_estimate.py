@@ -133,7 +133,7 @@ def test_an_estimate_that_fails_spoils_nothing_and_says_why(
 ) -> None:
     reason = "neither mesh can be made"
 
-    def none(problem: Problem, steps: object) -> Problem:
+    def none(problem: Problem, steps: object, runs: object) -> Problem:
         raise Finger3dError(reason)
 
     monkeypatch.setattr("finger3d.accuracy.estimate.adjoint_bars", none)

@@ -33,7 +33,7 @@ def test_automatic_increments_end_within_their_estimate() -> None:
     assert estimate.met
     assert max(estimate.normal_force, estimate.friction_sum, estimate.gauges) <= 0.01
     assert estimate.dissipation <= 0.05
-    assert [count for count, _ in estimate.levels] == [5 * 2**k for k in range(len(estimate.levels))]
+    assert [count for count, _ in estimate.runs] == [5 * 2**k for k in range(len(estimate.runs))]
     fine = list(march(replace(problem, model=replace(problem.model, legs=(Leg(10.0, steps=4 * len(frames)),)))))
     a, b = measure(problem.points, frames[-1]), measure(problem.points, fine[-1])
     assert a["normal_force_N"] == pytest.approx(b["normal_force_N"], rel=0.01)
@@ -109,7 +109,7 @@ def test_a_run_in_few_increments_that_fails_does_not_fail_the_press(monkeypatch:
     frames, estimate = march_automatic(problem)
     assert frames[-1].outcome.ok
     assert estimate is not None
-    assert estimate.levels[0][0] == 10
+    assert estimate.runs[0][0] == 10
 
 
 def test_the_remaining_error_is_exact_at_the_first_order_and_keeps_the_largest() -> None:

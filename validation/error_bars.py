@@ -293,7 +293,7 @@ def _by_steps(name: str, model: Model, counts: tuple[int, ...], true_count: int)
     free = replace(problem, model=replace(model, legs=tuple(replace(leg, steps="auto") for leg in model.legs)))
     frames, chosen = march_automatic(free)
     if chosen:
-        told = {count: press_numbers(problem, last[-1]) for count, last in chosen.levels[-4:]}
+        told = {count: press_numbers(problem, last[-1]) for count, last in chosen.runs[-4:]}
         kind = "automatic, met" if chosen.met else "automatic, not met"
         runs.append((kind, press_numbers(problem, frames[-1]), errors_from_counts(told, chosen.steps)))
         exact["floor"] = chosen.dissipation_floor_mJ

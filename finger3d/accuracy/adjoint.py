@@ -26,11 +26,12 @@ import scipy.sparse as sp
 from scipy.linalg import lu_factor, lu_solve
 
 from finger3d._types import Float
+from finger3d.contact.acceleration import assemble_in_place
 from finger3d.contact.conditions import ContactProblem, augmentation_parameters
 from finger3d.contact.friction import OPEN, SLIP
 from finger3d.contact.newton import ActiveSet
 from finger3d.mechanics.history import StepResult
-from finger3d.mechanics.linear_contact import LinearState, transported
+from finger3d.mechanics.linear_contact import LinearBody, LinearState, transported
 from finger3d.mechanics.problem import Problem
 from finger3d.objects import vertical_frame
 
@@ -77,19 +78,27 @@ class LinearisedIncrement:
     def of(cls, problem: Problem, before: LinearState, after: LinearState) -> LinearisedIncrement:
         """Linearise the increment between two states."""
         c, d = after.force.shape
-        delassus = problem.delassus.reshape(c * d, c * d)
-        turn = _block_diagonal(_bases(after) @ vertical_frame(d).T)
-        rho = augmentation_parameters(delassus, d)
+        rotations = _bases(after) @ vertical_frame(d).T
+        turn = _block_diagonal(rotations)
+        rho = augmentation_parameters(problem.delassus.reshape(c * d, c * d), d)
         slip = after.tangential_displacement - transported(before, _bases(after)).tangential_displacement
         normal, friction = after.force[:, 0], np.linalg.norm(after.force[:, 1:], axis=1)
         slips = after.status == SLIP
         mu = np.divide(friction, normal, out=np.zeros(c), where=slips & (normal > 0.0))
         moved = np.concatenate([after.gap[:, None], slip], axis=1)
-        local = ContactProblem(moved, delassus, mu, rho, 1.0)
-        active = ActiveSet.of(local, after.status, after.force - rho * np.where(slips[:, None], moved, 0.0))
-        forces, weights = turn.T @ active.force_matrix(), active.weight_matrix(rho) @ turn
-        matrix = active.with_turning(np.asarray(weights @ (delassus @ forces)))
-        return cls(forces, weights, lu_factor(matrix) if len(matrix) else (matrix, matrix), turn)
+        augmented = after.force - rho * np.where(slips[:, None], moved, 0.0)
+        if (rotations == np.eye(d)).all():
+            points, delassus = np.arange(c), problem.delassus
+        else:
+            points = np.flatnonzero(after.status != OPEN)
+            delassus = LinearBody(problem.delassus, np.zeros((c, d))).turned(rotations[points], points)
+        k = len(points)
+        local = ContactProblem(moved[points], delassus.reshape(k * d, k * d), mu[points], rho[points], 1.0)
+        active = ActiveSet.of(local, after.status[points], augmented[points])
+        matrix = cast("Float", assemble_in_place(local, active, np.float64))
+        factor = lu_factor(matrix, overwrite_a=True, check_finite=False) if len(matrix) else (matrix, matrix)
+        turned = turn[(points[:, None] * d + np.arange(d)).ravel()]
+        return cls(turned.T @ active.force_matrix(), active.weight_matrix(rho[points]) @ turned, factor, turn)
 
     def adjoint(self, gradient: Float) -> Float:
         """Return z (c d, g), D^T A^-T P^T times gradients (c d, g)."""

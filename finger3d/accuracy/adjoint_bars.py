@@ -28,6 +28,7 @@ from finger3d.mechanics.history import StepResult, flat_readings, measure
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
+from finger3d.mechanics.step_halving import Run
 
 
 @dataclass(frozen=True)
@@ -51,9 +52,9 @@ class _Shares:
 _SHARES = {
     # on coarse meshes recovery underestimates the error at bonded corners, by a factor of 2 to 4
     Kind.NORMAL_FORCE: _Shares(body=(2.0, 1.5), points=0.07, power=2),
-    Kind.FRICTION_SUM: _Shares(change=1.5, points=0.1),
+    Kind.FRICTION_SUM: _Shares(change=1.75, points=0.1),
     Kind.WORK: _Shares(change=2.0, body=(1.5, 1.5), points=0.03, power=2),
-    Kind.DISSIPATION: _Shares(change=2.75, points=0.05),
+    Kind.DISSIPATION: _Shares(change=3.0, points=0.05),
     Kind.STRAIN: _Shares(change=2.0, body=(1.5, 1.5)),
     Kind.DISPLACEMENT: _Shares(change=2.0, points=0.003),
     # recovery is poor where a taxel ends, and at the corners of the base
@@ -65,7 +66,7 @@ _SHARES = {
 _BASE_SHARE = 0.035
 """Relative error of the pressure on a taxel of a solid over the edge length of the base divided by its shorter side."""
 
-_MOST_INCREMENTS = 10
+_MOST_INCREMENTS = 5
 """Increments of a leg that the errors of mesh and contact are estimated with: they hardly depend on their number."""
 
 
@@ -113,13 +114,14 @@ def applies(model: Model) -> bool:
     return plain and as_given
 
 
-def adjoint_bars(problem: Problem, steps: Sequence[StepResult]) -> AdjointBars:
+def adjoint_bars(problem: Problem, steps: Sequence[StepResult], runs: Sequence[Run] = ()) -> AdjointBars:
     """Estimate the discretisation errors of the last increment.
 
     Parameters
     ----------
     problem : one whose model `applies`
     steps : all increments, converged
+    runs : with other numbers of increments in every leg, the fewest first
 
     Raises
     ------
@@ -129,11 +131,11 @@ def adjoint_bars(problem: Problem, steps: Sequence[StepResult]) -> AdjointBars:
     """
     c, d = problem.delassus.shape[:2]
     with threads_for(c * d):
-        return _bars(problem, steps)
+        return _bars(problem, steps, runs)
 
 
-def _bars(problem: Problem, steps: Sequence[StepResult]) -> AdjointBars:
-    short, few = _with_few_increments(problem, steps)
+def _bars(problem: Problem, steps: Sequence[StepResult], runs: Sequence[Run]) -> AdjointBars:
+    short, few = _with_few_increments(problem, steps, runs)
     try:
         numbers, body = _numbers(short, few[-1]), body_errors(short, few)
     except np.linalg.LinAlgError as error:
@@ -183,18 +185,27 @@ def _unresolved_by_base(problem: Problem) -> list[tuple[str, float]]:
 
 def short_press(problem: Problem) -> tuple[Problem, list[StepResult]]:
     """Return the press with no more than `_MOST_INCREMENTS` increments in a leg, and its steps."""
-    legs = tuple(
-        replace(leg, steps=min(leg.steps, _MOST_INCREMENTS) if isinstance(leg.steps, int) else _MOST_INCREMENTS)
-        for leg in problem.model.legs
-    )
-    short = replace(problem, model=replace(problem.model, legs=legs))
+    short = _with_at_most(problem, _MOST_INCREMENTS)
     return short, list(march(short))
 
 
-def _with_few_increments(problem: Problem, steps: Sequence[StepResult]) -> tuple[Problem, Sequence[StepResult]]:
-    """Return the press with few increments; it is solved again only where it had more."""
+def _with_at_most(problem: Problem, count: int) -> Problem:
+    """Return the press with no more than so many increments in a leg."""
+    legs = tuple(
+        replace(leg, steps=min(leg.steps, count) if isinstance(leg.steps, int) else count) for leg in problem.model.legs
+    )
+    return replace(problem, model=replace(problem.model, legs=legs))
+
+
+def _with_few_increments(
+    problem: Problem, steps: Sequence[StepResult], runs: Sequence[Run]
+) -> tuple[Problem, Sequence[StepResult]]:
+    """Return the press with few increments, from the first of the runs; it is solved again only where it had more."""
     if all(isinstance(leg.steps, int) and leg.steps <= _MOST_INCREMENTS for leg in problem.model.legs):
         return problem, steps
+    if runs:
+        count, results = runs[0]
+        return _with_at_most(problem, count), results
     short, found = short_press(problem)
     return (short, found) if found[-1].outcome.ok else (problem, steps)
 

@@ -32,6 +32,7 @@ from finger3d.mechanics.path import AUTO_START
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.step_halving import (
     COUNT_RATIOS,
+    Run,
     choose_counts,
     condensation_s,
     contact_s,
@@ -118,7 +119,7 @@ def estimate(
     frames: Sequence[StepResult],
     say: Say = lambda text: None,
     numbers: Measure = main_numbers,
-    levels: Sequence[tuple[int, StepResult]] = (),
+    runs: Sequence[Run] = (),
 ) -> ErrorEstimate:
     """Estimate the errors of the last increment from the mesh and from other counts of increments.
 
@@ -127,7 +128,7 @@ def estimate(
     problem, frames : the press as it was solved, all increments converged
     say : called with a line before a long stage
     numbers : the numbers of an increment by name, names as in `finger3d.accuracy.richardson.Quantity.of`
-    levels : number of increments and last increment of every run that chose automatic increments
+    runs : runs that chose automatic increments
 
     Returns
     -------
@@ -136,7 +137,7 @@ def estimate(
     """
     start = time.perf_counter()
     try:
-        found = _estimated(problem, frames, say, numbers, levels)
+        found = _estimated(problem, frames, say, numbers, runs)
     except (Finger3dError, RuntimeError, ValueError, np.linalg.LinAlgError, MemoryError) as error:
         found = ErrorEstimate(method=f"no estimate: {error}")
     return replace(found, seconds=time.perf_counter() - start)
@@ -147,17 +148,17 @@ def _estimated(
     frames: Sequence[StepResult],
     say: Say,
     numbers: Measure,
-    levels: Sequence[tuple[int, StepResult]],
+    runs: Sequence[Run],
 ) -> ErrorEstimate:
     if not frames or not frames[-1].outcome.ok:
         raise Finger3dError("the last step did not converge")
-    automatic = len(levels) > 1 and all(leg.steps == "auto" for leg in problem.model.legs)
+    automatic = len(runs) > 1 and all(leg.steps == "auto" for leg in problem.model.legs)
     # from here on, automatic increments are numbers
     own = replace(problem, model=replace(problem.model, legs=with_increments_of(problem.model.legs, len(frames))))
-    found, beside, where = discretisation(own, frames, say, numbers)
+    found, beside, where = discretisation(own, frames, say, numbers, runs if automatic else ())
     if automatic:
-        used = levels[-4:]
-        steps = errors_from_counts({count: numbers(own, frame) for count, frame in used}, used[-1][0])
+        used = runs[-4:]
+        steps = errors_from_counts({count: numbers(own, run[-1]) for count, run in used}, used[-1][0])
         by = ", ".join(str(count) for count, _ in used)
     else:
         on_own_mesh, way = choose_counts(_marching_cost(own), _marching_cost(beside), _budget(own))
@@ -171,7 +172,11 @@ def _estimated(
 
 
 def discretisation(
-    own: Problem, frames: Sequence[StepResult], say: Say = lambda text: None, numbers: Measure = main_numbers
+    own: Problem,
+    frames: Sequence[StepResult],
+    say: Say = lambda text: None,
+    numbers: Measure = main_numbers,
+    runs: Sequence[Run] = (),
 ) -> tuple[ErrorEstimate, Problem, str]:
     """Estimate the discretisation errors of the last increment.
 
@@ -181,7 +186,7 @@ def discretisation(
     beside : a press that costs less than this one
     where : what that press differs in, in words
     """
-    bars = _own_bars(own, frames) if numbers in (main_numbers, press_numbers) else None
+    bars = _own_bars(own, frames, runs) if numbers in (main_numbers, press_numbers) else None
     if bars is not None:
         named = {name: bars.bars[name] for name in numbers(own, frames[-1])}
         method = "mesh: dual-weighted residuals, and every second multiplier"
@@ -203,10 +208,10 @@ def discretisation(
     return found, beside, f"on the {kind} mesh"
 
 
-def _own_bars(own: Problem, frames: Sequence[StepResult]) -> AdjointBars | None:
+def _own_bars(own: Problem, frames: Sequence[StepResult], runs: Sequence[Run]) -> AdjointBars | None:
     """Return the error bars from the condensed body itself; None where a companion mesh must tell them."""
     try:
-        return adjoint_bars(own, frames) if applies(own.model) else None
+        return adjoint_bars(own, frames, runs) if applies(own.model) else None
     except NoAdjointBarsError:
         return None
 

@@ -233,9 +233,8 @@ def _estimate_errors(record: PressRecord, report: Progress) -> None:
     from finger3d.accuracy.estimate import estimate, press_numbers
 
     report.stage("estimating the error")
-    runs = record.step_estimate.levels if record.step_estimate else ()
-    levels = [(count, ends[-1]) for count, ends in runs]
-    record.error_estimate = estimate(record.problem, record.steps, report.say, press_numbers, levels)
+    runs = record.step_estimate.runs if record.step_estimate else ()
+    record.error_estimate = estimate(record.problem, record.steps, report.say, press_numbers, runs)
 
 
 def _estimate_changes(record: PressRecord, report: Progress) -> None:

@@ -30,7 +30,7 @@ of fewer samples overestimated the error of the force up to six times."""
 _SINGULAR = 1e-8
 """Least eigenvalue of the normal equations of a patch, over the largest, that is not round-off."""
 
-_CELLS_AT_ONCE = 512
+_CELLS_AT_ONCE, _PATCHES_AT_ONCE = 512, 256
 
 
 @dataclass(frozen=True)
@@ -55,39 +55,45 @@ class PatchRecovery:
     @classmethod
     def of(cls, mesh: Mesh) -> PatchRecovery:
         """Return the polynomial fits of a mesh."""
-        d, count = mesh.dim, len(mesh.cells)
-        bary, _ = quadrature(d, 2)
-        samples = len(bary)
+        bary, _ = quadrature(mesh.dim, 2)
+        samples, coefficients = len(bary), _basis(np.zeros((1, mesh.dim))).shape[1]
         vertices, corner = mesh.part_corners
         centre, v = mesh.points[vertices], len(vertices)
-        patches = _patches(corner, v, math.ceil(_SAMPLES_PER_COEFFICIENT * _basis(np.zeros((1, d))).shape[1] / samples))
-        of, cell = np.repeat(np.arange(v), np.diff(patches.indptr)), patches.indices
+        patches = _patches(corner, v, math.ceil(_SAMPLES_PER_COEFFICIENT * coefficients / samples))
         places = mesh.element.shape(bary) @ mesh.points[mesh.cells]
-        relative = places[cell] - centre[of][:, None]
-        scale = np.zeros(v)
-        np.maximum.at(scale, of, np.abs(relative).max(axis=(1, 2)))
-        basis = _basis(relative / scale[of][:, None, None])
-        normal = np.zeros((v, basis.shape[2], basis.shape[2]))
-        np.add.at(normal, of, np.einsum("pqi,pqj->pij", basis, basis))
-        inverse = np.linalg.pinv(normal, rcond=_SINGULAR, hermitian=True)
-        weights = np.einsum("pij,pqj->ipq", inverse[of], basis)
-        columns = (cell[:, None] * samples + np.arange(samples)).ravel()
-        shape = (v, count * samples)
-        fits = tuple(sp.csr_matrix((w.ravel(), columns, patches.indptr * samples), shape=shape) for w in weights)
+        scale, weights = np.empty(v), np.empty((coefficients, patches.nnz, samples))
+        for start in range(0, v, _PATCHES_AT_ONCE):
+            some = slice(start, min(start + _PATCHES_AT_ONCE, v))
+            first = patches.indptr[start : some.stop + 1]
+            entries, begins = slice(first[0], first[-1]), first[:-1] - first[0]
+            of = np.repeat(np.arange(len(begins)), np.diff(first))
+            relative = places[patches.indices[entries]] - centre[some][of][:, None]
+            scale[some] = np.maximum.reduceat(np.abs(relative).max(axis=(1, 2)), begins)
+            basis = _basis(relative / scale[some][of][:, None, None])
+            normal = np.add.reduceat(np.swapaxes(basis, 1, 2) @ basis, begins)
+            inverse = np.linalg.pinv(normal, rcond=_SINGULAR, hermitian=True)
+            weights[:, entries] = np.moveaxis(basis @ inverse[of], 2, 0)
+        # of the type of the patches' indices, so that all fits share them
+        columns = (patches.indices[:, None] * samples + np.arange(samples, dtype=patches.indices.dtype)).ravel()
+        rows, shape = patches.indptr * samples, (v, len(mesh.cells) * samples)
+        fits = tuple(sp.csr_matrix((w.ravel(), columns, rows), shape=shape) for w in weights)
         return cls(mesh, corner, centre, scale, fits)
 
     def polynomials(self, samples: Float) -> Float:
         """Return the coefficients (v, n, k) of the polynomials fitted to samples (e q, k)."""
-        return np.stack([fit @ samples for fit in self.fits], axis=1)
+        out = np.empty((len(self.centre), len(self.fits), samples.shape[1]))
+        for i, fit in enumerate(self.fits):
+            out[:, i] = fit @ samples
+        return out
 
     def evaluated(self, polynomials: Float, cells: Int, bary: Float) -> Float:
         """Return the recovered values (e', q, k) at barycentric points (q, d + 1) of cells (e',)."""
         places = self.mesh.element.shape(bary) @ self.mesh.points[self.mesh.cells[cells]]
-        total: Float = np.zeros(1)
-        for vertex, weight in zip(self.corner[cells].T, bary.T, strict=True):
-            relative = (places - self.centre[vertex][:, None]) / self.scale[vertex][:, None, None]
-            total = total + (weight[:, None] * _basis(relative)) @ polynomials[vertex]
-        return total
+        vertex = self.corner[cells]
+        centre, scale = self.centre[vertex][:, None], self.scale[vertex][:, None, :, None]
+        design = bary[:, :, None] * _basis((places[:, :, None] - centre) / scale)
+        e, q, _, n = design.shape
+        return np.asarray(design.reshape(e, q, -1) @ polynomials[vertex].reshape(e, -1, polynomials.shape[-1]))
 
 
 @dataclass(frozen=True)
@@ -112,36 +118,34 @@ class RecoveredErrors:
         In the displacement form this is the integral of ``sigma(e_a) : eps(e_b)``.  The mixed form has
         ``sigma(e_a) = C : eps(e_a) + p(e_a) I``, and ``p(e_b) (p_a / lam - div u_a)`` beside it.
         """
-        found = [np.swapaxes(a, 1, 2) @ b for a, b in self._factors(first, second)]
-        return np.concatenate(found)
+        return np.concatenate([self._products(cells, first, second) for cells in self._portions])
 
-    def _factors(self, first: slice, second: slice) -> Iterator[tuple[Float, Float]]:
-        """Yield arrays (e', n, a) and (e', n, b) of some cells; the products are sums over n."""
-        mesh, d, elastic = self.recovery.mesh, self.recovery.mesh.dim, self.elastic
+    def _products(self, cells: Int, first: slice, second: slice) -> Float:
+        """Return the energy products (e', a, b) in cells (e',)."""
+        d, elastic = self.recovery.mesh.dim, self.elastic
         bary, weights = quadrature(d, 5)
         pairs = _components(d)
         double = np.array([1.0 if i == j else 2.0 for i, j in pairs])
         diagonal = [k for k, (i, j) in enumerate(pairs) if i == j]
-        for start in range(0, len(mesh.cells), _CELLS_AT_ONCE):
-            cells = np.arange(start, min(start + _CELLS_AT_ONCE, len(mesh.cells)))
-            strain, determinant = self._strain(cells, bary)
-            recovered = self.recovery.evaluated(self._polynomials, cells, bary)
-            recovered = recovered.reshape(*recovered.shape[:2], -1, strain.shape[-1])
-            error = recovered[:, :, : len(pairs)] - strain
-            left, right = error[..., first], error[..., second]
-            law = elastic.of_cells(cells)
-            stress = _components_of(law.stress(_tensors(left, d)), left.shape)
-            one, two = [stress * double[:, None]], [right]
-            if elastic.mixed:
-                pressure = self._pressure(cells, bary)[:, :, None]
-                off = recovered[:, :, -1:] - pressure
-                residual = pressure[..., first] / np.reshape(law.pressure_modulus, (-1, 1, 1, 1))
-                residual = residual - strain[:, :, diagonal, first].sum(axis=2, keepdims=True)
-                one += [off[..., first], residual]
-                two += [right[:, :, diagonal].sum(axis=2, keepdims=True), off[..., second]]
-            volume = (determinant * weights * self.thickness)[:, :, None, None]
-            a, b = np.concatenate(one, axis=2) * volume, np.concatenate(two, axis=2)
-            yield a.reshape(len(cells), -1, a.shape[-1]), b.reshape(len(cells), -1, b.shape[-1])
+        strain, determinant = self._strain(cells, bary)
+        recovered = self.recovery.evaluated(self._polynomials, cells, bary)
+        recovered = recovered.reshape(*recovered.shape[:2], -1, strain.shape[-1])
+        error = recovered[:, :, : len(pairs)] - strain
+        left, right = error[..., first], error[..., second]
+        law = elastic.of_cells(cells)
+        stress = _components_of(law.stress(_tensors(left, d)), left.shape)
+        one, two = [stress * double[:, None]], [right]
+        if elastic.mixed:
+            pressure = self._pressure(cells, bary)[:, :, None]
+            off = recovered[:, :, -1:] - pressure
+            residual = pressure[..., first] / np.reshape(law.pressure_modulus, (-1, 1, 1, 1))
+            residual = residual - strain[:, :, diagonal, first].sum(axis=2, keepdims=True)
+            one += [off[..., first], residual]
+            two += [right[:, :, diagonal].sum(axis=2, keepdims=True), off[..., second]]
+        volume = (determinant * weights * self.thickness)[:, :, None, None]
+        a, b = np.concatenate(one, axis=2) * volume, np.concatenate(two, axis=2)
+        a, b = (x.reshape(len(cells), -1, x.shape[-1]) for x in (a, b))
+        return np.asarray(np.swapaxes(a, 1, 2) @ b)
 
     def strain_along(self, field: Float, direction: Float, cells: Int, bary: Float) -> Float:
         """Return the error (e', q) of the normal strain along a direction (d,) of the sum of the fields times (f,)."""
@@ -154,18 +158,23 @@ class RecoveredErrors:
     @cached_property
     def _polynomials(self) -> Float:
         """Coefficients (v, n, k f): of the components of strain, then of the pressure of the mixed form."""
-        bary, _ = quadrature(self.recovery.mesh.dim, 2)
-        samples = [self._sampled(slice(s, s + _CELLS_AT_ONCE), bary) for s in self._starts]
-        values = np.concatenate(samples)
-        return self.recovery.polynomials(values.reshape(values.shape[0] * values.shape[1], -1))
+        mesh = self.recovery.mesh
+        bary, _ = quadrature(mesh.dim, 2)
+        components = len(_components(mesh.dim)) + self.elastic.mixed
+        samples = np.empty((len(mesh.cells), len(bary), components * self.unknowns.shape[1]))
+        for cells in self._portions:
+            samples[cells] = self._sampled(cells, bary).reshape(len(cells), *samples.shape[1:])
+        return self.recovery.polynomials(samples.reshape(-1, samples.shape[2]))
 
     @property
-    def _starts(self) -> range:
-        return range(0, len(self.recovery.mesh.cells), _CELLS_AT_ONCE)
+    def _portions(self) -> Iterator[Int]:
+        """Numbers (e',) of cells whose fields fit into the cache."""
+        count = len(self.recovery.mesh.cells)
+        for start in range(0, count, _CELLS_AT_ONCE):
+            yield np.arange(start, min(start + _CELLS_AT_ONCE, count))
 
-    def _sampled(self, part: slice, bary: Float) -> Float:
+    def _sampled(self, cells: Int, bary: Float) -> Float:
         """Return strain and pressure (e', q, k, f) at barycentric points of some cells."""
-        cells = np.arange(len(self.recovery.mesh.cells))[part]
         strain, _ = self._strain(cells, bary)
         if not self.elastic.mixed:
             return strain

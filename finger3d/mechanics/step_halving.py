@@ -16,6 +16,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from threading import Event
+from typing import TypeAlias
 
 from finger3d.contact.rules import STEP_DEPENDENT_RULES
 from finger3d.errors import Finger3dError
@@ -28,6 +29,9 @@ from finger3d.mechanics.solve import march
 
 Measurement = Callable[[Problem, StepResult], dict[str, float]]
 """Quantities by name, measured at the end of a press."""
+
+Run: TypeAlias = tuple[int, tuple[StepResult, ...]]
+"""Number of increments in an automatic leg, and the results of all increments."""
 
 TOLERANCE = 0.01
 """Relative error allowed in normal force, friction sum and strain; a strain's is relative to the largest strain."""
@@ -64,7 +68,7 @@ class StepEstimate:
     dissipation_floor_mJ : `FLOOR` times the largest external work
     dissipation_resolved : False if the dissipation at the end is below the floor, so that its own error is not limited
     met : whether every error is below its tolerance; that of the dissipation counts only above the floor
-    levels : of every run, the number of increments in a leg and the results at the ends of the legs
+    runs : in the order of their numbers of increments
     """
 
     steps: int
@@ -77,11 +81,11 @@ class StepEstimate:
     met: bool
     tolerance: float = TOLERANCE
     dissipation_tolerance: float = DISSIPATION_TOLERANCE
-    levels: tuple[tuple[int, tuple[StepResult, ...]], ...] = field(default=(), repr=False, compare=False)
+    runs: tuple[Run, ...] = field(default=(), repr=False, compare=False)
 
     def as_dict(self) -> dict[str, float | bool]:
         """The estimate as an entry of summary.json."""
-        return {key: value for key, value in asdict(replace(self, levels=())).items() if key != "levels"}
+        return {key: value for key, value in asdict(replace(self, runs=())).items() if key != "runs"}
 
     @property
     def warning(self) -> str:
@@ -153,25 +157,25 @@ def refine(
     """
     workspace = workspace or problem.model.formulation.workspace()
     steps, last = limits(problem.model, problem.body.stiffness.upper.shape[0], len(problem.surface.nodes))
-    levels: list[tuple[int, tuple[StepResult, ...]]] = []
+    runs: list[Run] = []
     failed: tuple[StepResult, ...] = ()
     while steps <= last:
         trial = with_steps(problem, steps)
         results = tuple(march(trial, workspace=workspace, cancel=cancel))
         if not results[-1].outcome.ok:
-            if levels:
+            if runs:
                 return
             if failed:
                 break
             failed = results
         else:
-            levels.append((steps, _leg_ends(trial, results)))
-            estimate = _estimate(problem, levels) if len(levels) > 1 else None
+            runs.append((steps, results))
+            estimate = _estimate(problem, runs) if len(runs) > 1 else None
             yield results, estimate
             if estimate and estimate.met:
                 return
         steps *= 2
-    if not levels:
+    if not runs:
         yield failed, None
 
 
@@ -223,13 +227,15 @@ def _leg_ends(problem: Problem, results: tuple[StepResult, ...]) -> tuple[StepRe
     return tuple(results[count - 1] for count in counts)
 
 
-def _estimate(problem: Problem, levels: Sequence[tuple[int, tuple[StepResult, ...]]]) -> StepEstimate:
-    used = levels[-(_PAIRS[problem.dim] + 1) :]
+def _estimate(problem: Problem, runs: Sequence[Run]) -> StepEstimate:
+    used = runs[-(_PAIRS[problem.dim] + 1) :]
     counts = [count for count, _ in used]
-    runs = [[_quantities(problem, end) for end in ends] for _, ends in used]
-    finest = runs[-1]
+    ends = [
+        [_quantities(problem, end) for end in _leg_ends(with_steps(problem, count), results)] for count, results in used
+    ]
+    finest = ends[-1]
     errors = [
-        {name: increment_error(counts, [run[leg][name] for run in runs], counts[-1]) for name in quantities}
+        {name: increment_error(counts, [run[leg][name] for run in ends], counts[-1]) for name in quantities}
         for leg, quantities in enumerate(finest)
     ]
     strains = [name for name in finest[0] if name.startswith("gauge_") and not math.isnan(finest[-1][name])]
@@ -252,10 +258,10 @@ def _estimate(problem: Problem, levels: Sequence[tuple[int, tuple[StepResult, ..
         dissipation=dissipation_error,
         dissipation_floor_mJ=floor,
         dissipation_resolved=sum(dissipation[-1]) > floor or not any(dissipation[-1]),
-        met=len(levels) >= _LEAST_RUNS[problem.dim]
+        met=len(runs) >= _LEAST_RUNS[problem.dim]
         and max(normal_force, friction_sum, gauges) <= TOLERANCE
         and dissipation_error <= DISSIPATION_TOLERANCE,
-        levels=tuple(levels),
+        runs=tuple(runs),
     )
 
 

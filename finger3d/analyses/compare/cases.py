@@ -16,7 +16,7 @@ from finger3d.mechanics.build import build
 from finger3d.mechanics.history import ContactPoints, StepResult, contact_table, flat_readings, measure
 from finger3d.mechanics.model import Domain, Model
 from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.step_halving import march_automatic
+from finger3d.mechanics.step_halving import Run, march_automatic
 from finger3d.objects import PlacedObject
 from finger3d.results.comparison import Case
 
@@ -56,9 +56,9 @@ def widened(model: Model, width_mm: float) -> Model:
 def press_with_errors(name: str, model: Model) -> Case:
     """Press the model and estimate its errors; see `finger3d.accuracy.estimate.estimate`."""
     start = time.perf_counter()
-    problem, frames, levels, case = _pressed(name, model)
+    problem, frames, runs, case = _pressed(name, model)
     if case.ok:
-        found = estimate(problem, frames, numbers=lambda p, f: quantities(p.points, f), levels=levels)
+        found = estimate(problem, frames, numbers=lambda p, f: quantities(p.points, f), runs=runs)
         case = replace(
             case, errors=found.totals(), companion=found.companion_numbers, ratio=found.ratio, method=found.method
         )
@@ -70,18 +70,18 @@ def press_without_errors(name: str, model: Model) -> Case:
     return _pressed(name, model)[-1]
 
 
-def _pressed(name: str, model: Model) -> tuple[Problem, tuple[StepResult, ...], list[tuple[int, StepResult]], Case]:
+def _pressed(name: str, model: Model) -> tuple[Problem, tuple[StepResult, ...], tuple[Run, ...], Case]:
     start = time.perf_counter()
     # The whole contact face is a candidate, because the extent of contact differs from model to model.
     problem = build(model, margin=math.inf)
     frames, increments = march_automatic(problem)
-    levels = [(count, ends[-1]) for count, ends in increments.levels] if increments else []
+    runs = increments.runs if increments else ()
     frame = frames[-1]
     mesher = "swept" if problem.dim == 2 else model.mesh.mesher
     case = Case(name, model.design.width_mm, model.mesh.size_mm, mesher, frame.outcome)
     if frame.outcome.ok:
         case = replace(case, numbers=quantities(problem.points, frame), lines=lines_along_x(problem.points, frame))
-    return problem, frames, levels, replace(case, seconds=time.perf_counter() - start)
+    return problem, frames, runs, replace(case, seconds=time.perf_counter() - start)
 
 
 def quantities(points: ContactPoints, frame: StepResult) -> dict[str, float]:
