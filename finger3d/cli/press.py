@@ -25,7 +25,7 @@ def press(
     set_: Set = None,
     figures: Annotated[bool, Parameter(negative="--no-figures", help="Draw the pictures.")] = True,
     error: Annotated[
-        bool, Parameter(negative="--no-error", help="Estimate errors from a solution on another mesh.")
+        bool, Parameter(negative="--no-error", help="Estimate the errors due to the mesh and the increments.")
     ] = True,
     json_: Json = False,
 ) -> None:

@@ -44,7 +44,7 @@ class Silicone:
 
     Attributes
     ----------
-    name, maker : as on the tin
+    name, maker : as on the data sheet
     scale, shore : Shore hardness
     modulus_100_psi : engineering stress at 100 % strain, of the manufacturer
     tangent_tension_MPa : slope of a measured tensile curve between strains 0.068 and 0.205, strain by the crosshead
