@@ -122,3 +122,19 @@ def test_the_reference_is_the_codes_own(root: Path) -> None:
     inside = re.search(r"<!-- from finger3d.scene.reference[^\n]*-->\n(.*?)<!-- end -->", text, flags=re.DOTALL)
     assert inside is not None
     assert inside[1] == reference()
+
+
+@pytest.mark.slow
+def test_the_readings_of_two_gauges_in_the_readme_give_the_mu_it_states(
+    root: Path, folder: Path, capsys: pytest.CaptureFixture
+) -> None:
+    assert main(["new", "scene.toml"]) == 0
+    joint = [c for c in commands(root) if "--gauges 2" in c or "--gauge g1,g2" in c or "--strain g1" in c]
+    assert len(joint) == 3
+    for command in joint:
+        assert main(shlex.split(command)[1:]) == 0
+    found = re.search(r"mu = ([\d.]+) \+- ([\d.]+)", capsys.readouterr().out.splitlines()[-1])
+    assert found
+    # the README states two figures of the strains, and the standard deviation 0.016
+    assert float(found[1]) == pytest.approx(0.4, abs=0.005)
+    assert float(found[2]) == pytest.approx(0.016, abs=0.002)
