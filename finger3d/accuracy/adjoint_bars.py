@@ -52,9 +52,9 @@ class _Shares:
 _SHARES = {
     # on coarse meshes recovery underestimates the error at bonded corners, by a factor of 2 to 4
     Kind.NORMAL_FORCE: _Shares(body=(2.0, 1.5), points=0.07, power=2),
-    Kind.FRICTION_SUM: _Shares(change=1.75, points=0.1),
+    Kind.FRICTION_SUM: _Shares(change=1.5, points=0.1),
     Kind.WORK: _Shares(change=2.0, body=(1.5, 1.5), points=0.03, power=2),
-    Kind.DISSIPATION: _Shares(change=3.0, points=0.05),
+    Kind.DISSIPATION: _Shares(change=2.75, points=0.05),
     Kind.STRAIN: _Shares(change=2.0, body=(1.5, 1.5)),
     Kind.DISPLACEMENT: _Shares(change=2.0, points=0.003),
     # recovery is poor where a taxel ends, and at the corners of the base
@@ -66,7 +66,7 @@ _SHARES = {
 _BASE_SHARE = 0.035
 """Relative error of the pressure on a taxel of a solid over the edge length of the base divided by its shorter side."""
 
-_MOST_INCREMENTS = 5
+_MOST_INCREMENTS = 10
 """Increments of a leg that the errors of mesh and contact are estimated with: they hardly depend on their number."""
 
 
@@ -200,11 +200,12 @@ def _with_at_most(problem: Problem, count: int) -> Problem:
 def _with_few_increments(
     problem: Problem, steps: Sequence[StepResult], runs: Sequence[Run]
 ) -> tuple[Problem, Sequence[StepResult]]:
-    """Return the press with few increments, from the first of the runs; it is solved again only where it had more."""
+    """Return the press with few increments; it is solved again only if neither it nor a run had few."""
     if all(isinstance(leg.steps, int) and leg.steps <= _MOST_INCREMENTS for leg in problem.model.legs):
         return problem, steps
-    if runs:
-        count, results = runs[0]
+    few = [(count, results) for count, results in runs if count <= _MOST_INCREMENTS]
+    if few:
+        count, results = few[-1]
         return _with_at_most(problem, count), results
     short, found = short_press(problem)
     return (short, found) if found[-1].outcome.ok else (problem, steps)
