@@ -1,8 +1,8 @@
 """Frictional contact of an elastic, finger-shaped tactile sensor in 3D.
 
 The commands that compute are functions, too: `press`, `compare`, `calibrate`, `estimate`, `identify`, `sweep`,
-`optimise`, `place_gauges` (``optimise --gauges``), `export`, `plan` and `validate`. Names are loaded when they are first
-used, so that ``import finger3d`` is quick.
+`optimise`, `place_gauges` (``optimise --gauges``), `export`, `plan` and `validate`. Names are loaded when they are
+first used, so that ``import finger3d`` is quick.
 
 >>> import finger3d
 >>> result = finger3d.press("scene.toml")
