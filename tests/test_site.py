@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
@@ -15,7 +16,8 @@ from urllib.parse import unquote, urlsplit
 import pytest
 
 import finger3d
-from tests.scenes import SECTION
+from finger3d.cli import main
+from tests.scenes import HALF_CYLINDER, SECTION
 
 TUTORIALS = ("section", "objects", "friction", "mold", "accuracy")
 
@@ -36,6 +38,41 @@ def test_the_page_of_outputs_names_every_number_column_and_field(root: Path, tmp
     assert rows(page, "fields.vtu") == {*result.to_pyvista().array_names, "part"}
     files = {path.name for path in (tmp_path / "out").iterdir() if not path.name.startswith(".")}
     assert files <= rows(page.replace("# Outputs of a press", "## Outputs of a press"), "Outputs of a press")
+
+
+def columns_of(path: Path) -> set[str]:
+    return set(path.read_text(encoding="utf-8").splitlines()[0].split(","))
+
+
+def test_the_page_of_the_other_commands_names_what_they_write(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    page = (root / "docs" / "reference" / "analyses.md").read_text(encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    marker = '[[marker]]\nname = "m"\nx_mm = 1.0\ny_mm = 4.0\n'
+    Path("scene.toml").write_text(HALF_CYLINDER + marker, encoding="utf-8")
+    for command in (
+        "calibrate scene.toml --gauge g --map --out one",
+        "calibrate scene.toml --gauge g,m.x --out two",
+        "sweep scene.toml --vary friction.mu=0.1,0.2 --out sweep",
+        "press scene.toml --out press --no-figures",
+    ):
+        assert main(command.split()) == 0
+    capsys.readouterr()
+    assert main(["estimate", "one/calibration.json", "--strain", "0.01", "--json"]) == 0
+    one = json.loads(capsys.readouterr().out)
+    assert main(["estimate", "two/calibration.json", "--strain", "g=0.01", "--strain", "m.x=0.01", "--json"]) == 0
+    two = json.loads(capsys.readouterr().out)
+    assert rows(page, "finger3d estimate --json") == {*one, *two}
+    found = {re.sub(r"mu_sd_\w+", "mu_sd_TOLERANCE", name) for name in columns_of(Path("one/calibration.csv"))}
+    assert found == rows(page, "calibration.csv of one gauge")
+    found = {re.sub(r"\bm\.x|(?<![^_])g(?![^_])", "NAME", name) for name in columns_of(Path("two/calibration.csv"))}
+    assert {name.replace("m.x", "NAME") for name in found} == rows(page, "calibration.csv of several readings")
+    assert all(f"`{name}`" in page for name in columns_of(Path("one/map.csv")))
+    of_a_step = columns_of(Path("press/history.csv"))
+    assert columns_of(Path("sweep/results.csv")) - of_a_step == rows(page, "finger3d sweep") - of_a_step - {"KEY"} | {
+        "friction.mu"
+    }
 
 
 def test_the_python_page_has_every_public_name(root: Path) -> None:
