@@ -40,6 +40,13 @@ def test_the_page_of_outputs_names_every_number_column_and_field(root: Path, tmp
     assert files <= rows(page.replace("# Outputs of a press", "## Outputs of a press"), "Outputs of a press")
 
 
+def test_no_line_of_a_page_starts_with_a_per_cent_sign(root: Path) -> None:
+    # MyST drops such a line as a comment
+    for page in [root / "README.md", root / "CONTRIBUTING.md", *(root / "docs").rglob("*.md")]:
+        lines = page.read_text(encoding="utf-8").splitlines()
+        assert not [line for line in lines if line.lstrip().startswith("%")], page
+
+
 def columns_of(path: Path) -> set[str]:
     return set(path.read_text(encoding="utf-8").splitlines()[0].split(","))
 
