@@ -59,7 +59,7 @@ class SweepResult:
     failed: int
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """Return the columns as pandas has them, a row a point."""
+        """Return the columns as a pandas DataFrame, one row for each point."""
         require("to_dataframe()", "pandas")
         import pandas
 
@@ -87,7 +87,7 @@ def sweep(
     overrides : other keys to set, such as ``"mesh.size_mm=1.0"``
     scheduler : address of a Dask scheduler; None: processes on this machine
     workers : number of these processes; None: one for each core
-    report : told about every point
+    report : receives the progress at every point
 
     Raises
     ------
@@ -132,7 +132,7 @@ def optimise(
     method : "differential-evolution", "dual-annealing" or "nelder-mead"
     seed : of the random numbers
     overrides : other keys to set, such as ``"mesh.size_mm=1.0"``
-    report : told about every design
+    report : receives the progress at every design
 
     Returns
     -------
@@ -170,7 +170,7 @@ def place_gauges(
     overrides: Sequence[str] = (),
     report: Progress | None = None,
 ) -> GaugePlaces:
-    """Find the places and directions of gauges that together tell mu best, as ``finger3d optimise --gauges``.
+    """Find the places and directions of gauges that together determine mu best, as ``finger3d optimise --gauges``.
 
     Parameters
     ----------
@@ -216,12 +216,12 @@ def identify(
     free : key -> lower and upper bound, for instance ``{"material.E_MPa": (0.05, 5.0)}``
     out : folder for identify.json, identify.csv, identified.toml, identify.png and report.html
     overrides : other keys to set, such as ``"mesh.size_mm=1.0"``
-    report : told about every iteration
+    report : receives the progress at every iteration
 
     Returns
     -------
     Identification
-        With the values, their standard deviations and correlation, and what the data cannot tell.
+        With the values, their standard deviations and correlation, and notes on values that the data do not determine.
     """
     from finger3d.analyses.free_keys import FreeKey
     from finger3d.analyses.identify.run import identify as run

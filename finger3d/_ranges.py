@@ -31,7 +31,7 @@ class Radians:
 
 Zero = Annotated[float, Ge(0), Le(0)]
 Modulus = Annotated[float, Ge(1e-9), Le(1e9)]  # MPa
-Shore = Annotated[float, Ge(5), Le(90)]  # durometer reading; those nearer to the ends of a scale say little
+Shore = Annotated[float, Ge(5), Le(90)]  # durometer reading; unreliable nearer to the ends of a scale
 Poisson = Annotated[float, Ge(0), Le(0.5)]
 Friction = Annotated[float, Ge(0), Le(1e6)]
 Force = Annotated[float, Ge(1e-12), Le(1e12)]  # N

@@ -87,7 +87,7 @@ class Outcome(Enum):
 
     @property
     def is_cycle(self) -> bool:
-        """Whether the paper's rule ended without a solution; the march goes on to show what became of it."""
+        """Whether the paper's rule ended without a solution; later increments are solved nevertheless."""
         return self in (Outcome.CYCLED, Outcome.WRONG_WAY)
 
     def __str__(self) -> str:

@@ -65,14 +65,14 @@ _RESULTS = {
     "sweep": "sweep.json",
     "optimise": "search.json",
 }
-"""By command, the file that tells its results."""
+"""Command -> file whose presence in a folder shows its results."""
 
 
 @contextmanager
 def claimed(folder: str | Path, command: str = "") -> Iterator[Path]:
-    """Make a folder and keep every other finger3d from writing there while the block runs.
+    """Create a folder, and lock it against other runs of finger3d during the block.
 
-    A folder that this made, and into which nothing was written, is removed.
+    A folder created here is removed if nothing was written into it.
 
     Parameters
     ----------

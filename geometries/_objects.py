@@ -19,13 +19,13 @@ def spun(profile: Float, count: int) -> tuple[Float, NDArray[np.int64]]:
 
 
 def extruded(outline: Float, thickness: float) -> tuple[Float, NDArray[np.int64]]:
-    """Points and outward triangles of a prism along z over an outline (n, 2) that the origin sees whole."""
+    """Points and outward triangles of a prism along z over an outline (n, 2) that is star-shaped about the origin."""
     rings = [np.hstack([outline, np.full((len(outline), 1), z)]) for z in (-0.5 * thickness, 0.5 * thickness)]
     return _sewn(np.array(rings), -0.5 * thickness, 0.5 * thickness)
 
 
 def _sewn(rings: Float, low: float, high: float) -> tuple[Float, NDArray[np.int64]]:
-    """Rings (k, n, 3), counter-clockwise about z and rising, sewn together and closed by fans from the axis."""
+    """Triangulate between rings (k, n, 3), counterclockwise about z and ascending, closed by fans from the axis."""
     k, n, _ = rings.shape
     here = np.arange(n)
     after = (here + 1) % n

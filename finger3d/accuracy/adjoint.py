@@ -1,7 +1,7 @@
-"""Adjoint of the increments of a press: how its numbers change with the Delassus operator.
+"""Adjoint of the increments of a press: sensitivity of its numbers to the Delassus operator.
 
-In increment k the active set holds linear equations for the contact forces r_k, which are linear functions P_k x_k of
-its unknowns (`finger3d.contact.newton.ActiveSet`)::
+In increment k the contact forces r_k are linear functions P_k x_k of the unknowns of the active set, and satisfy its
+linear equations (`finger3d.contact.newton.ActiveSet`)::
 
     D_k (W r_k - S_k W r_{k-1} + q_k) + E_k x_k = 0
 
@@ -12,7 +12,7 @@ last increment, are ::
     A_k^T y_k = P_k^T (g_k + W v_k + W S_{k+1} z_{k+1}),   z_k = D_k^T y_k,   A_k = D_k W P_k + E_k
 
 and a change of the Delassus operator changes the number by ``sum_k l_k . dW r_k`` with the adjoint loads
-``l_k = v_k - z_k + S_{k+1} z_{k+1}``.  Active sets and the normals of the object are held.
+``l_k = v_k - z_k + S_{k+1} z_{k+1}``.  Active sets and the normals of the object are held fixed.
 """
 
 from __future__ import annotations
@@ -181,14 +181,14 @@ def _reading_columns(problem: Problem) -> list[str]:
 
 
 def _states(problem: Problem, steps: Sequence[StepResult]) -> list[LinearState]:
-    """Return the states of the meshed part, that at first touch before the others."""
+    """Return the states of the meshed part: at first touch, then after every step."""
     states = [problem.model.formulation.start(problem), *(step.meshed_state for step in steps)]
     assert all(isinstance(state, LinearState) for state in states)
     return cast("list[LinearState]", states)
 
 
 def _bases(state: LinearState) -> Float:
-    """Return the directions (c, d, d) of the points, which a linear state always knows."""
+    """Return the local bases (c, d, d) of the points; a linear state always has them."""
     assert state.bases is not None
     return state.bases
 
@@ -207,7 +207,7 @@ def _at_end(zero: Float, gradient: Float) -> Float:
 
 
 def _work(problem: Problem, states: Sequence[LinearState], count: Float, zero: Float) -> Goal:
-    """Return the external work: the energy stored, and what friction takes in all increments."""
+    """Return the external work: the stored energy plus the frictional dissipation of all increments."""
     c, d = states[-1].force.shape
     by_force, by_displacement = zero.copy(), zero.copy()
     for k, (before, after) in enumerate(zip(states, states[1:], strict=False)):

@@ -33,7 +33,7 @@ from finger3d.mechanics.step_halving import Run
 
 @dataclass(frozen=True)
 class _Shares:
-    """How the errors of one kind of number follow from what was computed.
+    """Calibrated factors of the error estimates of one kind of number.
 
     Attributes
     ----------
@@ -61,13 +61,13 @@ _SHARES = {
     Kind.BASE_PRESSURE: _Shares(change=2.0, body=(1.5, 1.5), points=0.01),
     Kind.OTHER_READING: _Shares(change=2.0, body=(1.5, 1.5), points=0.01),
 }
-"""Found in the sections of validation/error_bars.py; the force changes too little with the multipliers to tell."""
+"""Calibrated on the sections of validation/error_bars.py; the normal force hardly changes with the multipliers."""
 
 _BASE_SHARE = 0.035
 """Relative error of the pressure on a taxel of a solid over the edge length of the base divided by its shorter side."""
 
 _MOST_INCREMENTS = 10
-"""Increments of a leg that the errors of mesh and contact are estimated with: they hardly depend on their number."""
+"""Largest number of increments in a leg for the errors of mesh and contact, which hardly depend on this number."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ class AdjointBars:
 
 
 class NoAdjointBarsError(Finger3dError):
-    """The error bars do not follow from the condensed body; a companion mesh must tell them."""
+    """The condensed body gives no error bars; a companion mesh is needed."""
 
 
 def applies(model: Model) -> bool:
@@ -127,7 +127,7 @@ def adjoint_bars(problem: Problem, steps: Sequence[StepResult], runs: Sequence[R
     ------
     NoAdjointBarsError
         If the active set of an increment is singular, so that the contact forces are not unique, or if no press with
-        fewer multipliers settles.
+        fewer multipliers converges.
     """
     c, d = problem.delassus.shape[:2]
     with threads_for(c * d):
@@ -155,7 +155,7 @@ def _bars(problem: Problem, steps: Sequence[StepResult], runs: Sequence[Run]) ->
     for name, value in numbers.items():
         kind = Quantity.of(name).kind
         shares = _SHARES[kind]
-        # along the width no contact ends, so that the normal force does not depend on the points there
+        # contact does not end within the width, so that the normal force does not depend on the spacing along z
         spacing = resolution.along if kind in (Kind.NORMAL_FORCE, Kind.WORK) else resolution.share
         scale = scales.get(kind, abs(value))
         if resolution.alone and kind is Kind.FRICTION_SUM:
@@ -200,7 +200,7 @@ def _with_at_most(problem: Problem, count: int) -> Problem:
 def _with_few_increments(
     problem: Problem, steps: Sequence[StepResult], runs: Sequence[Run]
 ) -> tuple[Problem, Sequence[StepResult]]:
-    """Return the press with few increments; it is solved again only if neither it nor a run had few."""
+    """Return the press with few increments, and its steps; solve it only if no known run has few enough."""
     if all(isinstance(leg.steps, int) and leg.steps <= _MOST_INCREMENTS for leg in problem.model.legs):
         return problem, steps
     few = [(count, results) for count, results in runs if count <= _MOST_INCREMENTS]

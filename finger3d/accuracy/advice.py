@@ -1,4 +1,4 @@
-"""Advice: effects and increments that a press has left out although they matter, each with what it would change."""
+"""Advice: neglected effects, and more increments, that would change the results of a press significantly."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ LEAST_STRAIN = 0.05
 _LARGE_STRAIN = 0.1
 """Principal strain from which large deformation is advised without an estimate."""
 
-_QUANTILE = 0.99  # the clamped corners are singular, their strain says nothing
+_QUANTILE = 0.99  # leaves out the clamped corners, where the strain is singular
 
 _MOST_GAUGES = 3
 """Gauges that a line of advice names, those that change most."""

@@ -1,4 +1,4 @@
-"""Estimated changes of the numbers of a press, each with its own error: what a better model or more increments do."""
+"""Estimated changes of the numbers of a press by a better model or more increments, each with its own error."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _LEAST_CHANGE = 0.01
 """Significant change of a force, relative to it, and of a strain, relative to the largest of all gauges."""
 
 _SHARE, _SECONDS = 0.3, 1.0
-"""Largest cost of an estimate, over the cost of the press and in seconds; the larger counts, both are modelled."""
+"""Largest modelled cost of an estimate, relative to that of the press and in seconds; the larger limit applies."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class ChangeEstimate:
 
 
 def attempted(estimate: Callable[[], ChangeEstimate]) -> ChangeEstimate:
-    """Return an estimate with its time, or one without changes that tells why none can be made."""
+    """Return an estimate with its time, or one without changes that states why none can be made."""
     start = time.perf_counter()
     try:
         found = estimate()
@@ -125,7 +125,7 @@ def judged(values: Mapping[str, float], changes: Mapping[str, float], errors: Ma
 
 
 def check_kind(model: Model) -> None:
-    """Raise for a kind of press that the estimates were not compared with the truth of.
+    """Raise an error for a kind of press on which the estimates have not been validated.
 
     Raises
     ------

@@ -65,7 +65,7 @@ class _LinearisedContact(SmallStrain):
 
 
 def with_coarse_multipliers(problem: Problem, steps: Sequence[StepResult]) -> Iterator[Problem]:
-    """Yield the press with every second multiplier, and with the others; first points of rows are kept in both.
+    """Yield the press with every second multiplier, for two choices of the points; both keep the corners of faces.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ _GRADED_FACTOR = 3.0
 fine along the whole of x and z."""
 
 _LEAST_UNSTRUCTURED_UNKNOWNS = 15_000
-"""Unknowns below which an unstructured mesh is not coarsened: pytetwild resolves a curved body with little fewer."""
+"""Unknowns below which an unstructured mesh is not coarsened: pytetwild needs nearly as many for any curved body."""
 
 _FINITE_STRAIN_FACTOR = 2.5
 """Edge length of the companion of a section at finite strain, where every increment factorises the tangent: at `FACTOR`

@@ -20,10 +20,10 @@ from finger3d.meshing.given import GivenMesh
 from finger3d.meshing.limits import check_memory, rows_gb
 
 _BASE_MB = 170.0
-_TETWILD_MB = 500.0  # while it meshes, however little
+_TETWILD_MB = 500.0  # while meshing, even for a small mesh
 _IMPORT_S = 0.4
 _FIGURES_S = {2: 1.0, 3: 4.5}
-_GAUGE_S, _GAUGE_CELL_S = 3e-3, 7e-7  # a gauge, and for every cell that is searched for it
+_GAUGE_S, _GAUGE_CELL_S = 3e-3, 7e-7  # for each gauge, and for each cell searched for it
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Error estimate of a press: the discretisation error, and that of the increments from other counts.
+"""Error estimate of a press: the discretisation error, and the error due to the size of the increments.
 
 In small strain under a rigid object the discretisation error follows from the condensed body itself
 (`finger3d.accuracy.adjoint_bars`).  At large deformation, with viscosity, inclusions or an elastic object, and under a
@@ -209,7 +209,7 @@ def discretisation(
 
 
 def _own_bars(own: Problem, frames: Sequence[StepResult], runs: Sequence[Run]) -> AdjointBars | None:
-    """Return the error bars from the condensed body itself; None where a companion mesh must tell them."""
+    """Return the error bars from the condensed body itself; None where a companion mesh is needed."""
     try:
         return adjoint_bars(own, frames, runs) if applies(own.model) else None
     except NoAdjointBarsError:

@@ -34,8 +34,8 @@ _BODY_SHARE = 0.85
 """Error of the body over the whole error that is allowed; errors add as squares, which leaves half for the contact."""
 
 _LOCAL_SHARE = 0.6
-"""Error that the cells around a gauge may leave, and that the others may, over the error of its strain that is allowed;
-errors add as squares."""
+"""Allowed error of the cells around a gauge, and likewise of all others, over the allowed error of its strain; errors
+add as squares."""
 
 _LOCAL_ORDER = 2.0
 """Order of the strain in the cells around a gauge, away from its singularities."""
@@ -54,7 +54,7 @@ _FEWEST_POINTS = 8
 
 
 def graded_sizes(problem: Problem, bars: AdjointBars, goal: str, allowed: float) -> MeshOptions:
-    """Return the mesh that is expected to leave an error in a number.
+    """Return the options of a mesh that is expected to give a number with an allowed error.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def _largest(problem: Problem) -> float:
 
 
 def cell_growth(problem: Problem, options: MeshOptions) -> float:
-    """Return the number of cells that options with a grading ask for, over that of the mesh it was made from."""
+    """Return the estimated number of cells of a graded mesh, over that of the present mesh."""
     assert options.grading is not None
     places, model = _centroids(problem), replace(problem.model, mesh=options)
     wanted = options.grading.at(places, RATE)
@@ -141,17 +141,17 @@ def _centroids(problem: Problem) -> Float:
 
 
 def _edge_lengths(mesh: Mesh) -> Float:
-    """Return the edge lengths (e,) mm that cells of the volumes of a mesh's cells have."""
+    """Return the edge lengths (e,) mm of a mesh's cells, from their volumes."""
     return np.asarray((_CELLS_PER_CUBE[mesh.dim] * signed_volumes(mesh)) ** (1.0 / mesh.dim))
 
 
 def _contact_factor(bars: AdjointBars, goal: str, allowed: float, contact: float) -> float:
-    """Return the change of the edge length at the contact that leaves an allowed error of the contact."""
+    """Return the factor of the edge length at the contact for an allowed error of the contact."""
     return _factor(allowed, contact, bars.contact_order(goal))
 
 
 def _factor(allowed: float, error: float, order: float) -> float:
-    """Return the change of an edge length, within its bounds, that leaves an allowed error of a given order."""
+    """Return the factor of an edge length, within its bounds, for an allowed error of a given order."""
     return float(np.clip((allowed / error) ** (1.0 / order), *_FACTORS)) if error > 0.0 else _FACTORS[1]
 
 

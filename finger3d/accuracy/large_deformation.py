@@ -70,7 +70,7 @@ def _estimated(problem: Problem, last: StepResult, increments: int) -> ChangeEst
 def _affordable_factor(problem: Problem, increments: int) -> float:
     """Return the edge lengths of the coarse mesh over those of the press.
 
-    What is modelled is the press at large deformation on this mesh, which takes half of the estimate or more.
+    The modelled cost is that of the press at large deformation on this mesh, at least half of the estimate.
     """
     budget = budget_s(problem, increments)
     for factor in _FACTORS:

@@ -5,9 +5,9 @@ extrapolation determines its error::
 
     d = 2 x(8 N) - x(4 N) - x(N),    error of d = max(1.5 |x(8 N) - x(4 N)|, 0.15 |d|)
 
-The error bar of the increments is no such estimate: it is the largest of several rates, and too large by more than a
-factor of 1.5 in most sections.  Counts and factors were chosen on the 60 sections of ``validation/_drawn.py`` with the
-seed 2026; ``validation/advice_against_truth.py`` compares d with the truth in other scenes.
+The error bar of the increments cannot serve as d: it is the largest of several estimates, and in most sections too
+large by more than a factor of 1.5.  Counts and factors were chosen on the 60 sections of ``validation/_drawn.py`` with
+the seed 2026; ``validation/advice_against_truth.py`` compares d with the truth in other scenes.
 """
 
 from __future__ import annotations

@@ -20,21 +20,24 @@ of contact: 11, 5.3, 1.6 and 0.4 % were found at 5, 3.3, 2 and 1 mm on Fig. 9 (b
 
 _IN_SECTIONS = 0.25
 """Friction in a section has a relative error of about this times h/a, h the spacing of points, a the half-length of
-contact, even where its companion agrees by chance: in plane stress 93 % of validation/error_bars.py then lie within two
-bars, and 89 % with 0.1."""
+contact, even where its companion agrees by chance: in plane stress 93 % of the cases of validation/error_bars.py then
+lie within twice the bar, and 89 % with a factor of 0.1."""
 
 _AREA_SHARE = 0.375
-"""Error of an area over that of the points along its border: twice of it holds in 98 % of validation/error_bars.py."""
+"""Error of an area over that of the points along its border; twice it suffices in 98 % of validation/error_bars.py."""
 
 
 @dataclass(frozen=True)
 class PointResolution:
-    """Resolution of the contact points: their distance (mm) along x, and the larger of that over the half-length of
-    the contact and of their distance along z over the half width.
+    """Resolution of the contact zone by its points.
 
-    `along`: the distance of points along x over the half-length of contact.
-    `alone`: contact with friction has a half-length no longer than the spacing, and tells nothing of the friction.
-    `least`: by name, lower bounds of the error bars of lengths, areas and friction; see `least_bars`.
+    Attributes
+    ----------
+    spacing_mm : spacing of the points along x
+    share : the larger of `along` and of the spacing along z over the half width
+    alone : whether contact with friction is no longer than two spacings, so that friction is not resolved
+    least : by name, lower bounds of the error bars of lengths, areas and friction; see `least_bars`
+    along : spacing of the points along x over the half-length of contact
     """
 
     spacing_mm: float

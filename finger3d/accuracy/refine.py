@@ -3,7 +3,7 @@
 In small strain the mesh is graded towards the goal by the shares of the cells in its error
 (`finger3d.accuracy.graded`).  Where the error is estimated from a companion mesh, two lengths are free, that of the
 contact and that of the body far from it (the corners of the base).  A second coarse run, coarse at the contact only,
-tells which of them the error comes from.
+separates their contributions to the error.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ GOAL = "normal_force_N"
 _MIN_SHARE = 0.3  # of the difference to the companion: an edge length that causes less is kept
 _FACTOR_RANGE = (0.4, 0.85)  # a round changes an edge length at least and at most by these factors
 _SAFETY = 0.9  # of the tolerance, so that the last round does not just miss it
-_PRESS_TO_ROUND = 1.3  # a press takes so many times its last round, whose contact it marches again and draws
+_PRESS_TO_ROUND = 1.3  # time of a press over that of its last round: contact is solved again and drawn
 _EXPONENT = {2: 1.2, 3: 1.6}  # seconds grow with this power of the unknowns (measured from 161 000 to 523 000 in 3D)
 
 
@@ -71,7 +71,7 @@ class Refinement:
     Attributes
     ----------
     mesh : edge lengths of the best round
-    problem : condensed on them, if that was the last round; memory is not kept for others
+    problem : condensed on that mesh, if it is that of the last round; the others are not kept in memory
     stopped : why it ended: the tolerance is met, or the time, the memory, the rounds are used up
     """
 
@@ -219,7 +219,7 @@ def _run_round(model: Model, tolerance: float, goal: str) -> tuple[Problem, Roun
 
 
 def _round(mesh: MeshOptions, dofs: int, error: float, goal: str, seconds: float) -> Round:
-    """Return what is told of a round on a mesh."""
+    """Return the record of a round on a mesh."""
     return Round(mesh.size_mm, mesh.base_size_mm, dofs, error, goal, seconds, mesh.gauge_refinement)
 
 

@@ -31,7 +31,7 @@ UNRESOLVED_DISSIPATION = 2e-4
 
 
 class Kind(Enum):
-    """Kind of a number, which determines the bounds of its error from below."""
+    """Kind of a number, which determines the lower bound of its error."""
 
     NORMAL_FORCE = auto()
     FRICTION_SUM = auto()
@@ -78,7 +78,7 @@ ORDERS = {Kind.FRICTION_SUM: 1.5, Kind.STRAIN: 1.5, Kind.DISPLACEMENT: 2.0}
 """Orders of numbers that depend less on the bonded corners than forces do; of the others `ORDER`."""
 
 _FLOORS = {Kind.DISPLACEMENT: 0.01, Kind.BASE_PRESSURE: 0.03, Kind.WORK: 0.01}
-"""What takes the place of `_RESOLUTION_FLOOR` for numbers that depend less on the edge of contact."""
+"""Values in place of `_RESOLUTION_FLOOR` for numbers that depend less on the edge of contact."""
 
 _READINGS = {
     "gauge": Kind.STRAIN,
@@ -112,7 +112,7 @@ def largest_readings(numbers: Mapping[str, float]) -> dict[Kind, float]:
 
 
 def gain(ratio: float, order: float = ORDER) -> float:
-    """Return the change of a number to the companion over its error; `ratio` of edge lengths, companion over mesh."""
+    """Return the difference to the companion over the error, for a `ratio` of edge lengths, companion over mesh."""
     return abs(math.pow(ratio, order) - 1.0)
 
 
@@ -141,7 +141,7 @@ def mesh_error(
     for name, value in numbers.items():
         kind, change, bound = Quantity.of(name).kind, abs(value - companion[name]), own.least.get(name, 0.0)
         if kind.is_length or kind is Kind.AREA:
-            # what the companion's points leave open is no change
+            # a difference below the resolution of the companion's points does not count
             change = max(0.0, change - other.least.get(name, 0.0))
         else:
             scale = readings.get(kind, abs(value))

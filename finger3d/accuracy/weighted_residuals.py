@@ -29,7 +29,7 @@ from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.readings import Taxel
 
 _COMPRESSION = 0.05
-"""Singular values of loads, over the largest, that are left out: errors are wanted to some per cent."""
+"""Singular values of loads, over the largest, below which they are neglected: a few per cent of accuracy suffice."""
 
 _PLACES = 5
 """Places along a gauge at which the error of the strain is taken."""

@@ -57,14 +57,14 @@ class FreeKey:
 
 
 def check_distinct(keys: Sequence[str]) -> None:
-    """Raise an error for a key that is free twice."""
+    """Raise an error if a key is given twice."""
     twice = next((k for i, k in enumerate(keys) if k in keys[:i]), None)
     if twice is not None:
         raise Finger3dError(f"--free {twice}: given twice")
 
 
 def scene_with(given: TreeView, keys: Sequence[str], values: Sequence[float] | Float, path: Path | None) -> Scene:
-    """Return the scene with values of keys, which are named in the message if one cannot be."""
+    """Return the scene with new values of keys; the message about an invalid value names the option --free."""
     changes = [f"{key}={float(value)!r}" for key, value in zip(keys, values, strict=True)]
     changed = tree.override(dict(given), changes, "--free")
     return parse(changed, path=path, set_keys=dict.fromkeys(keys, "--free"))

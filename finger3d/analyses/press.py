@@ -206,7 +206,7 @@ def _remark(problem: Problem, step: StepResult) -> str:
 
 
 def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fields | None:
-    """Recover and write the fields after the last converged increment, and judge from them; None without increments."""
+    """Recover and write the fields after the last converged increment, None without one; add warnings and advice."""
     from finger3d.accuracy.advice import largest_principal_strain
     from finger3d.mechanics import resolution
     from finger3d.mechanics.cavity import cavity_warnings
@@ -238,7 +238,7 @@ def _estimate_errors(record: PressRecord, report: Progress) -> None:
 
 
 def _estimate_changes(record: PressRecord, report: Progress) -> None:
-    """Estimate what large deformation and more increments would change where they may matter, and advise of it."""
+    """Estimate the effects of large deformation and of more increments where they may matter; add advice on them."""
     from finger3d.accuracy.advice import LEAST_STRAIN
     from finger3d.accuracy.changes import changing_numbers
     from finger3d.accuracy.large_deformation import large_deformation
@@ -258,7 +258,7 @@ def _estimate_changes(record: PressRecord, report: Progress) -> None:
 
 
 def _advise(record: PressRecord) -> None:
-    """Enter the lines of advice that follow from what is known so far."""
+    """Set the lines of advice that follow from the results so far."""
     from finger3d.accuracy.advice import advise
     from finger3d.mechanics.coverage import penetration_advice
 

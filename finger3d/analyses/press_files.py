@@ -121,7 +121,7 @@ class ResultWriter:
         return content
 
     def error_shares(self, record: PressRecord) -> None:
-        """Write error_shares.vtu, the shares of the cells of the meshed part in the error of each number, if known."""
+        """Write error_shares.vtu, the share of each cell of the meshed part in the error of each number, if known."""
         estimate = record.error_estimate
         if estimate and estimate.body:
             mesh = record.problem.mesh
@@ -129,7 +129,7 @@ class ResultWriter:
             write_vtu(self.folder / "error_shares.vtu", mesh, at_rest, dict(estimate.body.shares))
 
     def fields(self, record: PressRecord, fields: Fields) -> None:
-        """Write fields.vtu, the fields after the last converged increment, and steps.npz, displacements of them all."""
+        """Write fields.vtu, fields after the last converged increment, and steps.npz, states of chosen increments."""
         good = record.converged_steps
         mesh, step = fields.mesh, good[-1]
         surface = _on_surface(mesh, record.problem.points, step)

@@ -33,7 +33,7 @@ from finger3d.objects import OBJECTS, MeshObject, RigidObject, vertical_frame
 FORMAT, VERSION = "finger3d condensed body", 5
 _SHAPES: dict[str, type[RigidObject]] = {r.__name__: r for r in OBJECTS.values()} | {"MeshObject": MeshObject}
 _OF_MESH = ("size_mm", "base_size_mm", "mesher", "layers", "gauge_refinement")
-"""What a file tells of the mesh; a reduced model has none, so that its grading does not matter."""
+"""Mesh options that a file stores; the grading is omitted, as a reduced model has no mesh."""
 
 _MAX_STEPS = 1_000_000
 """Largest number of increments of a leg in a file."""

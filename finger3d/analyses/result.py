@@ -100,7 +100,7 @@ class PressResult:
         return self._numbers
 
     def to_dataframe(self, table: Literal["history", "contact"] = "history") -> pandas.DataFrame:
-        """Return a table as pandas has them.
+        """Return a table as a pandas DataFrame.
 
         Parameters
         ----------

@@ -51,7 +51,7 @@ class Study:
 
     @property
     def by_name(self) -> bool:
-        """Whether it runs only when it is named, in full: it times this machine, and says so by ``BY_NAME = True``."""
+        """Whether a full run must name the study: one that times this machine states ``BY_NAME = True``."""
         return bool(re.search(r"^BY_NAME = True$", self.path.read_text(encoding="utf-8"), flags=re.MULTILINE))
 
     def run(self, quick: bool) -> Result:

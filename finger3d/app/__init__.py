@@ -1,1 +1,1 @@
-"""A local page that answers while its sliders move, from a condensed finger."""
+"""A local page with sliders that presses a condensed finger as they move."""

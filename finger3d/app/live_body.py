@@ -62,7 +62,7 @@ class LivePress:
 
 @dataclass(frozen=True)
 class LiveReading:
-    """What a gauge reads, and how well it tells the coefficient of friction.
+    """Reading of a gauge, and the standard deviation of the friction coefficient inferred from it.
 
     Attributes
     ----------

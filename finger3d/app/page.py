@@ -1,4 +1,4 @@
-"""The page: sliders, tractions along the contact, and what a gauge tells."""
+"""The page: sliders, tractions along the contact, and the reading of a gauge."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def numbers_of(press: LivePress) -> str:
 
 
 def text_of(reading: LiveReading) -> str:
-    """Return strain, its standard deviation, and what follows for mu in one line."""
+    """Return the strain, its standard deviation and that of mu in one line."""
     mu = "cannot be told" if reading.mu_sd > _LARGEST_MU else f"is told to +- {reading.mu_sd:.2g}"
     return (
         f"strain {reading.strain:.5f} +- {reading.strain_sd:.1g} (noise {NOISE:g}, place and angle), "

@@ -1,4 +1,4 @@
-"""Server of the page on the loopback interface, which answers only those who know its token."""
+"""Server of the page on the loopback interface, which refuses requests without its token."""
 
 from __future__ import annotations
 
@@ -63,9 +63,9 @@ def local_server(page: Dash, port: int = 0) -> LocalServer:
 
 
 def protect(application: Flask, token: str) -> None:
-    """Refuse requests without the token, and those that another site's name was resolved for.
+    """Refuse requests without the token, and requests for another host name (DNS rebinding).
 
-    The token comes once with the address; a cookie holds it from then on.
+    The address of the first request holds the token; a cookie holds it afterwards.
     """
 
     @application.before_request

@@ -21,7 +21,7 @@ def app_(
     browser: Annotated[bool, Parameter(help="Open the page in the browser.")] = True,
     set_: Set = None,
 ) -> None:
-    """Open a local page with sliders for friction, depth and a gauge, which answers from the condensed finger.
+    """Open a local page with sliders for friction, depth and a gauge, which shows presses of the condensed finger.
 
     The finger is pressed straight down, to at most the depth of the scene. Ctrl-C ends the page.
 

@@ -43,7 +43,7 @@ def calibrate(
 ) -> None:
     """Calibrate a gauge: strain against mu, second-order fit, resolution, usable range, and effect of tolerances.
 
-    Several readings are calibrated together: what changes them all, such as the depth, is told apart from mu.
+    Several readings are calibrated together: mu is separated from errors common to all, such as in the depth.
 
     Example: finger3d calibrate scene.toml --gauge g36 --out cal
 

@@ -1,4 +1,4 @@
-"""Option ``--tolerance`` of the commands that weigh what is not known exactly."""
+"""Option ``--tolerance`` of the commands that account for uncertain quantities."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ _ACTIVE_SETS = 12
 """Active sets tried for the normal contact problem."""
 
 _DEEP = 0.6
-"""Share of the points found inside the object that will touch; 0.5 to 0.67 under a cylinder."""
+"""Share of the newly penetrating points that will touch; 0.5 to 0.67 under a cylinder."""
 
 _FRICTION_STEPS, _ALTERNATE_EVERY = 40, 8
 """Largest number of projected-gradient steps of the friction, and of those between two updates of the normal forces."""
@@ -145,9 +145,9 @@ def assemble_in_place(problem: ContactProblem, active: ActiveSet, precision: Pre
 
 
 def chord_iterations(problem: ContactProblem, system: ActiveSetSystem, found: Iterate) -> Iterate:
-    """Return the better of an iterate and what chord iterations with its factors make of it.
+    """Return the better of an iterate and the result of chord iterations with its factors.
 
-    They turn the slip directions and remove the round-off of single precision, while the active set stays the same.
+    They update the slip directions and remove the round-off of single precision, while the active set stays the same.
     """
     if found.at_roundoff(problem) or system.is_exact:
         return found
@@ -199,7 +199,7 @@ def warm_start(problem: ContactProblem, expected: Float) -> Float:
             guess[points] = _alternate(active, normal, expected[points, 1:].astype(normal.dtype))
         else:
             guess[points, 0] = normal
-    except np.linalg.LinAlgError:  # a body that floats, or an indefinite operator
+    except np.linalg.LinAlgError:  # a body without support, or an indefinite operator
         return expected
     return guess
 
@@ -210,7 +210,7 @@ def _is_nearly_fixed_point(problem: ContactProblem, force: Float) -> bool:
 
 
 def _deepest(gap: Float, closing: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which points (c,) are deepest in the object among those that close; the others will open again."""
+    """Return which points (c,) are as deep as the deepest share `_DEEP` of those that close; others will open again."""
     return gap <= np.quantile(gap[closing], _DEEP) if closing.any() else closing
 
 

@@ -30,7 +30,7 @@ class FrictionLaw(ABC):
     Attributes
     ----------
     mu : float
-        Coefficient that a scene, a sweep or a calibration sets, from 0 up.
+        Coefficient set by a scene, a sweep or a calibration, at least 0.
     """
 
     mu: float

@@ -1,7 +1,7 @@
 """Semismooth Newton method on the projection equation r = P(r - rho w) (Alart and Curnier 1991).
 
-An iteration reads off which points are open, stick or slip (the active set) and solves the linear equations of these
-sets; it is an active-set strategy with the slip directions linearised.  Projected block Gauss-Seidel is the fallback.
+An iteration determines which points are open, stick or slip (the active set) and solves the linear equations of this
+set; it is an active-set strategy with the slip directions linearised.  Projected block Gauss-Seidel is the fallback.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ Precision: TypeAlias = type[np.float64] | type[np.float32]
 Solver: TypeAlias = Callable[[Array], Array]
 
 _CONDITIONS_TOLERANCE = 1e-11
-"""Residual of the contact conditions at which an iterate is a solution.  The residual of the projection would not do:
-round-off of a gap enters its limit times mu."""
+"""Residual of the contact conditions at which an iterate is a solution.  The residual of the projection is not
+used: in its friction limit the round-off of a gap is multiplied by mu."""
 
 _JUDGED_BELOW = 1e-6
-"""Residual of the projection over the forces, times a mu above 1, below which the contact conditions are evaluated."""
+"""Mismatch over max(1, mu) times the forces, below which the contact conditions are evaluated."""
 
 _STALLED = 1e-3
 """Relative decrease of the residual required of full steps when an active set comes back."""
@@ -84,7 +84,7 @@ class Iterate(NamedTuple):
         return cls(force, displacement, projected, status, augmented, float(np.linalg.norm(force - projected)))
 
     def at_roundoff(self, problem: ContactProblem) -> bool:
-        """Whether the mismatch of the forces, and of the gaps and slips that it stands for, is round-off."""
+        """Whether the mismatch is round-off, as a force and as the equivalent gap or slip."""
         lengths_as_forces = problem.length_scale * float(problem.augmentation.min(initial=np.inf))
         return self.mismatch <= _ROUND_OFF * min(float(np.linalg.norm(self.force)), lengths_as_forces)
 
@@ -99,7 +99,7 @@ class Iterate(NamedTuple):
 
 @dataclass(frozen=True)
 class ActiveSet:
-    """Which points stick and slip, with the forces that this allows as linear functions r = P x of unknowns x.
+    """Active set: the points that stick and slip, and their forces as linear functions r = P x of unknowns x.
 
     The unknowns are the forces of sticking points, the normal forces x_n of slipping points and, in 3D, their forces
     x_t along the tangent t across the slip direction e.  The equations ask that displacements vanish, weighted to
@@ -314,9 +314,9 @@ def newton(
     precision : float64 or float32
         Precision of the factored matrices.
     correct : callable, optional
-        What improves an iterate with the factors that led to it; see `finger3d.contact.acceleration`.
+        Function that improves an iterate with its factors; see `finger3d.contact.acceleration`.
     assembly : callable, optional
-        What assembles the matrix of an active set.
+        Function that assembles the matrix of an active set.
     """
     current = Iterate.of(problem, start)
     seen: dict[bytes, float] = {}

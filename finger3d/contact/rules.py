@@ -1,4 +1,4 @@
-"""Stick rules: the algorithms that a scene may choose to settle which points are open, stick or slip."""
+"""Stick rules: algorithms that determine which points are open, stick or slip; a scene chooses one."""
 
 from __future__ import annotations
 

@@ -44,8 +44,8 @@ _FINITE_STRAIN = _Limits(500, (20, 100))
 """At finite strain another linearisation, or half the increment, is cheaper than a long attempt."""
 
 _FRICTION_CAPS = (np.inf, 1e4, 1e3, 1e2)
-"""Bounds of mu tried with Lemke's method: a mu of 1e6 can cost its pivots their digits, and the active set is the same
-under a smaller one."""
+"""Bounds of mu tried with Lemke's method: with mu = 1e6 round-off can spoil its pivots, and a smaller mu gives the
+same active set."""
 
 _SMALLEST_STRIDE = 1e-3
 """Stride of the friction continuation, as a share of the whole, at which it is given up."""
@@ -181,7 +181,7 @@ def _friction_continuation(problem: ContactProblem, start: Float) -> NewtonResul
     found = newton(replace(problem, friction=np.zeros_like(problem.friction)), start, 60, damped=True)
     spent = found.iterations
     reached, stride = 0.0, 0.25
-    # beyond mu = 5 nothing changes but full stick, so that mu follows a saturating scale of the share
+    # large coefficients only extend the stick zone, so that mu saturates as a function of the share
     while found.solved and reached < 1.0 and stride > _SMALLEST_STRIDE:
         share = min(reached + stride, 1.0)
         mu = problem.friction if share == 1.0 else problem.friction * share / (1.0 + (1.0 - share) * problem.friction)

@@ -79,7 +79,7 @@ class ContactSolution:
     Attributes
     ----------
     state : ContactState
-        To be trusted only if `outcome` is CONVERGED; the state before the increment otherwise.
+        Valid only if `outcome` is CONVERGED; otherwise the state before the increment.
     residual : float
         Largest violation of Eqs. (1)-(4) and of "friction opposes slip", dimensionless.
     iterations : int
@@ -87,7 +87,7 @@ class ContactSolution:
     method : str
         Attempt that succeeded: newton, damped or full steps, ramp, pivots, sweeps; or paper.
     detail : str
-        What else is known of a failure.
+        Further information about a failure.
     """
 
     state: ContactState

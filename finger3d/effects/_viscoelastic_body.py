@@ -52,7 +52,7 @@ class Response:
     ----------
     compliance : (r, r) mm/N
     moved : (r,) mm
-        Where the past takes the rows under no force.
+        Displacement of the rows due to the past, without forces.
     shape : row forces (r,) -> the memory's vector `now`
     """
 
@@ -141,7 +141,7 @@ class ConstantBulkModulus:
 
     @property
     def size(self) -> int:
-        """Number of unknowns, and of rows that yield beyond the mesh."""
+        """Number of unknowns, plus that of the rows with a subgrid compliance."""
         return self._own + len(self.problem.inclusions.subgrid_compliance)
 
     @cached_property

@@ -3,7 +3,7 @@
 The object is meshed and condensed like the finger, in small strain, and held where it is gripped: the lower half of a
 cylinder or ball on its cut; behind a plane, wedge or wave a block as long and wide as the finger, on its far face; a
 body from a file on its highest plane.  Its surface is read at the finger's own contact points, as the same weighted
-means (`finger3d.fem.transfer`), so the two meshes need not match and each force acts on both bodies undiminished.
+means (`finger3d.fem.transfer`), so the two meshes need not match and contact forces are equal and opposite.
 """
 
 from __future__ import annotations

@@ -5,10 +5,10 @@ It is cut into bars whose ends follow the mesh's displacements; each bar's strai
 stiffness a spring on that row, so the body keeps its one factorisation (Woodbury).  In a solid the bars lie side by
 side over the foil's width along z; in a section the foil is spread over the finger's width.
 
-How a foil's own force unloads it is not read from the mesh, which would need cells of a hundredth of the foil: it is
-that of a foil in a body without end (`finger3d.fem.kelvin`).  This leaves out what the body's surface gives back, which
-dies out within the foil's length (see validation/embedded_gauge_study.py).  The foil carries no bending and no shear,
-and takes no room.
+The compliance of the body under a foil's own forces is not taken from the mesh, which would need cells of a hundredth
+of the foil, but from a foil in an infinite body (`finger3d.fem.kelvin`).  This neglects the effect of the body's
+surface, which decays within the foil's length (see validation/embedded_gauge_study.py).  The foil has no bending and
+no shear stiffness, and no volume.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ _COINCIDENT = 1e-9  # mm, and radians
 class Strips:
     """Foils along the gauges of a model: Young's modulus (MPa) and section (mm).
 
-    `patches` are the divisions of a foil along and across, in a section and in a solid; those given are within half a
-    percent of any number.
+    `patches` are the divisions of a foil along and across, in a section and in a solid; the default is within half a
+    percent of finer divisions.
     """
 
     E_MPa: float

@@ -1,9 +1,8 @@
 """Two friction coefficients: a slipping point is limited by ratio * mu.
 
-mu_k < mu_s has no unique answer without a rule (validation/REFERENCES.md, 2.5).  ``keep``: a point that slips keeps
-slipping at mu_k until its slip would reverse; this converges to the solution with mu_k.  ``paper``: every step starts
-all stuck, so that a point is asked for mu_s again in each step (Maeno 2004, Fig. 8); its answer depends on mesh and
-step.
+mu_k < mu_s has no unique solution without a rule (validation/REFERENCES.md, 2.5).  ``keep``: a point that slips keeps
+slipping at mu_k until its slip would reverse; this converges to the solution with mu_k.  ``paper``: in every step
+all points start stuck and slip only above mu_s (Maeno 2004, Fig. 8); the solution depends on mesh and step.
 """
 
 from __future__ import annotations

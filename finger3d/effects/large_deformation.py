@@ -26,7 +26,7 @@ _CONSTANTS = {
 """Keys of every law."""
 
 _LEAST_STABLE_STRAIN = 0.05
-"""Nominal strain in one of the usual tests below which no constants are accepted that make a law unstable."""
+"""Constants are refused if they make a law unstable below this nominal strain in one of the usual tests."""
 
 Ratio = Annotated[float, Ge(-100), Le(100)]
 Exponent = Annotated[float, Ge(-50), Le(50)]

@@ -1,11 +1,11 @@
 """Viscoelasticity: moduli that relax as a Prony series r(t) = 1 - sum g_i (1 - exp(-t/tau_i)), E_MPa at t = 0.
 
 With ``bulk`` Poisson's ratio is constant and everything follows from the instantaneous compliance C.  Let f_e be the
-row forces that would hold the present shape of the elastic body, u = K^-1 B^T f_e; then f = r * f_e', that is
+row forces that would hold the present shape of the elastic body, u = K^-1 B^T f_e; f is the convolution r * df_e/dt, or
 ``f = r_inf f_e + sum h_i`` with ``h_i' = e_i h_i + g_i gamma_i (f_e' - f_e)``, e_i = exp(-dt/tau_i) and
 gamma_i = (1 - e_i) tau_i/dt: exact where f_e moves at a constant rate within the step (Taylor, Pister and Goudreau
-1970).  So ``f_e' = (f + past)/alpha``, alpha = r_inf + sum g_i gamma_i: the contact rule sees the compliance C/alpha
-and points that the past has moved.  f_e lives on all contact points: an open one has f = 0 and yet creeps back.
+1970).  So ``f_e' = (f + past)/alpha``, alpha = r_inf + sum g_i gamma_i: contact is solved with the compliance C/alpha
+and points displaced by the past.  f_e is defined at all contact points: an open one has f = 0 but still creeps back.
 
 Without ``bulk`` only the shear modulus relaxes.  The same holds of the shear part K_s of K = K_b + K_s, with the whole
 displacement in place of f_e: one factorisation of K_b + alpha K_s for each length of step.

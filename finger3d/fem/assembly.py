@@ -20,7 +20,7 @@ from finger3d.fem.simplex import Mesh
 
 AnyInt = NDArray[np.int32] | NDArray[np.int64]
 
-# Cells at a time: so few that their matrices stay in a core's cache, and that the next ones find the memory at hand.
+# Cells assembled at a time: few enough for their matrices to stay in a core's cache, so that memory is reused.
 _CHUNK = 256
 
 

@@ -1,8 +1,8 @@
 """Bars embedded in a body at finite strain: axial forces and their tangent.
 
 A bar between two points of the body has the strain e = |t + r| - 1, with its direction t at rest and the displacement r
-of one end relative to the other over its length.  Beyond what the mesh resolves, the body around the bars yields by S T
-under their forces T, so that ``e = T / k + S T`` (with S relaxing, see `BarRelaxation`).
+of one end relative to the other over its length.  The body around the bars deforms by S T under their forces T, beyond
+what the mesh resolves, so that ``e = T / k + S T`` (with S relaxing, see `BarRelaxation`).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from finger3d._types import Float, Int, freeze_arrays
 
 @dataclass(frozen=True)
 class BarRelaxation:
-    """Relaxation over one increment of time: ``T = S^-1 (factor s - past)`` with the yielding s = S T (b,) at rest."""
+    """Relaxation over one increment of time: ``T = S^-1 (factor s - past)``, s (b,) the strain of the surroundings."""
 
     factor: float
     past: Float
@@ -69,7 +69,7 @@ class Bars:
         return np.asarray(self._vectors(u)[1] - 1.0 - self.tension(u, relaxation) / self.stiffness)
 
     def forces(self, u: Float, relaxation: BarRelaxation | None = None) -> Float:
-        """Return the nodal forces (n d,) N that the bars take from the body."""
+        """Return the internal nodal forces (n d,) N of the bars."""
         vectors, length = self._vectors(u)
         pull = (self.tension(u, relaxation) / length)[:, None] * vectors
         return np.asarray(self.relative.T @ pull.ravel())

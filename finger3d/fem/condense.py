@@ -34,7 +34,7 @@ class _Factor(Protocol):
     """Factor of the stiffness K of the free unknowns, with rows R."""
 
     def eliminated(self, load: Float) -> tuple[Float, Float]:
-        """Return ``R K^-1 load`` (r, m) of loads (n, m), after what `substituted` needs of it."""
+        """Return the intermediate result that `substituted` takes, and ``R K^-1 load`` (r, m), for loads (n, m)."""
         ...
 
     def substituted(self, eliminated: Float | None, force: Float) -> Float:

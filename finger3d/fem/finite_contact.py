@@ -152,10 +152,10 @@ class DeformedContact:
         return _rows([sp.diags_array(normal[:, k]) @ self.face.interpolate for k in range(normal.shape[1])])
 
     def geometric_stiffness(self, force: Float, curvature: Float | None = None) -> sp.csr_matrix:
-        """Second derivative (n d, n d) of the gaps under normal forces (c,) N; what contact takes from K.
+        """Return the geometric stiffness (n d, n d) of normal forces (c,) N, which is subtracted from K.
 
-        The pressure acts on the deformed area, without which the surface's own pressure would push its middle nodes
-        along it: from pressures of a few G on, K would lose its definiteness there.
+        It is the second derivative of the gaps, weighted with the forces.  The pressure acts on the deformed area;
+        otherwise it would push mid-edge nodes along the surface, and K would be indefinite at a few G.
 
         Parameters
         ----------

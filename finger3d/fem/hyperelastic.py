@@ -5,7 +5,7 @@ bodies take the mixed form ``W_iso + p (J - 1) - p^2 / (2 K)`` with linear p = K
 plane stress F_33 follows from P_33 = 0 at every quadrature point and is condensed out of the tangent.
 
 Where the stress relaxes (Simo 1987), an increment of time multiplies the two parts by factors and subtracts a second
-Piola-Kirchhoff stress that its start determines, see `Relaxing`.
+Piola-Kirchhoff stress that follows from the state at its start, see `Relaxing`.
 """
 
 from __future__ import annotations

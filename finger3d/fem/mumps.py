@@ -31,7 +31,7 @@ _LIBRARIES = {"win32": "libcoinmumps-3.dll", "darwin": "libcoinmumps.3.dylib"}
 _TOO_SMALL = (-8, -9, -14, -15, -17, -20)  # values of infog(1) that more workspace cures
 _NO_MEMORY = (-7, -13, -19, -22)
 _SMALLEST_PIVOT = 1e-13  # of a matrix that MUMPS has scaled to entries of order 1
-_SPACES = 35, 100, 300, 1000  # icntl(14): workspace beyond what the analysis foretells, %
+_SPACES = 35, 100, 300, 1000  # icntl(14): workspace beyond the prediction of the analysis, %
 _AT_ONCE = 64  # right-hand sides
 _LOCK = threading.Lock()  # MUMPS keeps data in global variables
 

@@ -36,12 +36,12 @@ class BoundarySurface:
     area : (c,) mm2
         Integral of the hat: a nodal force over it is the nodal pressure.
     normals : (c, d)
-        Outward unit normals, weighted means as of anything sampled.
+        Outward unit normals, from the weighted means over the samples.
     trace : (c, n)
         Weighted displacement of a point = trace @ u.
     samples : (q, d) mm, quadrature points on the boundary at rest
     average : (c, q)
-        Weighted mean at a point of anything sampled at `samples`.
+        Weighted means at the points of values at `samples`.
     hats : (c, q)
         Hat function of every point at `samples`, with the sparsity pattern of `average`.
     interpolate : (q, n)

@@ -69,7 +69,7 @@ def _edges_over(coords: Float, x: Float) -> tuple[Int, Float]:
 def _curved(element: Element, nodes: Float, straight: Float, at: Float) -> Float:
     """Barycentric coordinates on curved facets (q, k, d - 1), seen from below, from those on the straight ones.
 
-    A point that has none near its facet keeps those on the straight one.
+    A point whose coordinates lie far outside its facet keeps those on the straight facet.
     """
     if not element.is_quadratic:
         return straight

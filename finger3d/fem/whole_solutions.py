@@ -10,7 +10,7 @@ from finger3d._types import Float
 
 
 class WholeSolutions(ABC):
-    """Factor of a stiffness K (n, n) with rows R (r, n), which solves and does no more."""
+    """Factor of a stiffness K (n, n) with rows R (r, n) that offers full solutions only."""
 
     rows: sp.csr_matrix
 

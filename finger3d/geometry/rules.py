@@ -1,4 +1,4 @@
-"""Checks of dimensions, made before CAD is called: CAD builds a wrong body of impossible dimensions, or hangs."""
+"""Checks of dimensions, made before CAD is called: from impossible dimensions CAD builds a wrong body, or hangs."""
 
 from __future__ import annotations
 

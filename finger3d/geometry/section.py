@@ -85,7 +85,7 @@ class Core:
 
 @dataclass(frozen=True)
 class Layer:
-    """A layer under the contact curve: what of a section does not belong to the section `below`."""
+    """A layer under the contact curve: the part of a section outside the section `below`."""
 
     below: Section
     label: str = "skin"

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _SLACK = 1e-12  # over the surface's size: tolerance that makes vertical lines through shared edges hit a triangle
 _EDGES = ((0, 1), (1, 2), (2, 0))
 _SLENDER = 6.0  # longest edge squared over twice the area, from which a triangle is cut for its bounds
-_SHORT = 2e-3  # longest edge over the surface's size, below which it is not
+_SHORT = 2e-3  # longest edge over the surface's size, below which no triangle is cut
 _MOST_CUTS, _MOST_PIECES = 12, 32
 
 
@@ -78,7 +78,7 @@ class Triangles:
     @property
     def volume(self) -> float:
         """Enclosed volume of a closed surface, mm3; negative if it is inside out."""
-        # About the middle of the box: a body far from the origin would cancel to nothing.
+        # Relative to the middle of the box: far from the origin round-off would cancel the volume.
         a = self.corners[:, 0] - 0.5 * (self.low + self.high)
         return float(np.einsum("ij,ij->", a, self.area_vectors) / 3.0)
 

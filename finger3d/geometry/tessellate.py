@@ -22,7 +22,7 @@ _WELD = 1e-7  # mm
 
 @dataclass(frozen=True)
 class CadFace:
-    """One face of a solid: its label, its surface, the box (mm) around it, and +1 if the surface's normal looks out.
+    """Face of a solid: its label, its surface, the box (mm) around it, and +1 if the surface's normal points outward.
 
     `inside` and `outside` are the numbers of the parts on its sides; a face between two parts has no label, and "out"
     is away from the part `inside`.

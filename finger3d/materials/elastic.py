@@ -12,7 +12,7 @@ MODULUS_KEYS = ("E_MPa", "shore_A", "shore_00", "silicone")
 """Keys of which exactly one gives Young's modulus."""
 
 NU = 0.49
-"""Poisson's ratio of a silicone: its bulk modulus exceeds its shear modulus by 50 and more."""
+"""Poisson's ratio of a silicone: its bulk modulus is about 50 times its shear modulus or more."""
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,13 @@
 """Young's modulus of a silicone at small strain, and its spread, from what its sources measured.
 
-A data sheet gives the engineering stress s at 100 % strain. A curve that is straight up to there has E = s; a
+A data sheet gives the engineering stress s at 100 % strain. A linear curve up to there has E = s; a
 neo-Hookean one, s = G (l - 1 / l^2) at the stretch l = 2 with E = 3 G, has E = 12 s / 7. The estimate is the geometric
 mean of both.
 
 The tensile curves of the Soft Robotics Materials Database measure strain by the crosshead, over the 33 mm of the narrow
-section, although the shoulders of the dumbbell stretch too. By their width they add up to 0.83 times as much, if they
-are clamped where the tabs begin; so the modulus is 1 to 1.83 times the slope. The estimate is the geometric mean.
+section, although the shoulders of the dumbbell stretch too. From their width, the shoulders extend by up to 0.83 times
+as much as the section, if clamped where the tabs begin; the modulus is therefore 1 to 1.83 times the slope. The
+estimate is the geometric mean.
 
 Compression tests and published hyperelastic laws are taken as they are. The modulus of a silicone is the geometric mean
 of its estimates, with the standard error of their logarithms; that of a single estimate is the standard deviation of a
@@ -42,7 +43,7 @@ class YoungsModulus:
 
 
 def youngs_modulus(silicone: Silicone) -> YoungsModulus:
-    """Return the modulus of a silicone: from its sources, or from its Shore hardness if they measured none.
+    """Return the modulus of a silicone: from its sources, or from its Shore hardness if no source measured it.
 
     Examples
     --------

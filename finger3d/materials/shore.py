@@ -14,8 +14,9 @@ Type 00 has a sphere of radius R = 1.19 mm and the spring force F = 0.203 + 0.00
 which is how Mix and Giacomin (2011) relate the readings of spherical indenters to Young's modulus. For S below 53 the
 depth exceeds the radius, and Hertz's solution is extrapolated.
 
-Gent's formula gives too much for cast silicones, by `SOFTER_A` on average. That of Qi et al. (2003), from simulated
-tests, log10 E = 0.0235 S - 0.6403, is within a fifth of it for S from 20 to 40, and above it beyond.
+Gent's formula overestimates the modulus of cast silicones, by the factor `SOFTER_A` on average. That of Qi et al.
+(2003), from simulated tests, log10 E = 0.0235 S - 0.6403, agrees with Gent's within a fifth for S from 20 to 40,
+and exceeds it further above.
 
 References
 ----------

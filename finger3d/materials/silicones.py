@@ -1,6 +1,6 @@
-"""Table of silicones that are bought by Shore hardness, read from silicones.toml.
+"""Table of silicones that are sold by Shore hardness, read from silicones.toml.
 
-A property that no source gives is None: it is to be read from the data sheet of the tin.
+A property that no source gives is None; the data sheet of the product may state it.
 """
 
 from __future__ import annotations
@@ -137,7 +137,7 @@ def silicone_named(name: str) -> Silicone:
 
 
 _SPEEDS = ("slow", "medium", "fast", "veryfast", "a")
-"""Ends of names that tell the speed of the cure, or the scale of the hardness."""
+"""Suffixes of names that state the speed of the cure, or the scale of the hardness."""
 
 
 def _plain(name: str) -> str:

@@ -43,7 +43,7 @@ from finger3d.objects import DistanceTracker, ObjectPose, PlacedObject, initial_
 Say = Callable[[str], None]
 
 MARGIN = 0.3
-"""Rigid gap that candidate points reach to, in depths of the press; checked after the solution."""
+"""Largest rigid gap of candidate points, in depths of the press; whether it suffices is checked after the solution."""
 
 _STATIONS = 4, 20
 """Least and largest number of poses along a leg at which rigid gaps are taken to find the candidate points."""
@@ -208,9 +208,9 @@ def contact_rows(rows: Float, active: NDArray[np.int64], face: BoundarySurface, 
 
 
 def candidate_points(model: Model, free: BoundarySurface, touch: float, margin: float) -> BoundarySurface:
-    """Return the points of the free faces that the path brings near the object, the nearest first.
+    """Return the points of the free faces that come near the object on its path, the nearest first.
 
-    At finite strain points that do not face the object at rest may turn towards it: those near the others join.
+    At finite strain points that do not face the object at rest may turn towards it: those near others are included.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Whether the finger's free surface stayed out of the object, between the candidate points and beyond them."""
+"""Penetration of the finger's free surface into the object, between the candidate points and outside them."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from finger3d.mechanics.problem import Problem, free_surface
 from finger3d.objects import DistanceTracker, ObjectPose
 
 _TOUCHES = {True: 1e-9, False: 1e-3}
-"""Overlap outside the candidate points, over the depth, that counts as contact there: on the contact face, where points
-are chosen with a margin, and on other faces, where those at a crease overlap by what the mesh does not resolve."""
+"""Penetration of points outside the candidates, over the depth, from which they count as in contact: on the contact
+face (True), and on other faces (False), where points at a crease penetrate by as much as the mesh does not resolve."""
 
 
 _ADVISE_ABOVE, _WARN_ABOVE = 0.01, 0.1
-"""Penetration, over the depth of the press, above which a finer mesh is advised, and above which it is warned of."""
+"""Penetration, over the depth of the press, above which a finer mesh is advised, and above which a warning is given."""
 
 _ORDER, _ORDER_AT_CREASE = 1.5, 0.7
 """Power of the edge length with which penetration falls: at the edge of contact, beyond which the gap opens with the
@@ -41,8 +41,8 @@ class SurfaceCheck:
     Attributes
     ----------
     within_candidates : whether no point outside the candidates went through the object
-    penetration_mm : how deep its deepest place is inside the object; of an elastic object's deformed surface only what
-        the contact points know is told
+    penetration_mm : largest penetration of the surface; under an elastic object that of the contact points only, where
+        its deformed surface is known
     place : (d,) mm, that place
     face : number in `FREE_FACES` of its face
     at_crease : whether a sharp edge of the finger bounds its facet
@@ -87,7 +87,7 @@ def penetration_warnings(problem: Problem, checks: Sequence[SurfaceCheck]) -> li
 
 
 def penetration_advice(problem: Problem, checks: Sequence[SurfaceCheck]) -> list[str]:
-    """Return advice about penetration that is more than a hundredth of the depth and not yet warned of."""
+    """Return advice about penetration of more than a hundredth of the depth that gives no warning."""
     return _penetration(problem, checks, _ADVISE_ABOVE, _WARN_ABOVE)
 
 

@@ -14,7 +14,7 @@ from finger3d.objects import ObjectPose
 def external_work(problem: Problem, before: ContactState, after: ContactState, a: ObjectPose, b: ObjectPose) -> float:
     """Return the work (mJ) of the object on the finger in an increment from pose a to pose b.
 
-    It adds up to the energy stored in the body, and what friction takes, the trapezoidal sum of friction times slip.
+    It is the work of the contact forces on the body plus the frictional dissipation, by the trapezoidal rule.
     """
     assert after.bases is not None
     start = transported(before, after.bases)

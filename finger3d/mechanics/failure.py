@@ -1,4 +1,4 @@
-"""Why an increment at finite strain did not settle, as far as the object, the mesh and the last state tell."""
+"""Probable cause of an increment at finite strain that did not converge, from object, mesh and last state."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def cause_of_failure(problem: Problem, u: Float) -> str:
 
     Parameters
     ----------
-    u : (n, d) mm, displacement of the nodes at the last state that settled
+    u : (n, d) mm, displacement of the nodes at the last converged state
     """
     if details := unresolved_details(problem.model):
         return details[0]

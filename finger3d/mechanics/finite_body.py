@@ -66,7 +66,7 @@ class FiniteBody:
         return len(self.solid.slopes(np.zeros(self.solid.mesh.points.size)))
 
     def relaxing_variables(self, x: Float, bulk: bool) -> Float:
-        """Return what the internal variables follow (k,): elastic stresses of the solid, and how the bars yielded."""
+        """Return the relaxing quantities (k,): elastic stresses of the solid, and strains of the bars' surroundings."""
         stress = self.solid.elastic_stress(x, self.relaxing, bulk).ravel()
         if self.bars is None:
             return stress

@@ -48,7 +48,7 @@ _TARGET_RESIDUAL = 5e-9
 """Residual at which the iteration ends; where round-off prevents it, one up to `TOLERANCE` that no longer falls."""
 
 _NEGLIGIBLE = 1e-6
-"""Force, over the shear modulus times the square of the depth, below which there is no contact to speak of."""
+"""Force, over the shear modulus times the square of the depth, below which contact is negligible."""
 
 _LARGEST_STEP, _LEAST_STEP = 2.0, 0.05
 """Largest displacement in an iteration over that of the object, and the least over the depth that is always allowed."""
@@ -77,6 +77,9 @@ class IncrementEquations:
 
     Attributes
     ----------
+    body : over the time of the increment, if it relaxes
+    start : state at the beginning
+    workspace : holds the last linearisation
     """
 
     problem: Problem
@@ -101,7 +104,7 @@ class IncrementEquations:
     def failed(
         self, now: Configuration, outcome: Outcome, error: float, spent: int, detail: str = ""
     ) -> ContactSolution:
-        """Return the first state with what is known of the failure; later increments begin with a new tangent."""
+        """Return the initial state and the reason of the failure; later increments begin with a new tangent."""
         last = self.workspace.linearisations.get(self._has_inclusions)
         if last is not None:
             self.workspace.linearisations[self._has_inclusions] = replace(last, reusable=False)
@@ -132,7 +135,7 @@ class IncrementEquations:
 
     @cached_property
     def _least_force(self) -> float:
-        """Force (N) that the residual is at least divided by; without contact only round-off is left."""
+        """Smallest force (N) by which the residual is divided; without contact all forces are round-off."""
         before = float(np.linalg.norm(self.start.force, axis=1).max())
         shear, width = self.body.solid.material.law.shear, self.body.solid.thickness
         area = self._length_scale * (width if self.problem.dim == 2 else self._length_scale)
@@ -186,7 +189,7 @@ class IncrementEquations:
         raise InvertedError
 
     def linearise(self, now: Configuration, force: Float, damping: float = 0.0) -> Linearisation:
-        """Factor the tangent under contact forces (c, d), and leave it to later increments.
+        """Factor the tangent under contact forces (c, d), and keep the factor for later increments.
 
         `damping` times the linear stiffness of the displacements is added.
         """

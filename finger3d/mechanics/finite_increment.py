@@ -27,7 +27,7 @@ _SLOW = 0.35
 """Ratio of successive residuals above which the tangent is factored again; a factor costs about five iterations."""
 
 _ASTRAY, _DIVERGED = 0.1, 1.0
-"""Residual from which an iteration begins again if its tangent is an earlier one, and is given up if that is new."""
+"""Residuals above which an iteration starts again with a new tangent, and with a new tangent is given up."""
 
 _DAMPED_FACTORS = 40
 """Largest number of damped iterations."""
@@ -36,7 +36,7 @@ _LARGEST_RISE = 3.0
 """Largest ratio of successive residuals of damped iterations; beyond it the damping grows instead."""
 
 _FADING = 0.6
-"""Factor by which the damping at least falls where the residual does."""
+"""Factor of the damping, besides the ratio of residuals, where the residual falls."""
 
 _FIRST_DAMPING, _MORE_DAMPING, _LEAST_DAMPING = 1.0, 10.0, 1e-4
 """Linear stiffness added to the tangent at first, factor by which it grows where an iteration fails (and its largest
@@ -61,7 +61,7 @@ class FiniteIncrement(IncrementEquations):
     def _iterate(self, guess: Float | None) -> ContactSolution:
         """Iterate from the configuration extrapolated, with a new tangent where the residual falls slowly.
 
-        Where the tangent of an earlier increment leads nowhere, the iteration begins again with a new one.
+        If it does not converge with the tangent of an earlier increment, the iteration starts again with a new one.
         """
         first = now, force = self.initial(guess)
         linearisation, factors, spent, error = self.last_linearisation(), 0, 0, math.inf
@@ -94,7 +94,7 @@ class FiniteIncrement(IncrementEquations):
     def _iterate_damped(self) -> ContactSolution:
         """Iterate from the first state with a multiple of the linear stiffness added to the tangent.
 
-        The multiple goes with the residual and ends at zero (pseudo-transient continuation, Kelley and Keyes 1998).
+        The multiple decreases with the residual to zero (pseudo-transient continuation, Kelley and Keyes 1998).
         """
         now, force = self.at(self.start.unknowns), self.start.force
         damping, spent, error = _FIRST_DAMPING, 0, math.inf

@@ -225,7 +225,7 @@ class FiniteStrain:
         return contact.gap, contact.bases[:, 0]
 
     def may_touch(self, surface: BoundarySurface, normal: Float) -> NDArray[np.bool_]:
-        """Every point can: walls turn with the motion, and no place of the surface may be inside the object."""
+        """Return True for every point: walls rotate with the deformation and may touch the object as well."""
         return np.ones(len(surface.nodes), dtype=np.bool_)
 
     def fields(self, problem: Problem, state: ContactState) -> tuple[Float, Float, Float]:

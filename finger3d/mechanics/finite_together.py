@@ -1,4 +1,4 @@
-"""One increment of several presses at finite strain, which share each factor and the passes through it.
+"""One increment of several presses at finite strain, which share factors and solve for all right-hand sides at once.
 
 The presses iterate in step by the chord method: one elimination and one substitution of many right-hand sides cost a
 fraction of those of one after another, and the rest of an iteration runs on all cores.  A new tangent is that of the
@@ -29,13 +29,13 @@ _ITERATIONS, _FACTORS = 40, 10
 """Largest number of iterations and of new factors in an increment."""
 
 _ASTRAY, _DIVERGED = 0.1, 1.0
-"""Residual from which an iteration begins again if its tangent is an earlier one, and is given up if that is new."""
+"""Residuals above which an iteration starts again with a new tangent, and with a new tangent is given up."""
 
 _NEW_TANGENT, _FACTOR_COST = 5, 20
 """Iterations that a press needs with a new tangent, and those of one press that take as long as a factorisation."""
 
 _TOO_SLOW = 15
-"""Iterations ahead from which a press had better wait for a tangent nearer to its own."""
+"""Remaining iterations above which a press should wait for a tangent nearer to its own."""
 
 _SMALL = 5e-9
 """Residual down to which the remaining iterations are counted."""
@@ -50,7 +50,7 @@ class _Trial:
     number : of the press
     first : configuration and contact forces (c, d) where it begins
     is_new : whether the tangent has been factored since
-    slow : iterations after which convergence was far ahead, with a tangent that served the leader well
+    slow : number of iterations after which more than `_TOO_SLOW` remained, with a tangent that served the leader
     """
 
     number: int
@@ -100,7 +100,7 @@ class _Trial:
         return converged(self.error, self.last_error)
 
     def lags(self) -> bool:
-        """Whether convergence has been far ahead in two iterations while the tangent served the leader well."""
+        """Count the iteration if more than `_TOO_SLOW` remain; return whether two have been counted."""
         self.slow += self.remaining > _TOO_SLOW
         return self.slow > 1
 
@@ -125,7 +125,7 @@ def solve_together(
 
     Returns
     -------
-    Solution of each press, None where the iteration does not converge or would with another tangent in less time.
+    Solution of each press, None where the iteration does not converge, or would converge faster with another tangent.
     """
     found: list[ContactSolution | None] = [None] * len(increments)
     trials = [

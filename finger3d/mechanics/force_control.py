@@ -14,7 +14,7 @@ from finger3d.mechanics.model import Leg
 from finger3d.objects import ContactPath, ObjectPose, PlacedObject, RigidObject, first_contact_height
 
 _DEEPEST = 0.99
-"""Depth at which a force is looked for at most, over that at which the object would reach the finger's base."""
+"""Largest depth at which a force is searched for, over that at which the object would reach the finger's base."""
 
 _TOLERANCE = 1e-12
 """Error of the depth, over the largest one."""

@@ -1,7 +1,7 @@
 """Refinement of a mesh around the gauges of a model.
 
 The strain at a gauge close to the edge of the contact varies over its distance from that edge.  Edges as long as those
-at the contact do not resolve it, and its slope against friction then follows the mesh
+at the contact do not resolve it, and its derivative by mu then depends on the mesh
 (validation/slopes_of_readings.py).  Most of that error comes from the tractions close to the gauge, so that the contact
 face is refined around it, and the body only close to that part of the face and to the gauge.
 """

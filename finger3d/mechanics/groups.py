@@ -1,7 +1,7 @@
 """Presses of one body at finite strain with several friction laws, in groups that share tangents.
 
-A group solves every increment with all of its presses before the next.  Presses to which the tangent of the group's
-middle press is of little use wait at the increment where that shows, and go on from there in a later group.
+A group solves every increment with all of its presses before the next.  Presses that converge slowly with the
+tangent of the group's middle press stop before that increment, and continue from there in a later group.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class _Presses:
         self._loads = prescribed_forces(legs)
 
     def advanced(self) -> list[int]:
-        """Press to the end what shares the tangents of the middle press; returns the numbers of what has ended."""
+        """Finish the presses that share the tangents of the middle one; return the numbers of all that have ended."""
         ended: list[int] = []
         behind = min(len(self.steps[number]) for number in self.running)
         members = [number for number in self.running if len(self.steps[number]) == behind]

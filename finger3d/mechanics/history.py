@@ -111,7 +111,7 @@ class StepResult:
     `meshed_state` is the state of the meshed part (c points), from which fields are recovered; `moment` (3,), N mm,
     is that of all contact forces on the finger about the middle of the base; `penetration_mm` is how deep the deepest
     contact point is inside the object, or the deepest place of the free surface (`finger3d.mechanics.coverage`);
-    `detail` is what else is known of a failure. `gauges` are strains, `markers` displacements (d,) in mm, `taxels`
+    `detail` describes a failure. `gauges` are strains, `markers` displacements (d,) in mm, `taxels`
     pressures in MPa, all by name.
     """
 

@@ -1,11 +1,11 @@
 """One increment of contact between a linear body and an object, along the true normals of the object.
 
 The displacement U of the contact points is linear in their forces, U = W f + U_past, and the gap and the normal of each
-point follow from its present place.  In turn, contact is solved with gaps linearised at a displacement, and the
-displacement is found from the forces, until both agree.  Without curvature and turns one solution is exact.
+point follow from its present place.  Contact is solved with gaps linearised at a displacement, and the
+displacement is updated from the forces, until both agree.  Without curvature and rotation one solution is exact.
 
-At an edge of the object the normal of a point may jump.  Where directions do not settle, they are held: every normal
-between those of the adjacent faces is one of the edge (its generalised gradient, Clarke 1983).
+At an edge of the object the normal of a point may jump.  Where directions do not converge, they are held fixed: every
+normal between those of the adjacent faces is one of the edge (its generalised gradient, Clarke 1983).
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ if TYPE_CHECKING:
     from finger3d.mechanics.problem import Problem
 
 _TARGET = 1e-9
-"""Error of the geometry at which the iteration ends; below `TOLERANCE` by what the residual may add."""
+"""Error of the geometry at which the iteration ends; below `TOLERANCE`, to which other errors add."""
 
 _ITERATIONS = 30
 """Largest number of solutions of an increment."""
 
 _HOLD_FROM, _HOLD_ABOVE = 4, 1e-4
-"""Iteration from which mean gradients of the distance are held that still change by more than this."""
+"""Iteration from which mean gradients of the distance are held fixed if they still change by more than this."""
 
 _NEAR = 0.05
 """Distance, over the depth, within which points are evaluated again while an increment is solved."""
@@ -245,8 +245,8 @@ class _Increment:
     def passes_through(self, displacement: Float) -> bool:
         """Whether a contact point would enter the object and leave it again on the way to a displacement (c, d).
 
-        It leaves in the direction of the surface's normal.  Along the chord of an arc, on which a point slides over a
-        round object, that is nearly across the way.
+        A point leaves the object roughly along the surface's normal.  One that slides over a round object moves along
+        the chord of an arc, nearly perpendicular to the normal, and does not count.
         """
         problem, thing = self.problem, self.problem.model.object
         before, after = problem.placed(self.a), problem.placed(self.b)

@@ -72,8 +72,7 @@ class MeshOptions:
     `layers` is the least number of layers of a swept mesh over half the width; one layer cannot follow the bulge of a
     free end.  `grading` prescribes edge lengths inside the body, as a refinement towards a goal finds them.
     `gauge_refinement` is the edge length at the contact over that around gauges and on the contact face close to them;
-    at 1 they change no mesh.
-    `refined_gauges` names those that it is for; empty: all.
+    at 1 the mesh is not refined.  `refined_gauges` are the names of the gauges concerned; empty for all.
     """
 
     size_mm: float
@@ -126,7 +125,7 @@ class EmbeddedBars:
         return sp.csr_matrix(along @ self.relative)
 
     def at_finite_strain(self, yielding: Float) -> Bars:
-        """Return the bars at finite strain, in surroundings that yield by (s, s) beyond the mesh."""
+        """Return the bars at finite strain, with a compliance (s, s) of their surroundings that the mesh lacks."""
         return Bars(self.directions, self.relative, self.bar_stiffness, yielding)
 
     def subgrid_compliance(self, compliance: Float) -> Float:
@@ -248,7 +247,7 @@ class Model:
 
     @property
     def readings(self) -> tuple[Reading, ...]:
-        """All readings, in the order of their rows; inclusions read the gauges, the last."""
+        """All readings, in the order of their rows; gauges come last, next to the rows of inclusions."""
         return (*self.markers, *self.taxels, *self.other_readings, *self.gauges)
 
     @property

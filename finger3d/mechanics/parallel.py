@@ -18,7 +18,7 @@ Variant = TypeVar("Variant")
 Result = TypeVar("Result")
 
 _ROWS_FOR_THREADS = 1000
-"""Contact rows from which presses at once are quicker than in turn; below that their time is spent in Python."""
+"""Contact rows from which concurrent presses are faster than sequential ones; below, most time is spent in Python."""
 
 
 def map_parallel(

@@ -42,7 +42,13 @@ class Relaxation(Protocol):
 
 @dataclass(frozen=True)
 class InternalVariables:
-    """Internal variables: the shape of the body as a vector (k,), and the part of it that no branch has relaxed."""
+    """Internal variables of a relaxing body.
+
+    Attributes
+    ----------
+    elastic : (k,) present elastic response, such as displacements or stresses
+    branches : (b, k) the part of it in each branch that has not relaxed yet
+    """
 
     elastic: Float
     branches: Float
@@ -58,7 +64,7 @@ class InternalVariables:
 
 @dataclass(frozen=True)
 class Step:
-    """A Prony series over a step of `seconds`, in which the shape moves at a constant rate."""
+    """A Prony series over a step of `seconds`, in which the elastic response changes at a constant rate."""
 
     prony: Prony
     seconds: float
@@ -69,17 +75,17 @@ class Step:
 
     @property
     def decay(self) -> Float:
-        """e_i: what is left of a branch at the end."""
+        """e_i: the fraction of each branch that remains at the end."""
         return np.exp(-self._rates)
 
     @property
     def gain(self) -> Float:
-        """g_i gamma_i: what a branch takes of a change of shape."""
+        """g_i gamma_i: increment of each branch per change of the elastic response."""
         return np.asarray(np.array([share for share, _ in self.prony]) * exprel(-self._rates))
 
     @property
     def alpha(self) -> float:
-        """Stiffness against what moves in this step, in those of an instantaneous one."""
+        """Stiffness against a change within the step, over the instantaneous stiffness."""
         return long_time_share(self.prony) + float(self.gain.sum())
 
     def history_load(self, memory: InternalVariables) -> Float:
@@ -87,7 +93,7 @@ class Step:
         return np.asarray(self.gain.sum() * memory.elastic - self.decay @ memory.branches)
 
     def after(self, memory: InternalVariables, now: Float) -> InternalVariables:
-        """Return the internal variables at the end of the step, when the shape is `now`."""
+        """Return the internal variables at the end of the step, when the elastic response is `now`."""
         branches = self.decay[:, None] * memory.branches + self.gain[:, None] * (now - memory.elastic)
         return InternalVariables(now, branches)
 

@@ -32,10 +32,10 @@ from finger3d.mechanics.regular_points import Box, regular_points
 from finger3d.objects import ObjectPose, PlacedObject, RigidObject, initial_contact
 
 REFUSE_ABOVE, _WARN_ABOVE = 0.5, 0.1
-"""Unresolved overlap, over the depth of the press, above which a press is refused, and above which it is warned of."""
+"""Unresolved overlap, over the depth of the press, above which a press is refused, and above which it warns."""
 
 _RESOLVED = 0.05
-"""The same for the edge length that a message recommends; a mesh is less regular than the points it is found with."""
+"""The same for a recommended edge length; it is found on regular points, and those of a mesh are less regular."""
 
 _STATIONS = 4
 """Poses along each leg at which the overlap is evaluated."""

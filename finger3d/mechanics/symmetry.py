@@ -48,9 +48,9 @@ class Symmetry:
     image_of : (m,) array
         Number of the part's contact point that each point of the whole finger is an image of.
     mirror_sign : (m, d) array
-        What each local component at the part's point is multiplied with, +1 or -1.
+        Factor of each local component at the part's point, +1 or -1.
     multiplicity : (m,) array
-        How often force and area of the part's point count there: twice for each plane that the point lies on.
+        Factor of force and area of the part's point, doubled for each plane that the point lies on.
     """
 
     axes: tuple[str, ...]

@@ -19,7 +19,7 @@ from finger3d.contact.friction import OPEN, SLIP, STICK
 from finger3d.contact.state import ContactState
 
 ERROR_AT_ENDS = {"contact": 0.2, "stick": 0.3}
-"""Error of the end of a zone over the distance of its last point to the next; twice of it holds in nine cases of ten of
+"""Error of the end of a zone over the distance of its last point to the next; twice it suffices in nine of ten cases of
 validation/error_bars.py."""
 
 
@@ -62,7 +62,8 @@ def _to_limit(pressure: Float, shear: Float, status: NDArray[np.int8], beyond: i
 def _ends(x: Float, inside: NDArray[np.bool_], margin: Callable[[int], Float]) -> tuple[float, float]:
     """Return both ends of a zone of points of an ascending line.
 
-    `margin` returns, for the number of the point beyond an end, what vanishes there with the root of the distance (k,).
+    `margin` returns the quantity (k,) that vanishes at an end as the root of the distance, for the number of the point
+    beyond that end.
     """
     zone = np.flatnonzero(inside)
     if not len(zone):

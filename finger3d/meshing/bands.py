@@ -118,7 +118,7 @@ def _between(upper: Callable[[Float], Float], lower: Callable[[Float], Float]) -
 
 
 def _above_and_beside(section: Section, core: Core, part: int) -> Bands:
-    """Return a band above the line along the core's upper side, and one below it with the core and what is beside."""
+    """Return a band above the line along the core's upper side, and one below it with the core and its surroundings."""
     length, width = section.half_length_mm, core.half_length_mm
     border = width / length
 

@@ -1,4 +1,4 @@
-"""Cache of unstructured meshes, keyed by everything that shapes them; fTetWild does not reproduce its meshes."""
+"""Cache of unstructured meshes, keyed by everything that determines them; meshes of fTetWild are not reproducible."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Structured triangulation of a half section: rows of points from the contact curve down, zipped into triangles.
+"""Structured triangulation of a half section: rows of points from the contact curve down, joined by triangles.
 
 Rows run along the bands of the section. Their number and the points on them follow the size field, so triangles stay
 well shaped while they grow. Parts of a section are bands, or ranges of a band, and no triangle crosses their border.
@@ -20,7 +20,7 @@ from finger3d.meshing.grading import Grading
 RATE = 0.25
 """Growth of the edge length per length away from the contact zone."""
 
-_ASPECT = 3.0  # quadratic elements bear 5:1; zipping rows of different counts costs the rest
+_ASPECT = 3.0  # quadratic elements tolerate 5:1; joining rows with different numbers of points uses up the rest
 _PLACES, _STATIONS = 80, 400  # along the outline and in depth, where prescribed edge lengths are looked up
 
 

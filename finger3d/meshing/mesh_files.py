@@ -74,7 +74,7 @@ def read_contents(path: Path) -> MeshContents:
     Raises
     ------
     Finger3dError
-        If there is no such file, it is none of its format, or it holds other cells than tetrahedra of one order.
+        If there is no such file, it is not in its format, or it holds other cells than tetrahedra of one order.
     """
     if not path.is_file():
         raise Finger3dError(f"{path}: there is no such file")

@@ -1,8 +1,8 @@
 """Seams where CAD faces meet smoothly: a node there is placed on one of the faces, not on the seam.
 
-Two faces without a crease between them, a fillet and the flat it starts from, define no line that a node near it could
-be put on: a node of an edge length h beside the seam lies up to h^2/8R off the one or the other surface, and moved onto
-both it would slide along them, over its neighbours.
+Two faces without a crease between them, such as a fillet and the flat it starts from, define no line on which a node
+could be placed.  A node one edge length h from the seam is up to h^2/8R off one of the surfaces; moved onto both, it
+would slide along them past its neighbours.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Bool = NDArray[np.bool_]
 
 SMOOTH = np.cos(np.radians(6.0))
 """Creases below 6 degrees count as none: an edge of length h that cuts across one misses it by h/80 at most, and a node
-put onto two surfaces at a smaller angle moves by more than ten times what it was off them."""
+put onto two surfaces at a smaller angle moves by more than ten times its distance from them."""
 
 _PLANES = ("base", "symmetry_x", "symmetry_z")  # stay exactly planar, whatever runs into them
 

@@ -1,7 +1,7 @@
-"""Move boundary nodes of a tetrahedral mesh onto the CAD faces, which fTetWild leaves by up to its envelope.
+"""Move boundary nodes of a tetrahedral mesh onto the CAD faces, from which fTetWild deviates by up to its envelope.
 
-A boundary facet belongs to the CAD face it is nearest to and parallel with; a node belongs to the faces of its facets,
-and goes where these surfaces meet; of faces that join smoothly there it goes onto the nearest. Mid-edge nodes likewise.
+A boundary facet belongs to the CAD face it is nearest to and parallel with; a node belongs to the faces of its facets
+and is moved to where they meet; of faces that join smoothly only the nearest counts. The same holds for mid-edge nodes.
 A facet between two parts of a body belongs to a CAD face between these parts.
 """
 
@@ -253,8 +253,11 @@ def _collapse_edge(points: Float, tets: Int, sets: Bool, part: Int | None, cell:
 
 
 def _snap_mid_edge_nodes(mesh: Mesh, owner: Int, known: Bool, seams: Seams) -> Mesh:
-    """Move the mid-edge nodes of boundary facets onto CAD faces: those that own (m,) the facets that hold the edge, or
-    what these join smoothly if that is nearer and an end of the edge, known (n, f), is on it."""
+    """Move the mid-edge nodes of boundary facets onto the CAD faces (m,) of these facets.
+
+    A face that joins one of them smoothly is used instead if it is nearer and an end of the edge lies on it, which
+    `known` (n, f) states.
+    """
     faces = np.vstack(list(mesh.facets.values()))
     sets = np.zeros((len(mesh.points), len(seams.faces)), dtype=bool)
     sets[faces[:, 3:].ravel(), np.repeat(owner, 3)] = True

@@ -1,4 +1,4 @@
-"""What the unstructured meshers share: solids and size field before they run, checks and snapping after."""
+"""Common steps of the unstructured meshers: solids and size field before they run, checks and snapping after."""
 
 from __future__ import annotations
 

@@ -97,7 +97,7 @@ def _body(design: Design, symmetry: tuple[str, ...], field: Sizing) -> tuple[Tes
     surfaces += [surface_of(f.face) for f in glued.faces] if glued else []
     radius = min(getattr(surface, "radius", math.inf) for surface in surfaces)
     diagonal = float(np.linalg.norm(field.high - field.low))
-    # With an envelope below the sagitta of the longest edge a hemisphere takes 20 times as long and gets too fine.
+    # With an envelope below the sagitta of the longest edge a hemisphere takes 20 times as long, with too fine a mesh.
     least, usual, most = _ENVELOPE
     epsilon = min(
         max(usual, field.base_mm**2 / (8.0 * radius * diagonal)), most, _ENVELOPE_SHARE * field.size_mm / diagonal
@@ -172,7 +172,7 @@ def run_child(
 ) -> tuple[Float, Int]:
     """Run pytetwild in a child process; `keep_outside` keeps the cells outside the surface, up to a box around it.
 
-    With triangles inside the body pytetwild could not tell inside and outside, which it does by winding numbers.
+    pytetwild finds the inside by winding numbers, which triangles inside the body would make ambiguous.
     """
     extent = np.ptp(points, axis=0)
     bg_points, bg_tets, bg_values = field.background()

@@ -1,4 +1,4 @@
-"""A test button of the same batch of silicone, and the scene of the press that tells Young's modulus from it.
+"""A test button of the same batch of silicone, and the scene of the press that determines its Young's modulus.
 
 The button is a cylinder of the standard sizes of compression tests, ISO 815-1: 29 mm in diameter and 12.5 mm high
 (type A), or 13 mm and 6.3 mm (type B). It is cast in a ring on a floor, levelled with a straight edge, glued to a
@@ -24,7 +24,7 @@ SIZES = ((29.0, 12.5), (13.0, 6.3))
 
 _COMPRESSION = 0.1  # depth of the press over the height, where rubbers are still nearly linear
 _STEPS = 5
-_RANGE = 5.0  # of Young's modulus that is searched, as a factor both ways
+_RANGE = 5.0  # bounds of the search: Young's modulus over and times this factor
 _RECESS_MM = 1.5  # of the floor, in which the ring stands
 _EDGE = 0.1  # edge length of the mesh over the diameter
 _RING_RIMS = 2.5  # wall of the ring over the least rim

@@ -155,7 +155,7 @@ def mixing_lines() -> list[str]:
 
 
 def inhibition_lines() -> list[str]:
-    """Return what stops the cure of platinum silicones, and what to do about it."""
+    """Return the lines on cure inhibition of platinum silicones and how to prevent it."""
     return [
         "CURE INHIBITION",
         "  Sulphur (latex, some clays), tin (condensation silicones), amines (hardeners of epoxy) and uncured printing",

@@ -1,4 +1,4 @@
-"""Whether the halves of a mold can be removed from the cast body: undercuts and draft, in numbers.
+"""Draft and undercuts of a cast body, which decide whether the halves of the mold can be removed from it.
 
 The draft of a place of the surface is the angle between the surface and the opening direction; walls without draft
 rub along the cast body over their whole length. An undercut is a place where the half cannot move along the opening

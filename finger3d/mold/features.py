@@ -1,4 +1,4 @@
-"""What a feature of a mold adds to its parts and cuts from them."""
+"""Features of a mold: solids that are added to its parts or cut from them."""
 
 from __future__ import annotations
 

@@ -91,7 +91,7 @@ class MoldOptions:
     coupon
         Also a fit coupon: a peg, and holes with several clearances.
     button
-        Also a mold of a test button, whose press tells E of the batch.
+        Also a mold of a test button, whose press determines E of the batch.
     foil_length_mm
         Length of a gauge's foil where the scene has length_mm = 0.
     foil_thickness_mm

@@ -27,7 +27,7 @@ _BASE_HEIGHT = 1e-4  # over the body's height: where its base is cut
 _LEVEL = 5e-3  # over the length of a base: corners as far out as the outermost, of a rounded end too
 _VENT_INSET = 0.6  # distance of a vent's middle from the edge of the base over its diameter
 _LEAST_POUR_MM = 1.0
-_LEAST_CUP_MM = 2.0  # height of a riser that its share does not need
+_LEAST_CUP_MM = 2.0  # least height of the cylinder above a riser's cone
 _SPIGOT = 0.5  # length of the riser's spigot, over the thickness of the lid
 
 

@@ -1,4 +1,4 @@
-"""What a slicer sees of a part: whether it is closed, where it is thin, and whether a layer begins in the air."""
+"""Printability of a part: whether it is closed, where it is thin, and whether a layer begins without support."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _LEAST_OVERLAP = 1e-6  # of an island's area that must lie on the layer below
 
 @dataclass(frozen=True)
 class PrintCheck:
-    """A part as a slicer sees it.
+    """Result of the printability checks of a part.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""First touch of finger and object, and paths that are refused."""
+"""First touch of finger and object, and checks of the object's path."""
 
 from __future__ import annotations
 

@@ -102,8 +102,8 @@ class PlacedObject:
     def _traced(self, x: Float, z: Float) -> Float:
         """Follow vertical lines up to the surface by steps that cannot pass it.
 
-        Steps have the length of a lower bound of the distance; for a convex body they are Newton's, whose zero is never
-        beyond that of a convex function.
+        Steps have the length of a lower bound of the distance; for a convex body they are Newton steps, which never
+        overshoot the zero of a convex function.
         """
         at = np.stack([x, np.full(len(x), -_LOWEST_START), z], axis=1)
         out = np.full(len(x), np.nan)

@@ -71,8 +71,8 @@ class RigidObject(ABC):
     x_mm, z_mm : where the object's lowest point is
     turn_x, turn_y, turn_z : pose that it comes in, turned about x, then y, then z, all fixed axes
 
-    Constants of the class: `has_section` tells whether there is one at z = 0, `is_face` whether the object is the lower
-    face of a body of any height, and `body_mesher` how `held_body` is meshed in 3D.
+    Constants of the class: `has_section` states whether there is a section at z = 0, `is_face` whether the object is
+    the lower face of a body of any height, and `body_mesher` how `held_body` is meshed in 3D.
     """
 
     has_section: ClassVar[bool] = True
@@ -93,7 +93,7 @@ class RigidObject(ABC):
         """
 
     def clearance(self, points: Float) -> Float:
-        """Return a lower bound (n,) mm of the distance of points (n, 3), and at most it where that is negative."""
+        """Return a bound (n,) mm of the signed distance of points (n, 3), of its sign and at most its magnitude."""
         return self.distance(points)[0]
 
     @abstractmethod

@@ -19,7 +19,7 @@ class DistanceTracker:
     """
 
     def __init__(self) -> None:
-        """Know no distance."""
+        """Start without known distances."""
         self._at: Float | None = None
         self._value = self._gradient = np.zeros(0)
         self._known = np.zeros(0, dtype=bool)

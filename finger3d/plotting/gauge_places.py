@@ -1,4 +1,4 @@
-"""map.png of several gauges: what a gauge at each place adds to the others."""
+"""map.png of several gauges: the standard deviation of mu if one of them is moved to another place."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _CHOSEN, _OTHER = "#c0392b", "#222222"
 
 @dataclass(frozen=True)
 class GaugeMap:
-    """A gauge at x, y (mm) and an angle (rad), and the standard deviation of mu with it anywhere else.
+    """A gauge at x, y (mm) and an angle (rad), and the standard deviation of mu if it is moved elsewhere.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""calibration.png of several readings: their curves, the standard deviation of mu, and what would reduce it."""
+"""calibration.png of several readings: their curves, the standard deviation of mu, and reductions of its variance."""
 
 from __future__ import annotations
 

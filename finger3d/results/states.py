@@ -24,7 +24,7 @@ _MOST_TRIANGLES = 20_000
 """Triangles of the object that are kept for pictures, at most."""
 
 MOST = 10
-"""Increments kept: each costs a solution with the factor at hand, and a displacement of every node on disk."""
+"""Largest number of stored increments; each costs a back substitution, and a displacement of every node on disk."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class States:
     def on_points(self, name: str, k: int, face: int | None = None) -> Array:
         """Return a contact field of the k-th kept increment at all points (n,), 0 where there are no contact points.
 
-        It is that of the contact points of one face, or of all: at a crease, that with the larger pressure.
+        Values are those of one face, or of all faces; at a crease, of the face with the larger pressure.
         """
         values, own = getattr(self, name)[k], np.argsort(self.pressure[k], kind="stable")
         out = np.zeros(len(self.points), dtype=values.dtype)

@@ -26,14 +26,14 @@ than 1 % of the force in both, and .3 % of a gauge in a section (validation/cost
 _MOST_MARKERS = 20_000
 
 _ACROSS = {"swept": 20.0, "ftetwild": 30.0, "netgen": 30.0}
-"""Edges across the overlap of a curved object, which is some 1.4 times as wide as the contact. Between the points at
-the edge of contact the object enters by 0.8 times (edges across)^-1.6 of the depth in the median of 38 presses of
-random solids, and by less than 1 % from 20 on, but at sharp tips and at rims of the finger. Edges of unstructured
-meshes differ in length, and leave as much at 1.5 times as many."""
+"""Number of edges across the overlap of a curved object, which is about 1.4 times as wide as the contact. Penetration
+between points at the edge of contact has, over 38 presses of random solids, a median of 0.8 (edges across)^-1.6 times
+the depth, and is below 1 % of it from 20 edges on, except at sharp tips and at rims of the finger. Unstructured meshes,
+whose edges differ in length, need 1.5 times as many."""
 
 _LEAST_ACROSS = 12.0
-"""The same where the overlap ends at edges of the finger or the object, between which contact fills it; the least
-number in a wavelength."""
+"""The same if the overlap ends at edges of the finger or the object, and contact extends over all of it; also the least
+number of edges in a wavelength."""
 
 _PER_WAVE = 25.0
 """Edges in a wavelength, whose crests touch over up to some 0.8 of it."""

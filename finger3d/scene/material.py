@@ -71,8 +71,8 @@ def with_modulus(table: ElasticTable) -> Tree:
 def replace_modulus(tree: Tree, changed: Iterable[str]) -> None:
     """Remove from tables of `tree` the keys that changed ones replace, in place.
 
-    A modulus given on the command line takes the place of what the file gives for it, and keeps the Poisson's ratio
-    that the file means.
+    A modulus given on the command line replaces the modulus, hardness or silicone of the file; the Poisson's ratio
+    given or implied by the file is kept.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def modulus_of(tree: Mapping[str, object], key: str) -> float | None:
     try:
         return ElasticTable.model_validate(dict(table)).constants.E_MPa
     except (Finger3dError, ValueError):
-        return None  # a mistake that the check of the whole scene tells
+        return None  # the check of the whole scene reports the mistake
 
 
 def _table(tree: Mapping[str, object], where: Iterable[str]) -> Any:

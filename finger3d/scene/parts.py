@@ -15,7 +15,7 @@ _NU_OF_RIGID = 0.3  # of a material that hardly deforms, any does
 def parts_of(tables: SceneTable) -> tuple[tuple[str, Material], ...]:
     """Return label and material of every part with a table of its own.
 
-    A rigid part is one whose Young's modulus is `RIGID_RATIO` times the largest of the others.
+    Young's modulus of a rigid part is `RIGID_RATIO` times the largest of the elastic materials.
     """
     elastic = {label: part.constants for label, part in tables.parts.items() if not part.rigid}
     stiffest = max(one.E_MPa for one in (tables.material.constants, *elastic.values()))
@@ -34,7 +34,7 @@ def largest_spread(tables: SceneTable) -> float | None:
 
 
 def moduli(tables: SceneTable) -> dict[str, str]:
-    """Return Young's modulus of the finger and of its parts in words, with spread and origin, by what it is of."""
+    """Return Young's modulus of the finger and of its parts as text with spread and origin, by the name of the part."""
     found = {"modulus": str(tables.material.constants)}
     for label, part in tables.parts.items():
         found[f"modulus of {label}"] = "rigid" if part.rigid else str(part.constants)
@@ -42,7 +42,7 @@ def moduli(tables: SceneTable) -> dict[str, str]:
 
 
 def check_parts(tables: SceneTable, design: Design) -> list[str]:
-    """Return a line about every table of a part that the finger lacks, or that says too little or too much."""
+    """Return a line about every table whose part the finger lacks, or that has too few or too many keys."""
     lines = []
     for label, part in tables.parts.items():
         place = ("parts", label)

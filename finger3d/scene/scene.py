@@ -108,7 +108,7 @@ class Scene:
     def with_mesh(self, mesh: MeshOptions) -> Scene:
         """Return the scene with edge lengths in place of a tolerance.
 
-        A graded mesh has no edge lengths that a scene could name: the scene keeps its tolerance, and finds them again.
+        A scene cannot state the edge lengths of a graded mesh: it keeps its tolerance, from which they are found again.
         """
         if mesh.grading is not None:
             return replace(self, mesh=mesh)
@@ -221,7 +221,7 @@ class _Parts:
         Raises
         ------
         Finger3dError
-            If the object's way into the finger is none that the contact conditions can describe.
+            If the contact conditions cannot describe the object's motion into the finger.
         """
         domain = self.tables.model.domain
         legs = legs_of([dict(leg) for leg in self.legs], self.design, self.object, self.tables)
@@ -346,7 +346,7 @@ def _named(
         return "", None
     if name == "finger" and files.is_file(value):
         if not Path(value).exists():
-            # Told alone: the other keys may well be those of the design that the file was to replace.
+            # Reported alone: the other keys may be those of the design that the file replaces.
             found[name, key] = (
                 f"{name}.{key}: {value}: there is no such file; give its path from the scene's folder, or a design: "
                 f"{listed(known)}"

@@ -43,7 +43,7 @@ FEWEST = 4  # points: three make the second-order fit, one more its residual
 
 _CUTS = 32  # grid points between two calibrated mu
 
-_SHARPER = 4.0  # halving the spacing divides the error of an interpolation of second order, where PCHIP is at extrema
+_SHARPER = 4.0  # ratio of interpolation errors for half the spacing at second order, the order of PCHIP at extrema
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Fit:
 class Range:
     """Interval of mu in which the curve is monotone and the resolution is within the limit.
 
-    `elsewhere` are the stretches outside where the same strains occur: there a reading has two answers.
+    `elsewhere` are the intervals outside it in which the same readings occur, so that they are ambiguous.
     """
 
     low: float
@@ -95,7 +95,7 @@ class Calibration:
     noise : standard deviation of a reading
     limit : resolution of mu beyond which the gauge is called blind
     failed : (mu, why) of the points that did not converge
-    scene, hash : what was pressed, and 16 digits that tell it from another scene
+    scene, hash : what was pressed, and 16 digits that identify the scene
     about : domain, effects, dofs, seconds, versions
     """
 

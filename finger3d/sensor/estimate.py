@@ -64,7 +64,7 @@ def estimate(
         where readings of broken sensors may be left out
     std : standard deviation of each, 0 allowed; None: the noise of the calibration
     curve : whether to invert the monotone interpolation or the second-order fit, of a single gauge
-    tolerances : whether what is not known exactly counts; not for a sensor whose own curve was measured
+    tolerances : whether tolerances count; they do not for a sensor whose own curve was measured
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""calibration.json: written at once, and refused in one line if it is damaged or of another version."""
+"""Reading and writing of calibration.json; a damaged file or another version raises an error of one line."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def _mu_sd(c: Calibration, number: int) -> np.ndarray[tuple[int, ...], np.dtype[
 
 
 def write_table(calibration: Calibration | JointCalibration, path: Path) -> None:
-    """Write calibration.csv: every mu with its readings and what they leave of the variance of mu."""
+    """Write calibration.csv: every mu with its readings, their slopes, and standard deviations of mu."""
     from finger3d.io import write_csv
 
     c = calibration

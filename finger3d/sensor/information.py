@@ -1,4 +1,4 @@
-"""Fisher information of readings about mu, with what is not known exactly marginalised.
+"""Fisher information of readings about mu, with the tolerances marginalised.
 
 The unknowns are mu and the tolerances that all readings share, each in units of its standard deviation.  A reading with
 slope s against mu, effects f of the shared tolerances, and variance d of its own adds ``v v^T / d`` with v = (s, f) to
@@ -16,7 +16,7 @@ from finger3d._types import Float
 
 @dataclass(frozen=True)
 class ReadingEffects:
-    """What changes candidates for a reading (c) at several mu (m).
+    """Effects of mu and tolerances on candidates for a reading (c), at several mu (m).
 
     Attributes
     ----------

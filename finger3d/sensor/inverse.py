@@ -2,11 +2,11 @@
 
 With a standard deviation s(mu) of a reading about the curve e(mu), the 68 % set of a strain is ``|strain - e(mu)| <=
 s(mu)``: it holds the true mu as often as a normal error stays within one standard deviation, whatever the curve looks
-like (the inversion of a test, Neyman 1937).  Where the curve turns, it is two intervals, and both are named.
+like (the inversion of a test, Neyman 1937).  Where the curve is not monotone, it may be two intervals, both reported.
 
-The standard deviation of mu is the root mean square distance from the value told, over the likelihood of mu in the
+The standard deviation of mu is the root mean square distance from the reported value, over the likelihood of mu in the
 calibrated range, ``exp(-((strain - e(mu)) / s(mu))^2 / 2) / s(mu)``.  On a straight curve that is ``s / |de/dmu|``.
-Where a flat part is near, a reading that noise took from there to a steep part is told with the spread of both.
+Near a flat part of the curve it includes the spread there, since noise may move a reading from a flat to a steep part.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from finger3d.sensor.curve import LARGEST_STRAIN, Calibration, Shape
 
 Status = Literal["ok", "coarse", "ambiguous", "above", "below", "outside", "blind"]
 
-_CHUNK = 256  # readings at a time: each asks the whole grid
+_CHUNK = 256  # readings at a time: each is compared with the whole grid
 _MERGE_TOLERANCE = 1e-9
 _LEAST_SD = 1e-12  # of strain, where nothing is uncertain
 _MARGIN, _NODES = 4.0, 129  # of integrals over an interval: margin on each side, in its widths, and nodes
@@ -52,7 +52,7 @@ class Estimate:
     mu, std : nan unless the status is "ok" or "coarse"; std is the spread of the likelihood about mu
     low, high : ends of the 68 % set; infinite or 0 where the calibration does not reach, nan where it is empty
     status : ok; coarse: worse than the calibration's limit; ambiguous: several answers; above, below: beyond the end of
-        what can be told apart; blind: nothing can; outside: no mu has this strain
+        the range in which mu is resolved; blind: no mu is resolved; outside: no mu has this strain
     verdict : the same in words
     candidates : one for each interval of the 68 % set
     """

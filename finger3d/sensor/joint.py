@@ -109,7 +109,7 @@ class JointCalibration:
         Parameters
         ----------
         noise : (k,) standard deviations in place of those of the calibration
-        tolerances : whether what is not known exactly counts
+        tolerances : whether tolerances count
         without : name of a tolerance that is known exactly, or ``"noise"``
         """
         at = np.atleast_1d(np.asarray(mu, dtype=float))
@@ -192,7 +192,7 @@ def joint_summary(calibration: JointCalibration) -> list[tuple[str, str]]:
 
 
 def _alone(calibration: Calibration, mu: float) -> str:
-    """Return the standard deviation of mu by one reading, in words where it tells nothing."""
+    """Return the standard deviation of mu by one reading, in words where it contains no information."""
     sd = float(calibration.mu_sd([mu])[0])
     return f"{sd:.2g}" if np.isfinite(sd) else "tells nothing there"
 

@@ -3,7 +3,7 @@
 With the residual ``d(mu) = r - e(mu)`` of the readings r and their covariance C(mu), the likelihood of mu is ``exp(-d^T
 C^-1 d / 2) / sqrt(det C)``.  Normalised over the calibrated range it gives the mean of mu, its standard deviation, and
 the smallest set that holds 90 % (a credible set for a mu that may lie anywhere in the range).  Where the likelihood
-has several peaks, that set is several intervals, and all are named.
+has several peaks, that set is several intervals, all of which are reported.
 
 The smallest ``d^T C^-1 d`` follows a chi-square distribution with one degree of freedom less than there are readings,
 if these are of one press; readings with a p-value below 0.001 are said to contradict each other.
@@ -26,7 +26,7 @@ from finger3d.sensor.joint import JointCalibration
 JointStatus = Literal["ok", "coarse", "ambiguous", "above", "below", "outside", "blind", "contradiction"]
 
 CREDIBLE = 0.9
-"""Share of the likelihood in the set that is told."""
+"""Share of the likelihood in the reported set."""
 
 LEAST_P = 1e-3
 """Probability of so large a chi-square below which readings are said to contradict each other."""
@@ -47,8 +47,8 @@ class JointEstimate:
     low, high : ends of the 90 % set; 0 or infinite where it reaches an end of the calibrated range
     intervals : of the 90 % set, ascending
     status : ok; coarse: worse than the calibration's limit; ambiguous: several intervals; above, below: beyond the end
-        of what can be told apart; blind: nothing can; outside: no mu has these readings; contradiction: they are not of
-        one press
+        of the range in which mu is resolved; blind: no mu is resolved; outside: no mu has these readings;
+        contradiction: they are not of one press
     chi_square, p_value : of the test that the readings agree; the p-value of one reading tests whether it is in range
     verdict : the same in words
     """
@@ -114,7 +114,7 @@ class _Likelihood:
 
 @dataclass(frozen=True)
 class JointEstimator:
-    """What all estimates from the same readings share: curves, inverse covariance and its determinant on the grid.
+    """Data shared by all estimates from the same readings: curves, inverse covariance and its determinant on the grid.
 
     Attributes
     ----------
@@ -232,7 +232,7 @@ class JointEstimator:
         return text if status == "ok" else f"{text}: coarser than the limit of {c.limit:g}"
 
     def _contradiction(self, found: _Likelihood, reading: Float, p_value: float) -> str:
-        """Say that readings contradict each other, and without which one the others agree."""
+        """Return the verdict that readings contradict each other, and without which one the others agree."""
         c, text = self.calibration, ""
         for i, name in enumerate(c.names if len(c.names) > 2 else ()):
             others = [j for j in range(len(reading)) if j != i]

@@ -1,7 +1,7 @@
 """Maps of strain over a section for several values of mu, which show where a gauge is sensitive to mu.
 
-The displacement is linear in the contact forces, so the kept factor gives the field of every mu for one solve.  It is
-read at the middle of every square of a grid, inside the cell that holds it, as a point gauge there would be.
+The displacement is linear in the contact forces, so one solution with the stored factor gives the fields of all mu.
+The strain is evaluated at the middle of every square of a grid, inside the cell that holds it, as for a point gauge.
 """
 
 from __future__ import annotations

@@ -53,7 +53,7 @@ def _hyperelastic(law: IsochoricLaw, d1: float) -> tuple[str, ...]:
             c1 = 0.5 * law.shear
             return _cards("YEOH", [c1, c1 * law.c2_over_c1, c1 * law.c3_over_c1, d1, 0.0, 0.0])
         case Ogden() if len(law.terms) <= MOST_TERMS:
-            # sum of 2 mu / alpha^2 (l1^alpha + ...) there, of mu / alpha with mu = 2 share G / alpha here
+            # CalculiX sums 2 mu / alpha^2 (l1^alpha + ...); this project mu / alpha (...) with mu = 2 share G / alpha
             terms = [number for share, alpha in law.terms for number in (share * law.shear, alpha)]
             return _cards(f"OGDEN, N={len(law.terms)}", [*terms, d1, *[0.0] * (len(law.terms) - 1)])
         case Ogden():

@@ -1,4 +1,4 @@
-"""Rigid objects as elements behind their surface, of which those are kept that come near the finger.
+"""Rigid objects as elements behind their surface; elements that never come near the finger are omitted.
 
 A plane is one hexahedron (in a section, a quadrilateral).  The others are facets that follow the surface within a
 sagitta: the pieces of a section swept along its axis, each with a hexahedron behind it, or triangles, each with a
@@ -179,7 +179,7 @@ def _sphere(radius: float, sagitta: float) -> Facets:
 def _backed(obj: RigidObject, facets: Facets) -> tuple[Float, str, Int]:
     """Return nodes (k, 3), type and elements (m, n) behind the facets; the first face of each is its facet.
 
-    Corners are ordered so that the inner nodes lie on the side to which they turn counterclockwise.
+    Seen from its inner nodes, the corners of a facet run counterclockwise; a segment has them on its left.
     """
     corners = facets.points[facets.faces]
     count, sides = facets.faces.shape

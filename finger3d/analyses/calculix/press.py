@@ -33,27 +33,27 @@ _SAGITTA = 1e-3  # of the facets of the object, over the depth
 _MARGIN = 2.0  # around the finger at rest, in depths of the press: facets of the object beyond it are left out
 
 _SLICE = 1e-3
-"""Thickness of a section in plane stress, over its height.  CalculiX makes a layer of solids of it, which bulges: as
-wide as it is high its force was off by 6 %, and so thin by 0.06 %."""
+"""Thickness of a section in plane stress, over its height.  CalculiX makes a layer of solids of it, which bulges: the
+error of the force was 6 % with a thickness equal to the height, and 0.06 % with this one."""
 
 _EFFECTS = {
     "relaxation": "viscosity",
     "inclusions": "embedded_gauge",
     "object_compliance": "elastic_object",
 }
-"""Slots of a model, and the effects that fill them, which a deck has no equal of."""
+"""Slots of a model that have no equivalent in a deck, and the effects that fill them."""
 
 
 @dataclass(frozen=True)
 class PressDeck:
-    """A deck with what belongs to it.
+    """An input deck, the report on its mesh, and remarks.
 
     Attributes
     ----------
     deck : of the meshed part
     report : size and quality of the mesh
     multiple : forces on the whole finger over those on the part, for components along no mirrored axis
-    remarks : where the deck is not the press to the letter, a line each
+    remarks : differences between the deck and the press, a line each
     """
 
     deck: Deck
@@ -106,7 +106,7 @@ def press_deck(model: Model, title: str = "", say: Callable[[str], None] = lambd
 
 
 def _check(model: Model) -> None:
-    """Refuse what CalculiX has no equal of, by the name of the effect or the key."""
+    """Raise a Finger3dError that names an effect or a key without an equivalent in CalculiX."""
     for slot, effect in _EFFECTS.items():
         if getattr(model, slot) is not None:
             raise Finger3dError(f"--solver calculix: CalculiX has no equal of [effects.{effect}]; take it out")

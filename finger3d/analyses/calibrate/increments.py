@@ -2,7 +2,7 @@
 
 The error of N equal increments decreases about as 1/N, but the readings of N and 2N increments, or of N and 4N, often
 agree by chance.  The error is therefore estimated from several pairs of runs, each scaled to N, and the largest counts.
-Extrapolation in 1/N would leave 0.4 to 1.9 of the error (``validation/calibration_z_scores.py``) and is not used.
+Extrapolation in 1/N is not used: its error would be 0.4 to 1.9 times as large (``validation/calibration_z_scores.py``).
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ def pairwise_error(readings: Mapping[float, Float], count: float) -> Float:
 
 
 def choose_increments(problem: Problem, read: Read) -> Increments:
-    """Return the increments that a path gives, or double them until their error is small relative to the noise.
+    """Return the given increments of a path, or double automatic ones until their error is small relative to the noise.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def choose_increments(problem: Problem, read: Read) -> Increments:
 
 
 def _ratios(problem: Problem, chosen: bool) -> tuple[float, ...]:
-    """Return the ratios of increments, to those of the problem, that the error is estimated from."""
+    """Return the numbers of increments, relative to the problem's, from which the error is estimated."""
     if chosen:
         return 0.25, 0.5
     if problem.model.formulation.finite_strain:
@@ -122,7 +122,7 @@ def _ratios(problem: Problem, chosen: bool) -> tuple[float, ...]:
 
 
 def scale_increments(problem: Problem, ratio: float) -> tuple[float, Problem]:
-    """Return the ratio after rounding, and the problem with so many times as many increments."""
+    """Return the ratio after rounding, and the problem with its numbers of increments multiplied by it."""
     legs = problem.model.legs
     scaled = tuple(replace(leg, steps=max(1, round(ratio * int(leg.steps)))) for leg in legs)
     actual = sum(int(leg.steps) for leg in scaled) / sum(int(leg.steps) for leg in legs)

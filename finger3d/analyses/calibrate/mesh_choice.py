@@ -23,15 +23,15 @@ SHARE = 0.1
 """Largest share of the mesh in the variance of mu."""
 
 LONGEST_S = 60.0
-"""Estimated seconds of a calibration beyond which a finer mesh is named, and not made."""
+"""Estimated time of a calibration, s, beyond which a finer mesh is recommended but not used."""
 
 _FINER, _FINEST, _COARSEST = 0.9, 0.3, 0.8
-"""Edges of the next mesh over those that the order of convergence asks for, and bounds over those of the last."""
+"""Edge length of the next mesh relative to that from the order of convergence, and bounds relative to the last mesh."""
 
 
 @dataclass(frozen=True)
 class CalibratedMesh:
-    """A calibration, its presses, and what its mesh leaves to be wished for, in words; empty if nothing."""
+    """A calibration, its presses, and a note on its mesh, which is empty if the mesh is fine enough."""
 
     curve: CurvePoints
     calibration: Calibration | JointCalibration
@@ -88,7 +88,7 @@ def choose_mesh(
 
 
 def _finer(model: Model, share: float) -> Model:
-    """Return the model with edges that leave the mesh its allowed share, by the order of convergence."""
+    """Return the model with edges for which the mesh error has its allowed share, by the order of convergence."""
     excess = share * (1.0 - SHARE) / (SHARE * max(1.0 - share, 1e-6))
     ratio = min(max(_FINER * excess ** (-0.5 / ORDER), _FINEST), _COARSEST)
     mesh = replace(model.mesh, size_mm=ratio * model.mesh.size_mm, base_size_mm=ratio * model.mesh.base_size_mm)

@@ -59,7 +59,7 @@ class ReferenceBody:
         return np.asarray(read(problem, self.names, self.mu, initial or self.pressed) - self.readings)
 
     def rebuilt(self, **changes: Any) -> Problem:
-        """Return the body with a changed model, and without other readings, but for gauges that stiffen it."""
+        """Build the body with a changed model; other readings are omitted, except gauges that stiffen the body."""
         return built_like(self.problem, replace(reading_only(self.problem.model, self.names), **changes))
 
 

@@ -50,7 +50,7 @@ _FILES = ("calibration.json", "calibration.csv", "calibration.png", "reduced.npz
 _SIZES = {"size_mm", "base_size_mm", "tolerance"}
 """Keys of [mesh] with which a scene chooses its own mesh."""
 
-_SLOPES = {True: 7, False: 3}  # values of mu at which tolerances are tried: in small strain, and beyond
+_SLOPES = {True: 7, False: 3}  # values of mu at which tolerances are evaluated, in small and finite strain
 
 
 @dataclass(frozen=True)

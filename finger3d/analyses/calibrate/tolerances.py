@@ -37,7 +37,8 @@ from finger3d.objects import Plane
 from finger3d.sensor.curve import LARGEST_SD, Tolerance
 
 _LEAST_POINTS = {2: 150, 3: 500}
-"""Contact points, by dimension, from which differences on the coarser mesh are good to a fifth of the largest."""
+"""Least number of contact points, by dimension, for which differences on the coarser mesh are accurate enough: within a
+fifth of the largest."""
 
 _GAUGE_PLACES = ("gauge_x_mm", "gauge_y_mm", "gauge_angle_deg")
 
@@ -123,7 +124,7 @@ def evaluate_tolerances(
     problem : the condensed body
     readings : the calibrated ones
     tolerances : standard deviations by name
-    base : their values; without inclusions those of displaced gauges are among them
+    base : readings of the nominal body; without inclusions they include those of displaced gauges
     increments : of its path
     say : receives a line about each tolerance
 
@@ -240,9 +241,9 @@ def _vary_poisson(body: ReferenceBody, readings: Sequence[CalibratedReading], sd
 
 
 def _vary_tilt(body: ReferenceBody, readings: Sequence[CalibratedReading], sd: float) -> Iterator[Effect]:
-    """Tilt a plane by plus and minus `sd`; of a symmetric scene mirrored sensors give the second reading.
+    """Tilt a plane by plus and minus `sd`; in a symmetric scene, mirrored sensors replace the second tilt.
 
-    The mesh is another one, without symmetry, so that the two tilted bodies are compared with each other.
+    Tilted bodies are compared with each other, because their mesh, without symmetry, is not that of the body.
     """
     problem, model = body.problem, body.problem.model
     if not isinstance(model.object, Plane):
@@ -284,7 +285,7 @@ def _mirrored(model: Model, names: Sequence[str]) -> tuple[dict[str, tuple[Any, 
 def _vary_stiff_gauge(
     name: str, body: ReferenceBody, readings: Sequence[CalibratedReading], sd: float
 ) -> Iterator[Effect]:
-    """Displace every gauge that stiffens the body, as far as it stays inside; each changes its own reading."""
+    """Displace each gauge that stiffens the body, unless it would leave it; only its own reading is compared."""
     model = body.problem.model
     change = np.full((len(readings), len(body.mu)), math.nan)
     for i, gauge in _gauges(model, readings):

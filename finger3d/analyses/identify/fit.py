@@ -1,13 +1,14 @@
-"""Weighted least squares, and what the data can tell of each value.
+"""Weighted least squares, and the uncertainty of the fitted values.
 
 Values are fitted as shares of their range, on a logarithmic scale where the bounds differ by more than a decade.  With
 the Jacobian J of the residuals over their standard deviations, ``J^T J`` is the Fisher matrix and its inverse the
 covariance of the values (Bard 1974, Ch. 7).  An eigenvector of the Fisher matrix along which the standard deviation is
-a quarter of the range or more is a combination of values that the data cannot tell.
+a quarter of the range or more is a combination of values that the data do not determine.
 
-The response to friction saturates, so that the curvature at the solution may say little a standard deviation away.
-Each value is therefore moved, the others with it by their covariance, until the sum of squares has risen by one: these
-are the ends of its 68 % interval, and their root mean square distance is the standard deviation that is told.
+The response to friction saturates, so that the curvature at the solution may not hold one standard deviation away.
+Each value is therefore varied, and the others with it according to their covariance, until the sum of squares has
+increased by one: these are the ends of its 68 % interval, and the root mean square of their distances from the value
+is the reported standard deviation.
 """
 
 from __future__ import annotations
@@ -24,16 +25,16 @@ from finger3d.analyses.free_keys import FreeKey
 from finger3d.errors import Finger3dError
 
 _STEP = 0.01
-"""Difference of shares that the Jacobian is taken over: contact changes point by point, smaller ones see the mesh."""
+"""Step of shares for the Jacobian; contact changes point by point, so that smaller steps would resolve the mesh."""
 
 _SHARE_CHANGE, _COST_CHANGE, _MOST = 1e-4, 1e-5, 40
-"""Changes of the shares and of the sum of squares, relative, at which the fit ends, and the most trials."""
+"""Relative changes of the shares and of the sum of squares at which the fit ends, and its largest number of trials."""
 
 _INSIDE = 1e-6
 """Distance of the first shares from their bounds, which the trust region method asks for."""
 
 _UNTOLD = 0.25
-"""Standard deviation of a combination, over the range, from which the data cannot tell it."""
+"""Standard deviation of a combination, relative to the range, at which the data do not determine it."""
 
 _TRIALS, _RISE_TOLERANCE, _LARGEST_STEP = 6, 0.1, 3.0
 """Trials for an end of an interval, tolerance of the rise of the sum of squares, and largest change of a step."""
@@ -41,7 +42,7 @@ _TRIALS, _RISE_TOLERANCE, _LARGEST_STEP = 6, 0.1, 3.0
 _STRONG = 0.95  # correlation that is named
 _AT_BOUND = 1e-3  # distance of a share from 0 or 1
 _PART = 0.3  # component of an eigenvector that is named
-_FAILED = 1e3  # standard deviations that every row of a failed press is off
+_FAILED = 1e3  # residuals of a failed press, in standard deviations
 _MISFIT = 2.0  # residuals over their stated standard deviation beyond which the scene does not explain the data
 _DECADE = 10.0
 
@@ -91,7 +92,7 @@ class FittedValues:
     low, high : (k,) ends of the 68 % intervals, within the bounds
     correlation : (k, k)
     shares : (k,) of the ranges
-    untold : what the data cannot tell, in words; empty if they tell everything
+    untold : remarks on values that the data do not determine, that are strongly correlated, or that are at a bound
     """
 
     values: Float
@@ -150,7 +151,7 @@ def uncertainty(scales: Sequence[Scale], shares: Float, derivative: Float, resid
     """Return the values with their uncertainty, from the Jacobian (n, k) by shares and from the residuals around."""
     fisher = derivative.T @ derivative
     eigenvalues, vectors = np.linalg.eigh(fisher)
-    # nothing is known less well than its range says
+    # prior knowledge: a uniform distribution over the range, whose variance is 1/12
     covariance = (vectors / (np.maximum(eigenvalues, 0.0) + 12.0)) @ vectors.T
     sd = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(sd, sd)
@@ -190,7 +191,7 @@ def _interval(
 
 
 def _untold(scales: Sequence[Scale], eigenvalues: Float, vectors: Float) -> list[str]:
-    """Say which values, or combinations of them, the data cannot tell."""
+    """Name the values, or combinations of them, that the data do not determine."""
     found = []
     for value, vector in zip(eigenvalues, vectors.T, strict=True):
         if value * _UNTOLD**2 < 1.0:

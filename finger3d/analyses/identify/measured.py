@@ -18,12 +18,12 @@ INDEX = ("step", "time_s", "depth_mm")
 """Columns that say when a row was measured; the first of them that a file has counts."""
 
 _CLOCKS = ("step", "time_s")
-"""Columns that are never fitted; under a prescribed force the depth is."""
+"""Columns that are never fitted, unlike the depth, which is fitted if it does not locate the rows."""
 
 STD = "_std"
 
 _FEWEST = 2
-"""Rows of a measured press."""
+"""Least number of rows of a measured press."""
 
 _UNIT_RATIO = 30.0
 """Ratio of a measured column to the simulated one beyond which its unit is in doubt; 100 is a percentage."""

@@ -23,11 +23,11 @@ from finger3d.report.identify import identify_page
 from finger3d.results.journal import opened
 from finger3d.scene import Scene, parse, tree
 
-_SHARE = 0.02  # standard deviation of the first fit, over the largest magnitude of a column that has none
-_LEAST_SHARE = 1e-4  # the same, that its residuals leave at least
+_SHARE = 0.02  # standard deviation in the first fit of a column without one, over its largest magnitude
+_LEAST_SHARE = 1e-4  # lower bound of the same when it is taken from the residuals
 _MODULI = 41  # values of Young's modulus that are tried at the start
 _FROM_BOUND = 0.05  # of the first shares: the method is slow near a bound
-_SHARPEST = 1e-9  # of values that are the same at every row
+_SHARPEST = 1e-9  # standard deviation of a column of zeros
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Identification:
     stds : standard deviations by column (n,): those of the file, or those that the residuals have
     curve : the simulated press
     reduced_chi_square : of the columns with standard deviations of their own; NaN without any
-    notes : what the data cannot tell, and what does not fit, in words
+    notes : remarks on values that the data do not determine, and on a poor fit
     presses : number of presses that were solved
     """
 
@@ -205,7 +205,7 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
 
 
 def _with_modulus(simulation: Simulation, shares: Float) -> list[Float]:
-    """Return the shares, with several of Young's modulus if that needs no other solution."""
+    """Return the shares, and copies with several values of Young's modulus if these need no further solution."""
     keys = [f.key for f in simulation.free]
     if MODULUS not in keys or not simulation.scales_with_modulus:
         return [shares]

@@ -1,4 +1,4 @@
-"""Simulated presses for values of the free keys; where all forces scale with Young's modulus it needs no solution."""
+"""Simulated presses for values of the free keys; if all forces scale with Young's modulus, it needs no new solution."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from finger3d.results.summary import PressStep
 from finger3d.scene import Scene
 
 MODULUS, OFFSET = "material.E_MPa", "depth_offset_mm"
-"""Keys without a solution of their own: forces scale with one; the other is added to the measured depth."""
+"""Keys that need no solution of their own: forces scale with the first; the second is added to the measured depth."""
 
 _SCALED = ("_N", "_MPa", "_mJ", "_Nmm")
 """Endings of the names of numbers that are proportional to Young's modulus."""

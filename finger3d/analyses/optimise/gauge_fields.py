@@ -32,7 +32,7 @@ from finger3d.sensor.maps import Reader
 Say = Callable[[str], None]
 
 _STEPS = 20
-"""Increments of a leg whose number is automatic: places are compared with each other, not read."""
+"""Number of increments of a leg with automatic increments; few suffice, as places are only compared."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ class GaugeFields:
     def effects(self, points: Float, angles: Float) -> ReadingEffects:
         """Return slopes, effects and variances of gauges at points (p, 3) along angles (a,), a candidate for each pair.
 
-        Candidates that are not inside the body, or whose displacement by a tolerance is not, have NaN.
+        Values are NaN for a candidate outside the body, or displaced out of it by a tolerance.
         """
         strain = self.nominal.strain(points, angles)
         slope = np.gradient(strain, np.array(self.mus), axis=-1)
@@ -201,7 +201,7 @@ def _nu(nominal: StrainField, mus: Sequence[float], sd: float) -> Effect:
 
 
 def _tilt(nominal: StrainField, mus: Sequence[float], sd: float) -> Effect | None:
-    """Tilt a plane by plus and minus one standard deviation; of a symmetric scene the mirrored place has the second."""
+    """Tilt a plane by plus and minus one standard deviation; by symmetry, a mirrored gauge replaces the second tilt."""
     problem = nominal.problem
     plane = problem.model.object
     if not isinstance(plane, Plane):

@@ -34,14 +34,14 @@ _BOUNDS = {"gauge.x_mm": "x", "gauge.y_mm": "y", "gauge.z_mm": "z", "gauge.angle
 
 @dataclass(frozen=True)
 class GaugePlaces:
-    """Gauges that together tell mu best.
+    """Gauges that together determine mu best.
 
     Attributes
     ----------
     mus : (m,) coefficients of friction at which they are judged
     found : the gauges and their Fisher matrices
-    maps : (places (c, 3), mean standard deviation (c,) of mu with the best direction there) for each gauge in the
-        place of which another is tried beside the others
+    maps : for each gauge, places (c, 3) and the mean standard deviation (c,) of mu if the gauge is moved there, in the
+        best direction, while the others stay
     scene : with these gauges instead of its own
     """
 
@@ -87,7 +87,7 @@ def place_gauges(
     path: Path | None = None,
     report: Progress | None = None,
 ) -> GaugePlaces:
-    """Find the places and directions of gauges that together tell mu best.
+    """Find the places and directions of gauges that together determine mu best.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def _region(model: Model, free: Sequence[FreeKey]) -> Region:
 
 
 def _map(found: GaugeSet, number: int, everywhere: Candidates) -> tuple[Float, Float]:
-    """Return places (c, 3), and the mean standard deviation of mu with the best direction of a gauge there."""
+    """Return places (c, 3), and the mean standard deviation (c,) of mu with gauge `number` there, at its best angle."""
     values = objectives(found.fisher(without=number), everywhere)
     places, which = np.unique(everywhere.places, axis=0, return_inverse=True)
     best = np.full(len(places), np.inf)

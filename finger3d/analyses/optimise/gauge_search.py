@@ -1,4 +1,4 @@
-"""Search for the places and directions of gauges that together tell mu best.
+"""Search for the places and directions of gauges that together determine mu best.
 
 The gauges are found one after another, each the best beside those before it (greedy), and then exchanged one at a time
 as long as that helps: first on a grid over the whole region, then on finer and finer ones around each gauge.
@@ -152,7 +152,7 @@ def objectives(fixed: Float, candidates: Candidates) -> Float:
 def search(fields: GaugeFields, region: Region, count: int, say: Callable[[str], None]) -> tuple[GaugeSet, Candidates]:
     """Return the best `count` gauges, and the candidates of the whole region.
 
-    What is known of mu beforehand is that it lies within the values that are pressed.
+    The prior standard deviation of mu is that of a uniform distribution over the range of the pressed values.
     """
     say("comparing places")
     spread = (fields.mus[-1] - fields.mus[0]) / math.sqrt(12.0)

@@ -44,7 +44,7 @@ _MAX_STORED = 4  # bodies with their increments
 class OptimisationResult:
     """Result of a search; `scene` is the best design.
 
-    `evaluations` are in the order asked for, some more than once; the `distinct_designs` are in evaluations.csv.
+    `evaluations` are in the order of the search and may repeat; evaluations.csv has `distinct_designs` lines.
     """
 
     best: Evaluation
@@ -184,16 +184,16 @@ class _Search:
         return tuple(replace(leg, steps=n) for leg, n in zip(model.legs, self.chosen, strict=True))
 
     def restore_increments(self, start: Sequence[float]) -> None:
-        """Let the start choose the increments where its own press is remembered and would not."""
+        """Choose the increments at the start design, whose evaluation in the journal does not store them."""
         try:
             model = self.problem.scene(start).model()
             if any(leg.steps == "auto" for leg in model.legs):
                 self._legs(_DesignBody(model, _first_middle_last(self.problem.mus), self.report.say), model)
         except Finger3dError:
-            pass  # as at first: the first design that can be built chooses
+            pass  # as in a new search, the increments are chosen at the first design that can be built
 
     def increments(self, values: Sequence[float]) -> Tree:
-        """Return the increments of a design and the error that they leave in its strain."""
+        """Return the increments of a design and the resulting error of its strain."""
         model = self.problem.scene(values).model()
         gauge, mus = self._gauge(model), _first_middle_last(self.problem.mus)
         if gauge is None:

@@ -31,7 +31,7 @@ class ObjectiveTable:
     ----------
     mu : (n,)
     strain : gauge name -> (n,)
-    steps : (n,) the contract's numbers of the last step at each mu
+    steps : (n,) numbers of the last step at each mu, named as in summary.json
     noise : standard deviation of a strain reading
     gauge : name of the gauge that is designed
     scene : as it was pressed; its own friction.mu does not matter

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from loky import ProcessPoolExecutor
 
 ATTEMPTS = 4
-"""Workers that a body may end before its points are given up."""
+"""Number of workers that may die while pressing a body before its points are given up."""
 
 _POLL_S = 0.5
 """Longest time without an answer to Ctrl-C, which Windows delivers between waits only."""
@@ -55,7 +55,7 @@ class _Worker:
 
 
 def _begin(parent: int) -> None:
-    """Prepare a worker: it ends with its parent, which answers Ctrl-C for it."""
+    """Initialise a worker: it ends with its parent, and leaves Ctrl-C to it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_with(parent)
 
@@ -110,7 +110,7 @@ def _take(
         one.replace()
         if deaths[id(body)] == ATTEMPTS:
             _give_up(body, progress, _died(error))
-    except Exception as error:  # noqa: BLE001 - whatever a worker raised is told with the points that are lost
+    except Exception as error:  # noqa: BLE001 - whatever a worker raised is reported with the points that are lost
         _give_up(body, progress, f"{type(error).__name__}: {' '.join(str(error).split())}")
     else:
         body.advance(rows)

@@ -57,7 +57,7 @@ class ResultStore:
             yield self
 
     def _mistake(self, row: object) -> str:
-        """Return what makes a line of the journal unfit for this sweep, or an empty text."""
+        """Return why a row of the journal does not belong to this sweep; empty if it does."""
         if not isinstance(row, dict):
             return "is no JSON object"
         number = row.get("point")
@@ -139,7 +139,7 @@ class ResultStore:
 
     @contextmanager
     def room(self, name: str) -> Iterator[None]:
-        """Write a file of this name in the block; an error there says how many points are kept."""
+        """Convert errors while the block writes a file into a MissingError that states how many points are kept."""
         try:
             yield
         except (OSError, Finger3dError) as error:

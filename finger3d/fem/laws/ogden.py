@@ -31,7 +31,7 @@ class Ogden:
     terms: tuple[tuple[float, float], ...]
 
     def __post_init__(self) -> None:
-        """Refuse terms that do not make up the shear modulus."""
+        """Raise an error if the shares do not sum to 1 or an exponent is 0."""
         total = sum(share for share, _ in self.terms)
         if abs(total - 1.0) > 1e-9:
             raise Finger3dError(

@@ -1,7 +1,7 @@
 """Stability of hyperelastic laws: Drucker's postulate for incompressible deformation.
 
 The Kirchhoff stress must do positive second-order work on any change of the logarithmic strains that keeps the volume
-(Hill 1957; it is also what Abaqus tests of hyperelastic constants).  In principal directions this is a 2 x 2 matrix.
+(Hill 1957; Abaqus applies the same test to hyperelastic constants).  In principal directions this is a 2 x 2 matrix.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _ISOCHORIC = np.array([[1.0, 1.0], [-1.0, 1.0], [0.0, -2.0]]) / np.sqrt([2.0, 6.
 """Orthonormal basis (3, 2) of the principal strains that keep the volume."""
 
 _LARGEST_STRAIN, _GRID = 3.0, 301
-"""Logarithmic strain to which a law is searched, and number of places."""
+"""Largest logarithmic strain at which a law is checked, and number of strains."""
 
 
 def least_stiffness(law: IsochoricLaw, stretches: Float) -> Float:
@@ -35,7 +35,7 @@ def least_stiffness(law: IsochoricLaw, stretches: Float) -> Float:
 
 
 def unstable_from(law: IsochoricLaw) -> dict[str, float]:
-    """Return the nominal strain from which a law is unstable in each of the usual tests; those without are left out."""
+    """Return the nominal strain from which a law is unstable in each of the usual tests; stable tests are left out."""
     out = {}
     strains = np.linspace(0.0, _LARGEST_STRAIN, _GRID)
     for mode, direction in MODES.items():
