@@ -59,13 +59,15 @@ _LOCK = ".finger3d.lock"
 
 
 _RESULTS = {
-    "press": "summary.json",
-    "compare": "compare.json",
-    "calibrate": "calibration.json",
-    "sweep": "sweep.json",
-    "optimise": "search.json",
+    "summary.json": "press",
+    "compare.json": "compare",
+    "calibration.json": "calibrate",
+    "sweep.json": "sweep",
+    "search.json": "optimise",
+    "gauges.json": "optimise",
+    "identify.json": "identify",
 }
-"""Command -> file whose presence in a folder shows its results."""
+"""Files of results, and the command that writes each."""
 
 
 @contextmanager
@@ -86,7 +88,7 @@ def claimed(folder: str | Path, command: str = "") -> Iterator[Path]:
     from filelock import FileLock, Timeout
 
     path = Path(folder)
-    for other, file in _RESULTS.items():
+    for file, other in _RESULTS.items():
         if command not in ("", other) and (path / file).exists():
             raise Finger3dError(f"--out {path}: holds the results of a {other}; name another folder, or remove it")
     made = [p for p in (path, *path.parents) if not p.exists()]
@@ -118,7 +120,6 @@ _DAMAGED = (
     AttributeError,
     EOFError,
     MemoryError,
-    NotImplementedError,
     OverflowError,
     RuntimeError,
     SyntaxError,

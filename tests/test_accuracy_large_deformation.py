@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -14,8 +15,8 @@ from finger3d.accuracy.more_increments import more_increments
 from finger3d.effects.kinetic_friction import Effect as KineticFriction
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.model import MeshOptions
-from tests.models import ended, half_cylinder, run
+from finger3d.mechanics.model import MeshOptions, Model
+from tests.models import ended, fig9, half_cylinder, run
 
 COARSE = 0.3
 
@@ -59,3 +60,23 @@ def test_no_change_is_told_where_none_can_be_estimated(monkeypatch: pytest.Monke
 
     monkeypatch.setattr(module, "last_step", fail)
     assert large_deformation(problem, step, 2).method.endswith(reason)
+
+
+def test_a_body_of_a_million_unknowns_is_judged_from_a_small_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh = MeshOptions(0.9, 0.9, "swept")
+    large = SimpleNamespace(
+        model=fig9(mesh=mesh),
+        dim=3,
+        body=SimpleNamespace(stiffness=SimpleNamespace(upper=SimpleNamespace(shape=(1_009_778, 1_009_778)))),
+        surface=SimpleNamespace(nodes=range(600)),
+    )
+    pressed: list[Model] = []
+
+    def build(problem: Any, model: Model) -> None:
+        pressed.append(model)
+        raise Finger3dError("enough")
+
+    monkeypatch.setattr(module, "built_like", build)
+    large_deformation(large, None, 10)  # type: ignore[arg-type]
+    (model,) = pressed
+    assert model.mesh.size_mm >= 2.5  # below 50 000 unknowns

@@ -73,6 +73,15 @@ def test_a_folder_that_cannot_be_written_is_a_users_mistake(tmp_path: Path) -> N
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(("file", "command"), [("identify.json", "identify"), ("gauges.json", "optimise")])
+def test_a_folder_with_the_results_of_another_command_is_refused(tmp_path: Path, file: str, command: str) -> None:
+    (tmp_path / file).touch()
+    with claimed(tmp_path, command):
+        pass
+    with pytest.raises(Finger3dError, match=command), claimed(tmp_path, "press"):
+        pass
+
+
 def test_a_folder_into_which_nothing_was_written_goes_with_those_made_for_it(tmp_path: Path) -> None:
     mine = tmp_path / "mine"
     mine.mkdir()

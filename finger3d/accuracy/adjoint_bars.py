@@ -144,7 +144,7 @@ def _bars(problem: Problem, steps: Sequence[StepResult], runs: Sequence[Run]) ->
     changes: dict[str, list[float]] = {name: [] for name in numbers}
     ends = [(press, list(march(press))[-1]) for press in presses]
     if not any(end.outcome.ok for _, end in ends):
-        raise NoAdjointBarsError(f"no press with fewer multipliers settles: {ends[0][1].outcome}")
+        raise NoAdjointBarsError(f"no press with fewer multipliers converges: {ends[0][1].outcome}")
     for press, end in ends:
         if end.outcome.ok:
             for name, value in _numbers(press, end).items():

@@ -34,6 +34,9 @@ _COARSER_STILL = 2.0
 _STEPS = (5, 3)
 """Increments in each leg, on the coarse mesh and on the one that is coarser still."""
 
+_MOST_SECONDS = 10.0
+"""Largest modelled cost of the coarse press; 30 % of a press of a million unknowns would hold 4 GB beside its 20 GB."""
+
 _SAFETY, _LEAST_ERROR = 1.5, 0.15
 """Error of a change over its difference between both meshes, and least error relative to the change."""
 
@@ -72,7 +75,7 @@ def _affordable_factor(problem: Problem, increments: int) -> float:
 
     The modelled cost is that of the press at large deformation on this mesh, at least half of the estimate.
     """
-    budget = budget_s(problem, increments)
+    budget = min(budget_s(problem, increments), _MOST_SECONDS)
     for factor in _FACTORS:
         cost = forecast(_at_large_deformation(_coarse(problem.model, factor, _STEPS[0])))
         if cost["total_s"] - cost["start_s"] - cost["output_s"] <= budget:

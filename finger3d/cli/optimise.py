@@ -31,8 +31,8 @@ def optimise(
     gauges: Annotated[
         int | None,
         Parameter(
-            help="Find the places and directions of so many gauges that together tell mu best, with all tolerances of "
-            "a calibration; --free bounds gauge.x_mm, gauge.y_mm, gauge.z_mm and gauge.angle_deg."
+            help="Find the places and directions of so many gauges that together determine mu best, with all "
+            "tolerances of a calibration; --free bounds gauge.x_mm, gauge.y_mm, gauge.z_mm and gauge.angle_deg."
         ),
     ] = None,
     tolerance: Tolerances = None,

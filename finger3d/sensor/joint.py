@@ -194,7 +194,7 @@ def joint_summary(calibration: JointCalibration) -> list[tuple[str, str]]:
 def _alone(calibration: Calibration, mu: float) -> str:
     """Return the standard deviation of mu by one reading, in words where it contains no information."""
     sd = float(calibration.mu_sd([mu])[0])
-    return f"{sd:.2g}" if np.isfinite(sd) else "tells nothing there"
+    return f"{sd:.2g}" if np.isfinite(sd) else "not determined there"
 
 
 def _unit(calibration: Calibration) -> str:
