@@ -21,7 +21,7 @@ _MEMORY_SHARE = 0.8  # largest share of the machine's memory that a solution may
 def memory_gb(cells: float, dim: int) -> float:
     """Estimate the memory of a solution, GB.
 
-    Measured: 8.4 GB for 522 540 unknowns in 3D, 21.1 GB for 1 009 778, 12 % above the estimate; about 2 kB each in 2D.
+    Measured: 8.4 GB for 522 540 unknowns in 3D, 19.8 GB for 1 009 778, 7 % above the estimate; about 2 kB each in 2D.
     """
     if dim == 2:
         return 2e-6 * _DOFS_PER_TRIANGLE * cells
