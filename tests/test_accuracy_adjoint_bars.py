@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
@@ -14,6 +15,8 @@ from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.errors import Outcome
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Leg
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.solve import march
 from tests.models import half_cylinder, run
 
 
@@ -50,9 +53,17 @@ def test_a_run_of_automatic_increments_is_not_solved_again(monkeypatch: pytest.M
     problem, frames = run(half_cylinder(0.4, 20))
     _, few = short_press(problem)
     expected = adjoint_bars(problem, frames).bars
-    monkeypatch.setattr("finger3d.accuracy.adjoint_bars.short_press", None)
+    marched: list[Problem] = []
+
+    def march_too(press: Problem) -> Iterator[StepResult]:
+        marched.append(press)
+        return march(press)
+
+    monkeypatch.setattr("finger3d.accuracy.adjoint_bars.march", march_too)
     runs = [(5, tuple(few[:5])), (10, tuple(few)), (20, tuple(frames))]
     assert adjoint_bars(problem, frames, runs).bars == expected
+    assert marched
+    assert all(len(press.surface.nodes) < len(problem.surface.nodes) for press in marched)
 
 
 def test_without_a_press_of_fewer_multipliers_a_companion_mesh_tells_the_bars(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -31,7 +31,7 @@ from finger3d.contact.conditions import ContactProblem, augmentation_parameters
 from finger3d.contact.friction import OPEN, SLIP
 from finger3d.contact.newton import ActiveSet
 from finger3d.mechanics.history import StepResult
-from finger3d.mechanics.linear_contact import LinearBody, LinearState, transported
+from finger3d.mechanics.linear_contact import LinearState, transported, turned_delassus
 from finger3d.mechanics.problem import Problem
 from finger3d.objects import vertical_frame
 
@@ -91,7 +91,7 @@ class LinearisedIncrement:
             points, delassus = np.arange(c), problem.delassus
         else:
             points = np.flatnonzero(after.status != OPEN)
-            delassus = LinearBody(problem.delassus, np.zeros((c, d))).turned(rotations[points], points)
+            delassus = turned_delassus(problem.delassus, rotations[points], points)
         k = len(points)
         local = ContactProblem(moved[points], delassus.reshape(k * d, k * d), mu[points], rho[points], 1.0)
         active = ActiveSet.of(local, after.status[points], augmented[points])

@@ -121,7 +121,7 @@ def adjoint_bars(problem: Problem, steps: Sequence[StepResult], runs: Sequence[R
     ----------
     problem : one whose model `applies`
     steps : all increments, converged
-    runs : with other numbers of increments in every leg, the fewest first
+    runs : known runs with other numbers of increments in every leg
 
     Raises
     ------
@@ -183,31 +183,24 @@ def _unresolved_by_base(problem: Problem) -> list[tuple[str, float]]:
     return [(f"taxel_{t.name}_MPa", _BASE_SHARE * edge / min(t.length_mm, t.width_mm)) for t in taxels]
 
 
-def short_press(problem: Problem) -> tuple[Problem, list[StepResult]]:
-    """Return the press with no more than `_MOST_INCREMENTS` increments in a leg, and its steps."""
-    short = _with_at_most(problem, _MOST_INCREMENTS)
-    return short, list(march(short))
-
-
-def _with_at_most(problem: Problem, count: int) -> Problem:
-    """Return the press with no more than so many increments in a leg."""
+def short_press(problem: Problem, runs: Sequence[Run] = ()) -> tuple[Problem, Sequence[StepResult]]:
+    """Return the press with no more than `_MOST_INCREMENTS` increments in a leg, and its steps, those of a run if known."""
+    known = {count: results for count, results in runs if count <= _MOST_INCREMENTS}
+    most = max(known, default=_MOST_INCREMENTS)
     legs = tuple(
-        replace(leg, steps=min(leg.steps, count) if isinstance(leg.steps, int) else count) for leg in problem.model.legs
+        replace(leg, steps=min(leg.steps, most) if isinstance(leg.steps, int) else most) for leg in problem.model.legs
     )
-    return replace(problem, model=replace(problem.model, legs=legs))
+    short = replace(problem, model=replace(problem.model, legs=legs))
+    return short, known[most] if known else list(march(short))
 
 
 def _with_few_increments(
     problem: Problem, steps: Sequence[StepResult], runs: Sequence[Run]
 ) -> tuple[Problem, Sequence[StepResult]]:
-    """Return the press with few increments, and its steps; solve it only if no known run has few enough."""
+    """Return the press with few increments, and its steps: as it is if it has few, or if the short one fails."""
     if all(isinstance(leg.steps, int) and leg.steps <= _MOST_INCREMENTS for leg in problem.model.legs):
         return problem, steps
-    few = [(count, results) for count, results in runs if count <= _MOST_INCREMENTS]
-    if few:
-        count, results = few[-1]
-        return _with_at_most(problem, count), results
-    short, found = short_press(problem)
+    short, found = short_press(problem, runs)
     return (short, found) if found[-1].outcome.ok else (problem, steps)
 
 

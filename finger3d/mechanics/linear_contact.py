@@ -81,18 +81,20 @@ class LinearBody:
         moved = self.past + (rows @ upright[:touched].ravel()).reshape(force.shape)
         return np.asarray(moved @ frame)
 
-    def turned(self, rotations: Float, points: NDArray[np.intp]) -> Float:
-        """Return the Delassus operator (k, d, k, d) of some points along their own directions.
 
-        Parameters
-        ----------
-        rotations : (k, d, d) from the directions of an upright object
-        points : (k,)
-        """
-        k, d = len(points), rotations.shape[-1]
-        own = self.delassus[points[:, None, None, None], np.arange(d)[:, None, None], points[:, None], np.arange(d)]
-        half = (rotations @ own.reshape(k, d, k * d)).reshape(k * d, k, d)
-        return (half.transpose(1, 0, 2) @ rotations.transpose(0, 2, 1)).transpose(1, 0, 2).reshape(k, d, k, d)
+def turned_delassus(delassus: Float, rotations: Float, points: NDArray[np.intp]) -> Float:
+    """Return the Delassus operator (k, d, k, d) of some points along their own directions.
+
+    Parameters
+    ----------
+    delassus : (c, d, c, d) mm/N, in the directions of an upright object
+    rotations : (k, d, d) from these directions
+    points : (k,)
+    """
+    k, d = len(points), rotations.shape[-1]
+    own = delassus[points[:, None, None, None], np.arange(d)[:, None, None], points[:, None], np.arange(d)]
+    half = (rotations @ own.reshape(k, d, k * d)).reshape(k * d, k, d)
+    return (half.transpose(1, 0, 2) @ rotations.transpose(0, 2, 1)).transpose(1, 0, 2).reshape(k, d, k, d)
 
 
 def solve_increment(
@@ -216,7 +218,7 @@ class _Increment:
             return solve_contact(problem, start, free, self.body.delassus, scale, guess)
         expected = start.force if guess is None else guess
         near = np.flatnonzero((geometry.gap < 2.0 * _NEAR * scale) | (expected[:, 0] > 0.0))
-        delassus = self.body.turned(rotations[near], near)
+        delassus = turned_delassus(self.body.delassus, rotations[near], near)
         part = solve_contact(problem, start.of_points(near), free[near], delassus, scale, expected[near], points=near)
         force, status = np.zeros_like(expected), np.full(len(expected), OPEN, dtype=np.int8)
         force[near], status[near] = part.state.force, part.state.status
