@@ -184,7 +184,7 @@ def _unresolved_by_base(problem: Problem) -> list[tuple[str, float]]:
 
 
 def short_press(problem: Problem, runs: Sequence[Run] = ()) -> tuple[Problem, Sequence[StepResult]]:
-    """Return the press with no more than `_MOST_INCREMENTS` increments in a leg, and its steps, those of a run if known."""
+    """Return the press with at most `_MOST_INCREMENTS` increments in a leg, and its steps, from a run that has them."""
     known = {count: results for count, results in runs if count <= _MOST_INCREMENTS}
     most = max(known, default=_MOST_INCREMENTS)
     legs = tuple(
