@@ -139,7 +139,7 @@ def outputs() -> str:
     from finger3d.results.summary import PressStep
     from finger3d.scene.reference import descriptions
 
-    said = descriptions(PressStep)
+    said = {name: text.replace("|", r"\|") for name, text in descriptions(PressStep).items()}
     lines = ["| key | unit | meaning |", "|---|---|---|"]
     lines += [f"| `{f.name}` | {unit(f.name) or '–'} | {said[f.name]} |" for f in dataclasses.fields(PressStep)]
     return "\n".join(lines) + "\n"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import runpy
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -182,3 +183,11 @@ def test_tutorials_show_what_they_computed_and_can_be_downloaded(site: Path, bro
     letters = page.locator("div.math math").first.bounding_box()
     assert letters["width"] > 3.0 * letters["height"] > 24.0  # w = W r + q is set in a line
     page.close()
+
+
+@pytest.mark.browser  # needs docutils, as the site does
+def test_generated_tables_keep_their_columns(root: Path) -> None:
+    site = runpy.run_path(str(root / "docs" / "_site.py"))
+    table = site["outputs"]().splitlines()
+    assert {len(re.findall(r"(?<!\\)\|", line)) for line in table} == {4}  # a bare one would cut a cell
+    assert any(r"\|friction\|" in line for line in table)

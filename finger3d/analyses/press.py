@@ -38,7 +38,7 @@ def press(
     out : folder, made if it is not there; None: a temporary one, which is removed together with what is returned
     report : receives the progress
     figures : whether to draw PNG files and to write report.html; None: if a folder is given
-    error : whether to estimate the errors by mesh and increments, from a run on another mesh
+    error : whether to estimate the errors due to the mesh and the increments
 
     Returns
     -------
