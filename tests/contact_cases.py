@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from finger3d.contact.conditions import ContactProblem, augmentation_parameters
-from finger3d.contact.friction import OPEN, SLIP, STICK
+from finger3d.contact.conditions import ContactProblem
+from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
+from finger3d.contact.law import ContactLaw
 from finger3d.contact.state import ContactState
 
 
@@ -88,5 +89,5 @@ def random_problem(dim: int, seed: int = 0, points: int = 7) -> tuple[ContactPro
     rng = np.random.default_rng(seed)
     delassus = random_compliance(rng, points, dim, 1.0).reshape(points * dim, points * dim)
     free, force = rng.normal(size=(points, dim)), rng.normal(size=(points, dim))
-    problem = ContactProblem(free, delassus, np.full(points, 0.5), augmentation_parameters(delassus, dim), 1.0)
-    return problem, force
+    at_rest = ContactState.at_rest(np.zeros(points), dim)
+    return ContactProblem.of(at_rest, free, delassus, ContactLaw(Coulomb(0.5)), 1.0), force

@@ -10,6 +10,7 @@ import pytest
 from finger3d.contact.acceleration import accelerated_newton, assemble_in_place, chord_step, threads_for, warm_start
 from finger3d.contact.conditions import ContactProblem, augmentation_parameters
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
+from finger3d.contact.law import ContactLaw
 from finger3d.contact.newton import ActiveSet, ActiveSetSystem, Iterate, NewtonResult, Precision, assemble, newton
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState, next_state
@@ -31,9 +32,8 @@ def parabola() -> tuple[np.ndarray, np.ndarray]:
 
 
 def problem_of(compliance: np.ndarray, free: np.ndarray, mu: float, scale: float = 1.0) -> ContactProblem:
-    return ContactProblem.of(
-        ContactState.at_rest(np.zeros(len(free)), free.shape[1]), free, compliance, Coulomb(mu), scale, None, None
-    )
+    at_rest = ContactState.at_rest(np.zeros(len(free)), free.shape[1])
+    return ContactProblem.of(at_rest, free, compliance, ContactLaw(Coulomb(mu)), scale)
 
 
 def pressed(method: Method, compliance: np.ndarray, gap: np.ndarray, mu: float) -> list[NewtonResult]:
@@ -42,7 +42,7 @@ def pressed(method: Method, compliance: np.ndarray, gap: np.ndarray, mu: float) 
     state, out = ContactState.at_rest(gap, d), []
     for depth, x, z in ((0.05, 0.0, 0.0), (0.1, 0.0, 0.0), (0.1, 0.004, 0.002), (0.1, 0.008, 0.004)):
         free = np.stack([gap - depth, np.full(len(gap), -x), np.full(len(gap), -z)], axis=1)[:, :d]
-        problem = ContactProblem.of(state, free, compliance, Coulomb(mu), 0.1, None, None)
+        problem = ContactProblem.of(state, free, compliance, ContactLaw(Coulomb(mu)), 0.1)
         out.append(method(problem, state.force, 60, True))
         assert out[-1].solved
         state = next_state(state, out[-1].force, out[-1].relative_displacement, out[-1].status)
@@ -79,7 +79,9 @@ def test_without_friction_the_warm_start_is_the_solution(dim: int, accuracy: flo
     rng = np.random.default_rng(3)
     compliance, free = random_compliance(rng, 9, dim, 1.0), rng.normal(size=(9, dim))
     start = warm_start(problem_of(compliance, free, 0.0), np.zeros((9, dim)))
-    wanted = solve_increment(ContactState.at_rest(np.zeros(9), dim), free, compliance, Coulomb(0.0), 1.0)
+    wanted = solve_increment(
+        ContactProblem.of(ContactState.at_rest(np.zeros(9), dim), free, compliance, ContactLaw(Coulomb(0.0)), 1.0)
+    )
     assert wanted.outcome.ok
     assert wanted.state.force[:, 0].max() > 0.0
     assert np.abs(start - wanted.state.force).max() < accuracy * wanted.state.force.max()
@@ -89,7 +91,9 @@ def test_without_friction_the_warm_start_is_the_solution(dim: int, accuracy: flo
 def test_expected_forces_are_the_warm_start_if_they_nearly_fit(share: float, kept: bool) -> None:
     compliance, gap = sphere()
     free = np.stack([gap - 0.1, np.full(len(gap), 0.02), np.zeros(len(gap))], axis=1)
-    wanted = solve_increment(ContactState.at_rest(gap, 3), free, compliance, Coulomb(0.25), 1.0).state.force
+    wanted = solve_increment(
+        ContactProblem.of(ContactState.at_rest(gap, 3), free, compliance, ContactLaw(Coulomb(0.25)), 1.0)
+    ).state.force
     expected = wanted.copy()
     expected[:, 1:] *= share
     start = warm_start(problem_of(compliance, free, 0.25), expected)
@@ -101,7 +105,9 @@ def test_expected_forces_are_the_warm_start_if_they_nearly_fit(share: float, kep
 def test_the_warm_start_is_admissible_and_close() -> None:
     compliance, gap = sphere()
     free = np.stack([gap - 0.1, *np.zeros((2, len(gap)))], axis=1)
-    wanted = solve_increment(ContactState.at_rest(np.zeros(len(gap)), 3), free, compliance, Coulomb(0.25), 0.1)
+    wanted = solve_increment(
+        ContactProblem.of(ContactState.at_rest(np.zeros(len(gap)), 3), free, compliance, ContactLaw(Coulomb(0.25)), 0.1)
+    )
     assert wanted.outcome.ok
     start = warm_start(problem_of(compliance, free, 0.25), np.zeros_like(free))
     assert np.linalg.norm(start - wanted.state.force) < 1e-3 * np.linalg.norm(wanted.state.force)
@@ -110,7 +116,7 @@ def test_the_warm_start_is_admissible_and_close() -> None:
 
 def test_a_singular_operator_leaves_the_expected_forces() -> None:
     force = np.array([[1.0, 0.0], [0.0, 0.0]])
-    problem = ContactProblem(np.full((2, 2), -1.0), np.ones((4, 4)), np.full(2, 0.3), np.ones((2, 2)), 1.0)
+    problem = problem_of(np.ones((2, 2, 2, 2)), np.full((2, 2), -1.0), 0.3)
     assert np.array_equal(warm_start(problem, force), force)
 
 

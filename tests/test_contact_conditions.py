@@ -7,10 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from finger3d.contact.conditions import project_on_friction_cone, residual
+from finger3d.contact.conditions import ContactProblem, project_on_friction_cone, residual
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
+from finger3d.contact.law import ContactLaw
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
+from finger3d.errors import Outcome
 from tests.contact_cases import half_plane, random_problem
 
 
@@ -40,7 +42,7 @@ def test_the_projection_and_the_residual_know_the_same_solutions() -> None:
     compliance, gap = half_plane(21, 2, 0.2857, 0.05), np.linspace(-1.0, 1.0, 21) ** 2
     free = np.column_stack([gap - 0.3, np.full(21, -0.01)])
     state = ContactState.at_rest(gap, 2)
-    found = solve_increment(state, free, compliance, Coulomb(0.3), 1.0).state
+    found = solve_increment(ContactProblem.of(state, free, compliance, ContactLaw(Coulomb(0.3)), 1.0)).state
     moved = np.column_stack([found.gap, found.tangential_displacement])
     mu = np.full(21, 0.3)
     assert set(found.status) == {OPEN, STICK, SLIP}
@@ -55,3 +57,20 @@ def test_the_projection_and_the_residual_know_the_same_solutions() -> None:
     harder = found.force + 0.1 * largest * np.outer(np.arange(21) == j, [0.0, np.sign(found.force[j, 1])])
     assert residual(harder, moved, found.status, mu, 1.0) == pytest.approx(0.1, rel=0.1)
     assert residual(found.force * np.nan, moved, found.status, mu, 1.0) == np.inf
+
+
+@pytest.mark.parametrize(
+    ("gap", "sign", "augmentation", "refusal"),
+    [
+        (0.0, 1.0, None, None),
+        (np.nan, 1.0, None, Outcome.NOT_FINITE),
+        (0.0, -1.0, None, Outcome.INDEFINITE),
+        (0.0, -1.0, np.ones((2, 2)), None),
+    ],
+)
+def test_what_cannot_be_solved_is_said_before_it_is_tried(
+    gap: float, sign: float, augmentation: np.ndarray | None, refusal: Outcome | None
+) -> None:
+    rest, operator = ContactState.at_rest(np.zeros(2), 2), sign * np.eye(4).reshape(2, 2, 2, 2)
+    problem = ContactProblem.of(rest, np.full((2, 2), gap), operator, ContactLaw(), 1.0, augmentation)
+    assert problem.refusal is refusal

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import SLIP, Coulomb, FrictionLaw
+from finger3d.contact.law import ContactLaw
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
 from finger3d.effects.kinetic_friction import TwoCoefficients
@@ -32,7 +34,9 @@ def test_a_point_slips_at_the_coefficient_of_its_own_pressure() -> None:
     compliance = np.eye(2).reshape(1, 2, 1, 2)  # one point on two unit springs, 1 N on 0.5 mm2
     free = np.array([[-1.0, -0.6]])
     state = ContactState.at_rest(np.zeros(1), 2)
-    found = solve_increment(state, free, compliance, Saturating(0.9, 2.0), 1.0, area=np.array([0.5]))
+    found = solve_increment(
+        ContactProblem.of(state, free, compliance, ContactLaw(Saturating(0.9, 2.0)), 1.0, area=np.array([0.5]))
+    )
     assert found.outcome.ok
     assert found.state.status[0] == SLIP
     assert found.state.force[0] == pytest.approx([1.0, 0.9 / (1.0 + 2.0 / 2.0)], abs=1e-12)
@@ -45,7 +49,7 @@ def test_pressure_dependent_coefficients_agree_with_the_pressures_found(guessed:
     for depth, slide in ((0.2, 0.0), (0.4, 0.0), (0.4, 0.05), (0.4, 0.5)):
         free = np.column_stack([gap - depth, np.full(41, -slide)])
         guess = np.full((41, 2), 0.01) if guessed else None
-        found = solve_increment(state, free, compliance, law, 1.0, guess, area=area)
+        found = solve_increment(ContactProblem.of(state, free, compliance, ContactLaw(law), 1.0, area=area), guess)
         assert found.outcome.ok
         mu = law.coefficients(found.state.status, found.state.force[:, 0] / area)
         assert np.ptp(mu[found.state.force[:, 0] > 0.0]) > 0.1
@@ -60,7 +64,11 @@ def test_coefficients_that_never_agree_are_reported() -> None:
             return 0.7 - mu
 
     state = ContactState.at_rest(np.zeros(1), 2)
-    found = solve_increment(state, np.array([[-1.0, -0.6]]), np.eye(2).reshape(1, 2, 1, 2), Alternating(0.3), 1.0)
+    found = solve_increment(
+        ContactProblem.of(
+            state, np.array([[-1.0, -0.6]]), np.eye(2).reshape(1, 2, 1, 2), ContactLaw(Alternating(0.3)), 1.0
+        )
+    )
     assert found.outcome is Outcome.NO_CONVERGENCE
     assert found.state is state
 

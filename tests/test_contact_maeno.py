@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import Coulomb
+from finger3d.contact.law import ContactLaw
 from finger3d.contact.maeno import maeno_active_set
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
@@ -17,10 +19,13 @@ def test_where_it_settles_it_agrees_with_the_projection() -> None:
     a = b = ContactState.at_rest(gap, 2)
     for depth in np.linspace(0.05, 0.5, 10):
         free = np.column_stack([gap - depth, np.zeros(21)])
-        literal = maeno_active_set(a, free, compliance, Coulomb(0.25), depth)
+        literal = maeno_active_set(ContactProblem.of(a, free, compliance, ContactLaw(Coulomb(0.25)), depth))
         assert literal.outcome is Outcome.CONVERGED
         assert literal.method == "paper"
-        a, b = literal.state, solve_increment(b, free, compliance, Coulomb(0.25), depth).state
+        a, b = (
+            literal.state,
+            solve_increment(ContactProblem.of(b, free, compliance, ContactLaw(Coulomb(0.25)), depth)).state,
+        )
         assert np.array_equal(a.status, b.status)
         assert np.abs(a.force - b.force).max() < 1e-12
 
@@ -33,7 +38,7 @@ def test_a_cycle_is_reported_and_never_called_converged() -> None:
         state = ContactState.at_rest(np.zeros(6), 2)
         for _ in range(3):
             free = rng.normal(size=(6, 2))
-            found = maeno_active_set(state, free, compliance, Coulomb(0.8), 1.0)
+            found = maeno_active_set(ContactProblem.of(state, free, compliance, ContactLaw(Coulomb(0.8)), 1.0))
             outcomes.add(found.outcome)
             if not found.outcome.ok:
                 assert found.residual > 1e-8

@@ -7,7 +7,9 @@ from typing import get_args
 import numpy as np
 import pytest
 
+from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import SLIP, STICK, Coulomb
+from finger3d.contact.law import ContactLaw
 from finger3d.contact.rules import RULES, STEP_DEPENDENT_RULES, RuleName
 from finger3d.contact.state import ContactState
 from finger3d.effects.kinetic_friction import TwoCoefficients
@@ -28,7 +30,9 @@ def test_only_starting_all_stuck_depends_on_the_steps() -> None:
 def test_every_rule_settles_a_normal_press(name: RuleName) -> None:
     gap = np.linspace(-1.0, 1.0, 21) ** 2
     free = np.column_stack([gap - 0.3, np.zeros(21)])
-    found = RULES[name](ContactState.at_rest(gap, 2), free, half_plane(21, 2, 0.0), Coulomb(0.3), 1.0)
+    found = RULES[name](
+        ContactProblem.of(ContactState.at_rest(gap, 2), free, half_plane(21, 2, 0.0), ContactLaw(Coulomb(0.3)), 1.0)
+    )
     assert found.outcome.ok
 
 

@@ -9,7 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
+from finger3d.contact.law import ContactLaw
 from finger3d.contact.maeno import maeno_active_set
 from finger3d.contact.newton import uniqueness
 from finger3d.contact.solve import solve_increment
@@ -29,7 +31,7 @@ def press(compliance: np.ndarray, gap: np.ndarray, path: list[tuple[float, ...]]
         free = np.zeros((len(gap), d))
         free[:, 0] = gap - target[0]
         free[:, 1:] = -np.asarray(target[1:])[: d - 1]
-        found = solve_increment(state, free, compliance, Coulomb(mu), 1.0)
+        found = solve_increment(ContactProblem.of(state, free, compliance, ContactLaw(Coulomb(mu)), 1.0))
         assert found.outcome is Outcome.CONVERGED, (mu, target, found.outcome.name)
         assert found.residual <= 1e-8
         assert violation(state, found.state, free, compliance, mu) <= 1e-8
@@ -56,7 +58,7 @@ def test_any_state_returned_as_converged_meets_every_condition(
     for _ in range(4):
         free = rng.normal(size=(points, dim))
         free[:, 0] += 0.3
-        found = solve_increment(state, free, compliance, Coulomb(mu), 1.0)
+        found = solve_increment(ContactProblem.of(state, free, compliance, ContactLaw(Coulomb(mu)), 1.0))
         if found.outcome.ok:
             assert violation(state, found.state, free, compliance, mu) <= 1e-8
             state = found.state
@@ -164,10 +166,13 @@ def test_a_failed_increment_leaves_the_state_and_a_repeat_gives_the_same() -> No
     free = np.column_stack([gap - 0.6, np.full(len(gap), -0.05), np.full(len(gap), -0.1)])
     broken = free.copy()
     broken[0, 0] = np.nan
-    failed = solve_increment(first, broken, compliance, Coulomb(0.3), 1.0)
+    failed = solve_increment(ContactProblem.of(first, broken, compliance, ContactLaw(Coulomb(0.3)), 1.0))
     assert failed.outcome is Outcome.NOT_FINITE
     assert failed.state is first
-    a, b = (solve_increment(first, free, compliance, Coulomb(0.3), 1.0).state for _ in range(2))
+    a, b = (
+        solve_increment(ContactProblem.of(first, free, compliance, ContactLaw(Coulomb(0.3)), 1.0)).state
+        for _ in range(2)
+    )
     assert np.array_equal(a.force, b.force)
 
 
@@ -177,8 +182,14 @@ def test_floating_body_and_nan_are_outcomes_not_numbers() -> None:
     free = np.column_stack([gap - 0.3, np.zeros((len(gap), 2))])
     bad = compliance.copy()
     bad[0, 1, 0, 1] = -1.0
-    assert solve_increment(state, free, bad, Coulomb(0.3), 1.0).outcome is Outcome.INDEFINITE
-    assert solve_increment(state, free, compliance * np.nan, Coulomb(0.3), 1.0).outcome is Outcome.NOT_FINITE
+    assert (
+        solve_increment(ContactProblem.of(state, free, bad, ContactLaw(Coulomb(0.3)), 1.0)).outcome
+        is Outcome.INDEFINITE
+    )
+    assert (
+        solve_increment(ContactProblem.of(state, free, compliance * np.nan, ContactLaw(Coulomb(0.3)), 1.0)).outcome
+        is Outcome.NOT_FINITE
+    )
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
@@ -189,12 +200,14 @@ def test_a_number_that_is_none_shows_wherever_it_is_between_points_that_touch(
     compliance, gap, path = states_3d()
     before = press(compliance, gap, path[:1], 0.3)[0]
     free = np.column_stack([gap - 0.6, np.full(len(gap), -0.05), np.full(len(gap), -0.1)])
-    touching = np.flatnonzero(solve_increment(before, free, compliance, Coulomb(0.3), 1.0).state.force[:, 0])
+    touching = np.flatnonzero(
+        solve_increment(ContactProblem.of(before, free, compliance, ContactLaw(Coulomb(0.3)), 1.0)).state.force[:, 0]
+    )
     for i, j, a, b in ((0, -1, 0, 0), (1, 2, 1, 2), (-1, 0, 2, 0)):
         bad = compliance.copy()
         bad[touching[i], a, touching[j], b] = bad[touching[j], b, touching[i], a] = value
         for state in (ContactState.at_rest(gap, 3), before):
-            found = rule(state, free, bad, Coulomb(0.3), 1.0)
+            found = rule(ContactProblem.of(state, free, bad, ContactLaw(Coulomb(0.3)), 1.0))
             assert found.outcome is Outcome.NOT_FINITE
             assert found.state is state
 
@@ -213,11 +226,13 @@ def test_one_point_coulomb_is_unique_below_its_critical_coefficient() -> None:
 def test_no_touch_no_force() -> None:
     compliance, gap, _ = states_3d()
     found = solve_increment(
-        ContactState.at_rest(gap, 3),
-        np.column_stack([gap + 1.0, np.zeros((len(gap), 2))]),
-        compliance,
-        Coulomb(0.3),
-        1.0,
+        ContactProblem.of(
+            ContactState.at_rest(gap, 3),
+            np.column_stack([gap + 1.0, np.zeros((len(gap), 2))]),
+            compliance,
+            ContactLaw(Coulomb(0.3)),
+            1.0,
+        )
     )
     assert found.outcome.ok
     assert not found.state.force.any()

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from finger3d.contact.friction import OPEN, SLIP
-from finger3d.contact.state import ContactState, invalid_input, next_state, pressure
-from finger3d.errors import Outcome
+from finger3d.contact.state import ContactState, next_state, pressure
 from finger3d.fem.directions import bases_of
 
 
@@ -38,11 +37,3 @@ def test_pressure_is_unknown_without_an_area() -> None:
     force = np.array([[2.0, 1.0], [3.0, 0.0]])
     assert pressure(force, np.array([4.0, 0.5])) == pytest.approx([0.5, 6.0])
     assert np.isnan(pressure(force, None)).all()
-
-
-def test_what_cannot_be_solved_is_said_before_it_is_tried() -> None:
-    good = np.eye(4).reshape(2, 2, 2, 2)
-    assert invalid_input(np.zeros((2, 2)), good) is None
-    assert invalid_input(np.full((2, 2), np.nan), good) is Outcome.NOT_FINITE
-    assert invalid_input(np.zeros((2, 2)), -good) is Outcome.INDEFINITE
-    assert invalid_input(np.zeros((2, 2)), -good, definite=False) is None

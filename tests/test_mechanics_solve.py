@@ -9,10 +9,10 @@ import pytest
 import scipy.sparse as sp
 
 from finger3d.contact.friction import OPEN, Coulomb
+from finger3d.contact.rules import RULES
 from finger3d.errors import Outcome
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics import formulation
 from finger3d.mechanics.build import build
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
@@ -109,17 +109,17 @@ def test_tilted_plane_pushes_along_its_own_normal() -> None:
 
 def test_an_increment_that_fails_is_cut_and_the_state_restored(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = build(block(object=Plane(), legs=(Leg(0.3, steps=1),)))
-    true_rule = formulation.RULES["projection"]
+    true_rule = RULES["projection"]
 
-    def timid(state, free, *more):  # fails on strides above a quarter of the leg
-        found = true_rule(state, free, *more)
-        if np.abs(free[:, 0] - timid.gap).max() > 0.076:
-            return replace(found, state=state, outcome=Outcome.NO_CONVERGENCE)
-        timid.gap = free[:, 0]
+    def timid(contact, guess=None):  # fails on strides above a quarter of the leg
+        found = true_rule(contact, guess)
+        if np.abs(contact.free_motion[:, 0] - timid.gap).max() > 0.076:
+            return replace(found, state=contact.previous, outcome=Outcome.NO_CONVERGENCE)
+        timid.gap = contact.free_motion[:, 0]
         return found
 
     timid.gap = problem.gap(targets(problem.model.legs)[0].__class__(0.0))
-    monkeypatch.setitem(formulation.RULES, "projection", timid)
+    monkeypatch.setitem(RULES, "projection", timid)
     (cut,) = march(problem)
     monkeypatch.undo()
     four = list(march(replace(problem, model=replace(problem.model, legs=(Leg(0.3, steps=4),)))))

@@ -10,11 +10,11 @@ import pytest
 
 from finger3d.accuracy.estimate import press_numbers
 from finger3d.contact.friction import Coulomb
+from finger3d.contact.rules import RULES
 from finger3d.effects.kinetic_friction import TwoCoefficients
 from finger3d.errors import Outcome
 from finger3d.fem.laws import NeoHooke
 from finger3d.fem.material import Isotropic
-from finger3d.mechanics import formulation
 from finger3d.mechanics.build import build
 from finger3d.mechanics.finite_strain import FiniteStrain
 from finger3d.mechanics.history import measure
@@ -86,19 +86,19 @@ def test_rules_that_have_no_limit_in_increments_take_ten(name: str) -> None:
 
 def test_a_run_in_few_increments_that_fails_does_not_fail_the_press(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = build(block(object=Plane(), legs=(Leg(0.3, steps="auto"),)))
-    true_rule = formulation.RULES["projection"]
+    true_rule = RULES["projection"]
 
-    def timid(state, free, *more):  # fails from an increment above 0.3 / 8 mm on, so that cutting it does not help
-        found = true_rule(state, free, *more)
-        timid.failed |= bool(np.abs(free[:, 0] - timid.gap).max() > 0.3 / 8)
+    def timid(contact, guess=None):  # fails from an increment above 0.3 / 8 mm on, so that cutting it does not help
+        found = true_rule(contact, guess)
+        timid.failed |= bool(np.abs(contact.free_motion[:, 0] - timid.gap).max() > 0.3 / 8)
         if timid.failed:
-            return replace(found, state=state, outcome=Outcome.NO_CONVERGENCE)
-        timid.gap = free[:, 0]
+            return replace(found, state=contact.previous, outcome=Outcome.NO_CONVERGENCE)
+        timid.gap = contact.free_motion[:, 0]
         return found
 
     start = problem.gap(problem.origin)
     timid.gap, timid.failed = start, False
-    monkeypatch.setitem(formulation.RULES, "projection", timid)
+    monkeypatch.setitem(RULES, "projection", timid)
     true_march = march
 
     def anew(problem: Problem, **arguments: Any):

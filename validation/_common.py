@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import Coulomb
+from finger3d.contact.law import ContactLaw
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.fem.assembly import stiffness
@@ -189,7 +191,9 @@ class Body:
         free = np.zeros((len(gap), d))
         free[:, 0] = gap
         start = previous or ContactState.at_rest(np.maximum(gap, 0.0), d)
-        return solve_increment(start, free, self.compliance, Coulomb(mu), scale or float(-gap.min()))
+        return solve_increment(
+            ContactProblem.of(start, free, self.compliance, ContactLaw(Coulomb(mu)), scale or float(-gap.min()))
+        )
 
     def gap(self, height: Field) -> Float:
         """Weighted mean (c,) of a height above the surface, given at points (q, d)."""

@@ -10,7 +10,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from finger3d.contact.conditions import TOLERANCE, ContactProblem, project_on_friction_cone, residual
-from finger3d.contact.friction import SLIP, STICK
+from finger3d.contact.friction import SLIP, STICK, Coulomb
+from finger3d.contact.law import ContactLaw
 from finger3d.contact.state import ContactState, next_state
 from finger3d.mechanics.path import targets
 from finger3d.mechanics.problem import ContactSystem, Problem
@@ -69,7 +70,15 @@ class EachIteration:
         for target in targets(legs):
             free = free_motion(shell, target)
             free[:, 1:] -= state.tangential_displacement
-            problem = ContactProblem(free, np.zeros((0, 0)), np.full(c, MU), self.rho, target.depth_mm)
+            problem = ContactProblem(
+                previous=state,
+                free_motion=free,
+                delassus=np.zeros((0, 0)),
+                law=ContactLaw(Coulomb(MU)),
+                length_scale=target.depth_mm,
+                friction=np.full(c, MU),
+                augmentation=self.rho,
+            )
             force, moved, status, u = self._settle(problem, state.force)
             state = next_state(state, force, moved, status)
         # a point on a symmetry plane carries its part's share of the force, like all others

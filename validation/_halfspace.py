@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
+from finger3d.contact.law import ContactLaw
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
 from finger3d.fem.material import Elasticity
@@ -115,7 +117,9 @@ def press(ball: Ball, mu: float, path: Sequence[tuple[float, float]]) -> list[St
     for depth, slide in path:
         free = np.zeros((len(ball.gap), 3))
         free[:, 0], free[:, 1] = ball.gap - depth, -slide
-        found = solve_increment(state, free, ball.compliance, Coulomb(mu), max(depth, 1e-3))
+        found = solve_increment(
+            ContactProblem.of(state, free, ball.compliance, ContactLaw(Coulomb(mu)), max(depth, 1e-3))
+        )
         if not found.outcome.ok:
             raise AssertionError(f"mu = {mu:g}, depth {depth:g}, slide {slide:g}: {found.outcome}")
         friction, slips = found.state.force[:, 1:], found.state.status == SLIP

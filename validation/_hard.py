@@ -13,7 +13,9 @@ import numpy as np
 
 from finger3d.analyses.press import press
 from finger3d.analyses.study_rows import Row
+from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import OPEN, Coulomb
+from finger3d.contact.law import ContactLaw
 from finger3d.contact.newton import uniqueness
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
@@ -82,7 +84,9 @@ def one_point(quick: bool) -> Iterator[Row]:
         for free in loads:
             answers = _admissible(compliance, free, mu)
             rest = ContactState.at_rest(np.zeros(1), 2)
-            found = solve_increment(rest, free[None], compliance.reshape(1, 2, 1, 2), Coulomb(mu), 1.0)
+            found = solve_increment(
+                ContactProblem.of(rest, free[None], compliance.reshape(1, 2, 1, 2), ContactLaw(Coulomb(mu)), 1.0)
+            )
             several += len(answers) > 1
             near = [np.abs(found.state.force[0] - a).max() < 1e-8 for a in answers]
             unlisted += not (found.outcome.ok and any(near))
@@ -121,9 +125,14 @@ def touch(quick: bool) -> Iterator[Row]:
     arch = designs()["clipped_cylinder"](radius_mm=20.0, half_length_mm=10.0, edge_height_mm=5.0, width_mm=1.0)
     problem = _block(0.3, (Leg(1.0, steps=1),), arch)
     apart = solve_increment(
-        ContactState.at_rest(problem.gap(problem.origin), 2), free_motion(problem, problem.origin) + [1e-6, 0.0],
-        problem.delassus, Coulomb(0.25), 1.0,
-    )  # fmt: skip
+        ContactProblem.of(
+            ContactState.at_rest(problem.gap(problem.origin), 2),
+            free_motion(problem, problem.origin) + [1e-6, 0.0],
+            problem.delassus,
+            ContactLaw(Coulomb(0.25)),
+            1.0,
+        )
+    )
     yield _is("no point touches: settled, without force", 0, np.abs(apart.state.force).max() + (not apart.outcome.ok))
     tiny = list(march(_block(0.3, (Leg(0.05, steps=40 if quick else 100), Leg(1.0, steps=2)), arch)))
     counts = [int((f.meshed_state.status != OPEN).sum()) for f in tiny]
@@ -275,7 +284,9 @@ def turned(quick: bool) -> Iterator[Row]:
         state = ContactState.at_rest(problem.gap(problem.origin), 3)
         for frame in march(problem):
             state = solve_increment(
-                state, free_motion(problem, frame.target) @ turn.T, compliance, Coulomb(0.25), 0.3
+                ContactProblem.of(
+                    state, free_motion(problem, frame.target) @ turn.T, compliance, ContactLaw(Coulomb(0.25)), 0.3
+                )
             ).state
         states.append(state.force @ turn)
     apart = np.abs(states[1] - states[0]).max() / np.abs(states[0]).max()
@@ -302,7 +313,7 @@ def refusals(quick: bool) -> Iterator[Row]:
         ("compliance with NaN", free, spoilt, Outcome.NOT_FINITE),
         ("floating body", free, floating.reshape(problem.delassus.shape), Outcome.INDEFINITE),
     ):
-        found = solve_increment(state, gap, compliance, Coulomb(0.25), 0.5)
+        found = solve_increment(ContactProblem.of(state, gap, compliance, ContactLaw(Coulomb(0.25)), 0.5))
         message = found.outcome is wanted and found.state is state
         yield _is(f"{what}: outcome says so, and the state before is handed back", 1, message)
     legs = "[[press.leg]]\ndepth_mm = {}\nslide_x_mm = {}\n[[press.leg]]\ndepth_mm = 0.5\nslide_x_mm = 1.0\n"

@@ -22,7 +22,9 @@ import numpy as np
 from scipy import sparse
 
 from finger3d.analyses.study_rows import Result, Row
+from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
+from finger3d.contact.law import ContactLaw
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
 from finger3d.fem.assembly import stiffness
@@ -77,7 +79,9 @@ def block(dim: int, nu: float, cells: int) -> list[tuple[Any, ...]]:
     state = ContactState.at_rest(np.zeros(c), dim)
     table = []
     for share in (0.0, *SHARES):
-        found = solve_increment(state, press + share * shear, compliance, Coulomb(MU), 1.0)
+        found = solve_increment(
+            ContactProblem.of(state, press + share * shear, compliance, ContactLaw(Coulomb(MU)), 1.0)
+        )
         if not found.outcome.ok:
             raise AssertionError(f"{dim}D, nu = {nu:g}, {share:g} of mu N: {found.outcome}")
         state = found.state

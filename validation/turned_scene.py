@@ -15,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.analyses.study_rows import Result, Row
+from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import Coulomb
+from finger3d.contact.law import ContactLaw
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
 from finger3d.fem.material import Elasticity
@@ -79,7 +81,7 @@ def dragged(soft: Body, degrees: float, steps: int, obj: MeshObject, touch: floa
         free[:, 0] = soft.surface.average @ gap
         free[:, 1:] = -moved[[0, 2]]
         state = state or ContactState.at_rest(np.maximum(free[:, 0], 0.0), 3)
-        found = solve_increment(state, free, soft.compliance, Coulomb(MU), DEPTH)
+        found = solve_increment(ContactProblem.of(state, free, soft.compliance, ContactLaw(Coulomb(MU)), DEPTH))
         assert found.outcome.ok, found.outcome
         state = found.state
         total = state.force.sum(axis=0)

@@ -93,7 +93,15 @@ class LinearisedIncrement:
             points = np.flatnonzero(after.status != OPEN)
             delassus = turned_delassus(problem.delassus, rotations[points], points)
         k = len(points)
-        local = ContactProblem(moved[points], delassus.reshape(k * d, k * d), mu[points], rho[points], 1.0)
+        local = ContactProblem(
+            previous=before.of_points(points),
+            free_motion=moved[points],
+            delassus=delassus.reshape(k * d, k * d),
+            law=problem.model.contact_law,
+            length_scale=1.0,
+            friction=mu[points],
+            augmentation=rho[points],
+        )
         active = ActiveSet.of(local, after.status[points], augmented[points])
         matrix = cast("Float", assemble_in_place(local, active, np.float64))
         factor = lu_factor(matrix, overwrite_a=True, check_finite=False) if len(matrix) else (matrix, matrix)

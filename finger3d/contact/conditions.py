@@ -19,8 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._types import Float
-from finger3d.contact.friction import OPEN, SLIP, STICK, FrictionLaw
+from finger3d.contact.friction import OPEN, SLIP, STICK
+from finger3d.contact.law import ContactLaw
 from finger3d.contact.state import ContactState, pressure
+from finger3d.errors import Outcome
 
 TOLERANCE = 1e-8
 """Largest residual of an increment that is called converged."""
@@ -32,42 +34,85 @@ class ContactProblem:
 
     Attributes
     ----------
+    previous : ContactState
+        State at the beginning of the increment.
     free_motion : (c, d) array, mm
         Gap and increment of tangential displacement that the points would have without contact forces.
     delassus : (c d, c d) array, mm/N
         Relative displacement per contact force.
+    law : ContactLaw
+    length_scale : float, mm
+        Length by which violated gaps and slips are divided in the residual: the press depth.
     friction : (c,) array
-        Friction coefficient of every point.
+        Friction coefficient of every point; solvers replace it until it agrees with the law.
     augmentation : (c, d) array, N/mm
         Parameters rho of the projection.  They change the convergence, not the solution.
-    length_scale : float, mm
-        Length by which violated gaps and slips are divided.
+    area : (c,) array, mm2, optional
+        Tributary areas of the points; only laws that depend on the pressure need them.
+    is_definite : bool
+        Whether the Delassus operator must be positive definite.  At finite strain it need not be: a body under contact
+        forces may be stable by the contact alone.
     """
 
+    previous: ContactState
     free_motion: Float
     delassus: Float
+    law: ContactLaw
+    length_scale: float
     friction: Float
     augmentation: Float
-    length_scale: float
+    area: Float | None = None
+    is_definite: bool = True
 
     @classmethod
     def of(
         cls,
         previous: ContactState,
-        free: Float,
+        free_displacement: Float,
         delassus: Float,
-        law: FrictionLaw,
+        law: ContactLaw,
         length_scale: float,
-        augmentation: Float | None,
-        area: Float | None,
+        augmentation: Float | None = None,
+        area: Float | None = None,
     ) -> ContactProblem:
-        """Return the increment from a state; the arguments are those of `finger3d.contact.solve.solve_increment`."""
-        increment = free.copy()
-        increment[:, 1:] -= previous.tangential_displacement
-        matrix = delassus.reshape(free.size, free.size)
-        mu = law.coefficients(previous.status, pressure(previous.force, area))
-        rho = augmentation_parameters(matrix, free.shape[1]) if augmentation is None else augmentation
-        return cls(increment, matrix, mu, rho, length_scale)
+        """Return the increment from a state.
+
+        Parameters
+        ----------
+        free_displacement : (c, d) array, mm
+            Gap and tangential displacement relative to the object that the points would have without contact forces.
+        delassus : (c, d, c, d) array, mm/N
+        augmentation : (c, d) array, N/mm, optional
+            By default from the diagonal of a positive definite operator; if given, the operator may be indefinite.
+        """
+        motion = free_displacement.copy()
+        motion[:, 1:] -= previous.tangential_displacement
+        matrix = delassus.reshape(motion.size, motion.size)
+        compliance = np.zeros(0) if area is None else law.normal.compliance(area)
+        if compliance.any():
+            normals = np.arange(0, motion.size, motion.shape[1])
+            matrix = matrix.copy()
+            matrix[normals, normals] += compliance
+        return cls(
+            previous=previous,
+            free_motion=motion,
+            delassus=matrix,
+            law=law,
+            length_scale=length_scale,
+            friction=law.friction.coefficients(previous.status, pressure(previous.force, area)),
+            augmentation=augmentation_parameters(matrix, motion.shape[1]) if augmentation is None else augmentation,
+            area=area,
+            is_definite=augmentation is None,
+        )
+
+    @property
+    def refusal(self) -> Outcome | None:
+        """Why the increment cannot be solved: NaN, or a definite operator without a positive diagonal; else None."""
+        if not (np.isfinite(self.free_motion).all() and np.isfinite(self.delassus).all()):
+            return Outcome.NOT_FINITE
+        if self.is_definite and np.diagonal(self.delassus).min(initial=np.inf) <= 0.0:
+            return Outcome.INDEFINITE
+        return None
 
     def relative_displacement(self, force: Float) -> Float:
         """Return w = W r + q (c, d), mm, for forces (c, d), N."""
@@ -88,7 +133,8 @@ def augmentation_parameters(delassus: Float, dim: int) -> Float:
 
     The tangential directions of a point share the smaller value, so that the projection is isotropic.
     """
-    rho = 1.0 / np.diagonal(delassus).reshape(-1, dim)
+    with np.errstate(divide="ignore", invalid="ignore"):  # such an operator is refused
+        rho = 1.0 / np.diagonal(delassus).reshape(-1, dim)
     rho = rho.copy()
     rho[:, 1:] = rho[:, 1:].min(axis=1, keepdims=True, initial=np.inf)
     return rho

@@ -10,35 +10,24 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.contact.conditions import TOLERANCE, ContactProblem, residual
-from finger3d.contact.friction import OPEN, SLIP, STICK, FrictionLaw
+from finger3d.contact.friction import OPEN, SLIP, STICK
 from finger3d.contact.newton import force_of_sets
-from finger3d.contact.state import ContactSolution, ContactState, invalid_input, next_state
+from finger3d.contact.state import ContactSolution, next_state
 from finger3d.errors import Outcome
 
 _MAX_ITERATIONS = 500
 
 
-def maeno_active_set(
-    previous: ContactState,
-    free: Float,
-    compliance: Float,
-    law: FrictionLaw,
-    length_scale: float,
-    guess: Float | None = None,
-    weights: Float | None = None,
-    area: Float | None = None,
-) -> ContactSolution:
+def maeno_active_set(problem: ContactProblem, guess: Float | None = None) -> ContactSolution:
     """Solve one increment by the paper's rule.
 
-    Arguments as in `finger3d.contact.solve.solve_increment`; the guess is not used, and the friction coefficients stay
-    those at the beginning of the increment.  A cycled increment returns the last state that was tried.
+    The guess is not used, and the friction coefficients stay those at the beginning of the increment.  A cycled
+    increment returns the last state that was tried.
     """
-    c, d = free.shape
-    refused = invalid_input(free, compliance, weights is None)
-    if refused:
-        return ContactSolution(previous, refused, np.inf, 0, "none")
-    problem = ContactProblem.of(previous, free, compliance, law, length_scale, weights, area)
-    mu = problem.friction
+    previous, mu = problem.previous, problem.friction
+    c, d = problem.free_motion.shape
+    if problem.refusal:
+        return ContactSolution(previous, problem.refusal, np.inf, 0, "none")
     # points that touched at the end of the last increment stick, all others are open
     status = np.where(previous.status == OPEN, OPEN, STICK).astype(np.int8)
     direction = np.zeros((c, d))
@@ -61,7 +50,7 @@ def maeno_active_set(
         status = changed
         if status.tobytes() in seen:
             break
-    error = residual(force, displacement, status, mu, length_scale)
+    error = residual(force, displacement, status, mu, problem.length_scale)
     if outcome is Outcome.CONVERGED and error > TOLERANCE:
         outcome = Outcome.WRONG_WAY
     return ContactSolution(next_state(previous, force, displacement, status), outcome, error, iteration, "paper")

@@ -5,27 +5,17 @@ from __future__ import annotations
 from typing import Final, Literal, Protocol
 
 from finger3d._types import Float
-from finger3d.contact.friction import FrictionLaw
+from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.maeno import maeno_active_set
 from finger3d.contact.solve import solve_increment
-from finger3d.contact.state import ContactSolution, ContactState
+from finger3d.contact.state import ContactSolution
 
 
 class StickRule(Protocol):
-    """Solution of one increment; see `finger3d.contact.solve.solve_increment` for the arguments."""
+    """Solution of one increment."""
 
-    def __call__(
-        self,
-        previous: ContactState,
-        free: Float,
-        compliance: Float,
-        law: FrictionLaw,
-        length_scale: float,
-        guess: Float | None = None,
-        weights: Float | None = None,
-        area: Float | None = None,
-    ) -> ContactSolution:
-        """Solve one increment."""
+    def __call__(self, problem: ContactProblem, guess: Float | None = None) -> ContactSolution:
+        """Solve one increment, from an initial guess (c, d) N of the forces if there is one."""
         ...
 
 

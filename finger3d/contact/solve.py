@@ -11,10 +11,9 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.contact.acceleration import accelerated_newton, threads_for
 from finger3d.contact.conditions import TOLERANCE, ContactProblem, residual
-from finger3d.contact.friction import FrictionLaw
 from finger3d.contact.lemke import friction_start
 from finger3d.contact.newton import NewtonResult, block_gauss_seidel, force_of_sets, newton
-from finger3d.contact.state import ContactSolution, ContactState, invalid_input, next_state, pressure
+from finger3d.contact.state import ContactSolution, next_state, pressure
 from finger3d.errors import Outcome
 
 _FRICTION_UPDATES = 50
@@ -51,56 +50,33 @@ _SMALLEST_STRIDE = 1e-3
 """Stride of the friction continuation, as a share of the whole, at which it is given up."""
 
 
-def solve_increment(
-    previous: ContactState,
-    free: Float,
-    compliance: Float,
-    law: FrictionLaw,
-    length_scale: float,
-    guess: Float | None = None,
-    weights: Float | None = None,
-    area: Float | None = None,
-) -> ContactSolution:
+def solve_increment(problem: ContactProblem, guess: Float | None = None) -> ContactSolution:
     """Solve one increment.
 
     Parameters
     ----------
-    previous : ContactState
-        State at the beginning of the increment.
-    free : (c, d) array, mm
-        Gap and tangential displacement relative to the object that the points would have without contact forces.
-    compliance : (c, d, c, d) array, mm/N
-        Delassus operator.
-    law : FrictionLaw
-    length_scale : float, mm
-        Length by which violated gaps and slips are divided in the residual: the press depth.
+    problem : ContactProblem
+        If its operator may be indefinite, the slowest attempts are left out, since another linearisation follows.
     guess : (c, d) array, N, optional
-        Initial guess, by default the forces of `previous`.  It changes the iterations, not the solution.
-    weights : (c, d) array, N/mm, optional
-        Augmentation parameters, by default from the diagonal of `compliance`.  If they are given, an indefinite
-        operator is accepted: at finite strain a body under contact forces may be stable by the contact alone.  The
-        slowest attempts are left out, since another linearisation follows.
-    area : (c,) array, mm2, optional
-        Tributary areas of the points; only laws whose coefficient depends on the pressure need them.
+        Initial guess, by default the forces of the previous state.  It changes the iterations, not the solution.
 
     Returns
     -------
     ContactSolution
         Its outcome is CONVERGED only if the residual of the conditions, evaluated afterwards, is at most `TOLERANCE`.
     """
-    refused = invalid_input(free, compliance, weights is None)
-    if refused:
-        return ContactSolution(previous, refused, np.inf, 0, "none")
-    with threads_for(free.size):
-        problem = ContactProblem.of(previous, free, compliance, law, length_scale, weights, area)
+    previous, law = problem.previous, problem.law.friction
+    if problem.refusal:
+        return ContactSolution(previous, problem.refusal, np.inf, 0, "none")
+    with threads_for(problem.free_motion.size):
         start = previous.force if guess is None else guess
-        limits, total = _SMALL_STRAIN if weights is None else _FINITE_STRAIN, 0
-        for _ in range(_FRICTION_UPDATES + len(free)):
+        limits, total = _SMALL_STRAIN if problem.is_definite else _FINITE_STRAIN, 0
+        for _ in range(_FRICTION_UPDATES + len(start)):
             method, found, error, spent = _solve_once(problem, start, guess is None, limits)
             total += spent
             if found is None:
                 break
-            mu = law.updated(problem.friction, found.status, pressure(found.force, area))
+            mu = law.updated(problem.friction, found.status, pressure(found.force, problem.area))
             if np.abs(mu - problem.friction).max(initial=0.0) <= _FRICTION_TOLERANCE * mu.max(initial=0.0):
                 state = next_state(previous, found.force, found.relative_displacement, found.status)
                 return ContactSolution(state, Outcome.CONVERGED, error, total, method)

@@ -109,12 +109,3 @@ def next_state(previous: ContactState, force: Float, moved: Float, status: NDArr
     return ContactState(
         status, force, moved[:, 0], previous.tangential_displacement + moved[:, 1:], previous.accumulated_slip + slid
     )
-
-
-def invalid_input(free: Float, compliance: Float, definite: bool = True) -> Outcome | None:
-    """Return why an increment cannot be solved: NaN, or a compliance (c, d, c, d) without a positive diagonal."""
-    if not (np.isfinite(free).all() and np.isfinite(compliance).all()):
-        return Outcome.NOT_FINITE
-    if definite and np.diagonal(compliance.reshape(free.size, free.size)).min(initial=np.inf) <= 0.0:
-        return Outcome.INDEFINITE
-    return None

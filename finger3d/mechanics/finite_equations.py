@@ -20,7 +20,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from finger3d._types import Float
-from finger3d.contact.conditions import TOLERANCE, augmentation_parameters, residual
+from finger3d.contact.conditions import TOLERANCE, ContactProblem, augmentation_parameters, residual
+from finger3d.contact.rules import RULES
 from finger3d.contact.state import ContactSolution, ContactState, next_state
 from finger3d.errors import Outcome
 from finger3d.fem.assembly import on_places
@@ -38,7 +39,7 @@ from finger3d.mechanics.finite_state import (
     curvature_of,
     rotated,
 )
-from finger3d.mechanics.formulation import length_scale, solve_contact
+from finger3d.mechanics.formulation import length_scale
 from finger3d.mechanics.linear_contact import carried_by_object, transported
 from finger3d.mechanics.path import stride_ratio
 from finger3d.mechanics.problem import Problem, scatter_to_points
@@ -231,7 +232,16 @@ class IncrementEquations:
         free += self._active(np.einsum("cij,cj->ci", rotation, moved.reshape(force.shape)).ravel())
         free -= (delassus.reshape(force.size, force.size) @ force.ravel()).reshape(force.shape)
         free[:, 1:] += start.tangential_displacement
-        solution = solve_contact(problem, start, free, delassus, self._length_scale, force, self._augmentation)
+        contact = ContactProblem.of(
+            start,
+            free,
+            delassus,
+            problem.model.contact_law,
+            self._length_scale,
+            self._augmentation,
+            problem.surface.area,
+        )
+        solution = RULES[problem.model.rule](contact, force)
         change = np.einsum("cij,ci->cj", rotation, solution.state.force - force)
         return solution, change.ravel()[active]
 

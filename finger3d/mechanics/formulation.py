@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._types import Float
-from finger3d.contact.rules import RULES
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.mechanics.cost import AddedCost, PressCost
 from finger3d.objects import DistanceTracker
@@ -151,22 +150,3 @@ def length_scale(problem: Problem, a: ObjectPose, b: ObjectPose) -> float:
     """
     depth = 0.0 if a.is_turned or b.is_turned else max(a.depth_mm, b.depth_mm)
     return depth if depth > 0.0 else problem.model.largest_depth_mm
-
-
-def solve_contact(
-    problem: Problem,
-    state: ContactState,
-    free: Float,
-    compliance: Float,
-    scale: float,
-    guess: Float | None,
-    weights: Float | None = None,
-    points: NDArray[np.intp] | None = None,
-) -> ContactSolution:
-    """Solve one increment by the model's stick rule and friction law; see `finger3d.contact.solve.solve_increment`.
-
-    `points` (k,) are the contact points that the arguments belong to, all unless given.
-    """
-    model, area = problem.model, problem.surface.area
-    own = area if points is None else area[points]
-    return RULES[model.rule](state, free, compliance, model.friction, scale, guess, weights, own)

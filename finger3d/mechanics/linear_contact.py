@@ -17,12 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._types import Float
-from finger3d.contact.conditions import TOLERANCE
+from finger3d.contact.conditions import TOLERANCE, ContactProblem
 from finger3d.contact.friction import OPEN
+from finger3d.contact.rules import RULES
 from finger3d.contact.state import ContactSolution, ContactState, next_state
 from finger3d.errors import Outcome
 from finger3d.mechanics.contact_geometry import ContactGeometry, contact_geometry
-from finger3d.mechanics.formulation import Workspace, length_scale, solve_contact
+from finger3d.mechanics.formulation import Workspace, length_scale
 from finger3d.objects import DistanceTracker, ObjectPose, vertical_frame
 
 if TYPE_CHECKING:
@@ -212,14 +213,16 @@ class _Increment:
         start = transported(self.state, bases)
         free = self._relative(geometry, at, self.body.past @ vertical_frame(d))
         free[:, 1:] += start.tangential_displacement
-        scale = length_scale(problem, self.a, self.b)
+        scale, area = length_scale(problem, self.a, self.b), problem.surface.area
+        rule, law = RULES[problem.model.rule], problem.model.contact_law
         rotations = geometry.from_reference
         if (rotations == np.eye(d)).all():
-            return solve_contact(problem, start, free, self.body.delassus, scale, guess)
+            return rule(ContactProblem.of(start, free, self.body.delassus, law, scale, area=area), guess)
         expected = start.force if guess is None else guess
         near = np.flatnonzero((geometry.gap < 2.0 * _NEAR * scale) | (expected[:, 0] > 0.0))
         delassus = turned_delassus(self.body.delassus, rotations[near], near)
-        part = solve_contact(problem, start.of_points(near), free[near], delassus, scale, expected[near], points=near)
+        contact = ContactProblem.of(start.of_points(near), free[near], delassus, law, scale, area=area[near])
+        part = rule(contact, expected[near])
         force, status = np.zeros_like(expected), np.full(len(expected), OPEN, dtype=np.int8)
         force[near], status[near] = part.state.force, part.state.status
         return replace(part, state=replace(start, force=force, status=status))

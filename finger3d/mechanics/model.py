@@ -11,6 +11,7 @@ import scipy.sparse as sp
 
 from finger3d._types import Float, freeze_arrays
 from finger3d.contact.friction import Coulomb, FrictionLaw
+from finger3d.contact.law import ContactLaw
 from finger3d.contact.rules import RuleName
 from finger3d.fem.bars import Bars
 from finger3d.fem.material import Material
@@ -233,6 +234,11 @@ class Model:
     def formulation(self) -> Formulation:
         """Strain measure and material response of the body."""
         return self.strain_measure if self.relaxation is None else self.strain_measure.relaxing(self.relaxation)
+
+    @property
+    def contact_law(self) -> ContactLaw:
+        """Law of the interface between finger and object."""
+        return ContactLaw(self.friction)
 
     @property
     def mixed(self) -> bool:
