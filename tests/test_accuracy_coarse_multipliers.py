@@ -14,7 +14,7 @@ from finger3d.mechanics.contact_geometry import ContactGeometry
 from finger3d.mechanics.linear_contact import LinearBody, solve_linearised
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.solve import march
-from finger3d.objects import Sphere, Wave
+from finger3d.objects import Move, Sphere, Wave
 from tests.models import half_cylinder, swept_fig9
 
 MODELS = {
@@ -86,10 +86,10 @@ def test_no_distance_from_a_curved_object_is_computed_again(name: str, monkeypat
 @pytest.mark.parametrize("name", ["ball on a section", "wave"])
 def test_an_increment_linearised_about_its_own_solution_is_that_solution(name: str) -> None:
     problem = build(MODELS[name])
-    before, after = (problem.model.formulation.start(problem), problem.origin), list(march(problem))[0]
+    start, after = problem.model.formulation.start(problem), list(march(problem))[0]
     state = after.meshed_state
     own = ContactGeometry(state.gap, np.ones(len(state.gap)), np.zeros_like(state.displacement), state.bases)
     body = LinearBody(problem.delassus, np.zeros_like(state.displacement))
-    found = solve_linearised(problem, *before, after.target, body, None, own, state.displacement)
+    found = solve_linearised(problem, start, Move(problem.origin, after.target), body, None, own, state.displacement)
     assert found.outcome.ok
     assert found.state.force == pytest.approx(state.force, abs=1e-6 * np.abs(state.force).max())

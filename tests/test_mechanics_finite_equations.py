@@ -12,6 +12,7 @@ from finger3d.mechanics.finite_increment import FiniteIncrement
 from finger3d.mechanics.finite_state import DeformedState
 from finger3d.mechanics.finite_strain import FiniteStrain
 from finger3d.mechanics.path import targets
+from finger3d.objects import Move
 from tests.models import half_cylinder
 
 
@@ -21,7 +22,7 @@ def solved() -> tuple[FiniteIncrement, DeformedState]:
     formulation = problem.model.formulation
     assert isinstance(formulation, FiniteStrain)
     rest, pose = formulation.start(problem), targets(problem.model.legs)[0]
-    increment = formulation._increment(problem, rest, problem.origin, pose, formulation.workspace())
+    increment = formulation._increment(problem, rest, Move(problem.origin, pose), formulation.workspace())
     state = increment.solve(None).state
     assert isinstance(state, DeformedState)
     return increment, state

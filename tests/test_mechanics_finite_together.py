@@ -12,6 +12,7 @@ from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.mechanics.build import build
 from finger3d.mechanics.finite_strain import FiniteStrain
 from finger3d.mechanics.path import targets
+from finger3d.objects import Move
 from tests.models import half_cylinder
 
 MUS = (0.3, 0.5, 0.8)
@@ -22,15 +23,15 @@ def test_solutions_found_together_are_those_found_alone() -> None:
     formulation = problem.model.formulation
     assert isinstance(formulation, FiniteStrain)
     several = [replace(problem, model=replace(problem.model, friction=Coulomb(mu))) for mu in MUS]
-    rest, a, b = formulation.start(problem), problem.origin, targets(problem.model.legs)[0]
+    rest, move = formulation.start(problem), Move(problem.origin, targets(problem.model.legs)[0])
     workspace = formulation.workspace()
-    together = formulation.increments(several, [(rest, None)] * len(MUS), a, b, workspace, leader=1)
+    together = formulation.increments(several, [(rest, None)] * len(MUS), move, workspace, leader=1)
     alone = 0
     for one, found in zip(several, together, strict=True):
         assert found is not None
         assert found.residual <= TOLERANCE
         own = formulation.workspace()
-        wanted = formulation.increment(one, rest, a, b, None, own)
+        wanted = formulation.increment(one, rest, move, None, own)
         alone += own.factorizations
         # both are solved to a residual of 1e-8; forces follow to some times that
         np.testing.assert_allclose(

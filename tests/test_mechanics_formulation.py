@@ -8,7 +8,7 @@ import pytest
 from finger3d.mechanics.build import build
 from finger3d.mechanics.formulation import length_scale, moment_of
 from finger3d.mechanics.model import Leg, MeshOptions
-from finger3d.objects import ObjectPose
+from finger3d.objects import Move, ObjectPose
 from tests.models import block
 
 
@@ -24,6 +24,6 @@ def test_the_moment_of_a_couple_is_force_times_arm_in_section_and_solid() -> Non
 def test_gaps_are_measured_by_the_depth_and_by_the_deepest_leg_without_one() -> None:
     legs = (Leg(0.4, steps=1), Leg(0.1, steps=1), Leg(0.0, steps=1))
     problem = build(block(mesh=MeshOptions(2.0, 2.0, "swept"), legs=legs))
-    assert length_scale(problem, ObjectPose(0.1), ObjectPose(0.2)) == 0.2
-    assert length_scale(problem, ObjectPose(0.0), ObjectPose(0.0)) == 0.4
-    assert length_scale(problem, ObjectPose(0.1), ObjectPose(0.1, turn_z=0.1)) == 0.4
+    assert length_scale(problem, Move(ObjectPose(0.1), ObjectPose(0.2))) == 0.2
+    assert length_scale(problem, Move(ObjectPose(0.0), ObjectPose(0.0))) == 0.4
+    assert length_scale(problem, Move(ObjectPose(0.1), ObjectPose(0.1, turn_z=0.1))) == 0.4

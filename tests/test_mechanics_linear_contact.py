@@ -10,7 +10,7 @@ from finger3d.fem.directions import bases_of
 from finger3d.mechanics.build import build
 from finger3d.mechanics.linear_contact import LinearBody, carried_by_object, transported, turned_delassus
 from finger3d.mechanics.model import MeshOptions
-from finger3d.objects import ObjectPose, vertical_frame
+from finger3d.objects import Move, ObjectPose, vertical_frame
 from tests.contact_cases import random_compliance
 from tests.models import block
 
@@ -63,10 +63,10 @@ def test_a_transported_state_keeps_the_length_of_its_tangential_vectors_under_a_
 def test_the_object_carries_points_by_its_slide_and_its_turn() -> None:
     problem = build(block(mesh=MeshOptions(2.0, 2.0, "swept")))
     at = np.zeros_like(problem.surface.points)
-    slid = carried_by_object(problem, ObjectPose(0.1), ObjectPose(0.3, 0.5, -0.25), at)
+    slid = carried_by_object(problem, Move(ObjectPose(0.1), ObjectPose(0.3, 0.5, -0.25)), at)
     assert np.allclose(slid, [0.5, -0.2, -0.25])
     angle = 0.2
-    turned = carried_by_object(problem, ObjectPose(0.1), ObjectPose(0.1, turn_y=angle), at)
+    turned = carried_by_object(problem, Move(ObjectPose(0.1), ObjectPose(0.1, turn_y=angle)), at)
     x, z = problem.surface.points[:, 0], problem.surface.points[:, 2]
     # a rotation about the vertical through the lowest point, in the middle
     assert turned[:, 1] == pytest.approx(0.0 * x, abs=1e-12)

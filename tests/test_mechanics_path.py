@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from finger3d.mechanics.model import Leg
-from finger3d.mechanics.path import AUTO_START, between, stride_ratio, targets
-from finger3d.objects import ObjectPose
+from finger3d.mechanics.path import AUTO_START, targets
+from finger3d.objects import Move, ObjectPose
 
 
 def test_targets_pass_through_every_leg() -> None:
@@ -24,11 +24,11 @@ def test_automatic_legs_begin_with_a_fixed_number() -> None:
 
 
 def test_a_pose_between_two_is_linear_in_all_coordinates() -> None:
-    assert between(ObjectPose(0.0, 1.0), ObjectPose(4.0, 3.0, 8.0, 2.0), 0.25) == ObjectPose(1.0, 1.5, 2.0, 0.5)
+    assert Move(ObjectPose(0.0, 1.0), ObjectPose(4.0, 3.0, 8.0, 2.0)).at(0.25) == ObjectPose(1.0, 1.5, 2.0, 0.5)
 
 
-def test_the_stride_ratio_is_none_where_the_path_turns() -> None:
-    start, first = ObjectPose(0.0), ObjectPose(1.0, 2.0)
-    assert stride_ratio(start, first, ObjectPose(1.5, 3.0)) == pytest.approx(0.5)
-    assert stride_ratio(start, first, ObjectPose(1.0, 3.0)) is None
-    assert stride_ratio(start, first, ObjectPose(0.5, 1.0)) is None
+def test_the_ratio_of_lengths_is_none_where_the_path_turns() -> None:
+    first = Move(ObjectPose(0.0), ObjectPose(1.0, 2.0))
+    assert Move(first.end, ObjectPose(1.5, 3.0)).length_ratio(first) == pytest.approx(0.5)
+    assert Move(first.end, ObjectPose(1.0, 3.0)).length_ratio(first) is None
+    assert Move(first.end, ObjectPose(0.5, 1.0)).length_ratio(first) is None

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.material import Isotropic
 from finger3d.mechanics.model import Leg, MeshOptions
-from finger3d.objects import Plane
+from finger3d.objects import Move, Plane
 from tests.models import block, run
 
 COARSE = MeshOptions(1.5, 1.5, "swept")
@@ -32,7 +32,7 @@ def test_the_work_of_one_proportional_press_is_the_strain_energy() -> None:
     problem, frames = run(block(mesh=COARSE, legs=(Leg(0.2, steps=1),)))
     formulation, state = problem.model.formulation, frames[-1].meshed_state
     start = formulation.start(problem)
-    work = formulation.work_on_body(problem, start, state, problem.origin, frames[-1].target)
+    work = formulation.work_on_body(problem, start, state, Move(problem.origin, frames[-1].target))
     x = formulation.unknowns(problem, state)
     upper = problem.body.stiffness.upper
     energy = 0.5 * x @ ((upper + sp.triu(upper, 1).T) @ x)

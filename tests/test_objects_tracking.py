@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from finger3d.objects import DistanceTracker, MeshObject, ObjectPose, PlacedObject, between
+from finger3d.objects import DistanceTracker, MeshObject, Move, ObjectPose, PlacedObject
 from tests.bodies import ball, random_points
 
 
@@ -15,7 +15,7 @@ def test_tracked_distances_are_exact_where_they_are_small(within: float) -> None
     tracker, at = DistanceTracker(), random_points(200) - [0.0, 1.0, 0.0]
     last = ObjectPose(0.8, 0.5, 0.2, turn_y=0.3)
     for share in np.linspace(0.0, 1.0, 12):
-        placed = PlacedObject.of(obj, 0.0, between(ObjectPose(0.0), last, float(share)))
+        placed = PlacedObject.of(obj, 0.0, Move(ObjectPose(0.0), last).at(float(share)))
         value, gradient = tracker.distance(placed, at, within)
         exact, normal = placed.distance(at)
         near = exact < within

@@ -36,7 +36,7 @@ from finger3d.mechanics.linear_contact import LinearState
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
-from finger3d.objects import Cylinder, ObjectPose
+from finger3d.objects import Cylinder, Move, ObjectPose
 
 Float = NDArray[np.float64]
 
@@ -104,7 +104,7 @@ def travel(problem: Problem, state: ContactState, way: float, turn: float, steps
     out, lost = [], 0.0
     for k in range(steps):
         here = replace(problem, model=replace(model, object=Cylinder(BEGIN + way * k / steps, radius_mm=R)))
-        found = formulation.increment(here, state, start, end, None, formulation.workspace())
+        found = formulation.increment(here, state, Move(start, end), None, formulation.workspace())
         assert found.outcome.ok, found.outcome
         lost += frictional_dissipation(here, state, found.state)
         state = found.state

@@ -32,7 +32,7 @@ from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
-from finger3d.objects import ObjectPose, Sphere
+from finger3d.objects import Move, ObjectPose, Sphere
 
 RADIUS, E, NU = 100.0, 1.0, 0.3
 SHEAR, EFFECTIVE = E / (2.0 * (1.0 + NU)), E / (1.0 - NU**2)
@@ -102,7 +102,7 @@ def partial(problem: Problem, shares: tuple[float, ...]) -> list[tuple[float, fl
     place, area, out = problem.surface.centroids, problem.surface.area, []
     for share in shares:
         end = ObjectPose(DEPTH, turn_y=unit * turn_of(share))
-        found = formulation.increment(rough, state, start, end, None, formulation.workspace())
+        found = formulation.increment(rough, state, Move(start, end), None, formulation.workspace())
         assert found.outcome.ok, found.outcome
         state, start = found.state, end
         pull = state.scene_force

@@ -37,7 +37,7 @@ from finger3d.mechanics.formulation import Formulation
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.problem import AddedStiffness
 from finger3d.mechanics.small_strain import SmallStrain
-from finger3d.objects import ObjectPose, PlacedObject, Plane, Sphere, vertical_frame
+from finger3d.objects import Move, ObjectPose, PlacedObject, Plane, Sphere, vertical_frame
 
 from . import _rings
 from ._common import box, graded, held_at
@@ -171,7 +171,7 @@ def march(body: StandIn, kinematics: Formulation, path: Sequence[tuple[float, fl
     force, radius = [], []
     for t, depth in path:
         target = ObjectPose(DEPTH * max(depth, 0.0), time_s=t)
-        found = kinematics.increment(body, state, at, target, None, workspace)
+        found = kinematics.increment(body, state, Move(at, target), None, workspace)
         if not found.outcome.ok:
             raise AssertionError(f"t = {t:g}: {found.outcome}")
         state, at = found.state, target

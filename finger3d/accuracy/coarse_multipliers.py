@@ -32,7 +32,7 @@ from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.linear_contact import LinearBody, LinearState, solve_linearised
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.small_strain import SmallStrain
-from finger3d.objects import ObjectPose
+from finger3d.objects import Move, ObjectPose
 
 _LEAST_POINTS = 4
 """Points of a face that are all kept: fewer leave nothing to interpolate between."""
@@ -51,17 +51,16 @@ class _LinearisedContact(SmallStrain):
         self,
         problem: Problem,
         state: ContactState,
-        a: ObjectPose,
-        b: ObjectPose,
+        move: Move,
         guess: Float | None,
         workspace: Workspace,
     ) -> ContactSolution:
         """Solve contact once; an increment to a pose that is not known does not converge."""
         assert isinstance(state, LinearState)
-        if b not in self.known:
+        if move.end not in self.known:
             return ContactSolution(state, Outcome.NO_CONVERGENCE, np.inf, 0, "none")
         body = LinearBody(problem.delassus, np.zeros_like(state.displacement))
-        return solve_linearised(problem, state, a, b, body, guess, *self.known[b])
+        return solve_linearised(problem, state, move, body, guess, *self.known[move.end])
 
 
 def with_coarse_multipliers(problem: Problem, steps: Sequence[StepResult]) -> Iterator[Problem]:

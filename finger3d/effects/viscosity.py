@@ -41,7 +41,7 @@ from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem, scatter_to_points
 from finger3d.mechanics.relaxation import InternalVariables, Prony, Step
 from finger3d.mechanics.small_strain import SmallStrain
-from finger3d.objects import ObjectPose
+from finger3d.objects import Move
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,15 +103,14 @@ class Viscoelastic(SmallStrain):
         self,
         problem: Problem,
         state: ContactState,
-        a: ObjectPose,
-        b: ObjectPose,
+        move: Move,
         guess: Float | None,
         workspace: Workspace,
     ) -> ContactSolution:
         """Apply the contact rule once, with the compliance for this time step and the displacement due to the past."""
         assert isinstance(workspace, RelaxationWorkspace)
         assert isinstance(state, ViscousState)
-        memory, step = self._memory(state), Step(self.prony, b.time_s - a.time_s)
+        memory, step = self._memory(state), Step(self.prony, move.duration_s)
         body = self._body(problem).respond(step, memory, workspace)
         own, springs = body.compliance, problem.inclusions.bar_stiffness
         first = len(own) - len(springs)
@@ -126,7 +125,7 @@ class Viscoelastic(SmallStrain):
             stiffened(problem.body.condensed.compliance, springs), problem.system.active_dofs, c, d
         )
         compliance = scatter_to_points(stiffened(own, springs), problem.system.active_dofs, c, d) + rest
-        found = solve_increment(problem, state, a, b, LinearBody(compliance, past.reshape(c, d)), guess, workspace)
+        found = solve_increment(problem, state, move, LinearBody(compliance, past.reshape(c, d)), guess, workspace)
         if found.state is state:
             return found
         rows = problem.row_forces(problem.upright_force(found.state))

@@ -15,7 +15,7 @@ from finger3d.fem.traces import BoundarySurface, restrict
 from finger3d.mechanics.formulation import length_scale
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.problem import Problem, free_surface
-from finger3d.objects import DistanceTracker, ObjectPose
+from finger3d.objects import DistanceTracker, Move, ObjectPose
 
 _TOUCHES = {True: 1e-9, False: 1e-3}
 """Penetration of points outside the candidates, over the depth, from which they count as in contact: on the contact
@@ -153,6 +153,6 @@ def _stays_out(problem: Problem, u: Float, target: ObjectPose, others: BoundaryS
     gap, normal = problem.model.formulation.gap(problem, u, target, others)
     for on_contact, share in _TOUCHES.items():
         points = problem.model.formulation.may_touch(others, normal) & ((others.face == CONTACT) == on_contact)
-        if gap[points].min(initial=np.inf) <= -share * length_scale(problem, target, target):
+        if gap[points].min(initial=np.inf) <= -share * length_scale(problem, Move(target, target)):
             return False
     return True

@@ -8,11 +8,11 @@ from finger3d.contact.friction import SLIP
 from finger3d.contact.state import ContactState
 from finger3d.mechanics.linear_contact import transported
 from finger3d.mechanics.problem import Problem
-from finger3d.objects import ObjectPose
+from finger3d.objects import Move
 
 
-def external_work(problem: Problem, before: ContactState, after: ContactState, a: ObjectPose, b: ObjectPose) -> float:
-    """Return the work (mJ) of the object on the finger in an increment from pose a to pose b.
+def external_work(problem: Problem, before: ContactState, after: ContactState, move: Move) -> float:
+    """Return the work (mJ) of the object on the finger in an increment.
 
     It is the work of the contact forces on the body plus the frictional dissipation, by the trapezoidal rule.
     """
@@ -20,7 +20,7 @@ def external_work(problem: Problem, before: ContactState, after: ContactState, a
     start = transported(before, after.bases)
     friction = 0.5 * (start.force + after.force)[:, 1:]
     rubbed = np.einsum("ct,ct->c", friction, after.tangential_displacement - start.tangential_displacement)
-    on_body = problem.model.formulation.work_on_body(problem, before, after, a, b)
+    on_body = problem.model.formulation.work_on_body(problem, before, after, move)
     return float(2 ** len(problem.axes) * on_body - problem.symmetry.total(rubbed))
 
 

@@ -41,9 +41,8 @@ from finger3d.mechanics.finite_state import (
 )
 from finger3d.mechanics.formulation import length_scale
 from finger3d.mechanics.linear_contact import carried_by_object, transported
-from finger3d.mechanics.path import stride_ratio
 from finger3d.mechanics.problem import Problem, scatter_to_points
-from finger3d.objects import ObjectPose, vertical_frame
+from finger3d.objects import Move, vertical_frame
 
 _TARGET_RESIDUAL = 5e-9
 """Residual at which the iteration ends; where round-off prevents it, one up to `TOLERANCE` that no longer falls."""
@@ -74,7 +73,7 @@ def converged(error: float, last_error: float) -> bool:
 
 @dataclass(frozen=True)
 class IncrementEquations:
-    """Equations of an increment from a state, as the object moves from pose a to pose b.
+    """Equations of an increment from a state, as the object moves.
 
     Attributes
     ----------
@@ -86,8 +85,7 @@ class IncrementEquations:
     problem: Problem
     body: FiniteBody
     start: DeformedState
-    a: ObjectPose
-    b: ObjectPose
+    move: Move
     workspace: FiniteStrainWorkspace
 
     def finished(self, now: Configuration, solution: ContactSolution, error: float, spent: int) -> ContactSolution:
@@ -124,14 +122,14 @@ class IncrementEquations:
 
     @cached_property
     def _length_scale(self) -> float:
-        return length_scale(self.problem, self.a, self.b)
+        return length_scale(self.problem, self.move)
 
     @cached_property
     def _largest_step(self) -> float:
         """Largest displacement (mm) of an iteration: a multiple of that of the object, or a share of the depth."""
         problem = self.problem
         at = problem.surface.trace @ displacement(problem.mesh, self.start.unknowns)
-        moved = float(np.abs(carried_by_object(problem, self.a, self.b, at)).max(initial=0.0))
+        moved = float(np.abs(carried_by_object(problem, self.move, at)).max(initial=0.0))
         return max(_LARGEST_STEP * moved, _LEAST_STEP * self._length_scale)
 
     @cached_property
@@ -161,15 +159,15 @@ class IncrementEquations:
         """Yield expected unknowns (N,) and contact forces (c, d)."""
         start = self.start
         if start.previous is not None:
-            pose, x = start.previous
-            ratio = stride_ratio(pose, self.a, self.b)
+            before, x = start.previous
+            ratio = self.move.length_ratio(before)
             if ratio is not None:
                 yield start.unknowns + ratio * (start.unknowns - x), start.force if guess is None else guess
 
     def at(self, x: Float) -> Configuration:
         """Return the configuration at unknowns (N,); raises InvertedError."""
         problem = self.problem
-        contact = contact_of(problem, problem.surface, displacement(problem.mesh, x), self.b)
+        contact = contact_of(problem, problem.surface, displacement(problem.mesh, x), self.move.end)
         return Configuration(x, self.body.internal_forces(x), contact)
 
     def moved(self, now: Configuration, step: Float) -> Configuration:
@@ -198,7 +196,7 @@ class IncrementEquations:
         active = problem.system.active_dofs
         entries = on_places(now.contact.rows[active], pattern)
         rows = sp.csr_matrix((entries, pattern.indices, pattern.indptr), pattern.shape)
-        curvature = curvature_of(problem, problem.surface, displacement(problem.mesh, now.x), self.b)
+        curvature = curvature_of(problem, problem.surface, displacement(problem.mesh, now.x), self.move.end)
         moving = now.contact.geometric_stiffness(force[:, 0], curvature)
         tangent = self.body.tangent(now.x).less(moving)
         if damping:
@@ -264,7 +262,7 @@ class IncrementEquations:
         """Gap and increment of tangential displacement (c, d) under forces (c, d), in the present directions."""
         problem, bases = self.problem, now.contact.bases
         at, before = (problem.surface.trace @ displacement(problem.mesh, x) for x in (now.x, self.start.unknowns))
-        increment = at - before - carried_by_object(problem, self.a, self.b, at)
+        increment = at - before - carried_by_object(problem, self.move, at)
         out = np.empty_like(force)
         out[:, 0] = now.contact.gap
         compliance = problem.system.object_compliance
@@ -309,5 +307,5 @@ class IncrementEquations:
         start = transported(self.start, now.contact.bases)
         after = next_state(start, solution.force, moved, solution.status)
         return DeformedState(
-            **(vars(after) | {"bases": now.contact.bases}), unknowns=now.x, previous=(self.a, self.start.unknowns)
+            **(vars(after) | {"bases": now.contact.bases}), unknowns=now.x, previous=(self.move, self.start.unknowns)
         )

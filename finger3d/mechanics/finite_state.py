@@ -16,7 +16,7 @@ from finger3d.mechanics.finite_body import FiniteBody
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.relaxation import InternalVariables
-from finger3d.objects import ObjectPose
+from finger3d.objects import Move, ObjectPose
 
 _CURVATURE_STEP = 0.1
 """Step of the differences of the object's normals, over the edge length of the mesh."""
@@ -33,12 +33,12 @@ class DeformedState(ContactState):
     ----------
     unknowns : (N,) of the meshed part
     memory : internal variables of a body that relaxes
-    previous : pose and unknowns at the start of the increment that led here
+    previous : motion in the increment that led here, and unknowns at its start
     """
 
     unknowns: Float
     memory: InternalVariables | None = None
-    previous: tuple[ObjectPose, Float] | None = None
+    previous: tuple[Move, Float] | None = None
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from finger3d.mechanics.finite_together import solve_together
 from finger3d.mechanics.formulation import Workspace, moment_of
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.relaxation import InternalVariables, Relaxation, Step, relaxed
-from finger3d.objects import ObjectPose
+from finger3d.objects import Move, ObjectPose
 
 if TYPE_CHECKING:
     from finger3d.mechanics.model import Model
@@ -105,8 +105,7 @@ class FiniteStrain:
         self,
         problem: Problem,
         state: ContactState,
-        a: ObjectPose,
-        b: ObjectPose,
+        move: Move,
         guess: Float | None,
         workspace: Workspace,
     ) -> ContactSolution:
@@ -114,15 +113,14 @@ class FiniteStrain:
         known, workspace.known = workspace.known, None
         if known is not None:
             return known
-        increment = self._increment(problem, state, a, b, workspace)
+        increment = self._increment(problem, state, move, workspace)
         return self._remembered(increment, increment.solve(guess))
 
     def increments(
         self,
         problems: Sequence[Problem],
         starts: Sequence[tuple[ContactState, Float | None]],
-        a: ObjectPose,
-        b: ObjectPose,
+        move: Move,
         workspace: Workspace,
         leader: int,
     ) -> list[ContactSolution | None]:
@@ -131,7 +129,7 @@ class FiniteStrain:
         See `finger3d.mechanics.finite_together.solve_together`.
         """
         increments = [
-            self._increment(problem, state, a, b, workspace)
+            self._increment(problem, state, move, workspace)
             for problem, (state, _) in zip(problems, starts, strict=True)
         ]
         found = solve_together(increments, [guess for _, guess in starts], leader)
@@ -142,16 +140,15 @@ class FiniteStrain:
         self,
         problem: Problem,
         state: ContactState,
-        a: ObjectPose,
-        b: ObjectPose,
+        move: Move,
         workspace: Workspace,
     ) -> FiniteIncrement:
         assert isinstance(state, DeformedState)
         assert isinstance(workspace, FiniteStrainWorkspace)
         body = self._body(problem, workspace)
         if self.relaxation is not None and state.memory is not None:
-            body = body.over(self.relaxation, state.memory, b.time_s - a.time_s)
-        return FiniteIncrement(problem, body, state, a, b, workspace)
+            body = body.over(self.relaxation, state.memory, move.duration_s)
+        return FiniteIncrement(problem, body, state, move, workspace)
 
     def _remembered(self, increment: FiniteIncrement, found: ContactSolution) -> ContactSolution:
         """Return a solution with the internal variables at the end of the increment."""
@@ -160,7 +157,7 @@ class FiniteStrain:
             return found
         assert isinstance(after, DeformedState)
         strained = increment.body.relaxing_variables(after.unknowns, self.relaxation.bulk)
-        seconds = increment.b.time_s - increment.a.time_s
+        seconds = increment.move.duration_s
         memory = Step(self.relaxation.prony, seconds).after(start.memory, strained)
         return replace(found, state=replace(after, memory=memory))
 
@@ -201,12 +198,10 @@ class FiniteStrain:
             body = body.over(self.relaxation, state.memory, 0.0)
         return body.internal_forces(state.unknowns)[: problem.mesh.points.size].reshape(-1, problem.dim)
 
-    def work_on_body(
-        self, problem: Problem, before: ContactState, after: ContactState, a: ObjectPose, b: ObjectPose
-    ) -> float:
+    def work_on_body(self, problem: Problem, before: ContactState, after: ContactState, move: Move) -> float:
         """Return the sum of the mean nodal forces times the displacements of the nodes."""
         ends = []
-        for state, target in ((before, a), (after, b)):
+        for state, target in ((before, move.start), (after, move.end)):
             u = displacement(problem.mesh, self.unknowns(problem, state))
             ends.append((u, contact_of(problem, problem.surface, u, target).nodal_forces(state.force)))
         (u, force), (u_after, force_after) = ends

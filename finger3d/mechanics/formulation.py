@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from finger3d.mechanics.model import Model
     from finger3d.mechanics.problem import Problem
     from finger3d.mechanics.relaxation import Relaxation
-    from finger3d.objects import ObjectPose
+    from finger3d.objects import Move, ObjectPose
 
 
 @dataclass
@@ -86,12 +86,11 @@ class Formulation(Protocol):
         self,
         problem: Problem,
         state: ContactState,
-        a: ObjectPose,
-        b: ObjectPose,
+        move: Move,
         guess: Float | None,
         workspace: Workspace,
     ) -> ContactSolution:
-        """Advance a state from pose a to pose b of the object.
+        """Advance a state as the object moves.
 
         Parameters
         ----------
@@ -114,9 +113,7 @@ class Formulation(Protocol):
         """Every number that is read, by its name in `Model.reading_names`."""
         ...
 
-    def work_on_body(
-        self, problem: Problem, before: ContactState, after: ContactState, a: ObjectPose, b: ObjectPose
-    ) -> float:
+    def work_on_body(self, problem: Problem, before: ContactState, after: ContactState, move: Move) -> float:
         """Work (mJ) of the contact forces on the meshed part from one state to the next."""
         ...
 
@@ -143,10 +140,11 @@ def moment_of(places: Float, forces: Float) -> Float:
     return np.asarray(np.cross(arms, loads).sum(axis=0))
 
 
-def length_scale(problem: Problem, a: ObjectPose, b: ObjectPose) -> float:
+def length_scale(problem: Problem, move: Move) -> float:
     """Return the length (mm) that gaps are divided by: the depth, or that of the deepest leg during release.
 
     It is that of the deepest leg, too, while the object is turned: the depth is that of the point which was lowest.
     """
-    depth = 0.0 if a.is_turned or b.is_turned else max(a.depth_mm, b.depth_mm)
+    poses = move.start, move.end
+    depth = 0.0 if any(pose.is_turned for pose in poses) else max(pose.depth_mm for pose in poses)
     return depth if depth > 0.0 else problem.model.largest_depth_mm

@@ -19,6 +19,7 @@ from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.path import prescribed_forces, targets
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import extrapolated_force, march
+from finger3d.objects import Move
 
 
 def march_in_groups(
@@ -89,12 +90,10 @@ class _Presses:
             return None
         if self._loads[increment] is not None or not isinstance(formulation, FiniteStrain):
             return None
-        a, b = self._poses[increment : increment + 2]
         found = formulation.increments(
             [self.problems[number] for number in group],
             [self._start(number, increment) for number in group],
-            a,
-            b,
+            Move(*self._poses[increment : increment + 2]),
             self.workspace,
             group.index(leader),
         )
@@ -109,5 +108,5 @@ class _Presses:
         states = [self._rest, *(step.meshed_state for step in self.steps[number])]
         if not increment:
             return states[0], None
-        before, a, b = self._poses[increment - 1 : increment + 2]
-        return states[-1], extrapolated_force(states[-1], a, b, (before, states[-2].force))
+        before, start, end = self._poses[increment - 1 : increment + 2]
+        return states[-1], extrapolated_force(states[-1], Move(start, end), (Move(before, start), states[-2].force))

@@ -24,7 +24,7 @@ from finger3d.contact.state import ContactSolution, ContactState, next_state
 from finger3d.errors import Outcome
 from finger3d.mechanics.contact_geometry import ContactGeometry, contact_geometry
 from finger3d.mechanics.formulation import Workspace, length_scale
-from finger3d.objects import DistanceTracker, ObjectPose, vertical_frame
+from finger3d.objects import DistanceTracker, Move, vertical_frame
 
 if TYPE_CHECKING:
     from finger3d.mechanics.problem import Problem
@@ -101,13 +101,12 @@ def turned_delassus(delassus: Float, rotations: Float, points: NDArray[np.intp])
 def solve_increment(
     problem: Problem,
     state: LinearState,
-    a: ObjectPose,
-    b: ObjectPose,
+    move: Move,
     body: LinearBody,
     guess: Float | None,
     workspace: Workspace,
 ) -> ContactSolution:
-    """Advance a state as the object moves from pose a to pose b.
+    """Advance a state as the object moves.
 
     Returns
     -------
@@ -116,7 +115,7 @@ def solve_increment(
         that the forces were solved with.
     """
     assert state.bases is not None
-    increment = _Increment(problem, state, a, b, body, workspace.tracker)
+    increment = _Increment(problem, state, move, body, workspace.tracker)
     flat = problem.model.object.is_flat
     at = np.zeros_like(body.past) if flat else body.displacement(state.force if guess is None else guess, state.bases)
     geometry = increment.geometry(at)
@@ -155,15 +154,14 @@ def solve_increment(
 def solve_linearised(
     problem: Problem,
     state: LinearState,
-    a: ObjectPose,
-    b: ObjectPose,
+    move: Move,
     body: LinearBody,
     guess: Float | None,
     geometry: ContactGeometry,
     at: Float,
 ) -> ContactSolution:
-    """Advance a state from pose a to pose b with gaps linearised at a displacement `at` (c, d) mm, by one solution."""
-    increment = _Increment(problem, state, a, b, body, DistanceTracker())
+    """Advance a state with gaps linearised at a displacement `at` (c, d) mm, by one solution."""
+    increment = _Increment(problem, state, move, body, DistanceTracker())
     solution = increment.solve(geometry, at, guess)
     if not solution.outcome.ok:
         return replace(solution, state=state)
@@ -184,12 +182,11 @@ def _extrapolated(tried: list[Float], found: list[Float]) -> Float:
 
 @dataclass(frozen=True)
 class _Increment:
-    """An increment from a state, as the object moves from pose a to pose b."""
+    """An increment from a state, as the object moves."""
 
     problem: Problem
     state: LinearState
-    a: ObjectPose
-    b: ObjectPose
+    move: Move
     body: LinearBody
     tracker: DistanceTracker
 
@@ -198,8 +195,8 @@ class _Increment:
 
         It is exact for points nearer to the object than `within`, over the depth.
         """
-        problem, reach = self.problem, within * length_scale(self.problem, self.a, self.b)
-        placed, share = problem.placed(self.b), problem.system.object_share
+        problem, reach = self.problem, within * length_scale(self.problem, self.move)
+        placed, share = problem.placed(self.move.end), problem.system.object_share
 
         def distance(points: Float) -> tuple[Float, Float]:
             return self.tracker.distance(placed, points, reach)
@@ -213,7 +210,7 @@ class _Increment:
         start = transported(self.state, bases)
         free = self._relative(geometry, at, self.body.past @ vertical_frame(d))
         free[:, 1:] += start.tangential_displacement
-        scale, area = length_scale(problem, self.a, self.b), problem.surface.area
+        scale, area = length_scale(problem, self.move), problem.surface.area
         rule, law = RULES[problem.model.rule], problem.model.contact_law
         rotations = geometry.from_reference
         if (rotations == np.eye(d)).all():
@@ -232,7 +229,7 @@ class _Increment:
         bases = geometry.bases
         out: Float = np.einsum("cak,ck->ca", bases, displacement - at)
         out[:, 0] += geometry.gap
-        slid = displacement - self.state.displacement - carried_by_object(self.problem, self.a, self.b, at)
+        slid = displacement - self.state.displacement - carried_by_object(self.problem, self.move, at)
         out[:, 1:] = np.einsum("ctk,ck->ct", bases[:, 1:], slid)
         return out
 
@@ -241,7 +238,7 @@ class _Increment:
 
         Gaps are divided by the depth; turns (c,) rad count by the force of their point over the largest.
         """
-        scale = length_scale(self.problem, self.a, self.b)
+        scale = length_scale(self.problem, self.move)
         closed = found.status != OPEN
         gap = np.where(closed, np.abs(after.gap), np.maximum(-after.gap, 0.0)) / scale
         size = np.linalg.norm(found.force, axis=1)
@@ -254,7 +251,7 @@ class _Increment:
         the chord of an arc, nearly perpendicular to the normal, and does not count.
         """
         problem, thing = self.problem, self.problem.model.object
-        before, after = problem.placed(self.a), problem.placed(self.b)
+        before, after = problem.placed(self.move.start), problem.placed(self.move.end)
         start, end = (
             placed.to_own(np.pad(problem.surface.points + u, ((0, 0), (0, 3 - u.shape[1]))))
             for placed, u in ((before, self.state.displacement), (after, displacement))
@@ -297,11 +294,11 @@ def transported(state: ContactState, bases: Float) -> ContactState:
     )
 
 
-def carried_by_object(problem: Problem, a: ObjectPose, b: ObjectPose, at: Float) -> Float:
-    """Return how far (c, d) mm the object's material at points displaced by `at` (c, d) moves from pose a to pose b."""
-    d = at.shape[1]
-    if a.turns == b.turns:
-        return np.broadcast_to((b.displacement - a.displacement)[:d], at.shape)
+def carried_by_object(problem: Problem, move: Move, at: Float) -> Float:
+    """Return how far (c, d) mm the object's material at points displaced by `at` (c, d) moves."""
+    d, start, end = at.shape[1], move.start, move.end
+    if start.turns == end.turns:
+        return np.broadcast_to((end.displacement - start.displacement)[:d], at.shape)
     points = np.zeros((len(at), 3))
     points[:, :d] = problem.surface.points + at
-    return problem.placed(b).moved_from(problem.placed(a), points)[:, :d]
+    return problem.placed(end).moved_from(problem.placed(start), points)[:, :d]

@@ -25,7 +25,7 @@ from finger3d.mechanics.relaxation import Relaxation
 from finger3d.mechanics.small_strain import SmallStrain
 from finger3d.meshing.grading import Grading
 from finger3d.meshing.options import Mesher
-from finger3d.objects import ContactPath, ObjectPose, Plane, RigidObject, between
+from finger3d.objects import ContactPath, Move, ObjectPose, Plane, RigidObject
 
 if TYPE_CHECKING:
     from finger3d.mechanics.problem import Problem
@@ -289,7 +289,7 @@ def contact_path(
     at, poses = ObjectPose(0.0), list[ObjectPose]()
     for leg in legs:
         end = leg.end(at)
-        poses += [between(at, end, share) for share in (0.25, 0.5, 0.75, 1.0)]
+        poses += [Move(at, end).at(share) for share in (0.25, 0.5, 0.75, 1.0)]
         at = end
     return ContactPath(
         top=design.top,

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from finger3d.mechanics.model import Leg
-from finger3d.objects import ObjectPose, between
+from finger3d.objects import Move, ObjectPose
 
 AUTO_START = 10
 """Increments that ``steps = "auto"`` begins with."""
@@ -18,7 +16,7 @@ def targets(legs: tuple[Leg, ...]) -> list[ObjectPose]:
     for leg in legs:
         count = leg.steps if isinstance(leg.steps, int) else AUTO_START
         end = leg.end(at)
-        out += [between(at, end, k / count) for k in range(1, count)] + [end]
+        out += [Move(at, end).at(k / count) for k in range(1, count)] + [end]
         at = end
     return out
 
@@ -31,15 +29,3 @@ def prescribed_forces(legs: tuple[Leg, ...]) -> list[tuple[int, int, float] | No
         force = leg.force_N
         out += [None if force is None else (k, count, force) for k in range(1, count + 1)]
     return out
-
-
-def stride_ratio(before: ObjectPose, a: ObjectPose, b: ObjectPose) -> float | None:
-    """Return the length of the increment from a to b over that from `before` to a; None if the direction changes.
-
-    It is None, too, if the object did not move before.
-    """
-    last, now = a.coordinates - before.coordinates, b.coordinates - a.coordinates
-    if not last.any():
-        return None
-    ratio = float(now @ last) / float(last @ last)
-    return None if ratio <= 0.0 or not np.allclose(now, ratio * last) else ratio

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from finger3d.mechanics.model import Model
     from finger3d.mechanics.problem import Problem
     from finger3d.mechanics.relaxation import Relaxation
-    from finger3d.objects import ObjectPose
+    from finger3d.objects import Move, ObjectPose
 
 
 @dataclass(frozen=True)
@@ -65,15 +65,14 @@ class SmallStrain:
         self,
         problem: Problem,
         state: ContactState,
-        a: ObjectPose,
-        b: ObjectPose,
+        move: Move,
         guess: Float | None,
         workspace: Workspace,
     ) -> ContactSolution:
         """Solve contact along the normals of the object."""
         assert isinstance(state, LinearState)
         body = LinearBody(problem.delassus, np.zeros_like(state.displacement))
-        return solve_increment(problem, state, a, b, body, guess, workspace)
+        return solve_increment(problem, state, move, body, guess, workspace)
 
     def unknowns(self, problem: Problem, state: ContactState) -> Float:
         """Return the unknowns of one state."""
@@ -87,9 +86,7 @@ class SmallStrain:
         """Return the readings from the forces, by their rows."""
         return problem.read(problem.upright_force(state))
 
-    def work_on_body(
-        self, problem: Problem, before: ContactState, after: ContactState, a: ObjectPose, b: ObjectPose
-    ) -> float:
+    def work_on_body(self, problem: Problem, before: ContactState, after: ContactState, move: Move) -> float:
         """Return the sum of the mean force of every point times its displacement."""
         assert isinstance(before, LinearState)
         assert isinstance(after, LinearState)

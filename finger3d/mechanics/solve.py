@@ -16,9 +16,9 @@ from finger3d.mechanics.energy import external_work, frictional_dissipation
 from finger3d.mechanics.force_control import deepest, depth_of_force
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.history import StepResult
-from finger3d.mechanics.path import prescribed_forces, stride_ratio, targets
+from finger3d.mechanics.path import prescribed_forces, targets
 from finger3d.mechanics.problem import Problem
-from finger3d.objects import ObjectPose, between
+from finger3d.objects import Move, ObjectPose
 
 _CUTS = 6
 """Times that an increment which does not converge is halved, at most."""
@@ -26,12 +26,11 @@ _CUTS = 6
 
 @dataclass(frozen=True)
 class _Substep:
-    """A converged part of an increment: states before and after, and the poses they belong to."""
+    """A converged part of an increment: states before and after, and the motion of the object."""
 
     before: ContactState
     after: ContactState
-    a: ObjectPose
-    b: ObjectPose
+    move: Move
 
 
 def march(
@@ -64,26 +63,26 @@ def march(
     workspace = workspace or model.formulation.workspace()
     without_inclusions = _march_without_inclusions(problem, workspace)
     state, at = model.formulation.start(problem), problem.origin
-    previous: tuple[ObjectPose, Float] | None = None
+    previous: tuple[Move, Float] | None = None
     work = dissipation = 0.0
     start_force = 0.0
     for number, (target, load) in enumerate(zip(targets(model.legs), prescribed_forces(model.legs), strict=True)):
         if cancel is not None and cancel.is_set():
             raise CancelledError
-        guess = near[number] if number < len(near) else extrapolated_force(state, at, target, previous)
+        guess = near[number] if number < len(near) else extrapolated_force(state, Move(at, target), previous)
         if load is None:
-            found, substeps = _increment(problem, workspace, state, at, target, most_cuts, guess)
+            found, substeps = _increment(problem, workspace, state, Move(at, target), most_cuts, guess)
         else:
             if load[0] == 1:
                 start_force = _normal_force(problem, state)
             wanted = start_force + load[0] / load[1] * (load[2] - start_force)
             found, substeps, target = _to_force(
-                problem, workspace, state, at, target, most_cuts, (wanted, load[2]), previous
+                problem, workspace, state, Move(at, target), most_cuts, (wanted, load[2]), previous
             )
         for part in substeps:
-            work += external_work(problem, part.before, part.after, part.a, part.b)
+            work += external_work(problem, part.before, part.after, part.move)
             dissipation += frictional_dissipation(problem, part.before, part.after)
-        previous = at, state.force
+        previous = Move(at, target), state.force
         state, at = found.state, target
         read = model.formulation.readings(problem, state)
         yield StepResult(
@@ -132,30 +131,30 @@ def _to_force(
     problem: Problem,
     workspace: Workspace,
     state: ContactState,
-    a: ObjectPose,
-    b: ObjectPose,
+    move: Move,
     cuts: int,
     load: tuple[float, float],
-    previous: tuple[ObjectPose, Float] | None,
+    previous: tuple[Move, Float] | None,
 ) -> tuple[ContactSolution, list[_Substep], ObjectPose]:
-    """Advance from a to the pose b, at the depth where the normal force is `load[0]`, N; the leg ends at `load[1]`."""
+    """Advance to the depth where the normal force is `load[0]`, N; the leg ends at `load[1]`."""
 
     def pose(depth: float) -> ObjectPose:
-        return replace(b, depth_mm=depth)
+        return replace(move.end, depth_mm=depth)
 
     def force_at(depth: float) -> float:
-        found, _ = _increment(problem, workspace, state, a, pose(depth), cuts)
+        found, _ = _increment(problem, workspace, state, Move(move.start, pose(depth)), cuts)
         if not found.outcome.ok:
             raise _FailedError
         return _normal_force(problem, found.state)
 
     most = deepest(problem.model.object, problem.system.first_contact_mm, problem.model.design.height_mm)
-    guess = a.depth_mm + (a.depth_mm - previous[0].depth_mm if previous else b.depth_mm)
+    start_mm = move.start.depth_mm
+    guess = start_mm + (start_mm - previous[0].start.depth_mm if previous else move.end.depth_mm)
     try:
-        target = pose(depth_of_force(force_at, load[0], a.depth_mm, guess, most, load[1]))
+        target = pose(depth_of_force(force_at, load[0], start_mm, guess, most, load[1]))
     except _FailedError:
-        target = b
-    found, substeps = _increment(problem, workspace, state, a, target, cuts)
+        target = move.end
+    found, substeps = _increment(problem, workspace, state, Move(move.start, target), cuts)
     return found, substeps, target
 
 
@@ -163,14 +162,15 @@ class _FailedError(Exception):
     """An increment at a trial depth did not converge."""
 
 
-def extrapolated_force(
-    state: ContactState, a: ObjectPose, b: ObjectPose, previous: tuple[ObjectPose, Float] | None
-) -> Float | None:
-    """Return the forces extrapolated linearly, if the path continues in the direction of the previous increment."""
+def extrapolated_force(state: ContactState, move: Move, previous: tuple[Move, Float] | None) -> Float | None:
+    """Return the forces extrapolated linearly, if the path continues in the direction of the previous increment.
+
+    `previous` is the motion in that increment, and the forces (c, d) N at its start.
+    """
     if previous is None:
         return None
-    pose, force = previous
-    ratio = stride_ratio(pose, a, b)
+    before, force = previous
+    ratio = move.length_ratio(before)
     return None if ratio is None else state.force + ratio * (state.force - force)
 
 
@@ -178,20 +178,19 @@ def _increment(
     problem: Problem,
     workspace: Workspace,
     state: ContactState,
-    a: ObjectPose,
-    b: ObjectPose,
+    move: Move,
     cuts: int,
     guess: Float | None = None,
 ) -> tuple[ContactSolution, list[_Substep]]:
-    """Advance from a to b; an increment that does not converge is halved and repeated from the same state."""
-    found = problem.model.formulation.increment(problem, state, a, b, guess, workspace)
+    """Advance a state; an increment that does not converge is halved and repeated from the same state."""
+    found = problem.model.formulation.increment(problem, state, move, guess, workspace)
     if found.outcome.ok or cuts == 0:
-        return found, [_Substep(state, found.state, a, b)]
-    middle = between(a, b, 0.5)
-    first, done = _increment(problem, workspace, state, a, middle, cuts - 1)
+        return found, [_Substep(state, found.state, move)]
+    middle = move.at(0.5)
+    first, done = _increment(problem, workspace, state, Move(move.start, middle), cuts - 1)
     if not first.outcome.ok:
         return replace(first, state=state, iterations=first.iterations + found.iterations), done
-    second, more = _increment(problem, workspace, first.state, middle, b, cuts - 1)
+    second, more = _increment(problem, workspace, first.state, Move(middle, move.end), cuts - 1)
     return replace(
         second,
         residual=max(first.residual, second.residual),

@@ -3,7 +3,7 @@
 from finger3d.objects.first_contact import ContactPath, InitialContact, first_contact_height, initial_contact
 from finger3d.objects.held import HeldBody
 from finger3d.objects.placed import PlacedObject
-from finger3d.objects.pose import ObjectPose, between
+from finger3d.objects.pose import Move, ObjectPose
 from finger3d.objects.registry import OBJECTS
 from finger3d.objects.rigid import Axis, RigidObject, vertical_frame
 from finger3d.objects.shapes import Cylinder, Plane, Sphere, Wedge
@@ -20,6 +20,7 @@ __all__ = [
     "HeldBody",
     "InitialContact",
     "MeshObject",
+    "Move",
     "ObjectPose",
     "PlacedObject",
     "Plane",
@@ -27,7 +28,6 @@ __all__ = [
     "Sphere",
     "Wave",
     "Wedge",
-    "between",
     "first_contact_height",
     "initial_contact",
     "vertical_frame",

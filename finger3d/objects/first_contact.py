@@ -11,7 +11,7 @@ import numpy as np
 from finger3d._types import Float, freeze_arrays
 from finger3d.errors import Finger3dError
 from finger3d.objects.placed import PlacedObject
-from finger3d.objects.pose import ObjectPose, between
+from finger3d.objects.pose import Move, ObjectPose
 from finger3d.objects.rigid import RigidObject
 
 Top = Callable[[Float, Float], Float]
@@ -261,7 +261,7 @@ def _no_side(way: ContactPath, touch: float) -> None:
         count = max(1, math.ceil(_STRIDES * stride / way.half_length_mm))
         over = None
         for share in np.linspace(0.0, 1.0, count + 1) if stride else ():
-            at = between(before, pose, float(share))
+            at = Move(before, pose).at(float(share))
             now = np.maximum(_overlap(way.top, way.object, rim, touch, at), 0.0)
             if over is not None and (jump := now - over - _STEEP * stride / count).max() > 0.02 * touch:
                 x, z = rim[np.argmax(jump)]

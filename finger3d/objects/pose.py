@@ -51,6 +51,31 @@ class ObjectPose:
         return np.array([self.depth_mm, self.slide_x_mm, self.slide_z_mm, self.time_s, *self.turns])
 
 
-def between(a: ObjectPose, b: ObjectPose, share: float) -> ObjectPose:
-    """Return the pose a share of the way from a to b."""
-    return ObjectPose(*(a.coordinates + share * (b.coordinates - a.coordinates)).tolist())
+@dataclass(frozen=True)
+class Move:
+    """Motion of the object from one pose to another, during which its coordinates change in proportion."""
+
+    start: ObjectPose
+    end: ObjectPose
+
+    @property
+    def change(self) -> Float:
+        """Change of the coordinates: array (7,)."""
+        return self.end.coordinates - self.start.coordinates
+
+    @property
+    def duration_s(self) -> float:
+        """Time that it takes, s."""
+        return self.end.time_s - self.start.time_s
+
+    def at(self, share: float) -> ObjectPose:
+        """Return the pose a share of the way from the start to the end."""
+        return ObjectPose(*(self.start.coordinates + share * self.change).tolist())
+
+    def length_ratio(self, before: Move) -> float | None:
+        """Return its length over that of the move before; None if the direction changes, or nothing moved before."""
+        last, now = before.change, self.change
+        if not last.any():
+            return None
+        ratio = float(now @ last) / float(last @ last)
+        return None if ratio <= 0.0 or not np.allclose(now, ratio * last) else ratio

@@ -20,7 +20,7 @@ from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.path import AUTO_START
 from finger3d.mechanics.symmetry import symmetry
 from finger3d.meshing.report import MeshReport
-from finger3d.objects import ObjectPose, PlacedObject, between, initial_contact
+from finger3d.objects import Move, ObjectPose, PlacedObject, initial_contact
 
 PENALTY = 200.0
 """Pressure over overlap, times the depth over Young's modulus: the surfaces overlap by less than a percent of the
@@ -152,7 +152,7 @@ def _stretches(leg: Leg, start: ObjectPose) -> list[tuple[ObjectPose, int]]:
     count, end = leg.steps if isinstance(leg.steps, int) else AUTO_START, leg.end(start)
     if end.turns == start.turns:
         return [(end, count)]
-    return [(between(start, end, k / count), 1) for k in range(1, count)] + [(end, 1)]
+    return [(Move(start, end).at(k / count), 1) for k in range(1, count)] + [(end, 1)]
 
 
 def _rigid(moved: np.ndarray) -> np.ndarray:
