@@ -40,7 +40,7 @@ def test_errors_of_body_and_contact_add_as_squares_and_many_increments_are_not_r
     assert (
         0.0
         < found.bars["normal_force_N"]
-        < 0.1 * sum(f.meshed_state.scene_force[:, 1].sum() for f in frames[-1:]) * -2.0
+        < 0.1 * sum(f.meshed_state.contact.scene_force[:, 1].sum() for f in frames[-1:]) * -2.0
     )
     assert len(found.coarse.surface.nodes) < len(problem.surface.nodes)
     long = replace(problem, model=half_cylinder(0.3, 40))

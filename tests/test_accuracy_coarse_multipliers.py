@@ -11,6 +11,7 @@ from finger3d.accuracy.coarse_multipliers import with_coarse_multipliers
 from finger3d.accuracy.estimate import press_numbers
 from finger3d.mechanics.build import build
 from finger3d.mechanics.contact_geometry import ContactGeometry
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.linear_contact import LinearBody, solve_linearised
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.solve import march
@@ -86,10 +87,11 @@ def test_no_distance_from_a_curved_object_is_computed_again(name: str, monkeypat
 @pytest.mark.parametrize("name", ["ball on a section", "wave"])
 def test_an_increment_linearised_about_its_own_solution_is_that_solution(name: str) -> None:
     problem = build(MODELS[name])
-    start, after = problem.model.formulation.start(problem), list(march(problem))[0]
-    state = after.meshed_state
-    own = ContactGeometry(state.gap, np.ones(len(state.gap)), np.zeros_like(state.displacement), state.bases)
-    body = LinearBody(problem.delassus, np.zeros_like(state.displacement))
-    found = solve_linearised(problem, start, Move(problem.origin, after.target), body, None, own, state.displacement)
+    start, after = formulation_of(problem.model).start(problem), list(march(problem))[0]
+    contact, moved = after.meshed_state.contact, after.meshed_state.body
+    own = ContactGeometry(contact.gap, np.ones(len(contact.gap)), np.zeros_like(moved), contact.bases)
+    known = replace(problem, contact_geometry={after.target: (own, moved)})
+    body = LinearBody(problem.delassus, np.zeros_like(moved))
+    found = solve_linearised(known, start, Move(problem.origin, after.target), body, None)
     assert found.outcome.ok
-    assert found.state.force == pytest.approx(state.force, abs=1e-6 * np.abs(state.force).max())
+    assert found.state.contact.force == pytest.approx(contact.force, abs=1e-6 * np.abs(contact.force).max())

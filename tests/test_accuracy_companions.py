@@ -13,12 +13,11 @@ from finger3d.accuracy import companions
 from finger3d.accuracy.companions import coarser, companion
 from finger3d.accuracy.estimate import compared, estimate, main_numbers
 from finger3d.contact.friction import Coulomb
-from finger3d.effects.elastic_object import SoftObject
 from finger3d.fem.material import Isotropic
 from finger3d.fem.simplex import Mesh
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
-from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.model import ElasticObject, Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.step_halving import last_step
 from finger3d.meshing import tetwild
@@ -117,7 +116,7 @@ def test_a_body_meshed_finer_than_asked_for_is_judged_by_one_still_finer(made: l
 
 
 def test_an_elastic_ball_is_meshed_anew_for_the_companion_and_kept(made: list[str]) -> None:
-    soft = replace(unstructured(object_compliance=SoftObject(1.0, 0.45)), mesh=MeshOptions(0.4, 1.0, "swept"))
+    soft = replace(unstructured(object_compliance=ElasticObject(1.0, 0.45)), mesh=MeshOptions(0.4, 1.0, "swept"))
     problem, frames = run(replace(soft, design=soft.design.block))
     assert made == ["hemisphere"]
     found = estimate(problem, frames)

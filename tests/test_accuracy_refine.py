@@ -119,7 +119,7 @@ def test_a_graded_mesh_is_forecast_by_its_cells() -> None:
     problem = build(section(0.5))
     short, steps = short_press(problem)
     bars = adjoint_bars(short, steps)
-    force = -steps[-1].meshed_state.force[:, 0].sum() * 2.0
+    force = -steps[-1].meshed_state.contact.force[:, 0].sum() * 2.0
     growth = cell_growth(short, graded_sizes(short, bars, "normal_force_N", 0.9 * 1e-4 * abs(force)))
     # prescribed lengths grow with the distance, and rows of the structured mesh are as fine as their finest place
     assert 0.5 * growth < second.dofs / first.dofs < 4.0 * growth

@@ -14,6 +14,7 @@ from finger3d.fem.recover import displacement
 from finger3d.fem.traces import surface
 from finger3d.mechanics.build import build
 from finger3d.mechanics.coverage import beyond_candidates, contact_within_candidates
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.solve import march
@@ -189,7 +190,7 @@ def test_several_presses_are_proved_as_each_on_its_own(effect) -> None:
         for mu, depth in ((0.1, 0.3), (0.5, 0.2), (1.0, 0.1))
     ]
     face = surface(problem.mesh, "contact", problem.body.thickness)
-    kinematics = model.formulation
+    kinematics = formulation_of(model)
     together = kinematics.all_unknowns(problem, [f.meshed_state for f in ends])
     for frame, unknowns in zip(ends, together, strict=True):
         alone = kinematics.unknowns(problem, frame.meshed_state)
@@ -210,7 +211,7 @@ def test_one_solver_proves_as_the_other(monkeypatch) -> None:
     monkeypatch.setenv("FINGER3D_SOLVER", "superlu")
     other = build(scene().model())
     assert other.body.condensed.solver == "superlu"
-    forces = [f.meshed_state.force for f in ends]
+    forces = [f.meshed_state.contact.force for f in ends]
     for a, b in zip(problem.unknowns_of(forces), other.unknowns_of(forces), strict=True):
         assert np.abs(a - b).max() <= 1e-12 * np.abs(b).max()
 
@@ -255,7 +256,9 @@ def test_presses_together_are_the_presses_alone(threads, monkeypatch) -> None:
     assert [p.seconds > 0.0 for p in together] == [True, True, True, False]
     # frames speak of the body as it is in the end
     again = SharedBody(models[1], variants)
-    assert {f[-1].meshed_state.force.shape for f in again.frames(variants)} == {(len(again.problem.surface.nodes), 2)}
+    assert {f[-1].meshed_state.contact.force.shape for f in again.frames(variants)} == {
+        (len(again.problem.surface.nodes), 2)
+    }
 
 
 @pytest.mark.parametrize("threads", [False, True], ids=["in turn", "at once"])

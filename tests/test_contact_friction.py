@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from finger3d.contact.conditions import ContactProblem
-from finger3d.contact.friction import SLIP, Coulomb, FrictionLaw
+from finger3d.contact.friction import SLIP, Coulomb, FrictionLaw, TwoCoefficients
 from finger3d.contact.law import ContactLaw
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
-from finger3d.effects.kinetic_friction import TwoCoefficients
 from finger3d.errors import Finger3dError, Outcome
 from tests.contact_cases import half_plane, violation
 

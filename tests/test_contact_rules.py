@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from finger3d.contact.conditions import ContactProblem
-from finger3d.contact.friction import SLIP, STICK, Coulomb
+from finger3d.contact.friction import SLIP, STICK, Coulomb, TwoCoefficients
 from finger3d.contact.law import ContactLaw
 from finger3d.contact.rules import RULES, STEP_DEPENDENT_RULES, RuleName
 from finger3d.contact.state import ContactState
-from finger3d.effects.kinetic_friction import TwoCoefficients
 from tests.contact_cases import half_plane
 
 

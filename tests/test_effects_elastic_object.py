@@ -9,14 +9,13 @@ import numpy as np
 import pytest
 
 from finger3d.contact.friction import Coulomb
-from finger3d.effects import elastic_object
 from finger3d.effects.elastic_object import Effect
 from finger3d.errors import Finger3dError
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.history import measure
-from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.model import ElasticObject, Leg, MeshOptions, Model
 from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
 from finger3d.scene import parse
 from tests.bodies import ball
@@ -87,7 +86,7 @@ def test_energy_goes_into_both_bodies() -> None:
     problem, frames = run(
         Effect(1.0, 0.3).apply(pad(object=Cylinder(radius_mm=4.0), friction=Coulomb(0.0), legs=(Leg(0.3, steps=20),)))
     )
-    part = problem.upright_force(frames[-1].meshed_state)
+    part = problem.upright_force(frames[-1].meshed_state.contact)
     stored = 0.5 * 4.0 * np.einsum("id,idje,je->", part, problem.delassus, part)
     assert frames[-1].external_work_mJ == pytest.approx(stored, rel=1e-10)
 
@@ -137,7 +136,7 @@ def test_a_scene_names_the_effect() -> None:
         "effects": {"elastic_object": {"E_MPa": 10.0, "nu": 0.4}},
     }
     model = parse(tables).model()
-    assert model.object_compliance == elastic_object.SoftObject(10.0, 0.4, None)
+    assert model.object_compliance == ElasticObject(10.0, 0.4, None)
     for key, value, text in (
         ("nu", 0.6, "from 0 to 0.5"),
         ("E_MPa", 0.0, "from 1e-9 to 1e9"),

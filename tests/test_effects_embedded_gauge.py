@@ -12,7 +12,7 @@ import scipy.sparse as sp
 
 from finger3d.cli import main
 from finger3d.contact.friction import Coulomb
-from finger3d.effects.embedded_gauge import Effect, Strips
+from finger3d.effects.embedded_gauge import Effect
 from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import Stiffness
@@ -21,8 +21,9 @@ from finger3d.fem.kelvin import FoilPatches, InfiniteBody
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
+from finger3d.mechanics.foils import discretised_foils
 from finger3d.mechanics.history import measure
-from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.model import Foils, Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.symmetry import symmetry
 from finger3d.objects import Plane, Sphere
 from finger3d.scene import parse
@@ -65,7 +66,7 @@ def test_condensed_foils_are_foils_in_the_stiffness(domain: str, nu: float) -> N
     model = FOIL.apply(block(domain=domain, material=Isotropic(1.0, nu), gauges=(MIDDLE, ASIDE)))
     problem = build(model)
     assert problem.factorizations == 1
-    inlay = model.inclusions.discretise(model, problem.mesh, problem.axes)
+    inlay = discretised_foils(model.inclusions, model, problem.mesh, problem.axes)
     added = sp.csr_matrix(inlay.rows.T @ sp.diags_array(inlay.bar_stiffness) @ inlay.rows)
     added.resize(problem.body.stiffness.upper.shape)
     stiffer = Stiffness(
@@ -83,7 +84,7 @@ def test_condensed_foils_are_foils_in_the_stiffness(domain: str, nu: float) -> N
 def test_the_rows_of_gauges_are_means_of_their_bars() -> None:
     model = FOIL.apply(block(domain="plane-strain", gauges=(MIDDLE, ASIDE)))
     problem = build(model)
-    inlay = model.inclusions.discretise(model, problem.mesh, problem.axes)
+    inlay = discretised_foils(model.inclusions, model, problem.mesh, problem.axes)
     whole, r = problem.body.condensed.compliance, len(problem.system.active_dofs)
     assert inlay.gauge_weights.sum(axis=1) == pytest.approx(1.0)
     assert whole[r : r + 2] == pytest.approx(inlay.gauge_weights @ whole[r + 2 :], abs=1e-12 * whole.max())
@@ -238,8 +239,8 @@ def test_a_foil_in_a_relaxing_body_does_not_relax(bulk: bool) -> None:
     close = 1e-6 if bulk else 0.01  # the foil's neighbourhood relaxes as if nu were constant
     assert slow.gauges["g"] == pytest.approx(wanted.gauges["g"], rel=close)
     assert slow.gauges["g_free"] == pytest.approx(wanted.gauges["g_free"], rel=close)
-    assert slow.meshed_state.force == pytest.approx(
-        wanted.meshed_state.force, abs=close * wanted.meshed_state.force.max()
+    assert slow.meshed_state.contact.force == pytest.approx(
+        wanted.meshed_state.contact.force, abs=close * wanted.meshed_state.contact.force.max()
     )
 
 
@@ -248,7 +249,9 @@ def test_viscosity_with_and_without_bulk_agree_around_a_foil_in_an_incompressibl
     problem = build(model)
     prony = ((0.5, 1.0), (0.2, 0.1))
     a, b = (marched(replace(problem, model=Viscosity(prony, bulk).apply(model)))[-1] for bulk in (True, False))
-    assert a.meshed_state.force == pytest.approx(b.meshed_state.force, abs=1e-6 * a.meshed_state.force.max())
+    assert a.meshed_state.contact.force == pytest.approx(
+        b.meshed_state.contact.force, abs=1e-6 * a.meshed_state.contact.force.max()
+    )
     for name in ("g", "g_free"):
         assert a.gauges[name] == pytest.approx(b.gauges[name], rel=1e-5)
 
@@ -293,7 +296,7 @@ def test_mistakes_are_one_line(effect: dict, gauges: tuple, says: str) -> None:
 def test_python_users_are_told_too_that_a_gauge_lies_outside() -> None:
     with pytest.raises(Finger3dError, match="outside"):
         build(FOIL.apply(block(gauges=(replace(MIDDLE, y_mm=3.5),))))
-    assert Strips(1.0, 2.0, 3.0) == Strips(1.0, 2.0, 3.0)
+    assert Foils(1.0, 2.0, 3.0) == Foils(1.0, 2.0, 3.0)
 
 
 def test_press_writes_both_strains(tmp_path: Path) -> None:

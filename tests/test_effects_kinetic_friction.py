@@ -8,11 +8,10 @@ import pytest
 
 def test_a_point_that_slips_keeps_the_kinetic_limit_until_it_sticks() -> None:
     from finger3d.contact.conditions import ContactProblem
-    from finger3d.contact.friction import SLIP, STICK
+    from finger3d.contact.friction import SLIP, STICK, TwoCoefficients
     from finger3d.contact.law import ContactLaw
     from finger3d.contact.solve import solve_increment
     from finger3d.contact.state import ContactState
-    from finger3d.effects.kinetic_friction import TwoCoefficients
 
     compliance = np.eye(2).reshape(1, 2, 1, 2)  # one point on two unit springs
     law = ContactLaw(TwoCoefficients(0.5, 0.6, "keep"))

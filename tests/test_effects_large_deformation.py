@@ -16,6 +16,7 @@ from finger3d.fem.simplex import FREE_FACES
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
 from finger3d.mechanics.coverage import check_surface
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.solve import march
@@ -26,7 +27,7 @@ from tests.models import block, large_fig9, last
 def test_fig9_agrees_with_calculix() -> None:
     # validation/REFERENCES.md, 6.5: 28.5 N per mm by CalculiX, and 22.35 in small strain; stick zone 33 mm
     problem = build(large_fig9(0.45, 1.0))
-    workspace = problem.model.formulation.workspace()
+    workspace = formulation_of(problem.model).workspace()
     *_, end = march(problem, workspace=workspace)
     got = measure(problem.points, end)
     assert end.outcome is Outcome.CONVERGED
@@ -41,7 +42,7 @@ def test_incompressible_plane_stress_converges_to_the_limit_of_nu() -> None:
     forces = []
     for nu in (0.499, 0.4999, 0.5):
         problem = build(large_fig9(nu, 4.0, domain="plane-stress", legs=(Leg(3.0, steps=3),)))
-        workspace = problem.model.formulation.workspace()
+        workspace = formulation_of(problem.model).workspace()
         *_, end = march(problem, workspace=workspace)
         assert end.outcome is Outcome.CONVERGED
         forces.append(measure(problem.points, end)["normal_force_N"])

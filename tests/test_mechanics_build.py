@@ -15,7 +15,7 @@ def test_points_that_touch_come_first(domain: str) -> None:
     """The object sinks into the points in nearly the order of their distance: products end with the last that bears."""
     problem, frames = run(fig9(domain=domain))
     for frame in frames:
-        touching = np.flatnonzero(frame.meshed_state.force[:, 0])
+        touching = np.flatnonzero(frame.meshed_state.contact.force[:, 0])
         assert touching[-1] < 1.1 * len(touching) + 1
     assert len(touching) < 0.9 * len(problem.surface.nodes)
 

@@ -9,31 +9,34 @@ from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.hyperelastic import InvertedError
 from finger3d.mechanics.build import build
 from finger3d.mechanics.finite_increment import FiniteIncrement
-from finger3d.mechanics.finite_state import DeformedState
+from finger3d.mechanics.finite_state import DeformedBody
 from finger3d.mechanics.finite_strain import FiniteStrain
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.path import targets
+from finger3d.mechanics.state import State
 from finger3d.objects import Move
 from tests.models import half_cylinder
 
 
 @pytest.fixture(scope="module")
-def solved() -> tuple[FiniteIncrement, DeformedState]:
+def solved() -> tuple[FiniteIncrement, State[DeformedBody]]:
     problem = build(LargeDeformation().apply(half_cylinder(1.0)))
-    formulation = problem.model.formulation
+    formulation = formulation_of(problem.model)
     assert isinstance(formulation, FiniteStrain)
     rest, pose = formulation.start(problem), targets(problem.model.legs)[0]
     increment = formulation._increment(problem, rest, Move(problem.origin, pose), formulation.workspace())
     state = increment.solve(None).state
-    assert isinstance(state, DeformedState)
     return increment, state
 
 
-def test_a_solution_is_in_balance_and_a_displaced_one_is_not(solved: tuple[FiniteIncrement, DeformedState]) -> None:
+def test_a_solution_is_in_balance_and_a_displaced_one_is_not(
+    solved: tuple[FiniteIncrement, State[DeformedBody]],
+) -> None:
     increment, state = solved
-    force = np.abs(state.force).max()
-    free = np.setdiff1d(np.arange(len(state.unknowns)), increment.problem.body.fixed_dofs)
+    force = np.abs(state.contact.force).max()
+    free = np.setdiff1d(np.arange(len(state.body.unknowns)), increment.problem.body.fixed_dofs)
     at_rest, displaced = (
-        np.abs(increment.out_of_balance(increment.at(share * state.unknowns), state.force)[free]).max()
+        np.abs(increment.out_of_balance(increment.at(share * state.body.unknowns), state.contact.force)[free]).max()
         for share in (1.0, 1.001)
     )
     assert at_rest < 1e-7 * force
@@ -41,23 +44,23 @@ def test_a_solution_is_in_balance_and_a_displaced_one_is_not(solved: tuple[Finit
 
 
 def test_the_tangent_is_the_derivative_of_the_forces_out_of_balance(
-    solved: tuple[FiniteIncrement, DeformedState],
+    solved: tuple[FiniteIncrement, State[DeformedBody]],
 ) -> None:
     """One chord step from nearby leads back to the solution, up to the square of the distance."""
     increment, state = solved
-    now = increment.at(1.001 * state.unknowns)
-    linearisation = increment.linearise(now, state.force)
-    out = increment.out_of_balance(now, state.force)
+    now = increment.at(1.001 * state.body.unknowns)
+    linearisation = increment.linearise(now, state.contact.force)
+    out = increment.out_of_balance(now, state.contact.force)
     eliminated = linearisation.condensation.eliminated(-out)
-    found, change = increment.contact(now, state.force, linearisation, eliminated.displacement)
+    found, change = increment.contact(now, state.contact.force, linearisation, eliminated.displacement)
     assert found.outcome.ok
     assert change is not None
     after = increment.moved(now, eliminated.unknowns(change))
-    size = np.abs(state.unknowns).max()
-    assert np.abs(after.x - state.unknowns).max() < 0.02 * 0.001 * size
+    size = np.abs(state.body.unknowns).max()
+    assert np.abs(after.x - state.body.unknowns).max() < 0.02 * 0.001 * size
 
 
-def test_an_inverted_cell_is_an_error(solved: tuple[FiniteIncrement, DeformedState]) -> None:
+def test_an_inverted_cell_is_an_error(solved: tuple[FiniteIncrement, State[DeformedBody]]) -> None:
     increment, state = solved
     with pytest.raises(InvertedError):
-        increment.at(np.random.default_rng(0).normal(size=len(state.unknowns)))
+        increment.at(np.random.default_rng(0).normal(size=len(state.body.unknowns)))

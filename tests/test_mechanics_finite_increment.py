@@ -14,6 +14,7 @@ from finger3d.fem.quality import curved_jacobians
 from finger3d.fem.recover import displacement
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.solve import march
 from tests.models import large_fig9
@@ -32,7 +33,7 @@ def test_newton_with_a_new_tangent_in_every_iteration_converges_quadratically(
         finite_increment.FiniteIncrement, "residual", lambda *a: errors.append(residual(*a)) or errors[-1]
     )
     problem = build(large_fig9(nu, legs=(Leg(10.0, steps=5),)))
-    workspace = problem.model.formulation.workspace()
+    workspace = formulation_of(problem.model).workspace()
     frames = list(march(problem, workspace=workspace))
     assert all(f.outcome.ok for f in frames)
     assert workspace.factorizations <= 5 * len(frames)
@@ -56,5 +57,5 @@ def test_a_state_with_a_cell_folded_at_a_sharp_corner_is_refused_by_its_place() 
     assert y < 1.0
     for frame in frames[:-1]:
         assert frame.outcome.ok
-        u = displacement(problem.mesh, model.formulation.unknowns(problem, frame.meshed_state))
+        u = displacement(problem.mesh, next(formulation_of(model).unknowns(problem, [frame.meshed_state])))
         assert curved_jacobians(replace(problem.mesh, points=problem.mesh.points + u)).min() > 0.0

@@ -23,6 +23,6 @@ def test_gauge_reads_the_field_without_recovering_it() -> None:
     read = frames[-1].gauges
     assert read["point"] == pytest.approx(read["mirror"], rel=1e-12)
     assert read["point"] == pytest.approx(read["short"], rel=1e-6)
-    u = displacement(problem.mesh, problem.unknowns(problem.upright_force(frames[-1].meshed_state)))
+    u = displacement(problem.mesh, problem.unknowns(problem.upright_force(frames[-1].meshed_state.contact)))
     row = displacement_row(problem.mesh, np.array([1.0, 1.5, 0.0]), np.array([1.0, 0.0, 0.0]))
     assert read["long"] == pytest.approx((row @ u.ravel())[0], rel=1e-9)  # elongation 2 u_x(1) over length 2

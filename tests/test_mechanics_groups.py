@@ -16,6 +16,7 @@ from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.groups import march_in_groups
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Leg, MeshOptions, Model
@@ -51,19 +52,22 @@ def assert_same(steps: list[StepResult], wanted: list[StepResult]) -> None:
     for a, b in zip(steps, wanted, strict=True):
         assert a.outcome.ok
         assert a.residual <= TOLERANCE
-        assert np.abs(a.meshed_state.force - b.meshed_state.force).max() <= 1e-6 * np.abs(b.meshed_state.force).max()
+        assert (
+            np.abs(a.meshed_state.contact.force - b.meshed_state.contact.force).max()
+            <= 1e-6 * np.abs(b.meshed_state.contact.force).max()
+        )
         assert a.external_work_mJ == pytest.approx(b.external_work_mJ, rel=1e-6)
 
 
 @pytest.mark.parametrize("viscous", [False, True])
 def test_presses_in_groups_are_those_pressed_alone_with_fewer_factorisations(viscous: bool) -> None:
     several = problems(viscous=viscous)
-    shared = several[0].model.formulation.workspace()
+    shared = formulation_of(several[0].model).workspace()
     found = dict(march_in_groups(several, shared, Event()))
     assert sorted(found) == list(range(len(MUS)))
     factorizations = 0
     for number, steps in found.items():
-        workspace = several[0].model.formulation.workspace()
+        workspace = formulation_of(several[0].model).workspace()
         assert_same(steps, list(march(several[number], workspace=workspace)))
         factorizations += workspace.factorizations
     assert shared.factorizations < 0.5 * factorizations
@@ -71,7 +75,7 @@ def test_presses_in_groups_are_those_pressed_alone_with_fewer_factorisations(vis
 
 def test_presses_that_wait_for_a_nearer_tangent_lose_nothing() -> None:
     several = problems(DEEP, mus=FAR_APART)
-    groups = list(march_in_groups(several, several[0].model.formulation.workspace(), Event()))
+    groups = list(march_in_groups(several, formulation_of(several[0].model).workspace(), Event()))
     assert [number for number, _ in groups] != sorted(number for number, _ in groups)
     for number, steps in groups:
         assert_same(steps, list(march(several[number])))
@@ -79,7 +83,7 @@ def test_presses_that_wait_for_a_nearer_tangent_lose_nothing() -> None:
 
 def test_force_controlled_presses_go_on_by_themselves() -> None:
     several = problems((Leg(0.5, steps=1), Leg(1.0, force_N=1.0, steps=1)))
-    for number, steps in march_in_groups(several, several[0].model.formulation.workspace(), Event()):
+    for number, steps in march_in_groups(several, formulation_of(several[0].model).workspace(), Event()):
         assert_same(steps, list(march(several[number])))
 
 
@@ -87,7 +91,7 @@ def test_a_press_that_fails_ends_where_it_does_alone() -> None:
     """The material law is unstable from a strain on that the second increment reaches."""
     law = LargeDeformation(law="yeoh", c2_over_c1=-0.4, c3_over_c1=0.0)
     several = problems((Leg(0.2, steps=1), Leg(2.0, steps=1)), law, mus=MUS[:2])
-    found = dict(march_in_groups(several, several[0].model.formulation.workspace(), Event()))
+    found = dict(march_in_groups(several, formulation_of(several[0].model).workspace(), Event()))
     for number, steps in found.items():
         alone = list(march(several[number]))
         assert [step.outcome for step in steps] == [step.outcome for step in alone]
@@ -96,7 +100,7 @@ def test_a_press_that_fails_ends_where_it_does_alone() -> None:
 
 def test_groups_end_when_cancelled() -> None:
     several, cancel = problems(), Event()
-    groups = march_in_groups(several, several[0].model.formulation.workspace(), cancel)
+    groups = march_in_groups(several, formulation_of(several[0].model).workspace(), cancel)
     cancel.set()
     with pytest.raises(CancelledError):
         next(groups)

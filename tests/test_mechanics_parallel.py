@@ -28,7 +28,7 @@ def test_presses_at_once_are_the_presses_in_turn() -> None:
 
     def press(mu: float, before: Sequence[Any] = (), *_: object) -> list[np.ndarray]:
         own = replace(problem, model=replace(problem.model, friction=Coulomb(mu)))
-        return [f.meshed_state.force for f in march(own, before[-1] if before else ())]
+        return [f.meshed_state.contact.force for f in march(own, before[-1] if before else ())]
 
     at_once = list(map_parallel(problem, press, mus, 2, threads_from=1))
     assert all(

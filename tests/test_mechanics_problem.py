@@ -20,7 +20,7 @@ COARSE = MeshOptions(1.5, 1.5, "swept")
 
 def test_forces_on_the_whole_finger_are_those_of_the_part_and_its_images() -> None:
     problem, frames = run(block(mesh=COARSE, gauges=(Gauge("g", 1.0, 1.5),)))
-    state = frames[-1].meshed_state
+    state = frames[-1].meshed_state.contact
     assert problem.axes == ("x", "z")
     whole = problem.world_force(state)
     # friction of mirror images cancels, pressure adds up

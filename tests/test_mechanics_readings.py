@@ -53,7 +53,7 @@ def base_force(problem: Problem, frame: StepResult) -> float:
 def test_a_marker_moves_with_the_field_on_both_sides_of_a_symmetry_plane() -> None:
     at = (0.93, 1.41, 0.57)
     problem, frames = pressed(markers=(Marker("m", *at), Marker("image", -at[0], at[1], -at[2])))
-    u = displacement(problem.mesh, problem.unknowns(problem.upright_force(frames[-1].meshed_state)))
+    u = displacement(problem.mesh, problem.unknowns(problem.upright_force(frames[-1].meshed_state.contact)))
     rows = [displacement_row(problem.mesh, np.array(at), axis) for axis in np.eye(3)]
     assert frames[-1].markers["m"] == pytest.approx([(row @ u.ravel())[0] for row in rows], rel=1e-9)
     assert frames[-1].markers["image"] == pytest.approx(np.multiply(frames[-1].markers["m"], [-1, 1, -1]), rel=1e-12)

@@ -153,7 +153,7 @@ def test_a_flank_that_touches_the_wall_is_resolved_by_points_of_the_wall() -> No
     assert end.outcome.ok
     walls = problem.points.face == 1
     assert (end.state.status[walls] != OPEN).any()
-    force = problem.world_force(end.meshed_state)
+    force = problem.world_force(end.meshed_state.contact)
     pushed, down = np.abs(force[:, :2].sum(axis=0))
     assert math.atan2(down, pushed) == pytest.approx(math.radians(1.0) + math.atan(0.25), abs=0.01)  # it slides down
 

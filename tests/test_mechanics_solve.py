@@ -67,7 +67,7 @@ def test_contact_forces_and_base_reaction_balance() -> None:
     problem, frames = run(
         block(symmetry=(), legs=(Leg(0.3, steps=2), Leg(0.3, slide_x_mm=0.1, slide_z_mm=0.05, steps=2)))
     )
-    unknowns = problem.unknowns(frames[-1].meshed_state.force)
+    unknowns = problem.unknowns(frames[-1].meshed_state.contact.force)
     full = problem.body.stiffness.upper + sp.triu(problem.body.stiffness.upper, 1).T
     residual = (full @ unknowns)[: problem.mesh.points.size].reshape(problem.mesh.points.shape)
     base = np.unique(problem.mesh.facets["base"])

@@ -9,14 +9,12 @@ import numpy as np
 import pytest
 
 from finger3d.accuracy.estimate import press_numbers
-from finger3d.contact.friction import Coulomb
+from finger3d.contact.friction import Coulomb, TwoCoefficients
 from finger3d.contact.rules import RULES
-from finger3d.effects.kinetic_friction import TwoCoefficients
 from finger3d.errors import Outcome
 from finger3d.fem.laws import NeoHooke
 from finger3d.fem.material import Isotropic
 from finger3d.mechanics.build import build
-from finger3d.mechanics.finite_strain import FiniteStrain
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
@@ -126,4 +124,4 @@ def test_most_automatic_increments_fall_with_the_size_of_the_contact(domain: Dom
     found = [limits(model, 1e4 * points, points) for points in (30, 300, 3000)]
     assert all(first == 5 and last >= 20 for first, last in found)
     assert found[0][1] >= found[1][1] >= found[2][1]
-    assert limits(replace(model, strain_measure=FiniteStrain(NeoHooke(1.0))), 1e4, 100) == (3, 12)
+    assert limits(replace(model, hyperelastic_law=NeoHooke(1.0)), 1e4, 100) == (3, 12)

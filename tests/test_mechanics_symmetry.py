@@ -34,7 +34,7 @@ def test_the_whole_finger_is_the_part_and_its_mirror_images(domain: Domain) -> N
     problem = build(block(domain=domain))
     frame = list(march(problem))[-1]
     points, whole = problem.points.points, frame.state
-    assert np.sum(whole.force[:, 0]) == pytest.approx(problem.symmetry.total(frame.meshed_state.force[:, 0]))
+    assert np.sum(whole.force[:, 0]) == pytest.approx(problem.symmetry.total(frame.meshed_state.contact.force[:, 0]))
     assert problem.symmetry.total(problem.surface.area) == pytest.approx(problem.points.area.sum())
     at = {tuple(np.round(p, 9)): i for i, p in enumerate(points)}
     mirrored = [at[tuple(np.round(p * [-1.0, 1.0, 1.0], 9) + 0.0)] for p in points]

@@ -93,7 +93,9 @@ def test_a_slot_that_slides_pushes_the_wall(effect: Effect | None) -> None:
     assert all(on_walls[first:])
     table = [measure(problem.points, step) for step in steps]
     pushes = [row["force_x_N"] for row in table]
-    wall = [problem.world_force(step.meshed_state)[problem.points.face == WALLS, 0].sum() for step in steps[first:]]
+    wall = [
+        problem.world_force(step.meshed_state.contact)[problem.points.face == WALLS, 0].sum() for step in steps[first:]
+    ]
     assert all(b > a for a, b in zip(wall, wall[1:], strict=False))
     assert pushes[-1] > wall[-1] > 10.0  # the friction on the contact face pushes the same way
     checks = check_surface(problem, steps)
@@ -116,7 +118,7 @@ def test_a_ball_over_the_rim_touches_contact_face_wall_and_end() -> None:
     *_, end = march(problem)
     assert end.outcome.ok
     assert set(problem.points.face) == {0, WALLS, ENDS}
-    force = problem.world_force(end.meshed_state).sum(axis=0)
+    force = problem.world_force(end.meshed_state.contact).sum(axis=0)
     # the corner is pushed inwards along both axes, from the ball's middle
     assert force[0] < 0.0
     assert force[2] < 0.0

@@ -38,6 +38,7 @@ from finger3d.geometry.files import read_surface
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.build import build, contact_box
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
@@ -303,7 +304,7 @@ def _large_deformation(size: float) -> list[Row]:
     """Return factorisations and time of a press at large deformation, of many presses over one, and of a section."""
     model = LargeDeformation().apply(fig9(size))
     problem = build(model)
-    workspace = model.formulation.workspace()
+    workspace = formulation_of(model).workspace()
     begin = time.perf_counter()
     if not all(step.outcome.ok for step in march(problem, workspace=workspace)):
         raise AssertionError("large deformation did not settle")

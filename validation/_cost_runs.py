@@ -10,6 +10,7 @@ import numpy as np
 
 from finger3d.contact.friction import OPEN
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.formulations import formulation_of
 
 from ._common import free_motion
 from ._cost import Case, assembled, condensed, in_steps, model_of, numbers
@@ -58,7 +59,7 @@ def measured(given: dict[str, Any]) -> dict[str, Any]:
     found, iterations, factorizations = {}, {}, {}
     for count in case.counts:
         begin = time.perf_counter()
-        workspace = problem.model.formulation.workspace()
+        workspace = formulation_of(problem.model).workspace()
         frames = in_steps(problem, count, workspace)
         factorizations[str(count)] = 1 + workspace.factorizations
         seconds[f"contact {count}"] = time.perf_counter() - begin
@@ -94,7 +95,7 @@ def single(given: dict[str, Any]) -> dict[str, Any]:
     frames = [
         in_steps(p, count)[-1] for p in (problem, replace(problem, system=replace(problem.system, delassus=rounded)))
     ]
-    state = frames[1].meshed_state
+    state = frames[1].meshed_state.contact
     c, d = state.force.shape
     # the state found with the rounded compliance, held against the true one; position is the change from the start
     moved = free_motion(problem, frames[1].target) + np.einsum("aibj,bj->ai", problem.delassus, state.force)

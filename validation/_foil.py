@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from finger3d.effects.embedded_gauge import Strips
 from finger3d.fem.assembly import stiffness
 from finger3d.fem.condense import condense, stiffened
 from finger3d.fem.material import Elasticity, Isotropic
 from finger3d.fem.simplex import Mesh, quadratic
 from finger3d.fem.traces import displacement_row
-from finger3d.mechanics.model import Gauge
+from finger3d.mechanics.foils import discretised_foils
+from finger3d.mechanics.model import Foils, Gauge
 
 from ._common import box, graded, held_at, side_load
 
@@ -41,13 +41,13 @@ def wing(length: float, stiff: float, E: float, nu: float, terms: int = 200) -> 
     return float(0.25 * math.pi * first / stiff)  # mean of sum a_n sin(n theta) over s = cos(theta) length/2
 
 
-def alone(length: float, foil: Strips, E: float, nu: float, dim: int) -> float:
+def alone(length: float, foil: Foils, E: float, nu: float, dim: int) -> float:
     """The same by the product's own compliance of foils, on a mesh of one box, which has no say in it.
 
     A section is 1 mm wide, and the foil's width that of its share.
     """
     mesh = quadratic(box([np.array([0.0, length + foil.width_mm])] * dim))
-    inlay = foil.discretise(_model(length, E, nu, dim), mesh, ("x", "y", "z")[:dim])
+    inlay = discretised_foils(foil, _model(length, E, nu, dim), mesh, ("x", "y", "z")[:dim])
     strain = np.linalg.solve(
         np.eye(len(inlay.bar_stiffness)) + inlay.self_compliance * inlay.bar_stiffness,
         np.ones(len(inlay.bar_stiffness)),
@@ -55,9 +55,7 @@ def alone(length: float, foil: Strips, E: float, nu: float, dim: int) -> float:
     return float(inlay.gauge_weights[0] @ strain)
 
 
-def by_mesh(
-    length: float, foil: Strips, E: float, nu: float, dim: int, cells: int, below: float | None = None
-) -> float:
+def by_mesh(length: float, foil: Foils, E: float, nu: float, dim: int, cells: int, below: float | None = None) -> float:
     """The same by a mesh alone, `cells` to half the foil and to half its width; planes are mirrors.
 
     `below` (mm): the foil's plane is so far under a free surface, and the body is as deep as else on its other side.
@@ -94,7 +92,7 @@ def _model(length: float, E: float, nu: float, dim: int) -> Any:
 
 
 def _read(
-    mesh: Mesh, held: NDArray[np.bool_], length: float, foil: Strips, E: float, nu: float, cells: int, mirrored: bool
+    mesh: Mesh, held: NDArray[np.bool_], length: float, foil: Foils, E: float, nu: float, cells: int, mirrored: bool
 ) -> float:
     """Strain of the foil over the free one under a pull along x; three bars to a cell both ways."""
     rows, springs = _bars(mesh, length, foil, 3 * cells)
@@ -105,7 +103,7 @@ def _read(
     return float(stiffened(small, springs / 2 if mirrored else springs)[1, 0] / small[1, 0])
 
 
-def _bars(mesh: Mesh, length: float, foil: Strips, count: int) -> tuple[sparse.csr_matrix, Float]:
+def _bars(mesh: Mesh, length: float, foil: Foils, count: int) -> tuple[sparse.csr_matrix, Float]:
     """Strain rows and springs of even bars over the quarter x > 0, z > 0 of a foil (half of it in a plane)."""
     d = mesh.dim
     lines = count if d == 3 else 1

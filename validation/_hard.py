@@ -14,12 +14,11 @@ import numpy as np
 from finger3d.analyses.press import press
 from finger3d.analyses.study_rows import Row
 from finger3d.contact.conditions import ContactProblem
-from finger3d.contact.friction import OPEN, Coulomb
+from finger3d.contact.friction import OPEN, Coulomb, TwoCoefficients
 from finger3d.contact.law import ContactLaw
 from finger3d.contact.newton import uniqueness
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
-from finger3d.effects.kinetic_friction import TwoCoefficients
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
@@ -135,8 +134,8 @@ def touch(quick: bool) -> Iterator[Row]:
     )
     yield _is("no point touches: settled, without force", 0, np.abs(apart.state.force).max() + (not apart.outcome.ok))
     tiny = list(march(_block(0.3, (Leg(0.05, steps=40 if quick else 100), Leg(1.0, steps=2)), arch)))
-    counts = [int((f.meshed_state.status != OPEN).sum()) for f in tiny]
-    before = sum(float(np.abs(f.meshed_state.force).sum()) for f, n in zip(tiny, counts, strict=True) if not n)
+    counts = [int((f.meshed_state.contact.status != OPEN).sum()) for f in tiny]
+    before = sum(float(np.abs(f.meshed_state.contact.force).sum()) for f, n in zip(tiny, counts, strict=True) if not n)
     yield _is("approach in small steps: force before the first point touches, N", 0, before)
     yield _is("approach in small steps: points that touch first", 1, next(n for n in counts if n))
     yield _is("approach in small steps, then 1 mm: unsettled", 0, sum(not f.outcome.ok for f in tiny))

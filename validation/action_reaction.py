@@ -62,7 +62,7 @@ class Balance:
 def balance(problem: Problem, frame: StepResult) -> Balance:
     """Compare contact forces with K u, and work with what is stored and lost."""
     upper, n, d = problem.body.stiffness.upper, problem.mesh.points.size, problem.dim
-    unknowns = problem.unknowns(frame.meshed_state.force)
+    unknowns = problem.unknowns(frame.meshed_state.contact.force)
     inner = (upper + sparse.triu(upper, 1).T) @ unknowns
     nodal = inner[:n].reshape(-1, d)
     base = np.unique(problem.mesh.facets["base"])
@@ -86,7 +86,9 @@ def least_loss(frames: list[StepResult]) -> float:
     """Smallest energy lost by friction at any point in any increment, over the largest."""
     lost = [
         -np.sum(
-            b.meshed_state.force[:, 1:] * (b.meshed_state.accumulated_slip - a.meshed_state.accumulated_slip), axis=1
+            b.meshed_state.contact.force[:, 1:]
+            * (b.meshed_state.contact.accumulated_slip - a.meshed_state.contact.accumulated_slip),
+            axis=1,
         )
         for a, b in zip(frames, frames[1:], strict=False)
     ]

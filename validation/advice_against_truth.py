@@ -27,6 +27,7 @@ from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
@@ -123,7 +124,7 @@ def by_large_deformation(name: str, model: Model) -> Iterator[Judged]:
     """Yield the changes by large deformation where a press estimates them."""
     problem = build(model)
     step = last(problem)
-    strain = problem.model.formulation.fields(problem, step.meshed_state)[1]
+    strain = formulation_of(problem.model).fields(problem, step.meshed_state)[1]
     if largest_principal_strain(strain) < LEAST_STRAIN:
         return
     estimate = large_deformation(problem, step, sum(int(leg.steps) for leg in model.legs))

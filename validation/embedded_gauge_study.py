@@ -21,11 +21,11 @@ import numpy as np
 
 from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
-from finger3d.effects.embedded_gauge import Effect, Strips
+from finger3d.effects.embedded_gauge import Effect
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
-from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.model import Domain, Foils, Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
 
@@ -89,7 +89,7 @@ def run(quick: bool) -> Result:
 
 def _plane_rows(quick: bool) -> list[Row]:
     rows = []
-    foil = Strips(3000.0, 0.02, 0.15)  # 3 of 20 mm, on 1 mm
+    foil = Foils(3000.0, 0.02, 0.15)  # 3 of 20 mm, on 1 mm
     for length in (1.0, 4.0, 10.0):
         want = wing(length, 9.0, 1.0, NU)
         rows.append(
@@ -119,7 +119,7 @@ def _plane_rows(quick: bool) -> list[Row]:
 
 def _space_rows() -> list[Row]:
     rows = []
-    foil = Strips(3000.0, 0.02, 3.0)
+    foil = Foils(3000.0, 0.02, 3.0)
     for length in (1.0, 4.0, 10.0):
         meshes = [by_mesh(length, foil, 1.0, 0.3, 3, n) for n in (2, 4)]
         rows.append(
@@ -186,7 +186,7 @@ def _draw(figure: Any, found: dict[tuple[str, float], np.ndarray], mus: np.ndarr
     for domain, colour in (("plane-strain", "C0"), ("solid", "C1")):
         share = [100.0 * found[domain, n][at, 1] / found[domain, n][at, 0] for n in lengths]
         left.loglog(lengths, share, colour + "o", label=f"finger, {domain.replace('-', ' ')}")
-        dim, foil = (2, Strips(3000.0, 0.02, 0.15)) if domain == "plane-strain" else (3, Strips(3000.0, 0.02, 3.0))
+        dim, foil = (2, Foils(3000.0, 0.02, 0.15)) if domain == "plane-strain" else (3, Foils(3000.0, 0.02, 3.0))
         left.loglog(fine, [100.0 * alone(n, foil, 1.0, NU, dim) for n in fine], colour + "-", lw=0.9)
         free, read = found[domain, 4.0].T
         middle.plot(mus, free, colour + "--", label=f"free, {domain.replace('-', ' ')}")

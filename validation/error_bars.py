@@ -23,7 +23,6 @@ from finger3d.accuracy.companions import companion
 from finger3d.accuracy.estimate import compared, discretisation, press_numbers
 from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
-from finger3d.effects.elastic_object import SoftObject
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.design import Design
@@ -31,7 +30,7 @@ from finger3d.geometry.registry import designs
 from finger3d.io import AREAS, MAIN
 from finger3d.mechanics.build import build
 from finger3d.mechanics.history import StepResult
-from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.model import Domain, ElasticObject, Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.readings import Marker, Taxel
 from finger3d.mechanics.solve import march
@@ -81,7 +80,7 @@ class Case:
     def meshes(self) -> str:
         """The kind of mesh, for each of which the share is judged."""
         domain, mesher = self.model.domain, self.model.mesh.mesher
-        large = ", large deformation" if self.model.formulation.finite_strain else ""
+        large = ", large deformation" if self.model.finite_strain else ""
         if domain != "solid":
             return f"section in {domain.replace('-', ' ')}{large}"
         return ("solid swept" if mesher == "swept" else "solid pytetwild") + large
@@ -190,7 +189,7 @@ def _soft() -> Case:
     """Two soft balls, that of the finger held on its cut; the coarser mesh is too small for a coarser companion."""
     ball = designs()["hemisphere"](radius_mm=8.0)
     model = _model(ball, 0.45, "solid", 1.0, (), Sphere(radius_mm=10.0), "ftetwild")
-    model = replace(model, object_compliance=SoftObject(1.0, 0.45))
+    model = replace(model, object_compliance=ElasticObject(1.0, 0.45))
     return Case("two soft balls, solid pytetwild", model, (0.7, 0.5), 0.25, 8.0)
 
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from finger3d.analyses.study_rows import Result, Row
-from finger3d.effects.kinetic_friction import Branch, TwoCoefficients
+from finger3d.contact.friction import Branch, TwoCoefficients
 
 from ._paper import MUS, STRAIN, STRESS, columns, half_cylinder, line_r5, said, strains, under
 

@@ -54,7 +54,7 @@ def readings(model: Model, mus: tuple[float, ...]) -> dict[str, np.ndarray]:
         found[READ].append(press.frame.gauges["g"])
         found[FREE].append(press.frame.gauges["g_free"])
         state = replace(problem, model=replace(model, friction=model.friction.with_mu(press.mu)))
-        found["force"].append(-float(state.world_force(press.frame.meshed_state)[:, 1].sum()))
+        found["force"].append(-float(state.world_force(press.frame.meshed_state.contact)[:, 1].sum()))
     return {key: np.array(values) for key, values in found.items()}
 
 

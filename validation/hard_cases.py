@@ -27,6 +27,7 @@ from finger3d.errors import Outcome
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
@@ -93,7 +94,7 @@ def finger(dim: int, nu: float, size: float) -> Problem:
 
 def violation(problem: Problem, before: Any, frame: StepResult) -> float:
     """Largest violation of the conditions: lengths over DEPTH, forces over the largest; from compliance and forces."""
-    mu, state = problem.model.friction.mu, frame.meshed_state
+    mu, state = problem.model.friction.mu, frame.meshed_state.contact
     force, status = state.force, state.status
     moved = free_motion(problem, frame.target) + np.einsum("idje,je->id", problem.delassus, force)
     gap, change = moved[:, 0], moved[:, 1:] - before.tangential_displacement
@@ -121,10 +122,10 @@ def case(problem: Problem, mu: float, steps: int) -> Iterator[tuple[Any, ...]]:
     """Rows of the table of one history, one a leg; the iterations of every increment follow each."""
     model = replace(problem.model, friction=Coulomb(mu), legs=path(problem.dim, mu, steps))
     problem = replace(problem, model=model)
-    before, found = problem.model.formulation.start(problem), []
+    before, found = formulation_of(problem.model).start(problem).contact, []
     for frame in march(problem):
         found.append((frame, violation(problem, before, frame) if frame.outcome.ok else np.inf))
-        before = frame.meshed_state
+        before = frame.meshed_state.contact
     outcomes = _literal(replace(problem, model=replace(model, rule="paper")))
     for k, name in enumerate(LEGS):
         leg = slice(k * steps, (k + 1) * steps)

@@ -32,6 +32,7 @@ from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.build import MARGIN, build, contact_box
 from finger3d.mechanics.coverage import SurfaceCheck, check_surface
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
@@ -184,7 +185,7 @@ def solved(model: Model) -> Found | None:
             problem = build(model, margin=margin)
         except Finger3dError:  # the mesh is too coarse for the object
             return None
-        workspace = model.formulation.workspace()
+        workspace = formulation_of(model).workspace()
         steps = list(march(problem, workspace=workspace))
         good = [step for step in steps if step.outcome.ok]
         checks = check_surface(problem, good)
@@ -214,7 +215,7 @@ def _found(problem: Problem, steps: list[StepResult], checks: list[SurfaceCheck]
 def _least_volume(problem: Problem, step: StepResult) -> float:
     """Smallest determinant of the deformation gradient at the nodes of all cells, in the plane of a section."""
     mesh = problem.mesh
-    u: Float = displacement(mesh, problem.model.formulation.unknowns(problem, step.meshed_state))
+    u: Float = displacement(mesh, formulation_of(problem.model).unknowns(problem, step.meshed_state))
     gradients, _ = mesh.element.physical_gradients(mesh.points[mesh.cells], mesh.element.nodes)
     slope = np.einsum("eki,eqkj->eqij", u[mesh.cells], gradients, optimize=True)
     return float(np.linalg.det(slope + np.eye(mesh.dim)).min())

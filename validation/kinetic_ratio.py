@@ -17,8 +17,7 @@ from typing import Any
 import numpy as np
 
 from finger3d.analyses.study_rows import Kind, Result, Row
-from finger3d.contact.friction import Coulomb, FrictionLaw
-from finger3d.effects.kinetic_friction import TwoCoefficients
+from finger3d.contact.friction import Coulomb, FrictionLaw, TwoCoefficients
 from finger3d.mechanics.problem import Problem
 
 from ._halfplane import compliance, line, loading, under

@@ -111,7 +111,7 @@ def _last(problem: Problem, legs: tuple[Leg, ...], plane: Plane | None = None) -
 
 def _sliding(problem: Problem, centre: float, frame: StepResult, turn: float) -> Sliding:
     """Evaluate an increment in which the plane has turned by an angle about the centre, or has slid along x."""
-    state, at, arms = frame.meshed_state, problem.surface.points, problem.surface.centroids
+    state, at, arms = frame.meshed_state.contact, problem.surface.points, problem.surface.centroids
     normal = state.force[:, 0]
     # the plane's material at a point has come along a chord
     way = np.tile([1.0, 0.0], (len(at), 1))

@@ -27,15 +27,15 @@ from numpy.typing import NDArray
 
 from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
-from finger3d.contact.state import ContactState
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
 from finger3d.mechanics.energy import frictional_dissipation
-from finger3d.mechanics.linear_contact import LinearState
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
+from finger3d.mechanics.state import State
 from finger3d.objects import Cylinder, Move, ObjectPose
 
 Float = NDArray[np.float64]
@@ -88,16 +88,16 @@ def block(nu: float, size: float, height: float, domain: Any = "plane-strain") -
     return build(Model(design, Isotropic(E, nu), mesh, legs, object=thing, friction=Coulomb(MU), domain=domain))
 
 
-def pressed(problem: Problem) -> ContactState:
+def pressed(problem: Problem) -> State[Any]:
     """The state after the press."""
     *_, frame = march(replace(problem, model=replace(problem.model, legs=problem.model.legs[:1])))
     assert frame.outcome.ok
     return frame.meshed_state
 
 
-def travel(problem: Problem, state: ContactState, way: float, turn: float, steps: int) -> Travel:
+def travel(problem: Problem, state: State[Any], way: float, turn: float, steps: int) -> Travel:
     """Move the axis by a way along x while the cylinder turns about it."""
-    formulation, model = problem.model.formulation, problem.model
+    formulation, model = formulation_of(problem.model), problem.model
     angle = turn / steps
     start = ObjectPose(DEPTH)
     end = ObjectPose(DEPTH - R * (1.0 - math.cos(angle)), way / steps + R * math.sin(angle), turn_z=angle)
@@ -106,21 +106,20 @@ def travel(problem: Problem, state: ContactState, way: float, turn: float, steps
         here = replace(problem, model=replace(model, object=Cylinder(BEGIN + way * k / steps, radius_mm=R)))
         found = formulation.increment(here, state, Move(start, end), None, formulation.workspace())
         assert found.outcome.ok, found.outcome
-        lost += frictional_dissipation(here, state, found.state)
+        lost += frictional_dissipation(here, state.contact, found.state.contact)
         state = found.state
         out.append((way * (k + 1) / steps, *sums(problem, state, BEGIN + way * (k + 1) / steps), lost))
     return Travel(*np.array(out).T)
 
 
-def sums(problem: Problem, state: ContactState, axis: float) -> tuple[float, ...]:
+def sums(problem: Problem, state: State[Any], axis: float) -> tuple[float, ...]:
     """Normal and tangential force, that along x, sum of friction and torque about the axis at x = `axis`."""
-    assert isinstance(state, LinearState)
     height = problem.system.first_contact_mm - DEPTH + R
-    arm = (problem.surface.centroids + state.displacement)[:, :2] - [axis, height]
-    force, total = state.scene_force, problem.symmetry.total
+    arm = (problem.surface.centroids + state.body)[:, :2] - [axis, height]
+    contact, force, total = state.contact, state.contact.scene_force, problem.symmetry.total
     torque = arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]
-    friction = np.linalg.norm(state.force[:, 1:], axis=1)
-    return total(state.force[:, 0]), total(state.force[:, 1]), total(force[:, 0]), total(friction), total(torque)
+    friction = np.linalg.norm(contact.force[:, 1:], axis=1)
+    return total(contact.force[:, 0]), total(contact.force[:, 1]), total(force[:, 0]), total(friction), total(torque)
 
 
 def carter(creep: float) -> float:

@@ -98,7 +98,7 @@ def curve(case: str, refinement: float, size: float, steps: int) -> Curve:
     for mu in ENDS:
         frames = list(march(replace(problem, model=replace(model, friction=Coulomb(float(mu)))), near))
         strain.append(frames[-1].gauges["g"] if frames[-1].outcome.ok else math.nan)
-        near = [frame.meshed_state.force for frame in frames]
+        near = [frame.meshed_state.contact.force for frame in frames]
     return Curve(np.array(strain), problem.body.stiffness.upper.shape[0], len(problem.surface.nodes))
 
 

@@ -76,7 +76,7 @@ def slid(size: float) -> dict[str, Any]:
     steps = list(march(problem))
     assert all(step.outcome.ok for step in steps), [str(step.outcome) for step in steps]
     last = steps[-1]
-    force, at = problem.world_force(last.meshed_state), problem.points.points
+    force, at = problem.world_force(last.meshed_state.contact), problem.points.points
     touching = (last.state.status != OPEN) & (problem.points.face == WALLS)
     mouth = problem.system.first_contact_mm - depth
     return {
@@ -85,7 +85,9 @@ def slid(size: float) -> dict[str, Any]:
         "lowest": float(at[touching, 1].min() - mouth),
         "highest": float(at[touching, 1].max() - mouth),
         "penetration_mm": check_surface(problem, [last])[0].penetration_mm,
-        "wall_before_N": float(np.abs(problem.world_force(steps[0].meshed_state)[problem.points.face == WALLS]).sum()),
+        "wall_before_N": float(
+            np.abs(problem.world_force(steps[0].meshed_state.contact)[problem.points.face == WALLS]).sum()
+        ),
         "pressure": (at[problem.points.face == WALLS], last.state.force[problem.points.face == WALLS, 0]
                      / problem.points.area[problem.points.face == WALLS]),
         "mouth": mouth,

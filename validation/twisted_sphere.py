@@ -28,6 +28,7 @@ from finger3d.contact.friction import STICK, Coulomb
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
@@ -95,19 +96,22 @@ def partial(problem: Problem, shares: tuple[float, ...]) -> list[tuple[float, fl
     smooth = replace(problem.model, friction=Coulomb(0.0), legs=(Leg(DEPTH, steps=3),))
     *_, frame = march(replace(problem, model=smooth))
     state, start = frame.meshed_state, ObjectPose(DEPTH)
-    force = float(state.force[:, 0].sum())
+    force = float(state.contact.force[:, 0].sum())
     a = radius_of(force)
     unit = MU * 1.5 * force / (math.pi * a**2) / SHEAR
-    rough, formulation = replace(problem, model=replace(problem.model, friction=Coulomb(MU))), problem.model.formulation
+    rough, formulation = (
+        replace(problem, model=replace(problem.model, friction=Coulomb(MU))),
+        formulation_of(problem.model),
+    )
     place, area, out = problem.surface.centroids, problem.surface.area, []
     for share in shares:
         end = ObjectPose(DEPTH, turn_y=unit * turn_of(share))
         found = formulation.increment(rough, state, Move(start, end), None, formulation.workspace())
         assert found.outcome.ok, found.outcome
         state, start = found.state, end
-        pull = state.scene_force
+        pull = state.contact.scene_force
         torque = float((place[:, 2] * pull[:, 0] - place[:, 0] * pull[:, 2]).sum())
-        stuck = area[state.status == STICK].sum() / area[state.force[:, 0] > 0.0].sum()
+        stuck = area[state.contact.status == STICK].sum() / area[state.contact.force[:, 0] > 0.0].sum()
         full = 3.0 * math.pi / 16.0 * MU * force * a
         out.append((share, turn_of(share), torque / full, math.sqrt(float(stuck)), end.turn_y))
     return out

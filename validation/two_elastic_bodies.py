@@ -23,12 +23,13 @@ from scipy.optimize import brentq
 
 from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
-from finger3d.effects.elastic_object import Effect, ObjectBody
+from finger3d.effects.elastic_object import Effect
 from finger3d.fem.material import Elasticity, Isotropic
 from finger3d.fem.traces import local_rows
 from finger3d.fem.transfer import facing_trace
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build, contact_box
+from finger3d.mechanics.elastic_object import ObjectBody
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
@@ -187,7 +188,7 @@ def _third_law_rows() -> list[Row]:
     problem = build(model)
     *_, frame = march(problem)
     assert frame.outcome.ok
-    forces = problem.upright_force(frame.meshed_state)
+    forces = problem.upright_force(frame.meshed_state.contact)
     force = forces.ravel()
     other, _ = ObjectBody(model, 5.0, contact_box(model), (), lambda text: None).mesh()
     axes = vertical_frame(2)

@@ -67,7 +67,7 @@ def on_flanks(angles: tuple[float, float], size: float) -> dict[str, list[float]
     )  # fmt: skip
     *_, last = march(problem)
     assert last.outcome.ok, last.outcome
-    force, at = problem.world_force(last.meshed_state)[:, :2], problem.points.points[:, :2]
+    force, at = problem.world_force(last.meshed_state.contact)[:, :2], problem.points.points[:, :2]
     found: dict[str, list[float]] = {"force_N": [], "half_width_mm": [], "off_axis_mm": []}
     for normal in normals_of(angles):
         own = (last.state.force[:, 0] > 0.0) & (np.abs(last.state.bases[:, 0] - normal).max(axis=1) < FACE)
@@ -96,7 +96,7 @@ def cube_corner(size: float) -> Float:
     assert last.outcome.ok, last.outcome
     axes = problem.placed(last.target).turned.T
     down = -axes * np.sign(axes[:, 1])[:, None]  # the normals of the three faces that look down
-    return np.asarray(down @ problem.world_force(last.meshed_state).sum(axis=0))
+    return np.asarray(down @ problem.world_force(last.meshed_state.contact).sum(axis=0))
 
 
 def run(quick: bool) -> Result:

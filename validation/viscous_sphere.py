@@ -27,7 +27,6 @@ from scipy.signal import residue
 from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.contact.state import ContactState
-from finger3d.effects.viscosity import Viscoelastic
 from finger3d.fem.assembly import Stiffness, stiffness
 from finger3d.fem.condense import Condensation, condense
 from finger3d.fem.material import Elasticity, Isotropic
@@ -36,7 +35,9 @@ from finger3d.fem.traces import BoundarySurface, local_rows, restrict, surface
 from finger3d.mechanics.formulation import Formulation
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.problem import AddedStiffness
+from finger3d.mechanics.relaxation import Relaxation
 from finger3d.mechanics.small_strain import SmallStrain
+from finger3d.mechanics.viscoelastic import Viscoelastic
 from finger3d.objects import Move, ObjectPose, PlacedObject, Plane, Sphere, vertical_frame
 
 from . import _rings
@@ -165,7 +166,7 @@ def _widened(small: Condensation, kept: NDArray[np.int64], count: int) -> Float:
     return scatter_to_points(small.compliance, kept, count, 3)
 
 
-def march(body: StandIn, kinematics: Formulation, path: Sequence[tuple[float, float]]) -> tuple[Float, Float]:
+def march(body: StandIn, kinematics: Formulation[Any, Any], path: Sequence[tuple[float, float]]) -> tuple[Float, Float]:
     """Force (N) and contact radius (mm) at the end of every increment of a path of (time, depth over DEPTH)."""
     state, at, workspace = kinematics.start(body), body.origin, kinematics.workspace()
     force, radius = [], []
@@ -175,8 +176,8 @@ def march(body: StandIn, kinematics: Formulation, path: Sequence[tuple[float, fl
         if not found.outcome.ok:
             raise AssertionError(f"t = {t:g}: {found.outcome}")
         state, at = found.state, target
-        force.append(body.parts * float(state.force[:, 0].sum()))
-        radius.append(np.sqrt(body.parts * float(body.area[state.status != OPEN].sum()) / np.pi))
+        force.append(body.parts * float(state.contact.force[:, 0].sum()))
+        radius.append(np.sqrt(body.parts * float(body.area[state.contact.status != OPEN].sum()) / np.pi))
     return np.array(force), np.array(radius)
 
 
@@ -255,7 +256,7 @@ def convolved(elastic: Float, times: Float) -> Float:
 def run(quick: bool) -> Result:
     """Rings a/100 wide under 100 steps a second; tets of a/4, a/7, a/10 under 20."""
     count, per_second, meshes = (40, 20, (3,)) if quick else (100, 100, (4, 7, 10))
-    viscous = Viscoelastic(PRONY, True)
+    viscous = Viscoelastic(Relaxation(PRONY, True))
     rows: list[Row] = []
     table: list[tuple[Any, ...]] = []
     body = on_rings(0.3, count)
@@ -319,7 +320,7 @@ def _tet_rows(meshes: tuple[int, ...], table: list[tuple[Any, ...]], quick: bool
         elastic = march(body, SmallStrain(), path)[0]
         for bulk in (True, False):
             relax = modulus if bulk else contact_modulus(0.3)
-            force, radius = march(body, Viscoelastic(PRONY, bulk), path)
+            force, radius = march(body, Viscoelastic(Relaxation(PRONY, bulk)), path)
             found[points, bulk] = force / elastic
             for t, p, a in zip(times, force / elastic * np.minimum(times, 1.0) ** 1.5, radius, strict=True):
                 table.append(("tets", 0.3, bulk, points, per_second, t, p, lee_radok(t, relax), a))

@@ -15,6 +15,7 @@ import numpy as np
 
 from finger3d.analyses.study_rows import Result, Row
 from finger3d.mechanics.build import build
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.solve import march
 from finger3d.scene import parse
@@ -85,7 +86,7 @@ def _pressed(domain: str, effect: str, quick: bool) -> dict[str, float]:
     scene = _scene(domain, effect, quick)
     begin = time.process_time()
     problem = build(scene.model())
-    workspace = problem.model.formulation.workspace()
+    workspace = formulation_of(problem.model).workspace()
     *_, end = march(problem, workspace=workspace)
     seconds = time.process_time() - begin
     numbers = measure(problem.points, end)

@@ -30,8 +30,10 @@ from finger3d.contact.acceleration import assemble_in_place
 from finger3d.contact.conditions import ContactProblem, augmentation_parameters
 from finger3d.contact.friction import OPEN, SLIP
 from finger3d.contact.newton import ActiveSet
+from finger3d.contact.state import ContactState
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult
-from finger3d.mechanics.linear_contact import LinearState, transported, turned_delassus
+from finger3d.mechanics.linear_contact import transported, turned_delassus
 from finger3d.mechanics.problem import Problem
 from finger3d.objects import vertical_frame
 
@@ -75,13 +77,13 @@ class LinearisedIncrement:
     turn: Any
 
     @classmethod
-    def of(cls, problem: Problem, before: LinearState, after: LinearState) -> LinearisedIncrement:
+    def of(cls, problem: Problem, before: ContactState, after: ContactState) -> LinearisedIncrement:
         """Linearise the increment between two states."""
         c, d = after.force.shape
-        rotations = _bases(after) @ vertical_frame(d).T
+        rotations = after.own_bases @ vertical_frame(d).T
         turn = _block_diagonal(rotations)
         rho = augmentation_parameters(problem.delassus.reshape(c * d, c * d), d)
-        slip = after.tangential_displacement - transported(before, _bases(after)).tangential_displacement
+        slip = after.tangential_displacement - transported(before, after.own_bases).tangential_displacement
         normal, friction = after.force[:, 0], np.linalg.norm(after.force[:, 1:], axis=1)
         slips = after.status == SLIP
         mu = np.divide(friction, normal, out=np.zeros(c), where=slips & (normal > 0.0))
@@ -146,7 +148,7 @@ def adjoint_loads(problem: Problem, steps: Sequence[StepResult], goals: Sequence
 
 def forces_of(problem: Problem, steps: Sequence[StepResult]) -> Float:
     """Return the contact forces (c d, N) of increments, in the directions of an upright object."""
-    return np.stack([problem.upright_force(step.meshed_state).ravel() for step in steps], axis=1)
+    return np.stack([problem.upright_force(step.meshed_state.contact).ravel() for step in steps], axis=1)
 
 
 def press_goals(problem: Problem, steps: Sequence[StepResult]) -> list[Goal]:
@@ -188,23 +190,16 @@ def _reading_columns(problem: Problem) -> list[str]:
     return columns
 
 
-def _states(problem: Problem, steps: Sequence[StepResult]) -> list[LinearState]:
-    """Return the states of the meshed part: at first touch, then after every step."""
-    states = [problem.model.formulation.start(problem), *(step.meshed_state for step in steps)]
-    assert all(isinstance(state, LinearState) for state in states)
-    return cast("list[LinearState]", states)
+def _states(problem: Problem, steps: Sequence[StepResult]) -> list[ContactState]:
+    """Return the contact states of the meshed part: at first touch, then after every step."""
+    start = formulation_of(problem.model).start(problem)
+    return [start.contact, *(step.meshed_state.contact for step in steps)]
 
 
-def _bases(state: LinearState) -> Float:
-    """Return the local bases (c, d, d) of the points; a linear state always has them."""
-    assert state.bases is not None
-    return state.bases
-
-
-def _upright(state: LinearState, local: Float) -> Float:
+def _upright(state: ContactState, local: Float) -> Float:
     """Return vectors (c, d) in the directions of an upright object."""
     d = local.shape[1]
-    return np.asarray(np.einsum("ca,cak->ck", local, _bases(state)) @ vertical_frame(d).T)
+    return np.asarray(np.einsum("ca,cak->ck", local, state.own_bases) @ vertical_frame(d).T)
 
 
 def _at_end(zero: Float, gradient: Float) -> Float:
@@ -214,12 +209,12 @@ def _at_end(zero: Float, gradient: Float) -> Float:
     return out
 
 
-def _work(problem: Problem, states: Sequence[LinearState], count: Float, zero: Float) -> Goal:
+def _work(problem: Problem, states: Sequence[ContactState], count: Float, zero: Float) -> Goal:
     """Return the external work: the stored energy plus the frictional dissipation of all increments."""
     c, d = states[-1].force.shape
     by_force, by_displacement = zero.copy(), zero.copy()
     for k, (before, after) in enumerate(zip(states, states[1:], strict=False)):
-        start = transported(before, _bases(after))
+        start = transported(before, after.own_bases)
         slip, friction = np.zeros((c, d)), np.zeros((c, d))
         slip[:, 1:] = after.tangential_displacement - start.tangential_displacement
         friction[:, 1:] = (0.5 * (start.force + after.force))[:, 1:]
@@ -237,11 +232,11 @@ def _work(problem: Problem, states: Sequence[LinearState], count: Float, zero: F
     return Goal(name="external_work_mJ", by_force=by_force, by_displacement=by_displacement)
 
 
-def _dissipation(states: Sequence[LinearState], count: Float, zero: Float) -> Goal:
+def _dissipation(states: Sequence[ContactState], count: Float, zero: Float) -> Goal:
     """Return the dissipation, mu times the mean normal force times the slip of all increments."""
     by_force, by_displacement = zero.copy(), zero.copy()
     for k, (before, after) in enumerate(zip(states, states[1:], strict=False)):
-        start = transported(before, _bases(after))
+        start = transported(before, after.own_bases)
         slips = (after.status == SLIP) & (after.status != OPEN) & (after.force[:, 0] > 0.0)
         slip = np.where(slips[:, None], after.tangential_displacement - start.tangential_displacement, 0.0)
         end = np.where(slips, after.force[:, 0], 1.0)

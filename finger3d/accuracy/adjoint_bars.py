@@ -109,7 +109,7 @@ def applies(model: Model) -> bool:
 
     The body must be linear elastic without inclusions, the object rigid, and every leg given by its depth.
     """
-    plain = model.formulation.is_linear_elastic and model.inclusions is None and model.object_compliance is None
+    plain = model.is_linear_elastic and model.inclusions is None and model.object_compliance is None
     as_given = model.rule == "projection" and all(leg.force_N is None for leg in model.legs)
     return plain and as_given
 

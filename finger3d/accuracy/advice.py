@@ -38,7 +38,7 @@ def advise(
     large, increments : what large deformation and more increments would change, if it was estimated
     """
     out = []
-    if not model.formulation.finite_strain:
+    if not model.finite_strain:
         if large and large.significant:
             said = _changes(large.significant)
             out.append(f"large deformation would change {said}: [effects.large_deformation] accounts for it")

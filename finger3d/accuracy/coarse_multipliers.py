@@ -13,54 +13,26 @@ solution.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from finger3d._types import Float
-from finger3d.contact.state import ContactSolution, ContactState
-from finger3d.errors import Outcome
 from finger3d.fem.directions import bases_of
 from finger3d.fem.simplex import axis_numbers
 from finger3d.fem.traces import BoundarySurface
 from finger3d.mechanics.contact_geometry import ContactGeometry
-from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.history import StepResult
-from finger3d.mechanics.linear_contact import LinearBody, LinearState, solve_linearised
 from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.small_strain import SmallStrain
-from finger3d.objects import Move, ObjectPose
 
 _LEAST_POINTS = 4
 """Points of a face that are all kept: fewer leave nothing to interpolate between."""
 
 _FLAT = 1e-9
 """Extent of a face across its plane, over that along it, that is round-off."""
-
-
-@dataclass(frozen=True)
-class _LinearisedContact(SmallStrain):
-    """Small strain with known contact geometry: of each pose, the gaps linearised at a displacement (c, d) mm."""
-
-    known: Mapping[ObjectPose, tuple[ContactGeometry, Float]]
-
-    def increment(
-        self,
-        problem: Problem,
-        state: ContactState,
-        move: Move,
-        guess: Float | None,
-        workspace: Workspace,
-    ) -> ContactSolution:
-        """Solve contact once; an increment to a pose that is not known does not converge."""
-        assert isinstance(state, LinearState)
-        if move.end not in self.known:
-            return ContactSolution(state, Outcome.NO_CONVERGENCE, np.inf, 0, "none")
-        body = LinearBody(problem.delassus, np.zeros_like(state.displacement))
-        return solve_linearised(problem, state, move, body, guess, *self.known[move.end])
 
 
 def with_coarse_multipliers(problem: Problem, steps: Sequence[StepResult]) -> Iterator[Problem]:
@@ -110,26 +82,22 @@ def _coarsened(problem: Problem, steps: Sequence[StepResult], first: int) -> Pro
         reading_rows=system.reading_rows @ both,
         active_dofs=np.flatnonzero(active.ravel()),
     )
-    model = problem.model
-    if not model.object.is_flat:
-        known = {step.target: _geometry(problem, step, mean, kept) for step in steps}
-        model = replace(model, strain_measure=_LinearisedContact(known))
-    return replace(problem, model=model, symmetry=symmetric, system=coarse)
+    flat = problem.model.object.is_flat
+    known = None if flat else {step.target: _geometry(problem, step, mean, kept) for step in steps}
+    return replace(problem, symmetry=symmetric, system=coarse, contact_geometry=known)
 
 
 def _geometry(
     problem: Problem, step: StepResult, mean: sp.csr_array, kept: NDArray[np.intp]
 ) -> tuple[ContactGeometry, Float]:
     """Return the mean contact geometry (c') of the coarse multipliers after an increment, and their displacement."""
-    state = step.meshed_state
-    assert isinstance(state, LinearState)
-    assert state.bases is not None
-    normal = np.asarray(mean @ state.bases[:, 0])
+    contact, moved = step.meshed_state.contact, step.meshed_state.body
+    normal = np.asarray(mean @ contact.own_bases[:, 0])
     for k in axis_numbers(problem.axes):
         normal[problem.surface.points[kept, k] == 0.0, k] = 0.0
     normal /= np.linalg.norm(normal, axis=1)[:, None]
-    gap = np.asarray(mean @ state.gap)
-    return ContactGeometry(gap, np.ones_like(gap), np.zeros_like(normal), bases_of(normal)), mean @ state.displacement
+    gap = np.asarray(mean @ contact.gap)
+    return ContactGeometry(gap, np.ones_like(gap), np.zeros_like(normal), bases_of(normal)), np.asarray(mean @ moved)
 
 
 def _surface(

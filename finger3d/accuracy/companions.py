@@ -91,7 +91,7 @@ def companions(model: Model, unknowns: float) -> tuple[list[MeshOptions], list[M
     if isinstance(model.design, GivenMesh):
         return [], [_bisected(model.mesh, unknowns)]
     own, enough = model.mesh, unknowns >= _LEAST_UNSTRUCTURED_UNKNOWNS
-    costly = model.domain != "solid" and model.formulation.finite_strain
+    costly = model.domain != "solid" and model.finite_strain
     longer = coarser(model, _FINITE_STRAIN_FACTOR if costly else FACTOR).mesh
     chosen = [longer] if longer.mesher == "swept" or enough else []
     if model.domain == "solid" and own.mesher != longer.mesher:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from finger3d._types import Tree
 from finger3d.mechanics.build import contact_box
-from finger3d.mechanics.cost import AddedCost, PressCost
+from finger3d.mechanics.cost import PressCost, added_cost, state_size
 from finger3d.mechanics.gauge_refinement import refined_at_gauges
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.path import AUTO_START
@@ -64,7 +64,7 @@ def forecast(model: Model) -> Tree:
         factor_mb=_memory(size, d) - _BASE_MB,
     )
     memory += _states_mb(model, press, axes)
-    costs = {name: _added_cost(slot, model, press) for slot, name in model.filled}
+    costs = {name: added_cost(slot, model, press) for slot, name in model.filled}
     check_memory((memory + sum(cost.memory_mb for cost in costs.values())) / 1e3, "this press")
     return {
         "domain": model.domain,
@@ -96,20 +96,6 @@ def _runs(model: Model, size: _Size, d: int) -> list[int]:
     while runs[-1] < min(_USUAL, last):
         runs.append(2 * runs[-1])
     return runs
-
-
-def _added_cost(slot: str, model: Model, press: PressCost) -> AddedCost:
-    """Cost of the effect in a slot; a friction law adds none."""
-    match slot:
-        case "strain_measure":
-            return model.strain_measure.added_cost(model, press)
-        case "relaxation" if not model.formulation.finite_strain:
-            return model.formulation.added_cost(model, press)
-        case "inclusions" if model.inclusions:
-            return model.inclusions.added_cost(model, press)
-        case "object_compliance" if model.object_compliance:
-            return model.object_compliance.added_cost(model, press)
-    return AddedCost()
 
 
 def _size(model: Model, zone: tuple[float, float, float, float], axes: tuple[str, ...], mixed: bool) -> _Size:
@@ -157,7 +143,7 @@ def _triangles(model: Model) -> dict[str, int]:
 def _states_mb(model: Model, press: PressCost, axes: tuple[str, ...]) -> float:
     """Memory of the states of all increments, MB: those of the part, of the whole finger and of the formulation."""
     steps = sum(leg.steps if isinstance(leg.steps, int) else 8 * AUTO_START for leg in model.legs)
-    numbers = 3 * press.dim * press.contact_points * (1 + 2 ** len(axes)) + model.formulation.state_size(press)
+    numbers = 3 * press.dim * press.contact_points * (1 + 2 ** len(axes)) + state_size(model, press)
     return float(8e-6 * steps * numbers)
 
 

@@ -222,9 +222,9 @@ def _marching_cost(problem: Problem) -> float:
     count = sum(leg.steps if isinstance(leg.steps, int) else AUTO_START for leg in model.legs)
     condensation = condensation_s(_unknowns(problem), problem.dim)
     contact = count * contact_s(len(problem.surface.nodes), problem.dim)
-    if model.formulation.finite_strain:
+    if model.finite_strain:
         return contact + count * finite_strain_s(_unknowns(problem), condensation)
-    return contact + len(model.legs) * condensation * model.formulation.refactorises
+    return contact + len(model.legs) * condensation * model.refactorises
 
 
 def _budget(problem: Problem) -> float:

@@ -104,6 +104,5 @@ def _coarse(model: Model, factor: float, steps: int) -> Model:
 def _at_large_deformation(model: Model) -> Model:
     # imported here: without this estimate, a press in small strain does not need them
     from finger3d.fem.laws import NeoHooke
-    from finger3d.mechanics.finite_strain import FiniteStrain
 
-    return fill(model, "strain_measure", FiniteStrain(NeoHooke(1.0)), "large_deformation")
+    return fill(model, "hyperelastic_law", NeoHooke(1.0), "large_deformation")

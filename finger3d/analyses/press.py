@@ -14,6 +14,7 @@ from finger3d.analyses.press_files import Fields, ResultWriter
 from finger3d.analyses.press_record import PressRecord, point_count_warning
 from finger3d.analyses.result import PressResult
 from finger3d.io import claimed
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult, measure
 from finger3d.progress import Progress
 
@@ -216,7 +217,7 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fie
     report.stage("writing fields")
     fields, good, problem = None, record.converged_steps, record.problem
     if good:
-        u, strain, stress = problem.model.formulation.fields(problem, good[-1].meshed_state)
+        u, strain, stress = formulation_of(problem.model).fields(problem, good[-1].meshed_state)
         record.warnings += penetration_warnings(problem, record.surface_checks)
         record.largest_strain = largest_principal_strain(strain)
         _advise(record)
@@ -245,7 +246,7 @@ def _estimate_changes(record: PressRecord, report: Progress) -> None:
     from finger3d.accuracy.more_increments import may_matter, more_increments
 
     problem, steps = record.problem, record.steps
-    if problem.model.formulation.finite_strain or not steps or not steps[-1].outcome.ok:
+    if problem.model.finite_strain or not steps or not steps[-1].outcome.ok:
         return
     if record.largest_strain >= LEAST_STRAIN:
         report.stage("estimating what large deformation would change")

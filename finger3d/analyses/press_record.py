@@ -11,6 +11,7 @@ import numpy as np
 from finger3d._machine import peak_memory_MB, versions
 from finger3d._types import Tree
 from finger3d.contact.friction import OPEN
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import History, StepResult, measure
 
 if TYPE_CHECKING:
@@ -72,7 +73,7 @@ class PressRecord:
     def __post_init__(self) -> None:
         from finger3d.mechanics import resolution
 
-        self.workspace = self.problem.model.formulation.workspace()
+        self.workspace = formulation_of(self.problem.model).workspace()
         self.coupling = self.problem.coupling()
         self.seconds = {"cad": 0.0, "mesh": 0.0, **self.problem.seconds, "contact": 0.0, "output": 0.0}
         self.warnings += [
@@ -173,7 +174,7 @@ def _coupling_warning(coupling: float) -> list[str]:
 
 
 def _depth_warning(problem: Problem) -> list[str]:
-    if problem.model.formulation.finite_strain:
+    if problem.model.finite_strain:
         return []
     height = problem.model.design.height_mm
     ratio = max(leg.depth_mm for leg in problem.model.legs) / height

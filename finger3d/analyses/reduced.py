@@ -66,9 +66,9 @@ class ReducedModel:
             If an effect makes the compliance depend on the state or on time.
         """
         model = problem.model
-        if not model.formulation.is_linear_elastic:
+        if not model.is_linear_elastic:
             slots = dict(model.filled)
-            name = slots.get("strain_measure") or slots.get("relaxation", "its formulation")
+            name = slots.get("hyperelastic_law") or slots.get("relaxation", "its formulation")
             raise Finger3dError(
                 f"effects.{name}: a body with it has no reduced model, its compliance is not constant; "
                 "take the effect out, or press the scene itself"
@@ -184,7 +184,7 @@ class ReducedModel:
 
 def _kinetic(law: FrictionLaw, ratio: float | None, branch: str | None) -> FrictionLaw:
     """Return the law with another kinetic coefficient or branch; None leaves either as it is."""
-    from finger3d.effects.kinetic_friction import TwoCoefficients
+    from finger3d.contact.friction import TwoCoefficients
 
     if not isinstance(law, Coulomb | TwoCoefficients):
         raise Finger3dError(f"ratio and branch: {type(law).__name__} has no kinetic coefficient")

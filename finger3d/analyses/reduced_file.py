@@ -263,7 +263,7 @@ def _model(header: TreeView, arrays: TreeView) -> Model:
 
 def _friction_laws() -> dict[str, type[FrictionLaw]]:
     """Return the friction laws that a file may name."""
-    from finger3d.effects.kinetic_friction import TwoCoefficients
+    from finger3d.contact.friction import TwoCoefficients
 
     return {law.__name__: law for law in (Coulomb, TwoCoefficients)}
 

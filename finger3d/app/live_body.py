@@ -16,6 +16,7 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.recover import displacement
 from finger3d.fem.simplex import CONTACT, FREE_FACES
 from finger3d.mechanics.build import build
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.history import contact_table, measure
 from finger3d.mechanics.model import Leg
@@ -101,9 +102,9 @@ class LiveBody:
             If an effect makes the compliance depend on the state or on time.
         """
         model = scene.model()
-        if not model.formulation.is_linear_elastic or model.inclusions is not None:
+        if not model.is_linear_elastic or model.inclusions is not None:
             slots = dict(model.filled)
-            name = next(slots[slot] for slot in ("strain_measure", "relaxation", "inclusions") if slot in slots)
+            name = next(slots[slot] for slot in ("hyperelastic_law", "relaxation", "inclusions") if slot in slots)
             raise Finger3dError(f"app: not with effects.{name}, which takes seconds to press; take the effect out")
         straight = Leg(model.largest_depth_mm, steps=STEPS)
         return cls(scene.title, build(replace(model, legs=(straight,), gauges=(), markers=(), taxels=()), say))
@@ -175,7 +176,7 @@ def _pressed(body: LiveBody, mu: float, depth_mm: float) -> LivePress:
     on = np.flatnonzero(top & (distance <= max(problem.points.band_mm, distance[top].min() + _LINE_MM)))
     on = on[np.argsort(np.asarray(table["x_mm"])[on], kind="stable")]
     shear = np.hypot(np.asarray(table["shear_x_MPa"]), np.asarray(table["shear_z_MPa"]))
-    unknowns = problem.model.formulation.unknowns(problem, steps[-1].meshed_state)
+    unknowns = next(formulation_of(problem.model).unknowns(problem, [steps[-1].meshed_state]))
     return LivePress(
         numbers={name: measured[name] for name in _NUMBERS},
         x_mm=np.asarray(table["x_mm"])[on],

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Literal, Self, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,3 +75,40 @@ class Coulomb(FrictionLaw):
     def coefficients(self, status: Status, pressure: Float) -> Float:
         """Return `mu` for every point."""
         return np.full(len(status), self.mu)
+
+
+Branch = Literal["keep", "paper"]
+
+
+@dataclass(frozen=True)
+class TwoCoefficients(FrictionLaw):
+    """Friction law with the static coefficient ``mu`` and the kinetic one ``ratio * mu``.
+
+    mu_k < mu_s has no unique solution without a rule (validation/REFERENCES.md, 2.5).  ``keep``: a point that slips
+    keeps slipping at mu_k until its slip would reverse; this converges to the solution with mu_k.  ``paper``: in every
+    increment all points start stuck and slip only above mu_s (Maeno 2004, Fig. 8); the solution depends on mesh and
+    increments.
+    """
+
+    ratio: float
+    branch: Branch
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.ratio <= 1.0:
+            raise Finger3dError(f"ratio = {self.ratio}: must be a number from 0 to 1")
+        if self.branch not in get_args(Branch):
+            raise Finger3dError(f'branch = "{self.branch}": must be "keep" or "paper"')
+
+    @property
+    def depends_on_steps(self) -> bool:
+        """True where every increment starts with all points stuck."""
+        return self.branch == "paper"
+
+    def coefficients(self, status: Status, pressure: Float) -> Float:
+        """Return the kinetic coefficient for points that slip, if they keep it, and the static one elsewhere."""
+        keeps = (status == SLIP) & (self.branch == "keep")
+        return np.where(keeps, self.ratio, 1.0) * self.mu
+
+    def updated(self, mu: Float, status: Status, pressure: Float) -> Float:
+        """Lower the limit of points that slip; it is never raised within an increment, so this ends."""
+        return np.where(status == SLIP, self.ratio * self.mu, mu)

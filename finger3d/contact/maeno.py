@@ -12,13 +12,13 @@ from finger3d._types import Float
 from finger3d.contact.conditions import TOLERANCE, ContactProblem, residual
 from finger3d.contact.friction import OPEN, SLIP, STICK
 from finger3d.contact.newton import force_of_sets
-from finger3d.contact.state import ContactSolution, next_state
+from finger3d.contact.state import ContactSolution, ContactState, next_state
 from finger3d.errors import Outcome
 
 _MAX_ITERATIONS = 500
 
 
-def maeno_active_set(problem: ContactProblem, guess: Float | None = None) -> ContactSolution:
+def maeno_active_set(problem: ContactProblem, guess: Float | None = None) -> ContactSolution[ContactState]:
     """Solve one increment by the paper's rule.
 
     The guess is not used, and the friction coefficients stay those at the beginning of the increment.  A cycled

@@ -8,13 +8,13 @@ from finger3d._types import Float
 from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.maeno import maeno_active_set
 from finger3d.contact.solve import solve_increment
-from finger3d.contact.state import ContactSolution
+from finger3d.contact.state import ContactSolution, ContactState
 
 
 class StickRule(Protocol):
     """Solution of one increment."""
 
-    def __call__(self, problem: ContactProblem, guess: Float | None = None) -> ContactSolution:
+    def __call__(self, problem: ContactProblem, guess: Float | None = None) -> ContactSolution[ContactState]:
         """Solve one increment, from an initial guess (c, d) N of the forces if there is one."""
         ...
 

@@ -13,7 +13,7 @@ from finger3d.contact.acceleration import accelerated_newton, threads_for
 from finger3d.contact.conditions import TOLERANCE, ContactProblem, residual
 from finger3d.contact.lemke import friction_start
 from finger3d.contact.newton import NewtonResult, block_gauss_seidel, force_of_sets, newton
-from finger3d.contact.state import ContactSolution, next_state, pressure
+from finger3d.contact.state import ContactSolution, ContactState, next_state, pressure
 from finger3d.errors import Outcome
 
 _FRICTION_UPDATES = 50
@@ -50,7 +50,7 @@ _SMALLEST_STRIDE = 1e-3
 """Stride of the friction continuation, as a share of the whole, at which it is given up."""
 
 
-def solve_increment(problem: ContactProblem, guess: Float | None = None) -> ContactSolution:
+def solve_increment(problem: ContactProblem, guess: Float | None = None) -> ContactSolution[ContactState]:
     """Solve one increment.
 
     Parameters

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,9 @@ from numpy.typing import NDArray
 from finger3d._types import Float, freeze_arrays
 from finger3d.contact.friction import OPEN
 from finger3d.errors import Outcome
+
+S = TypeVar("S")
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -56,9 +60,20 @@ class ContactState:
         ValueError
             If the directions of the points are not known.
         """
+        return np.asarray(np.einsum("ca,cak->ck", self.force, self.own_bases))
+
+    @property
+    def own_bases(self) -> Float:
+        """Each point's own directions (c, d, d).
+
+        Raises
+        ------
+        ValueError
+            If they are not known.
+        """
         if self.bases is None:
             raise ValueError("the directions of the points are not known")
-        return np.asarray(np.einsum("ca,cak->ck", self.force, self.bases))
+        return self.bases
 
     def of_points(self, points: NDArray[np.intp]) -> ContactState:
         """Return the state of some points (k,)."""
@@ -73,12 +88,12 @@ class ContactState:
 
 
 @dataclass(frozen=True)
-class ContactSolution:
+class ContactSolution(Generic[S]):
     """Solution of one increment.
 
     Attributes
     ----------
-    state : ContactState
+    state : `ContactState`, or `finger3d.mechanics.state.State` with that of the body
         Valid only if `outcome` is CONVERGED; otherwise the state before the increment.
     residual : float
         Largest violation of Eqs. (1)-(4) and of "friction opposes slip", dimensionless.
@@ -90,12 +105,16 @@ class ContactSolution:
         Further information about a failure.
     """
 
-    state: ContactState
+    state: S
     outcome: Outcome
     residual: float
     iterations: int
     method: str
     detail: str = ""
+
+    def with_state(self, state: T) -> ContactSolution[T]:
+        """Return the solution with another state, such as that of contact and body."""
+        return ContactSolution(state, self.outcome, self.residual, self.iterations, self.method, self.detail)
 
 
 def pressure(force: Float, area: Float | None) -> Float:

@@ -12,7 +12,6 @@ from finger3d.effects.base import fill
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws import IsochoricLaw, MooneyRivlin, NeoHooke, Ogden, Yeoh
 from finger3d.fem.laws.stability import unstable_from
-from finger3d.mechanics.finite_strain import FiniteStrain
 from finger3d.mechanics.model import Model
 
 _TABLE = "effects.large_deformation"
@@ -48,7 +47,7 @@ class Effect:
     terms : ogden: [share of the shear modulus, alpha], ...; the shares sum to 1
     """
 
-    slot: ClassVar[str] = "strain_measure"
+    slot: ClassVar[str] = "hyperelastic_law"
 
     law: Literal["neo-hookean", "mooney-rivlin", "yeoh", "ogden"] = "neo-hookean"
     c01_share: Share | None = None
@@ -57,7 +56,7 @@ class Effect:
     terms: Annotated[tuple[tuple[Ratio, Exponent], ...], MinLen(1)] | None = None
 
     def apply(self, model: Model) -> Model:
-        """Set the strain measure and the law of the model."""
+        """Set the hyperelastic law of the model."""
         for material in (model.material, *(material for _, material in model.parts)):
             material.isotropic(_TABLE)
         law = self._isochoric_law()
@@ -68,7 +67,7 @@ class Effect:
                     f"{keys}: with these constants the stress falls from a nominal strain of {strain:.2g} in {mode}; "
                     "choose constants that are stable further"
                 )
-        return fill(model, "strain_measure", FiniteStrain(law), "large_deformation")
+        return fill(model, "hyperelastic_law", law, "large_deformation")
 
     def _isochoric_law(self) -> IsochoricLaw:
         """Return the law with a shear modulus of 1 MPa; a key that is missing, or of another law, is refused."""

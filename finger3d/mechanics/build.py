@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -20,7 +21,7 @@ from finger3d.fem.simplex import CONTACT, Mesh
 from finger3d.fem.traces import BoundarySurface, local_rows, restrict
 from finger3d.mechanics.contact_geometry import contact_geometry, may_touch
 from finger3d.mechanics.gauge_refinement import refined_at_gauges
-from finger3d.mechanics.model import EmbeddedBars, Leg, Model, ObjectResponse
+from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.path import targets
 from finger3d.mechanics.problem import (
     AddedStiffness,
@@ -39,6 +40,10 @@ from finger3d.meshing.limits import check_rows
 from finger3d.meshing.report import MeshReport
 from finger3d.meshing.swept import mesh_section
 from finger3d.objects import DistanceTracker, ObjectPose, PlacedObject, initial_contact, vertical_frame
+
+if TYPE_CHECKING:
+    from finger3d.mechanics.elastic_object import ObjectResponse
+    from finger3d.mechanics.foils import EmbeddedBars
 
 Say = Callable[[str], None]
 
@@ -86,7 +91,7 @@ def build(model: Model, say: Say = lambda text: None, margin: float = MARGIN) ->
     active = active_dofs(candidates, axes)
     count = len(model.reading_names)
     check_rows(len(active), count)
-    bars = model.inclusions.discretise(model, mesh, axes) if model.inclusions else None
+    bars = _bars(model, mesh, axes)
     contact_part = local_rows(candidates, vertical_frame(mesh.dim))[active]
     readings = _readings(model, MeshedBody(mesh, axes, matrix, thickness), bars, say)
     rows = sp.vstack([_widened(part, matrix.upper.shape[0]) for part in (contact_part, *readings)], format="csr")
@@ -119,9 +124,22 @@ def build(model: Model, say: Say = lambda text: None, margin: float = MARGIN) ->
         ),
         seconds={**report.seconds, "assembly": assembly, "condensation": condensed.seconds},
     )
-    response = model.object_compliance.respond(problem, contact.contact_box, say) if model.object_compliance else None
     whole = with_bars(problem, bars) if bars else problem
-    return with_object_compliance(whole, response) if response else whole
+    thing = model.object_compliance
+    if thing is None:
+        return whole
+    from finger3d.mechanics.elastic_object import object_response  # a press imports only what its scene names
+
+    return with_object_compliance(whole, object_response(problem, thing, contact.contact_box, say))
+
+
+def _bars(model: Model, mesh: Mesh, axes: tuple[str, ...]) -> EmbeddedBars | None:
+    """Return the bars of the model's inclusions, if there are any."""
+    if model.inclusions is None:
+        return None
+    from finger3d.mechanics.foils import discretised_foils
+
+    return discretised_foils(model.inclusions, model, mesh, axes)
 
 
 def with_bars(problem: Problem, bars: EmbeddedBars) -> Problem:
@@ -226,7 +244,7 @@ def candidate_points(model: Model, free: BoundarySurface, touch: float, margin: 
         placed = PlacedObject.of(model.object, touch, pose)
         geometry = contact_geometry(lambda points: tracker.distance(placed, points, near), free)
         normal = geometry.bases[:, 0]
-        allowed = may_touch(free, normal), model.formulation.may_touch(free, normal)
+        allowed = may_touch(free, normal), may_touch(free, normal, model.finite_strain)
         first, second = (np.where(mask, geometry.gap, np.inf) for mask in allowed)
         return first, second
 

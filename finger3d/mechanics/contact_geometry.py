@@ -88,12 +88,14 @@ class ContactGeometry:
         return self.bases @ vertical_frame(self.dim).T
 
 
-def may_touch(surface: BoundarySurface, normal: Float) -> NDArray[np.bool_]:
+def may_touch(surface: BoundarySurface, normal: Float, finite_strain: bool = False) -> NDArray[np.bool_]:
     """Return which points (c,) can touch an object with normals (c, d) there.
 
     Those of the contact face can.  On other faces the surfaces must face each other, or an object above the finger
-    would count as touching its walls.
+    would count as touching its walls; at finite strain, walls turn with the deformation and may touch it as well.
     """
+    if finite_strain:
+        return np.ones(len(surface.nodes), dtype=np.bool_)
     facing = np.einsum("ck,ck->c", normal, surface.normals) < _FACING
     return np.asarray(facing | (surface.face == CONTACT))
 

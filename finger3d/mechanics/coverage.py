@@ -12,7 +12,9 @@ from finger3d._types import Float
 from finger3d.fem.recover import displacement
 from finger3d.fem.simplex import CONTACT, FREE_FACES
 from finger3d.fem.traces import BoundarySurface, restrict
+from finger3d.mechanics.contact_geometry import may_touch
 from finger3d.mechanics.formulation import length_scale
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.problem import Problem, free_surface
 from finger3d.objects import DistanceTracker, Move, ObjectPose
@@ -120,7 +122,7 @@ def _penetration(problem: Problem, checks: Sequence[SurfaceCheck], above: float,
 
 def _displacements(problem: Problem, steps: Sequence[StepResult]) -> Iterator[Float]:
     """Yield the nodal displacement (n, d) mm after each step."""
-    for unknowns in problem.model.formulation.all_unknowns(problem, [step.meshed_state for step in steps]):
+    for unknowns in formulation_of(problem.model).unknowns(problem, [step.meshed_state for step in steps]):
         yield displacement(problem.mesh, unknowns)
 
 
@@ -136,8 +138,8 @@ def _surfaces(problem: Problem, steps: Sequence[StepResult]) -> tuple[BoundarySu
     others = beyond_candidates(problem, free)
     if problem.model.object.is_flat and steps:  # its normal is known everywhere
         normals = [problem.placed(step.target).distance(others.points)[1] for step in steps]
-        may_touch = problem.model.formulation.may_touch
-        others = restrict(others, np.any([may_touch(others, normal) for normal in normals], axis=0))
+        finite = problem.model.finite_strain
+        others = restrict(others, np.any([may_touch(others, normal, finite) for normal in normals], axis=0))
     return free, others
 
 
@@ -150,9 +152,10 @@ def _stays_out(problem: Problem, u: Float, target: ObjectPose, others: BoundaryS
     """Return whether no point of `others` went through the object."""
     if not len(others.nodes):
         return True
-    gap, normal = problem.model.formulation.gap(problem, u, target, others)
+    gap, normal = formulation_of(problem.model).gap(problem, u, target, others)
+    facing = may_touch(others, normal, problem.model.finite_strain)
     for on_contact, share in _TOUCHES.items():
-        points = problem.model.formulation.may_touch(others, normal) & ((others.face == CONTACT) == on_contact)
+        points = facing & ((others.face == CONTACT) == on_contact)
         if gap[points].min(initial=np.inf) <= -share * length_scale(problem, Move(target, target)):
             return False
     return True

@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from finger3d.contact.friction import SLIP
 from finger3d.contact.state import ContactState
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.linear_contact import transported
 from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.state import State
 from finger3d.objects import Move
 
 
-def external_work(problem: Problem, before: ContactState, after: ContactState, move: Move) -> float:
+def external_work(problem: Problem, before: State[Any], after: State[Any], move: Move) -> float:
     """Return the work (mJ) of the object on the finger in an increment.
 
     It is the work of the contact forces on the body plus the frictional dissipation, by the trapezoidal rule.
     """
-    assert after.bases is not None
-    start = transported(before, after.bases)
-    friction = 0.5 * (start.force + after.force)[:, 1:]
-    rubbed = np.einsum("ct,ct->c", friction, after.tangential_displacement - start.tangential_displacement)
-    on_body = problem.model.formulation.work_on_body(problem, before, after, move)
+    start, end = transported(before.contact, after.contact.own_bases), after.contact
+    friction = 0.5 * (start.force + end.force)[:, 1:]
+    rubbed = np.einsum("ct,ct->c", friction, end.tangential_displacement - start.tangential_displacement)
+    formulation = formulation_of(problem.model)
+    on_body = formulation.loads(problem, after, move.end).work_from(formulation.loads(problem, before, move.start))
     return float(2 ** len(problem.axes) * on_body - problem.symmetry.total(rubbed))
 
 

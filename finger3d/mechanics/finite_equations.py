@@ -32,7 +32,7 @@ from finger3d.fem.quality import inverted_place
 from finger3d.fem.recover import displacement
 from finger3d.mechanics.finite_body import FiniteBody
 from finger3d.mechanics.finite_state import (
-    DeformedState,
+    DeformedBody,
     FiniteStrainWorkspace,
     Linearisation,
     contact_of,
@@ -42,6 +42,7 @@ from finger3d.mechanics.finite_state import (
 from finger3d.mechanics.formulation import length_scale
 from finger3d.mechanics.linear_contact import carried_by_object, transported
 from finger3d.mechanics.problem import Problem, scatter_to_points
+from finger3d.mechanics.state import State
 from finger3d.objects import Move, vertical_frame
 
 _TARGET_RESIDUAL = 5e-9
@@ -84,11 +85,13 @@ class IncrementEquations:
 
     problem: Problem
     body: FiniteBody
-    start: DeformedState
+    start: State[DeformedBody]
     move: Move
     workspace: FiniteStrainWorkspace
 
-    def finished(self, now: Configuration, solution: ContactSolution, error: float, spent: int) -> ContactSolution:
+    def finished(
+        self, now: Configuration, solution: ContactSolution[ContactState], error: float, spent: int
+    ) -> ContactSolution[State[DeformedBody]]:
         """Return the solution with the state at the end, unless a cell is inverted or the material law unstable."""
         if self.body.instability(now.x):
             return self.failed(now, Outcome.UNSTABLE, error, spent)
@@ -98,11 +101,11 @@ class IncrementEquations:
             at = ", ".join(f"{axis} = {x:.3g}" for axis, x in zip("xyz", folded, strict=False))
             return self.failed(now, Outcome.INVERTED, error, spent, f"the cell at {at} mm")
         state, error = self._state(now, solution.state), max(solution.residual, error)
-        return replace(solution, state=state, residual=error, iterations=spent)
+        return replace(solution.with_state(state), residual=error, iterations=spent)
 
     def failed(
         self, now: Configuration, outcome: Outcome, error: float, spent: int, detail: str = ""
-    ) -> ContactSolution:
+    ) -> ContactSolution[State[DeformedBody]]:
         """Return the initial state and the reason of the failure; later increments begin with a new tangent."""
         last = self.workspace.linearisations.get(self._has_inclusions)
         if last is not None:
@@ -128,14 +131,14 @@ class IncrementEquations:
     def _largest_step(self) -> float:
         """Largest displacement (mm) of an iteration: a multiple of that of the object, or a share of the depth."""
         problem = self.problem
-        at = problem.surface.trace @ displacement(problem.mesh, self.start.unknowns)
+        at = problem.surface.trace @ displacement(problem.mesh, self.start.body.unknowns)
         moved = float(np.abs(carried_by_object(problem, self.move, at)).max(initial=0.0))
         return max(_LARGEST_STEP * moved, _LEAST_STEP * self._length_scale)
 
     @cached_property
     def _least_force(self) -> float:
         """Smallest force (N) by which the residual is divided; without contact all forces are round-off."""
-        before = float(np.linalg.norm(self.start.force, axis=1).max())
+        before = float(np.linalg.norm(self.start.contact.force, axis=1).max())
         shear, width = self.body.solid.material.law.shear, self.body.solid.thickness
         area = self._length_scale * (width if self.problem.dim == 2 else self._length_scale)
         return max(before, _NEGLIGIBLE * shear * area)
@@ -153,16 +156,17 @@ class IncrementEquations:
                 return self.at(x), force
             except InvertedError:
                 continue
-        return self.at(self.start.unknowns), self.start.force if guess is None else guess
+        return self.at(self.start.body.unknowns), self.start.contact.force if guess is None else guess
 
     def _extrapolated(self, guess: Float | None) -> Iterator[tuple[Float, Float]]:
         """Yield expected unknowns (N,) and contact forces (c, d)."""
         start = self.start
-        if start.previous is not None:
-            before, x = start.previous
+        at = start.body.unknowns
+        if start.body.previous is not None:
+            before, x = start.body.previous
             ratio = self.move.length_ratio(before)
             if ratio is not None:
-                yield start.unknowns + ratio * (start.unknowns - x), start.force if guess is None else guess
+                yield at + ratio * (at - x), start.contact.force if guess is None else guess
 
     def at(self, x: Float) -> Configuration:
         """Return the configuration at unknowns (N,); raises InvertedError."""
@@ -213,12 +217,12 @@ class IncrementEquations:
 
     def contact(
         self, now: Configuration, force: Float, linearisation: Linearisation, displacement: Float
-    ) -> tuple[ContactSolution, Float]:
+    ) -> tuple[ContactSolution[ContactState], Float]:
         """Solve contact of the linearised body; returns the solution and the changes (r,) of the forces on its rows.
 
         `displacement` (r,) mm is that of the rows under the forces out of balance alone.
         """
-        problem, start, bases = self.problem, transported(self.start, now.contact.bases), now.contact.bases
+        problem, start, bases = self.problem, transported(self.start.contact, now.contact.bases), now.contact.bases
         active, rotation = problem.system.active_dofs, linearisation.rotation(bases)
         delassus = rotated(linearisation.delassus, rotation)
         compliance = problem.system.object_compliance
@@ -261,17 +265,16 @@ class IncrementEquations:
     def _relative_displacement(self, now: Configuration, force: Float) -> Float:
         """Gap and increment of tangential displacement (c, d) under forces (c, d), in the present directions."""
         problem, bases = self.problem, now.contact.bases
-        at, before = (problem.surface.trace @ displacement(problem.mesh, x) for x in (now.x, self.start.unknowns))
+        at, before = (problem.surface.trace @ displacement(problem.mesh, x) for x in (now.x, self.start.body.unknowns))
         increment = at - before - carried_by_object(problem, self.move, at)
         out = np.empty_like(force)
         out[:, 0] = now.contact.gap
         compliance = problem.system.object_compliance
         if compliance is not None:
             frame = vertical_frame(problem.dim)
-            assert self.start.bases is not None
             upright, earlier = (
                 np.einsum("ca,cak->ck", f, b) @ frame.T
-                for f, b in ((force, bases), (self.start.force, self.start.bases))
+                for f, b in ((force, bases), (self.start.contact.force, self.start.contact.own_bases))
             )
             matrix = compliance.reshape(force.size, force.size)
             whole, last = ((matrix @ f.ravel()).reshape(force.shape) @ frame for f in (upright, earlier))
@@ -301,11 +304,10 @@ class IncrementEquations:
         moved = self._relative_displacement(now, force)
         return max(residual(force, moved, solution.status, mu, self._length_scale), equilibrium, dilatation)
 
-    def _state(self, now: Configuration, solution: ContactState) -> DeformedState:
+    def _state(self, now: Configuration, solution: ContactState) -> State[DeformedBody]:
         """Return the state at the end of the increment."""
         moved = self._relative_displacement(now, solution.force)
-        start = transported(self.start, now.contact.bases)
+        start = transported(self.start.contact, now.contact.bases)
         after = next_state(start, solution.force, moved, solution.status)
-        return DeformedState(
-            **(vars(after) | {"bases": now.contact.bases}), unknowns=now.x, previous=(self.move, self.start.unknowns)
-        )
+        body = DeformedBody(now.x, previous=(self.move, self.start.body.unknowns))
+        return State(replace(after, bases=now.contact.bases), body)

@@ -18,7 +18,8 @@ from finger3d.fem.hyperelastic import InvertedError
 from finger3d.fem.recover import displacement
 from finger3d.mechanics.failure import cause_of_failure
 from finger3d.mechanics.finite_equations import Configuration, IncrementEquations, converged
-from finger3d.mechanics.finite_state import Linearisation
+from finger3d.mechanics.finite_state import DeformedBody, Linearisation
+from finger3d.mechanics.state import State
 
 _ITERATIONS, _FACTORS = 60, 15
 """Largest number of iterations and of new factors in an increment."""
@@ -47,7 +48,7 @@ change and value), and share below which none is added."""
 class FiniteIncrement(IncrementEquations):
     """An increment solved by itself."""
 
-    def solve(self, guess: Float | None) -> ContactSolution:
+    def solve(self, guess: Float | None) -> ContactSolution[State[DeformedBody]]:
         """Iterate until equilibrium and the contact conditions hold; the state is without internal variables."""
         found = self._iterate(guess)
         if found.outcome.ok or found.detail:
@@ -55,10 +56,10 @@ class FiniteIncrement(IncrementEquations):
         damped = self._iterate_damped()
         detail = damped.detail
         if damped.outcome is Outcome.NEWTON:
-            detail = cause_of_failure(self.problem, displacement(self.problem.mesh, self.start.unknowns))
+            detail = cause_of_failure(self.problem, displacement(self.problem.mesh, self.start.body.unknowns))
         return replace(damped, iterations=found.iterations + damped.iterations, detail=detail)
 
-    def _iterate(self, guess: Float | None) -> ContactSolution:
+    def _iterate(self, guess: Float | None) -> ContactSolution[State[DeformedBody]]:
         """Iterate from the configuration extrapolated, with a new tangent where the residual falls slowly.
 
         If it does not converge with the tangent of an earlier increment, the iteration starts again with a new one.
@@ -91,12 +92,12 @@ class FiniteIncrement(IncrementEquations):
                     (now, force), error = first, math.inf
         return self.failed(now, outcome, error, spent)
 
-    def _iterate_damped(self) -> ContactSolution:
+    def _iterate_damped(self) -> ContactSolution[State[DeformedBody]]:
         """Iterate from the first state with a multiple of the linear stiffness added to the tangent.
 
         The multiple decreases with the residual to zero (pseudo-transient continuation, Kelley and Keyes 1998).
         """
-        now, force = self.at(self.start.unknowns), self.start.force
+        now, force = self.at(self.start.body.unknowns), self.start.contact.force
         damping, spent, error = _FIRST_DAMPING, 0, math.inf
         for _ in range(_DAMPED_FACTORS):
             solution, after = self._advance(now, force, self.linearise(now, force, damping))
@@ -119,7 +120,7 @@ class FiniteIncrement(IncrementEquations):
 
     def _advance(
         self, now: Configuration, force: Float, linearisation: Linearisation
-    ) -> tuple[ContactSolution, Configuration | None]:
+    ) -> tuple[ContactSolution[ContactState], Configuration | None]:
         """Return the contact solution, and the next configuration; None if there is no solution, or a cell inverts."""
         eliminated = linearisation.condensation.eliminated(-self.out_of_balance(now, force))
         solution, change = self.contact(now, force, linearisation, eliminated.displacement)

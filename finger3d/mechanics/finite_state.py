@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from finger3d._types import Float
-from finger3d.contact.state import ContactState
+from finger3d._types import Float, freeze_arrays
 from finger3d.fem.condense import Condensation
 from finger3d.fem.directions import bases_of
 from finger3d.fem.finite_contact import DeformedContact, deformed_contact
@@ -25,9 +24,9 @@ _ROUND_OFF = 1e-13
 """Round-off of directions."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class DeformedState(ContactState):
-    """Contact state of a body at finite strain.
+@dataclass(frozen=True)
+class DeformedBody:
+    """State of a body at finite strain.
 
     Attributes
     ----------
@@ -39,6 +38,9 @@ class DeformedState(ContactState):
     unknowns: Float
     memory: InternalVariables | None = None
     previous: tuple[Move, Float] | None = None
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
 
 
 @dataclass(frozen=True)

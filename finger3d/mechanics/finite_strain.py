@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finger3d._types import Float
 from finger3d.contact.state import ContactSolution, ContactState
@@ -17,18 +15,15 @@ from finger3d.fem.laws import IsochoricLaw
 from finger3d.fem.recover import displacement, extrapolated
 from finger3d.fem.tensors import determinant
 from finger3d.fem.traces import BoundarySurface
-from finger3d.mechanics.cost import AddedCost, PressCost, finite_strain_s
 from finger3d.mechanics.finite_body import FiniteBody
 from finger3d.mechanics.finite_increment import FiniteIncrement
-from finger3d.mechanics.finite_state import DeformedState, FiniteStrainWorkspace, contact_of
+from finger3d.mechanics.finite_state import DeformedBody, FiniteStrainWorkspace, contact_of
 from finger3d.mechanics.finite_together import solve_together
-from finger3d.mechanics.formulation import Workspace, moment_of
+from finger3d.mechanics.formulation import Loads
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.relaxation import InternalVariables, Relaxation, Step, relaxed
+from finger3d.mechanics.state import State
 from finger3d.objects import Move, ObjectPose
-
-if TYPE_CHECKING:
-    from finger3d.mechanics.model import Model
 
 
 @dataclass(frozen=True)
@@ -41,30 +36,8 @@ class FiniteStrain:
     relaxation : of the stresses (Simo 1987), if any
     """
 
-    finite_strain: ClassVar[bool] = True
-    is_linear_elastic: ClassVar[bool] = False
-    refactorises: ClassVar[bool] = True
-
     law: IsochoricLaw
     relaxation: Relaxation | None = None
-
-    def relaxing(self, relaxation: Relaxation) -> FiniteStrain:
-        """Return the formulation with stresses that relax."""
-        return replace(self, relaxation=relaxation)
-
-    def added_cost(self, model: Model, press: PressCost) -> AddedCost:
-        """Return the cost of the factorisations in every increment."""
-        increment = finite_strain_s(press.dofs, press.seconds["condensation"])
-        return AddedCost(
-            seconds=press.increments * increment,
-            memory_mb=press.factor_mb,
-            reason=f"about one factorisation and nine iterations in each of {press.increments} steps",
-        )
-
-    def state_size(self, press: PressCost) -> float:
-        """Return the number of unknowns, and of internal variables: 9 at 4 points of each of some dofs / 4.5 cells."""
-        branches = len(self.relaxation.prony) + 1 if self.relaxation else 0
-        return press.dofs * (1.0 + 8.0 * branches)
 
     def workspace(self) -> FiniteStrainWorkspace:
         """Return a workspace without body and factor."""
@@ -89,8 +62,8 @@ class FiniteStrain:
         points = len(quadrature(mesh.dim, 2)[0])
         return Hyperelastic.of_parts(self.law, linear, np.repeat(mesh.part, points), plane_stress)
 
-    def start(self, problem: Problem) -> DeformedState:
-        """State at rest."""
+    def start(self, problem: Problem) -> State[DeformedBody]:
+        """Return the state at rest."""
         mesh, body = problem.mesh, self._body(problem)
         x = np.zeros(mesh.points.size + len(body.solid.pattern.vertices))
         contact = contact_of(problem, problem.surface, displacement(mesh, x), problem.origin)
@@ -98,17 +71,17 @@ class FiniteStrain:
         if self.relaxation is not None:
             size = len(body.relaxing_variables(x, self.relaxation.bulk))
             memory = InternalVariables.at_rest(self.relaxation.prony, size)
-        rest = ContactState.at_rest(contact.gap, problem.dim)
-        return DeformedState(**(vars(rest) | {"bases": contact.bases}), unknowns=x, memory=memory)
+        rest = replace(ContactState.at_rest(contact.gap, problem.dim), bases=contact.bases)
+        return State(rest, DeformedBody(x, memory))
 
     def increment(
         self,
         problem: Problem,
-        state: ContactState,
+        state: State[DeformedBody],
         move: Move,
         guess: Float | None,
-        workspace: Workspace,
-    ) -> ContactSolution:
+        workspace: FiniteStrainWorkspace,
+    ) -> ContactSolution[State[DeformedBody]]:
         """Iterate until equilibrium and contact conditions hold in the deformed configuration."""
         known, workspace.known = workspace.known, None
         if known is not None:
@@ -119,11 +92,11 @@ class FiniteStrain:
     def increments(
         self,
         problems: Sequence[Problem],
-        starts: Sequence[tuple[ContactState, Float | None]],
+        starts: Sequence[tuple[State[DeformedBody], Float | None]],
         move: Move,
-        workspace: Workspace,
+        workspace: FiniteStrainWorkspace,
         leader: int,
-    ) -> list[ContactSolution | None]:
+    ) -> list[ContactSolution[State[DeformedBody]] | None]:
         """Advance several presses of one body at once, from their states and with their guesses of the forces.
 
         See `finger3d.mechanics.finite_together.solve_together`.
@@ -139,42 +112,35 @@ class FiniteStrain:
     def _increment(
         self,
         problem: Problem,
-        state: ContactState,
+        state: State[DeformedBody],
         move: Move,
-        workspace: Workspace,
+        workspace: FiniteStrainWorkspace,
     ) -> FiniteIncrement:
-        assert isinstance(state, DeformedState)
-        assert isinstance(workspace, FiniteStrainWorkspace)
         body = self._body(problem, workspace)
-        if self.relaxation is not None and state.memory is not None:
-            body = body.over(self.relaxation, state.memory, move.duration_s)
+        memory = state.body.memory
+        if self.relaxation is not None and memory is not None:
+            body = body.over(self.relaxation, memory, move.duration_s)
         return FiniteIncrement(problem, body, state, move, workspace)
 
-    def _remembered(self, increment: FiniteIncrement, found: ContactSolution) -> ContactSolution:
+    def _remembered(
+        self, increment: FiniteIncrement, found: ContactSolution[State[DeformedBody]]
+    ) -> ContactSolution[State[DeformedBody]]:
         """Return a solution with the internal variables at the end of the increment."""
-        start, after = increment.start, found.state
-        if not found.outcome.ok or self.relaxation is None or start.memory is None:
+        before, after = increment.start.body, found.state.body
+        if not found.outcome.ok or self.relaxation is None or before.memory is None:
             return found
-        assert isinstance(after, DeformedState)
         strained = increment.body.relaxing_variables(after.unknowns, self.relaxation.bulk)
-        seconds = increment.move.duration_s
-        memory = Step(self.relaxation.prony, seconds).after(start.memory, strained)
-        return replace(found, state=replace(after, memory=memory))
+        memory = Step(self.relaxation.prony, increment.move.duration_s).after(before.memory, strained)
+        return replace(found, state=replace(found.state, body=replace(after, memory=memory)))
 
-    def unknowns(self, problem: Problem, state: ContactState) -> Float:
-        """All unknowns (N,), which the state holds."""
-        assert isinstance(state, DeformedState)
-        return state.unknowns
+    def unknowns(self, problem: Problem, states: Sequence[State[DeformedBody]]) -> Iterator[Float]:
+        """Yield all unknowns (N,) of each state."""
+        return (state.body.unknowns for state in states)
 
-    def all_unknowns(self, problem: Problem, states: Sequence[ContactState]) -> Iterator[Float]:
-        """All unknowns (N,) of each state."""
-        return (self.unknowns(problem, state) for state in states)
-
-    def readings(self, problem: Problem, state: ContactState) -> dict[str, float]:
+    def readings(self, problem: Problem, state: State[DeformedBody]) -> dict[str, float]:
         """Return the readings in the deformed configuration; foils read the strain of their bars."""
-        assert isinstance(state, DeformedState)
-        model, body = problem.model, problem.meshed_body
-        u, forces = displacement(problem.mesh, state.unknowns), self._nodal_forces(problem, state)
+        model, body, memory = problem.model, problem.meshed_body, state.body.memory
+        u, forces = displacement(problem.mesh, state.body.unknowns), self._nodal_forces(problem, state.body)
         found = {
             name: float(number)
             for reading in model.readings
@@ -184,12 +150,12 @@ class FiniteStrain:
         }
         bars = problem.inclusions.bars
         if bars is not None:
-            yielded = state.memory.elastic[-len(bars.stiffness) :] if state.memory else bars.yielded(u)
+            yielded = memory.elastic[-len(bars.stiffness) :] if memory else bars.yielded(u)
             strains = problem.inclusions.gauge_weights @ bars.strain(u, yielded)
             found |= {gauge.name: float(strain) for gauge, strain in zip(model.gauges, strains, strict=True)}
         return found
 
-    def _nodal_forces(self, problem: Problem, state: DeformedState) -> Float:
+    def _nodal_forces(self, problem: Problem, state: DeformedBody) -> Float:
         """Return the internal nodal forces (n, d) of the present stress; only taxels read them."""
         if not problem.model.taxels:
             return np.zeros((0, problem.dim))
@@ -198,38 +164,23 @@ class FiniteStrain:
             body = body.over(self.relaxation, state.memory, 0.0)
         return body.internal_forces(state.unknowns)[: problem.mesh.points.size].reshape(-1, problem.dim)
 
-    def work_on_body(self, problem: Problem, before: ContactState, after: ContactState, move: Move) -> float:
-        """Return the sum of the mean nodal forces times the displacements of the nodes."""
-        ends = []
-        for state, target in ((before, move.start), (after, move.end)):
-            u = displacement(problem.mesh, self.unknowns(problem, state))
-            ends.append((u, contact_of(problem, problem.surface, u, target).nodal_forces(state.force)))
-        (u, force), (u_after, force_after) = ends
-        return float(np.sum(0.5 * (force + force_after) * (u_after - u)))
+    def loads(self, problem: Problem, state: State[DeformedBody], pose: ObjectPose) -> Loads:
+        """Return the nodal forces, at the displaced nodes."""
+        u = displacement(problem.mesh, state.body.unknowns)
+        contact = contact_of(problem, problem.surface, u, pose)
+        return Loads(problem.mesh.points + u, u, contact.nodal_forces(state.contact.force))
 
-    def moment(self, problem: Problem, state: ContactState, target: ObjectPose) -> Float:
-        """Return the moment about the middle of the base, of nodal forces at the displaced nodes."""
-        mesh = problem.mesh
-        u = displacement(mesh, self.unknowns(problem, state))
-        contact = contact_of(problem, problem.surface, u, target)
-        return moment_of(mesh.points + u, contact.nodal_forces(state.force))
-
-    def gap(self, problem: Problem, u: Float, target: ObjectPose, surface: BoundarySurface) -> tuple[Float, Float]:
+    def gap(self, problem: Problem, u: Float, pose: ObjectPose, surface: BoundarySurface) -> tuple[Float, Float]:
         """Return gaps and normals in the deformed configuration."""
-        contact = contact_of(problem, surface, u, target)
+        contact = contact_of(problem, surface, u, pose)
         return contact.gap, contact.bases[:, 0]
 
-    def may_touch(self, surface: BoundarySurface, normal: Float) -> NDArray[np.bool_]:
-        """Return True for every point: walls rotate with the deformation and may touch the object as well."""
-        return np.ones(len(surface.nodes), dtype=np.bool_)
-
-    def fields(self, problem: Problem, state: ContactState) -> tuple[Float, Float, Float]:
-        """Displacement, Green-Lagrange strain and Cauchy stress."""
-        x, body = self.unknowns(problem, state), self._body(problem)
+    def fields(self, problem: Problem, state: State[DeformedBody]) -> tuple[Float, Float, Float]:
+        """Return displacement, Green-Lagrange strain and Cauchy stress."""
+        x, memory, body = state.body.unknowns, state.body.memory, self._body(problem)
         f, strain, cauchy = nodal_fields(body.solid, x)
-        assert isinstance(state, DeformedState)
-        if self.relaxation is not None and state.memory is not None:
-            lost = relaxed(self.relaxation.prony, state.memory) - state.memory.elastic
+        if self.relaxation is not None and memory is not None:
+            lost = relaxed(self.relaxation.prony, memory) - memory.elastic
             nodal = extrapolated(problem.mesh, lost[: 9 * body.points].reshape(-1, 3, 3))
             cauchy = cauchy + f @ nodal @ np.swapaxes(f, 1, 2) / determinant(f)[:, None, None]
         return displacement(problem.mesh, x), strain, cauchy

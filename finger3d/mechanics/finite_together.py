@@ -18,10 +18,11 @@ import numpy as np
 from finger3d._machine import cores
 from finger3d._types import Float
 from finger3d.contact.acceleration import one_thread
-from finger3d.contact.state import ContactSolution
+from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.fem.hyperelastic import InvertedError
 from finger3d.mechanics.finite_equations import Configuration, IncrementEquations, converged
-from finger3d.mechanics.finite_state import Linearisation
+from finger3d.mechanics.finite_state import DeformedBody, Linearisation
+from finger3d.mechanics.state import State
 
 T = TypeVar("T")
 
@@ -64,7 +65,7 @@ class _Trial:
     spent: int = 0
     is_new: bool = False
     slow: int = 0
-    solution: ContactSolution | None = None
+    solution: ContactSolution[ContactState] | None = None
 
     def __post_init__(self) -> None:
         self.begin()
@@ -116,7 +117,7 @@ class _Trial:
 
 def solve_together(
     increments: Sequence[IncrementEquations], guesses: Sequence[Float | None], leader: int
-) -> list[ContactSolution | None]:
+) -> list[ContactSolution[State[DeformedBody]] | None]:
     """Solve an increment of several presses of one body, whose workspace they share.
 
     Parameters
@@ -127,7 +128,7 @@ def solve_together(
     -------
     Solution of each press, None where the iteration does not converge, or would converge faster with another tangent.
     """
-    found: list[ContactSolution | None] = [None] * len(increments)
+    found: list[ContactSolution[State[DeformedBody]] | None] = [None] * len(increments)
     trials = [
         _Trial(n, increment, increment.initial(guess))
         for n, (increment, guess) in enumerate(zip(increments, guesses, strict=True))

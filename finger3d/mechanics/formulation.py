@@ -1,25 +1,21 @@
-"""Formulation of the body, its strain measure and material response: the interface that effects implement."""
+"""Formulation of the body: the interface of what advances it by an increment, and what all formulations share."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finger3d._types import Float
-from finger3d.contact.state import ContactSolution, ContactState
-from finger3d.mechanics.cost import AddedCost, PressCost
-from finger3d.objects import DistanceTracker
+from finger3d.contact.state import ContactSolution
+from finger3d.fem.traces import BoundarySurface
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.state import B, State
+from finger3d.objects import DistanceTracker, Move, ObjectPose
 
-if TYPE_CHECKING:
-    from finger3d.fem.traces import BoundarySurface
-    from finger3d.mechanics.model import Model
-    from finger3d.mechanics.problem import Problem
-    from finger3d.mechanics.relaxation import Relaxation
-    from finger3d.objects import Move, ObjectPose
+W = TypeVar("W", bound="Workspace")
 
 
 @dataclass
@@ -37,59 +33,48 @@ class Workspace:
 
     factorizations: int = 0
     tracker: DistanceTracker = field(default_factory=DistanceTracker)
-    known: ContactSolution | None = None
+    known: ContactSolution[State[Any]] | None = None
 
 
-class Formulation(Protocol):
-    """Strain measure and material response of the body during a press.
+class Loads(NamedTuple):
+    """Forces on the body, as their work and their moment need them.
 
     Attributes
     ----------
-    finite_strain : bool
-        Whether the strain measure is that of finite deformation.
-    is_linear_elastic : bool
-        Whether strain is linear and the displacements follow from the present contact forces alone.
-    refactorises : bool
-        Whether increments factor the stiffness again; presses of such a body run one after another.
+    places : (k, d) mm, where they act
+    displacement : (k, d) mm, there
+    force : (k, d) N
     """
 
-    @property
-    def finite_strain(self) -> bool: ...
+    places: Float
+    displacement: Float
+    force: Float
 
     @property
-    def is_linear_elastic(self) -> bool: ...
+    def moment(self) -> Float:
+        """Moment (3,) N mm about the middle of the base."""
+        arms, forces = (np.pad(v, ((0, 0), (0, 3 - v.shape[1]))) for v in (self.places, self.force))
+        return np.asarray(np.cross(arms, forces).sum(axis=0))
 
-    @property
-    def refactorises(self) -> bool: ...
+    def work_from(self, before: Loads) -> float:
+        """Work (mJ) since other loads of the same points, by the trapezoidal rule."""
+        return float(np.sum(0.5 * (before.force + self.force) * (self.displacement - before.displacement)))
 
-    def relaxing(self, relaxation: Relaxation) -> Formulation:
-        """Return the formulation of a body whose moduli relax."""
-        ...
 
-    def added_cost(self, model: Model, press: PressCost) -> AddedCost:
-        """Return the cost that the formulation adds to that of small-strain elasticity."""
-        ...
+class Formulation(Protocol[B, W]):
+    """Strain measure and material response of the body during a press; B is the state of the body."""
 
-    def state_size(self, press: PressCost) -> float:
-        """Return how many numbers a state holds besides those of its contact points."""
-        ...
-
-    def workspace(self) -> Workspace:
+    def workspace(self) -> W:
         """Return an empty workspace for `increment`."""
         ...
 
-    def start(self, problem: Problem) -> ContactState:
-        """State at rest, before the first increment."""
+    def start(self, problem: Problem) -> State[B]:
+        """Return the state at rest, before the first increment."""
         ...
 
     def increment(
-        self,
-        problem: Problem,
-        state: ContactState,
-        move: Move,
-        guess: Float | None,
-        workspace: Workspace,
-    ) -> ContactSolution:
+        self, problem: Problem, state: State[B], move: Move, guess: Float | None, workspace: W
+    ) -> ContactSolution[State[B]]:
         """Advance a state as the object moves.
 
         Parameters
@@ -101,43 +86,25 @@ class Formulation(Protocol):
         """
         ...
 
-    def unknowns(self, problem: Problem, state: ContactState) -> Float:
-        """All unknowns (N,) of the meshed part in a state."""
+    def unknowns(self, problem: Problem, states: Sequence[State[B]]) -> Iterator[Float]:
+        """Yield all unknowns (N,) of the meshed part in each of several states, which may cost less than one by one."""
         ...
 
-    def all_unknowns(self, problem: Problem, states: Sequence[ContactState]) -> Iterator[Float]:
-        """Yield the unknowns of each of several states, which may cost less than one after another."""
+    def readings(self, problem: Problem, state: State[B]) -> dict[str, float]:
+        """Return every number that is read, by its name in `Model.reading_names`."""
         ...
 
-    def readings(self, problem: Problem, state: ContactState) -> dict[str, float]:
-        """Every number that is read, by its name in `Model.reading_names`."""
+    def loads(self, problem: Problem, state: State[B], pose: ObjectPose) -> Loads:
+        """Return the contact forces on the meshed part, with their places."""
         ...
 
-    def work_on_body(self, problem: Problem, before: ContactState, after: ContactState, move: Move) -> float:
-        """Work (mJ) of the contact forces on the meshed part from one state to the next."""
+    def gap(self, problem: Problem, u: Float, pose: ObjectPose, surface: BoundarySurface) -> tuple[Float, Float]:
+        """Return gap (c,) mm and normal (c, d) of any points of the surface, candidates or not, at displacements u."""
         ...
 
-    def moment(self, problem: Problem, state: ContactState, target: ObjectPose) -> Float:
-        """Moment (3,) N mm of the contact forces on the meshed part about the middle of the base."""
+    def fields(self, problem: Problem, state: State[B]) -> tuple[Float, Float, Float]:
+        """Return displacement (n, d) mm, strain (n, 3, 3) and stress (n, 3, 3) MPa at the nodes of the meshed part."""
         ...
-
-    def gap(self, problem: Problem, u: Float, target: ObjectPose, surface: BoundarySurface) -> tuple[Float, Float]:
-        """Gap (c,) mm and normal (c, d) of any points of the surface, candidates or not, at nodal displacements."""
-        ...
-
-    def may_touch(self, surface: BoundarySurface, normal: Float) -> NDArray[np.bool_]:
-        """Which points (c,) of a surface can touch an object with normals (c, d) there."""
-        ...
-
-    def fields(self, problem: Problem, state: ContactState) -> tuple[Float, Float, Float]:
-        """Displacement (n, d) mm, strain (n, 3, 3) and stress (n, 3, 3) MPa at the nodes of the meshed part."""
-        ...
-
-
-def moment_of(places: Float, forces: Float) -> Float:
-    """Return the moment (3,) N mm about the origin of forces (n, d) N at places (n, d) mm."""
-    arms, loads = (np.pad(v, ((0, 0), (0, 3 - v.shape[1]))) for v in (places, forces))
-    return np.asarray(np.cross(arms, loads).sum(axis=0))
 
 
 def length_scale(problem: Problem, move: Move) -> float:

@@ -10,15 +10,19 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from threading import Event
+from typing import Any
 
 from finger3d._types import Float
-from finger3d.contact.state import ContactSolution, ContactState
+from finger3d.contact.state import ContactSolution
+from finger3d.mechanics.finite_state import DeformedBody
 from finger3d.mechanics.finite_strain import FiniteStrain
 from finger3d.mechanics.formulation import Workspace
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.path import prescribed_forces, targets
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import extrapolated_force, march
+from finger3d.mechanics.state import State
 from finger3d.objects import Move
 
 
@@ -72,7 +76,7 @@ class _Presses:
                     ended += self._next(number, None if known is None else known.get(number))
         return ended
 
-    def _next(self, number: int, known: ContactSolution | None) -> list[int]:
+    def _next(self, number: int, known: ContactSolution[State[Any]] | None) -> list[int]:
         """Take the next increment of a press; returns its number if the press has ended."""
         self.workspace.known = known
         step = next(self.running[number], None)
@@ -83,9 +87,11 @@ class _Presses:
         self.steps[number].append(step)
         return []
 
-    def _known(self, group: list[int], leader: int, increment: int) -> dict[int, ContactSolution] | None:
+    def _known(
+        self, group: list[int], leader: int, increment: int
+    ) -> dict[int, ContactSolution[State[DeformedBody]]] | None:
         """Return the solutions found together, by their numbers; None if each press is to be solved by itself."""
-        formulation = self.problems[0].model.formulation
+        formulation = formulation_of(self.problems[0].model)
         if len(group) < 2 or self.cancel.is_set() or increment == len(self._loads):
             return None
         if self._loads[increment] is not None or not isinstance(formulation, FiniteStrain):
@@ -94,19 +100,20 @@ class _Presses:
             [self.problems[number] for number in group],
             [self._start(number, increment) for number in group],
             Move(*self._poses[increment : increment + 2]),
-            self.workspace,
+            self.workspace,  # type: ignore[arg-type]
             group.index(leader),
         )
         return {number: one for number, one in zip(group, found, strict=True) if one is not None}
 
     @cached_property
-    def _rest(self) -> ContactState:
-        return self.problems[0].model.formulation.start(self.problems[0])
+    def _rest(self) -> State[Any]:
+        return formulation_of(self.problems[0].model).start(self.problems[0])
 
-    def _start(self, number: int, increment: int) -> tuple[ContactState, Float | None]:
+    def _start(self, number: int, increment: int) -> tuple[State[Any], Float | None]:
         """Return the state at the start of an increment, and the contact forces expected at its end."""
         states = [self._rest, *(step.meshed_state for step in self.steps[number])]
         if not increment:
             return states[0], None
         before, start, end = self._poses[increment - 1 : increment + 2]
-        return states[-1], extrapolated_force(states[-1], Move(start, end), (Move(before, start), states[-2].force))
+        last, now = states[-2].contact, states[-1].contact
+        return states[-1], extrapolated_force(now, Move(start, end), (Move(before, start), last.force))

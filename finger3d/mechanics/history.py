@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from finger3d.contact.friction import OPEN, STATUS_NAMES, STICK
 from finger3d.contact.state import ContactState
 from finger3d.errors import Outcome
 from finger3d.fem.simplex import CONTACT, FREE_FACES
+from finger3d.mechanics.state import State
 from finger3d.mechanics.zones import half_extents
 from finger3d.objects import ObjectPose
 
@@ -117,7 +119,7 @@ class StepResult:
 
     target: ObjectPose
     state: ContactState
-    meshed_state: ContactState
+    meshed_state: State[Any]
     lowest: tuple[float, float]
     moment: Float
     gauges: dict[str, float]

@@ -11,7 +11,6 @@ normal between those of the adjacent faces is one of the edge (its generalised g
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,10 +23,9 @@ from finger3d.contact.state import ContactSolution, ContactState, next_state
 from finger3d.errors import Outcome
 from finger3d.mechanics.contact_geometry import ContactGeometry, contact_geometry
 from finger3d.mechanics.formulation import Workspace, length_scale
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.state import State
 from finger3d.objects import DistanceTracker, Move, vertical_frame
-
-if TYPE_CHECKING:
-    from finger3d.mechanics.problem import Problem
 
 _TARGET = 1e-9
 """Error of the geometry at which the iteration ends; below `TOLERANCE`, to which other errors add."""
@@ -49,13 +47,6 @@ _LEAVES = 0.5
 
 _MEMORY = 3
 """Earlier displacements from which the next is extrapolated (Anderson 1965)."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class LinearState(ContactState):
-    """Contact state with the displacement (c, d) mm of every contact point, in x, y, z."""
-
-    displacement: Float
 
 
 @dataclass(frozen=True)
@@ -100,24 +91,27 @@ def turned_delassus(delassus: Float, rotations: Float, points: NDArray[np.intp])
 
 def solve_increment(
     problem: Problem,
-    state: LinearState,
+    state: State[Float],
     move: Move,
     body: LinearBody,
     guess: Float | None,
     workspace: Workspace,
-) -> ContactSolution:
+) -> ContactSolution[State[Float]]:
     """Advance a state as the object moves.
 
     Returns
     -------
     ContactSolution
-        With a `LinearState`.  It is CONVERGED only if gaps and directions at the displacement found agree with those
-        that the forces were solved with.
+        Its body's state is the displacement (c, d) mm of the contact points.  It is CONVERGED only if gaps and
+        directions at the displacement found agree with those that the forces were solved with.
     """
-    assert state.bases is not None
     increment = _Increment(problem, state, move, body, workspace.tracker)
     flat = problem.model.object.is_flat
-    at = np.zeros_like(body.past) if flat else body.displacement(state.force if guess is None else guess, state.bases)
+    at = (
+        np.zeros_like(body.past)
+        if flat
+        else body.displacement(state.contact.force if guess is None else guess, state.contact.own_bases)
+    )
     geometry = increment.geometry(at)
     held = np.zeros(len(at), dtype=bool)
     spent, error, start = 0, np.inf, guess
@@ -127,7 +121,7 @@ def solve_increment(
         solution = increment.solve(geometry, at, start)
         spent += solution.iterations
         if not (solution.outcome.ok or solution.outcome.is_cycle):
-            return replace(solution, state=state, iterations=spent)
+            return replace(solution.with_state(state), iterations=spent)
         start = solution.state.force
         displacement = body.displacement(start, geometry.bases)
         if flat or solution.outcome.is_cycle:
@@ -148,25 +142,25 @@ def solve_increment(
         return ContactSolution(state, Outcome.NO_CONVERGENCE, float(error), spent, "none")
     gap = None if flat else increment.geometry(displacement, np.inf).holding(held, geometry).gap
     after_state = increment.reached(geometry, at, displacement, solution.state, gap)
-    return replace(solution, state=after_state, residual=max(solution.residual, error), iterations=spent)
+    return replace(solution.with_state(after_state), residual=max(solution.residual, error), iterations=spent)
 
 
 def solve_linearised(
-    problem: Problem,
-    state: LinearState,
-    move: Move,
-    body: LinearBody,
-    guess: Float | None,
-    geometry: ContactGeometry,
-    at: Float,
-) -> ContactSolution:
-    """Advance a state with gaps linearised at a displacement `at` (c, d) mm, by one solution."""
+    problem: Problem, state: State[Float], move: Move, body: LinearBody, guess: Float | None
+) -> ContactSolution[State[Float]]:
+    """Advance a state by one solution with the contact geometry that the problem knows of the pose at the end.
+
+    An increment to a pose that is not known does not converge.
+    """
+    if problem.contact_geometry is None or move.end not in problem.contact_geometry:
+        return ContactSolution(state, Outcome.NO_CONVERGENCE, np.inf, 0, "none")
+    geometry, at = problem.contact_geometry[move.end]
     increment = _Increment(problem, state, move, body, DistanceTracker())
     solution = increment.solve(geometry, at, guess)
     if not solution.outcome.ok:
-        return replace(solution, state=state)
+        return solution.with_state(state)
     displacement = body.displacement(solution.state.force, geometry.bases)
-    return replace(solution, state=increment.reached(geometry, at, displacement, solution.state, None))
+    return solution.with_state(increment.reached(geometry, at, displacement, solution.state, None))
 
 
 def _extrapolated(tried: list[Float], found: list[Float]) -> Float:
@@ -185,7 +179,7 @@ class _Increment:
     """An increment from a state, as the object moves."""
 
     problem: Problem
-    state: LinearState
+    state: State[Float]
     move: Move
     body: LinearBody
     tracker: DistanceTracker
@@ -203,11 +197,11 @@ class _Increment:
 
         return contact_geometry(distance, problem.surface, displacement, problem.axes, share)
 
-    def solve(self, geometry: ContactGeometry, at: Float, guess: Float | None) -> ContactSolution:
+    def solve(self, geometry: ContactGeometry, at: Float, guess: Float | None) -> ContactSolution[ContactState]:
         """Solve contact with the gaps linearised at a displacement (c, d); far points cannot touch."""
         problem, bases = self.problem, geometry.bases
         d = bases.shape[-1]
-        start = transported(self.state, bases)
+        start = transported(self.state.contact, bases)
         free = self._relative(geometry, at, self.body.past @ vertical_frame(d))
         free[:, 1:] += start.tangential_displacement
         scale, area = length_scale(problem, self.move), problem.surface.area
@@ -229,7 +223,7 @@ class _Increment:
         bases = geometry.bases
         out: Float = np.einsum("cak,ck->ca", bases, displacement - at)
         out[:, 0] += geometry.gap
-        slid = displacement - self.state.displacement - carried_by_object(self.problem, self.move, at)
+        slid = displacement - self.state.body - carried_by_object(self.problem, self.move, at)
         out[:, 1:] = np.einsum("ctk,ck->ct", bases[:, 1:], slid)
         return out
 
@@ -254,11 +248,11 @@ class _Increment:
         before, after = problem.placed(self.move.start), problem.placed(self.move.end)
         start, end = (
             placed.to_own(np.pad(problem.surface.points + u, ((0, 0), (0, 3 - u.shape[1]))))
-            for placed, u in ((before, self.state.displacement), (after, displacement))
+            for placed, u in ((before, self.state.body), (after, displacement))
         )
         way = end - start
         length = np.linalg.norm(way, axis=1)
-        near = np.flatnonzero(np.maximum(self.state.gap, 0.0) < length)
+        near = np.flatnonzero(np.maximum(self.state.contact.gap, 0.0) < length)
         if not len(near):
             return False
         enters = np.einsum("ni,ni->n", thing.distance(start[near])[1], way[near]) < 0.0
@@ -269,13 +263,13 @@ class _Increment:
 
     def reached(
         self, geometry: ContactGeometry, at: Float, displacement: Float, found: ContactState, gap: Float | None
-    ) -> LinearState:
+    ) -> State[Float]:
         """Return the state at the end of the increment, with gaps (c,) or those linearised at a displacement, `at`."""
-        start, relative = transported(self.state, geometry.bases), self._relative(geometry, at, displacement)
+        start, relative = transported(self.state.contact, geometry.bases), self._relative(geometry, at, displacement)
         if gap is not None:
             relative[:, 0] = gap
         after = next_state(start, found.force, relative, found.status)
-        return LinearState(**(vars(after) | {"bases": geometry.bases, "displacement": displacement}))
+        return State(replace(after, bases=geometry.bases), displacement)
 
 
 def transported(state: ContactState, bases: Float) -> ContactState:

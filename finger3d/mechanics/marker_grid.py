@@ -12,6 +12,7 @@ from finger3d._types import Float, Tree
 from finger3d.fem.recover import displacement
 from finger3d.fem.simplex import axis_numbers
 from finger3d.fem.transfer import values_over
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.problem import Problem
 
@@ -70,7 +71,7 @@ def marker_table(problem: Problem, steps: Sequence[StepResult], spacing_mm: floa
     count = len(at) - len(named)
     moved = [np.array([step.markers[m.name] for m in named]).reshape(-1, problem.dim) for step in steps]
     if grid is not None:
-        unknowns = problem.model.formulation.all_unknowns(problem, [step.meshed_state for step in steps])
+        unknowns = formulation_of(problem.model).unknowns(problem, [step.meshed_state for step in steps])
         fields = (grid.displacements(displacement(problem.mesh, x)) for x in unknowns)
         moved = [np.vstack(pair) for pair in zip(moved, fields, strict=True)]
     columns: Tree = {

@@ -2,33 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import Literal
 
-import numpy as np
-import scipy.sparse as sp
-
-from finger3d._types import Float, freeze_arrays
 from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.contact.law import ContactLaw
 from finger3d.contact.rules import RuleName
-from finger3d.fem.bars import Bars
+from finger3d.fem.laws import IsochoricLaw
 from finger3d.fem.material import Material
-from finger3d.fem.simplex import Mesh
 from finger3d.geometry.design import Design
-from finger3d.mechanics.cost import AddedCost, PressCost
-from finger3d.mechanics.formulation import Formulation
 from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.readings import Marker, Reading, Taxel
 from finger3d.mechanics.relaxation import Relaxation
-from finger3d.mechanics.small_strain import SmallStrain
 from finger3d.meshing.grading import Grading
 from finger3d.meshing.options import Mesher
 from finger3d.objects import ContactPath, Move, ObjectPose, Plane, RigidObject
-
-if TYPE_CHECKING:
-    from finger3d.mechanics.problem import Problem
 
 Domain = Literal["solid", "plane-strain", "plane-stress"]
 
@@ -92,103 +81,26 @@ class MeshOptions:
 
 
 @dataclass(frozen=True)
-class EmbeddedBars:
-    """Stiff inclusions of a meshed part, divided into bars.
+class Foils:
+    """Foils along the gauges of a model: Young's modulus (MPa) and section (mm).
 
-    Attributes
-    ----------
-    directions : (s, d) unit vectors
-    relative : (s d, n d) sparse, 1/mm
-        Displacement of one end of every bar relative to the other, over its length.
-    bar_stiffness : (s,) array, N mm
-        Stiffness of the bars that belongs to the part.
-    gauge_weights : (g, s) array
-        Strain of each gauge of the model from the strains of the bars.
-    self_compliance : (s, s) array, 1/(N mm)
-        Strain of the bars per unit force of the bars in an infinite body; it replaces that of the mesh, which does not
-        resolve a bar.
+    `patches` are the divisions of a foil along and across, in a section and in a solid; the default is within half a
+    percent of finer divisions.
     """
 
-    directions: Float
-    relative: sp.csr_matrix
-    bar_stiffness: Float
-    gauge_weights: Float
-    self_compliance: Float
-
-    def __post_init__(self) -> None:
-        freeze_arrays(self)
-
-    @property
-    def rows(self) -> sp.csr_matrix:
-        """Rows (s, n d) of the bars' strains from small displacements."""
-        count, d = self.directions.shape
-        along = sp.csr_matrix((self.directions.ravel(), np.arange(count * d), np.arange(count + 1) * d))
-        return sp.csr_matrix(along @ self.relative)
-
-    def at_finite_strain(self, yielding: Float) -> Bars:
-        """Return the bars at finite strain, with a compliance (s, s) of their surroundings that the mesh lacks."""
-        return Bars(self.directions, self.relative, self.bar_stiffness, yielding)
-
-    def subgrid_compliance(self, compliance: Float) -> Float:
-        """Return the compliance (g + s, g + s) of gauges and bars that the mesh lacks, from its compliance (s, s)."""
-        both = np.vstack([self.gauge_weights, np.eye(len(self.bar_stiffness))])
-        return both @ (self.self_compliance - compliance) @ both.T
-
-
-class Inclusions(Protocol):
-    """Stiff inclusions of the body that need no mesh of their own."""
-
-    def added_cost(self, model: Model, press: PressCost) -> AddedCost:
-        """Return the cost that the inclusions add."""
-        ...
-
-    def mirrors(self, model: Model) -> frozenset[str]:
-        """Return the planes, "x" and "z", about which the inclusions are symmetric."""
-        ...
-
-    def discretise(self, model: Model, mesh: Mesh, axes: tuple[str, ...]) -> EmbeddedBars:
-        """Divide the inclusions into bars."""
-        ...
+    E_MPa: float
+    thickness_mm: float
+    width_mm: float
+    patches: tuple[tuple[int, int], tuple[int, int]] = ((16, 1), (12, 8))
 
 
 @dataclass(frozen=True)
-class ObjectResponse:
-    """Elastic response of the object at the contact points.
+class ElasticObject:
+    """Material of an elastic object: Young's modulus (MPa), Poisson's ratio, and height (mm) of a block."""
 
-    Attributes
-    ----------
-    compliance : (c, d, c, d) array, mm/N
-        Zero in the directions that symmetry holds.
-    factorizations : int
-    seconds : time of each stage by name
-    """
-
-    compliance: Float
-    factorizations: int
-    seconds: dict[str, float]
-
-    def __post_init__(self) -> None:
-        freeze_arrays(self)
-
-
-class ObjectCompliance(Protocol):
-    """An elastic object."""
-
-    def added_cost(self, model: Model, press: PressCost) -> AddedCost:
-        """Return the cost that the object's elasticity adds."""
-        ...
-
-    def respond(
-        self, problem: Problem, zone: tuple[float, float, float, float], say: Callable[[str], None]
-    ) -> ObjectResponse:
-        """Return the response at the contact points of a problem.
-
-        Parameters
-        ----------
-        zone : (x_min, x_max, z_min, z_max), mm
-            Where the object touches the finger; its mesh is fine there.
-        """
-        ...
+    E_MPa: float
+    nu: float
+    height_mm: float | None = None
 
 
 @dataclass(frozen=True)
@@ -199,8 +111,10 @@ class Model:
     ----------
     design : a frozen dataclass from geometries/
     domain : solid, or a 2D section; forces are always N, for the design's width
-    strain_measure : small strain, or finite strain with a hyperelastic law
+    hyperelastic_law : isochoric part of the energy, with a shear modulus of 1 MPa; None in small strain
     relaxation : of the moduli; None without viscosity
+    inclusions : stiff foils along the gauges; None if gauges have no stiffness
+    object_compliance : material of an elastic object; None if it is rigid
     held_ends : both end faces held in z (plane strain realised in 3D; Python only)
     symmetry : symmetry planes that are used, "x" and "z"; None determines them
     parts : label and material of every solid of the design whose material is another
@@ -214,14 +128,14 @@ class Model:
     legs: tuple[Leg, ...]
     object: RigidObject = field(default_factory=Plane)
     friction: FrictionLaw = field(default_factory=Coulomb)
-    strain_measure: Formulation = field(default_factory=SmallStrain)
+    hyperelastic_law: IsochoricLaw | None = None
     relaxation: Relaxation | None = None
     gauges: tuple[Gauge, ...] = ()
     markers: tuple[Marker, ...] = ()
     taxels: tuple[Taxel, ...] = ()
     other_readings: tuple[Reading, ...] = ()
-    inclusions: Inclusions | None = None
-    object_compliance: ObjectCompliance | None = None
+    inclusions: Foils | None = None
+    object_compliance: ElasticObject | None = None
     domain: Domain = "solid"
     rule: RuleName = "projection"
     held_ends: bool = False
@@ -231,9 +145,22 @@ class Model:
     warnings: tuple[str, ...] = ()
 
     @property
-    def formulation(self) -> Formulation:
-        """Strain measure and material response of the body."""
-        return self.strain_measure if self.relaxation is None else self.strain_measure.relaxing(self.relaxation)
+    def finite_strain(self) -> bool:
+        """Whether the strain measure is that of finite deformation."""
+        return self.hyperelastic_law is not None
+
+    @property
+    def is_linear_elastic(self) -> bool:
+        """Whether strain is linear and the displacements follow from the present contact forces alone."""
+        return self.hyperelastic_law is None and self.relaxation is None
+
+    @property
+    def refactorises(self) -> bool:
+        """Whether increments factor the stiffness again; presses of such a body run one after another.
+
+        In small strain they do so if the shear modulus alone relaxes: every length of time step has its own factor.
+        """
+        return self.finite_strain or (self.relaxation is not None and not self.relaxation.bulk)
 
     @property
     def contact_law(self) -> ContactLaw:

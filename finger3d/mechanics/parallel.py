@@ -12,6 +12,7 @@ from typing import TypeVar
 from finger3d._machine import cores
 from finger3d.contact.acceleration import one_thread
 from finger3d.mechanics.formulation import Workspace
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.problem import Problem
 
 Variant = TypeVar("Variant")
@@ -45,12 +46,12 @@ def map_parallel(
     threads_from : int, optional
         Number of contact rows from which presses run at once; `_ROWS_FOR_THREADS` unless given.
     """
-    formulation = problem.model.formulation
+    formulation = formulation_of(problem.model)
     known: tuple[Result, ...] = ()
     at_once = min(len(variants), cores() if most is None else most)
     cancel = Event()
     least = _ROWS_FOR_THREADS if threads_from is None else threads_from
-    if len(problem.system.active_dofs) < least or at_once < 2 or formulation.refactorises:
+    if len(problem.system.active_dofs) < least or at_once < 2 or problem.model.refactorises:
         workspace = formulation.workspace()
         for variant in variants:
             known = (*known, press(variant, known, workspace, cancel))[-2:]

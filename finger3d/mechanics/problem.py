@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -20,7 +20,7 @@ from finger3d.fem.material import LinearElasticity
 from finger3d.fem.recover import strain_and_stress
 from finger3d.fem.simplex import FREE_FACES, Mesh
 from finger3d.fem.traces import BoundarySurface, joined, surface
-from finger3d.mechanics.contact_geometry import contact_geometry, may_touch
+from finger3d.mechanics.contact_geometry import ContactGeometry, contact_geometry, may_touch
 from finger3d.mechanics.history import ContactPoints
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings import MeshedBody
@@ -120,6 +120,8 @@ class Problem:
     inclusions : stiffness that inclusions add; empty without
     seconds : time of each stage of the build by name
     without_inclusions : the same problem without inclusions, if there are any
+    contact_geometry : of each pose, the contact geometry, and the displacement (c, d) mm that its gaps are linearised
+        at, if they are known; an increment then takes one solution
     """
 
     model: Model
@@ -129,6 +131,7 @@ class Problem:
     inclusions: AddedStiffness = field(default_factory=AddedStiffness)
     seconds: dict[str, float] = field(default_factory=dict)
     without_inclusions: Problem | None = None
+    contact_geometry: Mapping[ObjectPose, tuple[ContactGeometry, Float]] | None = None
 
     @property
     def body(self) -> CondensedBody:

@@ -7,37 +7,41 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from scipy.special import exprel
 
 from finger3d._types import Float, freeze_arrays
-
-if TYPE_CHECKING:
-    from finger3d.mechanics.formulation import Formulation
+from finger3d.errors import Finger3dError
 
 Prony = tuple[tuple[float, float], ...]
 
 
-class Relaxation(Protocol):
-    """Relaxation of the moduli of a body.
+@dataclass(frozen=True)
+class Relaxation:
+    """Relaxation of the moduli by a Prony series.
 
     Attributes
     ----------
     prony : relative modulus and time (s) of every branch
-    bulk : whether the bulk modulus relaxes too
+    bulk : whether the bulk modulus relaxes too, so that Poisson's ratio is constant
     """
 
-    @property
-    def prony(self) -> Prony: ...
+    prony: Prony
+    bulk: bool
 
-    @property
-    def bulk(self) -> bool: ...
+    def check_domain(self, domain: str) -> None:
+        """Refuse plane stress without `bulk`, where the thickness follows neither modulus alone.
 
-    def small_strain(self) -> Formulation:
-        """Return the formulation of a relaxing body in small strain."""
-        ...
+        Raises
+        ------
+        Finger3dError
+        """
+        if domain == "plane-stress" and not self.bulk:
+            raise Finger3dError(
+                "effects.viscosity.bulk = false: not in plane stress, where the thickness follows neither modulus "
+                'alone; set bulk = true, or model.domain = "plane-strain" or "solid"'
+            )
 
 
 @dataclass(frozen=True)

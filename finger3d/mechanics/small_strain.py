@@ -1,115 +1,83 @@
-"""Small-strain elasticity over the condensed compliance: the paper's baseline, which effects replace or wrap."""
+"""Small-strain elasticity over the condensed compliance: the paper's model."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finger3d._types import Float
 from finger3d.contact.state import ContactSolution, ContactState
-from finger3d.mechanics.contact_geometry import contact_geometry, may_touch
-from finger3d.mechanics.cost import AddedCost, PressCost
-from finger3d.mechanics.formulation import Workspace, moment_of
-from finger3d.mechanics.linear_contact import LinearBody, LinearState, solve_increment
-
-if TYPE_CHECKING:
-    from finger3d.fem.traces import BoundarySurface
-    from finger3d.mechanics.formulation import Formulation
-    from finger3d.mechanics.model import Model
-    from finger3d.mechanics.problem import Problem
-    from finger3d.mechanics.relaxation import Relaxation
-    from finger3d.objects import Move, ObjectPose
+from finger3d.fem.recover import displacement
+from finger3d.fem.traces import BoundarySurface
+from finger3d.mechanics.contact_geometry import contact_geometry
+from finger3d.mechanics.formulation import Loads, Workspace
+from finger3d.mechanics.linear_contact import LinearBody, solve_increment, solve_linearised
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.state import State
+from finger3d.objects import Move, ObjectPose
 
 
 @dataclass(frozen=True)
 class SmallStrain:
-    """Linear elasticity over the condensed compliance: the paper's baseline."""
+    """Linear elasticity over the condensed compliance.
 
-    finite_strain: ClassVar[bool] = False
-    is_linear_elastic: ClassVar[bool] = True
-
-    def relaxing(self, relaxation: Relaxation) -> Formulation:
-        """Return the formulation of a relaxing body in small strain."""
-        return relaxation.small_strain()
-
-    @property
-    def refactorises(self) -> bool:
-        """False: the factor of the build serves every increment."""
-        return False
-
-    def added_cost(self, model: Model, press: PressCost) -> AddedCost:
-        """Return zero cost."""
-        return AddedCost()
-
-    def state_size(self, press: PressCost) -> float:
-        """Return 0: the contact forces determine the displacements."""
-        return 0.0
+    The state of the body is the displacement (c, d) mm of the contact points, in x, y, z.
+    """
 
     def workspace(self) -> Workspace:
         """Return an empty workspace; the compliance is that of the build."""
         return Workspace()
 
-    def start(self, problem: Problem) -> LinearState:
+    def start(self, problem: Problem) -> State[Float]:
         """Return the state without forces, with the gaps at rest."""
-        distance, share = problem.placed(problem.origin).distance, problem.system.object_share
-        geometry = contact_geometry(distance, problem.surface, axes=problem.axes, share=share)
-        rest = ContactState.at_rest(geometry.gap, problem.dim)
-        still = np.zeros_like(problem.surface.points)
-        return LinearState(**(vars(rest) | {"bases": geometry.bases, "displacement": still}))
+        return State(at_rest(problem), np.zeros_like(problem.surface.points))
 
     def increment(
-        self,
-        problem: Problem,
-        state: ContactState,
-        move: Move,
-        guess: Float | None,
-        workspace: Workspace,
-    ) -> ContactSolution:
+        self, problem: Problem, state: State[Float], move: Move, guess: Float | None, workspace: Workspace
+    ) -> ContactSolution[State[Float]]:
         """Solve contact along the normals of the object."""
-        assert isinstance(state, LinearState)
-        body = LinearBody(problem.delassus, np.zeros_like(state.displacement))
+        body = LinearBody(problem.delassus, np.zeros_like(state.body))
+        if problem.contact_geometry is not None:
+            return solve_linearised(problem, state, move, body, guess)
         return solve_increment(problem, state, move, body, guess, workspace)
 
-    def unknowns(self, problem: Problem, state: ContactState) -> Float:
-        """Return the unknowns of one state."""
-        return next(iter(self.all_unknowns(problem, [state])))
-
-    def all_unknowns(self, problem: Problem, states: Sequence[ContactState]) -> Iterator[Float]:
+    def unknowns(self, problem: Problem, states: Sequence[State[Float]]) -> Iterator[Float]:
         """Yield the unknowns from the forces, by one back-substitution for many states."""
-        return problem.unknowns_of([problem.upright_force(state) for state in states])
+        return problem.unknowns_of([problem.upright_force(state.contact) for state in states])
 
-    def readings(self, problem: Problem, state: ContactState) -> dict[str, float]:
+    def readings(self, problem: Problem, state: State[Float]) -> dict[str, float]:
         """Return the readings from the forces, by their rows."""
-        return problem.read(problem.upright_force(state))
+        return problem.read(problem.upright_force(state.contact))
 
-    def work_on_body(self, problem: Problem, before: ContactState, after: ContactState, move: Move) -> float:
-        """Return the sum of the mean force of every point times its displacement."""
-        assert isinstance(before, LinearState)
-        assert isinstance(after, LinearState)
-        force = 0.5 * (before.scene_force + after.scene_force)
-        return float(np.sum(force * (after.displacement - before.displacement)))
+    def loads(self, problem: Problem, state: State[Float], pose: ObjectPose) -> Loads:
+        """Return the forces of the points, at their centroids at rest."""
+        return linear_loads(problem, state.contact, state.body)
 
-    def moment(self, problem: Problem, state: ContactState, target: ObjectPose) -> Float:
-        """Return the moment about the middle of the base, of forces at the centroids of their points at rest."""
-        return moment_of(problem.surface.centroids, state.scene_force)
-
-    def gap(self, problem: Problem, u: Float, target: ObjectPose, surface: BoundarySurface) -> tuple[Float, Float]:
+    def gap(self, problem: Problem, u: Float, pose: ObjectPose, surface: BoundarySurface) -> tuple[Float, Float]:
         """Return gaps and normals at the displaced points."""
-        placed = problem.placed(target)
-        geometry = contact_geometry(placed.distance, surface, surface.trace @ u, problem.axes)
-        return geometry.gap, geometry.bases[:, 0]
+        return linear_gap(problem, u, pose, surface)
 
-    def may_touch(self, surface: BoundarySurface, normal: Float) -> NDArray[np.bool_]:
-        """Return which points face the object at rest; see `finger3d.mechanics.contact_geometry.may_touch`."""
-        return may_touch(surface, normal)
-
-    def fields(self, problem: Problem, state: ContactState) -> tuple[Float, Float, Float]:
+    def fields(self, problem: Problem, state: State[Float]) -> tuple[Float, Float, Float]:
         """Return displacement, linear strain and stress; in a section also the out-of-plane components."""
-        from finger3d.fem.recover import displacement
-
-        unknowns = self.unknowns(problem, state)
+        unknowns = next(self.unknowns(problem, [state]))
         return displacement(problem.mesh, unknowns), *problem.strain_and_stress(unknowns)
+
+
+def at_rest(problem: Problem) -> ContactState:
+    """Return the contact state without forces, with the gaps at rest."""
+    distance, share = problem.placed(problem.origin).distance, problem.system.object_share
+    geometry = contact_geometry(distance, problem.surface, axes=problem.axes, share=share)
+    return replace(ContactState.at_rest(geometry.gap, problem.dim), bases=geometry.bases)
+
+
+def linear_loads(problem: Problem, contact: ContactState, moved: Float) -> Loads:
+    """Return the forces of the contact points, which are displaced by `moved` (c, d), at their centroids at rest."""
+    return Loads(problem.surface.centroids, moved, contact.scene_force)
+
+
+def linear_gap(problem: Problem, u: Float, pose: ObjectPose, surface: BoundarySurface) -> tuple[Float, Float]:
+    """Return gaps (c,) and normals (c, d) of the points of a surface at small nodal displacements u (n, d)."""
+    geometry = contact_geometry(problem.placed(pose).distance, surface, surface.trace @ u, problem.axes)
+    return geometry.gap, geometry.bases[:, 0]

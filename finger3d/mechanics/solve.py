@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import CancelledError
 from dataclasses import dataclass, replace
 from threading import Event
+from typing import Any
 
 import numpy as np
 
@@ -15,9 +16,11 @@ from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.mechanics.energy import external_work, frictional_dissipation
 from finger3d.mechanics.force_control import deepest, depth_of_force
 from finger3d.mechanics.formulation import Workspace
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.path import prescribed_forces, targets
 from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.state import State
 from finger3d.objects import Move, ObjectPose
 
 _CUTS = 6
@@ -28,8 +31,8 @@ _CUTS = 6
 class _Substep:
     """A converged part of an increment: states before and after, and the motion of the object."""
 
-    before: ContactState
-    after: ContactState
+    before: State[Any]
+    after: State[Any]
     move: Move
 
 
@@ -60,37 +63,38 @@ def march(
     """
     model = problem.model
     most_cuts = 0 if model.rule in STEP_DEPENDENT_RULES else _CUTS
-    workspace = workspace or model.formulation.workspace()
+    formulation = formulation_of(model)
+    workspace = workspace or formulation.workspace()
     without_inclusions = _march_without_inclusions(problem, workspace)
-    state, at = model.formulation.start(problem), problem.origin
+    state, at = formulation.start(problem), problem.origin
     previous: tuple[Move, Float] | None = None
     work = dissipation = 0.0
     start_force = 0.0
     for number, (target, load) in enumerate(zip(targets(model.legs), prescribed_forces(model.legs), strict=True)):
         if cancel is not None and cancel.is_set():
             raise CancelledError
-        guess = near[number] if number < len(near) else extrapolated_force(state, Move(at, target), previous)
+        guess = near[number] if number < len(near) else extrapolated_force(state.contact, Move(at, target), previous)
         if load is None:
             found, substeps = _increment(problem, workspace, state, Move(at, target), most_cuts, guess)
         else:
             if load[0] == 1:
-                start_force = _normal_force(problem, state)
+                start_force = _normal_force(problem, state.contact)
             wanted = start_force + load[0] / load[1] * (load[2] - start_force)
             found, substeps, target = _to_force(
                 problem, workspace, state, Move(at, target), most_cuts, (wanted, load[2]), previous
             )
         for part in substeps:
             work += external_work(problem, part.before, part.after, part.move)
-            dissipation += frictional_dissipation(problem, part.before, part.after)
-        previous = Move(at, target), state.force
+            dissipation += frictional_dissipation(problem, part.before.contact, part.after.contact)
+        previous = Move(at, target), state.contact.force
         state, at = found.state, target
-        read = model.formulation.readings(problem, state)
+        read = formulation.readings(problem, state)
         yield StepResult(
             target=target,
-            state=problem.symmetry.unfold(state),
+            state=problem.symmetry.unfold(state.contact),
             meshed_state=state,
             lowest=problem.placed(target).lowest,
-            moment=problem.symmetry.total_moment(model.formulation.moment(problem, state, target)),
+            moment=problem.symmetry.total_moment(formulation.loads(problem, state, target).moment),
             gauges={g.name: read[g.name] for g in model.gauges} | _free_strain(problem, without_inclusions),
             markers={m.name: tuple(read[name] for name in m.columns(problem.dim)) for m in model.markers},
             taxels={t.name: read[t.name] for t in model.taxels},
@@ -101,7 +105,7 @@ def march(
             residual=found.residual,
             iterations=found.iterations,
             method=found.method,
-            penetration_mm=max(-float(state.gap.min(initial=0.0)), 0.0),
+            penetration_mm=max(-float(state.contact.gap.min(initial=0.0)), 0.0),
             detail=found.detail,
         )
         if not (found.outcome.ok or found.outcome.is_cycle):
@@ -130,12 +134,12 @@ def _normal_force(problem: Problem, state: ContactState) -> float:
 def _to_force(
     problem: Problem,
     workspace: Workspace,
-    state: ContactState,
+    state: State[Any],
     move: Move,
     cuts: int,
     load: tuple[float, float],
     previous: tuple[Move, Float] | None,
-) -> tuple[ContactSolution, list[_Substep], ObjectPose]:
+) -> tuple[ContactSolution[State[Any]], list[_Substep], ObjectPose]:
     """Advance to the depth where the normal force is `load[0]`, N; the leg ends at `load[1]`."""
 
     def pose(depth: float) -> ObjectPose:
@@ -145,7 +149,7 @@ def _to_force(
         found, _ = _increment(problem, workspace, state, Move(move.start, pose(depth)), cuts)
         if not found.outcome.ok:
             raise _FailedError
-        return _normal_force(problem, found.state)
+        return _normal_force(problem, found.state.contact)
 
     most = deepest(problem.model.object, problem.system.first_contact_mm, problem.model.design.height_mm)
     start_mm = move.start.depth_mm
@@ -177,13 +181,13 @@ def extrapolated_force(state: ContactState, move: Move, previous: tuple[Move, Fl
 def _increment(
     problem: Problem,
     workspace: Workspace,
-    state: ContactState,
+    state: State[Any],
     move: Move,
     cuts: int,
     guess: Float | None = None,
-) -> tuple[ContactSolution, list[_Substep]]:
+) -> tuple[ContactSolution[State[Any]], list[_Substep]]:
     """Advance a state; an increment that does not converge is halved and repeated from the same state."""
-    found = problem.model.formulation.increment(problem, state, move, guess, workspace)
+    found = formulation_of(problem.model).increment(problem, state, move, guess, workspace)
     if found.outcome.ok or cuts == 0:
         return found, [_Substep(state, found.state, move)]
     middle = move.at(0.5)

@@ -21,6 +21,7 @@ from typing import TypeAlias
 from finger3d.contact.rules import STEP_DEPENDENT_RULES
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.formulation import Workspace
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.path import AUTO_START
@@ -155,7 +156,7 @@ def refine(
     omitted if one with fewer increments converged or one with twice as many does.  `workspace` and `cancel` are
     arguments of `march`.
     """
-    workspace = workspace or problem.model.formulation.workspace()
+    workspace = workspace or formulation_of(problem.model).workspace()
     steps, last = limits(problem.model, problem.body.stiffness.upper.shape[0], len(problem.surface.nodes))
     runs: list[Run] = []
     failed: tuple[StepResult, ...] = ()
@@ -194,10 +195,10 @@ def march_automatic(
 
 def limits(model: Model, dofs: float, contact_points: float) -> tuple[int, int]:
     """Smallest and largest number of automatic increments in a leg; they depend on the size of the problem only."""
-    if model.formulation.finite_strain:
+    if model.finite_strain:
         return _FIRST_IF_FACTORED, _LARGEST_IF_FACTORED
     dim = 3 if model.domain == "solid" else 2
-    if dim == 3 and model.formulation.refactorises:
+    if dim == 3 and model.refactorises:
         return _FIRST, 4 * _FIRST  # a condensation for each length of the increments
     budget = WORTH_S[dim] + condensation_s(dofs, dim)
     most = budget / contact_s(contact_points, dim) / len(model.legs)

@@ -33,7 +33,11 @@ def symmetry(model: Model) -> tuple[str, ...]:
     thing = PlacedObject.of(model.object, 0.0).mirrors()
     axes = ("x", "z") if model.domain == "solid" else ("x",)
     body = model.design.mirrors()
-    inner = model.inclusions.mirrors(model) if model.inclusions else axes
+    inner = frozenset(axes)
+    if model.inclusions is not None:
+        from finger3d.mechanics.foils import foil_mirrors
+
+        inner = foil_mirrors(model)
     return tuple(a for a in axes if a in body and a in inner and a in thing and not np.any(moves[a]))
 
 

@@ -13,6 +13,7 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.simplex import CONTACT, FREE_FACES, Mesh, middles
 from finger3d.geometry.surface import Triangles
 from finger3d.io import atomic, read_arrays
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult, contact_table
 from finger3d.mechanics.problem import Problem
 from finger3d.objects import PlacedObject
@@ -132,7 +133,7 @@ def states_of(
     kept = chosen(len(frames))
     u = np.empty((len(kept), *mesh.points.shape), dtype=np.float32)
     parts = [frames[number].meshed_state for number in kept[:-1]]
-    for k, unknowns in enumerate(problem.model.formulation.all_unknowns(problem, parts)):
+    for k, unknowns in enumerate(formulation_of(problem.model).unknowns(problem, parts)):
         u[k] = displacement(problem.mesh, unknowns)[parent] * sign
     u[-1] = last
     tables = [contact_table(problem.points, frames[i].state) for i in kept]

@@ -20,6 +20,7 @@ from finger3d.fem.locate import locate
 from finger3d.fem.recover import displacement
 from finger3d.fem.simplex import Mesh, axis_numbers
 from finger3d.io import write_csv
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
@@ -32,8 +33,8 @@ ANGLES = np.radians(np.arange(0.0, 180.0, 5.0))
 
 def check(model: Model) -> None:
     """Raise an error for a body whose gauges do not read the small strain of a displacement field."""
-    if model.formulation.finite_strain:
-        name = dict(model.filled).get("strain_measure", "finite strain")
+    if model.finite_strain:
+        name = dict(model.filled).get("hyperelastic_law", "finite strain")
         raise Finger3dError(f"--map: not with effects.{name}; take the effect out, or the map")
 
 
@@ -124,7 +125,7 @@ class StrainMap:
         reader = Reader.at(problem.mesh, points, problem.axes)
         mus = np.array(sorted(frames))
         fields = []
-        for unknowns in problem.model.formulation.all_unknowns(problem, [frames[float(mu)].meshed_state for mu in mus]):
+        for unknowns in formulation_of(problem.model).unknowns(problem, [frames[float(mu)].meshed_state for mu in mus]):
             fields.append(reader.strain(displacement(problem.mesh, unknowns)).reshape(len(y), len(x), 3))
         return cls(mus, x, y, z_mm, np.array(fields))
 

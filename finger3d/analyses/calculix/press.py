@@ -15,7 +15,6 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.laws import IsochoricLaw
 from finger3d.fem.simplex import FREE_FACES, Mesh
 from finger3d.mechanics.build import mesh_part
-from finger3d.mechanics.finite_strain import FiniteStrain
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.path import AUTO_START
 from finger3d.mechanics.symmetry import symmetry
@@ -73,7 +72,7 @@ def press_deck(model: Model, title: str = "", say: Callable[[str], None] = lambd
     _check(model)
     contact, axes = initial_contact(model.contact_path), symmetry(model)
     mesh, report = mesh_part(model, contact.contact_box, axes, say)
-    finite = model.formulation.finite_strain
+    finite = model.finite_strain
     law = _law(model)
     laws = tuple(law_cards(material, law) for material in model.materials(mesh.part_labels))
     touch = contact.first_contact_mm
@@ -123,16 +122,12 @@ def _check(model: Model) -> None:
 
 
 def _law(model: Model) -> IsochoricLaw | None:
-    measure = model.strain_measure
-    if not measure.finite_strain:
-        return None
-    assert isinstance(measure, FiniteStrain)
-    if model.domain == "plane-stress":
+    if model.finite_strain and model.domain == "plane-stress":
         raise Finger3dError(
             "--solver calculix: CalculiX has no equal of [effects.large_deformation] in plane stress; take it out, or "
             "change model.domain"
         )
-    return measure.law
+    return model.hyperelastic_law
 
 
 def _legs(model: Model) -> list[tuple[Leg, ObjectPose]]:

@@ -98,7 +98,7 @@ def choose_increments(problem: Problem, read: Read) -> Increments:
     model = problem.model
     if all(isinstance(leg.steps, int) for leg in model.legs):
         return Increments(model.legs, model.legs, False, math.nan)
-    largest, steps = _LARGEST_IF_FACTORED if model.formulation.finite_strain else _LARGEST[model.domain], AUTO_START
+    largest, steps = _LARGEST_IF_FACTORED if model.finite_strain else _LARGEST[model.domain], AUTO_START
     readings: dict[float, Float] = {}
     while True:
         trial = with_steps(problem, steps)
@@ -116,7 +116,7 @@ def _ratios(problem: Problem, chosen: bool) -> tuple[float, ...]:
     """Return the numbers of increments, relative to the problem's, from which the error is estimated."""
     if chosen:
         return 0.25, 0.5
-    if problem.model.formulation.finite_strain:
+    if problem.model.finite_strain:
         return 0.5, 2.0
     return (0.25, 0.5, 2.0) if min(int(leg.steps) for leg in problem.model.legs) >= _FEW else (2.0, 4.0, 8.0)
 

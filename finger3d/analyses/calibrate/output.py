@@ -44,7 +44,7 @@ def write_points(folder: Path, curve: CurvePoints, settings: CalibrationSettings
 
 def write_body(folder: Path, model: Model, problem: Problem, report: Progress) -> None:
     """Write the condensed body with the readings of the scene, without the displaced gauges, to reduced.npz."""
-    if not model.formulation.is_linear_elastic:
+    if not model.is_linear_elastic:
         report.say("no reduced.npz: the compliance of the body changes during the press")
         return
     rows = problem.system.reading_rows[: len(model.reading_names)]

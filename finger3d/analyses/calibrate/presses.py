@@ -12,6 +12,7 @@ from threading import Event
 
 from finger3d._types import Float
 from finger3d.mechanics.formulation import Workspace
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.groups import march_in_groups
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.parallel import map_parallel
@@ -57,10 +58,10 @@ def press(
     """Press the condensed body with this mu; the last two presses of `near` give the initial guess."""
     law, forces, frame = problem.model.friction.with_mu(mu), [], None
     start = _start(problem, mu, near)
-    workspace = workspace or problem.model.formulation.workspace()
+    workspace = workspace or formulation_of(problem.model).workspace()
     before = workspace.factorizations
     for frame in march(replace(problem, model=replace(problem.model, friction=law)), start, workspace, cancel):
-        forces.append(frame.meshed_state.force)
+        forces.append(frame.meshed_state.contact.force)
     assert frame is not None  # a path has an increment
     return Press(mu, frame, tuple(forces), workspace.factorizations - before)
 
@@ -70,7 +71,7 @@ def presses(problem: Problem, mus: Sequence[float], initial: PressesByMu | None 
 
     At finite strain they come in another order than that of mu; see `march_in_groups`.
     """
-    if problem.model.formulation.finite_strain:
+    if problem.model.finite_strain:
         yield from _together(problem, mus)
         return
     known = initial or {}
@@ -83,11 +84,11 @@ def presses(problem: Problem, mus: Sequence[float], initial: PressesByMu | None 
 
 def _together(problem: Problem, mus: Sequence[float]) -> Iterator[Press]:
     """Yield the presses with all values of mu, which share factors."""
-    workspace, model, counted = problem.model.formulation.workspace(), problem.model, 0
+    workspace, model, counted = formulation_of(problem.model).workspace(), problem.model, 0
     problems = [replace(problem, model=replace(model, friction=model.friction.with_mu(mu))) for mu in mus]
     for number, steps in march_in_groups(problems, workspace, Event()):
         new, counted = workspace.factorizations - counted, workspace.factorizations
-        yield Press(mus[number], steps[-1], tuple(step.meshed_state.force for step in steps), new)
+        yield Press(mus[number], steps[-1], tuple(step.meshed_state.contact.force for step in steps), new)
 
 
 def _start(problem: Problem, mu: float, near: Sequence[Press]) -> list[Float]:

@@ -266,8 +266,8 @@ def _curve_points(problem: Problem, settings: CalibrationSettings, report: Progr
     if increments.chosen:
         report.say(str(increments))
     problem = replace(problem, model=replace(problem.model, legs=increments.legs))
-    if problem.model.formulation.finite_strain:
-        formulation = dict(problem.model.filled).get("strain_measure", "this body")
+    if problem.model.finite_strain:
+        formulation = dict(problem.model.filled).get("hyperelastic_law", "this body")
         report.say(
             f"{formulation}: its compliance changes during the press, so that every one of {len(mus)} mu is a full "
             "press, and so is every tolerance"
@@ -328,7 +328,7 @@ def _joint(curve: CurvePoints, settings: CalibrationSettings, report: Progress) 
 
 def _sample(problem: Problem, count: int) -> NDArray[np.int64]:
     """Return the indices, among `count` values of mu, of those at which tolerances are applied."""
-    wanted = _SLOPES[not problem.model.formulation.finite_strain]
+    wanted = _SLOPES[not problem.model.finite_strain]
     return np.unique(np.linspace(0, count - 1, wanted).round().astype(int))
 
 

@@ -32,7 +32,7 @@ def poisson_step(nu: float, sd: float) -> float:
 def with_modulus(problem: Problem, factor: float) -> Problem:
     """Return the problem with Young's moduli of all parts multiplied; in small strain the condensation is reused."""
     model = problem.model
-    if not model.formulation.is_linear_elastic:
+    if not model.is_linear_elastic:
         parts = tuple((label, _stiffer(material, factor)) for label, material in model.parts)
         return build(replace(model, material=_stiffer(model.material, factor), parts=parts))
     c, d = problem.delassus.shape[:2]

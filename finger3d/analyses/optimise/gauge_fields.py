@@ -21,6 +21,7 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.recover import displacement
 from finger3d.mechanics.build import MARGIN, build
 from finger3d.mechanics.coverage import contact_within_candidates
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
@@ -59,12 +60,12 @@ class StrainField:
         for mu, frame in zip(mus, frames, strict=True):
             if not frame.outcome.ok:
                 raise Finger3dError(f"optimise: mu = {mu:g}: at depth {frame.target.depth_mm:.4g} mm: {frame.outcome}")
-        unknowns = problem.model.formulation.all_unknowns(problem, [f.meshed_state for f in frames])
+        unknowns = formulation_of(problem.model).unknowns(problem, [f.meshed_state for f in frames])
         return cls(problem, np.array([displacement(problem.mesh, x) for x in unknowns]))
 
     def strain(self, points: Float, angles: Float) -> Float:
         """Return the strain (p, a, m) at points (p, 3) along directions (a,), rad; NaN outside the body."""
-        d, finite = self.problem.dim, self.problem.model.formulation.finite_strain
+        d, finite = self.problem.dim, self.problem.model.finite_strain
         reader = Reader.at(self.problem.mesh, points[:, :d], self.problem.axes)
         every = np.stack([reader.green_lagrange(u) if finite else reader.strain(u) for u in self.u], axis=-1)
         c, s = np.cos(angles), np.sin(angles)

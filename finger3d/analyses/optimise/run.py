@@ -26,6 +26,7 @@ from finger3d.analyses.optimise.task import (
 from finger3d.analyses.shared_body import SharedBody, Variant, body_key
 from finger3d.errors import Finger3dError
 from finger3d.io import atomic, claimed, write_csv, write_json
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.model import Leg, Model
@@ -66,7 +67,7 @@ class _PressedBody:
 
 def _gauges_need_own_press(model: Model) -> bool:
     """Return whether a displaced gauge needs a press of its own."""
-    return model.inclusions is not None or model.formulation.finite_strain
+    return model.inclusions is not None or model.finite_strain
 
 
 class _DesignBody:
@@ -93,7 +94,7 @@ class _DesignBody:
             strains = [body.strains(variant, frame.gauges) for frame in ends]
             return lambda g: np.array([strain[g.name] for strain in strains])
         mesh, axes = body.problem.mesh, body.problem.axes
-        fields = body.problem.model.formulation.all_unknowns(body.problem, [f.meshed_state for f in ends])
+        fields = formulation_of(body.problem.model).unknowns(body.problem, [f.meshed_state for f in ends])
         u = np.array([x[: mesh.points.size] for x in fields])
         return lambda g: np.asarray(g.row(mesh, axes)[:, : mesh.points.size] @ u.T).ravel()
 

@@ -1,4 +1,4 @@
-"""Bodies whose moduli relax: the response of their condensed rows over one increment of time, see `viscosity`."""
+"""Bodies whose moduli relax: the response of their condensed rows over one increment of time, see `viscoelastic`."""
 
 from __future__ import annotations
 
