@@ -4,7 +4,7 @@ PYTHON ?= $(shell for p in python3.11 python3 python3.12 python3.13; do \
 	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet install --constraint constraints.txt
 
-.PHONY: install install-dev demo docs bench test test-all test-browser test-wheel coverage lint clean
+.PHONY: install install-dev demo docs bench validate test test-all test-browser test-wheel coverage lint clean
 
 # What a press needs, and what developers need besides. The stamps are younger than what they were made from, so nothing
 # is installed twice.
@@ -67,6 +67,10 @@ coverage: install-dev
 # Takes both cores and a quarter of an hour; every row says how busy the machine was.
 bench: install-dev
 	$(BIN)/python -m validation._bench
+
+# Studies whose results are older than the sources; one: .venv/bin/python -m validation NAME
+validate: install-dev
+	$(BIN)/python -m validation
 
 lint: install-dev
 	$(BIN)/ruff check .

@@ -1,7 +1,7 @@
 """Frictional contact of an elastic, finger-shaped tactile sensor in 3D.
 
 The commands that compute are functions, too: `press`, `compare`, `calibrate`, `estimate`, `identify`, `sweep`,
-`optimise`, `place_gauges` (``optimise --gauges``), `export`, `plan` and `validate`. Names are loaded when they are
+`optimise`, `place_gauges` (``optimise --gauges``), `export` and `plan`. Names are loaded when they are
 first used, so that ``import finger3d`` is quick.
 
 >>> import finger3d
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from finger3d.analyses.press import press
     from finger3d.analyses.reduced import ReducedModel
     from finger3d.analyses.result import PressResult
-    from finger3d.analyses.validate import validate
     from finger3d.contact.friction import Coulomb
     from finger3d.errors import Finger3dError, MissingError, Outcome
     from finger3d.fem.material import Isotropic
@@ -80,7 +79,6 @@ _HOME = {
     "plan": "_api",
     "press": "analyses.press",
     "sweep": "_api",
-    "validate": "analyses.validate",
 }
 """Module of each public name."""
 
@@ -118,7 +116,6 @@ __all__ = [
     "plan",
     "press",
     "sweep",
-    "validate",
 ]
 
 

@@ -8,7 +8,7 @@ GOOD = '''"""Is one and a half what it was?
 
 Source: none.
 """
-from finger3d.analyses.study_rows import Result, Row
+from validation._rows import Result, Row
 
 from ._shared import VALUE
 
@@ -17,7 +17,7 @@ def run(quick):
     return Result(rows, {"x": [1, 2], "y": [0.1, 1 / 3]}, lambda figure: figure.subplots().plot([1, 2]))
 '''
 BAD = '''"""Does it fail?"""
-from finger3d.analyses.study_rows import Result, Row
+from validation._rows import Result, Row
 
 def run(quick):
     return Result((Row("bound", "a page", 1e-8, 2e-8, 0.0, "so", measure="at most"),))

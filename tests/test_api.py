@@ -26,7 +26,7 @@ EXAMPLES = (
     "finger3d.results.format",
     "finger3d.results.states",
 )
-COMMANDS = ("press", "compare", "calibrate", "estimate", "identify", "sweep", "optimise", "export", "plan", "validate")
+COMMANDS = ("press", "compare", "calibrate", "estimate", "identify", "sweep", "optimise", "export", "plan")
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
@@ -92,11 +92,6 @@ def test_an_export_writes_files_of_the_fingers_volume(tmp_path: Path) -> None:
     done = finger3d.export(written(tmp_path, SECTION), tmp_path / "out")
     assert [file.name for file in done.files] == ["finger.step", "finger.stl"]
     assert done.stl_volume_mm3 == pytest.approx(done.volume_mm3, rel=0.01)
-
-
-def test_a_study_is_validated(tmp_path: Path) -> None:
-    found = finger3d.validate(["patch_test"], quick=True, out=tmp_path)
-    assert all(row.passed for row in found["patch_test"])
 
 
 def test_every_public_name_is_there() -> None:

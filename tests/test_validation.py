@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from finger3d.analyses.validate import Study, draw, kept_rows, studies, write_index
+from validation._runner import Study, draw, kept_rows, studies, write_index
 
 STUDIES = studies()
 
@@ -45,7 +45,7 @@ def test_every_number_of_a_study_names_its_reference_and_why_its_tolerance_is_ri
 @pytest.mark.parametrize("study", STUDIES.values(), ids=STUDIES.keys())
 def test_committed_results_pass(study: Study) -> None:
     rows = kept_rows(study.path.parent, study)
-    assert rows, f"no results: run finger3d validate {study.name}"
+    assert rows, f"no results: run python -m validation {study.name}"
     assert not [row for row in rows if not row.passed]
 
 

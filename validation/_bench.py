@@ -29,7 +29,6 @@ import trimesh
 
 from finger3d._machine import cores
 from finger3d.analyses.calibrate.presses import presses
-from finger3d.analyses.study_rows import Row
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.condense import condense
@@ -46,6 +45,8 @@ from finger3d.mechanics.symmetry import symmetry
 from finger3d.meshing.generate import mesh_solid
 from finger3d.objects import MeshObject, Plane, RigidObject, Sphere
 from finger3d.progress import Progress
+
+from ._rows import Row
 
 LARGE, MIDDLE, QUICK = 1.1, 1.25, 3.0  # mm: 150 000, 47 000 and 8 000 unknowns
 MUS = (0.06, 0.125, 0.25, 0.5, 1.0)
@@ -364,8 +365,9 @@ def main(arguments: Sequence[str]) -> None:
     if arguments and not arguments[0].startswith("-"):
         print(json.dumps(measured(json.loads(arguments[0]))))
         return
-    from finger3d.analyses.study_rows import table
     from finger3d.cli.common import job, print_columns
+
+    from ._rows import table
 
     begin = time.perf_counter()
     with job(False, lambda done: "the rows above are all") as report:

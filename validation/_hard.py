@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from finger3d.analyses.press import press
-from finger3d.analyses.study_rows import Row
 from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import OPEN, Coulomb, TwoCoefficients
 from finger3d.contact.law import ContactLaw
@@ -32,6 +31,7 @@ from finger3d.objects import Plane
 from finger3d.scene import load
 
 from ._common import free_motion
+from ._rows import Row
 
 POINT = "Klarbring 1990; REFERENCES.md, 8.1"
 ROBUST = "what a robust method does; REFERENCES.md, 8.2"

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.analyses.study_rows import Measure, Row
 from finger3d.contact.friction import OPEN, STICK, Coulomb, FrictionLaw
 from finger3d.fem.material import Isotropic
 from finger3d.fem.recover import displacement
@@ -25,6 +24,8 @@ from finger3d.mechanics.history import StepResult, contact_table
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
+
+from ._rows import Measure, Row
 
 Float = NDArray[np.float64]
 

@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
@@ -30,6 +29,7 @@ from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
 
 from ._common import rate
+from ._rows import Result, Row
 
 Float = NDArray[np.float64]
 _ALWAYS = "balance of the whole body; REFERENCES.md, 7.1"

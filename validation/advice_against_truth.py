@@ -21,7 +21,6 @@ from finger3d.accuracy.advice import LEAST_STRAIN, largest_principal_strain
 from finger3d.accuracy.changes import Change, changing_numbers
 from finger3d.accuracy.large_deformation import large_deformation
 from finger3d.accuracy.more_increments import more_increments
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.material import Isotropic
@@ -36,6 +35,7 @@ from finger3d.objects import Cylinder, Plane, Sphere
 
 from ._drawn import FAR, NEAR, UNDER, drawn
 from ._paper import columns
+from ._rows import Result, Row
 
 SEED = 23
 """The factors of the estimates were chosen with the seed 2026."""

@@ -23,7 +23,6 @@ from typing import Any
 
 from finger3d._machine import versions
 from finger3d.analyses.calculix.run import program
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.errors import MissingError
 from finger3d.mechanics.build import contact_box
 from finger3d.mechanics.symmetry import symmetry
@@ -35,6 +34,7 @@ from ._ccx import run as run_calculix
 from ._child import Bench, best_of
 from ._cost import SECTION, SOLID, Case, model_of
 from ._cost_runs import MODULE
+from ._rows import Result, Row
 
 BY_NAME = True
 CALCULIX = "CalculiX 2.20, same mesh"

@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.fem.material import Elasticity, Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
@@ -29,6 +28,7 @@ from finger3d.objects import Cylinder, Sphere
 
 from ._common import body, contact_axis, convergence, graded, halved, quarter_block, rate
 from ._layer import line, point
+from ._rows import Result, Row
 
 Float = NDArray[np.float64]
 RADIUS = 1e5  # of the indenter, in thicknesses: the theory neglects slopes, which add some a / R to the force

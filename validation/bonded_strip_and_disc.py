@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.fem.material import Elasticity
 from finger3d.fem.simplex import Mesh
 
 from ._common import box, convergence, held_at, mapped, nodes_of, solve
 from ._corner import clamped_free, extrapolated, observed
+from ._rows import Result, Row
 
 Float = NDArray[np.float64]
 _WILLIAMS = "2e of the rim, Williams 1952; REFERENCES.md, 5.3"

@@ -21,7 +21,6 @@ from typing import Any
 import numpy as np
 
 from finger3d.analyses.calculix.run import program
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect
 from finger3d.fem.material import Isotropic
@@ -34,6 +33,7 @@ from finger3d.mechanics.solve import march
 
 from ._ccx import Answer, Pressed
 from ._ccx import run as run_calculix
+from ._rows import Result, Row
 
 LABELS = {2: ("contact", "walls"), 3: ("contact", "walls", "ends")}
 PENALTY, STICK = 100.0, 40.0

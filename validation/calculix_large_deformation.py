@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 
 from finger3d.analyses.calculix.run import program
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect
 from finger3d.fem.material import Isotropic
@@ -29,6 +28,7 @@ from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
 
 from ._calculix import deck, solve
+from ._rows import Result, Row
 
 E, NU, MU, WIDTH = 1.0, 0.45, 0.25, 20.0
 DEPTHS = (5.0, 10.0)

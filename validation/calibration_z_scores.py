@@ -21,7 +21,6 @@ from finger3d.analyses.calibrate.increments import pairwise_error
 from finger3d.analyses.calibrate.reference import read
 from finger3d.analyses.calibrate.run import calibrated
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
@@ -29,6 +28,7 @@ from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.sensor import Calibration, estimate
 
 from ._paper import columns
+from ._rows import Result, Row
 
 Float = NDArray[np.float64]
 Steps = int | Literal["auto"]

@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import STICK
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.problem import Problem
 
 from . import _halfplane, _halfspace
+from ._rows import Result, Row
 
 NU, MU = 0.5, 0.25
 DEPTH = float(_halfplane.depth(1.0, _halfplane.DEPTH_OF_BLOCK))

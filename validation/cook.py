@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.fem.material import Elasticity
 from finger3d.fem.simplex import Mesh
 
 from ._common import box, convergence, held_at, mapped, side_load, solve
 from ._corner import clamped_free, extrapolated
+from ._rows import Result, Row
 
 Float = NDArray[np.float64]
 CORNER = np.pi / 2 + np.arctan2(16.0, 48.0)

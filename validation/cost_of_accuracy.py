@@ -24,7 +24,6 @@ from typing import Any
 import numpy as np
 
 from finger3d._machine import memory_bytes
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.scene.checks import BASE_SHARE, SIZE_SHARE
 
 from ._child import Bench, best_of
@@ -33,6 +32,7 @@ from ._cost import HALF, LARGE, QUANTITIES, SECTION, SOLID, Case
 from ._cost_figure import draw
 from ._cost_runs import MODULE
 from ._cost_truth import LENGTHS, Advice, Truth, advise, mesh_errors, seconds, step_errors, truth, value
+from ._rows import Result, Row
 
 BY_NAME = True
 WILLIAMS = "2e of the base's edge, Williams 1952; REFERENCES.md, 5.3"

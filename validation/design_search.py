@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.geometry.registry import designs
 
 from ._paper import BELOW_FIG9, MUS, STRAIN, Float, Profile, columns, fig9, line, said, strains, under
+from ._rows import Result, Row
 from .geometry_search import CHOSEN, EDGES, RADII
 
 NU = 0.49

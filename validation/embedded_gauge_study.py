@@ -19,7 +19,6 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.embedded_gauge import Effect
 from finger3d.fem.material import Isotropic
@@ -30,6 +29,7 @@ from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
 
 from ._foil import alone, by_mesh, wing
+from ._rows import Result, Row
 
 FOIL = Effect(3000.0, 0.02, 3.0)
 NU, SLOPE, NOISE = 0.49, 1.5e-3, 1.5e-4

@@ -21,7 +21,6 @@ import numpy as np
 from finger3d.accuracy.adjoint_bars import applies
 from finger3d.accuracy.companions import companion
 from finger3d.accuracy.estimate import compared, discretisation, press_numbers
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.material import Isotropic
@@ -45,6 +44,7 @@ from finger3d.objects import Cylinder, Plane, Sphere
 
 from ._drawn import drawn
 from ._paper import columns
+from ._rows import Result, Row
 
 MUS, DEPTHS = (0.125, 0.5), (1.0, 0.6)
 SWEPT_MUS = (0.1, 0.125, 0.25, 0.5, 1.0)

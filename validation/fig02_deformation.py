@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.fem.simplex import unfold
 
 from ._paper import STRAIN, STRESS, Profile, columns, half_cylinder, moved, said, under
+from ._rows import Result, Row
 
 CASES = ((STRESS, 0.0), (STRESS, 0.3), (STRESS, 0.45), (STRESS, 0.49), (STRAIN, 0.3), (STRAIN, 0.45), (STRAIN, 0.49))
 DRAWN = ((STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.49))

@@ -13,9 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.study_rows import Result
-
 from ._paper import BELOW_R5, STRAIN, STRESS, columns, half_cylinder, line_r5, said, strains, under
+from ._rows import Result
 
 CASES = ((STRESS, 0.0), (STRESS, 0.3), (STRESS, 0.45), (STRESS, 0.49), (STRAIN, 0.3), (STRAIN, 0.45), (STRAIN, 0.49))
 JUDGED = ((STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.49))

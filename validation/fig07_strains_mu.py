@@ -12,8 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.study_rows import Result, Row
-
 from ._paper import (
     BELOW_R5,
     MUS,
@@ -28,6 +26,7 @@ from ._paper import (
     steps_row,
     strains,
 )  # fmt: skip
+from ._rows import Result, Row
 
 CASES = ((STRESS, 0.0), (STRESS, 0.3), (STRESS, 0.45), (STRESS, 0.49), (STRAIN, 0.3), (STRAIN, 0.45), (STRAIN, 0.49))
 JUDGED = ((STRESS, 0.0), (STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.49))

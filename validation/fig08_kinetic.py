@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Branch, TwoCoefficients
 
 from ._paper import MUS, STRAIN, STRESS, columns, half_cylinder, line_r5, said, strains, under
+from ._rows import Result, Row
 
 CASES = ((STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.49))
 JUDGED = ((STRESS, 0.3), (STRAIN, 0.49))

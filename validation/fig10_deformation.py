@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.fem.simplex import unfold
 
 from ._paper import STRAIN, STRESS, Profile, columns, fig9, moved, said, under
+from ._rows import Result, Row
 
 NUS = (0.0, 0.3, 0.4, 0.43, 0.45, 0.49, 0.5)
 SHOWN_MU = (0.06, 0.25, 1.0)

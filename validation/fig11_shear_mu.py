@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.geometry.registry import designs
 
 from ._paper import (
@@ -32,6 +31,7 @@ from ._paper import (
     steps_row,
     strains,
 )  # fmt: skip
+from ._rows import Result, Row
 
 NUS = (0.3, 0.45, 0.49)
 

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.mechanics.model import Gauge
 
 from ._paper import BELOW_FIG9, STRAIN, STRESS, columns, fig9, said, settled, steps_row
+from ._rows import Result, Row
 
 ANGLES = (0, 15, 30, 45, 60, 75, 90)
 FINE = (0.06, 0.125, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
 from finger3d.mechanics.history import measure
@@ -30,6 +29,7 @@ from ._paper import (
     strains,
     under,
 )  # fmt: skip
+from ._rows import Result, Row
 from .fig12_gauge_angles import ANGLES, gauges, statements
 
 SOLID = "solid"

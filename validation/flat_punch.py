@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.fem.material import Elasticity
 
 from ._common import body, box, convergence, graded, held_at, mapped, rate
+from ._rows import Result, Row
 
 Float = NDArray[np.float64]
 HEIGHT = 200.0  # a = 1 mm, E = 1 MPa

@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 
 from finger3d.analyses.calibrate.presses import presses
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.embedded_gauge import Effect as EmbeddedGauge
 from finger3d.effects.large_deformation import Effect as LargeDeformation
@@ -27,6 +26,7 @@ from finger3d.mechanics.build import build
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 
 from ._paper import columns
+from ._rows import Result, Row
 
 NOISE, LIMIT, TURN = 1.5e-4, 0.1, math.radians(30.0)
 MUS = (0.06, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 1.0, 1.2)

@@ -23,7 +23,6 @@ from typing import Any
 import numpy as np
 
 from finger3d._types import Float, Tree
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.fem.material import Isotropic
@@ -35,6 +34,8 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
 from finger3d.objects import Sphere
+
+from ._rows import Result, Row
 
 E, PRONY = 1.0, ((0.5, 1.0),)
 RAMP, HELD = 1.0, 40.0  # s

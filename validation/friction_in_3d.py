@@ -23,7 +23,6 @@ from finger3d.analyses.calibrate.run import calibrated_together
 from finger3d.analyses.calibrate.tolerances import with_defaults
 from finger3d.analyses.optimise.gauge_fields import GaugeFields
 from finger3d.analyses.optimise.gauge_search import Region, search
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.effects.embedded_gauge import Effect as EmbeddedGauge
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.material import Isotropic
@@ -33,6 +32,7 @@ from finger3d.mechanics.readings import Marker
 from finger3d.sensor import JointCalibration
 
 from ._paper import columns
+from ._rows import Result, Row
 
 Float = NDArray[np.float64]
 Domain = Literal["solid", "plane-strain"]

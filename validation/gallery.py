@@ -22,7 +22,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.mechanics.build import build
 from finger3d.mechanics.history import measure
@@ -31,6 +30,7 @@ from finger3d.mechanics.solve import march
 from finger3d.scene import load
 
 from . import _layer
+from ._rows import Result, Row
 
 Float = NDArray[np.float64]
 SCENES = Path(__file__).resolve().parents[1] / "geometries"

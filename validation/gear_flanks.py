@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.files import read_surface
 from finger3d.geometry.registry import designs
@@ -25,6 +24,8 @@ from finger3d.mechanics.history import contact_table, measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.solve import march
 from finger3d.objects import MeshObject
+
+from ._rows import Result, Row
 
 Float = NDArray[np.float64]
 TEETH, DEPTH = 24, 1.0

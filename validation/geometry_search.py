@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.geometry.registry import designs
 
 from ._paper import BELOW_FIG9, MUS, Profile, columns, fig9, line, said, settled, steps_row, strains
+from ._rows import Result, Row
 
 RADII = (60.0, 80.0, 100.0, 150.0, 200.0, 300.0)
 EDGES = (15.0, 25.0, 36.6, 50.0, 60.0)

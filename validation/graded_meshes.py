@@ -25,13 +25,13 @@ import finger3d
 from finger3d.accuracy.adjoint_bars import adjoint_bars
 from finger3d.accuracy.estimate import press_numbers
 from finger3d.accuracy.refine import GOAL, refine_mesh
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.mechanics.build import build
 from finger3d.mechanics.model import Domain, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
 
 from ._paper import columns
+from ._rows import Result, Row
 
 FIG9 = Path(__file__).parents[1] / "geometries" / "fig9.toml"
 UNIFORM = Path(__file__).with_name("results") / "cost_of_accuracy_table.csv"

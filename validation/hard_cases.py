@@ -21,7 +21,6 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
 from finger3d.errors import Outcome
 from finger3d.fem.material import Isotropic
@@ -35,6 +34,7 @@ from finger3d.mechanics.solve import march
 
 from . import _hard
 from ._common import free_motion
+from ._rows import Result, Row
 
 DEPTH = 10.0
 NU = (0.0, 0.3, 0.45, 0.49, 0.499, 0.4999, 0.5)

@@ -21,7 +21,6 @@ import numpy as np
 import trimesh
 
 from finger3d._types import Float
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect
 from finger3d.errors import Finger3dError, Outcome
@@ -40,6 +39,8 @@ from finger3d.mechanics.solve import march
 from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
 from finger3d.scene.checks import chosen
 from finger3d.scene.tables import MeshTable
+
+from ._rows import Result, Row
 
 HEIGHT = 10.0
 SCENES, SCENES_QUICK = 320, 8

@@ -20,7 +20,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
@@ -32,6 +31,7 @@ from finger3d.objects import Cylinder
 
 from ._common import convergence, rate
 from ._layer import line
+from ._rows import Result, Row
 
 Float = NDArray[np.float64]
 RADIUS = 1000.0  # a = 1: the circle is a parabola to 1e-6

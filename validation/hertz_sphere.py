@@ -18,7 +18,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.fem.material import Elasticity, Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
@@ -28,6 +27,7 @@ from finger3d.objects import Sphere
 
 from ._common import body, contact_axis, convergence, graded, quarter_block, rate
 from ._layer import point
+from ._rows import Result, Row
 
 Float = NDArray[np.float64]
 RADIUS = 1000.0  # a = 1

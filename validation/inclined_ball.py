@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
@@ -24,6 +23,8 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
 from finger3d.objects import Cylinder, RigidObject, Sphere
+
+from ._rows import Result, Row
 
 DOME, BAR, ANGLE = 20.0, 5.0, math.radians(30.0)
 BESIDE = (DOME + BAR) * math.sin(ANGLE)

@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.step_halving import DISSIPATION_TOLERANCE, TOLERANCE, march_automatic
 
 from ._paper import STRAIN, STRESS, Profile, columns, half_cylinder, line_r5, said, strains, under
+from ._rows import Result, Row
 
 CASES = ((STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.3), (STRAIN, 0.49))
 COUNTS = (1, 2, 5, 10, 20, 40, 80, 160)

@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.study_rows import Kind, Result, Row
 from finger3d.contact.friction import Coulomb, FrictionLaw, TwoCoefficients
 from finger3d.mechanics.problem import Problem
 
 from ._halfplane import compliance, line, loading, under
+from ._rows import Kind, Result, Row
 
 NU, STATIC = 0.3, 0.25
 SOURCE = "Spence 1968 with mu_k; REFERENCES.md, 2.5"

@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.fem.material import Elasticity
 
 from ._common import box, convergence, error_norms, held_at, mapped, rate, side_load, solve
+from ._rows import Result, Row
 
 Float = NDArray[np.float64]
 _LAME = "Lame 1852; REFERENCES.md, 5.6"

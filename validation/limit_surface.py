@@ -23,7 +23,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import dblquad
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import STICK, Coulomb
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
@@ -33,6 +32,8 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
 from finger3d.objects import Plane
+
+from ._rows import Result, Row
 
 Float = NDArray[np.float64]
 

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.fem.material import Elasticity
 from finger3d.fem.simplex import quadratic
 
 from ._common import body_load, convergence, cube, error_norms, held_at, pressure_error, rate, solve
+from ._rows import Result, Row
 
 Float = NDArray[np.float64]
 PI = np.pi

@@ -19,12 +19,12 @@ import numpy as np
 
 import finger3d
 from finger3d.accuracy.estimate import press_numbers
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.mechanics.build import build
 from finger3d.mechanics.solve import march
 from finger3d.scene import parse
 
 from ._paper import columns
+from ._rows import Result, Row
 
 MESHERS = ("ftetwild", "netgen")
 COMMON = {"material": {"E_MPa": 1.0, "nu": 0.45}, "friction": {"mu": 0.25}, "object": {"shape": "plane"}}

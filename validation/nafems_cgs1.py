@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.fem.material import Elasticity
 
 from ._common import Body, body, box, contact_axis, convergence, graded, held_at, mapped, rate
+from ._rows import Result, Row
 
 Float = NDArray[np.float64]
 R, SIDE, FORCE = 50.0, 200.0, 35e3

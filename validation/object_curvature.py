@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
@@ -29,6 +28,8 @@ from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
 from finger3d.objects import Cylinder, Plane, RigidObject
+
+from ._rows import Result, Row
 
 FORCE = 200.0  # N over 20 mm: some 5 mm deep on the plane
 TRUE = 0.25

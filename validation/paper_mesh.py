@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import OPEN, STICK, Coulomb
 from finger3d.contact.law import ContactLaw
@@ -32,6 +31,7 @@ from finger3d.geometry.registry import designs
 from finger3d.meshing.grid import Sizes, rows, triangulate
 
 from ._paper import MUS, STRAIN, STRESS, Profile, columns, half_cylinder, line_r5, said, strains, under
+from ._rows import Result, Row
 
 CASES = ((STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.45), (STRAIN, 0.49))
 RULES = {"swap": maeno_active_set, "projection": solve_increment}

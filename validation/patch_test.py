@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.material import Elasticity, Isotropic
 from finger3d.fem.simplex import Mesh, quadratic
@@ -25,6 +24,7 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.solve import march
 
 from ._common import body, body_load, cube, held_at, shuffled, solve
+from ._rows import Result, Row
 
 Float = NDArray[np.float64]
 _PATCH = "Irons and Razzaque 1972; REFERENCES.md, 5.1"

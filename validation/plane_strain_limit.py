@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
@@ -28,6 +27,7 @@ from finger3d.mechanics.solve import march
 
 from ._common import convergence, rate
 from ._corner import clamped_free, extrapolated
+from ._rows import Result, Row
 
 Float = NDArray[np.float64]
 STEPS = 5

@@ -19,10 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import SLIP
 
 from ._halfplane import RADIUS, Profile, compliance, hertz, line, loading, under
+from ._rows import Result, Row
 
 C_OVER_A = {  # REFERENCES.md, 2.1, fully coupled; (nu, mu)
     (0.0, 0.25): 0.09910, (0.0, 0.5): 0.52191, (0.0, 1.0): 0.88959,

@@ -16,13 +16,13 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import OPEN, SLIP
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.problem import Problem
 
 from . import _halfspace
 from ._halfplane import Profile, compliance, line, loading, under
+from ._rows import Result, Row
 
 MU = 0.25
 REST = "an elastic body released; REFERENCES.md, 2.7"

@@ -15,10 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.study_rows import Result, Row
-
 from . import _halfspace, _rings
 from ._halfspace import RADIUS
+from ._rows import Result, Row
 
 SPENCE = "Spence 1975; REFERENCES.md, 2.2"
 C_OVER_A = {

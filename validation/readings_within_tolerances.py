@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from finger3d.analyses.calibrate.run import calibrated_together
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
@@ -30,6 +29,7 @@ from finger3d.mechanics.solve import march
 from finger3d.sensor import JointCalibration, JointEstimate, estimate
 
 from ._paper import columns
+from ._rows import Result, Row
 
 Float = NDArray[np.float64]
 Domain = Literal["solid", "plane-strain"]

@@ -25,7 +25,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
@@ -37,6 +36,8 @@ from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
 from finger3d.mechanics.state import State
 from finger3d.objects import Cylinder, Move, ObjectPose
+
+from ._rows import Result, Row
 
 Float = NDArray[np.float64]
 

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect
 from finger3d.fem.material import Isotropic
@@ -27,6 +26,7 @@ from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
 from finger3d.mechanics.solve import march
 from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
 
+from ._rows import Result, Row
 from .triangulated_objects import ball
 
 Float = NDArray[np.float64]

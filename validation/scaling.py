@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 
 from finger3d._machine import cores
-from finger3d.analyses.study_rows import Result, Row
 
 from ._child import Bench, available_gb, best_of
+from ._rows import Result, Row
 from ._scaling import BODIES, STAGES, Size, sweep_seconds
 
 Runs = Mapping[Size, dict[str, Any]]

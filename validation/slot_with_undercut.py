@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.fem.material import Isotropic
 from finger3d.fem.simplex import FREE_FACES
@@ -24,6 +23,8 @@ from finger3d.mechanics.coverage import check_surface
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.solve import march
 from finger3d.objects import MeshObject
+
+from ._rows import Result, Row
 
 E, NU = 1.0, 0.3
 HALF, HEIGHT, WIDTH = 4.0, 6.0, 4.0

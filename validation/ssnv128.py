@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import SLIP, STATUS_NAMES, Coulomb
 from finger3d.contact.law import ContactLaw
@@ -29,6 +28,7 @@ from finger3d.fem.simplex import quadratic
 from finger3d.fem.traces import BoundarySurface, local_rows, surface
 
 from ._common import box, held_at, nodes_of, side_load
+from ._rows import Result, Row
 
 SIDE, LEFT, TOP = 40.0, 150.0, 50.0  # mm, MPa
 PLACES = np.array([0.0, 1.25, 5.0, 7.5, 11.25])  # mm

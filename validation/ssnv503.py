@@ -21,7 +21,6 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
 from finger3d.contact.law import ContactLaw
@@ -39,6 +38,7 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.solve import march
 
 from ._common import cube, side_load
+from ._rows import Result, Row
 
 MU, PRESSURE, SPRINGS = 0.3, 0.01, 2e-5  # p/E, and the springs' stiffness over E, of a block of side 1
 TURN = np.pi / 6.0

@@ -23,7 +23,6 @@ from finger3d.analyses.calibrate.run import CurvePoints, calibrated
 from finger3d.analyses.calibrate.settings import MUS
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.analyses.reduced import ReducedModel
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.effects.embedded_gauge import Effect
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
@@ -34,6 +33,7 @@ from finger3d.sensor import Calibration, estimate
 from finger3d.sensor.maps import StrainMap
 
 from ._paper import columns, said
+from ._rows import Result, Row
 
 NU, NOISE, LIMIT = 0.49, 1.5e-4, 0.1
 TURN = math.radians(30.0)

@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
@@ -31,6 +30,7 @@ from finger3d.mechanics.solve import march
 from finger3d.objects import Cylinder, MeshObject, PlacedObject, RigidObject, Sphere, first_contact_height
 
 from ._common import convergence, rate
+from ._rows import Result, Row
 
 Float = NDArray[np.float64]
 RADIUS = 6.0

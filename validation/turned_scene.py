@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import Coulomb
 from finger3d.contact.law import ContactLaw
@@ -29,6 +28,7 @@ from finger3d.meshing.generate import mesh_solid
 from finger3d.objects import MeshObject, PlacedObject, first_contact_height
 
 from ._common import Body, body
+from ._rows import Result, Row
 from .triangulated_objects import ball
 
 Float = NDArray[np.float64]

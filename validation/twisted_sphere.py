@@ -23,7 +23,6 @@ from typing import Any
 from scipy.integrate import quad
 from scipy.special import ellipe, ellipkm1
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import STICK, Coulomb
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
@@ -34,6 +33,8 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
 from finger3d.objects import Move, ObjectPose, Sphere
+
+from ._rows import Result, Row
 
 RADIUS, E, NU = 100.0, 1.0, 0.3
 SHEAR, EFFECTIVE = E / (2.0 * (1.0 + NU)), E / (1.0 - NU**2)

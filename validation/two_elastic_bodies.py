@@ -21,7 +21,6 @@ import numpy as np
 from scipy import sparse
 from scipy.optimize import brentq
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.elastic_object import Effect
 from finger3d.fem.material import Elasticity, Isotropic
@@ -38,6 +37,7 @@ from finger3d.objects import Cylinder, Plane, vertical_frame
 
 from ._common import held_at, solve
 from ._halfplane import Profile, under
+from ._rows import Result, Row
 
 SPENCE = "Spence 1975 with Dundurs' beta; REFERENCES.md, 1.3 and 2.1"
 STEPPED = "Spence 1975 with 200 increments; REFERENCES.md, 2.4"

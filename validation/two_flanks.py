@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
@@ -24,6 +23,8 @@ from finger3d.mechanics.build import build
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.solve import march
 from finger3d.objects import MeshObject
+
+from ._rows import Result, Row
 
 Float = NDArray[np.float64]
 DOME, WIDTH, E, NU, DEPTH = 10.0, 2.0, 1.0, 0.3, 0.1

@@ -24,7 +24,6 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.signal import residue
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.contact.state import ContactState
 from finger3d.fem.assembly import Stiffness, stiffness
@@ -42,6 +41,7 @@ from finger3d.objects import Move, ObjectPose, PlacedObject, Plane, Sphere, vert
 
 from . import _rings
 from ._common import box, graded, held_at
+from ._rows import Result, Row
 
 Float = NDArray[np.float64]
 

@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.fem.material import Elasticity, Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
@@ -28,6 +27,7 @@ from finger3d.mechanics.solve import march
 from finger3d.objects import Wave, Wedge
 
 from ._common import Body, body, box, contact_axis, convergence, graded, halved, held_at, mapped, quarter_block, rate
+from ._rows import Result, Row
 
 Float = NDArray[np.float64]
 NU, SLOPE, AMPLITUDE = 0.3, 0.01, 1e-3

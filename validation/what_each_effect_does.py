@@ -13,13 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.study_rows import Result, Row
 from finger3d.mechanics.build import build
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.solve import march
 from finger3d.scene import parse
 from finger3d.scene.registry import effect_names
+
+from ._rows import Result, Row
 
 SETTINGS: dict[str, dict[str, Any]] = {
     "large_deformation": {},

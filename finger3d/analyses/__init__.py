@@ -1,1 +1,1 @@
-"""Analyses: press, compare, calibrate, sweep, optimise and validate."""
+"""Analyses: press, compare, calibrate, sweep and optimise."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from cyclopts import CycloptsError
+from cyclopts import App, CycloptsError
 
 # Importing a module registers its command.
 import finger3d.cli.app  # noqa: F401
@@ -32,18 +32,18 @@ from finger3d.cli.terminal import safe_streams, termination_interrupts
 from finger3d.errors import OUT_OF_MEMORY, Finger3dError, MissingError, out_of_memory
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line and return its exit code.
+def main(arguments: Sequence[str] | None = None, program: App = app) -> int:
+    """Run the command line of a program and return its exit code.
 
     Errors are reported in one line on standard error. SIGTERM and SIGHUP interrupt a command like Ctrl-C.
     """
     with safe_streams(), termination_interrupts():
-        return _run(arguments)
+        return _run(arguments, program)
 
 
-def _run(arguments: Sequence[str] | None) -> int:
+def _run(arguments: Sequence[str] | None, program: App) -> int:
     try:
-        return app(arguments, exit_on_error=False, print_error=False) or 0
+        return program(arguments, exit_on_error=False, print_error=False) or 0
     except CycloptsError as error:
         complain(f"{error} (finger3d --help lists the commands and options)")
         return Finger3dError.exit_code

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from finger3d.analyses.validate import Row
+from validation._rows import Row
 
 
 @pytest.mark.parametrize(

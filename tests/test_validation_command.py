@@ -1,15 +1,17 @@
-"""Command ``validate``: exit codes and what is kept."""
+"""Command ``python -m validation``: exit codes and what is kept."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
 
 from finger3d import cli
-from finger3d.analyses import validate as study
-from finger3d.analyses.validate import Study
 from tests.study_cases import STOPS, write_studies
+from validation import _runner as study
+from validation.__main__ import main
+from validation._runner import Study
 
 
 @pytest.fixture
@@ -27,27 +29,46 @@ def own_studies(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_the_command_tells_verdicts_by_its_exit_code(
     own_studies: Path, tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:
-    assert cli.main(["validate", "good"]) == 0
+    assert main(["good"]) == 0
     assert "pass" in capsys.readouterr().out
-    assert cli.main(["validate", "good", "bad", "--out", str(tmp_path / "out")]) == 3
+    assert main(["good", "bad", "--out", str(tmp_path / "out")]) == 3
     assert "bad" in capsys.readouterr().err
     assert (tmp_path / "out" / "results" / "bad.csv").is_file()
-    assert cli.main(["validate", "goood"]) == 2
+    assert main(["goood"]) == 2
     assert "'good'" in capsys.readouterr().err
 
 
 def test_quick_results_never_replace_full_ones(own_studies: Path, capsys: pytest.CaptureFixture) -> None:
-    assert cli.main(["validate", "good"]) == 0
+    assert main(["good"]) == 0
     before = (own_studies / "results" / "good.csv").read_bytes()
-    assert cli.main(["validate", "good", "--quick"]) == 0
+    assert main(["good", "--quick"]) == 0
     assert "1.501" in capsys.readouterr().out
-    assert cli.main(["validate", "good", "--quick", "--out", str(own_studies)]) == 2
+    assert main(["good", "--quick", "--out", str(own_studies)]) == 2
     assert (own_studies / "results" / "good.csv").read_bytes() == before
 
 
 def test_an_interrupted_command_says_what_is_kept(own_studies: Path, capsys: pytest.CaptureFixture) -> None:
-    assert cli.main(["validate", "good", "stops"]) == 130
+    assert main(["good", "stops"]) == 130
     err = capsys.readouterr().err
     assert len(err.splitlines()) == 1
     assert "1 of 2 studies" in err
     assert str(own_studies) in err
+
+
+def test_the_package_says_where_the_studies_are(capsys: pytest.CaptureFixture) -> None:
+    assert cli.main(["validate", "patch_test"]) == 2
+    assert "python -m validation" in capsys.readouterr().err
+
+
+def test_a_study_of_the_checkout_as_json(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    assert main(["patch_test", "--quick", "--json", "--out", str(tmp_path)]) == 0
+    out, err = capsys.readouterr()
+    rows = json.loads(out)["studies"]["patch_test"]
+    assert rows
+    assert all(row["passed"] and row["error"] >= 0.0 for row in rows)
+    assert "patch_test" in err
+
+
+def test_the_studies_are_listed_with_their_questions(capsys: pytest.CaptureFixture) -> None:
+    assert main(["--list"]) == 0
+    assert "patch_test" in capsys.readouterr().out
