@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import errno
 import json
 import math
 import os
@@ -19,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finger3d._types import Array
-from finger3d.errors import Finger3dError
+from finger3d.errors import Finger3dError, MissingError
 
 MAIN = ("normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm")
 """The numbers of a press that short tables show, and that get an error bar, beside every gauge."""
@@ -39,6 +40,8 @@ def atomic(path: str | Path) -> Iterator[Path]:
     ------
     Finger3dError
         If the file cannot be written.
+    MissingError
+        If the disk is full.
     """
     target = Path(path)
     temporary = target.with_name(f".{target.stem}.{secrets.token_hex(4)}{target.suffix}")
@@ -48,6 +51,8 @@ def atomic(path: str | Path) -> Iterator[Path]:
         os.replace(temporary, target)
     except OSError as error:
         reason = error.strerror or str(error)
+        if error.errno in (errno.ENOSPC, errno.EDQUOT):
+            raise MissingError(f"cannot write {target}: {reason}; make room and run the same command again") from error
         raise Finger3dError(f"cannot write {target}: {reason}; choose another place with --out") from error
     finally:
         # Usually it is gone by now, or was never made; and a folder that refuses has been reported above.

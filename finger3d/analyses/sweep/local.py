@@ -11,7 +11,7 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from finger3d._machine import cores, end_with
+from finger3d._machine import cores, end_with, reserve_for_linear_algebra
 from finger3d.analyses.sweep import worker
 from finger3d.analyses.sweep.progress import BodyPoints, SweepProgress
 from finger3d.errors import MissingError
@@ -58,6 +58,7 @@ def _begin(parent: int) -> None:
     """Initialise a worker: it ends with its parent, and leaves Ctrl-C to it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_with(parent)
+    reserve_for_linear_algebra()
 
 
 def press(bodies: Sequence[BodyPoints], progress: SweepProgress, workers: int) -> None:
