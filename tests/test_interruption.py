@@ -59,15 +59,15 @@ def test_an_interruption_in_a_callback_of_a_weak_reference_is_raised_again(capfd
         raise KeyboardInterrupt
 
     def work() -> None:
+        referents.clear()
         end = time.monotonic() + 10.0
         while time.monotonic() < end:
             pass
 
-    referent = Referent()
-    reference = weakref.ref(referent, interrupted)
+    referents = [Referent()]
+    reference = weakref.ref(referents[0], interrupted)
     hook = sys.unraisablehook
     with pytest.raises(KeyboardInterrupt), termination_interrupts():
-        del referent
         work()
     assert reference() is None
     assert sys.unraisablehook is hook

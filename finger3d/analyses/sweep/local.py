@@ -86,7 +86,9 @@ def press(bodies: Sequence[BodyPoints], progress: SweepProgress, workers: int) -
                 else:
                     _begin_next(one, waiting, running)
     except OSError as error:
-        raise MissingError(f"sweep: no worker could be started on this machine: {error}") from None
+        raise MissingError(
+            f"sweep: no worker could be started on this machine: {error}; --workers 1 presses without any"
+        ) from None
     finally:
         for one in started:
             one.end()
