@@ -10,10 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finger3d.fem.simplex import CONTACT, FREE_FACES
-
 from finger3d.contact.friction import OPEN, SLIP, STICK
-from finger3d.fem.simplex import Mesh
+from finger3d.fem.simplex import CONTACT, FREE_FACES, Mesh
 from finger3d.plotting import solid as render
 from finger3d.plotting.figures import contact_figure, finger_picture, force_figure, middle_line, zones
 from tests.pictures import MU, STEPS, finger, pixels, pressed, share, solid_finger
