@@ -37,7 +37,7 @@ def _pool() -> ProcessPoolExecutor:
 class _Worker:
     """A pool of one process, which keeps the body of its last batch; a new one takes the place of one that died."""
 
-    pool: ProcessPoolExecutor = field(default_factory=_pool)
+    pool: ProcessPoolExecutor = field(default_factory=lambda: _pool())
 
     def submit(self, body: BodyPoints) -> Future[list[Row]]:
         """Press the next batch of a body."""
