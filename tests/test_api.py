@@ -15,8 +15,7 @@ import pytest
 
 import finger3d
 import finger3d.analyses.press
-from finger3d.errors import Finger3dError
-from tests.scenes import HALF_CYLINDER, SECTION, written
+from tests.scenes import SECTION, written
 
 EXAMPLES = (
     "finger3d",
@@ -109,18 +108,3 @@ def test_every_public_name_is_there() -> None:
 def test_an_unknown_public_name_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match="has no attribute 'pres'"):
         _ = finger3d.pres
-
-
-def test_a_model_is_told_what_takes_it(tmp_path: Path) -> None:
-    model = finger3d.load(written(tmp_path, HALF_CYLINDER)).model()
-    for given in (model, 7, None):
-        with pytest.raises(Finger3dError, match=f"a {type(given).__name__} is no scene: .*finger3d.load"):
-            finger3d.press(given)
-
-
-def test_a_dict_is_a_scene(tmp_path: Path) -> None:
-    given = dict(finger3d.load(written(tmp_path, HALF_CYLINDER)).given)
-    assert finger3d.press(given, error=False).last.normal_force_N > 0.0
-    assert finger3d.plan(given).dofs > 0
-    with pytest.raises(Finger3dError, match=r"friction.mu = -1"):
-        finger3d.press(given | {"friction": {"mu": -1}})
