@@ -82,29 +82,38 @@ _LIBRARIES_BYTES, _THREAD_BYTES = 300 * 2**20, 82 * 2**20
 """Address space that the imported libraries and a small solution take, measured, and that each thread takes besides."""
 
 
-def enough_address_space() -> bool:
-    """Return whether a limit of the address space (``ulimit -v``), if there is one, leaves room for the libraries.
+def address_limit() -> int | None:
+    """Return the limit of the address space of a process (``ulimit -v``) in bytes, or None without one.
 
-    OpenBLAS, in the wheels of NumPy and SciPy, repeats an allocation that fails without end, even while it is imported.
+    Where such a limit is reached OpenBLAS, in the wheels of NumPy and SciPy, repeats an allocation that fails without
+    end, even while it is imported.
     """
     try:
         import resource
     except ModuleNotFoundError:  # Windows
-        return True
+        return None
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    return None if limit == resource.RLIM_INFINITY else limit
+
+
+def enough_address_space() -> bool:
+    """Return whether the limit of the address space, if there is one, leaves room for the libraries."""
+    limit = address_limit()
     given = next((n for n in map(os.environ.get, ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")) if n), "")
     threads = int(given) if given.isdecimal() else cores()
-    return limit == resource.RLIM_INFINITY or limit > _LIBRARIES_BYTES + threads * _THREAD_BYTES
+    return limit is None or limit > _LIBRARIES_BYTES + threads * _THREAD_BYTES
 
 
 def reserve_for_linear_algebra() -> None:
-    """Let OpenBLAS allocate its buffers now: later, without memory, it would repeat the allocation without end.
+    """Let OpenBLAS allocate its buffers now, if the address space is limited: later there may be no room for them.
 
     Raises
     ------
     MemoryError
-        If there is no room for them.
+        If there is no room for them now.
     """
+    if address_limit() is None:
+        return
     import numpy as np
     from scipy.linalg import lu_factor
 

@@ -29,6 +29,14 @@ AREAS = ("contact_area_mm2", "stick_area_mm2")
 """Those that get an error bar besides."""
 
 
+def cannot_write(path: Path, error: OSError) -> Finger3dError:
+    """Return the error of a file that cannot be written: a full disk is nobody's mistake in the input."""
+    reason = error.strerror or str(error)
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return MissingError(f"cannot write {path}: {reason}; make room and run the same command again")
+    return Finger3dError(f"cannot write {path}: {reason}; choose another place with --out")
+
+
 @contextmanager
 def atomic(path: str | Path) -> Iterator[Path]:
     """Give the name of a temporary file beside `path`; it takes the place of `path` when the block ends well.
@@ -50,10 +58,7 @@ def atomic(path: str | Path) -> Iterator[Path]:
         yield temporary
         os.replace(temporary, target)
     except OSError as error:
-        reason = error.strerror or str(error)
-        if error.errno in (errno.ENOSPC, errno.EDQUOT):
-            raise MissingError(f"cannot write {target}: {reason}; make room and run the same command again") from error
-        raise Finger3dError(f"cannot write {target}: {reason}; choose another place with --out") from error
+        raise cannot_write(target, error) from error
     finally:
         # Usually it is gone by now, or was never made; and a folder that refuses has been reported above.
         with suppress(OSError):

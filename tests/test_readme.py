@@ -17,7 +17,7 @@ COARSE = {
     "gear": "mesh.mesher=swept mesh.size_mm=1.0 mesh.base_size_mm=4.0",
     "compare": "mesh.mesher=swept mesh.size_mm=8.0 mesh.base_size_mm=20.0 press.steps=5",
     "calibrate": "mesh.size_mm=2.0 mesh.base_size_mm=8.0 press.steps=10",
-    "sweep": "model.domain=plane-strain mesh.size_mm=3.0 mesh.base_size_mm=12.0",
+    "sweep": "model.domain=plane-strain mesh.size_mm=3.0 mesh.base_size_mm=12.0 press.steps=5",
     "identify": "model.domain=plane-strain mesh.size_mm=4.0 mesh.base_size_mm=12.0 press.steps=5",
     "optimise": "model.domain=plane-strain mesh.size_mm=3.0 mesh.base_size_mm=12.0 press.steps=10",
 }
