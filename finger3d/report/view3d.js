@@ -124,7 +124,7 @@
   const range = [0, 1, 2].map((a) => {
     const [low, high] = bounds([rest, moved], a), [bottom, top] = bounds(placed, a);
     const room = 0.02 * (high - low), name = data.gaugeLabels.length ? NAME * extent * FROM[a] : 0;
-    const whole = top - bottom <= extent;  // false without an object
+    const whole = top - bottom <= extent;  // without an object both are infinite, and change nothing
     return [Math.min(low - Math.max(room, -name), whole ? bottom : low),
       Math.max(high + Math.max(room, name), whole ? top : high)];
   });
