@@ -17,7 +17,7 @@ install-dev: .venv/.installed-dev
 	@test -n "$(PYTHON)" || { echo "finger3d needs Python 3.11 or newer; none found (set PYTHON=/path/to/python3)"; exit 1; }
 	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { echo "$(PYTHON) has no venv module: apt install python3-venv"; exit 1; }
 	@test -x $(BIN)/python || $(PYTHON) -m venv .venv
-	@echo "installing finger3d and its packages into .venv (once; some minutes, 2.3 GB)"
+	@echo "installing finger3d and its packages into .venv (once; some minutes, 2.5 GB)"
 	@$(PIP) hatchling editables
 	@$(PIP) --no-build-isolation --editable '.[full]'
 	@$(BIN)/python -m finger3d._slim

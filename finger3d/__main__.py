@@ -2,13 +2,18 @@
 
 import sys
 
+from finger3d._interruption import interruption_ends_process, termination_interrupts
+
 
 def main() -> int:
     """Run the command line and return its exit code."""
     try:
-        from finger3d.cli import main as run
+        with termination_interrupts():
+            from finger3d.cli import main as run
 
-        return run()
+            code = run()
+        interruption_ends_process()
+        return code
     except KeyboardInterrupt:
         print("finger3d: interrupted; nothing was written", file=sys.stderr)
         return 130

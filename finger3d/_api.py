@@ -19,18 +19,18 @@ if TYPE_CHECKING:
     from finger3d.analyses.plan import Plan
     from finger3d.mold.export import Exported
     from finger3d.mold.options import MoldOptions
-    from finger3d.scene import Scene
+    from finger3d.scene import Source
 
 Value = float | int | bool | str
 """A value of a key of a scene."""
 
 
-def plan(scene: Scene | str | Path) -> Plan:
+def plan(scene: Source) -> Plan:
     """Forecast size, time and memory of a press without solving anything.
 
     Parameters
     ----------
-    scene : a loaded scene, or the path of a TOML file
+    scene : path of a TOML file, a dict with its tables, or a loaded scene
 
     Returns
     -------
@@ -38,8 +38,9 @@ def plan(scene: Scene | str | Path) -> Plan:
         For instance ``plan.dofs``, ``plan.total_s`` and ``plan.memory_MB``.
     """
     from finger3d.analyses import plan
+    from finger3d.scene import scene_of
 
-    return plan.plan(_loaded(scene))
+    return plan.plan(scene_of(scene))
 
 
 @dataclass(frozen=True)
@@ -67,38 +68,57 @@ class SweepResult:
 
 
 def sweep(
-    scene: str | Path,
-    vary: Mapping[str, Sequence[Value]],
+    scene: Source,
+    vary: Mapping[str, Sequence[Value]] | str | Path,
     out: str | Path,
     overrides: Sequence[str] = (),
     scheduler: str | None = None,
     workers: int | None = None,
     report: Progress | None = None,
+    sample: str = "grid",
+    seed: int = 0,
 ) -> SweepResult:
-    """Press every combination of some values of a scene's keys.
+    """Press many points of a scene: every combination of some values of keys, a list of points, or random samples.
 
     A sweep that was interrupted continues in the same folder.
 
     Parameters
     ----------
-    scene : path of a TOML file
-    vary : key -> values, for instance ``{"friction.mu": [0.06, 0.25, 1.0], "material.nu": [0.45, 0.49]}``
+    scene : path of a TOML file, a dict with its tables, or a loaded scene
+    vary : key -> values, for instance ``{"friction.mu": [0.06, 0.25, 1.0], "material.nu": [0.45, 0.49]}``; or the path
+        of a CSV file with a column for each key and a row for each point
     out : folder for the results
     overrides : other keys to set, such as ``"mesh.size_mm=1.0"``
     scheduler : address of a Dask scheduler; None: processes on this machine
     workers : number of these processes; None: one for each core
     report : receives the progress at every point
+    sample : ``"grid"``, every combination of the values; ``"list"``, values at the same place make a point;
+        ``"lhs:200"`` or ``"random:200"``, that many samples, of a Latin hypercube or independent, where `vary` has the
+        lower and the upper bound of every key
+    seed : of the random numbers
 
     Raises
     ------
     Finger3dError
         For a mistake in the scene or the values, before any point is solved.
     """
-    from finger3d.analyses.sweep.points import combinations
+    from finger3d.analyses.sweep.points import combinations, listed_points
     from finger3d.analyses.sweep.run import sweep as run
+    from finger3d.analyses.sweep.samples import columns_of, drawn, rows_of
 
-    texts = [f"{key}={','.join(map(_as_toml, values))}" for key, values in vary.items()]
-    store = run(combinations(Path(scene), overrides, texts), out, scheduler, workers, report)
+    if isinstance(vary, str | Path):
+        points = listed_points(scene, overrides, rows_of(Path(vary)), "--points")
+    elif sample == "list":
+        points = listed_points(
+            scene, overrides, columns_of({k: list(map(_as_toml, v)) for k, v in vary.items()}), "vary"
+        )
+    elif sample != "grid":
+        ranges = [f"{key}={':'.join(map(_as_toml, bounds))}" for key, bounds in vary.items()]
+        points = listed_points(scene, overrides, drawn(sample, ranges, seed), "--sample")
+    else:
+        texts = [f"{key}={','.join(map(_as_toml, values))}" for key, values in vary.items()]
+        points = combinations(scene, overrides, texts)
+    store = run(points, out, scheduler, workers, report)
     columns = store.columns()
     return SweepResult(Path(out), columns, sum(outcome != "converged" for outcome in columns["outcome"]))
 
@@ -121,7 +141,7 @@ def optimise(
 
     Parameters
     ----------
-    scene : path of a TOML file, the start of the search
+    scene : path of a TOML file, a dict with its tables, or a loaded scene; the start of the search
     free : key -> lower and upper bound, for instance ``{"gauge.g36.x_mm": (10.0, 48.0)}``
     out : folder for evaluations.csv, best.toml and report.html
     objective : "sensitivity", or a Python file with a function ``objective(table) -> number``
@@ -142,13 +162,14 @@ def optimise(
     from finger3d.analyses.free_keys import FreeKey
     from finger3d.analyses.optimise.run import optimise as run
     from finger3d.analyses.optimise.task import MUS, OptimisationProblem
-    from finger3d.scene import tree
+    from finger3d.scene import tables_of
 
+    given, path = tables_of(scene, overrides)
     problem = OptimisationProblem(
-        given=tree.override(tree.read(Path(scene)), overrides),
+        given=given,
         free=tuple(FreeKey.of(f"{key}={low!r}:{high!r}") for key, (low, high) in free.items()),
         objective=str(objective),
-        path=Path(scene),
+        path=path,
         gauge=gauge,
         mus=tuple(mus) if mus is not None else MUS,
         noise=noise,
@@ -174,7 +195,7 @@ def place_gauges(
 
     Parameters
     ----------
-    scene : path of a TOML file
+    scene : path of a TOML file, a dict with its tables, or a loaded scene
     count : number of gauges
     out : folder for gauges.json, best.toml, map.csv, map.png and report.html
     free : bounds of "gauge.x_mm", "gauge.y_mm", "gauge.z_mm" and "gauge.angle_deg"; None: the whole body at z = 0
@@ -192,11 +213,11 @@ def place_gauges(
     from finger3d.analyses.free_keys import FreeKey
     from finger3d.analyses.optimise.gauge_run import place_gauges as run
     from finger3d.analyses.optimise.task import MUS
-    from finger3d.scene import tree
+    from finger3d.scene import tables_of
 
-    given = tree.override(tree.read(Path(scene)), overrides)
+    given, path = tables_of(scene, overrides)
     keys = [FreeKey.of(f"{key}={low!r}:{high!r}") for key, (low, high) in (free or {}).items()]
-    return run(given, count, out, keys, MUS if mus is None else mus, noise, tolerances, Path(scene), report)
+    return run(given, count, out, keys, MUS if mus is None else mus, noise, tolerances, path, report)
 
 
 def identify(
@@ -211,7 +232,7 @@ def identify(
 
     Parameters
     ----------
-    scene : path of a TOML file
+    scene : path of a TOML file, a dict with its tables, or a loaded scene
     measured : CSV file with columns named as in history.csv, and optionally their standard deviations, ``..._std``
     free : key -> lower and upper bound, for instance ``{"material.E_MPa": (0.05, 5.0)}``
     out : folder for identify.json, identify.csv, identified.toml, identify.png and report.html
@@ -225,15 +246,15 @@ def identify(
     """
     from finger3d.analyses.free_keys import FreeKey
     from finger3d.analyses.identify.run import identify as run
-    from finger3d.scene import tree
+    from finger3d.scene import tables_of
 
-    given = tree.override(tree.read(Path(scene)), overrides)
+    given, path = tables_of(scene, overrides)
     keys = [FreeKey.of(f"{key}={low!r}:{high!r}") for key, (low, high) in free.items()]
-    return run(given, measured, keys, out, Path(scene), report)
+    return run(given, measured, keys, out, path, report)
 
 
 def export(
-    scene: Scene | str | Path,
+    scene: Source,
     out: str | Path,
     mold: MoldOptions | None = None,
     text: bool = False,
@@ -244,7 +265,7 @@ def export(
 
     Parameters
     ----------
-    scene : a loaded scene, or the path of a TOML file
+    scene : path of a TOML file, a dict with its tables, or a loaded scene
     out : folder for the files
     mold : `finger3d.MoldOptions`; None: no mold
     text : whether the STL file is text instead of binary
@@ -252,14 +273,9 @@ def export(
     report : told about stages
     """
     from finger3d.mold.export import export as run
+    from finger3d.scene import scene_of
 
-    return run(_loaded(scene), out, mold, text, tolerance_mm, report)
-
-
-def _loaded(scene: Scene | str | Path) -> Scene:
-    from finger3d.scene import load
-
-    return load(scene) if isinstance(scene, str | Path) else scene
+    return run(scene_of(scene), out, mold, text, tolerance_mm, report)
 
 
 def _as_toml(value: Value) -> str:

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import json
+import sys
+from importlib.metadata import PackageNotFoundError, distribution
 from importlib.util import find_spec
+from pathlib import Path
+from urllib.parse import urlsplit
+from urllib.request import url2pathname
 
 from finger3d.errors import MissingError
 
@@ -55,8 +61,28 @@ def require(what: str, *modules: str, instead: str = "") -> None:
 
 def message(what: str, module: str, instead: str = "") -> str:
     """Return the line about a module that is not installed."""
-    text = f'{what} needs {module}: pip install "finger3d[{EXTRAS[module]}]"'
+    text = f"{what} needs {module}: {install(EXTRAS[module])}"
     return f"{text}, or {instead}" if instead else text
+
+
+def install(extra: str) -> str:
+    """Return the command that adds an extra where this package is installed: no index has finger3d by its name.
+
+    It names this Python, whose pip need not be the first on the path, and the folder that finger3d came from.
+    """
+    source, editable = Path(__file__).resolve().parent.parent, "--editable "
+    if not (source / "pyproject.toml").is_file():
+        source, editable = _installed_from(), ""
+    return f'{sys.executable} -m pip install {editable}"{source}[{extra}]"'
+
+
+def _installed_from() -> Path:
+    """Return the folder or wheel that pip has installed this package from, as PEP 610 records it."""
+    try:
+        text = distribution("finger3d").read_text("direct_url.json")
+    except PackageNotFoundError:
+        text = None
+    return Path(url2pathname(urlsplit(json.loads(text)["url"]).path)) if text else Path("finger3d")
 
 
 def absent(error: ImportError) -> str | None:

@@ -13,6 +13,8 @@ from importlib import metadata
 from pathlib import Path
 
 _PR_SET_PDEATHSIG = 1  # linux/prctl.h
+_BUFFERS_BYTES = 2 * 2**26  # measured: NumPy's and SciPy's OpenBLAS map 32 MB each
+_UNROLLED = 64  # rows above which a product takes a buffer
 
 PACKAGES = (
     "finger3d",
@@ -74,6 +76,50 @@ def peak_memory_MB() -> float:
         return math.nan
     unit = 1 if sys.platform == "darwin" else 1024  # bytes on macOS, KiB elsewhere
     return float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit) / 2**20
+
+
+_LIBRARIES_BYTES, _THREAD_BYTES = 300 * 2**20, 82 * 2**20
+"""Address space that the imported libraries and a small solution take, measured, and that each thread takes besides."""
+
+
+def address_limit() -> int | None:
+    """Return the limit of the address space of a process (``ulimit -v``) in bytes, or None without one.
+
+    Where such a limit is reached OpenBLAS, in the wheels of NumPy and SciPy, repeats an allocation that fails without
+    end, even while it is imported.
+    """
+    try:
+        import resource
+    except ModuleNotFoundError:  # Windows
+        return None
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    return None if limit == resource.RLIM_INFINITY else limit
+
+
+def enough_address_space() -> bool:
+    """Return whether the limit of the address space, if there is one, leaves room for the libraries."""
+    limit = address_limit()
+    given = next((n for n in map(os.environ.get, ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")) if n), "")
+    threads = int(given) if given.isdecimal() else cores()
+    return limit is None or limit > _LIBRARIES_BYTES + threads * _THREAD_BYTES
+
+
+def reserve_for_linear_algebra() -> None:
+    """Let OpenBLAS allocate its buffers now, if the address space is limited: later there may be no room for them.
+
+    Raises
+    ------
+    MemoryError
+        If there is no room for them now.
+    """
+    if address_limit() is None:
+        return
+    import numpy as np
+    from scipy.linalg import lu_factor
+
+    np.empty(_BUFFERS_BYTES, dtype=np.uint8)  # raises MemoryError, which OpenBLAS does not
+    lu_factor(np.eye(2))
+    np.eye(_UNROLLED) @ np.eye(_UNROLLED)
 
 
 def child_environment() -> dict[str, str]:

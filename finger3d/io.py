@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import errno
 import json
 import math
 import os
@@ -19,13 +20,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finger3d._types import Array
-from finger3d.errors import Finger3dError
+from finger3d.errors import Finger3dError, MissingError
 
 MAIN = ("normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm")
 """The numbers of a press that short tables show, and that get an error bar, beside every gauge."""
 
 AREAS = ("contact_area_mm2", "stick_area_mm2")
 """Those that get an error bar besides."""
+
+
+def cannot_write(path: Path, error: OSError) -> Finger3dError:
+    """Return the error of a file that cannot be written: a full disk is nobody's mistake in the input."""
+    reason = error.strerror or str(error)
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return MissingError(f"cannot write {path}: {reason}; make room and run the same command again")
+    return Finger3dError(f"cannot write {path}: {reason}; choose another place with --out")
 
 
 @contextmanager
@@ -39,6 +48,8 @@ def atomic(path: str | Path) -> Iterator[Path]:
     ------
     Finger3dError
         If the file cannot be written.
+    MissingError
+        If the disk is full.
     """
     target = Path(path)
     temporary = target.with_name(f".{target.stem}.{secrets.token_hex(4)}{target.suffix}")
@@ -47,8 +58,7 @@ def atomic(path: str | Path) -> Iterator[Path]:
         yield temporary
         os.replace(temporary, target)
     except OSError as error:
-        reason = error.strerror or str(error)
-        raise Finger3dError(f"cannot write {target}: {reason}; choose another place with --out") from error
+        raise cannot_write(target, error) from error
     finally:
         # Usually it is gone by now, or was never made; and a folder that refuses has been reported above.
         with suppress(OSError):

@@ -49,7 +49,9 @@ class PlainProgress(Progress):
         self.start = time.perf_counter()
 
     def _line(self, text: str) -> None:
-        print(f"[{time.perf_counter() - self.start:7.1f} s] {printable(text)}", file=self.stream, flush=True)
+        # in one piece: an interruption may fall between the text and the end that print() adds
+        line = f"[{time.perf_counter() - self.start:7.1f} s] {printable(text)}\n"
+        print(line, end="", file=self.stream, flush=True)
 
     def stage(self, text: str) -> None:
         """Print the stage."""

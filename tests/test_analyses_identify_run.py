@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import csv
+import errno
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +13,7 @@ import numpy as np
 import pytest
 
 import finger3d
+from finger3d.errors import MissingError
 from finger3d.results.journal import Journal
 from finger3d.scene import parse
 from tests.identify_cases import FREE, PRESS, TRUE, bench
@@ -95,6 +98,20 @@ def test_a_scene_that_does_not_fit_is_said(tmp_path: Path, scene_file: Path) -> 
     )
     assert found.reduced_chi_square > 10.0
     assert any(f" {found.reduced_chi_square**0.5:.2g} " in note for note in found.notes)
+
+
+def test_a_full_disk_keeps_the_values_that_were_found(tmp_path: Path, scene_file: Path, monkeypatch: Any) -> None:
+    def full(source: Any, target: Any) -> None:
+        if str(target).endswith(".png"):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        replace(source, target)
+
+    replace, out = os.replace, tmp_path / "out"
+    monkeypatch.setattr(os, "replace", full)
+    with pytest.raises(MissingError, match=r"identify.png: No space left on device; make room"):
+        finger3d.identify(scene_file, bench(tmp_path / "bench.csv"), FREE, out)
+    assert (out / "identify.json").stat().st_size > 100
+    assert (out / "identify.csv").stat().st_size > 100
 
 
 def test_an_interrupted_identification_continues(tmp_path: Path, scene_file: Path, monkeypatch: Any) -> None:

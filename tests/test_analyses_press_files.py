@@ -130,3 +130,50 @@ def test_a_new_run_leaves_no_number_of_an_old_one(tmp_path: Path) -> None:
     assert main(["press", str(scene), "--out", str(out), "--no-figures", "--set", "press.steps=2"]) == 0
     assert not (out / "finger.png").exists()
     assert len(table(out / "history.csv")) == 2
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir() if path.name != ".finger3d.lock"}
+
+
+def test_a_press_that_writes_nothing_removes_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scene, out = written(tmp_path, HALF_CYLINDER), tmp_path / "out"
+    words = ["press", str(scene), "--out", str(out), "--no-error"]
+    assert main(words) == 0
+    before = contents(out)
+    assert {"summary.json", "report.html", "fields.vtu"} <= set(before)
+    capsys.readouterr()
+    assert main([*words, "--set", "press.depth_mm=1e-6"]) == 3  # less than the mesh resolves
+    assert contents(out) == before
+    # a press of one step takes their place, and leaves none of the pictures that it does not draw
+    assert main([*words, "--set", "press.steps=1", "--no-figures"]) == 0
+    after = contents(out)
+    assert "report.html" not in after
+    assert "finger.png" not in after
+    assert len(json.loads(after["summary.json"])["steps"]) == 1
+
+
+def test_an_interrupted_press_counts_no_step_of_an_earlier_one(tmp_path, monkeypatch, capsys) -> None:
+    scene, out = written(tmp_path, HALF_CYLINDER), tmp_path / "out"
+    words = ["press", str(scene), "--out", str(out), "--no-error", "--no-figures"]
+    assert main(words) == 0
+    before = contents(out)
+
+    def interrupted(*arguments: object, **settings: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("finger3d.mechanics.solve.march", interrupted)
+    capsys.readouterr()
+    assert main(words) == 130
+    assert "no step was finished" in capsys.readouterr().err
+    assert contents(out) == before
+
+
+@pytest.mark.parametrize("name", ["report.html", "scene.toml", "contact.csv"])
+def test_a_file_that_no_press_has_written_is_not_replaced(name: str, tmp_path: Path, capsys) -> None:
+    scene, out = written(tmp_path, HALF_CYLINDER), tmp_path / "out"
+    out.mkdir()
+    (out / name).write_text("mine", encoding="utf-8")
+    assert main(["press", str(scene), "--out", str(out), "--no-error"]) == 2
+    assert name in capsys.readouterr().err.splitlines()[-1]
+    assert contents(out) == {name: b"mine"}

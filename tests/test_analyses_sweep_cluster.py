@@ -10,8 +10,12 @@ import pytest
 
 from finger3d.analyses.sweep import run as running
 from finger3d.analyses.sweep import worker
+from finger3d.analyses.sweep.cluster import Cluster
 from finger3d.analyses.sweep.points import combinations
+from finger3d.analyses.sweep.progress import BodyPoints, SweepProgress
+from finger3d.analyses.sweep.store import ResultStore
 from finger3d.errors import MissingError
+from finger3d.progress import Progress
 from tests.scenes import HALF_CYLINDER, written
 from tests.sweep_cases import points_of
 
@@ -47,3 +51,60 @@ def test_workers_gain_no_threads(threads, tmp_path, monkeypatch) -> None:
     assert [row["point"] for row in rows] == [0, 1, 2]
     assert {row["outcome"] for row in rows} == {"converged"}
     assert pools == ([] if threads else [2])
+
+
+class Restarted:
+    """A cluster whose worker has been started again at another address after the first batch of a body."""
+
+    status = "running"
+
+    def __init__(self) -> None:
+        self.workers, self.sent = {"tcp://old:1": 1}, []
+
+    def nthreads(self) -> dict[str, int]:
+        return self.workers
+
+    def who_has(self, futures):
+        return {f.key: ("tcp://old:1",) for f in futures}
+
+    def cancel(self, futures, force: bool) -> None:
+        for future in futures:
+            future.cancelled = True
+
+    def submit(self, task, spec, left, size, *, pure, workers, allow_other_workers):
+        stranded = bool(self.sent)
+        self.sent.append(workers)
+        if len(self.sent) == 2:  # the worker dies while it presses this one
+            self.workers = {"tcp://new:2": 1}
+        reached = workers is None or not stranded
+        return Batch(
+            f"batch {len(self.sent)}", [{"point": p.number, "outcome": "converged"} for p in left[:1]], reached
+        )
+
+
+class Batch:
+    """A future of Dask, which is there at once, or never if its worker is gone."""
+
+    status = "finished"
+
+    def __init__(self, key, rows, reached: bool) -> None:
+        self.key, self.rows, self.reached, self.cancelled = key, rows, reached, False
+
+    def add_done_callback(self, told) -> None:
+        if self.reached:
+            told(self)
+
+    def result(self):
+        return self.rows
+
+
+def test_a_batch_whose_worker_is_gone_is_sent_to_any(paper_scene, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr("finger3d.analyses.sweep.cluster._POLL_S", 0.01)
+    sweep = points_of(paper_scene, "friction.mu=0.1,0.2,0.3")
+    client = Restarted()
+    with ResultStore(sweep, tmp_path).open() as store:
+        (spec,) = sweep.bodies.values()
+        kept = Cluster(client, SweepProgress(store, Progress()))
+        monkeypatch.setattr(kept.progress, "add", lambda row: None)
+        kept.press([BodyPoints(spec, list(sweep.points))])
+    assert client.sent[:3] == [None, ["tcp://old:1"], None]

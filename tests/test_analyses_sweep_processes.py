@@ -125,14 +125,14 @@ def test_a_thousand_points_survive_kill_9(root, paper_scene, tmp_path) -> None:
 
 @contextmanager
 def dask(
-    workers: int, env: dict[str, str], where: Path
+    workers: int, env: dict[str, str], where: Path, *options: str
 ) -> Iterator[tuple[str, subprocess.Popen, list[subprocess.Popen]]]:
     """Address and process of a scheduler, and the processes of its workers."""
     port = free_port()
     address = f"tcp://127.0.0.1:{port}"
     here = [sys.executable, "-m"]
     scheduler = ["distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]
-    worker = ["distributed.cli.dask_worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard"]
+    worker = ["distributed.cli.dask_worker", address, "--nthreads", "1", "--no-dashboard", *(options or ["--no-nanny"])]
     with ExitStack() as running:
         process = running.enter_context(started([*here, *scheduler], env, where, where / "scheduler.log"))
         logs = [where / f"worker{i}.log" for i in range(workers)]
@@ -166,6 +166,40 @@ def test_a_sweep_on_a_scheduler_survives_kill_9_of_a_worker(root, paper_scene, t
     assert_nothing_repeated_or_lost(out, 120)
 
 
+@pytest.mark.slow
+def test_a_sweep_goes_on_when_a_nanny_starts_its_worker_again(root, paper_scene, tmp_path) -> None:
+    """As after a death for lack of memory; Dask itself keeps the batch for the address that is gone."""
+    env, out = environment(root, str(tmp_path)), tmp_path / "out"
+    with dask(1, env, tmp_path, "--nanny", "--local-directory", str(tmp_path)) as (address, _, (nanny,)):
+        command = sweeping(paper_scene, out, 30, 2, "--scheduler", address, *SLOW)
+        with started(command, env, tmp_path, tmp_path / "log") as parent:
+            until(lambda: len(lines(out)) >= 3, "three points")
+            spawned = [n for n in children(nanny.pid) if "spawn_main" in Path(f"/proc/{n}/cmdline").read_text()]
+            for pid in spawned:
+                os.kill(pid, signal.SIGKILL)
+            assert len(spawned) == 1
+            assert parent.wait(timeout=200) == 0, (tmp_path / "log").read_text()
+    assert_nothing_repeated_or_lost(out, 60)
+
+
+def test_a_worker_without_finger3d_is_named(root, paper_scene, tmp_path) -> None:
+    env, out = environment(root, str(tmp_path)), tmp_path / "out"
+    hidden = tmp_path / "hidden"
+    hidden.mkdir()
+    # stands for an environment without it
+    code = "import importlib.metadata as m, sys; f = m.version\n"
+    code += "def version(name):\n    if name == 'finger3d': raise m.PackageNotFoundError(name)\n    return f(name)\n"
+    code += "m.version = version; sys.modules['finger3d'] = None\n"
+    (hidden / "sitecustomize.py").write_text(code, encoding="utf-8")
+    bare = {**env, "PYTHONPATH": str(hidden)}
+    with dask(1, bare, tmp_path) as (address, *_):
+        command = sweeping(paper_scene, out, 3, 2, "--scheduler", address)
+        done = subprocess.run(command, env=env, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 3, done.stderr
+    (line,) = done.stderr.splitlines()
+    assert "has no finger3d; install finger3d" in line
+
+
 @pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGTERM])
 def test_a_scheduler_that_dies_ends_a_sweep_with_3_and_one_line(sent, root, paper_scene, tmp_path) -> None:
     env, out = environment(root, str(tmp_path)), tmp_path / "out"
@@ -195,7 +229,7 @@ AT_ONCE += "from finger3d.cli import main; import sys; sys.exit(main())"
 @pytest.mark.parametrize("bodies", [1, 2, 0], ids=["here", "workers", "threads"])
 def test_ctrl_c_ends_with_130_and_one_line(bodies, root, paper_scene, tmp_path) -> None:
     out, threads, bodies = tmp_path / "out", bodies == 0, bodies or 1
-    command = sweeping(paper_scene, out, 120 // bodies, bodies, "--workers", "1", *SLOW)
+    command = sweeping(paper_scene, out, 120 // bodies, bodies, "--workers", str(bodies), *SLOW)
     if threads:
         command[1:3] = ["-c", AT_ONCE]
     with started(command, environment(root, str(tmp_path)), tmp_path, tmp_path / "log") as parent:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import errno
 import subprocess
 import sys
 
 import pyarrow.parquet as pq
 import pytest
 
+from finger3d.analyses.sweep import run as running
 from finger3d.analyses.sweep.store import ResultStore
 from finger3d.cli import main
-from finger3d.errors import Finger3dError
+from finger3d.errors import Finger3dError, MissingError
 from finger3d.results.journal import Journal, Row
 from finger3d.scene import load
 from tests.sweep_cases import COARSE, SETS, lines, points_of, pressed_here, table
@@ -70,3 +72,16 @@ def test_a_point_whose_row_is_written_at_an_interruption_is_counted(paper_scene,
 
 def test_the_scene_of_these_tests_is_small(paper_scene) -> None:
     assert load(paper_scene, SETS).mesh.size_mm == 4.0
+
+
+def test_one_worker_is_this_process(paper_scene, tmp_path, monkeypatch) -> None:
+    """It needs no shared memory, which a container may lack."""
+
+    def none(*arguments: object) -> None:
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    monkeypatch.setattr("finger3d.analyses.sweep.local._pool", none)
+    sweep = points_of(paper_scene, "material.nu=0.3,0.4")
+    with pytest.raises(MissingError, match="Read-only file system; --workers 1 "):
+        running.sweep(sweep, tmp_path, workers=2)
+    assert sorted(running.sweep(sweep, tmp_path, workers=1).rows) == [0, 1]

@@ -10,7 +10,7 @@ from tests.sweep_cases import points_of, pressed_here
 def test_a_body_that_cannot_be_built_and_a_point_that_fails_are_rows(paper_scene, monkeypatch) -> None:
     sweep = points_of(paper_scene, "friction.mu=0.06,1")
 
-    def fails(*arguments: object) -> None:
+    def fails(*arguments: object, **settings: object) -> None:
         raise Finger3dError("no mesh")
 
     monkeypatch.setattr(worker, "SharedBody", fails)
@@ -22,5 +22,5 @@ def test_a_body_that_cannot_be_built_and_a_point_that_fails_are_rows(paper_scene
         def presses(self, variants: list, most: int | None) -> list:
             return [MemoryError() for _ in variants]
 
-    monkeypatch.setattr(worker, "SharedBody", lambda *a: Weak())
+    monkeypatch.setattr(worker, "SharedBody", lambda *a, **k: Weak())
     assert [row["outcome"] for row in pressed_here(sweep)] == ["MemoryError: no further information"] * 2

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+import finger3d
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.app.live_body import MU_STEP, STEPS, LiveBody
 from finger3d.errors import Finger3dError
@@ -64,8 +65,22 @@ def test_traction_obeys_coulomb_along_the_middle_line(body: LiveBody) -> None:
     slips, sticks = press.status == "slip", press.status == "stick"
     assert sticks.any()
     assert slips.any()
-    np.testing.assert_allclose(press.shear_MPa[slips], 0.05 * press.pressure_MPa[slips], rtol=1e-8)
-    assert (press.shear_MPa[sticks] <= 0.05 * press.pressure_MPa[sticks] * (1.0 + 1e-8)).all()
+    # symmetric: pushed outwards on both sides, so that the friction on the finger points to the middle
+    outward = np.sign(press.x_mm[slips])
+    np.testing.assert_allclose(press.shear_x_MPa[slips], -outward * 0.05 * press.pressure_MPa[slips], rtol=1e-8)
+    assert (np.abs(press.shear_x_MPa[sticks]) <= 0.05 * press.pressure_MPa[sticks] * (1.0 + 1e-8)).all()
+
+
+@pytest.mark.parametrize("steps", [7, "auto"])
+def test_the_page_opens_with_the_numbers_of_the_press(steps: int | str) -> None:
+    scene = parse(SCENE | {"press": {"depth_mm": 0.6, "steps": steps}, "gauge": (GAUGE,)})
+    own = finger3d.press(scene, error=False)
+    body = LiveBody.of(scene)
+    assert body.steps == len(own.steps)
+    assert body.largest_depth_mm == own.last.depth_mm
+    assert body.press(0.3, body.largest_depth_mm).numbers["normal_force_N"] == own.last.normal_force_N
+    (gauge,) = body.problem.model.gauges
+    assert body.read(gauge, 0.3, 0.6, 0.0).strain == pytest.approx(own.last.gauges["g"], rel=1e-9)
 
 
 def test_a_gauge_outside_the_finger_is_refused(body: LiveBody) -> None:

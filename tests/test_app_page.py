@@ -7,17 +7,18 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from dash import Dash
 
 from finger3d.app.live_body import LiveBody, LivePress, LiveReading
 from finger3d.app.page import numbers_of, page, section_figure, text_of, traction_figure
 from finger3d.app.server import LocalServer, local_server
 from finger3d.mechanics.gauges import Gauge
 from finger3d.scene.scene import parse
-from tests.test_app_live_body import SCENE
+from tests.test_app_live_body import GAUGE, SCENE
 
 PRESS = LivePress(
     {"normal_force_N": 2.0, "friction_sum_N": 0.5, "contact_half_length_mm": 1.5, "stick_half_length_mm": 0.5},
-    np.array([-1.0, 0.0, 1.0]), np.array([0.1, 0.3, 0.1]), np.array([0.03, 0.0, 0.03]),
+    0.0, np.array([-1.0, 0.0, 1.0]), np.array([0.1, 0.3, 0.1]), np.array([0.03, 0.0, -0.03]), np.zeros(3),
     np.array(["slip", "stick", "slip"]), np.zeros((1, 2)),
 )  # fmt: skip
 
@@ -34,8 +35,44 @@ def test_figures_have_units_and_the_data() -> None:
     assert "MPa" in traction.layout.yaxis.title.text
     by_name = {trace.name.split()[-1]: trace for trace in traction.data}
     np.testing.assert_array_equal(by_name["slip"].x, [-1.0, 1.0])
+    np.testing.assert_array_equal(by_name["slip"].y, [0.03, -0.03])  # along x, not its magnitude
+    assert not any("along z" in trace.name for trace in traction.data)
     section = section_figure(LiveBody.of(parse(SCENE)), Gauge("g", 1.0, 2.0))
     assert np.mean(section.data[1].x) == pytest.approx(1.0)
+
+
+@pytest.fixture(scope="module")
+def opened() -> Dash:
+    return page(LiveBody.of(parse(SCENE | {"gauge": ({**GAUGE, "angle_deg": 200.0},)})), 0.3)
+
+
+def answers(opened: Dash, *values: object) -> dict[str, dict[str, object]]:
+    """What the page answers to values of its sliders that a browser sends."""
+    (name,) = opened.callback_map
+    ids = ("mu", "depth", "x", "y", "angle")
+    outputs = [{"id": part.split(".")[0], "property": part.split(".")[1]} for part in name.strip(".").split("...")]
+    inputs = [{"id": key, "property": "value", "value": v} for key, v in zip(ids, values, strict=True)]
+    body = {"output": name, "outputs": outputs, "inputs": inputs, "changedPropIds": ["mu.value"]}
+    path = f"{opened.config.requests_pathname_prefix}_dash-update-component"
+    answer = opened.server.test_client().post(path, json=body)
+    assert answer.status_code == 200
+    return answer.get_json()["response"]
+
+
+def test_the_page_opens_at_the_gauge_of_the_scene(opened: Dash) -> None:
+    sliders = {part.children[1].id: part.children[1] for part in opened.layout.children[1].children}
+    found = {name: slider.value for name, slider in sliders.items()}
+    assert found == {"mu": 0.3, "depth": 0.6, "x": 1.0, "y": 4.0, "angle": pytest.approx(20.0)}
+    said = answers(opened, *found.values())
+    assert "normal force" in said["numbers"]["children"]
+    assert said["mistake"]["children"] == ""
+
+
+@pytest.mark.parametrize("value", ["abc", None, 1e300, -1e300, [1.0], {}, 0.61, True])
+def test_a_value_that_no_slider_has_is_refused_in_one_line(opened: Dash, value: object) -> None:
+    said = answers(opened, 0.3, value, 1.0, 4.0, 20.0)
+    assert said["mistake"]["children"] == "depth (mm): must be a number from 0.03 to 0.6"
+    assert said["numbers"]["children"] == ""
 
 
 @pytest.fixture
@@ -70,4 +107,4 @@ def test_a_moved_slider_changes_numbers_and_figures_in_a_browser(running: LocalS
         expect(tab.locator("#traction .main-svg").first).to_be_visible()
         browser.close()
     assert complaints == []
-    assert all(url.startswith((running.url.partition("?")[0], "data:", "blob:")) for url in asked)
+    assert all(url.startswith((running.url, "data:", "blob:")) for url in asked)

@@ -194,7 +194,7 @@ def test_a_disk_that_fills(root: Path, tmp_path: Path, monkeypatch, capsys) -> N
 
     replace = os.replace
     monkeypatch.setattr(os, "replace", full)
-    assert main(press(root, tmp_path, *SECTION, "--no-figures")[3:]) == 2
+    assert main(press(root, tmp_path, *SECTION, "--no-figures")[3:]) == 3
     error = capsys.readouterr().err.strip().splitlines()[-1]
     assert f"{tmp_path / 'history.csv'}: {os.strerror(errno.ENOSPC)}" in error
     assert not [p.name for p in tmp_path.iterdir() if p.name.startswith(".") and p.suffix != ".lock"]

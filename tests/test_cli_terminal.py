@@ -1,19 +1,17 @@
-"""A command does its work whatever becomes of the terminal, and SIGTERM ends it as Ctrl-C does."""
+"""A command does its work whatever becomes of the terminal, and however narrow that is."""
 
 from __future__ import annotations
 
 import io
 import json
 import os
-import signal
 import subprocess
 import sys
-import threading
 from pathlib import Path
 
 import pytest
 
-from finger3d.cli.terminal import SafeStream, safe_streams, termination_interrupts
+from finger3d.cli.terminal import SafeStream, legible_width, safe_streams
 
 SECTION = [
     "--set", "model.domain=plane-strain", "--set", "mesh.size_mm=8", "--set", "mesh.base_size_mm=16", "--set",
@@ -100,35 +98,21 @@ def test_streams_are_put_back(capsys: pytest.CaptureFixture[str]) -> None:
     assert tuple(capsys.readouterr()) == ("out\n", "err\n")
 
 
-@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
-def test_a_termination_is_an_interruption(name: str) -> None:
-    number = getattr(signal, name)
-    outside = signal.signal(number, signal.SIG_DFL)  # under nohup, SIGHUP would be ignored
-    try:
-        with pytest.raises(KeyboardInterrupt), termination_interrupts():
-            signal.raise_signal(number)
-        assert signal.getsignal(number) == signal.SIG_DFL
-    finally:
-        signal.signal(number, outside)
+@pytest.mark.parametrize("columns", ["0", "1", "2", "19"])
+def test_help_ends_on_a_terminal_of_any_width(root: Path, columns: str) -> None:
+    env = {**os.environ, "PYTHONPATH": str(root), "COLUMNS": columns}
+    command = [sys.executable, "-m", "finger3d", "press", "--help"]
+    done = subprocess.run(command, env=env, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+    assert max(map(len, done.stdout.splitlines())) <= 20
+    assert "--out" in done.stdout
 
 
-def test_an_ignored_hangup_stays_ignored() -> None:
-    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    try:
-        with termination_interrupts():
-            assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
-        assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
-    finally:
-        signal.signal(signal.SIGHUP, before)
-
-
-def test_commands_run_outside_the_main_thread() -> None:
-    def run() -> None:
-        with termination_interrupts():
-            done.append(True)
-
-    done: list[bool] = []
-    thread = threading.Thread(target=run)
-    thread.start()
-    thread.join()
-    assert done
+def test_the_width_is_put_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "3")
+    with legible_width():
+        assert os.environ["COLUMNS"] == "20"
+    assert os.environ["COLUMNS"] == "3"
+    monkeypatch.setenv("COLUMNS", "77")
+    with legible_width():
+        assert os.environ["COLUMNS"] == "77"

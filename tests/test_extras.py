@@ -9,6 +9,7 @@ import sys
 import tomllib
 from importlib.metadata import packages_distributions
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -59,7 +60,7 @@ def test_every_optional_module_comes_with_its_extra(root: Path) -> None:
 def test_a_requirement_names_command_extra_and_a_way_around(monkeypatch: pytest.MonkeyPatch) -> None:
     _extras.require("here", "pyvista")
     monkeypatch.setattr(_extras, "find_spec", lambda module: None)
-    with pytest.raises(MissingError, match=r'^show.*pip install "finger3d\[view\]".*add --png FILE$'):
+    with pytest.raises(MissingError, match=r'^show needs pyvista: .* -m pip install .*\[view\]", or add --png FILE$'):
         _extras.require("show", "pyvista", instead="add --png FILE")
 
 
@@ -69,7 +70,37 @@ def test_an_import_that_fails_inside_an_installed_package_is_no_missing_extra() 
     assert _extras.absent(ImportError("cannot load", name="pyvista")) is None
 
 
-def test_a_command_that_lacks_its_extra_ends_with_one_line(paper_scene, tmp_path) -> None:
+@pytest.mark.parametrize(
+    ("record", "said"),
+    [
+        ('{"url": "file:///home/a%20b/finger3d", "dir_info": {}}', '"/home/a b/finger3d[cad]"'),
+        ('{"url": "file:///tmp/finger3d-0.1.0-py3-none-any.whl"}', '"/tmp/finger3d-0.1.0-py3-none-any.whl[cad]"'),
+        (None, '"finger3d[cad]"'),
+    ],
+)
+def test_the_hint_of_an_installed_package_names_what_it_came_from(record, said, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(_extras, "__file__", str(tmp_path / "site-packages" / "finger3d" / "_extras.py"))
+    monkeypatch.setattr(_extras, "distribution", lambda name: SimpleNamespace(read_text=lambda file: record))
+    assert _extras.install("cad") == f"{sys.executable} -m pip install {said}"
+
+
+def test_the_full_extra_brings_what_the_readme_shows(root: Path) -> None:
+    extras = tomllib.loads((root / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    text = (root / "README.md").read_text(encoding="utf-8")
+    shown = {
+        "pandas": "to_dataframe()",
+        "pyvista": "to_pyvista()",
+        "dash": "finger3d app",
+        "build123d": "export scene.toml",
+    }
+    assert all(words in text for words in shown.values())
+    own = re.findall(r"\w+", extras["full"][0].partition("[")[2])
+    brought = {re.match(r"[\w-]+", line)[0] for name in own for line in extras[name]}
+    brought |= {re.match(r"[\w-]+", line)[0] for line in extras["full"][1:]}
+    assert set(shown) <= brought
+
+
+def test_a_command_that_lacks_its_extra_ends_with_one_line(root, paper_scene, tmp_path) -> None:
     scene = str(paper_scene)
     cases = [
         (["press", scene, "--out", "o", "--set", "mesh.mesher=ftetwild"], "cad"),
@@ -84,7 +115,7 @@ def test_a_command_that_lacks_its_extra_ends_with_one_line(paper_scene, tmp_path
         *_, line, code = text.splitlines()
         assert code == "exit code 3", (words, text)
         assert line.startswith("finger3d: ")
-        assert f'pip install "finger3d[{extra}]"' in line
+        assert f'{sys.executable} -m pip install --editable "{root}[{extra}]"' in line
         assert "Traceback" not in text
 
 

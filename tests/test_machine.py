@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 import finger3d
+from finger3d import _machine
 from finger3d._machine import PACKAGES, child_environment, cores, memory_bytes, versions
 
 
@@ -76,3 +77,22 @@ def _runs(pid: int) -> bool:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except FileNotFoundError:
         return False
+
+
+def test_an_address_space_without_room_for_the_libraries_is_recognised(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "1")
+    for limit, enough in ((None, True), (10**8, False), (10**10, True)):
+        monkeypatch.setattr(_machine, "address_limit", lambda limit=limit: limit)
+        assert _machine.enough_address_space() == enough
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "200")  # each takes a stack and buffers
+    assert not _machine.enough_address_space()
+
+
+def test_buffers_that_do_not_fit_are_an_error_that_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_machine, "address_limit", lambda: 10**9)
+    _machine.reserve_for_linear_algebra()
+    monkeypatch.setattr(_machine, "_BUFFERS_BYTES", 2**62)
+    with pytest.raises(MemoryError):
+        _machine.reserve_for_linear_algebra()
+    monkeypatch.setattr(_machine, "address_limit", lambda: None)
+    _machine.reserve_for_linear_algebra()

@@ -106,7 +106,7 @@ def test_stl_is_left_to_ftetwild(tmp_path: Path) -> None:
 
 def test_without_the_package_a_line_names_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("finger3d._extras.available", lambda module: module != "netgen")
-    with pytest.raises(MissingError, match=r'pip install "finger3d\[netgen\]".*mesh.mesher = "swept"'):
+    with pytest.raises(MissingError, match=r'-m pip install .*\[netgen\]".*mesh.mesher = "swept"'):
         netgen.new_mesh(FIG9, OPTIONS, ZONE, BOTH, print)
 
 

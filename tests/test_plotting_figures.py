@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from finger3d.contact.friction import OPEN, SLIP, STICK
-from finger3d.fem.simplex import Mesh
+from finger3d.fem.simplex import CONTACT, FREE_FACES, Mesh
 from finger3d.plotting import solid as render
-from finger3d.plotting.figures import contact_figure, finger_picture, force_figure, zones
+from finger3d.plotting.figures import contact_figure, finger_picture, force_figure, middle_line, zones
 from tests.pictures import MU, STEPS, finger, pixels, pressed, share, solid_finger
 
 pytestmark = pytest.mark.usefixtures("fresh_renderer")
@@ -98,3 +98,22 @@ def test_force_against_depth_is_drawn(tmp_path: Path) -> None:
     force_figure(tmp_path / "f.png", STEPS, "Fig. 9")
     assert share(tmp_path / "f.png", "#c0392b", within=0.05) > 1e-4
     assert share(tmp_path / "f.png", render.COLOURS[STICK], within=0.05) > 1e-4
+
+
+@pytest.mark.parametrize(
+    ("z", "expected"),
+    [
+        ([0.0] * 6 + [0.3] * 2, (0.0, [0, 1, 2, 3, 4, 5])),  # those beside the line have another traction
+        ([0.0] * 2 + [0.3] * 3 + [0.6] * 3, (0.0, [0, 1, 2, 3, 4])),  # hardly any on the line
+        ([0.9] * 4 + [1.5] * 4, (1.5, [4, 5, 6, 7])),  # none near it: where the pressure is largest
+    ],
+)
+def test_the_line_that_is_drawn(z: list[float], expected: tuple[float, list[int]]) -> None:
+    top, wall = FREE_FACES[CONTACT], FREE_FACES[CONTACT] + 1
+    table = {
+        "face": [top] * 8 + [wall], "x_mm": [0.1 * k for k in range(9)], "z_mm": [*z, 0.0],
+        "pressure_MPa": [0.1 * k for k in range(9)],
+    }  # fmt: skip
+    at, points = middle_line(table, 0.4, 2.0)
+    assert (at, points.tolist()) == expected
+    assert middle_line(table, 0.4, None)[1].tolist() == list(range(8))

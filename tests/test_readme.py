@@ -17,7 +17,7 @@ COARSE = {
     "gear": "mesh.mesher=swept mesh.size_mm=1.0 mesh.base_size_mm=4.0",
     "compare": "mesh.mesher=swept mesh.size_mm=8.0 mesh.base_size_mm=20.0 press.steps=5",
     "calibrate": "mesh.size_mm=2.0 mesh.base_size_mm=8.0 press.steps=10",
-    "sweep": "model.domain=plane-strain mesh.size_mm=3.0 mesh.base_size_mm=12.0",
+    "sweep": "model.domain=plane-strain mesh.size_mm=3.0 mesh.base_size_mm=12.0 press.steps=5",
     "identify": "model.domain=plane-strain mesh.size_mm=4.0 mesh.base_size_mm=12.0 press.steps=5",
     "optimise": "model.domain=plane-strain mesh.size_mm=3.0 mesh.base_size_mm=12.0 press.steps=10",
 }
@@ -113,6 +113,42 @@ def test_the_examples_of_adding_work_and_are_short(root: Path, folder: Path) -> 
     ]
     assert forces[1] / forces[0] == pytest.approx(0.9, rel=1e-9)
     assert names["run"](True).passed
+
+
+def test_the_examples_of_models_and_objects_in_python_run(root: Path, folder: Path) -> None:
+    from dataclasses import replace
+
+    import finger3d
+
+    page = "docs/reference/python.md"
+    (model,), (bar,) = (python(root, head, page) for head in ("Models without a scene", "An object of one's own"))
+    names: dict = {}
+    execute(model, names)
+    execute(bar, names)
+    for steps in (names["steps"], names["ridge"]):
+        assert len(steps) == 20
+        assert all(step.outcome.ok for step in steps)
+    # the model is that of a scene, where angles are in degrees
+    scene = {
+        "finger": {"geometry": "half_cylinder", "radius_mm": 5.0, "width_mm": 2.0},
+        "material": {"E_MPa": 1.0, "nu": 0.45},
+        "mesh": {"size_mm": 0.25, "base_size_mm": 1.0},
+        "object": {"shape": "cylinder", "radius_mm": 8.0},
+        "friction": {"mu": 0.3},
+        "press": {"leg": [{"depth_mm": 0.5, "steps": 10}, {"depth_mm": 0.5, "slide_x_mm": 0.3, "steps": 10}]},
+        "gauge": [{"name": "g", "x_mm": 1.0, "y_mm": 4.0, "angle_deg": 30.0}],
+        "model": {"domain": "plane-strain"},
+    }
+    last = finger3d.press(scene, error=False).last
+    assert names["numbers"]["normal_force_N"] == pytest.approx(last.normal_force_N, rel=1e-9)
+    assert names["steps"][-1].gauges["g"] == pytest.approx(last.gauges["g"], rel=1e-9)
+    # without its flat side the bar is a cylinder
+    build, march = names["build"], names["march"]
+    forces = [
+        list(march(build(replace(names["model"], object=thing))))[-1].state.force[:, 0].sum()
+        for thing in (names["RoundedBar"](half_width_mm=0.0, radius_mm=2.0), finger3d.Cylinder(radius_mm=2.0))
+    ]
+    assert forces[0] == pytest.approx(forces[1], rel=1e-9)
 
 
 def test_the_reference_is_the_codes_own(root: Path) -> None:

@@ -16,7 +16,7 @@ from finger3d.plotting.layout import DPI
 from finger3d.report.build import write_page
 from finger3d.report.chart import Chart, Line
 from finger3d.results.states import load_states
-from tests.scenes import SECTION, SOLID
+from tests.scenes import HALF_CYLINDER, SECTION, SOLID, changed, pressed, solid
 
 pytestmark = pytest.mark.browser
 
@@ -252,4 +252,32 @@ def test_the_view_turns_and_answers_its_controls(browser: Any, results: dict[str
     visit.page.mouse.up()
     assert np.abs(visit.stage() - before).mean() > 1.0
     assert visit.complaints == []
+    visit.page.close()
+
+
+_LAID_OUT = """(() => {
+    const stage = document.getElementById("view-stage"), scene = stage._fullLayout.scene._scene;
+    const model = scene.glplot.cameraParams.model;
+    return { perMm: [0, 1, 2].map((a) => model[5 * a] * scene.dataScale[a]),
+        ranges: ["x", "y", "z"].map((a) => scene.fullSceneLayout[a + "axis"].range),
+        names: stage.data.filter((t) => t.mode === "text").map((t) => [t.x[0], t.y[0]]) };
+})()"""
+"""Length in the drawn scene of a millimetre along each axis, the ranges of the axes, and places of gauges' names."""
+
+
+def test_the_view_is_to_scale_and_shows_a_ball_whole(browser: Any, tmp_path: Path) -> None:
+    text = changed(HALF_CYLINDER, width_mm=4.0, steps=2) + '[object]\nshape = "sphere"\nradius_mm = 3.0\n'
+    text += "".join(f'[[gauge]]\nname = "close {i}"\nx_mm = {0.1 * i}\ny_mm = 3.0\n' for i in range(3))
+    visit = Visit(browser, pressed(tmp_path, solid(text, 0.8)), 1280)
+    visit.page.wait_for_timeout(1000)
+    laid_out = visit.page.evaluate(_LAID_OUT)
+    np.testing.assert_allclose(laid_out["perMm"], laid_out["perMm"][0], rtol=1e-6)
+    low, high = np.array(laid_out["ranges"]).T
+    # the ball's lowest point is at 4.75 mm, then at 4.5 mm; it is wider than the finger, which is 10 mm long
+    np.testing.assert_allclose(high, [5.0, 10.75, 3.0], rtol=0.25)
+    assert (high[1:] >= [10.74, 2.98]).all()  # of a drawn ball, whose corners are on it
+    assert low[2] <= -2.98
+    names = np.array(laid_out["names"])
+    assert len(names) == 4
+    assert np.diff(np.sort(names[1:, 1])).min() > 0.4  # a line of text, where the finger has some 500 pixels
     visit.page.close()

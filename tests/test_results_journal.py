@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from finger3d.errors import Finger3dError
+from finger3d.errors import Finger3dError, MissingError
 from finger3d.results.journal import Journal, Row, number_in, opened
 
 TASK = {"scene": {"mu": 0.5}, "points": 3}
@@ -60,7 +60,7 @@ def test_a_row_of_another_kind_is_named_by_its_line(tmp_path) -> None:
 
 def test_a_full_disk_is_an_error_of_the_row_that_does_not_fit() -> None:
     journal = Journal(Path("/dev/full"), [])
-    with pytest.raises(OSError, match="No space left"):
+    with pytest.raises(MissingError, match="/dev/full: No space left on device; make room"):
         journal.append({"n": 0})
     assert not journal.rows
     journal.close()

@@ -21,11 +21,11 @@ from finger3d.progress import Progress
 if TYPE_CHECKING:
     from finger3d.accuracy.refine import Refinement
     from finger3d.mechanics.problem import Problem
-    from finger3d.scene import Scene
+    from finger3d.scene import Scene, Source
 
 
 def press(
-    scene: Scene | str | Path,
+    scene: Source,
     out: str | Path | None = None,
     report: Progress | None = None,
     figures: bool | None = None,
@@ -35,7 +35,7 @@ def press(
 
     Parameters
     ----------
-    scene : a loaded scene, or the path of a TOML file
+    scene : path of a TOML file, a dict with its tables, or a loaded scene
     out : folder, made if it is not there; None: a temporary one, which is removed together with what is returned
     report : receives the progress
     figures : whether to draw PNG files and to write report.html; None: if a folder is given
@@ -55,10 +55,10 @@ def press(
     >>> len(finger3d.press(stiff).steps)
     4
     """
-    from finger3d.scene import load
+    from finger3d.scene import scene_of
 
     started = time.perf_counter()
-    scene = load(scene) if isinstance(scene, str | Path) else scene
+    scene = scene_of(scene)
     temporary = TemporaryDirectory(prefix="finger3d-") if out is None else None
     figures = temporary is None if figures is None else figures
     with claimed(temporary.name if temporary else str(out), "press") as folder:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from finger3d._types import Array, Float, Tree, TreeView
 from finger3d.contact.friction import STICK
+from finger3d.errors import Finger3dError
 from finger3d.fem.simplex import CONTACT, FREE_FACES, Mesh, axis_numbers, middles, unfold
 from finger3d.io import atomic, write_csv, write_json
 from finger3d.mechanics.history import (
@@ -39,8 +40,9 @@ _WRITE_SHARE = 10.0
 """Shortest time between two writes over the time of one: a table holds all increments, and grows with them."""
 
 _INCOMPLETE = "incomplete: the press was still running, or was interrupted; the steps written are valid"
+_SUMMARY, _SCENE = "summary.json", "scene.toml"
 _FILES = (
-    "summary.json", "history.csv", "contact.csv", "fields.vtu", "error_shares.vtu", "steps.npz", "report.html",
+    "history.csv", "contact.csv", "fields.vtu", "error_shares.vtu", "steps.npz", "report.html",
     "finger.png", "contact.png", "force.png", "markers.csv", "markers.png",
 )  # fmt: skip
 
@@ -79,25 +81,37 @@ class Fields:
 class ResultWriter:
     """Writes the results of a press into a folder as they come.
 
+    Results of an earlier press in the folder stay until the first step of this one is there.
+
     Parameters
     ----------
-    folder : where the files go; results of an earlier press there are removed
+    folder : where the files go
+
+    Raises
+    ------
+    Finger3dError
+        If a file there has the name of a result, but no press has written it.
     """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._written = -math.inf
         self._seconds = 0.0
-        for name in _FILES:
-            (folder / name).unlink(missing_ok=True)
+        self._scene = ""
+        self._replaces = (folder / _SUMMARY).exists()
+        if not self._replaces and (strange := [name for name in (_SCENE, *_FILES) if (folder / name).exists()]):
+            raise Finger3dError(
+                f"--out {folder}: holds {strange[0]} that no press has written there; name another folder, or move it"
+            )
 
     def scene(self, text: str) -> None:
-        """Write scene.toml."""
-        with atomic(self.folder / "scene.toml") as path:
-            path.write_text(text, encoding="utf-8")
+        """Keep the content of scene.toml, which is written with the first summary."""
+        self._scene = text
 
     def progress(self, record: PressRecord, outcome: str = _INCOMPLETE) -> None:
         """Write summary and tables of a press that still runs."""
+        if self._replaces and not record.steps:
+            return
         begin = time.perf_counter()
         steps = self.summary(record, outcome)["steps"]
         if steps:
@@ -116,7 +130,13 @@ class ResultWriter:
         """Write summary.json and return its content."""
         begin = time.perf_counter()
         content = record.summary(outcome)
-        write_json(self.folder / "summary.json", content)
+        write_json(self.folder / _SUMMARY, content)
+        if self._scene:
+            with atomic(self.folder / _SCENE) as path:
+                path.write_text(self._scene, encoding="utf-8")
+            for name in _FILES if self._replaces else ():
+                (self.folder / name).unlink(missing_ok=True)
+            self._scene, self._replaces = "", False
         record.seconds["output"] += time.perf_counter() - begin
         return content
 

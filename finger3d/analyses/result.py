@@ -14,7 +14,7 @@ from finger3d.analyses.press_files import history_table
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.io import atomic
 from finger3d.mechanics.history import History, contact_table
-from finger3d.results.summary import PressStep, steps_of
+from finger3d.results.summary import PressStep, read_rows, steps_of
 from finger3d.results.vtu import grid
 
 if TYPE_CHECKING:
@@ -99,21 +99,26 @@ class PressResult:
         """Return what summary.json holds: scene, effects, steps, mesh, cost, versions, errors, warnings."""
         return self._numbers
 
-    def to_dataframe(self, table: Literal["history", "contact"] = "history") -> pandas.DataFrame:
+    def to_dataframe(self, table: Literal["history", "contact", "markers"] = "history") -> pandas.DataFrame:
         """Return a table as a pandas DataFrame.
 
         Parameters
         ----------
         table : ``"history"``, a row a step, as in history.csv; or ``"contact"``, a row a contact point in the last
-            good step, as in contact.csv
+            good step, as in contact.csv; or ``"markers"``, a row a marker and step, as in markers.csv
         """
         require("to_dataframe()", "pandas")
         import pandas
 
         if table == "contact":
             return pandas.DataFrame(self._contact())
+        if table == "markers":
+            if not (self.out / "markers.csv").exists():
+                raise Finger3dError("to_dataframe('markers'): the scene has no [[marker]] and no [marker_grid]")
+            rows = pandas.DataFrame(read_rows(self.out / "markers.csv"))
+            return rows.astype({name: int if name == "step" else float for name in rows if name != "marker"})
         if table != "history":
-            raise Finger3dError(f'to_dataframe({table!r}): must be "history" or "contact"')
+            raise Finger3dError(f'to_dataframe({table!r}): must be "history", "contact" or "markers"')
         steps = self._numbers["steps"]
         return pandas.DataFrame(history_table(steps) if steps else {})
 

@@ -120,6 +120,7 @@ class SharedBody:
     model : any model of the family, with the mesh that all share
     variants : all variants that will be pressed
     say : receives messages about meshing and condensation
+    grid_mm : spacing of a grid of markers, whose displacements are among the numbers; None without one
 
     Attributes
     ----------
@@ -128,13 +129,17 @@ class SharedBody:
     """
 
     def __init__(
-        self, model: Model, variants: Sequence[Variant], say: Callable[[str], None] = lambda text: None
+        self,
+        model: Model,
+        variants: Sequence[Variant],
+        say: Callable[[str], None] = lambda text: None,
+        grid_mm: float | None = None,
     ) -> None:
         # Scenes are sorted by body without loading SciPy and the solver.
         from finger3d.mechanics.build import build
 
         start = time.perf_counter()
-        self._say = say
+        self._say, self._grid_mm = say, grid_mm
         gauges = model.gauges
         if model.inclusions is None:
             # Each place has one gauge, whose name is a number; variants may use one name for different places.
@@ -196,7 +201,7 @@ class SharedBody:
             press = variant.without_gauges()
             while press not in self._results:
                 done, run = next(runs)
-                self._results[done] = run.result()
+                self._results[done] = run.result(self._grid_mm)
             result = self._results[press]
             if isinstance(result, VariantResult):
                 gauges = self.strains(variant, result.gauges) if result.gauges else {}
@@ -289,8 +294,8 @@ class _Run:
             raise self.frames
         return self.frames
 
-    def result(self) -> VariantResult | Exception:
-        """Return the quantities of the last step."""
+    def result(self, grid_mm: float | None) -> VariantResult | Exception:
+        """Return the quantities of the last step, those of a grid of markers included."""
         if isinstance(self.frames, Exception):
             return self.frames
         residual = max(f.residual for f in self.frames)
@@ -303,6 +308,10 @@ class _Run:
         numbers = without_readings(numbers) | flat_readings(numbers | {"gauges": {}})
         for key in ("iterations", "residual", "method", "outcome"):
             numbers.pop(key)
+        if grid_mm is not None:
+            from finger3d.mechanics.marker_grid import grid_numbers
+
+            numbers |= grid_numbers(self.problem, self.frames[-1], grid_mm)
         return VariantResult(str(Outcome.CONVERGED), residual, numbers, gauges, self.seconds)
 
 

@@ -14,27 +14,28 @@ from finger3d._types import Array, Float, freeze_arrays
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.errors import Finger3dError
 from finger3d.fem.recover import displacement
-from finger3d.fem.simplex import CONTACT, FREE_FACES
 from finger3d.mechanics.build import build
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.gauges import Gauge
-from finger3d.mechanics.history import contact_table, measure
+from finger3d.mechanics.history import StepResult, contact_table, measure
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
+from finger3d.mechanics.step_halving import march_automatic
+from finger3d.plotting.figures import middle_line
 
 if TYPE_CHECKING:
     from finger3d.scene import Scene
 
 STEPS = 10
-"""Increments of every press; their error in the friction sum is some per cent."""
+"""Increments of every press of a scene that slides or turns the object; those of other scenes are the scene's own."""
 
 MU_STEP = 0.02
 """Difference of mu over which the slope of the strain is taken, to both sides."""
 
 _KEPT = 64  # presses; a slider that goes back finds them
 _PLACES = ("gauge_x_mm", "gauge_y_mm", "gauge_angle_deg")
-_LINE_MM = 1e-9
+_ALONG = ("x_mm", "pressure_MPa", "shear_x_MPa", "shear_z_MPa", "status")
 _NUMBERS = ("normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm")
 
 
@@ -45,15 +46,18 @@ class LivePress:
     Attributes
     ----------
     numbers : normal force, friction sum, half the lengths of contact and stick, as in `steps` of summary.json
-    x_mm, pressure_MPa, shear_MPa : (p,) traction along the middle of the contact face, ascending in x
+    z_mm : place of the line along x that the traction is given on, as in the picture of a press
+    x_mm, pressure_MPa, shear_x_MPa, shear_z_MPa : (p,) traction on the finger along that line, ascending in x
     status : (p,) "open", "stick" or "slip"
     displacement : (n, d) mm, of the meshed part
     """
 
     numbers: dict[str, float]
+    z_mm: float
     x_mm: Float
     pressure_MPa: Float
-    shear_MPa: Float
+    shear_x_MPa: Float
+    shear_z_MPa: Float
     status: Array
     displacement: Float
 
@@ -87,10 +91,14 @@ class LiveBody:
     ----------
     title : of the scene
     problem : condensed for the largest depth
+    largest_depth_mm : depth that the scene's own press ends at
+    steps : increments of every press
     """
 
     title: str
     problem: Problem
+    largest_depth_mm: float
+    steps: int
 
     @classmethod
     def of(cls, scene: Scene, say: Callable[[str], None] = lambda text: None) -> LiveBody:
@@ -106,13 +114,13 @@ class LiveBody:
             slots = dict(model.filled)
             name = next(slots[slot] for slot in ("hyperelastic_law", "relaxation", "inclusions") if slot in slots)
             raise Finger3dError(f"app: not with effects.{name}, which takes seconds to press; take the effect out")
-        straight = Leg(model.largest_depth_mm, steps=STEPS)
-        return cls(scene.title, build(replace(model, legs=(straight,), gauges=(), markers=(), taxels=()), say))
-
-    @property
-    def largest_depth_mm(self) -> float:
-        """Depth that the body is condensed for, that of the scene."""
-        return self.problem.model.largest_depth_mm
+        if len(model.legs) > 1 or model.legs[0].moves_sideways:
+            depth = model.largest_depth_mm
+            return cls(scene.title, build(replace(model, legs=(Leg(depth, steps=STEPS),)), say), depth, STEPS)
+        problem = build(model, say)
+        steps, _ = march_automatic(problem)
+        _check(steps[-1], scene.tables.friction.mu)
+        return cls(scene.title, problem, steps[-1].target.depth_mm, len(steps))
 
     def press(self, mu: float, depth_mm: float) -> LivePress:
         """Press with a coefficient of friction to a depth; the last presses are kept.
@@ -122,7 +130,7 @@ class LiveBody:
         Finger3dError
             If an increment does not converge.
         """
-        return _pressed(self, round(mu, 6), round(depth_mm, 6))
+        return _pressed(self, float(f"{mu:.9g}"), float(f"{depth_mm:.9g}"))
 
     def read(self, gauge: Gauge, mu: float, depth_mm: float, noise: float) -> LiveReading:
         """Read a gauge.
@@ -164,24 +172,21 @@ class LiveBody:
 def _pressed(body: LiveBody, mu: float, depth_mm: float) -> LivePress:
     problem = body.problem
     friction = problem.model.friction.with_mu(mu)
-    legs = (Leg(depth_mm, steps=STEPS),)
+    legs = (Leg(depth_mm, steps=body.steps),)
     steps = list(march(replace(problem, model=replace(problem.model, friction=friction, legs=legs))))
-    if not steps[-1].outcome.ok:
-        raise Finger3dError(f"app: mu = {mu:g} at a depth of {depth_mm:g} mm: {steps[-1].outcome}")
+    _check(steps[-1], mu)
     measured = measure(problem.points, steps[-1])
     table = contact_table(problem.points, steps[-1].state)
-    z, face = np.asarray(table["z_mm"]), np.asarray(table["face"])
-    top = face == FREE_FACES[CONTACT]
-    distance = np.abs(z)
-    on = np.flatnonzero(top & (distance <= max(problem.points.band_mm, distance[top].min() + _LINE_MM)))
-    on = on[np.argsort(np.asarray(table["x_mm"])[on], kind="stable")]
-    shear = np.hypot(np.asarray(table["shear_x_MPa"]), np.asarray(table["shear_z_MPa"]))
+    z_mm, on = middle_line(table, problem.points.band_mm, problem.points.half_width_mm if problem.dim == 3 else None)
     unknowns = next(formulation_of(problem.model).unknowns(problem, [steps[-1].meshed_state]))
     return LivePress(
         numbers={name: measured[name] for name in _NUMBERS},
-        x_mm=np.asarray(table["x_mm"])[on],
-        pressure_MPa=np.asarray(table["pressure_MPa"])[on],
-        shear_MPa=shear[on],
-        status=np.asarray(table["status"])[on],
+        z_mm=z_mm,
         displacement=displacement(problem.mesh, unknowns),
+        **{name: np.asarray(table[name])[on] for name in _ALONG},
     )
+
+
+def _check(last: StepResult, mu: float) -> None:
+    if not last.outcome.ok:
+        raise Finger3dError(f"app: mu = {mu:g} at a depth of {last.target.depth_mm:g} mm: {last.outcome}")

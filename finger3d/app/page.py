@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import secrets
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,24 +31,32 @@ _LAYOUT = {
 
 
 def page(body: LiveBody, mu: float) -> Dash:
-    """Return the page of a body; `mu` is where its slider begins."""
+    """Return the page of a body, at an address that cannot be guessed.
+
+    Parameters
+    ----------
+    mu : where its slider begins; that of depth begins at the scene's depth, those of the gauge at the scene's first
+    """
     import plotly.graph_objects as go
     from dash import Dash, Input, Output, dcc, html
 
-    app = Dash(__name__, title=f"finger3d: {body.title}", update_title="")
+    secret = f"/{secrets.token_urlsafe(24)}/"
+    app = Dash(__name__, title=f"finger3d: {body.title}", update_title="", url_base_pathname=secret)
     design = body.problem.model.design
-    deepest = body.largest_depth_mm
-    sliders = [
-        _slider("mu", "coefficient of friction mu", 0.0, _LARGEST_MU, 0.01, mu),
-        _slider("depth", "depth (mm)", _LEAST_DEPTH_SHARE * deepest, deepest, deepest / 100.0, deepest),
-        _slider("x", "gauge x (mm)", -design.half_length_mm, design.half_length_mm, 0.1, 0.5 * design.half_length_mm),
-        _slider("y", "gauge y (mm)", 0.0, design.height_mm, 0.1, 0.7 * design.height_mm),
-        _slider("angle", "gauge angle (degrees)", 0.0, 180.0, 1.0, 30.0),
-    ]
+    half, high, deepest = design.half_length_mm, design.height_mm, body.largest_depth_mm
+    first = next(iter(body.problem.model.gauges), Gauge("gauge", 0.5 * half, 0.7 * high, angle=math.radians(30.0)))
+    turned = math.degrees(first.angle) % 180.0  # a strain is the same in the opposite direction
+    sliders = {
+        "mu": Slider("coefficient of friction mu", 0.0, max(_LARGEST_MU, mu), 0.01, mu),
+        "depth": Slider("depth (mm)", _LEAST_DEPTH_SHARE * deepest, deepest, deepest / 100.0, deepest),
+        "x": Slider("gauge x (mm)", -half, half, 0.1, first.x_mm),
+        "y": Slider("gauge y (mm)", 0.0, high, 0.1, first.y_mm),
+        "angle": Slider("gauge angle (degrees)", 0.0, 180.0, 1.0, turned),
+    }
     app.layout = html.Div(
         [
             html.H1(body.title),
-            html.Div(sliders, style={"maxWidth": "50rem"}),
+            html.Div([slider.drawn(name) for name, slider in sliders.items()], style={"maxWidth": "50rem"}),
             html.P(id="numbers"),
             html.P(id="reading"),
             html.P(id="mistake", style={"color": "#a00"}),
@@ -59,10 +69,15 @@ def page(body: LiveBody, mu: float) -> Dash:
     @app.callback(
         [Output(name, "children") for name in ("numbers", "reading", "mistake")],
         [Output(name, "figure") for name in ("traction", "section")],
-        [Input(name, "value") for name in ("mu", "depth", "x", "y", "angle")],
+        [Input(name, "value") for name in sliders],
     )
-    def answer(mu: float, depth: float, x: float, y: float, angle: float) -> tuple[str, str, str, go.Figure, go.Figure]:
-        gauge = Gauge("gauge", x, y, angle=math.radians(angle))
+    def answer(*given: object) -> tuple[str, str, str, go.Figure, go.Figure]:
+        try:
+            values = [slider.checked(value) for slider, value in zip(sliders.values(), given, strict=True)]
+        except Finger3dError as error:
+            return "", "", str(error), go.Figure(), go.Figure()
+        mu, depth, x, y, angle = values
+        gauge = replace(first, x_mm=x, y_mm=y, angle=math.radians(angle))
         section = section_figure(body, gauge)
         try:
             press = body.press(mu, depth)
@@ -78,14 +93,44 @@ def page(body: LiveBody, mu: float) -> Dash:
     return app
 
 
-def _slider(name: str, label: str, low: float, high: float, step: float, value: float) -> html.Div:
-    from dash import dcc, html
+@dataclass(frozen=True)
+class Slider:
+    """A number that the page asks for, and the range of it."""
 
-    marks = {float(f"{at:.4g}"): f"{at:.3g}" for at in np.linspace(low, high, 5)}
-    slider = dcc.Slider(
-        low, high, step, value=round(value, 2), id=name, marks=marks, updatemode="drag", tooltip={"placement": "bottom"}
-    )
-    return html.Div([html.Label(label, htmlFor=name), slider], style={"marginBottom": "0.5rem"})
+    label: str
+    low: float
+    high: float
+    step: float
+    value: float
+
+    def checked(self, value: object) -> float:
+        """Return a value that a browser has sent, as a number.
+
+        Raises
+        ------
+        Finger3dError
+            If it is no number, or out of range.
+        """
+        room = 1e-6 * (self.high - self.low)
+        if isinstance(value, int | float) and self.low - room <= value <= self.high + room:
+            return float(value)
+        raise Finger3dError(f"{self.label}: must be a number from {self.low:g} to {self.high:g}")
+
+    def drawn(self, name: str) -> html.Div:
+        """Return the slider and its label."""
+        from dash import dcc, html
+
+        slider = dcc.Slider(
+            self.low,
+            self.high,
+            self.step,
+            value=float(f"{self.value:.6g}"),
+            id=name,
+            marks={float(f"{at:.4g}"): f"{at:.3g}" for at in np.linspace(self.low, self.high, 5)},
+            updatemode="drag",
+            tooltip={"placement": "bottom"},
+        )
+        return html.Div([html.Label(self.label, htmlFor=name), slider], style={"marginBottom": "0.5rem"})
 
 
 def numbers_of(press: LivePress) -> str:
@@ -107,26 +152,28 @@ def text_of(reading: LiveReading) -> str:
 
 
 def traction_figure(press: LivePress, mu: float) -> go.Figure:
-    """Return pressure, friction and its limit along the middle of the contact, with stick and slip."""
+    """Return pressure, friction and its limit along the middle of the contact, as the picture of a press shows them."""
     import plotly.graph_objects as go
 
     figure = go.Figure()
     figure.add_scatter(x=press.x_mm, y=press.pressure_MPa, name="pressure", mode="lines", line_color="#222222")
-    limit = mu * press.pressure_MPa
-    figure.add_scatter(
-        x=press.x_mm, y=limit, name="friction limit mu p", mode="lines", line={"dash": "dot", "color": "#777777"}
-    )
-    for status in ("stick", "slip"):
-        on = press.status == status
+    for sign in (1.0, -1.0):
         figure.add_scatter(
-            x=press.x_mm[on],
-            y=press.shear_MPa[on],
-            name=f"friction, {status}",
-            mode="markers",
-            marker={"color": _COLOURS[status], "size": 6},
-        )
-    title, x, y = "traction on the finger at z = 0", "x at rest (mm)", "traction (MPa)"
-    figure.update_layout(_LAYOUT, title=title, xaxis_title=x, yaxis_title=y)
+            x=press.x_mm, y=sign * mu * press.pressure_MPa, name="friction limit ± mu p", mode="lines",
+            line={"dash": "dot", "color": "#777777"}, showlegend=sign > 0.0,
+        )  # fmt: skip
+    parts = {"x": press.shear_x_MPa}
+    if np.any(np.abs(press.shear_z_MPa) > 1e-6 * np.abs(press.pressure_MPa).max(initial=0.0)):
+        parts["z"] = press.shear_z_MPa
+    for axis, shear in parts.items():
+        for status in ("stick", "slip"):
+            on = press.status == status
+            figure.add_scatter(
+                x=press.x_mm[on], y=shear[on], name=f"friction along {axis}, {status}", mode="markers",
+                marker={"color": _COLOURS[status], "size": 6, "symbol": "circle" if axis == "x" else "circle-open"},
+            )  # fmt: skip
+    title = f"traction on the finger at z = {press.z_mm:.3g} mm"
+    figure.update_layout(_LAYOUT, title=title, xaxis_title="x at rest (mm)", yaxis_title="traction (MPa)")
     return figure
 
 

@@ -1,13 +1,12 @@
-"""Server of the page on the loopback interface, which refuses requests without its token."""
+"""Server of the page on the loopback interface."""
 
 from __future__ import annotations
 
 import logging
-import secrets
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from flask import Flask, Response, abort, make_response, redirect, request
+from flask import abort, request
 from werkzeug.serving import BaseWSGIServer, make_server
 
 from finger3d.errors import Finger3dError
@@ -16,7 +15,6 @@ if TYPE_CHECKING:
     from dash import Dash
 
 HOST = "127.0.0.1"
-_COOKIE = "finger3d_token"
 
 
 @dataclass(frozen=True)
@@ -25,7 +23,7 @@ class LocalServer:
 
     Attributes
     ----------
-    url : of the page, with its token
+    url : of the page
     """
 
     url: str
@@ -43,6 +41,9 @@ class LocalServer:
 def local_server(page: Dash, port: int = 0) -> LocalServer:
     """Return a server of a page on 127.0.0.1.
 
+    The address of the page is secret, and requests for another host name (DNS rebinding) are refused. Nothing is kept
+    in the browser: cookies of one port would be sent to every other port of this machine.
+
     Parameters
     ----------
     port : 0 chooses a free one
@@ -50,33 +51,19 @@ def local_server(page: Dash, port: int = 0) -> LocalServer:
     Raises
     ------
     Finger3dError
-        If the port is taken.
+        If the port is taken, or cannot be one.
     """
-    logging.getLogger("werkzeug").setLevel(logging.ERROR)  # it would print every request, one of them with the token
-    token = secrets.token_urlsafe(24)
-    protect(page.server, token)
+    if not 0 <= port < 2**16:
+        raise Finger3dError(f"app: port {port}: must be from 1 to 65535, or 0 for a free one")
+    logging.getLogger("werkzeug").setLevel(logging.ERROR)  # it would print every request, with the secret
+    page.server.before_request(_refuse_other_hosts)
     try:
         server = make_server(HOST, port, page.server, threaded=True)
     except (OSError, SystemExit):
         raise Finger3dError(f"app: port {port} is not free; name another with --port, or none") from None
-    return LocalServer(f"http://{HOST}:{server.port}/?token={token}", server)
+    return LocalServer(f"http://{HOST}:{server.port}{page.config.requests_pathname_prefix}", server)
 
 
-def protect(application: Flask, token: str) -> None:
-    """Refuse requests without the token, and requests for another host name (DNS rebinding).
-
-    The address of the first request holds the token; a cookie holds it afterwards.
-    """
-
-    @application.before_request
-    def check() -> Response | None:
-        if request.host.partition(":")[0] != HOST:
-            abort(403)
-        given = request.args.get("token", "")
-        if secrets.compare_digest(given, token):
-            answer = make_response(redirect(request.path))
-            answer.set_cookie(_COOKIE, token, httponly=True, samesite="Strict")
-            return answer
-        if not secrets.compare_digest(request.cookies.get(_COOKIE, ""), token):
-            abort(403)
-        return None
+def _refuse_other_hosts() -> None:
+    if request.host.partition(":")[0] != HOST:
+        abort(403)

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
 
 from cyclopts import App, CycloptsError
 
 # Importing a module registers its command.
 import finger3d.cli.app  # noqa: F401
 from finger3d._extras import absent, message
+from finger3d._interruption import termination_interrupts
+from finger3d._machine import enough_address_space
 from finger3d.cli import (  # noqa: F401
     calibrate,
     compare,
@@ -28,7 +32,7 @@ from finger3d.cli import (  # noqa: F401
     validate,
 )
 from finger3d.cli.common import Interrupted, app, complain
-from finger3d.cli.terminal import safe_streams, termination_interrupts
+from finger3d.cli.terminal import legible_width, safe_streams
 from finger3d.errors import OUT_OF_MEMORY, Finger3dError, MissingError, out_of_memory
 
 
@@ -37,12 +41,26 @@ def main(arguments: Sequence[str] | None = None, program: App = app) -> int:
 
     Errors are reported in one line on standard error. SIGTERM and SIGHUP interrupt a command like Ctrl-C.
     """
-    with safe_streams(), termination_interrupts():
-        return _run(arguments, program)
+    with safe_streams(), termination_interrupts(), legible_width():
+        return _run(list(sys.argv[1:] if arguments is None else arguments), program)
 
 
-def _run(arguments: Sequence[str] | None, program: App) -> int:
+def _check_surroundings(arguments: Sequence[str]) -> None:
+    """Raise Finger3dError where a command would end in a traceback, or not at all, before it can say why."""
+    for before, word in pairwise(["finger3d", *arguments]):
+        if not word or (word.startswith("--") and word.endswith("=")):
+            raise Finger3dError(f"the value after {word.rstrip('=') or before} is empty; give one")
     try:
+        Path.cwd()
+    except FileNotFoundError:
+        raise Finger3dError("the working folder has been removed; change into one that exists") from None
+    if not enough_address_space():
+        raise MissingError(OUT_OF_MEMORY)
+
+
+def _run(arguments: Sequence[str], program: App) -> int:
+    try:
+        _check_surroundings(arguments)
         return program(arguments, exit_on_error=False, print_error=False) or 0
     except CycloptsError as error:
         complain(f"{error} (finger3d --help lists the commands and options)")
@@ -63,8 +81,7 @@ def _run(arguments: Sequence[str] | None, program: App) -> int:
             complain(OUT_OF_MEMORY)
             return MissingError.exit_code
         if (module := absent(error)) is not None:
-            words = sys.argv[1:] if arguments is None else arguments
-            complain(message(next(iter(words), "finger3d"), module))
+            complain(message(next(iter(arguments), "finger3d"), module))
             return MissingError.exit_code
         # The loaders of OCP and VTK turn a KeyboardInterrupt into an ImportError.
         if not isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):

@@ -9,7 +9,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from finger3d._extras import require
-from finger3d.cli.common import Set, app, job, load
+from finger3d.cli.common import Interrupted, Set, app, job, load
 
 
 @app.command(name="app")
@@ -23,7 +23,8 @@ def app_(
 ) -> None:
     """Open a local page with sliders for friction, depth and a gauge, which shows presses of the condensed finger.
 
-    The finger is pressed straight down, to at most the depth of the scene. Ctrl-C ends the page.
+    The page opens with the numbers that `finger3d press` gives for the scene, and with the scene's first gauge. The
+    finger is pressed straight down, to at most the depth of the scene. Ctrl-C ends the page.
 
     Example: finger3d app scene.toml --set model.domain=plane-strain
 
@@ -45,4 +46,5 @@ def app_(
     print(f"open {server.url}", flush=True)
     if browser:
         webbrowser.open(server.url)
-    server.serve()
+    server.serve()  # until Ctrl-C, which it takes for its end
+    raise Interrupted("interrupted; the page is closed")

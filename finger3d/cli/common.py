@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import App, Parameter
 
 import finger3d
+from finger3d._machine import reserve_for_linear_algebra
 from finger3d._ranges import printable
 from finger3d.errors import Finger3dError
 from finger3d.progress import Progress, reporter
@@ -82,6 +83,7 @@ def job(json_: bool, kept: Callable[[Progress], str]) -> Iterator[Progress]:
         On Ctrl-C, SIGTERM or SIGHUP.
     """
     report = reporter(sys.stderr if json_ else None)
+    reserve_for_linear_algebra()
     try:
         with redirect_stdout(sys.stderr) if json_ else nullcontext(), report:
             yield report

@@ -7,7 +7,7 @@ from finger3d.cli.common import Json, app, print_json, print_rows
 _SOLVERS = {
     "pardiso": "PARDISO of MKL",
     "mumps": "MUMPS",
-    "superlu": 'SuperLU, dozens of times slower in solids; pip install "finger3d[mkl]" or "finger3d[mumps]"',
+    "superlu": "SuperLU, dozens of times slower in solids; the extra mkl or mumps brings another",
 }
 
 

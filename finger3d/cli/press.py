@@ -14,6 +14,7 @@ from finger3d.errors import Finger3dError, MissingError
 
 if TYPE_CHECKING:
     from finger3d._types import TreeView
+    from finger3d.progress import Progress
 
 
 @app.command
@@ -42,7 +43,7 @@ def press(
     from finger3d.analyses.press import press as run
     from finger3d.scene.parts import moduli
 
-    with job(json_, lambda report: _kept(out, report.steps_total)) as report:
+    with job(json_, lambda report: _kept(out, report)) as report:
         result = run(loaded, out, report, figures=figures, error=error)
     summary = result.summary()
     if json_:
@@ -53,19 +54,19 @@ def press(
         for text in summary.get(kind, ()):
             print(f"{kind.removesuffix('s')}: {text}", file=sys.stderr if json_ else sys.stdout)
     if not result.outcome.ok:
-        raise MissingError(f"{scene}: {summary['outcome']} ({_kept(out, report.steps_total)})")
+        raise MissingError(f"{scene}: {summary['outcome']} ({_kept(out, report)})")
 
 
-def _kept(out: Path, total: int) -> str:
-    """Return how many converged steps are in the files."""
+def _kept(out: Path, report: Progress) -> str:
+    """Return how many converged steps are in the files; those of an earlier press do not count."""
     from finger3d.results.summary import read_json
 
     try:
-        steps = read_json(out / "summary.json")["steps"]
+        steps = read_json(out / "summary.json")["steps"] if report.steps_done else []
     except (Finger3dError, KeyError):
         steps = []
     good = sum(step["outcome"] == "converged" for step in steps)
-    return f"{good} of {total} steps are kept in {out}" if good else "no step was finished, none is kept"
+    return f"{good} of {report.steps_total} steps are kept in {out}" if good else "no step was finished, none is kept"
 
 
 _NUMBERS = {

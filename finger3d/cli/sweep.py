@@ -23,11 +23,23 @@ def sweep(
     scene: Path,
     /,
     *,
-    vary: Annotated[
-        list[str],
-        Parameter(negative=(), help="A key and its values, for instance friction.mu=0.06,0.25,1; may be repeated."),
-    ],
     out: Annotated[Path, Parameter(help="Folder for the results; an interrupted sweep continues there.")],
+    vary: Annotated[
+        list[str] | None,
+        Parameter(negative=(), help="A key and its values, for instance friction.mu=0.06,0.25,1; may be repeated."),
+    ] = None,
+    points: Annotated[
+        Path | None, Parameter(help="CSV file with a column for each key and a row for each point, instead of --vary.")
+    ] = None,
+    sample: Annotated[
+        str | None,
+        Parameter(help="Points within --range, instead of --vary: lhs:200 (Latin hypercube) or random:200."),
+    ] = None,
+    range_: Annotated[
+        list[str] | None,
+        Parameter(name="--range", negative=(), help="A key and its bounds, as friction.mu=0.05:1; may be repeated."),
+    ] = None,
+    seed: Annotated[int, Parameter(help="Of the random numbers of --sample.")] = 0,
     set_: Set = None,
     scheduler: Annotated[
         str | None, Parameter(help="Address of a Dask scheduler that runs the presses, instead of processes here.")
@@ -38,9 +50,10 @@ def sweep(
     ] = None,
     json_: Json = False,
 ) -> None:
-    """Press all combinations of given values in parallel; the same command continues after an interruption.
+    """Press many points in parallel; the same command continues after an interruption.
 
-    Values of friction, depths, slides, steps and gauges share one condensed body; other keys need one for each value.
+    The points are all combinations of given values, the rows of a table, or random samples within ranges. Values of
+    friction, depths, slides, steps and gauges share one condensed body; other keys need one for each value.
 
     Example: finger3d sweep scene.toml --vary friction.mu=0.06,0.25,1 --vary gauge.g36.angle_deg=15,30,45 --out out
 
@@ -53,14 +66,26 @@ def sweep(
         raise Finger3dError(f"--workers {workers}: must be at least 1")
     if workers is not None and scheduler is not None:
         raise Finger3dError("--workers and --scheduler: give one of them; a cluster has its own workers")
-    from finger3d.analyses.sweep.points import combinations
+    if sum(given is not None for given in (vary, points, sample)) != 1:
+        raise Finger3dError(
+            "sweep: give one of --vary, --points and --sample, for instance --vary friction.mu=0.06,0.25,1"
+        )
+    if range_ is not None and sample is None:
+        raise Finger3dError("--range: only with --sample, for instance --sample lhs:200")
+    from finger3d.analyses.sweep.points import combinations, listed_points
     from finger3d.analyses.sweep.run import sweep as run
+    from finger3d.analyses.sweep.samples import drawn, rows_of
 
     with job(json_, lambda done: _kept(done, out)) as report:
         report.stage("checking every point")
-        points = combinations(scene, set_ or [], vary)
+        if points is not None:
+            checked = listed_points(scene, set_ or [], rows_of(points), "--points")
+        elif sample is not None:
+            checked = listed_points(scene, set_ or [], drawn(sample, range_ or [], seed), "--sample")
+        else:
+            checked = combinations(scene, set_ or [], vary or [])
         check_writable(out, scene)
-        store = run(points, out, scheduler, workers, report)
+        store = run(checked, out, scheduler, workers, report)
     if json_:
         print_json(_as_dict(store, out))
     else:
@@ -69,7 +94,7 @@ def sweep(
     failed = [row for row in (store.rows | store.lost).values() if row["outcome"] != "converged"]
     if failed:
         raise MissingError(
-            f"{scene}: {len(failed)} of {len(points.points)} points gave no numbers, the first: {failed[0]['outcome']}"
+            f"{scene}: {len(failed)} of {len(checked.points)} points gave no numbers, the first: {failed[0]['outcome']}"
         )
 
 

@@ -1,12 +1,11 @@
-"""Standard streams that never fail, and termination signals as interruptions."""
+"""Standard streams that never fail, on a terminal that is wide enough."""
 
 from __future__ import annotations
 
 import errno
 import os
-import signal
+import shutil
 import sys
-import threading
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, TextIO
@@ -105,18 +104,21 @@ def _fill_descriptors() -> None:
             os.set_inheritable(number, True)
 
 
+_LEAST_COLUMNS = 20
+"""Width below which cyclopts and rich break lines without end."""
+
+
 @contextmanager
-def termination_interrupts() -> Iterator[None]:
-    """Raise KeyboardInterrupt on SIGTERM and SIGHUP within the block, unless they are ignored (``nohup``)."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    known = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]  # Windows has no SIGHUP
-    names = [s for s in known if signal.getsignal(s) is signal.SIG_DFL]
-    for name in names:
-        signal.signal(name, signal.default_int_handler)
+def legible_width() -> Iterator[None]:
+    """Within the block, let text be at least 20 columns wide on a terminal that says it is narrower."""
+    said = os.environ.get("COLUMNS")
+    too_narrow = said is not None and said.isdecimal() and int(said) < _LEAST_COLUMNS
+    if too_narrow or shutil.get_terminal_size().columns < _LEAST_COLUMNS:
+        os.environ["COLUMNS"] = str(_LEAST_COLUMNS)
     try:
         yield
     finally:
-        for name in names:
-            signal.signal(name, signal.SIG_DFL)
+        if said is None:
+            os.environ.pop("COLUMNS", None)
+        else:
+            os.environ["COLUMNS"] = said

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,17 @@ from finger3d.fem.transfer import values_over
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.problem import Problem
+from finger3d.objects import ObjectPose
+
+_POSE: dict[str, Callable[[ObjectPose], float]] = {
+    "depth_mm": lambda pose: pose.depth_mm,
+    "slide_x_mm": lambda pose: pose.slide_x_mm,
+    "slide_z_mm": lambda pose: pose.slide_z_mm,
+    "turn_x_deg": lambda pose: math.degrees(pose.turn_x),
+    "turn_y_deg": lambda pose: math.degrees(pose.turn_y),
+    "turn_z_deg": lambda pose: math.degrees(pose.turn_z),
+}
+"""Columns of the pose of the object, as in history.csv."""
 
 
 @dataclass(frozen=True)
@@ -76,12 +88,24 @@ def marker_table(problem: Problem, steps: Sequence[StepResult], spacing_mm: floa
         moved = [np.vstack(pair) for pair in zip(moved, fields, strict=True)]
     columns: Tree = {
         "step": np.repeat(np.arange(1, len(steps) + 1), len(at)),
-        "depth_mm": np.repeat([step.target.depth_mm for step in steps], len(at)),
+        **{key: np.repeat([value(step.target) for step in steps], len(at)) for key, value in _POSE.items()},
         "marker": [*(m.name for m in named), *(f"grid_{k + 1}" for k in range(count))] * len(steps),
     }
     places, displacements = np.tile(_in_space(np.array(at)), (len(steps), 1)), _in_space(np.vstack(moved))
     columns |= {f"{axis}_mm": places[:, k] for k, axis in enumerate("xyz")}
     return columns | {f"displacement_{axis}_mm": displacements[:, k] for k, axis in enumerate("xyz")}
+
+
+def grid_numbers(problem: Problem, step: StepResult, spacing_mm: float) -> dict[str, float]:
+    """Return the displacements of the markers of a grid after an increment, named as those of other markers."""
+    grid = MarkerGrid.of(problem, spacing_mm)
+    (unknowns,) = problem.model.formulation.all_unknowns(problem, [step.meshed_state])
+    moved = _in_space(grid.displacements(displacement(problem.mesh, unknowns)))
+    return {
+        f"marker_grid_{k + 1}_{axis}_mm": float(u)
+        for k, at in enumerate(moved)
+        for axis, u in zip("xyz", at, strict=True)
+    }
 
 
 def _in_space(vectors: Float) -> Float:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from finger3d._types import Float, Int
 from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
@@ -40,7 +40,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch
 
-_FEWEST_POINTS = 5  # of a line z = const that is drawn
+_FEWEST_ON_LINE = 5
+_ON_LINE = 1e-6
+"""Distance from a line z = const, in half widths, below which a point lies on it."""
+
 _SHADES = {STICK: "#c9d9ee", SLIP: "#fde3c4"}
 
 
@@ -90,6 +93,42 @@ def finger_picture(
     return renderer
 
 
+def middle_line(
+    table: Mapping[str, ArrayLike], band_mm: float, half_width_mm: float | None
+) -> tuple[float, NDArray[np.intp]]:
+    """Return the points of the contact face that a picture along x shows: on z = 0, or near it where hardly any is.
+
+    Parameters
+    ----------
+    table : columns of contact.csv
+    band_mm : largest distance from z = 0 where the mesh has hardly any points on it
+    half_width_mm : half the width of a solid; None for a section, all of whose points are on the line
+
+    Returns
+    -------
+    z_mm, points : the place of the line, that of the largest pressure if no point is near z = 0, and numbers of points
+        (n,), ascending in x
+    """
+    x, z = _column(table, "x_mm"), _column(table, "z_mm")
+    top = _on_contact_face(table)
+    at, points = 0.0, np.flatnonzero(top)
+    if half_width_mm is not None:
+        # a mesh has points on its middle only if that is a plane of symmetry
+        points = np.flatnonzero(top & (np.abs(z) <= _ON_LINE * half_width_mm))
+        if len(points) < _FEWEST_ON_LINE:
+            points = np.flatnonzero(top & (np.abs(z) <= band_mm))
+        if not len(points):
+            at = float(z[top][np.argmax(_column(table, "pressure_MPa")[top])])
+            points = np.flatnonzero(top & (np.abs(z - at) <= band_mm))
+    return at, points[np.argsort(x[points], kind="stable")]
+
+
+def _on_contact_face(table: Mapping[str, ArrayLike]) -> NDArray[np.bool_]:
+    """Return which points are on the contact face; all if none is."""
+    top: NDArray[np.bool_] = np.asarray(table["face"]) == FREE_FACES[CONTACT]
+    return top if top.any() else ~top
+
+
 def contact_figure(
     path: str | Path,
     table: Mapping[str, ArrayLike],
@@ -114,26 +153,20 @@ def contact_figure(
     title : title of the picture
     """
     x, z, status = _column(table, "x_mm"), _column(table, "z_mm"), _status(table)
-    top = np.asarray(table["face"]) == FREE_FACES[CONTACT]
-    top |= not top.any()
-    lines = [("", np.flatnonzero(top))]
+    if band_mm is None:
+        band_mm = 0.4 * _spacing(x, z)
+    at, points = middle_line(table, band_mm, half_width_mm)
+    lines = [("", points)]
     if half_width_mm is not None:
-        band = 0.4 * _spacing(x, z) if band_mm is None else band_mm
-        # A mesh always has points on its end, and on its middle only if that is a plane of symmetry.
-        exact = 1e-6 * half_width_mm
-        middle, end = (np.flatnonzero(top & (np.abs(z - at) <= exact)) for at in (0.0, half_width_mm))
-        near = middle if len(middle) >= _FEWEST_POINTS else np.flatnonzero(top & (np.abs(z) <= band))
-        lines = [("in the middle, z = 0", near)]
-        lines += [(f"at the end, z = {half_width_mm:g} mm", end)]
-        lines = [line for line in lines if len(line[1])]
-        if not lines:  # contact is somewhere between
-            at = float(z[top][np.argmax(_column(table, "pressure_MPa")[top])])
-            lines = [(f"near z = {at:.3g} mm", np.flatnonzero(top & (np.abs(z - at) <= band)))]
+        lines = [("in the middle, z = 0" if at == 0.0 else f"near z = {at:.3g} mm", points)]
+        # a mesh always has points on its end
+        end = np.flatnonzero(_on_contact_face(table) & (np.abs(z - half_width_mm) <= _ON_LINE * half_width_mm))
+        if len(end):
+            lines.append((f"at the end, z = {half_width_mm:g} mm", end[np.argsort(x[end], kind="stable")]))
     fn, fx, fz = (_column(table, name) for name in ("pressure_MPa", "shear_x_MPa", "shear_z_MPa"))
     coefficient = np.broadcast_to(np.asarray(mu, dtype=np.float64), x.shape)
     made = sheet(len(lines), 1, (WIDEST, 4.4), (0.95, 0.15, 1.25, 0.35), title)
-    for axes, (where, points) in zip(made.axes, lines, strict=True):
-        on = points[np.argsort(x[points], kind="stable")]
+    for axes, (where, on) in zip(made.axes, lines, strict=True):
         _contact_line(axes, x[on], fn[on], fx[on], fz[on], status[on], coefficient[on])
         axes.set_title(where, fontsize=10, loc="left")
         axes.set_ylabel("traction on the finger (MPa)")

@@ -16,8 +16,8 @@
     }, []);
   }
   function traces(chart) {
-    return chart.lines.map((line) => ({ type: "scatter", mode: "lines+markers", name: plain(line.label),
-      x: line.x, y: line.y, line: { width: 1.6 }, marker: { size: 6 },
+    return chart.lines.map((line) => ({ type: "scatter", name: plain(line.label),
+      mode: chart.joined ? "lines+markers" : "markers", x: line.x, y: line.y, line: { width: 1.6 }, marker: { size: 6 },
       hovertemplate: `%{x:.6~g}, %{y:.5~g}<extra>${chart.lines.length > 1 ? plain(line.label) : ""}</extra>` }));
   }
   function layout(chart, box) {

@@ -30,6 +30,7 @@ class Chart:
     lines : at least one line; labels are shown if there are several
     legend : title of the legend: the quantity whose values the labels are
     more : number of omitted lines
+    joined : whether the points of a line are joined
     """
 
     caption: str
@@ -38,6 +39,7 @@ class Chart:
     lines: Sequence[Line]
     legend: str = ""
     more: int = 0
+    joined: bool = True
 
     def html(self) -> str:
         """Return the HTML element that holds the chart."""
@@ -58,6 +60,7 @@ def script(charts: Sequence[Chart]) -> str:
             "x": chart.x,
             "y": chart.y,
             "legend": chart.legend,
+            "joined": chart.joined,
             "lines": [{"label": line.label, "x": _known(line.x), "y": _known(line.y)} for line in chart.lines],
         }
         for chart in charts

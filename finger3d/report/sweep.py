@@ -39,7 +39,8 @@ def sweep_page(folder: str | Path) -> Path:
         headline.append(HeadlineRow("normal force", f"{min(forces):.4g} to {max(forces):.4g}", "N"))
     shown = [tuple(_number(row.get(name, "")) for name in names) for row in rows[:_MOST_ROWS]]
     more = [f"The first {_MOST_ROWS} of {len(rows)} points; all are in results.csv."] if len(rows) > _MOST_ROWS else []
-    varied = [(key, ", ".join(values)) for key, values in data["vary"].items()]
+    is_list = data.get("list", False)
+    varied = [(key, _values(values, is_list)) for key, values in data["vary"].items()]
     return write_page(
         folder,
         f"{title_of(data['scene'])}: sweep over {', '.join(data['vary'])}",
@@ -49,7 +50,7 @@ def sweep_page(folder: str | Path) -> Path:
             PageSection("Varied", [Table(("key", "values"), varied)]),
             PageSection("Scene", [Code(json.dumps(data["scene"], indent=2), "scene before the variation")]),
         ],
-        charts=sweep_charts(rows, list(data["vary"])),
+        charts=sweep_charts(rows, list(data["vary"]), is_list),
         command="sweep",
         outcome=f"{len(rows) - len(failed)} of {data['points']} points converged",
         good=len(rows) == data["points"] and not failed,
@@ -57,13 +58,22 @@ def sweep_page(folder: str | Path) -> Path:
     )
 
 
-def sweep_charts(rows: Sequence[Mapping[str, str]], keys: Sequence[str]) -> list[Chart]:
+def _values(texts: Sequence[str], is_list: bool) -> str:
+    """Return the values of a key; of a list of points, how many there are and between which numbers."""
+    numbers = [value for value in map(_number, texts) if isinstance(value, float)]
+    if not is_list or len(numbers) < len(texts):
+        return ", ".join(dict.fromkeys(texts))
+    return f"{len(set(numbers))} values from {min(numbers):.6g} to {max(numbers):.6g}"
+
+
+def sweep_charts(rows: Sequence[Mapping[str, str]], keys: Sequence[str], is_list: bool = False) -> list[Chart]:
     """Return charts of the normal force and of gauge strains against each varied key with several numeric values.
 
     Parameters
     ----------
     rows : rows of results.csv; points that failed are ignored
     keys : varied keys; a chart against one of them has a line for each combination of the others
+    is_list : whether the points are a list: each is then drawn by itself
     """
     good = [{name: _number(text) for name, text in row.items()} for row in rows if row["outcome"] == "converged"]
     values = {key: {row[key] for row in good} for key in keys}
@@ -76,7 +86,7 @@ def sweep_charts(rows: Sequence[Mapping[str, str]], keys: Sequence[str]) -> list
     found = []
     for name, (quantity, title) in titles.items():
         for key in along[:_MOST_KEYS]:
-            others = [k for k in keys if k != key]
+            others = [] if is_list else [k for k in keys if k != key]
             lines: dict[str, list[tuple[float, float]]] = {}
             for row in good:
                 setting = ", ".join(f"{v:.12g}" if isinstance(v, float) else v for v in (row[k] for k in others))
@@ -85,7 +95,8 @@ def sweep_charts(rows: Sequence[Mapping[str, str]], keys: Sequence[str]) -> list
                 Line(label, *zip(*sorted(points), strict=True)) for label, points in list(lines.items())[:_MOST_LINES]
             ]
             left_out = len(lines) - len(shown)
-            found.append(Chart(f"{quantity} against {key}", key, title, shown, ", ".join(others), left_out))
+            legend = ", ".join(others)
+            found.append(Chart(f"{quantity} against {key}", key, title, shown, legend, left_out, joined=not is_list))
     return found
 
 

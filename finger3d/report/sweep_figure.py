@@ -37,8 +37,8 @@ def picture(folder: str | Path, path: str | Path) -> None:
     """
     folder = Path(folder)
     try:
-        keys = list(read_json(folder / "sweep.json")["vary"])
-        charts = sweep_charts(read_rows(folder / "results.csv"), keys)
+        data = read_json(folder / "sweep.json")
+        charts = sweep_charts(read_rows(folder / "results.csv"), list(data["vary"]), data.get("list", False))
     except (KeyError, TypeError, ValueError):  # for instance saved by a spreadsheet
         raise Finger3dError(
             f"{folder}: sweep.json or results.csv is not as a sweep wrote it; remove the folder, and sweep again"
@@ -66,7 +66,7 @@ def _columns(chart: Chart) -> int:
 
 def _panel(axes: Axes, chart: Chart) -> None:
     for line in chart.lines:
-        axes.plot(line.x, line.y, "o-", ms=4, lw=1.2, label=line.label)
+        axes.plot(line.x, line.y, "o-" if chart.joined else "o", ms=4, lw=1.2, label=line.label)
     if chart.more:
         axes.plot([], [], " ", label=f"and {chart.more} more")
     axes.set_xlabel(chart.x)

@@ -46,6 +46,11 @@
     const at = rest.filter((v, p) => p % 3 === a);
     return at.reduce((x, y) => Math.max(x, y)) - at.reduce((x, y) => Math.min(x, y));
   }));
+  // Coordinates of the object's points at every step.
+  const placed = data.objectPoses.map((pose) => Float32Array.from(objectPoints, (_, p) => {
+    const from = p - p % 3, row = pose[p % 3];
+    return row[3] + row[0] * objectPoints[from] + row[1] * objectPoints[from + 1] + row[2] * objectPoints[from + 2];
+  }));
 
   // On a narrow screen the colour bar is below the body, and the camera is farther away.
   const narrow = () => stage.clientWidth < 600;
@@ -84,20 +89,25 @@
     const tint = window.matchMedia("(prefers-color-scheme: dark)").matches ? "#e0408f" : "#b0006a";
     const before = (points, share) => Object.fromEntries(["x", "y", "z"].map((name, a) =>
       [name, points.map((p) => p[a] + share * extent * FROM[a])]));
+    // A name is lowered until it is clear of the others; sizes of text relative to the extent of the body.
+    const placedNames = [], [across, down] = narrow() ? [0.6, 0.09] : [0.3, 0.045];
+    const nameOf = (middle) => {
+      const at = [...middle], apart = (o, a) => Math.abs(o[a] - at[a]) / extent;
+      while (placedNames.some((o) => apart(o, 0) < across && apart(o, 1) < down)) at[1] -= 0.1 * down * extent;
+      placedNames.push(at);
+      return at;
+    };
     const lines = !gauges.checked ? [] : data.gauges[s].flatMap((line, g) => {
       const mark = { type: "scatter3d", hoverinfo: "skip", textfont: { color: tint, size: 13 } };
       return [
         { ...mark, mode: "lines+markers", ...before(line, LINE), line: { color: tint, width: 6 },
           marker: { color: tint, size: [0, 5, 0], line: { width: 0 } } },
-        { ...mark, mode: "text", ...before([line[1]], NAME), text: [data.gaugeLabels[g]],
+        { ...mark, mode: "text", ...before([nameOf(line[1])], NAME), text: [data.gaugeLabels[g]],
           textposition: "bottom center" },
       ];
     });
     const object = { ...base, hoverinfo: "skip", color: "#7fa7c9", opacity: 0.3, x: [], y: [], z: [], i: [], j: [], k: [] };
-    for (let p = 0; p < objectPoints.length; p += 3) {
-      const at = data.objectPoses[s].map((row) => row[3] + [0, 1, 2].reduce((sum, a) => sum + row[a] * objectPoints[p + a], 0));
-      object.x.push(at[0]); object.y.push(at[1]); object.z.push(at[2]);
-    }
+    placed[s].forEach((value, p) => object["xyz"[p % 3]].push(value));
     for (let f = 0; f < objectFaces.length; f += 3) {
       object.i.push(objectFaces[f]); object.j.push(objectFaces[f + 1]); object.k.push(objectFaces[f + 2]);
     }
@@ -105,14 +115,18 @@
     return [...lines, side, face, ...(what === "pressure" ? [open] : []), ...shown];
   }
 
-  // The axes are the same for all steps, so that the motion of the finger is visible.
+  // The axes are the same for all steps, so that the motion of the finger is visible. Along an axis they hold the object
+  // where it is no longer than the body; a longer one, such as a plane, is cut.
+  const bounds = (lists, a) => lists.reduce(([low, high], list) => {
+    for (let p = a; p < list.length; p += 3) { low = Math.min(low, list[p]); high = Math.max(high, list[p]); }
+    return [low, high];
+  }, [Infinity, -Infinity]);
   const range = [0, 1, 2].map((a) => {
-    let low = Infinity, high = -Infinity;
-    for (const list of [rest, moved]) for (let p = a; p < list.length; p += 3) {
-      low = Math.min(low, list[p]); high = Math.max(high, list[p]);
-    }
+    const [low, high] = bounds([rest, moved], a), [bottom, top] = bounds(placed, a);
     const room = 0.02 * (high - low), name = data.gaugeLabels.length ? NAME * extent * FROM[a] : 0;
-    return [low - Math.max(room, -name), high + Math.max(room, name)];
+    const whole = top - bottom <= extent;  // without an object both are infinite, and change nothing
+    return [Math.min(low - Math.max(room, -name), whole ? bottom : low),
+      Math.max(high + Math.max(room, name), whole ? top : high)];
   });
   // Distance of the camera at which the projected width and height of the body fit into the stage.
   const size = range.map(([low, high]) => high - low), cube = Math.cbrt(size[0] * size[1] * size[2]);
@@ -126,7 +140,9 @@
       showbackground: false, nticks: narrow() ? 4 : 6, showspikes: false });
     return { margin: { l: 0, r: 0, t: 0, b: 0 }, paper_bgcolor: "rgba(0,0,0,0)", font: { color: ink, size: 12 },
       uirevision: "keep", showlegend: false,
-      scene: { xaxis: axis(0), yaxis: axis(1), zaxis: axis(2), aspectmode: "data", dragmode: "orbit",
+      scene: { xaxis: axis(0), yaxis: axis(1), zaxis: axis(2), dragmode: "orbit",
+        // "data" would take the aspect from the data, which the ranges cut
+        aspectmode: "manual", aspectratio: { x: size[0] / cube, y: size[1] / cube, z: size[2] / cube },
         camera: { up: { x: 0, y: 1, z: 0 }, center: { x: 0, y: narrow() ? -0.12 : 0, z: 0 }, eye: eye } } };
   }
   const config = { responsive: true, displaylogo: false, displayModeBar: false };

@@ -16,7 +16,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from finger3d.errors import Finger3dError
-from finger3d.io import atomic, write_json
+from finger3d.io import atomic, cannot_write, write_json
 from finger3d.results.summary import read_json
 
 Row = Mapping[str, object]
@@ -41,12 +41,15 @@ class Journal:
 
         Raises
         ------
-        OSError
-            If it cannot be written in full.
+        Finger3dError
+            If it cannot be written in full; a MissingError if the disk is full.
         """
         line = _line(row)
-        if self._file.write(line) < len(line):
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        try:
+            if self._file.write(line) < len(line):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        except OSError as error:
+            raise cannot_write(self.path, error) from error
         self.rows.append(row)
 
     def close(self) -> None:

@@ -63,7 +63,7 @@ def _with_lists(value: object) -> object:
     return [_with_lists(v) for v in value] if isinstance(value, list | tuple) else value
 
 
-def override(tree: Tree, overrides: Iterable[str], option: str = "--set") -> Tree:
+def override(tree: TreeView, overrides: Iterable[str], option: str = "--set") -> Tree:
     """Return `tree` with keys set from texts such as ``friction.mu=0.5`` or ``press.leg.0.depth_mm=3``.
 
     `option` is where the texts come from, for messages.

@@ -43,7 +43,7 @@ from finger3d.sensor.curve import (
 from finger3d.sensor.joint import JointCalibration
 
 if TYPE_CHECKING:
-    from finger3d.scene import Scene
+    from finger3d.scene import Scene, Source
 
 _FILES = ("calibration.json", "calibration.csv", "calibration.png", "reduced.npz", "map.png", "map.csv", "report.html")
 
@@ -98,7 +98,7 @@ class CurvePoints:
 
 
 def calibrate(
-    scene: Scene | str | Path,
+    scene: Source,
     gauge: str | Sequence[str],
     out: str | Path | None = None,
     mus: Sequence[float] = MUS,
@@ -114,7 +114,7 @@ def calibrate(
 
     Parameters
     ----------
-    scene : a loaded scene, or the path of a TOML file; its own friction.mu does not matter
+    scene : path of a TOML file, a dict with its tables, or a loaded scene; its own friction.mu does not matter
     gauge : name of a [[gauge]]; or names of several readings: gauges, ``m1.x`` of a [[marker]], and taxels
     out : folder for calibration.json, .csv, .png, reduced.npz (and map.png, map.csv); None writes nothing
     mus : coefficients of friction, from 0 up
@@ -137,11 +137,11 @@ def calibrate(
     MissingError
         If fewer than four values of mu converge; the others are in calibration.csv.
     """
-    from finger3d.scene import load
+    from finger3d.scene import scene_of
     from finger3d.scene.parts import largest_spread
 
     report = report or Progress()
-    scene = load(scene) if isinstance(scene, str | Path) else scene
+    scene = scene_of(scene)
     model = scene.model()
     noises: dict[Kind, float] = {"gauge": noise, "marker": marker_noise_mm, "taxel": taxel_noise_MPa}
     readings = found_readings(model, [gauge] if isinstance(gauge, str) else gauge, noises)

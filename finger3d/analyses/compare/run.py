@@ -22,7 +22,7 @@ from finger3d.progress import Progress
 from finger3d.results.comparison import Case
 
 if TYPE_CHECKING:
-    from finger3d.scene import Scene
+    from finger3d.scene import Scene, Source
 
 
 _WIDTHS = (1.0, 4.0, 12.0, 24.0)
@@ -62,13 +62,13 @@ class Comparison:
 
 
 def compare(
-    scene: Scene | str | Path, out: str | Path, widths: Sequence[float] | None = None, report: Progress | None = None
+    scene: Source, out: str | Path, widths: Sequence[float] | None = None, report: Progress | None = None
 ) -> Comparison:
     """Solve a scene in plane stress, in plane strain and as a solid, and compare the results.
 
     Parameters
     ----------
-    scene : a loaded scene, or the path of a TOML file; its domain is ignored
+    scene : path of a TOML file, a dict with its tables, or a loaded scene; its domain is ignored
     out : folder for compare.csv, compare.json, lines.csv, compare.png, report.html and scene.toml
     widths : further widths of the finger, mm; None takes multiples of its height
     report : progress of the cases
@@ -78,10 +78,10 @@ def compare(
     Comparison
         Cases may have failed to converge; the verdict names them.
     """
-    from finger3d.scene import load
+    from finger3d.scene import scene_of
 
     report = report or Progress()
-    solid = _as_solid(load(scene) if isinstance(scene, str | Path) else scene)
+    solid = _as_solid(scene_of(scene))
     model = solid.model()
     other_widths = _other_widths(model, widths)
     _check(model, other_widths)

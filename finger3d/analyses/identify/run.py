@@ -239,6 +239,7 @@ def _rms(values: Float) -> float:
 
 def _write(folder: Path, found: Identification) -> None:
     """Write the results, the figure and the page."""
+    write_json(folder / "identify.json", found.as_dict())
     data = found.measured
     columns: Tree = {data.index: data.at}
     for name, values in data.columns.items():
@@ -253,5 +254,4 @@ def _write(folder: Path, found: Identification) -> None:
     offset = dict(zip(found.keys, found.fitted.values, strict=True)).get(OFFSET, 0.0)
     panels = [Panel(n, values, found.stds[n], found.simulated[n], found.curve[n]) for n, values in data.columns.items()]
     draw(folder / "identify.png", data.index, data.at + float(offset), found.curve[data.index], panels)
-    write_json(folder / "identify.json", found.as_dict())
     identify_page(folder)

@@ -211,12 +211,7 @@ class _Search:
 
     def _record(self, found: Evaluation) -> None:
         self.known[found.values] = found
-        try:
-            self.journal.append({"values": list(found.values), "objective": found.value, "outcome": found.outcome})
-        except OSError as error:
-            raise Finger3dError(
-                f"cannot write {self.journal.path}: {error.strerror}; choose another place with --out"
-            ) from None
+        self.journal.append({"values": list(found.values), "objective": found.value, "outcome": found.outcome})
 
     def write_table(self, path: Path) -> None:
         """Write every evaluated design as a line of a CSV file."""

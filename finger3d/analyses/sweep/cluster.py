@@ -76,15 +76,12 @@ def _ready(client: Client, address: str) -> None:
         raise MissingError(
             f"--scheduler {address}: has no worker; start some with `dask worker {address} --nthreads 1`"
         ) from None
-    here = version_here()
-    for place, there in client.run(version_here).items():
+    here = version("finger3d")
+    # the function is of the standard library: a worker without finger3d could not load one of this package
+    for place, there in client.run(version, "finger3d", on_error="return").items():
         if there != here:
-            raise MissingError(f"--scheduler {address}: the worker {place} has finger3d {there}; install {here} there")
-
-
-def version_here() -> str:
-    """Return the version of finger3d in the process that calls this."""
-    return version("finger3d")
+            has = f"has finger3d {there}" if isinstance(there, str) else "has no finger3d"
+            raise MissingError(f"--scheduler {address}: the worker {place} {has}; install finger3d {here} there")
 
 
 class Cluster:
@@ -92,7 +89,7 @@ class Cluster:
 
     def __init__(self, client: Client, progress: SweepProgress) -> None:
         self.client, self.progress = client, progress
-        self._running: dict[Future[list[Row]], BodyPoints] = {}
+        self._running: dict[Future[list[Row]], tuple[BodyPoints, str | None]] = {}
         self._finished: SimpleQueue[Future[list[Row]]] = SimpleQueue()
         self._seen = time.monotonic()
 
@@ -128,7 +125,7 @@ class Cluster:
             workers=address and [address],
             allow_other_workers=address is not None,
         )
-        self._running[future] = body
+        self._running[future] = body, address
         future.add_done_callback(self._finished.put)
 
     def _receive(self) -> None:
@@ -138,9 +135,12 @@ class Cluster:
         try:
             future = self._finished.get(timeout=_POLL_S)
         except Empty:
-            self._workers()
+            if self._workers():
+                self._send_again()
             return
-        body = self._running.pop(future)
+        if future not in self._running:  # cancelled, and sent again
+            return
+        body, _ = self._running.pop(future)
         if future.status != "finished":
             self._give_up(body, _reason(future))
             return
@@ -151,6 +151,15 @@ class Cluster:
         body.advance(rows)
         if body.left:
             self._submit(body, address)
+
+    def _send_again(self) -> None:
+        """Send the batches of workers that have left without an address: Dask gives them to no other worker."""
+        there = self.client.nthreads()
+        stranded = {f: body for f, (body, address) in self._running.items() if address and address not in there}
+        for future, body in stranded.items():
+            del self._running[future]
+            self.client.cancel([future], force=True)
+            self._submit(body)
 
     def _give_up(self, body: BodyPoints, reason: str) -> None:
         if self.client.status != "running":  # a lost connection cancels every future

@@ -11,7 +11,7 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from finger3d._machine import cores, end_with
+from finger3d._machine import cores, end_with, reserve_for_linear_algebra
 from finger3d.analyses.sweep import worker
 from finger3d.analyses.sweep.progress import BodyPoints, SweepProgress
 from finger3d.errors import MissingError
@@ -37,7 +37,7 @@ def _pool() -> ProcessPoolExecutor:
 class _Worker:
     """A pool of one process, which keeps the body of its last batch; a new one takes the place of one that died."""
 
-    pool: ProcessPoolExecutor = field(default_factory=_pool)
+    pool: ProcessPoolExecutor = field(default_factory=lambda: _pool())
 
     def submit(self, body: BodyPoints) -> Future[list[Row]]:
         """Press the next batch of a body."""
@@ -58,6 +58,7 @@ def _begin(parent: int) -> None:
     """Initialise a worker: it ends with its parent, and leaves Ctrl-C to it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_with(parent)
+    reserve_for_linear_algebra()
 
 
 def press(bodies: Sequence[BodyPoints], progress: SweepProgress, workers: int) -> None:
@@ -85,7 +86,9 @@ def press(bodies: Sequence[BodyPoints], progress: SweepProgress, workers: int) -
                 else:
                     _begin_next(one, waiting, running)
     except OSError as error:
-        raise MissingError(f"sweep: no worker could be started on this machine: {error}") from None
+        raise MissingError(
+            f"sweep: no worker could be started on this machine: {error}; --workers 1 presses without any"
+        ) from None
     finally:
         for one in started:
             one.end()

@@ -1,18 +1,18 @@
-"""Points of a sweep: every combination of the values, each a checked scene."""
+"""Points of a sweep: every combination of the values, or a list of points, each a checked scene."""
 
 from __future__ import annotations
 
 import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from pathlib import Path
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 from finger3d._types import Tree, TreeView
 from finger3d.analyses.shared_body import Variant, body_key, finest
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import MeshOptions
-from finger3d.scene import Scene, parse, tree
+from finger3d.scene import Scene, Source, parse, tables_of, tree
 from finger3d.scene import files as bodies
 from finger3d.scene.messages import listed, nearest, shown
 
@@ -138,6 +138,8 @@ class Sweep:
     Attributes
     ----------
     given : the scene that is varied, as written, overrides included, paths absolute
+    vary : the varied keys; their values are combined, or, of a list of points, belong together by their place
+    is_list : whether the points are a list
     """
 
     given: TreeView
@@ -145,24 +147,26 @@ class Sweep:
     points: tuple[Point, ...]
     bodies: dict[str, BodySpec]
     title: str
+    is_list: bool = False
 
     def identity(self) -> Tree:
         """Return what identifies the sweep; the hashes of bodies include the contents of files."""
         return {
             "scene": tree.plain(self.given),
             "vary": {v.key: list(v.texts) for v in self.vary},
+            **({"list": True} if self.is_list else {}),
             "points": len(self.points),
             "bodies": list(self.bodies),
         }
 
 
 def combinations(
-    path: Path,
+    source: Source,
     overrides: Sequence[str],
     texts: Sequence[str],
     say: Callable[[int, int], None] = lambda done, total: None,
 ) -> Sweep:
-    """Read a scene and check every point of a sweep.
+    """Read a scene and check every combination of some values.
 
     Parameters
     ----------
@@ -179,24 +183,64 @@ def combinations(
     count = math.prod(len(v.texts) for v in vary)
     if count > MOST:
         raise Finger3dError(f"--vary: {count} combinations; at most {MOST} in one sweep, split it")
-    base = tree.override(tree.read(path), overrides)
-    keys = [numbered(v.key, base, "--vary") for v in vary]
+    return _checked(source, overrides, vary, "--vary", say)
+
+
+def listed_points(
+    source: Source,
+    overrides: Sequence[str],
+    columns: tuple[Vary, ...],
+    option: str,
+    say: Callable[[int, int], None] = lambda done, total: None,
+) -> Sweep:
+    """Read a scene and check every point of a list.
+
+    Parameters
+    ----------
+    overrides : as for ``--set``
+    columns : the keys, each with its value at every point
+    option : what gave them, for messages
+    say : told how many points are checked
+
+    Raises
+    ------
+    Finger3dError
+        For the first mistake, in one line that names the key and the value.
+    """
+    count = len(columns[0].texts)
+    if count > MOST:
+        raise Finger3dError(f"{option}: {count} points; at most {MOST} in one sweep, split it")
+    return replace(_checked(source, overrides, columns, option, say, zip), is_list=True)
+
+
+def _checked(
+    source: Source,
+    overrides: Sequence[str],
+    vary: tuple[Vary, ...],
+    option: str,
+    say: Callable[[int, int], None],
+    joined: Callable[..., Iterable[tuple[Any, ...]]] = itertools.product,
+) -> Sweep:
+    """Return the sweep over values that `joined` makes points of, each a checked scene."""
+    base, path = tables_of(source, overrides)
+    keys = [numbered(v.key, base, option) for v in vary]
     if len(set(keys)) < len(keys):
         both = next(v.key for i, v in enumerate(vary) if keys[i] in keys[:i])
-        raise Finger3dError(f"--vary {both}: given twice; put all its values into one list")
-    options = {o.partition("=")[0].strip(): "--set" for o in overrides} | dict.fromkeys(keys, "--vary")
+        raise Finger3dError(f"{option} {both}: given twice; put all its values into one list")
+    options = {o.partition("=")[0].strip(): "--set" for o in overrides} | dict.fromkeys(keys, option)
+    settings = list(joined(*(v.texts for v in vary)))
     scenes: list[Scene] = []
-    for texts_here in itertools.product(*(v.texts for v in vary)):
-        changes = [f"{key}={text}" for key, text in zip(keys, texts_here, strict=True)]
-        scene = parse(tree.override(base, changes, "--vary"), path=path, set_keys=options)
+    for texts in settings:
+        changes = [f"{key}={text}" for key, text in zip(keys, texts, strict=True)]
+        scene = parse(tree.override(base, changes, option), path=path, set_keys=options)
         if scene.tables.mesh.tolerance is not None:
             raise Finger3dError(
-                f"{path}: mesh.tolerance chooses a mesh for one press; give a sweep mesh.size_mm, for instance what "
-                "finger3d press has chosen, in its summary.json"
+                f"{path or scene.title}: mesh.tolerance chooses a mesh for one press; give a sweep mesh.size_mm, for "
+                "instance what finger3d press has chosen, in its summary.json"
             )
         scenes.append(scene)
-        say(len(scenes), count)
-    values = itertools.product(*(v.values for v in vary))
+        say(len(scenes), len(settings))
+    values = joined(*(v.values for v in vary))
     points, members = [], dict[str, list[tuple[Scene, Variant]]]()
     for number, (scene, here) in enumerate(zip(scenes, values, strict=True)):
         body, variant = body_key(scene), Variant.of(scene.model())

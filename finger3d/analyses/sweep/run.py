@@ -27,8 +27,8 @@ def sweep(
     out : folder for points.jsonl, results.csv, report.html and, with pyarrow, results.parquet; a sweep found there is
         continued
     scheduler : address of a Dask scheduler; None starts workers on this machine
-    workers : processes on this machine; None: one for each core, at most one for each body. A single body is pressed
-        by this process.
+    workers : processes on this machine; None: one for each core, at most one for each body. One worker is this process,
+        as for a single body.
     report : shows the progress
 
     Returns
@@ -59,7 +59,7 @@ def sweep(
 
 
 def _press(store: ResultStore, scheduler: str | None, workers: int | None, progress: SweepProgress) -> None:
-    """Press the points that are left: on a cluster, in processes of this machine, or those of a single body here."""
+    """Press the points that are left: on a cluster, in processes of this machine, or in this process."""
     bodies = _bodies(store)
     if bodies and scheduler is not None:
         from finger3d.analyses.sweep import cluster
@@ -67,15 +67,16 @@ def _press(store: ResultStore, scheduler: str | None, workers: int | None, progr
         progress.report.stage(f"connecting to {scheduler}")
         with cluster.remote(scheduler) as client:
             cluster.Cluster(client, progress).press(bodies)
-    elif len(bodies) > 1:
+    elif len(bodies) > 1 and workers != 1:
         from finger3d.analyses.sweep import local
 
         progress.report.stage("pressing")
         local.press(bodies, progress, workers or local.default_workers(len(bodies)))
-    elif bodies:
+    else:
         progress.report.stage("pressing")
-        for row in worker.rows(bodies[0].spec, bodies[0].left):
-            progress.add(row)
+        for body in bodies:
+            for row in worker.rows(body.spec, body.left):
+                progress.add(row)
 
 
 def _bodies(store: ResultStore) -> list[BodyPoints]:
