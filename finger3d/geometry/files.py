@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import re
+import io
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._child import ChildError, in_child
 from finger3d._extras import require
 from finger3d._ranges import number
 from finger3d._types import Float
@@ -19,8 +20,7 @@ from finger3d.geometry.surface import Triangles
 from finger3d.geometry.surface_checks import mistake
 
 if TYPE_CHECKING:
-    from build123d import Compound, Face, Shape, Solid
-    from OCP.STEPControl import STEPControl_Reader
+    from build123d import Compound, Face, Solid
 
 
 STL, STEP = (".stl",), (".step", ".stp")
@@ -29,11 +29,9 @@ SUFFIXES = (*STL, *STEP)
 MOST_TRIANGLES = 300_000
 """Largest number of triangles of an STL file; the checks take about 25 us a triangle."""
 
-_NO_LABEL = re.compile(r"|COMPOUND|COMPSOLID|SOLID|SHELL|NONE|unnamed|Open_CASCADE.*|=>.*", re.IGNORECASE)
-"""Names that CAD programs give to solids without a name."""
-
 _CHORD_ERROR = 5e-5  # of the tessellation of a CAD solid, over its diagonal
 _FACET_ANGLE = 0.2  # radians, between facets of the tessellation
+_STEP_S, _STEP_S_PER_BYTE = 120.0, 5e-5  # time limit of a STEP file; 28 kB took 0.1 s
 _LARGEST_COORDINATE_MM = 1e12
 _WELD_DISTANCE = 1e-6  # over the diagonal: gaps that single precision leaves between neighbouring triangles
 
@@ -80,8 +78,6 @@ def content(path: Path) -> str:
 
 
 def _stl(path: Path, scale: float) -> Triangles:
-    import io
-
     import trimesh
 
     try:
@@ -170,71 +166,31 @@ def read_step(path: Path) -> StepBody:
     Finger3dError
         If this is no STEP file, or holds no solid or an invalid one.
     """
-    _bytes(path)
+    size = len(_bytes(path))
     require(f"{path}: a STEP file", "build123d")
     from build123d import Compound
-    from OCP.IFSelect import IFSelect_RetDone
-    from OCP.Message import Message, Message_PrinterOStream
-    from OCP.Standard import Standard_Failure
-    from OCP.STEPControl import STEPControl_Reader
+    from OCP.BinTools import BinTools
+    from OCP.TopoDS import TopoDS_Shape
 
-    # OCCT prints messages to the terminal directly.
-    Message.DefaultMessenger_s().RemovePrinters(Message_PrinterOStream.get_type_descriptor_s())
-    reader = STEPControl_Reader()
+    from finger3d.geometry import _step
+
     try:
-        done = reader.ReadFile(str(path)) == IFSelect_RetDone and reader.TransferRoots() > 0
-        shape = reader.OneShape() if done else None
-    except Standard_Failure:
-        shape = None
-    if shape is None or shape.IsNull():
-        raise Finger3dError(f"{path}: this is no STEP file that can be read")
+        read = in_child(_step.read, _STEP_S + _STEP_S_PER_BYTE * size, path=str(path.resolve()))
+    except ChildError as error:
+        raise Finger3dError(
+            f"{path}: OpenCASCADE {error} on this STEP file, which is damaged or too complex; export it again where it "
+            "was drawn"
+        ) from None
+    if read["error"]:
+        raise Finger3dError(f"{path}: {read['error']}")
+    shape = TopoDS_Shape()
+    BinTools.Read_s(shape, io.BytesIO(read["shape"].tobytes()))
     solids = tuple(Compound(shape).solids())
-    if not solids:
-        raise Finger3dError(f"{path}: the file has no solid, only faces or curves; give a solid body")
-    if not all(solid.is_valid for solid in solids):
-        raise Finger3dError(f"{path}: CAD calls its solid invalid; mend it where it was drawn")
     faces: dict[str, list[Face]] = {}
-    for face in (face for solid in solids for face in solid.faces()):
-        if name := _entity_name(face, reader):
+    for face, name in zip((f for solid in solids for f in solid.faces()), read["faces"].tolist(), strict=True):
+        if name:
             faces.setdefault(name.lower(), []).append(face)
-    labels = [_label(_entity_name(solid, reader)) for solid in solids]
-    if len(solids) > 1 and not all(labels):
-        labels = [own or product for own, product in zip(labels, _product_names(path, solids), strict=True)]
-    return StepBody(solids, tuple(labels), faces)
-
-
-def _entity_name(shape: Shape, reader: STEPControl_Reader) -> str:
-    """Return the name of the ADVANCED_FACE or MANIFOLD_SOLID_BREP that a shape was read from."""
-    from OCP.StepRepr import StepRepr_RepresentationItem
-    from OCP.TopLoc import TopLoc_Location
-
-    drawn = shape.wrapped.Located(TopLoc_Location())  # the entity has no location of an assembly
-    entity = reader.WS().TransferReader().EntityFromShapeResult(drawn, 1)
-    named = isinstance(entity, StepRepr_RepresentationItem) and entity.Name() is not None
-    return str(entity.Name().ToCString()).strip() if named else ""
-
-
-def _product_names(path: Path, solids: tuple[Solid, ...]) -> list[str]:
-    """Return the label of the product that each solid belongs to."""
-    from build123d import import_step
-
-    known = []
-    waiting = [*import_step(str(path)).children]
-    while waiting:
-        shape = waiting.pop()
-        waiting += shape.children
-        if not shape.children:
-            known += [(solid, _label(shape.label)) for solid in shape.solids()]
-    if not known:
-        return [""] * len(solids)
-    nearest = [min(known, key=lambda item: (item[0].center() - solid.center()).length) for solid in solids]
-    return [label for _, label in nearest]
-
-
-def _label(name: str) -> str:
-    """Return the label that a name in a STEP file stands for."""
-    label = name.translate(str.maketrans(" .()[]", "______"))
-    return "" if _NO_LABEL.fullmatch(label) else label
+    return StepBody(solids, tuple(read["labels"].tolist()), faces)
 
 
 def tessellated(solid: Solid | Compound) -> Triangles:
