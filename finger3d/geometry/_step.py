@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from finger3d._types import Array
+from finger3d._types import Array, Float
 
 if TYPE_CHECKING:
     from OCP.STEPControl import STEPControl_Reader
+    from OCP.TDF import TDF_Label
     from OCP.TopAbs import TopAbs_ShapeEnum
     from OCP.TopoDS import TopoDS_Shape
 
@@ -98,18 +99,64 @@ def _label(name: str) -> str:
 
 
 def _product_names(path: str, solids: Sequence[TopoDS_Shape]) -> list[str]:
-    """Return the name of the product that each solid belongs to."""
-    from build123d import Solid, import_step
+    """Return the name of the product that each solid belongs to; empty where the file has one product only."""
+    from OCP.collections import Sequence_TDF_Label
+    from OCP.STEPCAFControl import STEPCAFControl_Reader
+    from OCP.TCollection import TCollection_ExtendedString
+    from OCP.TDF import TDF_Label
+    from OCP.TDocStd import TDocStd_Document
+    from OCP.TopAbs import TopAbs_ShapeEnum
+    from OCP.TopLoc import TopLoc_Location
+    from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
-    known = []
-    waiting = [*import_step(path).children]
-    while waiting:
-        shape = waiting.pop()
-        waiting += shape.children
-        if not shape.children:
-            known += [(solid, shape.label) for solid in shape.solids()]
-    if not known:
+    document = TDocStd_Document(TCollection_ExtendedString("XCAF"))
+    reader = STEPCAFControl_Reader()
+    reader.SetNameMode(True)
+    reader.ReadFile(path)
+    reader.Transfer(document)
+    found: list[tuple[Float, str]] = []
+
+    def visit(entry: TDF_Label, location: TopLoc_Location) -> None:
+        product = entry
+        if XCAFDoc_ShapeTool.IsReference_s(entry):
+            product = TDF_Label()
+            XCAFDoc_ShapeTool.GetReferredShape_s(entry, product)
+            location = location.Multiplied(XCAFDoc_ShapeTool.GetLocation_s(entry))
+        components = Sequence_TDF_Label()
+        if XCAFDoc_ShapeTool.GetComponents_s(product, components):
+            for component in components:
+                visit(component, location)
+        else:
+            shape = XCAFDoc_ShapeTool.GetShape_s(product).Moved(location)
+            found.extend((_centre(s), _attribute(product)) for s in _inside(shape, TopAbs_ShapeEnum.TopAbs_SOLID))
+
+    free = Sequence_TDF_Label()
+    XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).GetFreeShapes(free)
+    if free.Length() == 1 and not XCAFDoc_ShapeTool.IsAssembly_s(free.Value(1)):
         return [""] * len(solids)
-    centres = [Solid(solid).center() for solid in solids]
-    nearest = [min(known, key=lambda item: (item[0].center() - centre).length) for centre in centres]
-    return [label for _, label in nearest]
+    for entry in free:
+        visit(entry, TopLoc_Location())
+    if not found:
+        return [""] * len(solids)
+    centres = np.array([centre for centre, _ in found])
+    return [found[int(np.linalg.norm(centres - _centre(solid), axis=1).argmin())][1] for solid in solids]
+
+
+def _centre(solid: TopoDS_Shape) -> Float:
+    """Return the centre of mass (3,) of a solid, mm."""
+    from OCP.BRepGProp import BRepGProp
+    from OCP.GProp import GProp_GProps
+
+    properties = GProp_GProps()
+    BRepGProp.VolumeProperties_s(solid, properties)
+    at = properties.CentreOfMass()
+    return np.array([at.X(), at.Y(), at.Z()])
+
+
+def _attribute(entry: TDF_Label) -> str:
+    """Return the name of an entry of the document."""
+    from OCP.TCollection import TCollection_AsciiString
+    from OCP.TDataStd import TDataStd_Name
+
+    name = TDataStd_Name()
+    return str(TCollection_AsciiString(name.Get()).ToCString()) if entry.FindAttribute(name.GetID_s(), name) else ""
