@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.geometry.files import STEP, StepBody, content, read_step, read_surface, tessellated
-from finger3d.geometry.parts import glue
+from finger3d.geometry.parts import apart, check_gaps, glue
 from finger3d.geometry.surface import Triangles
 from finger3d.geometry.surface_checks import mistake
 
@@ -216,7 +216,7 @@ def united(path: Path, read: StepBody) -> tuple[Solid, dict[str, list[Solid]]]:
     Raises
     ------
     Finger3dError
-        If solids overlap, or do not touch.
+        If solids overlap, do not touch, or nearly touch.
     """
     if len(read.solids) == 1:
         return read.solids[0], {}
@@ -225,11 +225,11 @@ def united(path: Path, read: StepBody) -> tuple[Solid, dict[str, list[Solid]]]:
         parts.setdefault(label, []).append(solid)
     from build123d import Compound
 
-    glue({label: Compound(found) for label, found in parts.items()}, str(path))
+    check_gaps(glue({label: Compound(found) for label, found in parts.items()}, str(path)), read.solids, str(path))
     whole = read.solids[0].fuse(*read.solids[1:]).clean().solids()
     if len(whole) != 1:
         raise Finger3dError(
-            f"{path}: the {len(read.solids)} solids do not touch: they make {len(whole)} bodies; give one body"
+            f"{path}: the {len(read.solids)} solids make {len(whole)} bodies: {apart(*whole[:2])}; give one body"
         )
     return whole[0], parts if len(parts) > 1 else {}
 
