@@ -75,7 +75,10 @@ def test_a_text_of_several_solids_is_one_body(tmp_path: Path, change) -> None:
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
-        (lambda t: t[: t.rindex("endloop")], "11 whole facets and 36 vertices, where a facet has three: it was cut off"),
+        (
+            lambda t: t[: t.rindex("endloop")],
+            "11 whole facets and 36 vertices, where a facet has three: it was cut off",
+        ),
         (lambda t: t[: t.rindex("endsolid")], "does not end with 'endsolid': it was cut off"),
         (lambda t: t.replace("10.0", "10,0"), "not three numbers"),
         (lambda t: "solid a\nendsolid a\n", "no triangles"),

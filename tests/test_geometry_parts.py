@@ -85,7 +85,10 @@ def test_a_part_off_the_middle_leaves_no_symmetry(tmp_path: Path) -> None:
     assert imported(path).mirrors() == ("z",)
 
 
-@pytest.mark.parametrize(("shift", "text"), [(9.0, "2 solids .*2 bodies.* 1 mm apart"), (8.0005, " 0.0005 mm apart near "), (3.0, "two.step: .*overlap")])
+@pytest.mark.parametrize(
+    ("shift", "text"),
+    [(9.0, "2 solids .*2 bodies.* 1 mm apart"), (8.0005, " 0.0005 mm apart near "), (3.0, "two.step: .*overlap")],
+)
 def test_step_files_of_solids_that_do_not_fit_together(tmp_path: Path, shift: float, text: str) -> None:
     from build123d import Box, Pos
 

@@ -202,7 +202,8 @@ class Effect:
         """Refuse a series whose long-time modulus is negative by more than round-off in a data sheet."""
         if self._total > 1.0 + _ROUNDING:
             raise Finger3dError(
-                f"prony: the relative moduli sum to {self._total:.6g}; must be below 1, the rest is the long-time modulus"
+                f"prony: the relative moduli sum to {self._total:.6g}; must be below 1, the rest is the long-time "
+                "modulus"
             )
 
     @property

@@ -50,7 +50,8 @@ def read_surface(path: str | Path, scale: float = 1.0) -> Triangles:
     Raises
     ------
     Finger3dError
-        If there is no such file, or it does not hold one closed body with triangles facing outward that do not intersect.
+        If there is no such file, or it does not hold one closed body with triangles that face outward and do not
+        intersect.
     """
     path = Path(path)
     if path.suffix.lower() in STEP:
@@ -116,7 +117,9 @@ def _is_binary(content: bytes) -> bool:
 def _binary_stl(path: Path, content: bytes) -> Float:
     """Return the corners (3 m, 3) of m triangles, one triangle after the other."""
     if len(content) < _STL_HEADER:
-        raise Finger3dError(f"{path}: this is no STL file: it has {len(content)} bytes, and does not begin with 'solid'")
+        raise Finger3dError(
+            f"{path}: this is no STL file: it has {len(content)} bytes, and does not begin with 'solid'"
+        )
     count = int.from_bytes(content[_STL_COUNT], "little")
     held = (len(content) - _STL_HEADER) // _STL_FACET.itemsize
     if held < count:

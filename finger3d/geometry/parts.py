@@ -152,7 +152,7 @@ def _inner_point(face: Face) -> tuple[float, float, float]:
 
     def area(nodes: list[Any]) -> float:
         a, b, c = nodes
-        return abs((b.X() - a.X()) * (c.Y() - a.Y()) - (c.X() - a.X()) * (b.Y() - a.Y()))
+        return float(abs((b.X() - a.X()) * (c.Y() - a.Y()) - (c.X() - a.X()) * (b.Y() - a.Y())))
 
     largest = max(corners, key=area)
     at = BRepAdaptor_Surface(face.wrapped).Value(

@@ -46,7 +46,7 @@ def pytetwild(
 
 
 def netgen(step: Array, rate: Array, largest: Array, points: Float, sizes: Float) -> Mapping[str, Array]:
-    """Return points (n, 3) and positive tets (m, 4) of a STEP file's solids, with edge lengths (k,) at points (k, 3)."""
+    """Return points (n, 3) and positive tets (m, 4) of the solids in a STEP file, with sizes (k,) at points (k, 3)."""
     from netgen.meshing import MeshingParameters, SetMessageImportance
     from netgen.occ import Glue, OCCGeometry
 

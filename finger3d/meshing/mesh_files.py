@@ -3,7 +3,8 @@
 In a .msh file facets and parts are physical surfaces and volumes.  In a .vtu file they are the values of the cell data
 ``label`` at triangles and ``part`` at tetrahedra: texts, or whole numbers k that stand for the k-th text, counted from
 0, of the field data ``label_names`` and ``part_names``; a negative number is no name.  The names of facets are compared
-in lower case.  meshio reads .msh and turns nodes into VTK's order, and names are read here; VTK reads .vtu, whose texts meshio does not know.
+in lower case.  meshio reads the nodes and cells of .msh and turns them into VTK's order; names are read here.  VTK reads
+.vtu, whose texts meshio does not know.
 """
 
 from __future__ import annotations
@@ -193,7 +194,8 @@ def _groups(entities: bytes, is_binary: bool, word: int) -> dict[tuple[int, int]
     def take(kind: str, count: int) -> list[int]:
         if not is_binary:
             return [int(float(next(words))) for _ in range(count)]
-        return np.frombuffer(stream.read(count * np.dtype(kind).itemsize), kind, count).astype(int).tolist()
+        found = np.frombuffer(stream.read(count * np.dtype(kind).itemsize), kind, count)
+        return [int(value) for value in found.tolist()]
 
     size, found = f"<u{word}", {}
     for dim, count in enumerate(take(size, 4)):
