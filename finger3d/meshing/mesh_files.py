@@ -3,8 +3,8 @@
 In a .msh file facets and parts are physical surfaces and volumes.  In a .vtu file they are the values of the cell data
 ``label`` at triangles and ``part`` at tetrahedra: texts, or whole numbers k that stand for the k-th text, counted from
 0, of the field data ``label_names`` and ``part_names``; a negative number is no name.  The names of facets are compared
-in lower case.  meshio reads the nodes and cells of .msh and turns them into VTK's order; names are read here.  VTK reads
-.vtu, whose texts meshio does not know.
+in lower case.  meshio reads the nodes and cells of .msh and turns them into VTK's order; names are read here.  VTK
+reads .vtu, whose texts meshio does not know.
 """
 
 from __future__ import annotations
