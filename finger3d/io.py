@@ -140,6 +140,10 @@ _DAMAGED = (
 """What NumPy raises for an .npz file that is cut short, changed, or of another kind."""
 
 
+_MOST_EXPANSION = 100
+"""Largest ratio of the arrays' bytes to those of an .npz file; finger3d writes them uncompressed."""
+
+
 def read_arrays(path: str | Path) -> dict[str, Array]:
     """Read all arrays of an .npz file.
 
@@ -151,6 +155,10 @@ def read_arrays(path: str | Path) -> dict[str, Array]:
         If it is damaged.
     """
     try:
+        with zipfile.ZipFile(path) as archive:
+            expanded = sum(member.file_size for member in archive.infolist())
+        if expanded > _MOST_EXPANSION * os.path.getsize(path):
+            raise ValueError(f"it expands to {expanded / 1e6:.0f} MB")
         with np.load(path, allow_pickle=False) as stored:
             return {name: stored[name] for name in stored.files}
     except _DAMAGED as error:

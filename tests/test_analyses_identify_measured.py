@@ -46,3 +46,14 @@ def test_files_that_are_refused(tmp_path: Path, text: str, told: str) -> None:
         read_measured(path, KNOWN)
     assert re.search(told, str(found.value))
     assert "\n" not in str(found.value)
+
+
+@pytest.mark.parametrize(
+    "text", ["depth_mm;gauge_a\n0,5;1,25e-3\n1;2,5e-3\n", "depth_mm\tgauge_a\n0,5\t1,25e-3\n1\t2,5e-3\n"]
+)
+def test_semicolons_and_tabs_come_with_decimal_commas(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "bench.csv"
+    path.write_text(text)
+    found = read_measured(path, KNOWN)
+    assert found.at.tolist() == [0.5, 1.0]
+    assert found.columns["gauge_a"].tolist() == [1.25e-3, 2.5e-3]

@@ -13,6 +13,7 @@ import pytest
 
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.errors import Finger3dError
+from finger3d.io import read_arrays
 from finger3d.mechanics.build import build
 from tests.models import small_section
 
@@ -95,7 +96,8 @@ def test_damaged_files_are_one_line(tmp_path: Path) -> None:
         with_array("parent", put(0, 10**6)), with_array("parent", put(0, -1)), with_array("share", lambda a: a[:-1]),
         with_array("face_mean_at", put(0, 10**6)), with_array("compliance", put(0, np.nan)),
         with_array("reading_rows", put(0, np.inf)), with_array("sign", lambda a: a[:, :1]),
-        with_array("face_area", lambda a: a.astype(object).astype(str)),
+        with_array("face_area", lambda a: a.astype(object).astype(str)), with_array("face_mean_rows", put(1, -1)),
+        with_header(legs=[{**json.loads(arrays["header"].tobytes())["legs"][0], "force_N": -1}]),
     ]  # fmt: skip
     for content in damaged:
         (tmp_path / "bad.npz").write_bytes(content)
@@ -113,3 +115,22 @@ def test_damaged_files_are_one_line(tmp_path: Path) -> None:
         assert "\n" not in str(found.value)
     with pytest.raises(Finger3dError, match="none.npz"):
         ReducedModel.load(tmp_path / "none.npz")
+
+
+def test_whole_numbers_of_a_header_become_floats(tmp_path: Path) -> None:
+    good = ReducedModel.of(build(small_section())).save(tmp_path / "good.npz")
+    with np.load(good) as stored:
+        arrays = dict(stored)
+    header = json.loads(arrays["header"].tobytes())
+    header["legs"][0]["slide_x_mm"] = 10**30
+    arrays["header"] = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
+    np.savez(tmp_path / "whole.npz", **arrays)
+    assert isinstance(ReducedModel.load(tmp_path / "whole.npz").problem.model.legs[0].slide_x_mm, float)
+
+
+def test_a_file_that_expands_a_thousandfold_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    np.savez_compressed(tmp_path / "zeros.npz", compliance=np.zeros(2_000_000))
+    with pytest.raises(Finger3dError, match="no reduced model"):
+        ReducedModel.load(tmp_path / "zeros.npz")
+    with pytest.raises(ValueError, match="expands to 16 MB"):
+        read_arrays(tmp_path / "zeros.npz")

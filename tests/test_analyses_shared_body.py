@@ -191,9 +191,9 @@ def test_several_presses_are_proved_as_each_on_its_own(effect) -> None:
     ]
     face = surface(problem.mesh, "contact", problem.body.thickness)
     kinematics = formulation_of(model)
-    together = kinematics.all_unknowns(problem, [f.meshed_state for f in ends])
+    together = kinematics.unknowns(problem, [f.meshed_state for f in ends])
     for frame, unknowns in zip(ends, together, strict=True):
-        alone = kinematics.unknowns(problem, frame.meshed_state)
+        alone = next(kinematics.unknowns(problem, [frame.meshed_state]))
         found, expected = (
             kinematics.gap(problem, displacement(problem.mesh, x), frame.target, face)[0] for x in (unknowns, alone)
         )

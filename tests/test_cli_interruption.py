@@ -120,7 +120,7 @@ def test_a_press_killed_while_it_meshes_leaves_no_child_and_no_folder(
 
     def meshing() -> bool:
         names = [Path(f"/proc/{pid}/cmdline") for pid in with_environment(str(cache))]
-        return any(path.exists() and b"_tetwild_child" in path.read_bytes() for path in names)
+        return any(path.exists() and b"pytetwild" in path.read_bytes() for path in names)
 
     until(meshing, 60.0)
     time.sleep(1.0)  # it loads pytetwild

@@ -232,7 +232,7 @@ def scene_of(effect: dict, domain: str = "solid", legs: tuple = ({"depth_mm": 1.
 @pytest.mark.parametrize(
     ("effect", "domain", "legs", "says"),
     [
-        ({"prony": ((0.6, 1.0), (0.4, 2.0))}, "solid", None, r"effects\.viscosity: prony: .* 1"),
+        ({"prony": ((0.6, 1.0), (0.41, 2.0))}, "solid", None, r"effects\.viscosity: prony: .* 1"),
         ({"prony": ((-0.1, 1.0),)}, "solid", None, r"effects\.viscosity\.prony = .*above 0"),
         ({"prony": ((0.0, 1.0),)}, "solid", None, r"effects\.viscosity\.prony = .*above 0"),
         ({"prony": ((0.1, 0.0),)}, "solid", None, r"effects\.viscosity\.prony = .*above 0"),
@@ -305,3 +305,12 @@ def test_an_elastic_object_does_not_relax_with_the_finger() -> None:
     relaxed = viscous(problem, ((0.7, 1.0),))
     wanted = build(replace(model, material=Isotropic(0.3, 0.3)))
     assert forces(problem, marched(relaxed))[-1] == pytest.approx(forces(wanted, marched(wanted))[-1], rel=1e-7)
+
+
+def test_shares_that_sum_to_more_than_1_by_rounding_are_scaled_and_told() -> None:
+    model = Effect(((0.6, 1.0), (0.401, 2.0))).apply(block())
+    assert any("sum to 1.001" in text for text in model.warnings)
+    shares = [share for share, _ in model.relaxation.prony]
+    assert sum(shares) == pytest.approx(1.0 - 1e-6, rel=1e-12)
+    assert shares[0] / shares[1] == pytest.approx(0.6 / 0.401)
+    assert Effect(TWO).apply(block()).relaxation.prony == TWO

@@ -85,7 +85,10 @@ def test_a_part_off_the_middle_leaves_no_symmetry(tmp_path: Path) -> None:
     assert imported(path).mirrors() == ("z",)
 
 
-@pytest.mark.parametrize(("shift", "text"), [(9.0, "2 solids .*2 bodies"), (3.0, "two.step: .*overlap")])
+@pytest.mark.parametrize(
+    ("shift", "text"),
+    [(9.0, "2 solids .*2 bodies.* 1 mm apart"), (8.0005, " 0.0005 mm apart near "), (3.0, "two.step: .*overlap")],
+)
 def test_step_files_of_solids_that_do_not_fit_together(tmp_path: Path, shift: float, text: str) -> None:
     from build123d import Box, Pos
 
@@ -93,6 +96,29 @@ def test_step_files_of_solids_that_do_not_fit_together(tmp_path: Path, shift: fl
     with pytest.raises(Finger3dError, match=text) as refused:
         imported(path)
     assert "\n" not in str(refused.value)
+
+
+def test_a_core_with_clearance_in_its_pocket_is_told_with_the_place(tmp_path: Path) -> None:
+    from build123d import Box, Pos
+
+    outer = Pos(0.0, 3.0, 0.0) * Box(20.0, 6.0, 10.0)
+    for gap in (0.005, 5e-5, 0.2):
+        pocket = Pos(0.0, 1.0, 0.0) * Box(10.0 + 2.0 * gap, 2.0, 4.0)
+        core = Pos(0.0, 1.0, 0.0) * Box(10.0, 2.0, 4.0)
+        path = file_of(tmp_path / "finger.step", _=outer - pocket, core=core)
+        if gap > 0.1:  # a slot that can be meshed
+            assert imported(path).part_labels == ("core",)
+            continue
+        with pytest.raises(Finger3dError, match=rf"not touch, but are {gap:.2g} mm apart near \(-?5(\.\d+)?, "):
+            imported(path)
+
+
+def test_a_thin_part_between_two_others_is_no_gap(tmp_path: Path) -> None:
+    from build123d import Box, Pos
+
+    low, foil, high = (Pos(0.0, y, 0.0) * Box(20.0, h, 10.0) for y, h in ((1.0, 2.0), (2.0025, 0.005), (3.005, 2.0)))
+    body = imported(file_of(tmp_path / "finger.step", _=low, foil=foil, top=high))
+    assert set(body.part_labels) == {"foil", "top"}
 
 
 def test_solids_with_one_name_are_one_body(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import subprocess
 import sys
 from pathlib import Path
@@ -68,6 +69,12 @@ def test_the_cache_returns_what_was_stored(stored: tuple[Path, Mesh]) -> None:
     np.testing.assert_array_equal(found[0].cells, stored[1].cells)
     assert set(found[0].facets) == set(stored[1].facets)
     assert found[1] == 250.0
+
+
+@pytest.mark.parametrize("volume", [math.nan, math.inf, -1.0, 0.0])
+def test_a_volume_that_is_none_is_not_trusted(stored: tuple[Path, Mesh], volume: float, tmp_path: Path) -> None:
+    cache.save(tmp_path / "mesh.npz", stored[1], volume)
+    assert cache.load(tmp_path / "mesh.npz") is None
 
 
 def test_the_cache_keeps_parts(tmp_path: Path) -> None:

@@ -90,7 +90,9 @@ def test_both_kinds_of_files_of_gmsh_are_read(name: str) -> None:
         (TET10.replace("4.1 0 8", "5 0 8"), r" 5 .*4\.1: gmsh -format msh41"),
         ("solid x\n", r"\$MeshFormat"),
         ("", r"\$MeshFormat"),
-        (TET10[:-60], "Mesh.SaveParametric = 0"),
+        (TET10[:-60], "damaged or incomplete"),
+        (TET10.replace("3 1 0 10\n", "3 1 1 10\n"), "Mesh.SaveParametric = 0"),
+        (TET10.replace("$Nodes", "$PartitionedEntities\n1\n0\n0 0 0 0\n$EndPartitionedEntities\n$Nodes"), "undivided"),
         (TET10.replace("3 1 11 1\n3 1 2 3 4 5 6 7 8 9 10", "3 1 5 1\n3 1 2 3 4 5 6 7 8"), "1 of type hexahedron"),
         (
             TET10.replace("3 3 1 3\n", "2 2 1 2\n").split("3 1 11 1")[0] + "$EndElements\n",
@@ -103,6 +105,43 @@ def test_other_files_of_gmsh_are_refused(text: str, told: str, tmp_path: Path) -
     path = tmp_path / "body.msh"
     path.write_text(text, encoding="ascii")
     assert re.search(told, refused(lambda: read_contents(path)))
+
+
+def test_every_name_that_gmsh_writes_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "one.msh"
+    changes = {
+        "a reversed surface": ("1 1 1 1 0\n2", "1 1 1 -1 0\n2", ["base", "contact"], "skin"),
+        "a volume named as a surface": ('3 7 "skin"', '3 7 "base"', ["base", "contact"], "base"),
+        "a quotation mark": ('"skin"', '"the "soft" skin"', ["base", "contact"], 'the "soft" skin'),
+        "two groups": ("1 1 1 1 7 0", "1 1 1 2 9 7 0", ["base", "contact"], "skin"),
+    }
+    for what, (old, new, labels, part) in changes.items():
+        assert old in TET10
+        path.write_text(TET10.replace(old, new), encoding="ascii")
+        found = read_contents(path)
+        assert found.label.tolist() == labels, what
+        assert found.part.tolist() == [part], what
+
+
+def test_a_file_of_gmsh_with_cells_of_no_group_is_read(tmp_path: Path) -> None:  # Mesh.SaveAll = 1
+    text = TET10.replace("0 0 2 1\n", "0 0 3 1\n").replace("1 2 0\n", "1 2 0\n3 0 0 0 1 1 1 0 0\n")
+    text = text.replace("3 3 1 3\n", "4 4 1 4\n").replace("3 1 11 1\n", "2 3 9 1\n4 1 2 4 5 10 8\n3 1 11 1\n")
+    path = tmp_path / "one.msh"
+    path.write_text(text, encoding="ascii")
+    assert read_contents(path).label.tolist() == ["base", "contact"]
+
+
+def test_every_negative_number_is_no_name(tmp_path: Path) -> None:
+    import pyvista
+
+    path = vtu_of(tmp_path / "a.vtu", cube(1), parts=["", "bone"], numbers=True)
+    expected, grid = read_contents(path), pyvista.read(path)
+    label = np.asarray(grid.cell_data["label"])
+    grid.cell_data["label"] = np.where(label < 0, -5, label)
+    grid.save(path)
+    found = read_contents(path)
+    assert found.label.tolist() == expected.label.tolist()
+    np.testing.assert_array_equal(found.triangles, expected.triangles)
 
 
 def test_names_are_texts_or_numbers_of_field_data(tmp_path: Path) -> None:

@@ -96,3 +96,18 @@ def test_a_mushroom_is_refused_whatever_the_split() -> None:
     shape -= Pos(0, 8, 0) * Rot(0, 45, 0) * Cylinder(1.5, 40)
     with pytest.raises(Finger3dError, match="halves"):
         mold(shape.solids()[0], (), MoldOptions())
+
+
+def test_an_undercut_that_no_printer_resolves_is_accepted() -> None:
+    from build123d import Box, Pos
+
+    gel = (Pos(0.0, 2.0, 0.0) * Box(20.0, 4.0, 20.0)).solids()[0]
+    for depth, accepted in ((0.008, True), (0.05, False)):
+        groove = Pos(0.0, 2.0, 9.0) * Box(20.0, 1.0, 1.0)  # open along x, 0.5 mm inside the end
+        lip = Pos(0.0, 2.0 - depth, 9.75) * Box(20.0, 1.0, 0.5)
+        body = Body.of((gel - groove - lip).solids()[0], 0.02)
+        if accepted:
+            assert check_opening(body, MoldOptions(), may_turn=True).undercut_mm == pytest.approx(depth, rel=0.2)
+        else:
+            with pytest.raises(Finger3dError, match="undercut of 0.05 mm"):
+                check_opening(body, MoldOptions(), may_turn=True)

@@ -16,6 +16,7 @@ from finger3d.mold.options import MoldOptions
 from finger3d.mold.parts import mold, overlaps
 from finger3d.mold.pegs import THIN
 from finger3d.mold.shell import shell
+from finger3d.mold.solids import common
 from tests.mold_cases import BODIES, GAUGES, made
 
 
@@ -108,3 +109,18 @@ def test_molds_that_cannot_be(gauges, options, told, paper_finger) -> None:
     with pytest.raises(Finger3dError, match=told) as error:
         mold(paper_finger.solid(), foils(gauges, chosen, None), chosen)
     assert "\n" not in str(error.value)
+
+
+def test_the_lid_fills_a_recess_in_the_base() -> None:
+    from build123d import Box, Cylinder, Pos, Rot
+
+    block = Pos(0.0, 6.0, 0.0) * Box(20.0, 12.0, 20.0)
+    hole = Pos(-3.0, 2.5, 0.0) * Rot(90.0, 0.0, 0.0) * Cylinder(3.0, 5.0)
+    plain, cast = (mold(body.solids()[0], [], MoldOptions()) for body in (block, block - hole))
+    for name in ("half_a", "half_b"):
+        assert cast.parts[name].volume == pytest.approx(plain.parts[name].volume, rel=1e-9)
+    assert common(cast.parts["lid"], hole) == pytest.approx(45.0 * np.pi, rel=1e-6)
+    assert cast.silicone_mm3 == pytest.approx(4800.0 - 45.0 * np.pi, rel=1e-6)
+    wide = hole + Pos(-3.0, 4.5, 0.0) * Rot(90.0, 0.0, 0.0) * Cylinder(4.0, 1.0)
+    with pytest.raises(Finger3dError, match=r"the recess in the base near \(-3, .*, an undercut of 1 mm"):
+        mold((block - wide).solids()[0], [], MoldOptions())

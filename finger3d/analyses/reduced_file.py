@@ -243,6 +243,8 @@ def _model(header: TreeView, arrays: TreeView) -> Model:
         raise ValueError("body or material")
     if not all(0.0 <= leg.depth_mm <= 10.0 * body.height_mm for leg in legs):
         raise ValueError("a depth")
+    if not all(leg.force_N is None or leg.force_N > 0.0 for leg in legs):
+        raise ValueError("a force")
     return Model(
         body,
         material,
@@ -289,13 +291,13 @@ def _dataclass(kind: Any, values: TreeView) -> Any:
     ValueError, TypeError
         If a field is missing, unknown, or of another type.
     """
-    result, hints = kind(**values), get_type_hints(kind)
+    hints, numbers = get_type_hints(kind), {}
     for field in fields(kind):
-        value, declared = getattr(result, field.name), "float" if hints[field.name] is float else str(field.type)
-        if value is None and declared.endswith("| None"):
+        value, declared = values.get(field.name), "float" if hints[field.name] is float else str(field.type)
+        if value is None and (declared.endswith("| None") or field.name not in values):
             continue
         if declared.startswith("float"):
-            _number(value)
+            numbers[field.name] = _number(value)
         elif declared.startswith("int"):
             if value != "auto" and (type(value) is not int or not 1 <= value <= _MAX_STEPS):
                 raise ValueError(f"{field.name} is no number of increments")
@@ -303,7 +305,7 @@ def _dataclass(kind: Any, values: TreeView) -> Any:
             raise ValueError(f"{field.name} is no text")
         elif field.name == "axis" and value not in ("x", "z"):
             raise ValueError("axis is neither x nor z")
-    return result
+    return kind(**{**values, **numbers})
 
 
 def _check_arrays(arrays: TreeView, d: int, readings: int) -> None:
@@ -347,6 +349,10 @@ def _check_arrays(arrays: TreeView, d: int, readings: int) -> None:
         kinds = "iu" if name.endswith(whole) else "f"
         if values.shape != shape or values.dtype.kind not in kinds:
             raise ValueError(f"{name} does not fit")
+    for face in ("face", "other"):
+        rows = arrays[f"{face}_mean_rows"].astype(np.int64)
+        if (np.diff(rows, prepend=0) < 0).any() or rows[-1] != len(arrays[f"{face}_mean"]):
+            raise ValueError(f"{face}_mean_rows does not fit")
     for name, values in arrays.items():
         if values.dtype.kind not in "iufb" or not np.isfinite(values).all():
             raise ValueError(f"{name} holds other things than finite numbers")

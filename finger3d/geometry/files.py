@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import codecs
+import io
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,29 +13,29 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._child import ChildError, in_child
 from finger3d._extras import require
 from finger3d._ranges import number
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.geometry.surface import Triangles
-from finger3d.geometry.surface_checks import mistake
+from finger3d.geometry.surface_checks import crossings, mistake
 
 if TYPE_CHECKING:
-    from build123d import Compound, Face, Shape, Solid
-    from OCP.STEPControl import STEPControl_Reader
+    from build123d import Compound, Face, Solid
 
 
 STL, STEP = (".stl",), (".step", ".stp")
 SUFFIXES = (*STL, *STEP)
 
 MOST_TRIANGLES = 300_000
-"""Largest number of triangles of an STL file; the checks take about 25 us a triangle."""
-
-_NO_LABEL = re.compile(r"|COMPOUND|COMPSOLID|SOLID|SHELL|NONE|unnamed|Open_CASCADE.*|=>.*", re.IGNORECASE)
-"""Names that CAD programs give to solids without a name."""
+"""Largest number of triangles of an STL file; the checks take about 60 us a triangle."""
 
 _CHORD_ERROR = 5e-5  # of the tessellation of a CAD solid, over its diagonal
 _FACET_ANGLE = 0.2  # radians, between facets of the tessellation
+_STL_COUNT, _STL_HEADER = slice(80, 84), 84  # bytes of a binary STL file
+_STL_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+_STEP_S, _STEP_S_PER_BYTE = 120.0, 5e-5  # time limit of a STEP file; 28 kB took 0.1 s
 _LARGEST_COORDINATE_MM = 1e12
 _WELD_DISTANCE = 1e-6  # over the diagonal: gaps that single precision leaves between neighbouring triangles
 
@@ -48,7 +50,8 @@ def read_surface(path: str | Path, scale: float = 1.0) -> Triangles:
     Raises
     ------
     Finger3dError
-        If there is no such file, or it does not hold one closed body with triangles facing outward.
+        If there is no such file, or it does not hold one closed body with triangles that face outward and do not
+        intersect.
     """
     path = Path(path)
     if path.suffix.lower() in STEP:
@@ -60,7 +63,20 @@ def read_surface(path: str | Path, scale: float = 1.0) -> Triangles:
     surface = Triangles(surface.points * scale, surface.faces)
     if reason := mistake(surface):
         raise Finger3dError(f"{path}: the body {reason}")
+    if path.suffix.lower() in STL:  # CAD checks its solids itself
+        _check_crossings(path, surface)
     return surface
+
+
+def _check_crossings(path: Path, surface: Triangles) -> None:
+    """Raise a Finger3dError if triangles intersect."""
+    crossed = crossings(surface)
+    if len(crossed):
+        at = surface.corners[crossed[0]].mean(axis=0)
+        raise Finger3dError(
+            f"{path}: the body's surface runs through itself at {len(crossed)} triangles, the first near "
+            f"({at[0]:.4g}, {at[1]:.4g}, {at[2]:.4g}) mm; mend it where it was drawn"
+        )
 
 
 def _bytes(path: Path) -> bytes:
@@ -80,29 +96,69 @@ def content(path: Path) -> str:
 
 
 def _stl(path: Path, scale: float) -> Triangles:
-    import io
-
-    import trimesh
-
-    try:
-        mesh = trimesh.load(io.BytesIO(_bytes(path)), file_type="stl", process=False)
-    except (ValueError, IndexError, KeyError, TypeError, AttributeError, OverflowError, MemoryError):
-        mesh = None
-    if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
-        raise Finger3dError(f"{path}: this is no STL mesh, or an empty one")
-    if len(mesh.faces) > MOST_TRIANGLES:
-        raise Finger3dError(
-            f"{path}: {len(mesh.faces)} triangles; must be at most {MOST_TRIANGLES}: triangles much smaller than "
-            "mesh.size_mm do not change the mesh; export it coarser, or simplify it"
-        )
-    points = np.asarray(mesh.vertices, dtype=float)
+    content = _bytes(path)
+    points = _binary_stl(path, content) if _is_binary(content) else _text_stl(path, content)
     far = np.isfinite(points) & (np.abs(points) * scale > _LARGEST_COORDINATE_MM)
     if far.any():
         raise Finger3dError(
             f"{path}: a point at {points[far].flat[0]:g}: coordinates must be numbers from "
             f"-{number(_LARGEST_COORDINATE_MM)} to {number(_LARGEST_COORDINATE_MM)} mm; mend it where it was drawn"
         )
-    return welded(points, np.asarray(mesh.faces, dtype=np.int64))
+    return welded(points, np.arange(len(points)).reshape(-1, 3))
+
+
+def _is_binary(content: bytes) -> bool:
+    """Whether an STL file is binary, whose header may begin with "solid", too."""
+    count = int.from_bytes(content[_STL_COUNT], "little")
+    text = content.lstrip(codecs.BOM_UTF8).lstrip()[:5].lower() == b"solid" and b"\0" not in content[:_STL_HEADER]
+    return len(content) == _STL_HEADER + count * _STL_FACET.itemsize or not text
+
+
+def _binary_stl(path: Path, content: bytes) -> Float:
+    """Return the corners (3 m, 3) of m triangles, one triangle after the other."""
+    if len(content) < _STL_HEADER:
+        raise Finger3dError(
+            f"{path}: this is no STL file: it has {len(content)} bytes, and does not begin with 'solid'"
+        )
+    count = int.from_bytes(content[_STL_COUNT], "little")
+    held = (len(content) - _STL_HEADER) // _STL_FACET.itemsize
+    if held < count:
+        raise Finger3dError(
+            f"{path}: the header of this binary STL file announces {count} triangles, and {held} follow: it was cut "
+            "off, or is no STL file; copy or export it again"
+        )
+    _check_triangles(path, count)
+    return np.frombuffer(content, _STL_FACET, count, _STL_HEADER)["corners"].reshape(-1, 3).astype(float)
+
+
+def _text_stl(path: Path, content: bytes) -> Float:
+    """Return the corners (3 m, 3) of the triangles of all solids, which together make one body."""
+    count, vertices = (len(re.findall(rb"(?im)^\s*" + word, content)) for word in (rb"end\s*facet", rb"vertex\s"))
+    if vertices != 3 * count:
+        raise Finger3dError(
+            f"{path}: this STL text has {count} whole facets and {vertices} vertices, where a facet has three: it was "
+            "cut off or damaged; export it again"
+        )
+    if not re.search(rb"(?im)^\s*end\s*solid[^\n]*\s*\Z", content):
+        raise Finger3dError(f"{path}: this STL text does not end with 'endsolid': it was cut off; export it again")
+    _check_triangles(path, count)
+    words = re.findall(rb"(?im)^\s*vertex[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)[ \t]*\r?$", content)
+    try:
+        return np.array(words, dtype=bytes).astype(float).reshape(3 * count, 3)
+    except ValueError:
+        raise Finger3dError(
+            f"{path}: a vertex of this STL text is not three numbers, as -1.5 0 2e-3; export it again"
+        ) from None
+
+
+def _check_triangles(path: Path, count: int) -> None:
+    if not count:
+        raise Finger3dError(f"{path}: this STL file holds no triangles")
+    if count > MOST_TRIANGLES:
+        raise Finger3dError(
+            f"{path}: {count} triangles; must be at most {MOST_TRIANGLES}: triangles much smaller than "
+            "mesh.size_mm do not change the mesh; export it coarser, or simplify it"
+        )
 
 
 def welded(points: Float, faces: NDArray[np.int64]) -> Triangles:
@@ -170,71 +226,31 @@ def read_step(path: Path) -> StepBody:
     Finger3dError
         If this is no STEP file, or holds no solid or an invalid one.
     """
-    _bytes(path)
+    size = len(_bytes(path))
     require(f"{path}: a STEP file", "build123d")
     from build123d import Compound
-    from OCP.IFSelect import IFSelect_RetDone
-    from OCP.Message import Message, Message_PrinterOStream
-    from OCP.Standard import Standard_Failure
-    from OCP.STEPControl import STEPControl_Reader
+    from OCP.BinTools import BinTools
+    from OCP.TopoDS import TopoDS_Shape
 
-    # OCCT prints messages to the terminal directly.
-    Message.DefaultMessenger_s().RemovePrinters(Message_PrinterOStream.get_type_descriptor_s())
-    reader = STEPControl_Reader()
+    from finger3d.geometry import _step
+
     try:
-        done = reader.ReadFile(str(path)) == IFSelect_RetDone and reader.TransferRoots() > 0
-        shape = reader.OneShape() if done else None
-    except Standard_Failure:
-        shape = None
-    if shape is None or shape.IsNull():
-        raise Finger3dError(f"{path}: this is no STEP file that can be read")
+        read = in_child(_step.read, _STEP_S + _STEP_S_PER_BYTE * size, path=str(path.resolve()))
+    except ChildError as error:
+        raise Finger3dError(
+            f"{path}: OpenCASCADE {error} on this STEP file, which is damaged or too complex; export it again where it "
+            "was drawn"
+        ) from None
+    if read["error"]:
+        raise Finger3dError(f"{path}: {read['error']}")
+    shape = TopoDS_Shape()
+    BinTools.Read_s(shape, io.BytesIO(read["shape"].tobytes()))
     solids = tuple(Compound(shape).solids())
-    if not solids:
-        raise Finger3dError(f"{path}: the file has no solid, only faces or curves; give a solid body")
-    if not all(solid.is_valid for solid in solids):
-        raise Finger3dError(f"{path}: CAD calls its solid invalid; mend it where it was drawn")
     faces: dict[str, list[Face]] = {}
-    for face in (face for solid in solids for face in solid.faces()):
-        if name := _entity_name(face, reader):
+    for face, name in zip((f for solid in solids for f in solid.faces()), read["faces"].tolist(), strict=True):
+        if name:
             faces.setdefault(name.lower(), []).append(face)
-    labels = [_label(_entity_name(solid, reader)) for solid in solids]
-    if len(solids) > 1 and not all(labels):
-        labels = [own or product for own, product in zip(labels, _product_names(path, solids), strict=True)]
-    return StepBody(solids, tuple(labels), faces)
-
-
-def _entity_name(shape: Shape, reader: STEPControl_Reader) -> str:
-    """Return the name of the ADVANCED_FACE or MANIFOLD_SOLID_BREP that a shape was read from."""
-    from OCP.StepRepr import StepRepr_RepresentationItem
-    from OCP.TopLoc import TopLoc_Location
-
-    drawn = shape.wrapped.Located(TopLoc_Location())  # the entity has no location of an assembly
-    entity = reader.WS().TransferReader().EntityFromShapeResult(drawn, 1)
-    named = isinstance(entity, StepRepr_RepresentationItem) and entity.Name() is not None
-    return str(entity.Name().ToCString()).strip() if named else ""
-
-
-def _product_names(path: Path, solids: tuple[Solid, ...]) -> list[str]:
-    """Return the label of the product that each solid belongs to."""
-    from build123d import import_step
-
-    known = []
-    waiting = [*import_step(str(path)).children]
-    while waiting:
-        shape = waiting.pop()
-        waiting += shape.children
-        if not shape.children:
-            known += [(solid, _label(shape.label)) for solid in shape.solids()]
-    if not known:
-        return [""] * len(solids)
-    nearest = [min(known, key=lambda item: (item[0].center() - solid.center()).length) for solid in solids]
-    return [label for _, label in nearest]
-
-
-def _label(name: str) -> str:
-    """Return the label that a name in a STEP file stands for."""
-    label = name.translate(str.maketrans(" .()[]", "______"))
-    return "" if _NO_LABEL.fullmatch(label) else label
+    return StepBody(solids, tuple(read["labels"].tolist()), faces)
 
 
 def tessellated(solid: Solid | Compound) -> Triangles:

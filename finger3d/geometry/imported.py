@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.geometry.files import STEP, StepBody, content, read_step, read_surface, tessellated
-from finger3d.geometry.parts import glue
+from finger3d.geometry.parts import apart, check_gaps, glue
 from finger3d.geometry.surface import Triangles
-from finger3d.geometry.surface_checks import crossings, mistake
+from finger3d.geometry.surface_checks import mistake
 
 if TYPE_CHECKING:
     from build123d import Compound, Face, Solid
@@ -204,7 +204,6 @@ def imported(path: str | Path, upside_down: bool = False, scale: float = 1.0) ->
             raise Finger3dError(f"{path}: the body {reason}")
     else:
         surface = read_surface(path, scale)
-        _stl_only(path, surface)
         if upside_down:
             surface = Triangles(surface.points * [-1.0, -1.0, 1.0], surface.faces)
     found = _on_its_base(str(path), content(path), scale, upside_down, surface, solid)
@@ -217,7 +216,7 @@ def united(path: Path, read: StepBody) -> tuple[Solid, dict[str, list[Solid]]]:
     Raises
     ------
     Finger3dError
-        If solids overlap, or do not touch.
+        If solids overlap, do not touch, or nearly touch.
     """
     if len(read.solids) == 1:
         return read.solids[0], {}
@@ -226,11 +225,11 @@ def united(path: Path, read: StepBody) -> tuple[Solid, dict[str, list[Solid]]]:
         parts.setdefault(label, []).append(solid)
     from build123d import Compound
 
-    glue({label: Compound(found) for label, found in parts.items()}, str(path))
+    check_gaps(glue({label: Compound(found) for label, found in parts.items()}, str(path)), read.solids, str(path))
     whole = read.solids[0].fuse(*read.solids[1:]).clean().solids()
     if len(whole) != 1:
         raise Finger3dError(
-            f"{path}: the {len(read.solids)} solids do not touch: they make {len(whole)} bodies; give one body"
+            f"{path}: the {len(read.solids)} solids make {len(whole)} bodies: {apart(*whole[:2])}; give one body"
         )
     return whole[0], parts if len(parts) > 1 else {}
 
@@ -326,14 +325,3 @@ def _base(path: str, surface: Triangles, which: str) -> NDArray[np.bool_]:
             f"{footprint:.3g} mm2 seen from there); draw it with y up and a flat base"
         )
     return base
-
-
-def _stl_only(path: Path, surface: Triangles) -> None:
-    """Raise a Finger3dError if triangles intersect; CAD checks its solids itself."""
-    crossed = crossings(surface)
-    if len(crossed):
-        at = surface.corners[crossed[0]].mean(axis=0)
-        raise Finger3dError(
-            f"{path}: the body's surface runs through itself at {len(crossed)} triangles, the first near "
-            f"({at[0]:.4g}, {at[1]:.4g}, {at[2]:.4g}) mm; mend it where it was drawn"
-        )

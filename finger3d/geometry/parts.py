@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from finger3d.errors import Finger3dError
 from finger3d.geometry.cad import label_face
@@ -17,6 +17,9 @@ OUTSIDE = -1
 """Number that stands for the space around a body, where its parts are numbered from 0."""
 
 _OVERLAP = 1e-6  # of the smallest solid's volume: what solids may share by round-off
+
+_SMALLEST_GAP = 5e-4
+"""Distance of solids that do not touch, over the diagonal of the body: narrower gaps cannot be meshed."""
 
 
 @dataclass(frozen=True)
@@ -93,3 +96,66 @@ def glue(solids: Mapping[str, Solid | Compound], name: str) -> Glued:
         faces.append(GluedFace(first, numbers[0], numbers[1] if len(numbers) == 2 else OUTSIDE))
     volumes = tuple(math.fsum(s.volume for number, s in given if number == i) for i in range(len(labels)))
     return Glued(shape, labels, volumes, tuple(faces))
+
+
+def check_gaps(glued: Glued, solids: Sequence[Solid], name: str) -> None:
+    """Refuse solids that nearly touch: the middle of a face of the surface is close to another solid.
+
+    Raises
+    ------
+    Finger3dError
+        With the place, in the coordinates of the file, and the distance.
+    """
+    from build123d import Compound, Vector, Vertex
+
+    least = _SMALLEST_GAP * Compound(solids).bounding_box().diagonal
+    boxes = [(solid.bounding_box(), solid) for solid in solids]
+    for glued_face in glued.faces:
+        if glued_face.outside != OUTSIDE:
+            continue
+        at = _inner_point(glued_face.face)
+        near = [
+            solid
+            for box, solid in boxes
+            if all(lo - least <= c <= hi + least for lo, c, hi in zip(box.min, at, box.max, strict=True))
+        ]
+        if len(near) < 2:
+            continue
+        ways = sorted((solid.distance_to_with_closest_points(Vertex(*at)) for solid in near), key=lambda way: way[0])
+        gap, there, _ = ways[1]  # the first solid is the face's own
+        facing = glued_face.face.normal_at(Vector(*at)).dot(there - Vector(*at)) >= 0.5 * gap  # not beside a thin part
+        if gap < least and facing:
+            raise Finger3dError(f"{name}: {_apart(gap, at)}; draw them with common faces, or a gap that can be meshed")
+
+
+def apart(a: Solid, b: Solid) -> str:
+    """Return a clause that tells how far two solids are apart, and where."""
+    gap, at, _ = a.distance_to_with_closest_points(b)
+    return _apart(gap, (at.X, at.Y, at.Z))
+
+
+def _apart(gap: float, at: tuple[float, float, float]) -> str:
+    x, y, z = at
+    return f"solids do not touch, but are {gap:.2g} mm apart near ({x:.4g}, {y:.4g}, {z:.4g}) mm"
+
+
+def _inner_point(face: Face) -> tuple[float, float, float]:
+    """Return a point inside a face: that of the surface in the middle of the largest of a few triangles."""
+    from OCP.BRep import BRep_Tool
+    from OCP.BRepAdaptor import BRepAdaptor_Surface
+    from OCP.BRepMesh import BRepMesh_IncrementalMesh
+    from OCP.TopLoc import TopLoc_Location
+
+    BRepMesh_IncrementalMesh(face.wrapped, 0.1, True, 0.5, False)
+    mesh = BRep_Tool.Triangulation_s(face.wrapped, TopLoc_Location())
+    corners = [[mesh.UVNode(node) for node in mesh.Triangle(i).Get()] for i in range(1, mesh.NbTriangles() + 1)]
+
+    def area(nodes: list[Any]) -> float:
+        a, b, c = nodes
+        return float(abs((b.X() - a.X()) * (c.Y() - a.Y()) - (c.X() - a.X()) * (b.Y() - a.Y())))
+
+    largest = max(corners, key=area)
+    at = BRepAdaptor_Surface(face.wrapped).Value(
+        math.fsum(p.X() for p in largest) / 3.0, math.fsum(p.Y() for p in largest) / 3.0
+    )
+    return at.X(), at.Y(), at.Z()

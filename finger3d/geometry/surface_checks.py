@@ -98,7 +98,7 @@ def crossings(surface: Triangles) -> Int:
 
 
 def _pierced(start: Float, stop: Float, corner: Float, slack: float) -> NDArray[np.bool_]:
-    """Whether segments pass through triangles (n, 3, 3), by more than `slack` (mm) on every side."""
+    """Whether segments pass through triangles (n, 3, 3), or their edges, and reach more than `slack` (mm) beyond."""
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     length = np.linalg.norm(normal, axis=1)
     normal = normal / np.maximum(length, 1e-300)[:, None]
@@ -110,5 +110,5 @@ def _pierced(start: Float, stop: Float, corner: Float, slack: float) -> NDArray[
         along = corner[:, j] - corner[:, i]
         inward = np.cross(normal, along)
         inward /= np.maximum(np.linalg.norm(inward, axis=1), 1e-300)[:, None]
-        through &= np.einsum("ij,ij->i", at - corner[:, i], inward) > slack
+        through &= np.einsum("ij,ij->i", at - corner[:, i], inward) > -slack
     return through

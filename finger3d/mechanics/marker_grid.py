@@ -99,7 +99,7 @@ def marker_table(problem: Problem, steps: Sequence[StepResult], spacing_mm: floa
 def grid_numbers(problem: Problem, step: StepResult, spacing_mm: float) -> dict[str, float]:
     """Return the displacements of the markers of a grid after an increment, named as those of other markers."""
     grid = MarkerGrid.of(problem, spacing_mm)
-    (unknowns,) = problem.model.formulation.all_unknowns(problem, [step.meshed_state])
+    (unknowns,) = formulation_of(problem.model).unknowns(problem, [step.meshed_state])
     moved = _in_space(grid.displacements(displacement(problem.mesh, unknowns)))
     return {
         f"marker_grid_{k + 1}_{axis}_mm": float(u)

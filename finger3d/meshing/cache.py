@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import inspect
 import json
+import math
 import os
 from importlib import metadata
 from pathlib import Path
@@ -68,7 +69,8 @@ def load(path: Path) -> tuple[Mesh, float] | None:
         facets = {name[7:]: array for name, array in arrays.items() if name.startswith("facets_")}
         labels = tuple(str(label) for label in arrays["part_labels"]) if "part" in arrays else ()
         mesh = Mesh(arrays["points"], arrays["cells"], facets, arrays.get("part"), labels)
-        return (mesh, float(arrays["cad_volume_mm3"])) if str(arrays["hash"]) == _checksum(mesh) else None
+        volume = float(arrays["cad_volume_mm3"])
+        return (mesh, volume) if str(arrays["hash"]) == _checksum(mesh) and 0.0 < volume < math.inf else None
     except (OSError, ValueError, TypeError, KeyError, IndexError, AttributeError):  # or an archive of other arrays
         return None
 

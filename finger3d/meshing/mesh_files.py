@@ -3,11 +3,15 @@
 In a .msh file facets and parts are physical surfaces and volumes.  In a .vtu file they are the values of the cell data
 ``label`` at triangles and ``part`` at tetrahedra: texts, or whole numbers k that stand for the k-th text, counted from
 0, of the field data ``label_names`` and ``part_names``; a negative number is no name.  The names of facets are compared
-in lower case.  meshio reads .msh and turns nodes into VTK's order; VTK reads .vtu, whose texts meshio does not know.
+in lower case.  meshio reads the nodes and cells of .msh and turns them into VTK's order; names are read here.  VTK
+reads .vtu, whose texts meshio does not know.
 """
 
 from __future__ import annotations
 
+import io
+import re
+import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -33,6 +37,9 @@ _TETS = {"tetra": 4, "tetra10": 10}
 _TRIANGLES = {"triangle": 3, "triangle6": 6}
 _IGNORED = ("vertex", "line", "line3", "empty")
 _VTK = {0: "empty", 1: "vertex", 3: "line", 21: "line3", 5: "triangle", 22: "triangle6", 10: "tetra", 24: "tetra10"}
+_DAMAGED = (
+    ValueError, KeyError, IndexError, TypeError, AttributeError, OverflowError, MemoryError, StopIteration
+)  # fmt: skip
 _HEAD = 4096  # bytes in which the format of a .msh file is looked for
 
 
@@ -133,30 +140,76 @@ def _check_arrays(path: Path, contents: MeshContents) -> None:
 
 
 def _msh(path: Path) -> tuple[Float, list[_Block]]:
-    _check_msh_version(path)
+    is_binary, word = _msh_header(path)
+    content = path.read_bytes()
+    if b"\n$PartitionedEntities" in content:
+        raise Finger3dError(f"{path}: this mesh is partitioned; save it undivided")
+    # meshio loses names of reversed surfaces and those of two dimensions, and cannot read files with unnamed cells.
+    content, names = _without(content, b"PhysicalNames")
+    content, entities = _without(content, b"Entities")
     import meshio
 
     try:
-        mesh = meshio.gmsh.read(path)
-    except (meshio.ReadError, ValueError, KeyError, IndexError, TypeError, AttributeError, OverflowError, MemoryError):
-        raise Finger3dError(
-            f"{path}: this Gmsh file is damaged or incomplete, or its nodes are parametric; save it again, with "
-            "Mesh.SaveParametric = 0"
-        ) from None
-    blocks = []
-    for k, block in enumerate(mesh.cells):
-        names = [
-            name
-            for name, members in mesh.cell_sets.items()
-            if name in mesh.field_data and len(members[k]) and mesh.field_data[name][1] == block.dim
-        ]
-        own = names[0] if names else ""
-        blocks.append(_Block(block.type, np.asarray(block.data, dtype=np.int64), np.full(len(block.data), own)))
+        name_of = _names_of_entities(names, entities, is_binary, word)
+        with tempfile.TemporaryDirectory(prefix="finger3d_") as folder:
+            (Path(folder) / "nameless.msh").write_bytes(content)
+            mesh = meshio.gmsh.read(Path(folder) / "nameless.msh")
+        entity = [int(tags[0]) if len(tags) else 0 for tags in mesh.cell_data["gmsh:geometrical"]]
+    except (meshio.ReadError, *_DAMAGED) as error:
+        if "parametric" in str(error):
+            raise Finger3dError(f"{path}: its nodes are parametric; save it with Mesh.SaveParametric = 0") from None
+        raise Finger3dError(f"{path}: this Gmsh file is damaged or incomplete; save it again") from None
+    blocks = [
+        _Block(b.type, np.asarray(b.data, dtype=np.int64), np.full(len(b.data), name_of.get((b.dim, tag), "")))
+        for b, tag in zip(mesh.cells, entity, strict=True)
+    ]
     return np.asarray(mesh.points, dtype=float), blocks
 
 
-def _check_msh_version(path: Path) -> None:
-    """Refuse a file of another format or of another version of the format."""
+def _without(content: bytes, section: bytes) -> tuple[bytes, bytes]:
+    """Return a file without a section, and what is between the lines that begin and end it."""
+    first, last = b"$" + section, b"$End" + section
+    before, found, rest = content.partition(first)
+    if not found:
+        return content, b""
+    inside, _, after = rest.partition(last)
+    return before + after.lstrip(), inside[inside.index(b"\n") + 1 :]
+
+
+def _names_of_entities(names: bytes, entities: bytes, is_binary: bool, word: int) -> dict[tuple[int, int], str]:
+    """Return the name of the physical group of each entity (dimension, tag); of several groups the first named."""
+    lines = re.findall(r'^[ \t]*(\d+)[ \t]+(\d+)[ \t]+"(.*)"', names.decode(), re.MULTILINE)
+    known = [(int(dim), int(group), name) for dim, group, name in lines]
+    groups = _groups(entities, is_binary, word) if entities else {}
+    return {
+        (dim, tag): next((name for d, g, name in known if d == dim and g in own), "")
+        for (dim, tag), own in groups.items()
+    }
+
+
+def _groups(entities: bytes, is_binary: bool, word: int) -> dict[tuple[int, int], list[int]]:
+    """Return the physical groups of each entity (dimension, tag), without the sign, which tells the orientation."""
+    stream, words = io.BytesIO(entities), iter(entities.split() if not is_binary else [])
+
+    def take(kind: str, count: int) -> list[int]:
+        if not is_binary:
+            return [int(float(next(words))) for _ in range(count)]
+        found = np.frombuffer(stream.read(count * np.dtype(kind).itemsize), kind, count)
+        return [int(value) for value in found.tolist()]
+
+    size, found = f"<u{word}", {}
+    for dim, count in enumerate(take(size, 4)):
+        for _ in range(count):
+            (tag,) = take("<i4", 1)
+            take("<f8", 3 if dim == 0 else 6)  # its box
+            found[dim, tag] = [abs(group) for group in take("<i4", *take(size, 1))]
+            if dim > 0:
+                take("<i4", *take(size, 1))  # its boundary
+    return found
+
+
+def _msh_header(path: Path) -> tuple[bool, int]:
+    """Return whether a file is binary, and the bytes of its large integers; refuse one of another format or version."""
     with path.open("rb") as file:
         lines = file.read(_HEAD).split(b"\n")
     stripped = [line.strip() for line in lines]
@@ -168,6 +221,7 @@ def _check_msh_version(path: Path) -> None:
         raise Finger3dError(
             f"{path}: Gmsh's format {printable(version)} is not read; save it as {MSH_VERSION}: gmsh -format msh41"
         )
+    return words[1:2] == ["1"], 4 if words[2:3] == ["4"] else 8
 
 
 # --- VTK ----------------------------------------------------------------------------------------------------------
@@ -240,4 +294,4 @@ def _names(path: Path, grid: Any, key: str, count: int) -> NDArray[np.str_]:
         raise Finger3dError(
             f"{where} has the number {number.max()}, and '{names}' has {len(known)} names, counted from 0"
         )
-    return np.where(number < 0, "", np.append(known, "")[number])
+    return np.append(known, "")[np.where(number < 0, len(known), number)]

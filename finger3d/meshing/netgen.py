@@ -18,6 +18,7 @@ from finger3d._types import Float, Int
 from finger3d.errors import Finger3dError
 from finger3d.fem.simplex import Mesh
 from finger3d.geometry.design import Design
+from finger3d.meshing import _meshers
 from finger3d.meshing.limits import MAX_TETS, check_count
 from finger3d.meshing.options import MeshSizes, Zone
 from finger3d.meshing.sizing import RATE, Sizing, forecast, sizing
@@ -103,7 +104,7 @@ def run_child(glued: Glued, field: Sizing, limit: float) -> tuple[Float, Int]:
         step = np.frombuffer(path.read_bytes(), dtype=np.uint8)
     points, sizes = size_points(field)
     return run_mesher(
-        "netgen",
+        _meshers.netgen,
         limit,
         step=step,
         rate=RATE,

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import io
 import math
-import os
-import subprocess
-import sys
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from finger3d._machine import child_environment
-from finger3d._types import Float, Int
+from finger3d._child import ChildError, in_child
+from finger3d._types import Array, Float, Int
 from finger3d.errors import Finger3dError
 from finger3d.fem.quality import curved_volume
 from finger3d.fem.simplex import Mesh, signed_volumes
@@ -25,9 +22,6 @@ from finger3d.meshing.sizing import Sizing
 if TYPE_CHECKING:
     from finger3d.geometry.parts import Glued
     from finger3d.geometry.tessellate import Tessellation
-
-CHILDREN = {"pytetwild": "finger3d.meshing._tetwild_child", "netgen": "finger3d.meshing._netgen_child"}
-"""Package of a mesher -> module of the child process that calls it."""
 
 VOLUME_TOLERANCE = 0.01
 """Relative difference between the volumes of the curved mesh, the tessellation, and the design."""
@@ -151,14 +145,14 @@ def check_tets(points: Float, tets: Int, volume_mm3: float, mesher: str = "pytet
         raise UnusableMeshError(f"its volume is {volumes.sum():.6g} mm3, the body's {volume_mm3:.6g}")
 
 
-def run_mesher(mesher: str, limit: float, **given: ArrayLike) -> tuple[Float, Int]:
+def run_mesher(mesher: Callable[..., Mapping[str, Array]], limit: float, **given: ArrayLike) -> tuple[Float, Int]:
     """Run a mesher in a child process; return points (n, 3), mm, and tets (t, 4).
 
     Parameters
     ----------
-    mesher : the name of the package, in `CHILDREN`
+    mesher : a function of :mod:`finger3d.meshing._meshers`, named like its package
     limit : seconds
-    given : what the child reads from its standard input, an .npz file
+    given : its arguments
 
     Raises
     ------
@@ -167,17 +161,8 @@ def run_mesher(mesher: str, limit: float, **given: ArrayLike) -> tuple[Float, In
     """
     from finger3d.meshing.snap import UnusableMeshError
 
-    stream = io.BytesIO()
-    np.savez(stream, allow_pickle=False, **given)
-    command = [sys.executable, "-P", "-m", CHILDREN[mesher], str(os.getpid())]
     try:
-        done = subprocess.run(
-            command, env=child_environment(), input=stream.getbuffer(), timeout=limit, capture_output=True, check=False
-        )
-    except subprocess.TimeoutExpired as error:
-        raise UnusableMeshError(f"{mesher} did not finish within {limit:.0f} s") from error
-    if done.returncode != 0:
-        said = (done.stderr.decode(errors="replace").strip().splitlines() or ["no message"])[-1]
-        raise UnusableMeshError(f"{mesher} crashed (return code {done.returncode}): {said}")
-    with np.load(io.BytesIO(done.stdout), allow_pickle=False) as result:
-        return result["points"], result["tets"]
+        result = in_child(mesher, limit, **given)
+    except ChildError as error:
+        raise UnusableMeshError(f"{mesher.__name__} {error}") from error
+    return result["points"], result["tets"]

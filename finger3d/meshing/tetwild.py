@@ -19,6 +19,7 @@ from finger3d._types import Float, Int
 from finger3d.errors import Finger3dError
 from finger3d.fem.simplex import Mesh
 from finger3d.geometry.design import Design
+from finger3d.meshing import _meshers
 from finger3d.meshing.limits import MAX_TETS, check_count
 from finger3d.meshing.options import MeshSizes, Zone
 from finger3d.meshing.sizing import Sizing, forecast, sizing
@@ -177,7 +178,7 @@ def run_child(
     extent = np.ptp(points, axis=0)
     bg_points, bg_tets, bg_values = field.background()
     return run_mesher(
-        "pytetwild",
+        _meshers.pytetwild,
         limit,
         points=points,
         triangles=triangles,

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 _ON_PLANE_MM = 1e-6  # distance at which a face lies on a plane
 _NORMAL_TOLERANCE = 1e-6  # component of a unit normal against the opening direction
-_FACET_UNDERCUT_MM = 0.02  # depth of undercuts that triangles of a smooth body have, below what a printer resolves
+_LEAST_UNDERCUT_MM = 0.02  # what a printer resolves, and triangles of a smooth body have
 _LEVELS = 24  # heights of a half at which its undercut is measured
 _DEPTH_TOLERANCE = 1e-3  # of the depth, relative
 _LITTLE_DRAFT = np.radians(1.0)
@@ -64,13 +64,13 @@ def check_opening(finger: Body, options: MoldOptions, may_turn: bool) -> Draft:
     Raises
     ------
     Finger3dError
-        If the body has an undercut deeper than `options.undercut_mm`.
+        If the body has an undercut deeper than `options.undercut_mm`, and than a printer resolves.
     """
     found = draft(finger, options.split, options.split_mm)
-    if found.undercut_mm <= options.undercut_mm:
+    if found.undercut_mm <= max(options.undercut_mm, _LEAST_UNDERCUT_MM):
         return found
     other = "x" if options.split == "z" else "z"
-    free = (may_turn or other == "z") and not draft(finger, other, 0.0).undercut_mm
+    free = (may_turn or other == "z") and draft(finger, other, 0.0).undercut_mm <= _LEAST_UNDERCUT_MM
     advice = f"--split {other} would do" if free else "a mold of two halves cannot be taken off; change the body"
     raise Finger3dError(
         f"--split {options.split} --split-mm {options.split_mm:g}: {found.where}, an undercut of "
@@ -94,7 +94,7 @@ def draft(finger: Body, split: str, at_mm: float) -> Draft:
         against = sign * half.normals[walls, axis]
         locked = _locked(finger, axis, sign, at_mm)
         depth = undercut_depth(half, axis, sign) if locked or finger.cad is None else 0.0
-        if depth > max(deepest, 0.0 if finger.cad is not None else _FACET_UNDERCUT_MM):
+        if depth > max(deepest, 0.0 if finger.cad is not None else _LEAST_UNDERCUT_MM):
             point = locked or half.corners[walls][int(np.argmin(against))].mean(axis=0)
             side = f"{'+' if sign > 0 else '-'}{split}"
             place = ", ".join(f"{c:.4g}" for c in point)

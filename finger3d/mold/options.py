@@ -27,6 +27,13 @@ the groove is three quarters full."""
 
 _LEAST_WALL_MM = 8.0  # where nothing needs a thicker one
 
+_LARGEST_MM = {
+    "wall_mm": 200.0, "peg_mm": 50.0, "lid_mm": 100.0, "foil_length_mm": 500.0, "foil_thickness_mm": 10.0,
+    "foil_width_mm": 500.0, "pour_mm": 100.0, "vent_mm": 50.0, "band_mm": 50.0, "cord_mm": 20.0, "carrier_mm": 100.0,
+    "key_mm": 100.0,
+}  # fmt: skip
+"""Largest value of each length: several times what molds of large printers have."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class MoldOptions:
@@ -150,10 +157,9 @@ class MoldOptions:
         for name, known in choices.items():
             if getattr(self, name) not in known:
                 raise _refused(name, getattr(self, name), " or ".join(known))
-        for name in ("wall_mm", "peg_mm", "lid_mm", "foil_length_mm", "foil_thickness_mm", "foil_width_mm",
-                     "pour_mm", "vent_mm", "band_mm", "cord_mm", "carrier_mm", "key_mm"):  # fmt: skip
+        for name, most in _LARGEST_MM.items():
             if getattr(self, name) is not None:
-                self._within(name, 0.0, math.inf, "above 0", open_low=True)
+                self._within(name, 0.0, most, f"above 0, and at most {most:g}", open_low=True)
         if not 0.0 <= self.shrinkage < 0.2:
             raise _refused("shrinkage", self.shrinkage, "a share from 0 up to 0.2: 0.001 is a tenth of a percent")
         self._within("riser", 0.0, 0.5, "a share of the cavity from 0 to 0.5; 0.03 to 0.05 is usual")

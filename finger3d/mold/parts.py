@@ -27,7 +27,7 @@ from finger3d.errors import Finger3dError
 from finger3d.geometry.surface import Triangles
 from finger3d.mold.body import Body
 from finger3d.mold.carrier import Keys, key_solids, keys
-from finger3d.mold.demould import Draft, check_opening
+from finger3d.mold.demould import Draft, check_opening, undercut_depth
 from finger3d.mold.fasteners import Bolts, band_grooves, bolts, pry_notches, screws
 from finger3d.mold.features import Feature, added, cuts
 from finger3d.mold.foils import FoilSlot, check_foils, plugs, slot
@@ -44,6 +44,7 @@ if TYPE_CHECKING:
 
 _OVERLAP_TOLERANCE = 1e-6  # relative volume that booleans leave between faces in contact
 _MESH_OVERLAP_TOLERANCE = 1e-3  # the same where one of two bodies is tessellated
+_ON_BASE_MM = 1e-6
 HALVES = ("half_a", "half_b")
 MAIN = "body"
 """Name of the solid without a label."""
@@ -163,12 +164,44 @@ def mold(shape: Solid | Triangles, gauges: Sequence[FoilSlot], options: MoldOpti
         )
     finger = Body.of(shape, options.machine.tolerance_mm)
     check_split(finger, options)
-    draft = check_opening(finger, options, may_turn=not gauges)
+    draft = check_opening(filled(finger, options), options, may_turn=not gauges)
     body = finger.scaled(options.scale).opening_along_z(options.split)
     check_foils(body, gauges, options)
     made = _assembled(body, tuple(gauges), options, draft)
     check_parts(made)
     return made
+
+
+def recesses(body: Body) -> list[Solid]:
+    """Return what fills the recesses in the base of a CAD body, which the lid does."""
+    if body.cad is None:
+        return []
+    low, high = body.box
+    around = between([low[0] - 1.0, 0.0, low[2] - 1.0], high + 1.0)
+    pieces = sorted((around - body.cad).solids(), key=lambda piece: piece.bounding_box().diagonal)
+    return [piece for piece in pieces[:-1] if abs(piece.bounding_box().min.Y) < _ON_BASE_MM]
+
+
+def filled(finger: Body, options: MoldOptions) -> Body:
+    """Return the body that the halves enclose: the finger with the recesses in its base filled.
+
+    Raises
+    ------
+    Finger3dError
+        If the lid could not be pulled out of a recess.
+    """
+    tolerance = options.machine.tolerance_mm
+    fillings = recesses(finger)
+    for filling in fillings:
+        depth = undercut_depth(Body.of(filling, tolerance).surface, 1, 1.0)
+        if depth > max(options.undercut_mm, tolerance):
+            at = filling.center()
+            raise Finger3dError(
+                f"mold: the recess in the base near ({at.X:.4g}, {at.Y:.4g}, {at.Z:.4g}) mm widens inside, an undercut "
+                f"of {depth:.2g} mm: the lid, which fills it, cannot be pulled out; change the body, or allow it with "
+                "--undercut-mm"
+            )
+    return Body.of(one(finger.solid.fuse(*fillings).clean(), "the finger"), tolerance) if fillings else finger
 
 
 def halves_and_features(
@@ -179,7 +212,8 @@ def halves_and_features(
     cast = [body.at(x) for x in at.places]
     pegs = half_pegs(at, options)
     slots = tuple(slot(foil, at, options, x) for x in at.places for foil in foils)
-    cavities = [b.cad for b in cast if b.cad is not None]
+    fillings = [recesses(b) for b in cast]
+    cavities = [solid for b, own in zip(cast, fillings, strict=True) if b.cad is not None for solid in (b.cad, *own)]
     features = [
         screws(at, options),
         band_grooves(at, options),
@@ -187,6 +221,7 @@ def halves_and_features(
         seal([b.surface for b in cast], at, options),
         plugs(foils, at, options),
         Feature(add={"half_b": pegs.pegs}, cut={"half_a": pegs.holes}),
+        Feature(add={"lid": list(itertools.chain(*fillings))}),
         Feature(cut={name: [*slots, *cavities] for name in HALVES}),
     ]
     return at, features, pegs, slots

@@ -32,6 +32,7 @@ from finger3d.mold.parts import (
     check_parts,
     check_split,
     cover,
+    filled,
     halves,
     halves_and_features,
     part,
@@ -67,7 +68,7 @@ def poured(whole: Solid, solids: Mapping[str, Solid], gauges: Sequence[FoilSlot]
     check_split(finger, options)
     if options.split == "x" and gauges:
         raise Finger3dError(f'--split x: gauge "{gauges[0].names[0]}" needs halves that open along z')
-    draft = check_opening(finger, options, may_turn=not gauges)
+    draft = check_opening(filled(finger, options), options, may_turn=not gauges)
     body = finger.scaled(options.scale).opening_along_z(options.split)
     tolerance = options.machine.tolerance_mm
     cast = {
@@ -80,17 +81,17 @@ def poured(whole: Solid, solids: Mapping[str, Solid], gauges: Sequence[FoilSlot]
     features.append(Feature(add={"lid": upright.pegs}, cut=dict.fromkeys(HALVES, upright.holes)))
     parts = halves(at, features)
     pours: list[Pour] = []
-    filled: list[Body] = []
+    poured: list[Body] = []
     steps = [label for label in order if label not in inserts]
     for label in steps:
-        filled.append(cast[label])
+        poured.append(cast[label])
         later = order[order.index(label) + 1 :]
         placed = [] if label != steps[-1] else [name for name in later if name in inserts]
         positive = _positive([cast[name] for name in later if name not in placed], body, at, options, label)
         own, found = _lid(label, cast[label], positive, [(name, cast[name]) for name in placed], at, features, options)
         _check_strips(gauges, cast, label, positive, at, options)
         parts.update(own)
-        pours.append(Pour(label, f"lid_{label or MAIN}", cast[label].volume_mm3, found, tuple(filled), tuple(own)))
+        pours.append(Pour(label, f"lid_{label or MAIN}", cast[label].volume_mm3, found, tuple(poured), tuple(own)))
     if pours[-1].ports is None:
         raise Finger3dError(f"mold: {pours[-1].name} has no base to pour it through; choose another --pour-order")
     for feature in features:

@@ -76,7 +76,7 @@ def read_measured(path: Path, known: Sequence[str]) -> MeasuredPress:
 
     Parameters
     ----------
-    path : CSV file with a line of names, then a line for each row
+    path : CSV file with a line of names, then a line for each row; with semicolons or tabs the comma is decimal
     known : names that columns may have, besides those of `INDEX`
 
     Raises
@@ -122,9 +122,13 @@ def _table(path: Path) -> tuple[list[str], list[tuple[int, dict[str, str]]]]:
     """Return the names and the rows, with the number of their lines."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as stream:
-            reader = csv.reader(stream)
+            separator = _separator(stream.readline())
+            stream.seek(0)
+            reader = csv.reader(stream, delimiter=separator)
             names = [name.strip() for name in next(reader, [])]
             lines = [(reader.line_num, cells) for cells in reader if cells]
+            if separator != ",":  # where the comma is decimal
+                lines = [(line, [cell.replace(",", ".") for cell in cells]) for line, cells in lines]
     except FileNotFoundError:
         raise Finger3dError(f"{path}: there is no such file") from None
     except OSError as error:
@@ -138,6 +142,11 @@ def _table(path: Path) -> tuple[list[str], list[tuple[int, dict[str, str]]]]:
         if len(cells) != len(names):
             raise Finger3dError(f"{path}: line {line}: has {len(cells)} cells, and there are {len(names)} columns")
     return names, [(line, dict(zip(names, cells, strict=True))) for line, cells in lines]
+
+
+def _separator(names: str) -> str:
+    """Return what separates the names: semicolons and tabs are those of languages with a decimal comma."""
+    return max(",;\t", key=names.count)
 
 
 def _number(path: Path, line: int, name: str, text: str) -> float:
