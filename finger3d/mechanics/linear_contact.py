@@ -295,10 +295,13 @@ def transported(state: ContactState, bases: Float) -> ContactState:
 
 
 def carried_by_object(problem: Problem, a: ObjectPose, b: ObjectPose, at: Float) -> Float:
-    """Return how far (c, d) mm the object's material at points displaced by `at` (c, d) moves from pose a to pose b."""
+    """Return how far (c, d) mm the object moves from pose a to pose b where the points are, displaced by `at` (c, d).
+
+    The displacement of a point is the mean over its hat function; the mean of a turn is that of the centroid.
+    """
     d = at.shape[1]
     if a.turns == b.turns:
         return np.broadcast_to((b.displacement - a.displacement)[:d], at.shape)
     points = np.zeros((len(at), 3))
-    points[:, :d] = problem.surface.points + at
+    points[:, :d] = problem.surface.centroids + at
     return problem.placed(b).moved_from(problem.placed(a), points)[:, :d]
