@@ -102,14 +102,14 @@ class Marker:
 class Taxel:
     """Mean pressure in MPa on a rectangle of the base, per area at rest, as a pressure cell below the finger reads it.
 
-    A section has the length along x only.
+    Only a solid needs the width along z.
     """
 
     name: str
     x_mm: float
     z_mm: float
     length_mm: float
-    width_mm: float
+    width_mm: float | None = None
     kind: ClassVar[Literal["taxel"]] = "taxel"
 
     def columns(self, dim: int) -> tuple[str, ...]:
@@ -141,7 +141,11 @@ class Taxel:
         """Return the weights (n,) of the nodal forces along y."""
         from finger3d.fem.reactions import mean_traction_weights
 
-        sides = [("x", self.x_mm, self.length_mm), ("z", self.z_mm, self.width_mm)][: body.mesh.dim - 1]
+        sides = [("x", self.x_mm, self.length_mm)]
+        if body.mesh.dim == 3:
+            if self.width_mm is None:
+                raise Finger3dError(f"taxel {self.name}: width_mm is missing; a solid needs it")
+            sides.append(("z", self.z_mm, self.width_mm))
         bounds = [_folded(at - 0.5 * extent, at + 0.5 * extent, axis in body.axes) for axis, at, extent in sides]
         boxes = np.array([np.transpose(box) for box in product(*bounds)])
         try:
