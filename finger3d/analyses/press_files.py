@@ -103,7 +103,10 @@ class ResultWriter:
         if steps:
             write_csv(self.folder / "history.csv", history_table(steps))
             last = next((step for step in reversed(record.steps) if step.outcome.ok), record.steps[-1])
-            write_csv(self.folder / "contact.csv", contact_table(record.problem.points, last.state))
+            columns = contact_table(record.problem.points, last.state)
+            acting = record.problem.acting_places(last.meshed_state)
+            columns |= {f"acting_{axis}_mm": acting[:, k] for k, axis in enumerate("xyz")}
+            write_csv(self.folder / "contact.csv", columns)
         self._written = time.perf_counter()
         self._seconds = self._written - begin
 

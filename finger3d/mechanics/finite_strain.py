@@ -219,6 +219,12 @@ class FiniteStrain:
         contact = contact_of(problem, problem.surface, u, target)
         return moment_of(mesh.points + u, contact.nodal_forces(state.force))
 
+    def acting_places(self, problem: Problem, state: ContactState) -> Float:
+        """Return the centroids of the points on the deformed surface."""
+        surface = problem.surface
+        moved = surface.trace @ displacement(problem.mesh, self.unknowns(problem, state))
+        return np.asarray(surface.centroids + moved)
+
     def gap(self, problem: Problem, u: Float, target: ObjectPose, surface: BoundarySurface) -> tuple[Float, Float]:
         """Return gaps and normals in the deformed configuration."""
         contact = contact_of(problem, surface, u, target)

@@ -125,6 +125,10 @@ class Formulation(Protocol):
         """Moment (3,) N mm of the contact forces on the meshed part about the middle of the base."""
         ...
 
+    def acting_places(self, problem: Problem, state: ContactState) -> Float:
+        """Places (c, d) mm where the forces of the contact points act: means over their hat functions."""
+        ...
+
     def gap(self, problem: Problem, u: Float, target: ObjectPose, surface: BoundarySurface) -> tuple[Float, Float]:
         """Gap (c,) mm and normal (c, d) of any points of the surface, candidates or not, at nodal displacements."""
         ...

@@ -237,6 +237,10 @@ class Problem:
         """The meshed part as readings see it."""
         return MeshedBody(self.mesh, self.axes, self.body.stiffness, self.body.thickness, moduli_of(self.body.elastic))
 
+    def acting_places(self, state: ContactState) -> Float:
+        """Places (m, 3) mm where the forces of the whole finger's contact points act, in a state of the part."""
+        return self.symmetry.unfold_places(self.model.formulation.acting_places(self, state), self.points.points)
+
     def row_forces(self, force: Float) -> Float:
         """Forces on the condensed rows from contact forces (c, d); none on the rows of readings and inclusions."""
         rows = np.zeros(len(self.body.condensed.compliance))

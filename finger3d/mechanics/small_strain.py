@@ -98,7 +98,11 @@ class SmallStrain:
 
     def moment(self, problem: Problem, state: ContactState, target: ObjectPose) -> Float:
         """Return the moment about the middle of the base, of forces at the centroids of their points at rest."""
-        return moment_of(problem.surface.centroids, state.scene_force)
+        return moment_of(self.acting_places(problem, state), state.scene_force)
+
+    def acting_places(self, problem: Problem, state: ContactState) -> Float:
+        """Return the centroids of the points at rest."""
+        return problem.surface.centroids
 
     def gap(self, problem: Problem, u: Float, target: ObjectPose, surface: BoundarySurface) -> tuple[Float, Float]:
         """Return gaps and normals at the displaced points."""
