@@ -51,3 +51,10 @@ def test_an_interrupted_command_says_what_is_kept(own_studies: Path, capsys: pyt
     assert len(err.splitlines()) == 1
     assert "1 of 2 studies" in err
     assert str(own_studies) in err
+
+
+def test_the_names_of_the_studies_are_listed_and_none_runs(own_studies: Path, capsys: pytest.CaptureFixture) -> None:
+    assert cli.main(["validate", "--list"]) == 0
+    said = capsys.readouterr().out
+    assert "good" in said
+    assert "results" not in said

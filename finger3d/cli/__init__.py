@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from cyclopts import CycloptsError
+from cyclopts import CycloptsError, MissingArgumentError
 
 # Importing a module registers its command.
 import finger3d.cli.app  # noqa: F401
@@ -44,6 +44,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(arguments: Sequence[str] | None) -> int:
     try:
         return app(arguments, exit_on_error=False, print_error=False) or 0
+    except MissingArgumentError as error:
+        option = error.argument.name if error.argument else ""
+        complain("give --out FOLDER, the folder for the results" if option == "--out" else str(error))
+        return Finger3dError.exit_code
     except CycloptsError as error:
         complain(f"{error} (finger3d --help lists the commands and options)")
         return Finger3dError.exit_code

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from finger3d.cli.common import Json, app, check_folder, job, print_columns, print_json
+from finger3d.cli.common import Json, app, check_folder, job, print_columns, print_json, print_rows
 from finger3d.errors import MissingError
 
 
@@ -18,6 +18,7 @@ def validate(
     /,
     *,
     quick: Annotated[bool, Parameter(negative=())] = False,
+    list_: Annotated[bool, Parameter(name="--list", negative=())] = False,
     out: Annotated[Path | None, Parameter(help="Folder for the results instead of validation/.")] = None,
     json_: Json = False,
 ) -> None:
@@ -34,11 +35,16 @@ def validate(
         Names of studies.
     quick
         Use small meshes and few steps; the committed results do not change.
+    list_
+        Print the names of the studies and their questions, and run none.
     """
     from finger3d.analyses import validate as study
     from finger3d.analyses.study_rows import table
 
     known = study.studies()
+    if list_:
+        print_rows("studies", [(name, one.question) for name, one in known.items()])
+        return
     selected = study.chosen(studies or [], known, quick)
     folder = study.results_folder(known, quick, out)
     check_folder(folder)
