@@ -148,3 +148,14 @@ def test_large_deformation_takes_what_was_foretold(domain: Domain) -> None:
         took.append(time.process_time() - begin)
     foretold = forecast(large)["total_s"] - forecast(plain)["total_s"]
     assert 0.5 < (took[1] - took[0]) / foretold < 2.0
+
+
+@pytest.mark.parametrize("domain", ["plane-strain", "solid"])
+def test_a_mesh_that_needs_no_mesher_is_counted_exactly(domain: Domain) -> None:
+    """Parts that meet count the pressures of their interface twice, and candidates lie beyond the overlap."""
+    from tests.test_parts import tip
+
+    model = tip(domain=domain, mesh=MeshOptions(0.4 if domain == "plane-strain" else 1.2, 1.5, "swept"))
+    expected, problem = forecast(model), build(model)
+    assert expected["contact_points"] == len(problem.surface.nodes)
+    assert expected["dofs"] == problem.body.stiffness.upper.shape[0]

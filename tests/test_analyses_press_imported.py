@@ -88,3 +88,21 @@ def test_a_finger_drawn_outside_presses_alike_from_step_and_stl(
         force[kind] = measure(problem.points, frames[-1])["normal_force_N"]
     # the same mesher on the body and on its facets: their meshes differ by as much as two runs do, within 1 %
     assert force["stl"] == pytest.approx(force["step"], rel=0.01)
+
+
+def test_a_twisted_column_has_the_torque_of_its_polar_moment(tmp_path: Path) -> None:
+    """Held without slip, a round column twists by u = theta y / h (z, 0, -x), which quadratic cells hold exactly."""
+    from build123d import Cylinder, Rot
+
+    from finger3d.contact.friction import Coulomb
+    from finger3d.fem.material import Isotropic
+    from finger3d.mechanics.model import Leg, MeshOptions, Model
+    from tests.models import run
+
+    column = imported(step_of(tmp_path / "column.step", (Rot(90, 0, 0) * Cylinder(4.0, 10.0)).solids()[0]))
+    twist, shear = 0.02, 0.5
+    legs = (Leg(0.01, steps=1), Leg(0.01, steps=1, turn_y=twist))
+    model = Model(column, Isotropic(2.0 * shear, 0.0), MeshOptions(2.5, 2.5), legs, friction=Coulomb(100.0))
+    _, frames = run(model)
+    polar = 0.5 * np.pi * 4.0**4
+    assert frames[-1].moment[1] == pytest.approx(shear * polar * twist / 10.0, rel=1e-3)

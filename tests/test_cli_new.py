@@ -59,3 +59,11 @@ def test_new_without_a_name_writes_scene_toml(tmp_path, monkeypatch) -> None:
 def test_new_in_a_folder_that_is_not_there(tmp_path, capsys) -> None:
     assert run("new", tmp_path / "no" / "scene.toml") == 2
     assert str(tmp_path / "no") in capsys.readouterr().err
+
+
+def test_a_core_install_gets_a_scene_that_it_can_press(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from finger3d import _extras
+
+    monkeypatch.setattr(_extras, "available", lambda *modules: False)
+    assert run("new", tmp_path / "core.toml") == 0
+    assert load(tmp_path / "core.toml").mesh.mesher == "swept"

@@ -67,7 +67,8 @@ def test_the_object_carries_points_by_its_slide_and_its_turn() -> None:
     assert np.allclose(slid, [0.5, -0.2, -0.25])
     angle = 0.2
     turned = carried_by_object(problem, Move(ObjectPose(0.1), ObjectPose(0.1, turn_y=angle)), at)
-    x, z = problem.surface.points[:, 0], problem.surface.points[:, 2]
-    # a rotation about the vertical through the lowest point, in the middle
-    assert turned[:, 1] == pytest.approx(0.0 * x, abs=1e-12)
-    assert np.hypot(turned[:, 0], turned[:, 2]) == pytest.approx(2.0 * np.sin(angle / 2.0) * np.hypot(x, z))
+    # the mean over each hat of the turn that brought the object's material there, about the vertical in the middle
+    x, z = problem.surface.samples[:, 0], problem.surface.samples[:, 2]
+    c, s = 1.0 - np.cos(angle), np.sin(angle)
+    mean = problem.surface.average @ np.stack([c * x + s * z, 0.0 * x, c * z - s * x], axis=1)
+    assert turned == pytest.approx(mean, abs=1e-12)

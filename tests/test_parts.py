@@ -21,6 +21,7 @@ from finger3d.fem.simplex import quadratic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.readings import Taxel
 from finger3d.scene.registry import effect_type
 from tests.meshes import edge_load, full, grid
 from tests.models import last, marched
@@ -172,3 +173,16 @@ def test_a_skin_on_a_half_space_gives_way_as_the_layered_closed_form_says(
         errors.append(abs(-u[2 * corner + 1] / layered_compliance(k, thickness, layer, below) - 1.0))
     assert errors[1] < 5e-3
     assert errors[0] / errors[1] > 2.0**2.5  # quadratic elements: order 3 to 4 in the mean
+
+
+@pytest.mark.parametrize(("ratio", "beside"), [(RIGID_RATIO, 6.58e-3), (20.0, 1.31e-2)])
+def test_taxels_beside_a_stiff_core_on_the_base(ratio: float, beside: float) -> None:
+    """The traction jumps by a factor of 10 at the core's edge; the value is that of edges of 0.025 mm."""
+    taxels = Taxel("beside", 2.0, 0.0, 1.0, 1.0), Taxel("away", 3.25, 0.0, 1.5, 1.0), Taxel("core", 0.75, 0.0, 1.5, 1.0)
+    mesh, core = MeshOptions(0.2, 0.4, "swept"), (("core", Isotropic(0.5 * ratio, 0.3)),)
+    problem = build(tip(mesh=mesh, taxels=taxels, legs=(Leg(0.5, steps=1),), parts=core))
+    step = marched(problem)[-1]
+    assert step.taxels["beside"] == pytest.approx(beside, rel=0.04)
+    lengths = {"beside": 1.0, "away": 1.5, "core": 1.5}
+    force = 2.0 * 8.0 * sum(lengths[name] * pressure for name, pressure in step.taxels.items())
+    assert force == pytest.approx(float(step.state.force[:, 0].sum()), rel=1e-9)

@@ -37,6 +37,7 @@ TAXEL = {"name": "t1", "x_mm": 0.0, "z_mm": 0.0, "length_mm": 2.0, "width_mm": 2
         ({"taxel": [{**TAXEL, "x_mm": 3.5}]}, 'taxel.0.x_mm = 3.5: taxel "t1" .* -3 to 3'),
         ({"taxel": [{**TAXEL, "width_mm": 5.0}]}, 'taxel.0.z_mm = 0.0: taxel "t1" '),
         ({"taxel": [{**TAXEL, "length_mm": 0.0}]}, "taxel.0.length_mm = 0.0: "),
+        ({"taxel": [{**TAXEL, "width_mm": None}]}, "taxel.0.width_mm is missing: .* required of a solid"),
         ({"marker_grid": {"spacing_mm": 1e-3}}, "marker_grid.spacing_mm = 0.001: .* 0.04 to 8"),
         ({"marker_grid": {}}, "marker_grid.spacing_mm "),
     ],
@@ -52,6 +53,22 @@ def test_a_taxel_must_stay_on_a_round_base() -> None:
     parse(dome | {"taxel": [TAXEL]})
     with pytest.raises(Finger3dError, match="taxel"):
         parse(dome | {"taxel": [{**TAXEL, "x_mm": 2.9, "z_mm": 2.9}]})
+
+
+def test_a_taxel_of_a_section_needs_no_width() -> None:
+    narrow = {key: value for key, value in TAXEL.items() if key != "width_mm"}
+    (taxel,) = parse(SCENE | {"model": {"domain": "plane-strain"}, "taxel": [narrow]}).model().taxels
+    assert taxel.width_mm is None
+    with pytest.raises(Finger3dError, match="width_mm is missing"):
+        parse(SCENE | {"taxel": [narrow]})
+
+
+def test_a_file_has_no_section_to_sweep(tmp_path: Path) -> None:
+    from tests.bodies import box, write_stl
+
+    finger = {"geometry": str(write_stl(tmp_path / "box.stl", box(4.0, 3.0, 4.0)))}
+    with pytest.raises(Finger3dError, match=r"is a file, of which no section is known .* must be \"ftetwild\""):
+        parse(SCENE | {"finger": finger})
 
 
 @pytest.mark.parametrize("domain", ["solid", "plane-strain"])

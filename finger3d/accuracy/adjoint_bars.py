@@ -180,7 +180,7 @@ def _unresolved_by_base(problem: Problem) -> list[tuple[str, float]]:
     corners = mesh.points[mesh.facets["base"][:, :3]]
     edge = float(np.median(np.linalg.norm(corners[:, 0] - corners[:, 1], axis=1)))
     taxels = problem.model.taxels
-    return [(f"taxel_{t.name}_MPa", _BASE_SHARE * edge / min(t.length_mm, t.width_mm)) for t in taxels]
+    return [(f"taxel_{t.name}_MPa", _BASE_SHARE * edge / min(t.length_mm, t.width_mm or t.length_mm)) for t in taxels]
 
 
 def short_press(problem: Problem, runs: Sequence[Run] = ()) -> tuple[Problem, Sequence[StepResult]]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 
-from cyclopts import App, CycloptsError
+from cyclopts import App, CycloptsError, MissingArgumentError
 
 # Importing a module registers its command.
 import finger3d.cli.app  # noqa: F401
@@ -62,6 +62,10 @@ def _run(arguments: Sequence[str], program: App) -> int:
     try:
         _check_surroundings(arguments)
         return program(arguments, exit_on_error=False, print_error=False) or 0
+    except MissingArgumentError as error:
+        option = error.argument.name if error.argument else ""
+        complain("give --out FOLDER, the folder for the results" if option == "--out" else str(error))
+        return Finger3dError.exit_code
     except CycloptsError as error:
         complain(f"{error} (finger3d --help lists the commands and options)")
         return Finger3dError.exit_code

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -39,6 +40,7 @@ def press(
     scene
         The scene file (TOML); `finger3d new` writes one.
     """
+    begin = time.perf_counter()
     loaded = load(scene, set_, out)
     from finger3d.analyses.press import press as run
     from finger3d.scene.parts import moduli
@@ -49,7 +51,7 @@ def press(
     if json_:
         print_json(summary)
     else:
-        print_rows(loaded.title, [*moduli(loaded.tables).items(), *_rows(summary, out)])
+        print_rows(loaded.title, [*moduli(loaded.tables).items(), *_rows(summary, out, time.perf_counter() - begin)])
     for kind in ("warnings", "advice"):
         for text in summary.get(kind, ()):
             print(f"{kind.removesuffix('s')}: {text}", file=sys.stderr if json_ else sys.stdout)
@@ -80,7 +82,7 @@ _NUMBERS = {
 """Name of a row -> key of a step, factor, significant digits, unit."""
 
 
-def _rows(summary: TreeView, out: Path) -> Iterator[tuple[str, str]]:
+def _rows(summary: TreeView, out: Path, seconds: float) -> Iterator[tuple[str, str]]:
     """Yield the rows of the closing table: numbers of the last step with their errors, cost, and files."""
     from finger3d.accuracy.error_bars import ErrorBars
     from finger3d.results.format import with_error
@@ -109,8 +111,7 @@ def _rows(summary: TreeView, out: Path) -> Iterator[tuple[str, str]]:
         yield "+-", f"error of mesh and steps, not of the model; estimated in {bars.seconds:.1f} s; --no-error skips it"
     elif estimate:
         yield "error", bars.method
-    if summary.get("cost"):
-        yield "time", f"{summary['cost']['seconds']['total']:.1f} s"
+    yield "time", f"{seconds:.1f} s, with imports, pictures and page"
     yield "results", str(out)
     for path in sorted(out.iterdir()):
         if path.is_file() and not path.name.startswith("."):

@@ -31,6 +31,12 @@ def elasticity_of(materials: Sequence[Material], mesh: Mesh, plane_stress: bool)
     return ElasticityByPart(tuple(m.elasticity(plane_stress, mixed) for m in materials), mesh.part)
 
 
+def moduli_of(elastic: LinearElasticity) -> tuple[float, ...]:
+    """Return the shear modulus of each part by its number, MPa."""
+    laws = elastic.laws if isinstance(elastic, ElasticityByPart) else (elastic,)
+    return tuple(law.shear_modulus for law in laws)
+
+
 @dataclass(frozen=True)
 class ElasticityByPart:
     """Linear elastic laws of a body of several parts; see `finger3d.fem.material.LinearElasticity`.

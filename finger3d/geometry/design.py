@@ -21,6 +21,13 @@ if TYPE_CHECKING:
     from finger3d.geometry.tessellate import Tessellation
 
 
+def lacks_section(design: Design) -> str:
+    """Return why a design has no section that could be meshed."""
+    if hasattr(design, "surface"):
+        return "a file, of which no section is known (only designs of geometries/ have one)"
+    return "a design without a constant section"
+
+
 class Design(Protocol):
     """Shape of a body in mm, a frozen dataclass: y points up, the base lies on y = 0, and its middle is the origin."""
 

@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 from finger3d._types import Float
 from finger3d.fem.assembly import stiffness
 from finger3d.fem.condense import condense, stiffened
-from finger3d.fem.parts import elasticity_of
+from finger3d.fem.parts import elasticity_of, moduli_of
 from finger3d.fem.simplex import CONTACT, Mesh
 from finger3d.fem.traces import BoundarySurface, local_rows, restrict
 from finger3d.mechanics.contact_geometry import contact_geometry, may_touch
@@ -93,7 +93,7 @@ def build(model: Model, say: Say = lambda text: None, margin: float = MARGIN) ->
     check_rows(len(active), count)
     bars = _bars(model, mesh, axes)
     contact_part = local_rows(candidates, vertical_frame(mesh.dim))[active]
-    readings = _readings(model, MeshedBody(mesh, axes, matrix, thickness), bars, say)
+    readings = _readings(model, MeshedBody(mesh, axes, matrix, thickness, moduli_of(elastic)), bars, say)
     rows = sp.vstack([_widened(part, matrix.upper.shape[0]) for part in (contact_part, *readings)], format="csr")
     assembly = time.perf_counter() - start
     say(f"condensing {matrix.upper.shape[0]} unknowns to {len(candidates.nodes)} contact points")

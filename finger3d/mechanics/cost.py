@@ -1,6 +1,7 @@
 """Estimated cost of a press, and what an effect adds to it.
 
-The seconds are calibrated on 2 cores by validation/cost_of_accuracy.py and scaling.py, and good to a factor 2.
+The seconds are calibrated on 2 cores by validation/cost_of_accuracy.py and scaling.py, and good to a factor
+2.5.
 """
 
 from __future__ import annotations

@@ -289,10 +289,13 @@ def transported(state: ContactState, bases: Float) -> ContactState:
 
 
 def carried_by_object(problem: Problem, move: Move, at: Float) -> Float:
-    """Return how far (c, d) mm the object's material at points displaced by `at` (c, d) moves."""
+    """Return how far (c, d) mm the object moves where the points are, displaced by `at` (c, d).
+
+    The displacement of a point is the mean over its hat function; the mean of a turn is that of the centroid.
+    """
     d, start, end = at.shape[1], move.start, move.end
     if start.turns == end.turns:
         return np.broadcast_to((end.displacement - start.displacement)[:d], at.shape)
     points = np.zeros((len(at), 3))
-    points[:, :d] = problem.surface.points + at
+    points[:, :d] = problem.surface.centroids + at
     return problem.placed(end).moved_from(problem.placed(start), points)[:, :d]

@@ -17,6 +17,7 @@ from finger3d.fem.assembly import Stiffness
 from finger3d.fem.bars import Bars
 from finger3d.fem.condense import Condensation, spring_forces
 from finger3d.fem.material import LinearElasticity
+from finger3d.fem.parts import moduli_of
 from finger3d.fem.recover import strain_and_stress
 from finger3d.fem.simplex import FREE_FACES, Mesh
 from finger3d.fem.traces import BoundarySurface, joined, surface
@@ -237,7 +238,7 @@ class Problem:
     @property
     def meshed_body(self) -> MeshedBody:
         """The meshed part as readings see it."""
-        return MeshedBody(self.mesh, self.axes, self.body.stiffness, self.body.thickness)
+        return MeshedBody(self.mesh, self.axes, self.body.stiffness, self.body.thickness, moduli_of(self.body.elastic))
 
     def row_forces(self, force: Float) -> Float:
         """Forces on the condensed rows from contact forces (c, d); none on the rows of readings and inclusions."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import ClassVar, Literal, Protocol
 
 import numpy as np
@@ -12,11 +13,8 @@ from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import Stiffness, times
 from finger3d.fem.locate import cells_at
-from finger3d.fem.simplex import Mesh, axis_numbers, reflect_into_part
+from finger3d.fem.simplex import Mesh, reflect_into_part
 from finger3d.fem.traces import displacement_rows
-
-_PATCH_PLACES = 64
-"""Places along each side of a taxel that its mean is taken over."""
 
 
 @dataclass(frozen=True)
@@ -27,12 +25,14 @@ class MeshedBody:
     ----------
     axes : symmetry planes; a reading in a mirror image is taken from the part
     thickness : width of a section, 1 for a solid, mm
+    moduli : shear modulus of each part by its number, MPa
     """
 
     mesh: Mesh
     axes: tuple[str, ...]
     stiffness: Stiffness
     thickness: float
+    moduli: tuple[float, ...]
 
 
 class Reading(Protocol):
@@ -102,14 +102,14 @@ class Marker:
 class Taxel:
     """Mean pressure in MPa on a rectangle of the base, per area at rest, as a pressure cell below the finger reads it.
 
-    A section has the length along x only.
+    Only a solid needs the width along z.
     """
 
     name: str
     x_mm: float
     z_mm: float
     length_mm: float
-    width_mm: float
+    width_mm: float | None = None
     kind: ClassVar[Literal["taxel"]] = "taxel"
 
     def columns(self, dim: int) -> tuple[str, ...]:
@@ -141,17 +141,25 @@ class Taxel:
         """Return the weights (n,) of the nodal forces along y."""
         from finger3d.fem.reactions import mean_traction_weights
 
-        shares = (np.arange(_PATCH_PLACES) + 0.5) / _PATCH_PLACES - 0.5
-        x, z = self.x_mm + self.length_mm * shares, self.z_mm + self.width_mm * shares
-        z = z if body.mesh.dim == 3 else np.zeros(1)
-        places = np.stack([x.repeat(len(z)), np.zeros(len(x) * len(z)), np.tile(z, len(x))], axis=1)
-        places = places[:, : body.mesh.dim]
-        for k in axis_numbers(body.axes):
-            places[:, k] = np.abs(places[:, k])
+        sides = [("x", self.x_mm, self.length_mm)]
+        if body.mesh.dim == 3:
+            if self.width_mm is None:
+                raise Finger3dError(f"taxel {self.name}: width_mm is missing; a solid needs it")
+            sides.append(("z", self.z_mm, self.width_mm))
+        bounds = [_folded(at - 0.5 * extent, at + 0.5 * extent, axis in body.axes) for axis, at, extent in sides]
+        boxes = np.array([np.transpose(box) for box in product(*bounds)])
         try:
-            return mean_traction_weights(body.mesh, "base", places, body.thickness)
+            return mean_traction_weights(body.mesh, "base", boxes, body.thickness, body.moduli)
         except Finger3dError as error:
             raise Finger3dError(f"taxel {self.name}: {error}") from None
+
+
+def _folded(low: float, high: float, mirrored: bool) -> list[tuple[float, float]]:
+    """Return an interval as intervals of the meshed part, which a symmetry plane at 0 bounds if it is mirrored."""
+    if not mirrored:
+        return [(low, high)]
+    images = (max(low, 0.0), high), (max(-high, 0.0), -low)
+    return [(start, stop) for start, stop in images if stop > start]
 
 
 def moved_place(mesh: Mesh, u: Float, place: Float, axes: tuple[str, ...]) -> Float:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from finger3d._types import Float, Int
 from finger3d.errors import Finger3dError
 from finger3d.fem.simplex import Mesh, boundary, quadratic, unfold
-from finger3d.geometry.design import Design
+from finger3d.geometry.design import Design, lacks_section
 from finger3d.geometry.section import Arc, Flat, Section
 from finger3d.meshing.grid import Grid, Sizes, folded_zone, rows, triangulate
 from finger3d.meshing.limits import check_count, check_sizes
@@ -86,7 +86,7 @@ def _grid(design: Design, options: MeshSizes, zone: Zone, dim: int, copies: int)
     section = design.section()
     if section is None:
         what, allowed = ("model.domain", "'solid'") if dim == 2 else ("mesh.mesher = 'swept'", "'ftetwild'")
-        raise Finger3dError(f"{what}: {design.name} has no constant section to mesh; allowed: {allowed}")
+        raise Finger3dError(f"{what}: {design.name} is {lacks_section(design)}; allowed: {allowed}")
     low, high = folded_zone(zone, section.half_length_mm)
     grading = options.grading.in_section if options.grading else None
     layout = rows(section, Sizes(options.size_mm, options.base_size_mm, low, high, grading))

@@ -30,10 +30,10 @@ class PressStep:
     force_x_N, force_y_N, force_z_N : the whole contact force on the finger, pressure and friction
     moment_x_Nmm, moment_y_Nmm, moment_z_Nmm : its moment about the middle of the base
     outward_friction_x_N, outward_friction_z_N : sum of the friction away from the object's lowest point
-    contact_area_mm2, stick_area_mm2 : area of the points in contact, and of those that stick
+    contact_area_mm2, stick_area_mm2 : area at rest of the points in contact, and of those that stick
     largest_penetration_mm : how deep any place of the finger's free surface is inside the object; of its contact points
         where the object is elastic, and while the press runs
-    contact_half_length_mm, stick_half_length_mm : half the extent along x of contact and stick zone at z = 0
+    contact_half_length_mm, stick_half_length_mm : half the extent along x, at rest, of contact and stick zone at z = 0
     contact_half_length_end_mm : half the extent of the contact zone at z = width/2; None for a section
     external_work_mJ, dissipation_mJ : work done on the finger, and work lost to friction, since the start
     gauges : strain by the name of the gauge, dimensionless; None if it is unknown

@@ -9,7 +9,7 @@ import numpy as np
 
 from finger3d._ranges import LONGEST_SLIDE, at_least, at_most
 from finger3d._types import Float, Tree
-from finger3d.geometry.design import Design
+from finger3d.geometry.design import Design, lacks_section
 from finger3d.mechanics.model import Domain, MeshOptions
 from finger3d.meshing.given import GivenMesh
 from finger3d.objects import RigidObject
@@ -51,7 +51,7 @@ def check(tables: SceneTable, legs: tuple[LegTable, ...], design: Design) -> lis
     solid = tables.model.domain == "solid"
     lines = []
     if design.section() is None:
-        lacks = f"finger.geometry = {shown(design.name)} has no constant section"
+        lacks = f"finger.geometry = {shown(design.name)} is {lacks_section(design)}"
         if not solid:
             lines.append(f'model.domain = {shown(tables.model.domain)}: {lacks}; must be "solid"')
         if tables.mesh.mesher == "swept":
@@ -282,8 +282,11 @@ def _marker_grid(spacing_mm: float, design: Design, solid: bool) -> list[str]:
 
 
 def _taxel(index: int, taxel: TaxelTable, design: Design, solid: bool) -> list[str]:
-    """Check that a taxel is on the base."""
-    halves = {"x_mm": (taxel.length_mm, design.half_length_mm), "z_mm": (taxel.width_mm, design.width_mm / 2.0)}
+    """Check that a taxel is on the base, and that it has a width if the base has."""
+    width = (taxel.width_mm or 0.0) if solid else 0.0
+    if solid and not width:
+        return [f"{dotted(('taxel', index, 'width_mm'))} is missing: a number from 1e-6 to 1e6 is required of a solid"]
+    halves = {"x_mm": (taxel.length_mm, design.half_length_mm), "z_mm": (width, design.width_mm / 2.0)}
     for key, (extent, half) in halves.items():
         most, value = half - 0.5 * extent, getattr(taxel, key)
         if abs(value) > most * (1.0 + 1e-9) and (solid or key == "x_mm"):
@@ -291,7 +294,7 @@ def _taxel(index: int, taxel: TaxelTable, design: Design, solid: bool) -> list[s
                 f"{dotted(('taxel', index, key))} = {shown(value)}: taxel {shown(taxel.name)} leaves the base; "
                 + (f"must be from -{at_most(most)} to {at_most(most)}" if most > 0.0 else "must be smaller")
             ]
-    corners = 0.5 * np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]]) * [taxel.length_mm, taxel.width_mm]
+    corners = 0.5 * np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]]) * [taxel.length_mm, width]
     x, z = (1.0 - 1e-9) * (corners + [taxel.x_mm, taxel.z_mm]).T
     if np.isnan(design.top(x, z if solid else np.zeros_like(z))).any():
         return [

@@ -235,14 +235,15 @@ class TaxelTable(TomlTable):
     ----------
     name : name in the results
     x_mm, z_mm : its middle on the base
-    length_mm, width_mm : along x and along z; a section has the length only
+    length_mm : along x
+    width_mm : along z; required of a solid, and not read in a section
     """
 
     name: Name
     x_mm: Place
     z_mm: Place = 0.0
     length_mm: Length
-    width_mm: Length
+    width_mm: Length | None = None
 
 
 class SceneTable(TomlTable):

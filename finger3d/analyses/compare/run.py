@@ -15,6 +15,7 @@ from finger3d._types import Tree
 from finger3d.analyses.compare.cases import press_with_errors, section_of, widened
 from finger3d.analyses.compare.verdict import WITHIN, Deviation, crossing_width, deviations, verdict
 from finger3d.errors import Finger3dError, Outcome, UnresolvedError
+from finger3d.geometry.design import lacks_section
 from finger3d.io import atomic, claimed, write_csv, write_json
 from finger3d.mechanics.model import Model
 from finger3d.objects import PlacedObject
@@ -135,14 +136,16 @@ def _check(model: Model, widths: Sequence[float]) -> None:
     """Refuse a scene that has no plane model."""
     if model.design.section() is None:
         raise Finger3dError(
-            f'compare: finger.geometry = "{model.design.name}" has no constant section, so there is no 2D model of it; '
-            "take an extruded design"
+            f'compare: finger.geometry = "{model.design.name}" is {lacks_section(model.design)}, so there is no 2D '
+            "model of it; take an extruded design"
         )
+    if narrow := next((t.name for t in model.taxels if t.width_mm is None), None):
+        raise Finger3dError(f'compare: taxel "{narrow}" has no width_mm; the solids need it')
     if any(leg.slide_z_mm for leg in model.legs):
         raise Finger3dError("compare: press.slide_z_mm must be 0.0; a section cannot slide along its width")
     reach = [(f'gauge "{g.name}"', g.z_mm, 0.0) for g in model.gauges]
     reach += [(f'marker "{m.name}"', m.z_mm, 0.0) for m in model.markers]
-    reach += [(f'taxel "{t.name}"', t.z_mm, t.width_mm) for t in model.taxels]
+    reach += [(f'taxel "{t.name}"', t.z_mm, t.width_mm or 0.0) for t in model.taxels]
     for name, z, across in reach:
         if beyond := [w for w in widths if 2.0 * abs(z) + across > w * (1.0 + 1e-9)]:
             raise Finger3dError(
