@@ -24,6 +24,7 @@ from finger3d.accuracy.richardson import UNRESOLVED_DISSIPATION, Kind, Quantity,
 from finger3d.accuracy.weighted_residuals import BodyErrors, body_errors
 from finger3d.contact.acceleration import threads_for
 from finger3d.errors import Finger3dError
+from finger3d.io import RESULTANTS
 from finger3d.mechanics.history import StepResult, flat_readings, measure
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
@@ -53,6 +54,7 @@ _SHARES = {
     # on coarse meshes recovery underestimates the error at bonded corners, by a factor of 2 to 4
     Kind.NORMAL_FORCE: _Shares(body=(2.0, 1.5), points=0.07, power=2),
     Kind.FRICTION_SUM: _Shares(change=1.5, points=0.1),
+    Kind.FORCE: _Shares(change=2.0, body=(2.0, 1.5), points=0.02),
     Kind.WORK: _Shares(change=2.0, body=(1.5, 1.5), points=0.03, power=2),
     Kind.DISSIPATION: _Shares(change=2.75, points=0.05),
     Kind.STRAIN: _Shares(change=2.0, body=(1.5, 1.5)),
@@ -209,5 +211,5 @@ def _numbers(problem: Problem, step: StepResult) -> dict[str, float]:
     numbers = measure(problem.points, step)
     readings = flat_readings(numbers)
     across = {f"marker_{name}_z_mm" for name in step.markers} if problem.dim == 2 else set()  # zero, without an error
-    main = ("normal_force_N", "friction_sum_N", "external_work_mJ", "dissipation_mJ")
+    main = ("normal_force_N", "friction_sum_N", *RESULTANTS[problem.dim], "external_work_mJ", "dissipation_mJ")
     return {name: float(numbers[name]) for name in main} | {k: v for k, v in readings.items() if k not in across}

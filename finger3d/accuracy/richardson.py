@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from enum import Enum, auto
 
 from finger3d.accuracy.point_resolution import PointResolution
+from finger3d.io import RESULTANTS
 
 ORDER = 1.2
 """Order of convergence at the bonded corners of the base for nu = 0.49, the lowest of all (validation/bonded_layer)."""
@@ -53,8 +54,11 @@ class Kind(Enum):
         return self in (Kind.LENGTH, Kind.HALF_LENGTH)
 
 
-_KINDS = {
+_KINDS = dict.fromkeys(RESULTANTS[3], Kind.FORCE) | {
     "normal_force_N": Kind.NORMAL_FORCE,
+    "force_y_N": Kind.NORMAL_FORCE,
+    "outward_friction_x_N": Kind.FRICTION_SUM,
+    "outward_friction_z_N": Kind.FRICTION_SUM,
     "force_N_per_mm": Kind.NORMAL_FORCE,
     "friction_sum_N": Kind.FRICTION_SUM,
     "friction_sum_N_per_mm": Kind.FRICTION_SUM,
@@ -67,6 +71,7 @@ _KINDS = {
     "dissipation_mJ": Kind.DISSIPATION,
     "contact_half_length_mm": Kind.HALF_LENGTH,
     "stick_half_length_mm": Kind.HALF_LENGTH,
+    "contact_half_length_end_mm": Kind.HALF_LENGTH,
     "contact_length_mm": Kind.LENGTH,
     "contact_length_end_mm": Kind.LENGTH,
     "stick_length_mm": Kind.LENGTH,
