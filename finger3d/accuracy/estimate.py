@@ -87,10 +87,14 @@ def main_numbers(problem: Problem, frame: StepResult) -> dict[str, float]:
 
 
 def press_numbers(problem: Problem, frame: StepResult) -> dict[str, float]:
-    """Return the numbers of a press that have an error bar: the main numbers, resultants and both energies."""
+    """Return the numbers of a press that have an error bar: the main numbers, resultants and both energies.
+
+    Under a prescribed force the depth is one of them.
+    """
     measured = measure(problem.points, frame)
     others = (*RESULTANTS[problem.dim], "external_work_mJ", "dissipation_mJ", "contact_half_length_end_mm")
-    return main_numbers(problem, frame) | {name: float(measured[name]) for name in others if name in measured}
+    numbers = main_numbers(problem, frame) | {name: float(measured[name]) for name in others if name in measured}
+    return {"depth_mm": frame.target.depth_mm, **numbers} if problem.model.ends_at_force else numbers
 
 
 def compared(
@@ -137,7 +141,7 @@ def estimate(
     Returns
     -------
     ErrorEstimate
-        A part that fails, that of the mesh or that of the increments, leaves the other as it is; `method` has the reason.
+        If the part of the mesh or that of the increments fails, the other stays as it is, and `method` has the reason.
     """
     start = time.perf_counter()
     if not frames or not frames[-1].outcome.ok:
@@ -155,6 +159,11 @@ def estimate(
         steps, by = _of_increments(own, frames, beside, where, numbers, used)
     except _FAILURES as error:
         steps, by = {}, f"no estimate: {_reason(error)}"
+    if own.model.ends_at_force:  # the normal force is given
+        given = ("normal_force_N", "force_y_N")
+        mesh = {name: error for name, error in found.discretisation.items() if name not in given}
+        found = replace(found, discretisation=mesh)
+        steps = {name: error for name, error in steps.items() if name not in given}
     return replace(found, steps=steps, method=f"{found.method}; steps: {by}", seconds=time.perf_counter() - start)
 
 

@@ -126,13 +126,16 @@ def refine_mesh(
     tolerance : relative, see `relative_error`
     max_seconds : no round is begun that is forecast to end later, output included
     say : receives a line for each round
-    goal : name of a number of the press, as in `finger3d.accuracy.estimate.main_numbers`
+    goal : name of a number of the press, as in `finger3d.accuracy.estimate.press_numbers`; for the normal force under
+        a prescribed one, the depth takes its place
 
     Raises
     ------
     Finger3dError
         If even the first mesh cannot be generated or pressed.
     """
+    if model.ends_at_force and goal == GOAL:  # the force is given, and the depth follows
+        goal = "depth_mm"
     start, rounds, meshes = time.perf_counter(), list[Round](), list[MeshOptions]()
     options, problem = model.mesh, None
     run = _graded_round if applies(model) else _run_round

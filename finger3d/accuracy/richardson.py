@@ -47,6 +47,8 @@ class Kind(Enum):
     HALF_LENGTH = auto()
     LENGTH = auto()
     AREA = auto()
+    DEPTH = auto()
+    MOMENT = auto()
 
     @property
     def is_length(self) -> bool:
@@ -54,7 +56,8 @@ class Kind(Enum):
         return self in (Kind.LENGTH, Kind.HALF_LENGTH)
 
 
-_KINDS = dict.fromkeys(RESULTANTS[3], Kind.FORCE) | {
+_KINDS = {name: Kind.MOMENT if name.startswith("moment") else Kind.FORCE for name in RESULTANTS[3]} | {
+    "depth_mm": Kind.DEPTH,
     "normal_force_N": Kind.NORMAL_FORCE,
     "force_y_N": Kind.NORMAL_FORCE,
     "outward_friction_x_N": Kind.FRICTION_SUM,
@@ -152,7 +155,7 @@ def mesh_error(
             scale = readings.get(kind, abs(value))
             if own.alone and kind is Kind.FRICTION_SUM:
                 scale = max(scale, normal_force)
-            power = 2 if kind is Kind.NORMAL_FORCE else 1
+            power = 2 if kind in (Kind.NORMAL_FORCE, Kind.DEPTH) else 1
             bound = max(bound, _FLOORS.get(kind, _RESOLUTION_FLOOR) * own.share**power * scale)
         if kind is Kind.DISSIPATION:
             bound = max(bound, UNRESOLVED_DISSIPATION * own.share * largest(numbers, Kind.WORK))
