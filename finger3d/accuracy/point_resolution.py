@@ -146,6 +146,8 @@ def _half_length_bar(
     at, nearest = line
     on = zone[nearest]
     ends = ERROR_AT_ENDS[name] * _to_next_points(at, on)
+    if ends == 0.0 and np.count_nonzero(on) == 1:  # a single point, and no other on the line: what it stands for
+        return 0.5 * float(points.area[nearest[on]].sum()) / (2.0 * points.half_width_mm)
     if points.dim == 2 or not on.any() or points.resolved(zone)[nearest[on]].any():
         return ends
     half = 0.5 * float(np.ptp(at[on]))
