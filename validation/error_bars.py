@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 import secrets
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -216,7 +217,8 @@ def run(quick: bool, seed: int | None = None) -> Result:
     rows += _by_kind_of_mesh(found, {case.name: case.meshes for case in chosen}, least)
     for here, what in zip(anew, ("sections", "solids"), strict=True):
         text = f"by mesh, {what} drawn with seed {seed}"
-        many = [j for j in here if sum(other.kind == j.kind for other in here) >= least]
+        count = Counter(j.kind for j in here)
+        many = [j for j in here if count[j.kind] >= least]
         rows += [row for kind in KINDS for row in _rows(kind, many, text)]
         rows += _narrow(many, text)
     explicit = [j for j in steps if j.part.endswith("steps")]
