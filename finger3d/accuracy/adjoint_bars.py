@@ -66,6 +66,9 @@ _SHARES = {
 }
 """Calibrated on the sections of validation/error_bars.py; the normal force hardly changes with the multipliers."""
 
+_FEW_POINTS = 8.0
+"""Relative error of the friction in a section over (h/a)^3: a zone of few points has errors of higher order, too."""
+
 _BASE_SHARE = 0.035
 """Relative error of the pressure on a taxel of a solid over the edge length of the base divided by its shorter side."""
 
@@ -164,6 +167,8 @@ def _bars(problem: Problem, steps: Sequence[StepResult], runs: Sequence[Run]) ->
         if resolution.alone and kind is Kind.FRICTION_SUM:
             scale = max(scale, abs(numbers["normal_force_N"]))
         relative = shares.points * spacing**shares.power * scale
+        if kind is Kind.FRICTION_SUM and problem.dim == 2:
+            relative = math.hypot(relative, min(1.0, _FEW_POINTS * resolution.along**3) * abs(value))
         contact = math.hypot(max(changes[name]) / shares.change, relative)
         parts[name] = body.bar(name, shares.body[problem.dim - 2]), contact
     bars = {name: math.hypot(*both) for name, both in parts.items()}
