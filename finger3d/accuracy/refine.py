@@ -1,10 +1,9 @@
 """Mesh refinement until the estimated error of one number, the goal, is below a tolerance.
 
 A first mesh whose error is far below the tolerance is made coarser instead, as long as the tolerance is met.  In small
-strain the mesh is graded towards the goal by the shares of the cells in its error
-(`finger3d.accuracy.graded`).  Where the error is estimated from a companion mesh, two lengths are free, that of the
-contact and that of the body far from it (the corners of the base).  A second coarse run, coarse at the contact only,
-separates their contributions to the error.
+strain the mesh is graded towards the goal by the shares of the cells in its error (`finger3d.accuracy.graded`).  Where
+the error is estimated from a companion mesh, two lengths are free, that of the contact and that of the body far from it
+(the corners of the base).  A second coarse run, coarse at the contact only, separates their contributions to the error.
 """
 
 from __future__ import annotations
@@ -162,7 +161,6 @@ def refine_mesh(
             problem, done, wanted = run(replace(model, mesh=options), tolerance, goal)
         except UnresolvedError as error:
             if rounds and rounds[-1].error <= tolerance:
-                stopped = "met"
                 break
             if error.size_mm is None or error.size_mm >= options.size_mm:
                 raise
@@ -171,7 +169,7 @@ def refine_mesh(
         except (Finger3dError, MemoryError) as error:
             if not rounds:
                 raise
-            stopped = "met" if rounds[-1].error <= tolerance else f"no finer mesh: {error or 'out of memory'}"
+            stopped = f"no finer mesh: {error or 'out of memory'}"
             break
         rounds.append(done)
         meshes.append(options)
@@ -183,7 +181,6 @@ def refine_mesh(
             or (len(rounds) > 1 and done.dofs > _WORTHWHILE * rounds[-2].dofs)
         )
         if coarsest or (done.error > tolerance and any(r.error <= tolerance for r in rounds)):
-            stopped = "met"
             break
         left = math.inf if max_seconds is None else max_seconds - (time.perf_counter() - start)
         if wanted.grading is None:
@@ -195,6 +192,7 @@ def refine_mesh(
             break
         options = found
     best = best_round(rounds, tolerance)
+    stopped = "met" if best.error <= tolerance else stopped
     kept = meshes[rounds.index(best)]
     return Refinement(tolerance, kept, tuple(rounds), stopped, problem if best is rounds[-1] else None)
 
