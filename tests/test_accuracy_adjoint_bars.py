@@ -9,14 +9,16 @@ from dataclasses import replace
 import pytest
 
 from finger3d.accuracy.adjoint_bars import NoAdjointBarsError, adjoint_bars, applies, short_press
-from finger3d.accuracy.estimate import discretisation
+from finger3d.accuracy.estimate import discretisation, press_numbers
 from finger3d.effects.elastic_object import Effect as ElasticObject
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.errors import Outcome
+from finger3d.io import RESULTANTS
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
+from finger3d.objects import Plane
 from tests.models import half_cylinder, run
 
 
@@ -79,3 +81,18 @@ def test_without_a_press_of_fewer_multipliers_a_companion_mesh_tells_the_bars(mo
     assert found.body is None
     assert beside.body.mesh is not problem.body.mesh
     assert found.discretisation["normal_force_N"] > 0.0
+
+
+def test_components_of_force_and_the_moment_have_bars_from_their_adjoints() -> None:
+    # under an inclined plane the finger is pushed aside
+    def pressed(size: float) -> tuple[Problem, list[StepResult]]:
+        return run(replace(half_cylinder(size, 4), object=Plane(tilt=math.radians(8.0))))
+
+    problem, frames = pressed(0.3)
+    told, bars = press_numbers(problem, frames[-1]), adjoint_bars(problem, frames)
+    fine, last = pressed(0.05)
+    exact = press_numbers(fine, last[-1])
+    for name in set(RESULTANTS[2]) - {"force_y_N"}:  # that is the normal force
+        assert abs(told[name] - exact[name]) <= 2.0 * bars.bars[name], name
+        assert 0.0 < bars.bars[name] <= 0.2 * abs(told[name]), name
+    assert bars.body.signed["force_y_N"] == pytest.approx(-bars.body.signed["normal_force_N"], rel=1e-9)

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from finger3d.accuracy.estimate import estimate, main_numbers
+from finger3d.accuracy.estimate import estimate, main_numbers, press_numbers
 from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.accuracy.richardson import mesh_error
-from finger3d.contact.friction import STICK, Coulomb
+from finger3d.contact.friction import OPEN, STICK, Coulomb
 from finger3d.mechanics.model import Leg, MeshOptions
+from finger3d.mechanics.zones import ERROR_AT_ENDS
 from tests.models import half_cylinder, run, swept_fig9
 
 
@@ -48,3 +51,21 @@ def test_a_stick_zone_one_row_wide_is_not_resolved() -> None:
     assert found["stick_area_mm2"] >= 0.3 * told["stick_area_mm2"]
     # contact is eleven rows wide and resolved: known to less than half the spacing of 1.96 mm
     assert found["contact_half_length_mm"] < 0.5 * 1.96
+
+
+def test_the_length_of_a_contact_with_one_point_is_known_to_what_the_point_stands_for() -> None:
+    # edges as long as the finger is high; on a fine mesh the half-length of contact is 2.43 mm
+    model = replace(half_cylinder(3.0), mesh=MeshOptions(3.0, 5.0, "swept"))
+    problem, frames = run(model)
+    told, found = main_numbers(problem, frames[-1]), PointResolution.of(problem, frames[-1])
+    assert told["contact_half_length_mm"] == 0.0
+    assert 0.5 * 2.43 <= found.least["contact_half_length_mm"] <= 0.25 * math.pi * 5.0 + 1e-9
+
+
+def test_the_contact_length_at_the_end_has_the_resolution_of_the_points_there() -> None:
+    problem, frames = run(swept_fig9(4.0))
+    found = estimate(problem, frames, numbers=press_numbers).discretisation["contact_half_length_end_mm"]
+    x, nearest = problem.points.end_line()
+    touching = np.sort(x[frames[-1].state.status[nearest] != OPEN])
+    following = np.sort(x)[np.searchsorted(np.sort(x), touching[-1]) + 1]
+    assert found == pytest.approx(ERROR_AT_ENDS["contact"] * (following - touching[-1]), rel=1e-9)

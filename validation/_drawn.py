@@ -1,4 +1,4 @@
-"""Random sections on which the error estimate of the increments is tested; none was used to choose the rule."""
+"""Random sections and solids on which error estimates are tested; none was used to choose their rules."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from finger3d.contact.friction import Coulomb
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.objects import Cylinder, Plane, Wave, Wedge
+from finger3d.objects import Cylinder, Plane, Sphere, Wave, Wedge
 
 NEAR = (Gauge("a", 1.5, 4.0, angle=0.5), Gauge("b", 3.0, 3.0, angle=0.7), Gauge("c", 0.0, 3.5))
 FAR = (Gauge("a", 36.0, 40.0, angle=0.5), Gauge("b", 20.0, 44.0, angle=0.2), Gauge("c", 5.0, 40.0))
@@ -50,3 +50,31 @@ def drawn(count: int, seed: int = 2026) -> Iterator[tuple[str, Model]]:
             friction=Coulomb(mu), gauges=gauges, domain=plane,
         )  # fmt: skip
         yield f"{number}: {type(rigid).__name__} on {design.name}, {plane}, nu = {nu:.3g}, mu = {mu:.3g}", model
+
+
+def drawn_solids(count: int, seed: int) -> Iterator[tuple[str, Model]]:
+    """Names and models of swept solids: four scenes in turn; nu, mu, depth, edge length and object at random."""
+    random = np.random.default_rng(seed)
+    half = designs()["half_cylinder"](radius_mm=5.0, width_mm=6.0)
+    fig9 = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
+    block = designs()["block"](half_length_mm=8.0, height_mm=8.0, width_mm=16.0)
+    for number in range(count):
+        u = random.uniform(size=6)
+        nu, mu = (0.5 * u[0], 0.4 + 0.1 * u[0])[int(2 * u[1])], 0.03 * 40.0 ** u[2]
+        part, size = 0.3 + 0.7 * u[3], 0.8 + 0.5 * u[4]
+        shapes: tuple[tuple[Any, Any, tuple[Gauge, ...], float, float], ...] = (
+            (fig9, Plane(tilt=math.radians(2.0 + 8.0 * u[5])), FAR, 6.0, 4.0),
+            (block, Sphere(radius_mm=6.0 + 20.0 * u[5]), UNDER, 0.8, 1.2),
+            (fig9, Plane(), FAR, 8.0, 4.0),
+            (half, Cylinder(radius_mm=3.0 + 17.0 * u[5]), NEAR, 1.0, 0.8),
+        )
+        kind = number % len(shapes)
+        design, rigid, gauges, depth, edge = shapes[kind]
+        path: tuple[Leg, ...] = (Leg(part * depth, steps=5),)
+        if kind == 2:
+            path += (Leg(part * depth, slide_z_mm=0.3 * u[5] * part * depth, steps=5),)
+        model = Model(
+            design, Isotropic(1.0, nu), MeshOptions(size * edge, 4.0 * size * edge, "swept"), path, object=rigid,
+            friction=Coulomb(mu), gauges=gauges,
+        )  # fmt: skip
+        yield f"solid {number}: {type(rigid).__name__} on {design.name}, nu = {nu:.3g}, mu = {mu:.3g}", model

@@ -11,7 +11,7 @@
 # %% [markdown]
 # # What accuracy costs
 #
-# Every number of a press has an error bar. This tutorial refines a mesh by hand, compares the error bars with the
+# The numbers of a press have error bars. This tutorial refines a mesh by hand, compares the error bars with the
 # true errors, and lets finger3d choose the mesh for a given accuracy. Download this page as a script:
 # {download}`accuracy.py`.
 
@@ -78,8 +78,8 @@ for size, (force, bar, dofs, seconds) in found.items():
 
 # %% [markdown]
 # The true error is the difference from a mesh with edges of 0.1 mm. Error bars are estimates from the solution
-# itself; they are at most 2.5 times the true error in the median of many cases, and hold in nine of ten ([Accuracy
-# and cost](../accuracy.md)).
+# itself. The true error is within twice the bar in nine cases of ten, and most bars are wider than they need be
+# ([Accuracy and cost](../accuracy.md)).
 
 # %%
 unknowns = [found[size][2] for size in sizes]
@@ -98,7 +98,7 @@ plt.show()
 # %% [markdown]
 # `tolerance` in place of edge lengths states the wanted accuracy, as a share of the normal force or of the number that
 # `goal` names. finger3d starts from its default mesh, and refines it where that number needs it, until the error bar is
-# small enough. Here the default mesh is.
+# small enough; a mesh that is finer than the tolerance asks for is made coarser.
 
 # %%
 scene = finger3d.load("finger.toml", ["mesh.tolerance=0.002"])

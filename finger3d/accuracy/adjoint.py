@@ -152,7 +152,7 @@ def forces_of(problem: Problem, steps: Sequence[StepResult]) -> Float:
 
 
 def press_goals(problem: Problem, steps: Sequence[StepResult]) -> list[Goal]:
-    """Return normal force, friction sum, energies and readings of the last increment, linearised."""
+    """Return forces and moments, friction sum, energies and readings of the last increment, linearised."""
     c, d = problem.delassus.shape[:2]
     states, zero = _states(problem, steps), np.zeros((len(steps), c * d))
     count: Float = np.bincount(problem.symmetry.image_of, problem.symmetry.multiplicity, c).astype(np.float64)
@@ -167,11 +167,53 @@ def press_goals(problem: Problem, steps: Sequence[StepResult]) -> list[Goal]:
         _work(problem, states, count, zero),
         _dissipation(states, count, zero),
     ]
+    found += [
+        Goal(name=name, by_force=_at_end(zero, gradient), by_displacement=zero)
+        for name, gradient in _resultants(problem, steps[-1], last).items()
+        if gradient.any()
+    ]
     rows = problem.system.reading_rows
     return found + [
         Goal(name=name, by_force=_at_end(zero, row), by_displacement=zero, row=k)
         for k, (name, row) in enumerate(zip(_reading_columns(problem), rows, strict=True))
     ]
+
+
+def _resultants(problem: Problem, step: StepResult, last: ContactState) -> dict[str, Float]:
+    """Return the derivatives (c, d) of the resultants by the forces, in the directions of an upright object.
+
+    Resultants in planes of symmetry are zero, and so are their derivatives; those across a section are left out.
+    """
+    c, d = last.force.shape
+    whole = problem.symmetry.unfold(last)
+    bases, points = np.asarray(whole.bases), problem.points.points
+    signs = problem.symmetry.mirror_sign * problem.symmetry.multiplicity[:, None]
+    arms = np.pad(problem.surface.centroids, ((0, 0), (0, 3 - d)))
+
+    def of_weights(weights: Float, tangential: bool) -> Float:
+        """Derivative of the sum of weights (m, d) times forces, or friction, of the whole finger's points."""
+        local = np.einsum("mak,mk->ma", bases, weights) * signs
+        if tangential:
+            local[:, 0] = 0.0
+        own = np.zeros((c, d))
+        np.add.at(own, problem.symmetry.image_of, local)
+        return _upright(last, own)
+
+    found = {}
+    for k, axis in enumerate("xyz"[:d]):
+        along = np.broadcast_to(np.eye(d)[k], (len(points), d))
+        found[f"force_{axis}_N"] = of_weights(along, tangential=False)
+        if axis != "y":
+            outward = np.sign(points[:, k] - step.lowest[k // 2])[:, None] * along
+            found[f"tangential_force_{axis}_N"] = of_weights(along, tangential=True)
+            found[f"outward_friction_{axis}_N"] = of_weights(outward, tangential=True)
+    for k, factor in enumerate(problem.symmetry.total_moment(np.ones(3))):
+        if factor and (d == 3 or k == 2):
+            # the k-th component of arm x force is force . (unit_k x arm)
+            lever = factor * np.cross(np.eye(3)[k], arms)[:, :d]
+            found[f"moment_{'xyz'[k]}_Nmm"] = lever @ vertical_frame(d).T
+    moves = np.isin(np.arange(c * d), problem.system.active_dofs).reshape(c, d)  # none across a plane of symmetry
+    return {name: np.where(moves, gradient, 0.0) for name, gradient in found.items()}
 
 
 def _reading_columns(problem: Problem) -> list[str]:

@@ -24,6 +24,7 @@ from finger3d.accuracy.richardson import UNRESOLVED_DISSIPATION, Kind, Quantity,
 from finger3d.accuracy.weighted_residuals import BodyErrors, body_errors
 from finger3d.contact.acceleration import threads_for
 from finger3d.errors import Finger3dError
+from finger3d.io import RESULTANTS
 from finger3d.mechanics.history import StepResult, flat_readings, measure
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
@@ -53,6 +54,8 @@ _SHARES = {
     # on coarse meshes recovery underestimates the error at bonded corners, by a factor of 2 to 4
     Kind.NORMAL_FORCE: _Shares(body=(2.0, 1.5), points=0.07, power=2),
     Kind.FRICTION_SUM: _Shares(change=1.5, points=0.1),
+    Kind.FORCE: _Shares(change=2.0, body=(2.0, 1.5), points=0.02),
+    Kind.MOMENT: _Shares(change=1.5, body=(2.0, 1.5), points=0.06),
     Kind.WORK: _Shares(change=2.0, body=(1.5, 1.5), points=0.03, power=2),
     Kind.DISSIPATION: _Shares(change=2.75, points=0.05),
     Kind.STRAIN: _Shares(change=2.0, body=(1.5, 1.5)),
@@ -62,6 +65,9 @@ _SHARES = {
     Kind.OTHER_READING: _Shares(change=2.0, body=(1.5, 1.5), points=0.01),
 }
 """Calibrated on the sections of validation/error_bars.py; the normal force hardly changes with the multipliers."""
+
+_FEW_POINTS = 8.0
+"""Relative error of the friction in a section over (h/a)^3: a zone of few points has errors of higher order, too."""
 
 _BASE_SHARE = 0.035
 """Relative error of the pressure on a taxel of a solid over the edge length of the base divided by its shorter side."""
@@ -161,6 +167,8 @@ def _bars(problem: Problem, steps: Sequence[StepResult], runs: Sequence[Run]) ->
         if resolution.alone and kind is Kind.FRICTION_SUM:
             scale = max(scale, abs(numbers["normal_force_N"]))
         relative = shares.points * spacing**shares.power * scale
+        if kind is Kind.FRICTION_SUM and problem.dim == 2:
+            relative = math.hypot(relative, min(1.0, _FEW_POINTS * resolution.along**3) * abs(value))
         contact = math.hypot(max(changes[name]) / shares.change, relative)
         parts[name] = body.bar(name, shares.body[problem.dim - 2]), contact
     bars = {name: math.hypot(*both) for name, both in parts.items()}
@@ -209,5 +217,5 @@ def _numbers(problem: Problem, step: StepResult) -> dict[str, float]:
     numbers = measure(problem.points, step)
     readings = flat_readings(numbers)
     across = {f"marker_{name}_z_mm" for name in step.markers} if problem.dim == 2 else set()  # zero, without an error
-    main = ("normal_force_N", "friction_sum_N", "external_work_mJ", "dissipation_mJ")
+    main = ("normal_force_N", "friction_sum_N", *RESULTANTS[problem.dim], "external_work_mJ", "dissipation_mJ")
     return {name: float(numbers[name]) for name in main} | {k: v for k, v in readings.items() if k not in across}

@@ -17,12 +17,14 @@ class ErrorBars:
     ----------
     discretisation : error of the mesh
     steps : error of the increments
+    modulus : error due to the spread of Young's modulus, not part of `total`
     method : one line that says how the errors were estimated, or ``no estimate: ...``
     seconds : wall time of the estimate
     """
 
     discretisation: Mapping[str, float] = field(default_factory=dict)
     steps: Mapping[str, float] = field(default_factory=dict)
+    modulus: Mapping[str, float] = field(default_factory=dict)
     method: str = ""
     seconds: float = 0.0
 
@@ -30,12 +32,17 @@ class ErrorBars:
     def of_summary(cls, summary: TreeView) -> Self:
         """Read the error bars of a summary.json; without names if the press made no estimate."""
         known = summary.get("error_estimate") or {}
-        mesh, steps = (
+        mesh, steps, modulus = (
             {name: float(error) for name, error in (known.get(part) or {}).items() if error is not None}
-            for part in ("discretisation", "steps")
+            for part in ("discretisation", "steps", "modulus")
         )
         method, seconds = str(known.get("method", "")), float(known.get("seconds") or 0.0)
-        return cls(discretisation=mesh, steps=steps, method=method, seconds=seconds)
+        return cls(discretisation=mesh, steps=steps, modulus=modulus, method=method, seconds=seconds)
+
+    @property
+    def covered(self) -> str:
+        """The errors that `total` is the sum of, in words."""
+        return "error of mesh and steps" if self.steps else "error of the mesh without that of the steps"
 
     def total(self, name: str) -> float | None:
         """Return the sum of both errors of a number, None without an estimate of its discretisation error."""
@@ -52,6 +59,7 @@ class ErrorBars:
         return {
             "discretisation": dict(self.discretisation),
             "steps": dict(self.steps),
+            "modulus": dict(self.modulus),
             "method": self.method,
             "seconds": self.seconds,
         }

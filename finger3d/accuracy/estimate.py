@@ -25,7 +25,7 @@ from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.accuracy.richardson import ORDER, ORDERS, mesh_error
 from finger3d.accuracy.weighted_residuals import BodyErrors
 from finger3d.errors import Finger3dError
-from finger3d.io import AREAS, MAIN
+from finger3d.io import AREAS, MAIN, RESULTANTS
 from finger3d.mechanics.cost import finite_strain_s
 from finger3d.mechanics.history import StepResult, flat_readings, measure
 from finger3d.mechanics.path import AUTO_START
@@ -33,7 +33,7 @@ from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.step_halving import (
     COUNT_RATIOS,
     Run,
-    choose_counts,
+    choices_of_counts,
     condensation_s,
     contact_s,
     errors_from_counts,
@@ -53,6 +53,9 @@ _STEPS_S = 0.2
 
 _MESHED_S = 1.0
 """Seconds above which a mesh was made by pytetwild and not read from the cache."""
+
+_FAILURES = (Finger3dError, RuntimeError, ValueError, np.linalg.LinAlgError, MemoryError)
+"""Errors that end one part of an estimate, and no other."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,9 +87,14 @@ def main_numbers(problem: Problem, frame: StepResult) -> dict[str, float]:
 
 
 def press_numbers(problem: Problem, frame: StepResult) -> dict[str, float]:
-    """Return the numbers of a press that have an error bar: the main numbers and both energies."""
-    energies = {"external_work_mJ": frame.external_work_mJ, "dissipation_mJ": frame.dissipation_mJ}
-    return main_numbers(problem, frame) | energies
+    """Return the numbers of a press that have an error bar: the main numbers, resultants and both energies.
+
+    Under a prescribed force the depth is one of them.
+    """
+    measured = measure(problem.points, frame)
+    others = (*RESULTANTS[problem.dim], "external_work_mJ", "dissipation_mJ", "contact_half_length_end_mm")
+    numbers = main_numbers(problem, frame) | {name: float(measured[name]) for name in others if name in measured}
+    return {"depth_mm": frame.target.depth_mm, **numbers} if problem.model.ends_at_force else numbers
 
 
 def compared(
@@ -133,42 +141,70 @@ def estimate(
     Returns
     -------
     ErrorEstimate
-        Without errors, and with the reason, where no estimate can be made; a failure does not fail the press.
+        If the part of the mesh or that of the increments fails, the other stays as it is, and `method` has the reason.
     """
     start = time.perf_counter()
-    try:
-        found = _estimated(problem, frames, say, numbers, runs)
-    except (Finger3dError, RuntimeError, ValueError, np.linalg.LinAlgError, MemoryError) as error:
-        found = ErrorEstimate(method=f"no estimate: {error}")
-    return replace(found, seconds=time.perf_counter() - start)
-
-
-def _estimated(
-    problem: Problem,
-    frames: Sequence[StepResult],
-    say: Say,
-    numbers: Measure,
-    runs: Sequence[Run],
-) -> ErrorEstimate:
     if not frames or not frames[-1].outcome.ok:
-        raise Finger3dError("the last step did not converge")
+        return ErrorEstimate(method="no estimate: the last step did not converge")
     automatic = len(runs) > 1 and all(leg.steps == "auto" for leg in problem.model.legs)
+    used = runs if automatic else ()
     # from here on, automatic increments are numbers
     own = replace(problem, model=replace(problem.model, legs=with_increments_of(problem.model.legs, len(frames))))
-    found, beside, where = discretisation(own, frames, say, numbers, runs if automatic else ())
-    if automatic:
+    beside, where = None, ""
+    try:
+        found, beside, where = discretisation(own, frames, say, numbers, used)
+    except _FAILURES as error:
+        found = ErrorEstimate(method=f"mesh: no estimate: {_reason(error)}")
+    try:
+        steps, by = _of_increments(own, frames, beside, where, numbers, used)
+    except _FAILURES as error:
+        steps, by = {}, f"no estimate: {_reason(error)}"
+    if own.model.ends_at_force:  # the normal force is given
+        given = ("normal_force_N", "force_y_N")
+        mesh = {name: error for name, error in found.discretisation.items() if name not in given}
+        found = replace(found, discretisation=mesh)
+        steps = {name: error for name, error in steps.items() if name not in given}
+    return replace(found, steps=steps, method=f"{found.method}; steps: {by}", seconds=time.perf_counter() - start)
+
+
+def _of_increments(
+    own: Problem,
+    frames: Sequence[StepResult],
+    beside: Problem | None,
+    where: str,
+    numbers: Measure,
+    runs: Sequence[Run],
+) -> tuple[dict[str, float], str]:
+    """Return the errors due to the increments by name, and how they were estimated.
+
+    Parameters
+    ----------
+    beside, where : a press that costs less, and what it differs in, in words; None without one
+    runs : runs that chose automatic increments
+    """
+    if runs:
         used = runs[-4:]
-        steps = errors_from_counts({count: numbers(own, run[-1]) for count, run in used}, used[-1][0])
-        by = ", ".join(str(count) for count, _ in used)
-    else:
-        on_own_mesh, way = choose_counts(_marching_cost(own), _marching_cost(beside), _budget(own))
+        errors = errors_from_counts({count: numbers(own, run[-1]) for count, run in used}, used[-1][0])
+        return errors, ", ".join(str(count) for count, _ in used) + ", order 1"
+    beside_s = math.inf if beside is None else _marching_cost(beside)
+    failure: Exception | None = None
+    for on_own_mesh, way in choices_of_counts(_marching_cost(own), beside_s, _budget(own)):
         judged = own if on_own_mesh else beside
-        last = frames[-1] if on_own_mesh else last_step(beside)
-        steps = step_error(judged, numbers(judged, last), numbers, way)
+        if judged is None:
+            continue
+        try:
+            last = frames[-1] if on_own_mesh else last_step(judged)
+            errors = step_error(judged, numbers(judged, last), numbers, way)
+        except _FAILURES as error:
+            failure = failure or error
+            continue
         by = " and ".join({0.25: "a quarter", 0.5: "half", 2: "twice", 4: "four times"}[t] for t in COUNT_RATIOS[way])
-        by += " as many" + ("" if on_own_mesh else f" {where}")
-    steps = {name: error for name, error in steps.items() if name in found.discretisation}
-    return replace(found, steps=steps, method=f"{found.method}; steps: {by}, order 1")
+        return errors, f"{by} as many{'' if on_own_mesh else ' ' + where}, order 1"
+    raise failure or Finger3dError("no run with another number of increments")
+
+
+def _reason(error: Exception) -> str:
+    return str(error) or type(error).__name__
 
 
 def discretisation(
@@ -192,7 +228,7 @@ def discretisation(
         method = "mesh: dual-weighted residuals, and every second multiplier"
         return (
             ErrorEstimate(discretisation=named, method=method, body=bars.body),
-            bars.coarse,
+            replace(bars.coarse, model=own.model),  # with the object itself, since it is pressed to other poses
             "with every second multiplier",
         )
     beside = companion(own, say)

@@ -49,7 +49,8 @@ class PointResolution:
     @property
     def zone_bars(self) -> dict[str, float]:
         """Error bars of lengths and areas of contact and stick by name."""
-        return {name: self.least[name] for name in (*MAIN, *AREAS) if not name.endswith("_N")}
+        names = (*MAIN, *AREAS, "contact_half_length_end_mm")
+        return {name: self.least[name] for name in names if name in self.least and not name.endswith("_N")}
 
     @classmethod
     def of(cls, problem: Problem, frame: StepResult) -> PointResolution:
@@ -117,15 +118,13 @@ def least_bars(points: ContactPoints, frame: StepResult, along_z_mm: float) -> d
     for name, zone in (("contact", touching), ("stick", frame.state.status == STICK)):
         border = [float(points.area[points.rim(side)].sum()) for side in (zone, ~zone)]
         found[f"{name}_area_mm2"] = _AREA_SHARE * max(0.5 * sum(border), one)
-        on = zone[nearest]
-        ends = ERROR_AT_ENDS[name] * _to_next_points(line, on)
-        if points.dim == 3 and on.any():
-            half = 0.5 * float(np.ptp(line[on]))
-            resolved = points.resolved(zone)[nearest[on]].any()
-            ends = ends if resolved else max(0.5 * max(half, reach - half), ends)
-        found[f"{name}_half_length_mm"] = ends
-        found[f"{name}_length_mm"] = 2.0 * ends
-    found["contact_length_end_mm"] = found["contact_length_mm"]
+        found[f"{name}_half_length_mm"] = _half_length_bar(points, name, zone, (line, nearest), reach)
+        found[f"{name}_length_mm"] = 2.0 * found[f"{name}_half_length_mm"]
+    if points.dim == 3:
+        end = points.end_line()
+        reach = 0.5 * float(np.ptp(end[0][touching[end[1]]])) if touching[end[1]].any() else 0.0
+        found["contact_half_length_end_mm"] = _half_length_bar(points, "contact", touching, end, reach)
+    found["contact_length_end_mm"] = 2.0 * found.get("contact_half_length_end_mm", found["contact_half_length_mm"])
     if points.dim == 3 and touching.any():
         extent = max(0.5 * float(np.ptp(points.points[touching, 2])), along_z_mm)
         friction = float(np.abs(points.with_basis_of(frame.state).friction(frame.state.force)[:, 2]).sum())
@@ -134,6 +133,25 @@ def least_bars(points: ContactPoints, frame: StepResult, along_z_mm: float) -> d
         found["friction_sum_N"] = force
         found["friction_sum_N_per_mm"] = found["friction_along_z_N_per_mm"] = force / width
     return found
+
+
+def _half_length_bar(
+    points: ContactPoints,
+    name: str,
+    zone: NDArray[np.bool_],
+    line: tuple[NDArray[np.float64], NDArray[np.int64]],
+    reach: float,
+) -> float:
+    """Return the error bar (mm) of the half-length of a zone on a line: x, and the number of the nearest point."""
+    at, nearest = line
+    on = zone[nearest]
+    ends = ERROR_AT_ENDS[name] * _to_next_points(at, on)
+    if ends == 0.0 and np.count_nonzero(on) == 1:  # a single point, and no other on the line: what it stands for
+        return 0.5 * float(points.area[nearest[on]].sum()) / (2.0 * points.half_width_mm)
+    if points.dim == 2 or not on.any() or points.resolved(zone)[nearest[on]].any():
+        return ends
+    half = 0.5 * float(np.ptp(at[on]))
+    return max(0.5 * max(half, reach - half), ends)
 
 
 def _to_next_points(line: NDArray[np.float64], on: NDArray[np.bool_]) -> float:

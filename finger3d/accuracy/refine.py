@@ -1,16 +1,16 @@
 """Mesh refinement until the estimated error of one number, the goal, is below a tolerance.
 
-In small strain the mesh is graded towards the goal by the shares of the cells in its error
-(`finger3d.accuracy.graded`).  Where the error is estimated from a companion mesh, two lengths are free, that of the
-contact and that of the body far from it (the corners of the base).  A second coarse run, coarse at the contact only,
-separates their contributions to the error.
+A first mesh whose error is far below the tolerance is made coarser instead, as long as the tolerance is met.  In small
+strain the mesh is graded towards the goal by the shares of the cells in its error (`finger3d.accuracy.graded`).  Where
+the error is estimated from a companion mesh, two lengths are free, that of the contact and that of the body far from it
+(the corners of the base).  A second coarse run, coarse at the contact only, separates their contributions to the error.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 
 from finger3d._types import Tree
@@ -31,6 +31,15 @@ GOAL = "normal_force_N"
 
 _MIN_SHARE = 0.3  # of the difference to the companion: an edge length that causes less is kept
 _FACTOR_RANGE = (0.4, 0.85)  # a round changes an edge length at least and at most by these factors
+_COARSEN = 0.25
+"""Error over the tolerance from which a mesh is not made coarser: the next would hardly have fewer unknowns."""
+
+_WORTHWHILE = 0.7
+"""Unknowns of a coarser mesh over those of the one before, above which no coarser one is tried."""
+
+_FEWEST_POINTS = 8
+"""Contact points that the half-length of contact keeps on a coarser mesh."""
+
 _SAFETY = 0.9  # of the tolerance, so that the last round does not just miss it
 _PRESS_TO_ROUND = 1.3  # time of a press over that of its last round: contact is solved again and drawn
 _EXPONENT = {2: 1.2, 3: 1.6}  # seconds grow with this power of the unknowns (measured from 161 000 to 523 000 in 3D)
@@ -83,8 +92,8 @@ class Refinement:
 
     @property
     def best(self) -> Round:
-        """The round with the smallest error."""
-        return min(self.rounds, key=lambda r: r.error)
+        """The round with the fewest unknowns that meets the tolerance, else that with the smallest error."""
+        return best_round(self.rounds, self.tolerance)
 
     @property
     def met(self) -> bool:
@@ -111,6 +120,12 @@ class Refinement:
         }
 
 
+def best_round(rounds: Sequence[Round], tolerance: float) -> Round:
+    """Return the round with the fewest unknowns that meets a tolerance; without one, that with the smallest error."""
+    met = [r for r in rounds if r.error <= tolerance]
+    return min(met, key=lambda r: r.dofs) if met else min(rounds, key=lambda r: r.error)
+
+
 def refine_mesh(
     model: Model,
     tolerance: float,
@@ -126,13 +141,16 @@ def refine_mesh(
     tolerance : relative, see `relative_error`
     max_seconds : no round is begun that is forecast to end later, output included
     say : receives a line for each round
-    goal : name of a number of the press, as in `finger3d.accuracy.estimate.main_numbers`
+    goal : name of a number of the press, as in `finger3d.accuracy.estimate.press_numbers`; for the normal force under
+        a prescribed one, the depth takes its place
 
     Raises
     ------
     Finger3dError
         If even the first mesh cannot be generated or pressed.
     """
+    if model.ends_at_force and goal == GOAL:  # the force is given, and the depth follows
+        goal = "depth_mm"
     start, rounds, meshes = time.perf_counter(), list[Round](), list[MeshOptions]()
     options, problem = model.mesh, None
     run = _graded_round if applies(model) else _run_round
@@ -142,6 +160,8 @@ def refine_mesh(
         try:
             problem, done, wanted = run(replace(model, mesh=options), tolerance, goal)
         except UnresolvedError as error:
+            if rounds and rounds[-1].error <= tolerance:
+                break
             if error.size_mm is None or error.size_mm >= options.size_mm:
                 raise
             options = replace(options, size_mm=error.size_mm)
@@ -154,8 +174,13 @@ def refine_mesh(
         rounds.append(done)
         meshes.append(options)
         say(done.line(len(rounds)))
-        if done.error <= tolerance:
-            stopped = "met"
+        coarsest = done.error <= tolerance and (
+            done.error > _COARSEN * tolerance
+            or any(r.error > tolerance for r in rounds)
+            or wanted == options
+            or (len(rounds) > 1 and done.dofs > _WORTHWHILE * rounds[-2].dofs)
+        )
+        if coarsest or (done.error > tolerance and any(r.error <= tolerance for r in rounds)):
             break
         left = math.inf if max_seconds is None else max_seconds - (time.perf_counter() - start)
         if wanted.grading is None:
@@ -166,7 +191,8 @@ def refine_mesh(
             stopped = f"max_seconds = {max_seconds:g}"
             break
         options = found
-    best = min(rounds, key=lambda r: r.error)
+    best = best_round(rounds, tolerance)
+    stopped = "met" if best.error <= tolerance else stopped
     kept = meshes[rounds.index(best)]
     return Refinement(tolerance, kept, tuple(rounds), stopped, problem if best is rounds[-1] else None)
 
@@ -195,7 +221,7 @@ def _graded_round(model: Model, tolerance: float, goal: str) -> tuple[Problem, R
     numbers = press_numbers(short, steps[-1])
     error = relative_error(numbers, goal, bars.bars[goal])
     scale = bars.bars[goal] / error if error > 0.0 else 0.0
-    sizes = graded_sizes(short, bars, goal, _SAFETY * tolerance * scale) if error > tolerance else model.mesh
+    sizes = graded_sizes(short, bars, goal, _SAFETY * tolerance * scale) if scale > 0.0 else model.mesh
     dofs = int(problem.body.stiffness.upper.shape[0])
     seconds = time.perf_counter() - start
     return problem, _round(model.mesh, dofs, error, goal, seconds), sizes
@@ -231,10 +257,10 @@ def _next_sizes(
     fine: Mapping[str, float],
     coarse: Mapping[str, float] | None,
 ) -> MeshOptions:
-    """Return smaller edge lengths of contact, base or both, according to the error of the goal."""
+    """Return smaller edge lengths of contact, base or both by the error of the goal, or longer ones of both."""
     options = problem.model.mesh
     if error <= tolerance:
-        return options
+        return _longer(problem, fine["contact_half_length_mm"])
     kind = Quantity.of(number).kind
     is_length = kind.is_length
     shares = (1.0, 0.0) if is_length else _error_shares(problem, number, fine, coarse)
@@ -243,6 +269,15 @@ def _next_sizes(
     size = options.size_mm * (factor if shares[0] >= _MIN_SHARE else 1.0)
     base = options.base_size_mm * (factor if shares[1] >= _MIN_SHARE else 1.0)
     return replace(options, size_mm=_rounded(size), base_size_mm=_rounded(max(size, base)))
+
+
+def _longer(problem: Problem, contact_half_length_mm: float) -> MeshOptions:
+    """Return twice the edge lengths, as far as contact stays resolved and the body is two edges thick."""
+    own, design = problem.model.mesh, problem.model.design
+    most = 0.5 * min(design.height_mm, 2.0 * design.half_length_mm)
+    width = 0.25 * design.width_mm if problem.dim == 3 else math.inf
+    size = max(own.size_mm, min(2.0 * own.size_mm, contact_half_length_mm / _FEWEST_POINTS, most, width))
+    return replace(own, size_mm=_rounded(size), base_size_mm=_rounded(max(size, min(2.0 * own.base_size_mm, most))))
 
 
 def _error_shares(

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from enum import Enum, auto
 
 from finger3d.accuracy.point_resolution import PointResolution
+from finger3d.io import RESULTANTS
 
 ORDER = 1.2
 """Order of convergence at the bonded corners of the base for nu = 0.49, the lowest of all (validation/bonded_layer)."""
@@ -46,6 +47,8 @@ class Kind(Enum):
     HALF_LENGTH = auto()
     LENGTH = auto()
     AREA = auto()
+    DEPTH = auto()
+    MOMENT = auto()
 
     @property
     def is_length(self) -> bool:
@@ -53,8 +56,12 @@ class Kind(Enum):
         return self in (Kind.LENGTH, Kind.HALF_LENGTH)
 
 
-_KINDS = {
+_KINDS = {name: Kind.MOMENT if name.startswith("moment") else Kind.FORCE for name in RESULTANTS[3]} | {
+    "depth_mm": Kind.DEPTH,
     "normal_force_N": Kind.NORMAL_FORCE,
+    "force_y_N": Kind.NORMAL_FORCE,
+    "outward_friction_x_N": Kind.FRICTION_SUM,
+    "outward_friction_z_N": Kind.FRICTION_SUM,
     "force_N_per_mm": Kind.NORMAL_FORCE,
     "friction_sum_N": Kind.FRICTION_SUM,
     "friction_sum_N_per_mm": Kind.FRICTION_SUM,
@@ -67,6 +74,7 @@ _KINDS = {
     "dissipation_mJ": Kind.DISSIPATION,
     "contact_half_length_mm": Kind.HALF_LENGTH,
     "stick_half_length_mm": Kind.HALF_LENGTH,
+    "contact_half_length_end_mm": Kind.HALF_LENGTH,
     "contact_length_mm": Kind.LENGTH,
     "contact_length_end_mm": Kind.LENGTH,
     "stick_length_mm": Kind.LENGTH,
@@ -147,7 +155,7 @@ def mesh_error(
             scale = readings.get(kind, abs(value))
             if own.alone and kind is Kind.FRICTION_SUM:
                 scale = max(scale, normal_force)
-            power = 2 if kind is Kind.NORMAL_FORCE else 1
+            power = 2 if kind in (Kind.NORMAL_FORCE, Kind.DEPTH) else 1
             bound = max(bound, _FLOORS.get(kind, _RESOLUTION_FLOOR) * own.share**power * scale)
         if kind is Kind.DISSIPATION:
             bound = max(bound, UNRESOLVED_DISSIPATION * own.share * largest(numbers, Kind.WORK))

@@ -41,7 +41,7 @@ class BodyErrors:
 
     Attributes
     ----------
-    signed : by name, in the unit of the number; of a gauge without the cells around it
+    signed : by name, in the unit of the number, unless it is zero by symmetry; of a gauge without the cells around it
     local : by name, for gauges: the error of the strain in the cells that hold the gauge, not signed
     shares : by name, (e,) shares of the cells
     around : by name, for gauges: which cells (e,) hold the gauge or touch those that do
@@ -54,7 +54,7 @@ class BodyErrors:
 
     def bar(self, name: str, share: float = 1.0) -> float:
         """Return the magnitude of the error of a number, if its signed part is `share` times its estimate."""
-        return float(np.hypot(share * self.signed[name], self.local.get(name, 0.0)))
+        return float(np.hypot(share * self.signed.get(name, 0.0), self.local.get(name, 0.0)))
 
 
 def body_errors(problem: Problem, steps: Sequence[StepResult]) -> BodyErrors:

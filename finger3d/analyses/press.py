@@ -232,10 +232,14 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fie
 def _estimate_errors(record: PressRecord, report: Progress) -> None:
     """Estimate the errors by mesh and increments."""
     from finger3d.accuracy.estimate import estimate, press_numbers
+    from finger3d.accuracy.modulus import modulus_errors
 
     report.stage("estimating the error")
     runs = record.step_estimate.runs if record.step_estimate else ()
-    record.error_estimate = estimate(record.problem, record.steps, report.say, press_numbers, runs)
+    found = estimate(record.problem, record.steps, report.say, press_numbers, runs)
+    spread = record.scene.tables.material.constants.spread
+    by_modulus = modulus_errors(record.problem, record.converged_steps, spread, press_numbers)
+    record.error_estimate = replace(found, modulus=by_modulus)
 
 
 def _estimate_changes(record: PressRecord, report: Progress) -> None:

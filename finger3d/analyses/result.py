@@ -173,9 +173,9 @@ class PressResult:
         from finger3d.report.build import number
         from finger3d.report.press import headline
 
-        good = self._good()
+        good, bars = self._good(), ErrorBars.of_summary(self._numbers)
         rows = [
             (row.name, f"{number(row.value, row.error)} {row.unit}".strip())
-            for row in (headline(good[-1], ErrorBars.of_summary(self._numbers).totals()) if good else ())
+            for row in (headline(good[-1], bars.totals(), bars.modulus) if good else ())
         ]
         return card(self._title, self._status(), rows, self._numbers["warnings"], self._numbers["advice"])

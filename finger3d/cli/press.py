@@ -93,23 +93,32 @@ def _rows(summary: TreeView, out: Path, seconds: float) -> Iterator[tuple[str, s
         error = bars.total(key)
         return with_error(factor * value, None if error is None else factor * error, digits, "+-")
 
+    def of_modulus(key: str, unit: str, factor: float = 1.0) -> str:
+        error = bars.modulus.get(key)
+        return "" if error is None else f", +- {factor * error:.2g}{unit} by the modulus"
+
     yield "outcome", summary["outcome"]
     if steps:
         last = steps[-1]
-        yield "depth", f"{last['depth_mm']:.4g} mm, step {len(steps)}"
+        depth = number(last["depth_mm"], "depth_mm", 4) + " mm" + of_modulus("depth_mm", " mm")
+        yield "depth", f"{depth}, step {len(steps)}"
         for name, (key, factor, digits, unit) in _NUMBERS.items():
-            yield name, number(last[key], key, digits, factor) + unit
+            yield name, number(last[key], key, digits, factor) + unit + of_modulus(key, unit.split(" at ")[0], factor)
         yield "residual", f"{max(step['residual'] for step in steps):.1e}, the largest of all steps"
         for name, strain in last["gauges"].items():
-            yield f"strain {name}", number(strain, f"gauge_{name}", 5)
+            yield f"strain {name}", number(strain, f"gauge_{name}", 5) + of_modulus(f"gauge_{name}", "")
         for name, moved in last["markers"].items():
             parts = [number(value, f"marker_{name}_{axis}_mm", 5) for axis, value in zip("xyz", moved, strict=True)]
             yield f"marker {name}", ", ".join(parts) + " mm"
+            by_modulus = [bars.modulus.get(f"marker_{name}_{axis}_mm", 0.0) for axis in "xyz"]
+            if any(by_modulus):
+                yield "", ", ".join(f"+- {error:.2g}" for error in by_modulus) + " mm by the modulus"
         for name, pressure in last["taxels"].items():
-            yield f"taxel {name}", number(pressure, f"taxel_{name}_MPa", 5) + " MPa"
+            key = f"taxel_{name}_MPa"
+            yield f"taxel {name}", number(pressure, key, 5) + " MPa" + of_modulus(key, " MPa")
     if bars.discretisation:
-        yield "+-", f"error of mesh and steps, not of the model; estimated in {bars.seconds:.1f} s; --no-error skips it"
-    elif estimate:
+        yield "+-", f"{bars.covered}, not of the model; estimated in {bars.seconds:.1f} s; --no-error skips it"
+    if estimate and not (bars.discretisation and bars.steps):
         yield "error", bars.method
     yield "time", f"{seconds:.1f} s, with imports, pictures and page"
     yield "results", str(out)

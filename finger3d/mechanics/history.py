@@ -75,6 +75,12 @@ class ContactPoints:
         crossing = x[i] + share * (x[j] - x[i])
         return np.concatenate([x[on], crossing]), np.concatenate([on, np.where(share <= 0.5, i, j)])
 
+    def end_line(self) -> tuple[Float, NDArray[np.int64]]:
+        """Return x (k,), mm, and the numbers (k,) of the points where the contact face ends, at half the width."""
+        end = np.abs(self.points[:, 2] - self.half_width_mm) <= 1e-6 * self.half_width_mm
+        nearest = np.flatnonzero(end & (self.face == CONTACT))
+        return self.points[nearest, 0], nearest
+
     def rim(self, inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return which points (m,) of a zone an edge joins with a point outside it."""
         i, j = self.edges.T
@@ -199,8 +205,7 @@ def measure(points: ContactPoints, step: StepResult) -> Tree:
         "stick_half_length_mm": stick,
     }
     if points.dim == 3:
-        end = (np.abs(z - points.half_width_mm) <= 1e-6 * points.half_width_mm) & (points.face == CONTACT)
-        numbers["contact_half_length_end_mm"] = half_extents(x[end], np.flatnonzero(end), state, points.area)[0]
+        numbers["contact_half_length_end_mm"] = half_extents(*points.end_line(), state, points.area)[0]
     return numbers | {
         "largest_penetration_mm": step.penetration_mm,
         "external_work_mJ": step.external_work_mJ,

@@ -10,7 +10,7 @@ from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.contact.law import ContactLaw
 from finger3d.contact.rules import RuleName
 from finger3d.fem.laws import IsochoricLaw
-from finger3d.fem.material import Material
+from finger3d.fem.material import RIGID_RATIO, Isotropic, Material
 from finger3d.geometry.design import Design
 from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.readings import Marker, Reading, Taxel
@@ -193,8 +193,22 @@ class Model:
     @property
     def forces_scale_with_modulus(self) -> bool:
         """Whether all forces are proportional to Young's modulus, and no displacement depends on it."""
-        forced = any(leg.force_N is not None for leg in self.legs)
-        return not self.parts and self.inclusions is None and self.object_compliance is None and not forced
+        return self.stresses_scale_with_modulus and all(leg.force_N is None for leg in self.legs)
+
+    @property
+    def stresses_scale_with_modulus(self) -> bool:
+        """Whether all stresses at given displacements are proportional to Young's modulus of the finger."""
+        own, parts = self.material, [material for _, material in self.parts]
+        rigid = all(
+            isinstance(own, Isotropic) and isinstance(part, Isotropic) and part.E_MPa == RIGID_RATIO * own.E_MPa
+            for part in parts
+        )
+        return rigid and self.inclusions is None and self.object_compliance is None
+
+    @property
+    def ends_at_force(self) -> bool:
+        """Whether the last leg ends at a prescribed force, so that the depth is unknown."""
+        return self.legs[-1].force_N is not None
 
     @property
     def largest_depth_mm(self) -> float:

@@ -313,8 +313,8 @@ def errors_from_counts(runs: Mapping[int, Mapping[str, float]], count: int) -> d
     return {name: float(error) for name, error in errors.items() if math.isfinite(error)}
 
 
-def choose_counts(own_s: float, companion_s: float, budget_s: float) -> tuple[bool, str]:
-    """Choose the mesh and the counts of increments that the error due to the increments is estimated on.
+def choices_of_counts(own_s: float, companion_s: float, budget_s: float) -> list[tuple[bool, str]]:
+    """Return the meshes and counts of increments that the error due to the increments may be estimated on.
 
     Parameters
     ----------
@@ -325,14 +325,14 @@ def choose_counts(own_s: float, companion_s: float, budget_s: float) -> tuple[bo
 
     Returns
     -------
-    on_own_mesh : bool
-    ratios : str
-        Key of `COUNT_RATIOS`.
+    list of (on_own_mesh, ratios)
+        Those that the budget allows, the best first, then fewer increments on the companion, and on the mesh itself.
+        `ratios` is a key of `COUNT_RATIOS`.
     """
     seconds = {True: own_s, False: companion_s}
     choices = [(own, ratios) for ratios in ("up", "both") for own in (True, False)]
-    affordable = ((own, ratios) for own, ratios in choices if sum(COUNT_RATIOS[ratios]) * seconds[own] <= budget_s)
-    return next(affordable, (False, "down"))
+    affordable = [(own, ratios) for own, ratios in choices if sum(COUNT_RATIOS[ratios]) * seconds[own] <= budget_s]
+    return [*affordable, (False, "down"), (True, "down")]
 
 
 def last_step(problem: Problem) -> StepResult:

@@ -68,7 +68,6 @@ _CHANGES = {
 }
 """Key of summary.json -> heading on the page."""
 
-_ERROR_REMARK = "The number after ± is the error of mesh and increments; it does not include the error of the model."
 _ROUND_OFF = 1e-9  # magnitude of round-off, relative to the force that a number is compared with
 
 
@@ -126,61 +125,72 @@ def press_page(folder: str | Path) -> Path:
     return write_page(
         folder,
         title_of(summary["scene"]),
-        headline(good[-1], bars.totals()) if good else (),
+        headline(good[-1], bars.totals(), bars.modulus) if good else (),
         sections,
         [Figure(name, text) for name, text in _PICTURES.items()],
         view_of(states, gauges_of(summary["scene"])) if states else None,
         command="press",
         outcome=f"{summary['outcome']}{last if summary['outcome'] == 'converged' else ''}",
         good=summary["outcome"] == "converged",
-        notes=[*summary["warnings"], *summary["advice"], *([_ERROR_REMARK] if bars.discretisation else [])],
+        notes=[*summary["warnings"], *summary["advice"], *([_remark(bars)] if bars.discretisation else [])],
         versions=summary["versions"],
     )
 
 
-def headline(step: PressStep, errors: Mapping[str, float]) -> list[HeadlineRow]:
+def _remark(bars: ErrorBars) -> str:
+    """Return what the number after ± is."""
+    covered = bars.covered.replace("steps", "increments")
+    return f"The number after ± is the {covered}; it does not include the error of the model."
+
+
+def headline(
+    step: PressStep, errors: Mapping[str, float], by_modulus: Mapping[str, float] | None = None
+) -> list[HeadlineRow]:
     """Return the main numbers of a step with their errors, without a tangential force of the size of round-off.
 
     Parameters
     ----------
     step : the step
     errors : key of a number -> its error, in the unit of the number
+    by_modulus : key of a number -> its error due to the spread of the modulus, in the unit of the number
     """
-    rows = []
+    by_modulus = by_modulus or {}
+
+    def row(key: str, name: str, value: float | None, unit: str = "", factor: float = 1.0) -> HeadlineRow:
+        error, spread = errors.get(key), by_modulus.get(key)
+        if spread is not None:
+            unit = f"{unit}, ± {factor * spread:.2g} by the modulus".removeprefix(", ")
+        shown = "unknown" if value is None else factor * value
+        return HeadlineRow(name, shown, unit, None if error is None else factor * error)
+
+    rows = [row("depth_mm", "depth", step.depth_mm, "mm")] if "depth_mm" in errors else []
     for key, (name, factor, unit) in _HEADLINE.items():
         value = getattr(step, key)
         if key.startswith("tangential") and abs(value) <= _ROUND_OFF * max(step.friction_sum_N, 1e-300):
             continue
-        error = errors.get(key)
-        rows.append(HeadlineRow(name, factor * value, unit, None if error is None else factor * error))
-    return (
-        rows
-        + [
-            HeadlineRow(
-                f"strain of gauge {name}", "unknown" if strain is None else strain, "", errors.get(f"gauge_{name}")
-            )
-            for name, strain in step.gauges.items()
-        ]
-        + [
-            HeadlineRow(
-                f"displacement of marker {name} along {axis}", value, "mm", errors.get(f"marker_{name}_{axis}_mm")
-            )
-            for name, moved in step.markers.items()
-            for axis, value in zip("xyz", moved, strict=True)
-            if value
-        ]
-        + [
-            HeadlineRow(f"pressure of taxel {name}", pressure, "MPa", errors.get(f"taxel_{name}_MPa"))
-            for name, pressure in step.taxels.items()
-        ]
-    )
+        rows.append(row(key, name, value, unit, factor))
+    rows += [row(f"gauge_{name}", f"strain of gauge {name}", strain) for name, strain in step.gauges.items()]
+    rows += [
+        row(f"marker_{name}_{axis}_mm", f"displacement of marker {name} along {axis}", value, "mm")
+        for name, moved in step.markers.items()
+        for axis, value in zip("xyz", moved, strict=True)
+        if value
+    ]
+    taxels = step.taxels.items()
+    return rows + [row(f"taxel_{name}_MPa", f"pressure of taxel {name}", pressure, "MPa") for name, pressure in taxels]
 
 
 def _error_bars(bars: ErrorBars) -> PageSection:
     """Return the contributions of mesh and increments to each error, and the method of estimation."""
-    rows = [(name, value, bars.steps.get(name)) for name, value in bars.discretisation.items()]
-    table = [Table(("error, in the unit of the name", "of the mesh", "of the increments"), rows)] if rows else []
-    return PageSection("Error bars", [f"The number after ± is the sum of both errors. Method: {bars.method}", *table])
+    parts = {"of the mesh": bars.discretisation, "of the increments": bars.steps, "of the modulus": bars.modulus}
+    parts = {head: errors for head, errors in parts.items() if errors}
+    names = dict.fromkeys(name for errors in parts.values() for name in errors)
+    rows = [(name, *(errors.get(name) for errors in parts.values())) for name in names]
+    table = [Table(("error, in the unit of the name", *parts), rows)] if rows else []
+    said = "The number after ± is the sum of the errors of mesh and increments. "
+    if bars.modulus:
+        said += "The error of the modulus, one standard deviation, stands apart. "
+    return PageSection("Error bars", [f"{said}Method: {bars.method}", *table])
 
 
 def _changes(summary: TreeView) -> list[PageSection]:

@@ -59,7 +59,7 @@ def check(tables: SceneTable, legs: tuple[LegTable, ...], design: Design) -> lis
     lines += check_parts(tables, design)
     lines += _legs(tables.press, legs, design, solid)
     lines += _sizes(tables.mesh, design, solid)
-    lines += _goal(tables, solid)
+    lines += _goal(tables, legs, solid)
     lines += _names(tables)
     for i, gauge in enumerate(tables.gauge):
         along = np.array([-0.5, 0.5]) * gauge.length_mm if gauge.length_mm else np.zeros(1)
@@ -73,14 +73,15 @@ def check(tables: SceneTable, legs: tuple[LegTable, ...], design: Design) -> lis
     return lines
 
 
-def _goal(tables: SceneTable, solid: bool) -> list[str]:
+def _goal(tables: SceneTable, legs: tuple[LegTable, ...], solid: bool) -> list[str]:
     """Return a line about a goal without a tolerance, or one that is no number of the press."""
     goal = tables.mesh.goal
     if goal is None:
         return []
     if tables.mesh.tolerance is None:
         return [f"mesh.goal = {shown(goal)}: only with mesh.tolerance, for which the mesh is refined"]
-    names = ["normal_force_N", "friction_sum_N", "external_work_mJ", "dissipation_mJ"]
+    first = "normal_force_N" if legs[-1].force_N is None else "depth_mm"  # under a force the depth is unknown
+    names = [first, "friction_sum_N", "external_work_mJ", "dissipation_mJ"]
     names += [f"gauge_{g.name}" for g in tables.gauge] + [f"taxel_{t.name}_MPa" for t in tables.taxel]
     names += [f"marker_{m.name}_{axis}_mm" for m in tables.marker for axis in ("xyz" if solid else "xy")]
     if goal in names:

@@ -170,7 +170,8 @@ class MeshTable(TomlTable):
         gauges do not change the mesh
     mesher : fTetWild; netgen, the same on every run, for CAD; or structured, for extruded designs
     tolerance : instead of sizes: refine until the estimated error of the goal is below it
-    goal : with tolerance: the number that the mesh is refined for, such as gauge_g36; the normal force unless given
+    goal : with tolerance: the number that the mesh is refined for, such as gauge_g36; unless given the normal force,
+        or the depth under one
     max_seconds : with tolerance: stop refining then, with the best so far
     """
 

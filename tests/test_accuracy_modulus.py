@@ -1,0 +1,84 @@
+"""Errors due to the spread of Young's modulus."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from finger3d.accuracy.estimate import press_numbers
+from finger3d.accuracy.modulus import modulus_errors
+from finger3d.cli import main
+from finger3d.effects.elastic_object import Effect as ElasticObject
+from finger3d.fem.material import RIGID_RATIO, Isotropic
+from finger3d.materials.shore import SPREAD_A
+from finger3d.mechanics.model import Gauge, Leg, Model
+from finger3d.mechanics.readings import Taxel
+from tests.models import half_cylinder, run
+from tests.scenes import HALF_CYLINDER, changed
+
+SPREAD = 0.25
+
+
+def model_at(E_MPa: float, leg: Leg) -> Model:
+    model = half_cylinder(0.4)
+    gauges, taxels = (Gauge("g", 1.5, 3.5),), (Taxel("t", 0.0, 0.0, 1.0, 1.0),)
+    material = Isotropic(E_MPa, 0.4)
+    return replace(model, legs=(leg,), gauges=gauges, taxels=taxels, material=material)
+
+
+@pytest.mark.parametrize("leg", [Leg(1.0, steps=8), Leg(1.0, steps=8, force_N=1.5)], ids=["depth", "force"])
+def test_they_are_the_changes_of_a_press_with_a_modulus_one_deviation_higher(leg: Leg) -> None:
+    problem, steps = run(model_at(1.0, leg))
+    told, found = press_numbers(problem, steps[-1]), modulus_errors(problem, steps, SPREAD, press_numbers)
+    stiff = press_numbers(*_last(run(model_at(1.0 + SPREAD, leg))))
+    scale = 1.0 if leg.force_N is None else 1.0 + SPREAD
+    # zones grow from point to point, and the dissipation depends on the increments
+    rough = ("contact_half", "contact_area", "stick_", "dissipation")
+    for name, value in told.items():
+        change = scale * abs(stiff[name] - value)
+        # under a force, linear between the increments at a force 0.8 times as large
+        if leg.force_N is None or not name.startswith(rough):
+            assert found.get(name, 0.0) == pytest.approx(change, rel=0.05, abs=2e-3 * abs(value) + 1e-12), name
+    assert ("depth_mm" in found, "normal_force_N" in found) == (leg.force_N is not None, leg.force_N is None)
+
+
+def _last(pressed: tuple) -> tuple:
+    return pressed[0], pressed[1][-1]
+
+
+def test_there_are_none_where_the_modulus_is_given_or_is_not_the_only_one() -> None:
+    model = model_at(1.0, Leg(1.0, steps=2))
+    problem, steps = run(model)
+    assert modulus_errors(problem, steps, None, press_numbers) == {}
+    assert modulus_errors(problem, [], SPREAD, press_numbers) == {}
+    soft = replace(problem, model=ElasticObject(10.0, 0.3).apply(model))
+    assert modulus_errors(soft, steps, SPREAD, press_numbers) == {}
+    parts = {True: Isotropic(RIGID_RATIO, 0.3), False: Isotropic(5.0, 0.3)}
+    for rigid, material in parts.items():
+        other = replace(problem, model=replace(model, parts=(("core", material),)))
+        assert bool(modulus_errors(other, steps, SPREAD, press_numbers)) is rigid
+    slid = replace(problem, model=replace(model, legs=(Leg(1.0, slide_x_mm=0.1, steps=2, force_N=1.0),)))
+    assert modulus_errors(slid, steps, SPREAD, press_numbers) == {}
+
+
+def test_table_page_and_summary_keep_them_apart_from_those_of_the_mesh(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene, out = tmp_path / "scene.toml", tmp_path / "out"
+    text = changed(HALF_CYLINDER, domain="plane-strain", size_mm=0.4)
+    scene.write_text(text.replace("E_MPa = 1.0\n", "shore_A = 30\n"), encoding="utf-8")
+    assert main(["press", str(scene), "--out", str(out)]) == 0
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    bars, force = summary["error_estimate"], summary["steps"][-1]["normal_force_N"]
+    spread = bars["modulus"]["normal_force_N"] / force
+    assert spread == pytest.approx(SPREAD_A, rel=1e-9)
+    assert bars["discretisation"]["normal_force_N"] < 0.05 * force
+    said = f"+- {spread * force:.2g} N by the modulus"
+    printed = next(line for line in capsys.readouterr().out.splitlines() if "normal force" in line)
+    assert said in printed
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert said.replace("+-", "±").replace(" N by", " by") in page
+    assert "of the modulus" in page
