@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from finger3d._types import Float
 from finger3d.contact.state import ContactSolution, ContactState
+from finger3d.errors import Outcome
 from finger3d.fem.elements import quadrature
 from finger3d.fem.hyperelastic import Hyperelastic, nodal_fields
 from finger3d.fem.laws import IsochoricLaw
@@ -23,6 +24,8 @@ from finger3d.mechanics.finite_increment import FiniteIncrement
 from finger3d.mechanics.finite_state import DeformedState, FiniteStrainWorkspace, contact_of
 from finger3d.mechanics.finite_together import solve_together
 from finger3d.mechanics.formulation import Workspace, moment_of
+from finger3d.mechanics.linear_contact import carried_by_object
+from finger3d.mechanics.passing import moves_too_far, passes_through, pulls
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.relaxation import InternalVariables, Relaxation, Step, relaxed
 from finger3d.objects import ObjectPose
@@ -112,10 +115,21 @@ class FiniteStrain:
     ) -> ContactSolution:
         """Iterate until equilibrium and contact conditions hold in the deformed configuration."""
         known, workspace.known = workspace.known, None
-        if known is not None:
-            return known
-        increment = self._increment(problem, state, a, b, workspace)
-        return self._remembered(increment, increment.solve(guess))
+        u = displacement(problem.mesh, self.unknowns(problem, state))
+        before = problem.surface.trace @ u
+        if moves_too_far(problem, a, b, state.gap, carried_by_object(problem, a, b, before)):
+            return ContactSolution(state, Outcome.PASSED_THROUGH, np.inf, 0, "none")
+        found = known
+        if found is None:
+            increment = self._increment(problem, state, a, b, workspace)
+            found = self._remembered(increment, increment.solve(guess))
+        if not found.outcome.ok:
+            return found
+        after = problem.surface.trace @ displacement(problem.mesh, self.unknowns(problem, found.state))
+        through = passes_through(problem, a, b, before, after, state.gap)
+        if through or pulls(problem, state, found.state, a, b):
+            return replace(found, state=state, outcome=Outcome.PASSED_THROUGH)
+        return found
 
     def increments(
         self,
