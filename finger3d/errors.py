@@ -77,6 +77,10 @@ class Outcome(Enum):
         "fillet where a sharp edge of the finger folds over"
     )
     INDEFINITE = "the compliance is not positive: the body is not held; fix its base, or check the mesh"
+    PASSED_THROUGH = (
+        "the object would pass through the finger's surface within an increment, or the surface through it; the steps "
+        "before are good; try more steps, or a finer mesh"
+    )
     UNRESOLVED = "the object passes between the contact points; try a smaller mesh.size_mm"
     NOT_FINITE = "the compliance or the gap contains NaN or infinity; check the mesh and the material"
 

@@ -6,6 +6,7 @@ import re
 
 import numpy as np
 
+from finger3d.analyses.press_record import depth_warning
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect
 from finger3d.fem.material import Isotropic
@@ -97,3 +98,32 @@ def test_a_sharp_edge_of_the_finger_is_named_where_the_object_enters_there() -> 
     assert check.at_crease
     (line,) = penetration_advice(problem, [check])
     assert "fillet" in line
+
+
+def test_penetration_is_compared_with_the_depth_that_a_force_reaches() -> None:
+    leg = Leg(5.0 * DEPTH, steps=2, force_N=12.0)  # the depth is a forecast, which is far too large
+    forced = Model(
+        designs()["block"](half_length_mm=7.0, height_mm=HEIGHT, width_mm=HEIGHT), Isotropic(1.0, 0.4),
+        MeshOptions(0.8, 1.6, "swept"), (leg,), object=Plane(), friction=Coulomb(2.0), domain="plane-strain",
+    )  # fmt: skip
+    problem = build(Effect().apply(forced))
+    steps = list(march(problem))
+    checks, reached = check_surface(problem, steps), steps[-1].target.depth_mm
+    assert reached < 0.5 * leg.depth_mm
+    share = max(check.penetration_mm for check in checks) / reached
+    assert 0.01 < share < 0.1
+    assert penetration_advice(problem, checks)
+
+
+def test_the_warning_of_a_deep_press_tells_the_depth_that_a_force_reaches() -> None:
+    leg = Leg(9.0, steps=3, force_N=60.0)
+    forced = Model(
+        designs()["block"](half_length_mm=7.0, height_mm=HEIGHT, width_mm=HEIGHT), Isotropic(1.0, 0.4),
+        MeshOptions(1.6, 1.6, "swept"), (leg,), object=Plane(), friction=Coulomb(0.2), domain="plane-strain",
+    )  # fmt: skip
+    problem = build(forced)
+    steps = list(march(problem))
+    depth = steps[-1].target.depth_mm
+    assert 0.3 * HEIGHT < depth < 0.8 * leg.depth_mm
+    (line,) = depth_warning(problem, steps)
+    assert f"is {10.0 * depth:.0f} % of the finger's height" in line

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from finger3d._types import Tree
 from finger3d.analyses.press_files import Fields, ResultWriter
-from finger3d.analyses.press_record import PressRecord, point_count_warning
+from finger3d.analyses.press_record import PressRecord, depth_warning, point_count_warning
 from finger3d.analyses.result import PressResult
 from finger3d.io import claimed
 from finger3d.mechanics.formulations import formulation_of
@@ -216,6 +216,8 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fie
     begin = time.perf_counter()
     report.stage("writing fields")
     fields, good, problem = None, record.converged_steps, record.problem
+    if any(leg.force_N is not None for leg in problem.model.legs):
+        record.warnings += depth_warning(problem, good)
     if good:
         u, strain, stress = formulation_of(problem.model).fields(problem, good[-1].meshed_state)
         record.warnings += penetration_warnings(problem, record.surface_checks)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -76,10 +77,11 @@ class PressRecord:
         self.workspace = formulation_of(self.problem.model).workspace()
         self.coupling = self.problem.coupling()
         self.seconds = {"cad": 0.0, "mesh": 0.0, **self.problem.seconds, "contact": 0.0, "output": 0.0}
+        forced = any(leg.force_N is not None for leg in self.problem.model.legs)  # the depth is not known yet
         self.warnings += [
             *self.problem.model.warnings,
             *_coupling_warning(self.coupling),
-            *_depth_warning(self.problem),
+            *([] if forced else depth_warning(self.problem, [])),
         ]
         self.warnings += resolution.warnings(self.problem)
         if self.refinement and self.refinement.warning:
@@ -173,11 +175,14 @@ def _coupling_warning(coupling: float) -> list[str]:
     ]
 
 
-def _depth_warning(problem: Problem) -> list[str]:
+def depth_warning(problem: Problem, steps: Sequence[StepResult]) -> list[str]:
+    """Return a warning if a press in small strain is deep; `steps` tell the depth of one whose force is given."""
+    from finger3d.mechanics.coverage import reached_depth
+
     if problem.model.finite_strain:
         return []
     height = problem.model.design.height_mm
-    ratio = max(leg.depth_mm for leg in problem.model.legs) / height
+    ratio = reached_depth(problem.model, steps) / height
     if ratio <= _SMALL_STRAIN_DEPTH:
         return []
     return [

@@ -41,6 +41,12 @@ class Effect:
             raise Finger3dError(
                 "effects.elastic_object: not with a turned object; take turn_x_deg, turn_y_deg and turn_z_deg out"
             )
+        deepest = max((leg.depth_mm for leg in model.legs if leg.force_N is None), default=0.0)
+        if deepest > obj.held_height_mm:
+            raise Finger3dError(
+                f"press.depth_mm = {deepest:g}: deeper than the elastic object, which is held {obj.held_height_mm:g} "
+                "mm above its lowest point; press less deep, or take [effects.elastic_object] out"
+            )
         soft = ElasticObject(self.E_MPa, self.nu, self.height_mm)
         model = fill(model, "object_compliance", soft, "elastic_object")
         if any(leg.moves_sideways for leg in model.legs):

@@ -16,6 +16,7 @@ from finger3d.mechanics.contact_geometry import may_touch
 from finger3d.mechanics.formulation import length_scale
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult
+from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem, free_surface
 from finger3d.objects import DistanceTracker, Move, ObjectPose
 
@@ -48,6 +49,7 @@ class SurfaceCheck:
     place : (d,) mm, that place
     face : number in `FREE_FACES` of its face
     at_crease : whether a sharp edge of the finger bounds its facet
+    depth_mm : largest depth of the press, to which the penetration is compared
     """
 
     within_candidates: bool
@@ -55,6 +57,7 @@ class SurfaceCheck:
     place: Float
     face: int
     at_crease: bool
+    depth_mm: float
 
 
 def check_surface(problem: Problem, steps: Sequence[StepResult]) -> list[SurfaceCheck]:
@@ -62,7 +65,7 @@ def check_surface(problem: Problem, steps: Sequence[StepResult]) -> list[Surface
     tracker, rigid = DistanceTracker(), problem.model.object_compliance is None
     free, others = _surfaces(problem, steps)
     hats, creased = free.hats.tocsc(), np.bincount(free.nodes)[free.nodes] > 1
-    out = []
+    out, largest = [], reached_depth(problem.model, steps)
     for u, step in zip(_displacements(problem, steps), steps, strict=True):
         within = _stays_out(problem, u, step.target, others)
         at = free.samples + free.interpolate @ u
@@ -70,7 +73,8 @@ def check_surface(problem: Problem, steps: Sequence[StepResult]) -> list[Surface
         worst = int(value.argmin())
         depth = max(-float(value[worst]), 0.0) if rigid else step.penetration_mm
         corners = hats[:, [worst]].indices
-        out.append(SurfaceCheck(within, depth, at[worst], int(free.face[corners[0]]), bool(creased[corners].any())))
+        face, at_crease = int(free.face[corners[0]]), bool(creased[corners].any())
+        out.append(SurfaceCheck(within, depth, at[worst], face, at_crease, largest))
     return out
 
 
@@ -93,9 +97,16 @@ def penetration_advice(problem: Problem, checks: Sequence[SurfaceCheck]) -> list
     return _penetration(problem, checks, _ADVISE_ABOVE, _WARN_ABOVE)
 
 
-def resolving_edge(problem: Problem, check: SurfaceCheck) -> float:
+def reached_depth(model: Model, steps: Sequence[StepResult]) -> float:
+    """Return the largest depth (mm) of a press: that of its steps where a force is given, whose depth is a forecast."""
+    if all(leg.force_N is None for leg in model.legs):
+        return model.largest_depth_mm
+    return max((step.target.depth_mm for step in steps), default=model.largest_depth_mm)
+
+
+def resolving_edge(check: SurfaceCheck) -> float:
     """Return the edge length, over the present one, at which penetration is a hundredth of the depth."""
-    share = check.penetration_mm / problem.model.largest_depth_mm
+    share = check.penetration_mm / check.depth_mm
     order = _ORDER_AT_CREASE if check.at_crease else _ORDER
     return float(min(1.0, _MARGIN * (_ADVISE_ABOVE / share) ** (1.0 / order))) if share > _ADVISE_ABOVE else 1.0
 
@@ -103,13 +114,13 @@ def resolving_edge(problem: Problem, check: SurfaceCheck) -> float:
 def _penetration(problem: Problem, checks: Sequence[SurfaceCheck], above: float, most: float) -> list[str]:
     """Return a line about the deepest place if its penetration over the depth is between two bounds."""
     deepest = max(checks, key=lambda check: check.penetration_mm, default=None)
-    mesh, depth = problem.model.mesh, problem.model.largest_depth_mm
-    if deepest is None or not above * depth < deepest.penetration_mm <= most * depth:
+    if deepest is None or not above * deepest.depth_mm < deepest.penetration_mm <= most * deepest.depth_mm:
         return []
+    mesh, depth = problem.model.mesh, deepest.depth_mm
     where = ", ".join(f"{axis} = {value:.3g}" for axis, value in zip("xyz", deepest.place, strict=False))
     on_wall = deepest.face != CONTACT and not deepest.at_crease
     key, length = ("base_size_mm", mesh.base_size_mm) if on_wall else ("size_mm", mesh.size_mm)
-    cure = f"mesh.{key} = {resolving_edge(problem, deepest) * length:.2g} leaves about {_ADVISE_ABOVE:.0%}"
+    cure = f"mesh.{key} = {resolving_edge(deepest) * length:.2g} leaves about {_ADVISE_ABOVE:.0%}"
     if mesh.grading is not None:
         cure = "a smaller mesh.tolerance leaves less"
     if deepest.at_crease:

@@ -9,6 +9,7 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.contact.state import ContactSolution, ContactState
+from finger3d.errors import Outcome
 from finger3d.fem.elements import quadrature
 from finger3d.fem.hyperelastic import Hyperelastic, nodal_fields
 from finger3d.fem.laws import IsochoricLaw
@@ -20,6 +21,8 @@ from finger3d.mechanics.finite_increment import FiniteIncrement
 from finger3d.mechanics.finite_state import DeformedBody, FiniteStrainWorkspace, contact_of
 from finger3d.mechanics.finite_together import solve_together
 from finger3d.mechanics.formulation import Loads
+from finger3d.mechanics.linear_contact import carried_by_object
+from finger3d.mechanics.passing import moves_too_far, passes_through, pulls
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.relaxation import InternalVariables, Relaxation, Step, relaxed
 from finger3d.mechanics.state import State
@@ -84,10 +87,20 @@ class FiniteStrain:
     ) -> ContactSolution[State[DeformedBody]]:
         """Iterate until equilibrium and contact conditions hold in the deformed configuration."""
         known, workspace.known = workspace.known, None
-        if known is not None:
-            return known
-        increment = self._increment(problem, state, move, workspace)
-        return self._remembered(increment, increment.solve(guess))
+        before, gap = problem.surface.trace @ displacement(problem.mesh, state.body.unknowns), state.contact.gap
+        if moves_too_far(problem, move, gap, carried_by_object(problem, move, before)):
+            return ContactSolution(state, Outcome.PASSED_THROUGH, np.inf, 0, "none")
+        found = known
+        if found is None:
+            increment = self._increment(problem, state, move, workspace)
+            found = self._remembered(increment, increment.solve(guess))
+        if not found.outcome.ok:
+            return found
+        after = problem.surface.trace @ displacement(problem.mesh, found.state.body.unknowns)
+        through = passes_through(problem, move, before, after, gap)
+        if through or pulls(problem, state.contact, found.state.contact, move):
+            return replace(found, state=state, outcome=Outcome.PASSED_THROUGH)
+        return found
 
     def increments(
         self,

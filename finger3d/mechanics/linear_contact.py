@@ -23,6 +23,7 @@ from finger3d.contact.state import ContactSolution, ContactState, next_state
 from finger3d.errors import Outcome
 from finger3d.mechanics.contact_geometry import ContactGeometry, contact_geometry
 from finger3d.mechanics.formulation import Workspace, length_scale
+from finger3d.mechanics.passing import moves_too_far, passes_through, pulls
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.state import State
 from finger3d.objects import DistanceTracker, Move, vertical_frame
@@ -38,12 +39,6 @@ _HOLD_FROM, _HOLD_ABOVE = 4, 1e-4
 
 _NEAR = 0.05
 """Distance, over the depth, within which points are evaluated again while an increment is solved."""
-
-_ON_WAY = (0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875)
-"""Shares of an increment at which points are looked for inside the object."""
-
-_LEAVES = 0.5
-"""Least cosine between the normal and the way of a point that leaves the object."""
 
 _MEMORY = 3
 """Earlier displacements from which the next is extrapolated (Anderson 1965)."""
@@ -106,6 +101,9 @@ def solve_increment(
         directions at the displacement found agree with those that the forces were solved with.
     """
     increment = _Increment(problem, state, move, body, workspace.tracker)
+    gap_before = state.contact.gap
+    if moves_too_far(problem, move, gap_before, carried_by_object(problem, move, state.body)):
+        return ContactSolution(state, Outcome.PASSED_THROUGH, np.inf, 0, "none")
     flat = problem.model.object.is_flat
     at = (
         np.zeros_like(body.past)
@@ -138,10 +136,13 @@ def solve_increment(
         at = _extrapolated(tried, found)
         following = after if at is displacement else increment.geometry(at)
         geometry = following.holding(held, geometry)
-    if error > TOLERANCE or (not flat and increment.passes_through(displacement)):
+    if error > TOLERANCE:
         return ContactSolution(state, Outcome.NO_CONVERGENCE, float(error), spent, "none")
     gap = None if flat else increment.geometry(displacement, np.inf).holding(held, geometry).gap
     after_state = increment.reached(geometry, at, displacement, solution.state, gap)
+    through = passes_through(problem, move, state.body, displacement, gap_before)
+    if through or pulls(problem, state.contact, after_state.contact, move):
+        return ContactSolution(state, Outcome.PASSED_THROUGH, float(error), spent, "none")
     return replace(solution.with_state(after_state), residual=max(solution.residual, error), iterations=spent)
 
 
@@ -237,29 +238,6 @@ class _Increment:
         gap = np.where(closed, np.abs(after.gap), np.maximum(-after.gap, 0.0)) / scale
         size = np.linalg.norm(found.force, axis=1)
         return float(max(gap.max(initial=0.0), (turned * size).max(initial=0.0) / (size.max(initial=0.0) or 1.0)))
-
-    def passes_through(self, displacement: Float) -> bool:
-        """Whether a contact point would enter the object and leave it again on the way to a displacement (c, d).
-
-        A point leaves the object roughly along the surface's normal.  One that slides over a round object moves along
-        the chord of an arc, nearly perpendicular to the normal, and does not count.
-        """
-        problem, thing = self.problem, self.problem.model.object
-        before, after = problem.placed(self.move.start), problem.placed(self.move.end)
-        start, end = (
-            placed.to_own(np.pad(problem.surface.points + u, ((0, 0), (0, 3 - u.shape[1]))))
-            for placed, u in ((before, self.state.body), (after, displacement))
-        )
-        way = end - start
-        length = np.linalg.norm(way, axis=1)
-        near = np.flatnonzero(np.maximum(self.state.contact.gap, 0.0) < length)
-        if not len(near):
-            return False
-        enters = np.einsum("ni,ni->n", thing.distance(start[near])[1], way[near]) < 0.0
-        outside, normal = thing.distance(end[near])
-        leaves = np.einsum("ni,ni->n", normal, way[near]) > _LEAVES * length[near]
-        through = near[enters & leaves & (outside > 0.0)]
-        return any((thing.distance(start[through] + share * way[through])[0] < 0.0).any() for share in _ON_WAY)
 
     def reached(
         self, geometry: ContactGeometry, at: Float, displacement: Float, found: ContactState, gap: Float | None

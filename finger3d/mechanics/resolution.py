@@ -43,6 +43,9 @@ _STATIONS = 4
 _NEAREST_POINTS = {2: 4, 3: 16}
 """Contact points compared with a place: with two rings of neighbours, all may lie under the foot of a step."""
 
+_MOST_CHORD = 0.5
+"""Depth, over the object's mean chord, from which contact is looked for at a smaller depth too."""
+
 _COVERED = 0.5
 """Least share of a point's hat function that the object must cover for its overlap to be seen."""
 
@@ -118,13 +121,21 @@ def unresolved_overlap(
     for slide, target in deepest_at.items():
         overlap = _mean_overlap(model, face, touch_mm, target)
         placed = PlacedObject.of(model.object, touch_mm, target)
-        touched = bool(overlap.any()) or (len(beside.nodes) > 0 and bool((rigid_gap(placed, beside) < 0.0).any()))
-        found = replace(found, in_contact=found.in_contact or touched)
         at = np.zeros((0, d)) if landmarks is None else _surface_points(model, _over(placed, landmarks, d), d)
         mirrored = np.where([a in axes for a in "xz"[: d - 1]], np.abs(_horizontal(at)), _horizontal(at))
         near = tree.query(mirrored, k=count)[1]
         places, around = np.vstack([face.samples, at]), np.vstack([nearest, near.reshape(-1, count)])
         vertical = _overlap(model, places, touch_mm, target)
+        if not found.in_contact:
+            under = face.average @ (vertical[: len(face.samples)] > 0.0) > 0.0  # no other can be inside
+            # an object deeper than it is thick has left the finger at rest behind
+            shallow = min(target.depth_mm, _MOST_CHORD * model.object.mean_chord(-placed.turned[1]))
+            touched = any(
+                (rigid_gap(PlacedObject.of(model.object, touch_mm, pose), part) < 0.0).any()
+                for pose in (target, replace(target, depth_mm=shallow))
+                for part in (restrict(face, under), beside)
+            )
+            found = replace(found, in_contact=touched)
         missed = vertical - overlap[around].max(axis=1)
         worst, depth = _worst(model, free, placed, places, vertical, missed, _WARN_ABOVE * deepest)
         if landmarks is None and not any(slide):  # the overlap is largest at first touch, wherever that is
@@ -302,7 +313,8 @@ def resolving_size(model: Model, touch_mm: float, found: UnresolvedOverlap, land
         points = regular_points(model, box, size, at)
         landmarks = _within(landmarks, placed, box, points.points.shape[1])
         there = replace(model, legs=(leg,), mesh=replace(model.mesh, size_mm=size))
-        if unresolved_overlap(there, points, touch_mm, landmarks).share <= _RESOLVED:
+        seen = unresolved_overlap(there, points, touch_mm, landmarks)
+        if seen.in_contact and seen.share <= _RESOLVED:
             return _rounded(min(size, _resolving(model.object)))
     return None
 

@@ -23,6 +23,7 @@ _ZOOMS = 8
 _PLACES = 8  # best places that are searched further: bumps and teeth may be equally high
 _STEEP = math.tan(math.radians(80.0))  # a flank that runs into the finger faster than this is a wall
 _STRIDES = 60
+_TURN = math.radians(5.0)  # between poses at which a turning object is looked at
 _NOTHING = 1e-9  # of the finger's extent: a contact as narrow as this has no area
 
 
@@ -156,6 +157,7 @@ def initial_contact(way: ContactPath) -> InitialContact:
             f"object: no part of it is above the finger (|x| <= {half_length:g}, |z| <= {half_width:g} mm), so that it "
             "never touches; change x_mm, z_mm"
         )
+    _clear_of_base(way, touch)
     if obj.is_flat:  # it has no end that could hang down
         return InitialContact(touch, _box(top, obj, half_length, half_width, touch, place, path), _pair(place))
     deepest = max(pose.depth_mm for pose in path)
@@ -174,6 +176,27 @@ def initial_contact(way: ContactPath) -> InitialContact:
 
 def _pair(place: Float) -> tuple[float, float]:
     return float(place[0]), float(place[1])
+
+
+def _clear_of_base(way: ContactPath, touch: float) -> None:
+    """Raise an error if a plane, or another object that is turned on its path, reaches the finger's base."""
+    across = [-1.0, 1.0] if way.object.is_flat else np.linspace(-1.0, 1.0, _GRID[1])  # of a plane, corners reach most
+    x, z = np.meshgrid(across, across if way.half_width_mm else [0.0], indexing="ij")
+    base = np.stack([way.half_length_mm * x.ravel(), 0.0 * x.ravel(), way.half_width_mm * z.ravel()], axis=1)
+    before = ObjectPose(0.0)
+    for pose in way.poses:
+        count = max(1, math.ceil(float(np.abs(np.subtract(pose.turns, before.turns)).max()) / _TURN))
+        for share in np.arange(1, count + 1) / count:
+            at = Move(before, pose).at(float(share))
+            if not (way.object.is_flat or at.is_turned):
+                continue
+            if (PlacedObject.of(way.object, touch, at).distance(base)[0] < 0.0).any():
+                x, y, z = np.degrees(at.turns)
+                raise Finger3dError(
+                    f"press: turned by {x:.4g}, {y:.4g}, {z:.4g} deg about x, y, z at a depth of {at.depth_mm:.4g} mm, "
+                    "the object reaches the finger's base, which is held; turn it less, or press less deep"
+                )
+        before = pose
 
 
 def _stays_on_finger(way: ContactPath, touch: float) -> None:

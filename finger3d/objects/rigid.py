@@ -96,6 +96,13 @@ class RigidObject(ABC):
         """Return a bound (n,) mm of the signed distance of points (n, 3), of its sign and at most its magnitude."""
         return self.distance(points)[0]
 
+    def mean_chord(self, direction: Float) -> float:
+        """Return the mean length (mm) of the body's chords along a unit vector (3,): volume over projected area.
+
+        It is infinite for a body that is not closed.
+        """
+        return math.inf
+
     @abstractmethod
     def profile(self, x: Float, z: Float) -> Float:
         """Return the height (n,) mm of the lower side at x, z (n,) mm, in own coordinates; nan beside it."""
@@ -149,6 +156,11 @@ class RigidObject(ABC):
     def detail(self) -> Detail | None:
         """The shortest length of the surface, or None."""
         return None
+
+    @property
+    def held_height_mm(self) -> float:
+        """Height (mm) of `held_body`, whose highest plane is held: the radius of a half ball or cylinder."""
+        return math.inf if self.is_face or self.detail is None else self.detail.length_mm
 
     @abstractmethod
     def drawing(self, reach_mm: float) -> Triangles:

@@ -72,6 +72,11 @@ class Cylinder(Prism):
         """Return the distance to a circle."""
         return _circle_distance(r, y, self.radius_mm)
 
+    def mean_chord(self, direction: Float) -> float:
+        """Return the mean chord of a circle, lengthened by the angle to the axis."""
+        across = math.sqrt(max(1.0 - float(direction @ self.direction) ** 2, 0.0))
+        return 0.5 * math.pi * self.radius_mm / across if across > 0.0 else math.inf
+
     def section_profile(self, r: Float) -> Float:
         """Return the height of the lower half of the circle."""
         return _arc(r, self.radius_mm)
@@ -127,6 +132,10 @@ class Sphere(RigidObject):
         value, by_r, by_y = _circle_distance(r, points[:, 1], self.radius_mm)
         radial = points[:, ::2] * (by_r / np.where(r > 0.0, r, 1.0))[:, None]
         return value, np.stack([radial[:, 0], by_y, radial[:, 1]], axis=1)
+
+    def mean_chord(self, direction: Float) -> float:
+        """Return the mean chord of a sphere."""
+        return 4.0 / 3.0 * self.radius_mm
 
     def profile(self, x: Float, z: Float) -> Float:
         """Return the height of the lower half."""

@@ -59,6 +59,11 @@ class MeshObject(RigidObject):
             return np.zeros(0), np.zeros((0, 3))
         return self.triangles.signed_distance(points)
 
+    def mean_chord(self, direction: Float) -> float:
+        """Return the volume over the area projected along a direction, overlapping parts counted separately."""
+        projected = 0.5 * float(np.abs(self.surface.area_vectors @ direction).sum())
+        return abs(self.surface.volume) / projected
+
     def profile(self, x: Float, z: Float) -> Float:
         """Return where a vertical line from below first meets the body, exact on its triangles; nan beside it."""
         x, z = (np.ascontiguousarray(v, dtype=float) for v in np.broadcast_arrays(x, z))
@@ -91,6 +96,11 @@ class MeshObject(RigidObject):
     def probe_reach(self) -> float:
         """The size of the body."""
         return self.surface.size
+
+    @property
+    def held_height_mm(self) -> float:
+        """Height (mm) of the body."""
+        return float(self.surface.high[1] - self.surface.low[1])
 
     def held_body(self, finger: Design, solid: bool) -> HeldBody:
         """Return the whole body, held on its highest plane; a STEP file is read with its CAD faces."""
