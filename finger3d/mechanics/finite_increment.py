@@ -14,8 +14,8 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.errors import Outcome
-from finger3d.fem.hyperelastic import InvertedError
 from finger3d.fem.recover import displacement
+from finger3d.fem.tensors import InvertedError
 from finger3d.mechanics.failure import cause_of_failure
 from finger3d.mechanics.finite_equations import Configuration, IncrementEquations, converged
 from finger3d.mechanics.finite_state import Linearisation
