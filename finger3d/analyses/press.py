@@ -211,13 +211,14 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fie
     from finger3d.mechanics import resolution
     from finger3d.mechanics.cavity import cavity_warnings
     from finger3d.mechanics.coverage import penetration_warnings
+    from finger3d.mechanics.failure import fold_warnings
 
     begin = time.perf_counter()
     report.stage("writing fields")
     fields, good, problem = None, record.converged_steps, record.problem
     if good:
         u, strain, stress = problem.model.formulation.fields(problem, good[-1].meshed_state)
-        record.warnings += penetration_warnings(problem, record.surface_checks)
+        record.warnings += penetration_warnings(problem, record.surface_checks) + fold_warnings(problem, good)
         record.largest_strain = largest_principal_strain(strain)
         _advise(record)
         fields = Fields.of(record, u, strain, stress)

@@ -96,7 +96,7 @@ class FiniteBody:
         if law.is_stable:
             return ""
         f = self.solid.deformation(x, self.relaxing)
-        stretches = np.linalg.svd(f, compute_uv=False)[:, ::-1]
+        stretches = np.asarray(np.linalg.svd(f, compute_uv=False)[:, ::-1], dtype=np.float64)
         stiffness = least_stiffness(law, stretches)
         if (stiffness > 0.0).all():
             return ""

@@ -26,7 +26,6 @@ from finger3d.errors import Outcome
 from finger3d.fem.assembly import on_places
 from finger3d.fem.condense import condense
 from finger3d.fem.finite_contact import DeformedContact
-from finger3d.fem.quality import inverted_place
 from finger3d.fem.recover import displacement
 from finger3d.fem.tensors import InvertedError
 from finger3d.mechanics.finite_body import FiniteBody
@@ -90,14 +89,9 @@ class IncrementEquations:
     workspace: FiniteStrainWorkspace
 
     def finished(self, now: Configuration, solution: ContactSolution, error: float, spent: int) -> ContactSolution:
-        """Return the solution with the state at the end, unless a cell is inverted or the material law unstable."""
+        """Return the solution with the state at the end, unless the material law is unstable there."""
         if self.body.instability(now.x):
             return self.failed(now, Outcome.UNSTABLE, error, spent)
-        mesh = self.problem.mesh
-        folded = inverted_place(mesh, displacement(mesh, now.x))
-        if folded is not None:
-            at = ", ".join(f"{axis} = {x:.3g}" for axis, x in zip("xyz", folded, strict=False))
-            return self.failed(now, Outcome.INVERTED, error, spent, f"the cell at {at} mm")
         state, error = self._state(now, solution.state), max(solution.residual, error)
         return replace(solution, state=state, residual=error, iterations=spent)
 

@@ -65,7 +65,6 @@ class FiniteIncrement(IncrementEquations):
         """
         first = now, force = self.initial(guess)
         linearisation, factors, spent, error = self.last_linearisation(), 0, 0, math.inf
-        outcome = Outcome.NEWTON
         for _ in range(_ITERATIONS):
             if linearisation is None:
                 if factors == _FACTORS:
@@ -75,7 +74,6 @@ class FiniteIncrement(IncrementEquations):
             spent += solution.iterations
             if after is None:
                 if factors:
-                    outcome = Outcome.INVERTED if solution.outcome.ok else solution.outcome
                     break
                 linearisation, (now, force), error = None, first, math.inf
                 continue
@@ -89,7 +87,7 @@ class FiniteIncrement(IncrementEquations):
                 linearisation = None
                 if not factors and error > _ASTRAY:
                     (now, force), error = first, math.inf
-        return self.failed(now, outcome, error, spent)
+        return self.failed(now, Outcome.NEWTON, error, spent)
 
     def _iterate_damped(self) -> ContactSolution:
         """Iterate from the first state with a multiple of the linear stiffness added to the tangent.
