@@ -64,10 +64,6 @@ class Outcome(Enum):
         "Eqs. (1)-(4) hold, but friction helps slip at some points, which the paper's rule does not exclude; "
         "use [contact] rule = 'projection'"
     )
-    INVERTED = (
-        "a cell was turned inside out; the steps before are good; try more steps or a shallower press, and a fillet or "
-        "a coarser mesh where a sharp edge of the finger folds over"
-    )
     UNSTABLE = (
         "the material law is not stable at the strains reached, its stress falls; change its constants in "
         "[effects.large_deformation], or press less"

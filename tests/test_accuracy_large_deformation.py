@@ -12,10 +12,14 @@ from finger3d.accuracy import large_deformation as module
 from finger3d.accuracy.changes import budget_s, changing_numbers
 from finger3d.accuracy.large_deformation import large_deformation
 from finger3d.accuracy.more_increments import more_increments
+from finger3d.contact.friction import Coulomb
 from finger3d.effects.kinetic_friction import Effect as KineticFriction
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.model import MeshOptions, Model
+from finger3d.fem.material import Isotropic
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
+from finger3d.objects import Sphere
 from tests.models import ended, fig9, half_cylinder, run
 
 COARSE = 0.3
@@ -31,6 +35,26 @@ def test_the_change_by_large_deformation_is_that_of_the_press_at_large_deformati
         true = truth[name] - change.value
         assert 1.0 / 1.5 <= true / change.change <= 1.5  # what is claimed, validation/advice_against_truth.py
     assert estimate.method
+
+
+def test_the_interval_of_a_number_that_no_coarse_mesh_resolves_holds() -> None:
+    """The gauge is an edge length below a ball: its changes on both coarse meshes agree by chance, 3.3 times too large.
+
+    The truth is the same press at large deformation.
+    """
+    block = designs()["block"](half_length_mm=8.0, height_mm=8.0, width_mm=11.2)
+    model = Model(
+        block, Isotropic(1.0, 0.358), MeshOptions(1.05, 4.2, "swept"), (Leg(0.727, steps=10),),
+        object=Sphere(radius_mm=10.0), friction=Coulomb(0.106), gauges=(Gauge("b", 0.0, 7.0),),
+    )  # fmt: skip
+    problem, step = ended(model)
+    estimate = large_deformation(problem, step, 10)
+    truth = changing_numbers(*ended(LargeDeformation().apply(model)))
+    gauge = estimate.changes["gauge_b"]
+    assert gauge.low <= truth["gauge_b"] - gauge.value <= gauge.high
+    assert not gauge.significant
+    force = estimate.changes["normal_force_N"]
+    assert force.low <= truth["normal_force_N"] - force.value <= force.high
 
 
 def test_no_change_is_told_where_none_can_be_estimated(monkeypatch: pytest.MonkeyPatch) -> None:

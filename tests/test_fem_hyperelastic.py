@@ -9,10 +9,11 @@ import pytest
 from scipy.sparse.linalg import splu
 
 from finger3d.fem.assembly import Pattern, stiffness
-from finger3d.fem.hyperelastic import Hyperelastic, InvertedError, Relaxing, TotalLagrangian
-from finger3d.fem.laws import IsochoricLaw, MooneyRivlin, NeoHooke
+from finger3d.fem.hyperelastic import Hyperelastic, Relaxing, TotalLagrangian
+from finger3d.fem.laws import IsochoricLaw, MooneyRivlin, NeoHooke, Ogden
 from finger3d.fem.material import Elasticity
 from finger3d.fem.simplex import Mesh, quadratic
+from finger3d.fem.tensors import InvertedError, determinant
 from tests.meshes import edge_load, full, grid, mapped
 
 LAW = MooneyRivlin(0.4, 0.3)
@@ -137,6 +138,20 @@ def test_inverted_cells_are_an_error() -> None:
     mesh = quadratic(grid((1, 1, 1)))
     with pytest.raises(InvertedError):
         body(mesh, 0.3).internal_forces(-2.0 * mesh.points.ravel())
+
+
+@pytest.mark.parametrize("terms", [((0.5, 2.0), (0.5, -2.0)), ((1.0, 8.0),), ((1.0, 1.3),)])
+@pytest.mark.parametrize("nu", [0.3, 0.49])
+def test_plane_stress_has_a_thickness_at_any_stretch(nu: float, terms: tuple[tuple[float, float], ...]) -> None:
+    """Out of the plane the Kirchhoff stress is that of the law and K (J - 1) J: their sum vanishes."""
+    law = Ogden(0.4, terms)
+    material = Hyperelastic.of(law, nu, plane_stress=True)
+    one, two = (a.ravel() for a in np.meshgrid(*2 * (np.geomspace(0.05, 10.0, 9),)))
+    f = material.deformation(np.stack([one - 1.0, 0 * one, 0 * one, two - 1.0], axis=1).reshape(-1, 2, 2))
+    j = determinant(f)
+    kirchhoff = law.stress(f) @ np.swapaxes(f, 1, 2)
+    out_of_plane = kirchhoff[:, 2, 2] + material.bulk * (j - 1.0) * j
+    assert np.abs(out_of_plane / (np.abs(kirchhoff).max(axis=(1, 2)) + material.bulk * j)).max() < 1e-10
 
 
 def test_thick_sphere_under_pressure() -> None:

@@ -12,6 +12,7 @@ from finger3d.fem.laws import IsochoricLaw, MooneyRivlin, NeoHooke, Ogden, Yeoh
 from finger3d.fem.laws.base import Derivatives
 from finger3d.fem.laws.invariants import InvariantLaw
 from finger3d.fem.laws.stability import least_stiffness, unstable_from
+from finger3d.fem.tensors import InvertedError
 
 G = 0.7
 LAWS: dict[str, IsochoricLaw] = {
@@ -132,6 +133,32 @@ def test_special_cases_of_ogdens_law() -> None:
             assert np.abs(a - b).max() < 1e-13
     with pytest.raises(Finger3dError, match="terms: .* 0.9"):
         Ogden(G, ((0.9, 2.0),))
+
+
+@pytest.mark.parametrize("alpha", [1e-3, 1e-9, -1e-9])
+def test_ogdens_law_with_a_vanishing_exponent_is_that_of_hencky(alpha: float) -> None:
+    """mu (l^alpha - 1) -> 2 G ln l, whatever mu = 2 G / alpha is; corrections are of the order of alpha."""
+    stretches = np.array([1.5, 0.8, 1.0 / 1.2])
+    left, _, right = np.linalg.svd(gradients()[3])
+    f = left @ (stretches[:, None] * right)
+    law, logs = Ogden(G, ((1.0, alpha),)), np.log(stretches)
+    wanted = left @ ((2.0 * G * logs / stretches)[:, None] * right)
+    assert np.abs(law.stress(f) - wanted).max() < max(abs(alpha), 1e-14)
+    assert float(law.energy(f)) == pytest.approx(G * (logs**2).sum(), rel=max(abs(alpha), 1e-14))
+    stress, tangent = law.stress_and_tangent(f)
+    step = 1e-6 * np.random.default_rng(2).normal(size=(3, 3))
+    slope = (law.stress(f + step) - law.stress(f - step)) / 2.0
+    assert np.abs(np.einsum("ijkl,kl->ij", tangent, step) - slope).max() < 1e-14
+    assert np.abs(stress - law.stress(f)).max() < 1e-15
+
+
+def test_a_stretch_lost_in_round_off_is_told() -> None:
+    law = LAWS["Ogden"]
+    law.stress_and_tangent(np.diag([1e-6, 1.0, 1.0]))
+    skew = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
+    for f in (np.full((3, 3), np.nan), skew @ np.diag([1e-30, 1.0, 1e10]) @ skew.T):
+        with pytest.raises(InvertedError):
+            law.stress_and_tangent(f)
 
 
 def test_principal_stress_is_that_of_the_tensor(law: IsochoricLaw) -> None:

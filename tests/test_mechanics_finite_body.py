@@ -9,6 +9,7 @@ import scipy.sparse as sp
 from finger3d.effects.embedded_gauge import Effect as Foil
 from finger3d.fem.hyperelastic import Hyperelastic
 from finger3d.fem.laws import NeoHooke, Yeoh
+from finger3d.fem.material import Isotropic
 from finger3d.mechanics.build import build
 from finger3d.mechanics.finite_body import FiniteBody
 from finger3d.mechanics.model import Gauge, MeshOptions
@@ -41,3 +42,14 @@ def test_an_unstable_law_names_the_stretches_that_are_reached() -> None:
     assert body.instability(np.zeros(len(stretched))) == ""
     assert "1.8" in body.instability(stretched)
     assert FiniteBody.of(problem, Hyperelastic.of(NeoHooke(0.4), 0.3, False)).instability(stretched) == ""
+
+
+def test_an_unstable_law_of_several_materials_names_the_limits_of_each() -> None:
+    """The shear modulus scales all stresses of a law, so that the strains at which it is unstable are the same."""
+    problem, law = build(block(mesh=COARSE)), Yeoh(0.4, -0.5, 0.0)
+    alone = FiniteBody.of(problem, Hyperelastic.of(law, 0.3, False))
+    part = np.arange(alone.points) % 2
+    both = FiniteBody.of(problem, Hyperelastic.of_parts(law, (Isotropic(1.0, 0.3), Isotropic(5.0, 0.3)), part))
+    stretched = (problem.mesh.points * np.array([0.8, -0.5, 0.0])).ravel()
+    assert both.instability(np.zeros(len(stretched))) == ""
+    assert both.instability(stretched) == alone.instability(stretched) != ""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from finger3d.effects.large_deformation import Effect as LargeDeformation
-from finger3d.fem.hyperelastic import InvertedError
+from finger3d.fem.tensors import InvertedError
 from finger3d.mechanics.build import build
 from finger3d.mechanics.finite_increment import FiniteIncrement
 from finger3d.mechanics.finite_state import DeformedBody

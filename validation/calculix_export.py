@@ -104,12 +104,12 @@ CASES = (
     Case(
         "plane strain, cylinder, Yeoh",
         (*SECTION, CYLINDER, PRESS, 'effects.large_deformation={law="yeoh",c2_over_c1=0.2,c3_over_c1=0.1}'),
-        13.2097,
+        13.151518,
     ),
     Case(
         "plane strain, cylinder, Ogden",
         (*SECTION, CYLINDER, PRESS, 'effects.large_deformation={law="ogden",terms=[[0.7,2.0],[0.3,-3.0]]}'),
-        13.163838,
+        13.111784,
     ),
     Case("solid, cylinder", (CYLINDER, PRESS), 8.812384),
     Case(

@@ -23,7 +23,8 @@ import trimesh
 from finger3d._types import Float
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect
-from finger3d.errors import Finger3dError, Outcome
+from finger3d.errors import Finger3dError
+from finger3d.fem.elements import quadrature
 from finger3d.fem.material import Isotropic
 from finger3d.fem.recover import displacement
 from finger3d.geometry.design import Design
@@ -61,13 +62,13 @@ class Found:
     Attributes
     ----------
     settled : whether all increments converged
-    folds : whether it ended at a sharp edge of the finger, with a cell turned inside out or nearly so
+    folds : whether it ended at a sharp edge of the finger, with a cell compressed there or folded over
     says : outcome of the increment that failed
     increments, factorizations, iterations : in all
     penetration : deepest place of the surface inside the object, over the depth
     at_sharp_edge : whether it is beside a sharp edge of the finger, or under an object that has edges
     outside : whether no point of the surface is inside the object but those in contact
-    least_volume : smallest ratio of deformed to initial volume at the nodes of all cells, over all increments
+    least_volume : smallest ratio of deformed to initial volume at the quadrature points, over all increments
     """
 
     settled: bool
@@ -201,7 +202,7 @@ def _found(problem: Problem, steps: list[StepResult], checks: list[SurfaceCheck]
     deepest = max(checks, key=lambda check: check.penetration_mm, default=None)
     return Found(
         settled=last.outcome.ok,
-        folds=last.outcome is Outcome.INVERTED or "sharp edge of the finger" in last.detail,
+        folds="sharp edge of the finger" in last.detail,
         says=f"{last.outcome} ({last.detail})" if last.detail else str(last.outcome),
         increments=sum(int(leg.steps) for leg in model.legs),
         factorizations=factorizations,
@@ -214,10 +215,10 @@ def _found(problem: Problem, steps: list[StepResult], checks: list[SurfaceCheck]
 
 
 def _least_volume(problem: Problem, step: StepResult) -> float:
-    """Smallest determinant of the deformation gradient at the nodes of all cells, in the plane of a section."""
+    """Smallest determinant of the deformation gradient at the quadrature points, in the plane of a section."""
     mesh = problem.mesh
-    u: Float = displacement(mesh, formulation_of(problem.model).unknowns(problem, step.meshed_state))
-    gradients, _ = mesh.element.physical_gradients(mesh.points[mesh.cells], mesh.element.nodes)
+    u: Float = displacement(mesh, next(formulation_of(problem.model).unknowns(problem, [step.meshed_state])))
+    gradients, _ = mesh.element.physical_gradients(mesh.points[mesh.cells], quadrature(mesh.dim, 2)[0])
     slope = np.einsum("eki,eqkj->eqij", u[mesh.cells], gradients, optimize=True)
     return float(np.linalg.det(slope + np.eye(mesh.dim)).min())
 
@@ -283,8 +284,8 @@ def _settling(found: Sequence[Found]) -> list[Row]:
             float(sum(not f.folds for f in unsettled)), 0.0, "none", "statement", "at most"),
         _bound(f"{here}: scenes with a point inside the object that is not in contact", 0,
                sum(not f.outside for f in found), "none"),
-        Row(f"{here}: smallest ratio of volumes at any node", ROBUST, 0.0, min(f.least_volume for f in found), 0.0,
-            "no cell inverted", measure="at least"),
+        Row(f"{here}: smallest ratio of volumes at any quadrature point", ROBUST, 0.0,
+            min(f.least_volume for f in found), 0.0, "no cell inverted", measure="at least"),
         _bound(f"{here}: factorisations of an increment", 3.0, sum(f.factorizations for f in found) / increments, GOAL,
                GOAL),
     ]  # fmt: skip

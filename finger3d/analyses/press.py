@@ -212,6 +212,7 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fie
     from finger3d.mechanics import resolution
     from finger3d.mechanics.cavity import cavity_warnings
     from finger3d.mechanics.coverage import penetration_warnings
+    from finger3d.mechanics.failure import fold_warnings
 
     begin = time.perf_counter()
     report.stage("writing fields")
@@ -220,7 +221,7 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fie
         record.warnings += depth_warning(problem, good)
     if good:
         u, strain, stress = formulation_of(problem.model).fields(problem, good[-1].meshed_state)
-        record.warnings += penetration_warnings(problem, record.surface_checks)
+        record.warnings += penetration_warnings(problem, record.surface_checks) + fold_warnings(problem, good)
         record.largest_strain = largest_principal_strain(strain)
         _advise(record)
         fields = Fields.of(record, u, strain, stress)

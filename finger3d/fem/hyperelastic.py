@@ -26,13 +26,10 @@ from finger3d.fem.locate import cells_at
 from finger3d.fem.material import LEAST_COMPRESSIBILITY, MIXED_FROM, Isotropic
 from finger3d.fem.recover import averaged, displacement, nodal_gradient, nodal_pressure
 from finger3d.fem.simplex import Mesh, MeshPart
-from finger3d.fem.tensors import cofactor, determinant
+from finger3d.fem.tensors import InvertedError, cofactor, determinant
 
-_THICKNESS_ITERATIONS = 30
-
-
-class InvertedError(ArithmeticError):
-    """A cell was inverted: the increment is too large for the mesh."""
+_THICKNESS_ITERATIONS, _THICKNESS_ERROR = 60, 1e-9
+"""Iterations for the stretch of the thickness at most, and largest relative change of it in the last."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +104,7 @@ class Hyperelastic:
         Raises
         ------
         InvertedError
-            If a determinant is not positive.
+            If a determinant is not positive, or in plane stress no thickness is free of stress.
         """
         d = slope.shape[-1]
         f = np.zeros((*slope.shape[:-2], 3, 3))
@@ -121,21 +118,29 @@ class Hyperelastic:
         """F (..., 3, 3) with F_33 such that P_33 = 0 (plane stress), by Newton from the isochoric value.
 
         Solves ``area F_33 - 1 = - P_33 / (K area)`` with P_33 of all but the volumetric part; the area is the
-        determinant in the plane.  Well conditioned for any K.
+        determinant in the plane.  Well conditioned for any K.  Steps out of the interval that holds the root halve it.
         """
         f = f.copy()
         a_iso, a_vol, past = _factors(relaxing)
         area = f[..., 0, 0] * f[..., 1, 1] - f[..., 0, 1] * f[..., 1, 0]
         f[..., 2, 2] = 1.0 / area
+        low, high = np.zeros_like(area), np.full_like(area, np.inf)
         for _ in range(_THICKNESS_ITERATIONS):
             stress, tangent = self.law.stress_and_tangent(f)
             stretch, scale = f[..., 2, 2], 1.0 / (a_vol * self.bulk * area)
             excess = a_iso * stress[..., 2, 2] - stretch * past[..., 2, 2]
             slope = area + scale * (a_iso * tangent[..., 2, 2, 2, 2] - past[..., 2, 2])
-            step = (1.0 - area * stretch - scale * excess) / slope
-            f[..., 2, 2] = stretch + np.maximum(step, -0.5 * stretch)
+            short = 1.0 - area * stretch - scale * excess
+            low, high = np.where(short > 0.0, stretch, low), np.where(short < 0.0, stretch, high)
+            step = short / slope
+            outside = (stretch + step <= low) | (stretch + step >= high) | (slope <= 0.0)
+            halved = np.where(np.isinf(high), 2.0 * stretch, 0.5 * (low + high)) - stretch
+            step = np.where(outside & (short != 0.0), halved, step)
+            f[..., 2, 2] = stretch + step
             if np.abs(step).max(initial=0.0) < 1e-14:
                 break
+        if not (np.abs(step) < _THICKNESS_ERROR * f[..., 2, 2]).all():
+            raise InvertedError
         return f
 
     def _spherical(self, f: Float, cof: Float, isochoric: Float, p: Float | None, relaxing: Relaxing | None) -> Float:
@@ -348,7 +353,8 @@ def stretch(mesh: Mesh, u: Float, point: Float, direction: Float) -> float:
 def nodal_fields(body: TotalLagrangian, x: Float) -> tuple[Float, Float, Float]:
     """Return deformation gradient, Green-Lagrange strain and elastic Cauchy stress (n, 3, 3) at the nodes.
 
-    They follow from the volume-weighted mean of the displacement gradient at every node.
+    They follow from the volume-weighted mean of the displacement gradient at every node.  At a node where it is folded
+    over they are those of a quadrature point beside it.
     """
     points, u = len(quadrature(body.mesh.dim, 2)[0]), displacement(body.mesh, x)
     vertex_pressure = body.pressure_scale * x[body.mesh.points.size :]
@@ -356,9 +362,24 @@ def nodal_fields(body: TotalLagrangian, x: Float) -> tuple[Float, Float, Float]:
     def of_part(part: MeshPart) -> tuple[Float, Float]:
         first = part.cells[0] * points  # one point stands for all of a part
         material = body.material.of_points(slice(first, first + 1))
-        f = material.deformation(nodal_gradient(part.mesh, u[part.nodes]))
+        f = material.deformation(_sound_gradient(part.mesh, u[part.nodes]))
         p = nodal_pressure(part.mesh, vertex_pressure[part.corners]) if material.mixed else None
         return f, material.stress(f, p) @ np.swapaxes(f, 1, 2) / determinant(f)[:, None, None]
 
     f, cauchy = averaged(body.mesh, of_part)
     return f, 0.5 * (np.swapaxes(f, 1, 2) @ f - np.eye(3)), cauchy
+
+
+def _sound_gradient(mesh: Mesh, u: Float) -> Float:
+    """Displacement gradient (n, d, d) at the nodes, where it is folded over that of a quadrature point beside it."""
+    slope = nodal_gradient(mesh, u)
+    folded = np.linalg.det(slope + np.eye(mesh.dim)) <= 0.0
+    if folded.any():
+        bary, _ = quadrature(mesh.dim, 2)
+        nearest = (mesh.element.nodes @ bary.T).argmax(axis=1)
+        cells, local = np.nonzero(folded[mesh.cells])
+        for q in np.unique(nearest[local]):
+            one, nodes = cells[nearest[local] == q], local[nearest[local] == q]
+            gradients, _ = mesh.element.physical_gradients(mesh.points[mesh.cells[one]], bary[q : q + 1])
+            slope[mesh.cells[one, nodes]] = np.einsum("eki,ekj->eij", u[mesh.cells[one]], gradients[:, 0])
+    return slope

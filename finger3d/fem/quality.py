@@ -41,18 +41,6 @@ def curved_jacobians(mesh: Mesh) -> Float:
     )
 
 
-def inverted_place(mesh: Mesh, u: Float) -> Float | None:
-    """Return the middle (d,) mm, at rest, of the most inverted cell under displacements u (n, d) mm, None if none is.
-
-    A cell counts as inverted if the Jacobian determinant at any of its nodes or at its centre is not positive.
-    """
-    determinants = curved_jacobians(replace(mesh, points=mesh.points + u))
-    worst = int(determinants.argmin())
-    if determinants[worst] > 0.0:
-        return None
-    return np.asarray(mesh.points[mesh.cells[worst, : mesh.dim + 1]].mean(axis=0))
-
-
 def most_distorted(mesh: Mesh, u: Float) -> tuple[int, float]:
     """Return the cell that displacements u (n, d) mm compress most, and its ratio of volumes after and before.
 

@@ -7,6 +7,10 @@ import numpy as np
 from finger3d._types import Float
 
 
+class InvertedError(ArithmeticError):
+    """A cell is inverted, or deformed beyond what a law can be evaluated at: the increment is too large."""
+
+
 def determinant(f: Float) -> Float:
     """Return the determinants (...,) of tensors (..., 3, 3)."""
     return np.asarray(

@@ -11,6 +11,7 @@ from finger3d._types import Float
 from finger3d.fem.assembly import Pattern, Stiffness
 from finger3d.fem.bars import BarRelaxation, Bars
 from finger3d.fem.hyperelastic import Hyperelastic, Relaxing, TotalLagrangian
+from finger3d.fem.laws.inhomogeneous import Inhomogeneous
 from finger3d.fem.laws.stability import least_stiffness, unstable_from
 from finger3d.fem.recover import displacement
 from finger3d.mechanics.problem import Problem
@@ -90,10 +91,12 @@ class FiniteBody:
     def instability(self, x: Float) -> str:
         """Return where the material law is unstable, in words; empty if it is stable."""
         law = self.solid.material.law
+        if isinstance(law, Inhomogeneous):
+            law = law.law  # the strains at which a law is unstable do not depend on its shear modulus
         if law.is_stable:
             return ""
         f = self.solid.deformation(x, self.relaxing)
-        stretches = np.sqrt(np.linalg.eigvalsh(np.swapaxes(f, 1, 2) @ f))
+        stretches = np.asarray(np.linalg.svd(f, compute_uv=False)[:, ::-1], dtype=np.float64)
         stiffness = least_stiffness(law, stretches)
         if (stiffness > 0.0).all():
             return ""

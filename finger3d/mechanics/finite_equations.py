@@ -27,9 +27,8 @@ from finger3d.errors import Outcome
 from finger3d.fem.assembly import on_places
 from finger3d.fem.condense import condense
 from finger3d.fem.finite_contact import DeformedContact
-from finger3d.fem.hyperelastic import InvertedError
-from finger3d.fem.quality import inverted_place
 from finger3d.fem.recover import displacement
+from finger3d.fem.tensors import InvertedError
 from finger3d.mechanics.finite_body import FiniteBody
 from finger3d.mechanics.finite_state import (
     DeformedBody,
@@ -92,14 +91,9 @@ class IncrementEquations:
     def finished(
         self, now: Configuration, solution: ContactSolution[ContactState], error: float, spent: int
     ) -> ContactSolution[State[DeformedBody]]:
-        """Return the solution with the state at the end, unless a cell is inverted or the material law unstable."""
+        """Return the solution with the state at the end, unless the material law is unstable there."""
         if self.body.instability(now.x):
             return self.failed(now, Outcome.UNSTABLE, error, spent)
-        mesh = self.problem.mesh
-        folded = inverted_place(mesh, displacement(mesh, now.x))
-        if folded is not None:
-            at = ", ".join(f"{axis} = {x:.3g}" for axis, x in zip("xyz", folded, strict=False))
-            return self.failed(now, Outcome.INVERTED, error, spent, f"the cell at {at} mm")
         state, error = self._state(now, solution.state), max(solution.residual, error)
         return replace(solution.with_state(state), residual=error, iterations=spent)
 

@@ -14,8 +14,8 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.errors import Outcome
-from finger3d.fem.hyperelastic import InvertedError
 from finger3d.fem.recover import displacement
+from finger3d.fem.tensors import InvertedError
 from finger3d.mechanics.failure import cause_of_failure
 from finger3d.mechanics.finite_equations import Configuration, IncrementEquations, converged
 from finger3d.mechanics.finite_state import DeformedBody, Linearisation
@@ -66,7 +66,6 @@ class FiniteIncrement(IncrementEquations):
         """
         first = now, force = self.initial(guess)
         linearisation, factors, spent, error = self.last_linearisation(), 0, 0, math.inf
-        outcome = Outcome.NEWTON
         for _ in range(_ITERATIONS):
             if linearisation is None:
                 if factors == _FACTORS:
@@ -76,7 +75,6 @@ class FiniteIncrement(IncrementEquations):
             spent += solution.iterations
             if after is None:
                 if factors:
-                    outcome = Outcome.INVERTED if solution.outcome.ok else solution.outcome
                     break
                 linearisation, (now, force), error = None, first, math.inf
                 continue
@@ -90,7 +88,7 @@ class FiniteIncrement(IncrementEquations):
                 linearisation = None
                 if not factors and error > _ASTRAY:
                     (now, force), error = first, math.inf
-        return self.failed(now, outcome, error, spent)
+        return self.failed(now, Outcome.NEWTON, error, spent)
 
     def _iterate_damped(self) -> ContactSolution[State[DeformedBody]]:
         """Iterate from the first state with a multiple of the linear stiffness added to the tangent.

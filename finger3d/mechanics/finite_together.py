@@ -19,7 +19,7 @@ from finger3d._machine import cores
 from finger3d._types import Float
 from finger3d.contact.acceleration import one_thread
 from finger3d.contact.state import ContactSolution, ContactState
-from finger3d.fem.hyperelastic import InvertedError
+from finger3d.fem.tensors import InvertedError
 from finger3d.mechanics.finite_equations import Configuration, IncrementEquations, converged
 from finger3d.mechanics.finite_state import DeformedBody, Linearisation
 from finger3d.mechanics.state import State

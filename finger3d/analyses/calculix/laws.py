@@ -13,6 +13,10 @@ from finger3d.fem.material import Isotropic, Material
 MOST_TERMS = 3
 """Largest number of terms of Ogden's law in CalculiX."""
 
+_NO_TERM = 1e12
+"""Compressibility D_k, over D_1, of a volumetric term (J - 1)^2k / D_k that is left out: CalculiX takes 0 for a value
+that is not given, and puts in one of its own."""
+
 _ONE_CARD = 8  # constants on a line of a deck
 
 
@@ -51,11 +55,11 @@ def _hyperelastic(law: IsochoricLaw, d1: float) -> tuple[str, ...]:
             return _cards("MOONEY-RIVLIN", [half * (1.0 - law.c01_share), half * law.c01_share, d1])
         case Yeoh():
             c1 = 0.5 * law.shear
-            return _cards("YEOH", [c1, c1 * law.c2_over_c1, c1 * law.c3_over_c1, d1, 0.0, 0.0])
+            return _cards("YEOH", [c1, c1 * law.c2_over_c1, c1 * law.c3_over_c1, d1, *2 * [_NO_TERM * d1]])
         case Ogden() if len(law.terms) <= MOST_TERMS:
             # CalculiX sums 2 mu / alpha^2 (l1^alpha + ...); this project mu / alpha (...) with mu = 2 share G / alpha
             terms = [number for share, alpha in law.terms for number in (share * law.shear, alpha)]
-            return _cards(f"OGDEN, N={len(law.terms)}", [*terms, d1, *[0.0] * (len(law.terms) - 1)])
+            return _cards(f"OGDEN, N={len(law.terms)}", [*terms, d1, *(len(law.terms) - 1) * [_NO_TERM * d1]])
         case Ogden():
             raise Finger3dError(
                 f"--solver calculix: effects.large_deformation.terms: CalculiX has Ogden's law with up to {MOST_TERMS} "

@@ -14,7 +14,7 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
-from finger3d.fem.tensors import determinant
+from finger3d.fem.tensors import InvertedError, determinant
 
 
 @dataclass(frozen=True)
@@ -55,19 +55,24 @@ class Ogden:
 
     def energy(self, f: Float) -> Float:
         """Return the energy (...,)."""
-        square = np.linalg.eigvalsh(np.swapaxes(f, -1, -2) @ f) * determinant(f)[..., None] ** (-2.0 / 3.0)
-        return np.asarray(sum(mu / a * ((square ** (0.5 * a)).sum(axis=-1) - 3.0) for mu, a in self._constants()))
+        square, _ = _principal(f)
+        logs = 0.5 * np.log(square / np.cbrt(determinant(f))[..., None] ** 2)
+        logs -= logs.mean(axis=-1, keepdims=True)  # their sum is 0, up to round-off that 1 / a multiplies
+        return np.asarray(sum(mu * (a * logs**2 * _second_order(a * logs)).sum(axis=-1) for mu, a in self._constants()))
 
     def principal_stress(self, stretches: Float) -> tuple[Float, Float]:
-        """Return the sum of mu l^alpha, and that of mu alpha l^alpha on the diagonal."""
-        powers = [(mu, a, stretches**a) for mu, a in self._constants()]
-        stress = np.asarray(sum(mu * power for mu, _, power in powers))
-        slope = np.asarray(sum(mu * a * power for mu, a, power in powers))
+        """Return the sum of mu (l^alpha - 1), and that of mu alpha l^alpha on the diagonal.
+
+        The power less 1 is a pressure that keeps the digits which a large mu = 2 share G / alpha would lose.
+        """
+        logs = np.log(stretches)
+        stress = np.asarray(sum(mu * np.expm1(a * logs) for mu, a in self._constants()))
+        slope = np.asarray(sum(mu * a * np.exp(a * logs) for mu, a in self._constants()))
         return stress, slope[..., None] * np.eye(3)
 
     def stress(self, f: Float) -> Float:
-        """Return the first Piola-Kirchhoff stress (..., 3, 3)."""
-        square, vectors = np.linalg.eigh(np.swapaxes(f, -1, -2) @ f)
+        """Return the first Piola-Kirchhoff stress (..., 3, 3); raises InvertedError."""
+        square, vectors = _principal(f)
         second = self._second(square, determinant(f))
         return np.asarray((f @ vectors) * second[..., None, :] @ np.swapaxes(vectors, -1, -2))
 
@@ -77,15 +82,15 @@ class Ogden:
         return np.asarray((kirchhoff - kirchhoff.mean(axis=-1, keepdims=True)) / square)
 
     def stress_and_tangent(self, f: Float) -> tuple[Float, Float]:
-        """Return the stress and its derivative (..., 3, 3, 3, 3)."""
-        square, vectors = np.linalg.eigh(np.swapaxes(f, -1, -2) @ f)
+        """Return the stress and its derivative (..., 3, 3, 3, 3); raises InvertedError."""
+        square, vectors = _principal(f)
         j = determinant(f)
         second = self._second(square, j)
         axes, turned = np.swapaxes(vectors, -1, -2), np.swapaxes(f @ vectors, -1, -2)  # rows N_a and F N_a
         stress = np.einsum("...a,...ai,...aJ->...iJ", second, turned, axes, optimize=True)
         # with E_ab = F N_a (x) N_b: d(S) = sum of c_ab sym parts, P = F S
         normal = self._normal_moduli(square, j, second)
-        shear = self._shear_moduli(square, j)
+        shear = self._shear_moduli(square, j, second)
         pairs = turned[..., :, None, :, None] * axes[..., None, :, None, :]  # (a, b, i, J)
         tangent = np.einsum("...ab,...aaiJ,...bbkL->...iJkL", normal, pairs, pairs, optimize=True)
         tangent += np.einsum("...ab,...abiJ,...abkL->...iJkL", shear, pairs, pairs, optimize=True)
@@ -107,26 +112,49 @@ class Ogden:
         out = rate * inverse[..., :, None] * inverse[..., None, :]
         return np.asarray(out - 2.0 * (second * inverse)[..., None] * np.eye(3))
 
-    def _shear_moduli(self, square: Float, j: Float) -> Float:
+    def _shear_moduli(self, square: Float, j: Float, second: Float) -> Float:
         """(S_a - S_b) / (l_a^2 - l_b^2) (..., 3, 3), zero on the diagonal.
 
-        Of the terms c x^q in x = l^2 it is c x_b^(q-1) expm1(q t) / expm1(t) with t = ln(x_a / x_b).
+        With x = l^2 and the Kirchhoff stress tau = S x it is ((tau_a - tau_b) / (x_a - x_b) - S_b) / x_a, and of the
+        terms mu x^q of tau the quotient is mu x_b^(q-1) expm1(q t) / expm1(t) with t = ln(x_a / x_b).
         """
         x, y = square[..., :, None], square[..., None, :]
-        t = np.log1p((x - y) / y)
+        apart = (x - y) / y
+        t = np.where(np.abs(apart) < 0.5, np.log1p(np.maximum(apart, -0.5)), np.log(x / y))
         scale = j ** (-1.0 / 3.0)
         out = np.zeros((*square.shape, 3))
-        mean = np.zeros_like(j)
         for mu, a in self._constants():
-            factor = mu * scale**a
-            mean += factor * (square ** (0.5 * a)).mean(axis=-1)
-            out += factor[..., None, None] * y ** (0.5 * a - 2.0) * _ratio(0.5 * a - 1.0, t)
-        out -= mean[..., None, None] * y**-2.0 * _ratio(-1.0, t)
+            out += (mu * scale**a)[..., None, None] * y ** (0.5 * a - 1.0) * _ratio(0.5 * a, t)
+        out = (out - second[..., None, :]) / x
         out[..., np.arange(3), np.arange(3)] = 0.0
         return out
+
+
+def _principal(f: Float) -> tuple[Float, Float]:
+    """Return the squares of the principal stretches (..., 3), and their directions at rest as columns (..., 3, 3).
+
+    Raises
+    ------
+    InvertedError
+        If the smallest stretch of a tensor is lost in the round-off of the largest.
+    """
+    right = np.swapaxes(f, -1, -2) @ f
+    if np.isfinite(right).all():
+        square, vectors = np.linalg.eigh(right)
+        if (square > 0.0).all():
+            return square, vectors
+    raise InvertedError
 
 
 def _ratio(q: float, t: Float) -> Float:
     """expm1(q t) / expm1(t), q at t = 0."""
     safe = np.where(t == 0.0, 1.0, t)
     return np.where(t == 0.0, q, np.expm1(q * safe) / np.expm1(safe))
+
+
+def _second_order(y: Float) -> Float:
+    """(exp(y) - 1 - y) / y^2, 1/2 at y = 0."""
+    small = np.abs(y) < 1e-2
+    safe = np.where(small, 1.0, y)
+    series = 0.5 + y / 6.0 * (1.0 + y / 4.0 * (1.0 + y / 5.0 * (1.0 + y / 6.0 * (1.0 + y / 7.0))))
+    return np.asarray(np.where(small, series, (np.expm1(safe) - safe) / safe**2))
