@@ -46,3 +46,11 @@ def test_the_picture_shows_each_reading_alone_and_all_together(tmp_path: Path, f
     assert first == pytest.approx([0.0, 0.0], abs=1e-9)
     names = [text.get_text() for text in right.get_legend().get_texts()]
     assert any(name.startswith("depth_mm ± 0.1") for name in names)
+
+
+@pytest.mark.filterwarnings("error::UserWarning")
+def test_a_reading_that_never_tells_mu_is_drawn_as_well(tmp_path: Path, figures: list[Any]) -> None:
+    draw(tmp_path / "a.png", curve(lambda mu: 0.03 + 0.0 * mu))
+    ((_, middle, right),) = (figure.axes for figure in figures)
+    assert [one.get_label() for one in middle.get_lines() if np.isfinite(one.get_ydata()).any()] == ["limit 0.1"]
+    assert right.get_legend() is None

@@ -36,7 +36,10 @@ def draw(path: Path, calibration: Calibration) -> None:
 def _finish(axes: Axes) -> None:
     style(axes)
     axes.set_xlabel("friction coefficient mu")
-    axes.legend(frameon=False, fontsize=9, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2, columnspacing=1.0)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(
+            frameon=False, fontsize=9, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2, columnspacing=1.0
+        )
 
 
 def _shade_trusted(axes: Axes, c: Calibration) -> None:
@@ -83,6 +86,10 @@ def _mu_sd(axes: Axes, c: Calibration) -> None:
     axes.semilogy(c.judged_mu, [e.std for e in c.judged], color="#222222", lw=2.0, label="with all tolerances")
     axes.semilogy(c.judged_mu, [e.std for e in c.judged_by_noise], "--", color="#222222", lw=1.0, label="noise alone")
     axes.axhline(c.limit, color="#1b7837", lw=1.0, label=f"limit {c.limit:g}")
+    known = [e.std for e in (*c.judged, *c.judged_by_noise) if e.is_determined]
+    axes.set_autoscale_on(False)  # which warns where there is nothing but the limit
+    axes.set_ylim(0.5 * min([*known, c.limit]), 2.0 * max([*known, c.limit]))
+    axes.set_xlim(float(c.mu[0]), float(c.mu[-1]))
     axes.set_ylabel("standard deviation of mu")
     _finish(axes)
 
