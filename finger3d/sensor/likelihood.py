@@ -245,7 +245,7 @@ class Estimator:
             share = {name: float(values[0]) for name, values in self.model.reductions([found.mean]).items()}
             largest = max(share, key=lambda name: share[name])
             return (
-                f"out of range: {these} cannot tell any mu from {first:g} to {last:g} from another"
+                f"out of range: every mu from {first:g} to {last:g} is plausible"
                 + f"; {100.0 * share[largest]:.0f} % of the variance is from {largest}" * (share[largest] > 0.0)
             )
         if status == "above":
