@@ -165,3 +165,9 @@ def test_a_tolerance_that_hides_mu_is_named() -> None:
     assert re.search(r"100 % .*tilt_deg$", blind.verdict)
     (clear,) = estimate(made, straight(0.5), tolerances=False)
     assert clear.std == pytest.approx(0.1, rel=1e-3)  # the noise over the slope
+
+
+def test_a_blind_reading_without_tolerances_blames_the_noise() -> None:
+    made = curve(line(1e-6), tolerances=(tolerance("tilt_deg", 0.5, 1.0),))
+    assert estimate(made, 0.05)[0].verdict.endswith(" tilt_deg")
+    assert estimate(made, 0.05, tolerances=False)[0].verdict.endswith(" noise")

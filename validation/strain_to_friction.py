@@ -105,7 +105,7 @@ def _checks(domain: Domain, calibration: Calibration, points: CurvePoints) -> li
     random = np.random.default_rng(20261121)
     count = 4000
     mu = random.uniform(first, last, count)
-    quiet = calibration.without_tolerances()
+    quiet = calibration.without_tolerances
     c = quiet.readings[0]
     # what the set allows for, drawn whole
     answers = estimate(quiet, c.at(mu) + random.normal(0.0, 1.0, count) * c.reading_sd(mu))

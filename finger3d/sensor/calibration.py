@@ -69,11 +69,13 @@ class Calibration(SensorModel):
     ) -> list[Estimate]:
         """Return an estimate for each set of readings (m, k); `noise` (m, k) has their standard deviations."""
         stds = np.broadcast_to(self.noise if noise is None else noise, readings.shape)
+        model = self if tolerances else self.without_tolerances
         return [
-            estimator(self, self.limit, tuple(std.tolist()), tolerances, shape).estimate(reading)
+            estimator(model, self.limit, tuple(std.tolist()), shape).estimate(reading)
             for reading, std in zip(readings, stds, strict=True)
         ]
 
+    @cached_property
     def without_tolerances(self) -> Calibration:
         """Return the calibration of a sensor of which all is known exactly but the noise."""
         return replace(self, readings=tuple(replace(c, tolerances=()) for c in self.readings))

@@ -143,11 +143,10 @@ class Estimator:
         model: SensorModel,
         limit: float,
         noise: Float,
-        tolerances: bool = True,
         shape: Shape = "interpolation",
     ) -> Estimator:
         """Prepare estimates from readings with noise (k,)."""
-        covariance = model.covariance(model.grid, noise, tolerances, shape=shape)
+        covariance = model.covariance(model.grid, noise, shape=shape)
         scale = model.noise
         scaled = covariance / np.outer(scale, scale)
         precision = np.linalg.inv(scaled) / np.outer(scale, scale)
@@ -283,11 +282,9 @@ class Estimator:
 
 
 @lru_cache(maxsize=8)
-def estimator(
-    model: SensorModel, limit: float, noise: tuple[float, ...], tolerances: bool, shape: Shape = "interpolation"
-) -> Estimator:
+def estimator(model: SensorModel, limit: float, noise: tuple[float, ...], shape: Shape = "interpolation") -> Estimator:
     """Return the estimator for readings with noise (k,); a few are kept, so that readings one by one are quick."""
-    return Estimator.of(model, limit, np.array(noise), tolerances, shape)
+    return Estimator.of(model, limit, np.array(noise), shape)
 
 
 def ranges_text(intervals: Sequence[tuple[float, float]]) -> str:

@@ -79,7 +79,6 @@ class SensorModel:
         self,
         mu: ArrayLike,
         noise: Float | None = None,
-        tolerances: bool = True,
         without: str = "",
         shape: Shape = "interpolation",
     ) -> Float:
@@ -88,7 +87,6 @@ class SensorModel:
         Parameters
         ----------
         noise : (k,) standard deviations in place of those of the calibration
-        tolerances : whether tolerances count
         without : name of a tolerance that is known exactly, or ``"noise"``
         shape : the curve whose error counts
         """
@@ -98,7 +96,7 @@ class SensorModel:
         if without != "noise":
             own = own + np.maximum(scale if noise is None else noise, _LEAST_NOISE * scale) ** 2
         shared = [np.zeros((len(at), len(self.readings))) for _ in SHARED]
-        for i, c in enumerate(self.readings if tolerances else ()):
+        for i, c in enumerate(self.readings):
             for t in (t for t in c.tolerances if t.name != without):
                 square = np.interp(at, c.mu, t.spread) ** 2
                 if t.name in SHARED:
@@ -112,14 +110,14 @@ class SensorModel:
             found += effect[:, :, None] * effect[:, None, :]
         return found
 
-    def mu_sd(self, mu: ArrayLike, without: str = "", tolerances: bool = True) -> Float:
+    def mu_sd(self, mu: ArrayLike, without: str = "") -> Float:
         """Return the standard deviation (m,) of mu of a linear model, ``1 / sqrt(s^T C^-1 s)`` with the slopes s.
 
         It holds where the curves are straight over several of these deviations; that of an estimate holds on any curve.
         """
         slope = np.atleast_2d(self.slope(np.atleast_1d(mu)))
         slope = slope / self.noise
-        covariance = self.covariance(mu, without=without, tolerances=tolerances) / np.outer(self.noise, self.noise)
+        covariance = self.covariance(mu, without=without) / np.outer(self.noise, self.noise)
         information = np.einsum("mi,mi->m", slope, np.linalg.solve(covariance, slope[:, :, None])[:, :, 0])
         with np.errstate(divide="ignore"):
             return np.asarray(1.0 / np.sqrt(np.maximum(information, 0.0)))
