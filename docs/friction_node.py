@@ -1,7 +1,7 @@
 """ROS 2 node that turns the strain of a calibrated finger into a friction coefficient.
 
 It subscribes to ``strain`` (std_msgs/Float64) and publishes ``friction`` (std_msgs/Float64MultiArray: mu, its standard
-deviation, and the ends of the 68 % interval); readings that do not determine mu are logged with the reason.  The robot
+deviation, and the ends of the 90 % interval); readings that do not determine mu are logged with the reason.  The robot
 needs finger3d and NumPy only::
 
     python3 friction_node.py --ros-args -p calibration:=out/cal/calibration.json
@@ -28,7 +28,7 @@ class FrictionNode(Node):
     def on_strain(self, message: Float64) -> None:
         """Publish mu, or log why the reading does not determine it."""
         found = finger3d.sensor.estimate(self.calibration, message.data)[0]
-        if found.status in ("ok", "coarse"):
+        if found.is_determined:
             self.publisher.publish(Float64MultiArray(data=[found.mu, found.std, found.low, found.high]))
         else:
             self.get_logger().warning(found.verdict)

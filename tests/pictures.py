@@ -11,7 +11,7 @@ from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
 from finger3d.fem.simplex import Mesh, quadratic
 from finger3d.objects import Plane
 from finger3d.plotting import solid as render
-from finger3d.sensor.curve import Calibration, Tolerance
+from finger3d.sensor import Calibration, ReadingCurve, Tolerance
 from tests.meshes import grid
 
 MU = 0.25
@@ -32,8 +32,11 @@ OBJECT = (PLATE.points + [0.0, 40.0, 0.0])[PLATE.faces]
 MUS = np.linspace(0.05, 1.0, 6)
 CAUSES = ("depth_mm", "E_percent", "nu", "tilt_deg", "gauge_x_mm", "gauge_y_mm", "gauge_angle_deg", "mesh")
 CURVE = Calibration(
-    "g36", MUS, 0.02 + 0.01 * MUS - 0.004 * MUS**2, 1.5e-4, 0.1,
-    tuple(Tolerance(name, "", 0.5, np.full(6, 1e-3), np.full(6, 1e-3)) for name in CAUSES), about={"domain": "solid"},
+    (ReadingCurve(
+        "g36", MUS, 0.02 + 0.01 * MUS - 0.004 * MUS**2, 1.5e-4,
+        tuple(Tolerance(name, "", 0.5, np.full(6, 1e-3), np.full(6, 1e-3)) for name in CAUSES),
+    ),),
+    0.1, about={"domain": "solid"},
 )  # fmt: skip
 """A calibration that nobody pressed, with every cause of uncertainty."""
 

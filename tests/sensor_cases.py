@@ -10,7 +10,7 @@ import numpy as np
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.analyses.optimise.task import ObjectiveTable
 from finger3d.scene import parse
-from finger3d.sensor import Calibration, JointCalibration, Tolerance
+from finger3d.sensor import Calibration, ReadingCurve, Tolerance
 
 SCENE: dict[str, Any] = {
     "finger": {
@@ -35,8 +35,10 @@ def scene(**changes: Any) -> Any:
 
 
 def curve(function: Any, **changes: Any) -> Calibration:
+    """A calibration of one reading, g; changes are of its curve, or of the calibration."""
     mu = np.linspace(0.02, 1.2, 25)
-    return Calibration("g", mu, function(mu), **{"noise": 1.5e-4, "limit": 0.1, **changes})
+    own = {name: changes.pop(name) for name in ("noise", "tolerances", "kind") if name in changes}
+    return Calibration((ReadingCurve("g", mu, function(mu), **{"noise": 1.5e-4, **own}),), **{"limit": 0.1, **changes})
 
 
 def straight(mu: Any) -> Any:
@@ -67,13 +69,13 @@ def tolerance(name: str, sd: float, slope: float, spread: float | None = None) -
     return Tolerance(name, "1", sd, np.full(25, slope), np.full(25, size))
 
 
-def together(*curves: Calibration) -> JointCalibration:
+def together(*curves: Calibration) -> Calibration:
     """Curves as readings a, b, c and so on of one sensor."""
-    named = tuple(replace(one, name=letter) for one, letter in zip(curves, "abcdef", strict=False))
-    return JointCalibration(named, 0.1)
+    named = tuple(replace(one.readings[0], name=letter) for one, letter in zip(curves, "abcdef", strict=False))
+    return Calibration(named, 0.1)
 
 
-def opposite() -> JointCalibration:
+def opposite() -> Calibration:
     """Two readings that friction changes in opposite directions, and the depth in the same."""
     depth = tolerance("depth_mm", 0.1, 0.02)
     return together(curve(line(0.01), tolerances=(depth,)), curve(line(-0.006), tolerances=(depth,)))

@@ -94,13 +94,14 @@ def test_what_increments_leave_is_a_tolerance_and_widens_mu(tmp_path: Path) -> N
     found = calibrate(rough, "g36", tmp_path, (0.1, 0.4, 0.5, 0.6, 0.7, 0.9), tolerances={**NONE, "increments": 1.0})
     data = json.loads((tmp_path / "calibration.json").read_text())
     assert data["about"]["increments"] == {"steps": [4], "chosen": False}
-    assert (data["tolerances"]["increments"]["unit"], data["tolerances"]["increments"]["sd"]) == ("error bar", 1.0)
-    assert found.shares(0.7)["increments"] > 0.5
+    increments = data["readings"]["g36"]["tolerances"]["increments"]
+    assert (increments["unit"], increments["sd"]) == ("error bar", 1.0)
+    assert found.reductions([0.7])["increments"][0] > 0.5
     # read by a press of many: off by far more than the noise, but not by more than what is told
     strain = float(read(build(steps(160).model()), ("g36",), np.array([0.6]))[0, 0])
-    away = abs(strain - float(found.at(0.6)))
-    assert away > 5.0 * found.noise
-    assert away < 2.0 * float(found.reading_sd([0.6])[0])
+    away = abs(strain - float(found.at(0.6)[0]))
+    assert away > 5.0 * found.noise[0]
+    assert away < 2.0 * float(found.readings[0].reading_sd([0.6])[0])
     (sure,), (honest,) = (estimate(load(tmp_path / "calibration.json"), strain, tolerances=t) for t in (False, True))
     assert abs(sure.mu - 0.6) > 5.0 * sure.std
     assert abs(honest.mu - 0.6) < 2.0 * honest.std
@@ -114,10 +115,10 @@ def test_chosen_increments_press_the_curve_and_fewer_the_differences() -> None:
     assert curve.increments.chosen
     assert curve.problem.model.legs[0].steps == 40
     same = calibrate(steps(40), "g36", mus=mus, tolerances={**NONE, "depth_mm": 0.1})
-    assert found.reading == pytest.approx(same.reading, rel=1e-9)
-    assert found.tolerances[0].slope == pytest.approx(same.tolerances[0].slope, rel=1e-6)
-    assert found.tolerances[1].name == "increments"
-    assert found.tolerances[1].spread.max() <= 0.1 * found.noise
+    assert found.readings[0].reading == pytest.approx(same.readings[0].reading, rel=1e-9)
+    assert found.readings[0].tolerances[0].slope == pytest.approx(same.readings[0].tolerances[0].slope, rel=1e-6)
+    assert found.readings[0].tolerances[1].name == "increments"
+    assert found.readings[0].tolerances[1].spread.max() <= 0.1 * found.noise[0]
 
 
 @pytest.mark.parametrize("count", [4, "auto"])

@@ -27,7 +27,7 @@ from tests.sensor_cases import FEW, NONE, SCENE, scene
 def test_every_tolerance_is_the_difference_of_two_scenes() -> None:
     """Each slope against two presses of changed scenes, made from scratch."""
     found = calibrate(scene(), "g36", mus=FEW)
-    slopes = {t.name: t.slope for t in found.tolerances}
+    slopes = {t.name: t.slope for t in found.readings[0].tolerances}
     assert set(slopes) == set(TOLERANCES)
 
     def strain(mu: float, **changes: Any) -> float:
@@ -65,7 +65,7 @@ def test_the_spread_of_a_silicone_is_the_tolerance_of_its_modulus() -> None:
     few = NONE | {"depth_mm": 0.1}
     del few["E_percent"]
     found = calibrate(silicone, "g36", mus=FEW, tolerances=few)
-    assert {t.name: t.sd for t in found.tolerances} == {
+    assert {t.name: t.sd for t in found.readings[0].tolerances} == {
         "depth_mm": 0.1,
         "E_percent": pytest.approx(100.0 * silicone.constants.spread),
     }
@@ -81,7 +81,7 @@ def test_slopes_between_the_few_mu_that_are_tried() -> None:
     few = calibrate(fine, "g36", mus=mus, tolerances=told)
     # so few mu are all tried
     tried, between = (calibrate(fine, "g36", mus=mus[first::2], tolerances=told) for first in (0, 1))
-    for a, b, c in zip(few.tolerances, tried.tolerances, between.tolerances, strict=True):
+    for a, b, c in zip(*(one.readings[0].tolerances for one in (few, tried, between)), strict=True):
         assert a.name == b.name == c.name
         assert a.slope[::2] == pytest.approx(b.slope, rel=1e-6)
         assert 0.0 < np.abs(a.slope[1::2] - c.slope).max() <= 0.2 * np.abs(b.slope).max(), a.name
@@ -102,9 +102,9 @@ def test_a_fine_body_leaves_its_differences_to_the_coarser_one_beside_it() -> No
         return np.array([reduced.press(mu, [Leg(depth_mm, steps=10)]).steps[-1].gauges["g36"] for mu in FEW])
 
     at, softer = strains(body), build(scene(**settings, material={"E_MPa": 1.0, "nu": 0.447}).model())
-    assert found.reading == pytest.approx(at, rel=1e-9)
+    assert found.readings[0].reading == pytest.approx(at, rel=1e-9)
     own = {"depth_mm": (strains(body, 10.1) - strains(body, 9.9)) / 0.2, "nu": (at - strains(softer)) / 0.003}
-    assert [a.name for a in found.tolerances] == list(own)
-    for a, b in zip(found.tolerances, beside.tolerances, strict=True):
+    assert [a.name for a in found.readings[0].tolerances] == list(own)
+    for a, b in zip(found.readings[0].tolerances, beside.readings[0].tolerances, strict=True):
         assert a.slope == pytest.approx(b.slope, rel=1e-6, abs=1e-9), a.name
         assert 0.0 < np.abs(a.slope - own[a.name]).max() < 0.2 * np.abs(own[a.name]).max(), a.name

@@ -13,7 +13,7 @@ from tests.identify_cases import PRESS
 from tests.scenes import written
 from tests.sensor_cases import scene
 
-KNOWN = ("normal_force_N", "gauge_a")
+KNOWN = ("force_z_N", "normal_force_N", "gauge_a")
 
 
 @pytest.fixture
@@ -26,7 +26,11 @@ def scene_file(tmp_path: Path) -> Path:
     [
         ("normal_force_N\n1\n", "depth_mm"),
         ("depth_mm\n1\n2\n", "measured"),
-        ("depth_mm,normal_force\n1,2\n2,3\n", 'column "normal_force" .*"normal_force_N"'),
+        ("depth_mm,normal_force\n1,2\n2,3\n", 'column "normal_force": .*"normal_force_N"'),
+        ("depth_mm,force_N\n1,2\n2,3\n", 'column "force_N": did you mean "normal_force_N"[?]'),
+        ("depth_mm,iterations\n1,2\n2,3\n", 'column "iterations": it is none of'),
+        ("depth_mm;gauge_a\n1;2\n2;3\n", "semicolons"),
+        ("depth_mm,gauge_a,gauge_a_std\n1,2,0.1\n2,3,1e-160\n", "line 3: gauge_a_std = 1e-160: must be from 1e-12"),
         ("depth_mm,gauge_a_std\n1,2\n2,3\n", 'column "gauge_a_std" .*"gauge_a"'),
         ("depth_mm,gauge_a,gauge_a\n1,2,3\n2,3,4\n", '"gauge_a"'),
         ("depth_mm,gauge_a\n1,2\n2,\n", "line 3: gauge_a"),

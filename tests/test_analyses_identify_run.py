@@ -14,6 +14,7 @@ import pytest
 
 import finger3d
 from finger3d.errors import MissingError
+from finger3d.materials.shore import modulus_of_shore_00
 from finger3d.results.journal import Journal
 from finger3d.scene import parse
 from tests.identify_cases import FREE, PRESS, TRUE, bench
@@ -59,6 +60,17 @@ def test_the_modulus_alone_needs_one_press(tmp_path: Path, scene_file: Path) -> 
     )
     assert found.presses == 1
     assert found.fitted.values[0] == pytest.approx(0.37, abs=4.0 * found.fitted.stds[0])
+
+
+def test_a_hardness_is_fitted_by_the_modulus_that_it_gives(tmp_path: Path, scene_file: Path) -> None:
+    """Forces scale with the modulus of the hardness, so that one press is enough."""
+    measured, fitted = bench(tmp_path / "bench.csv"), {}
+    for key, bounds in {"material.E_MPa": (0.05, 5.0), "material.shore_00": (5.0, 90.0)}.items():
+        options = ["friction.mu=0.6", "material.nu=0.45"]
+        found = finger3d.identify(scene_file, measured, {key: bounds}, tmp_path / key, options)
+        assert found.presses == 1
+        fitted[key] = float(found.fitted.values[0])
+    assert modulus_of_shore_00(fitted["material.shore_00"]) == pytest.approx(fitted["material.E_MPa"], rel=5e-3)
 
 
 def test_an_offset_of_the_depth_is_found(tmp_path: Path, scene_file: Path) -> None:

@@ -44,7 +44,7 @@ def test_the_offset_is_added_to_the_measured_depth(tmp_path: Path) -> None:
     known = simulation(tmp_path, ROW)
     found = known.at([1.25, 0.5], measured([4.5, 9.5]))
     assert [*found["normal_force_N"]] == pytest.approx([2.0, 5.0])
-    with pytest.raises(Finger3dError, match=r"bench\.csv: line 2: depth_mm = 10\.5: .* 10$"):
+    with pytest.raises(Finger3dError, match=r"line 2: depth_mm = 10: with .* 10\.5, .* ends at 10; .* up to 0 only"):
         known.at([1.25, 0.5], measured([10.0]))
 
 

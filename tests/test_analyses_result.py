@@ -79,7 +79,7 @@ def test_what_a_notebook_prints_of_the_other_objects_is_short_and_its_html_is_wh
     from finger3d.analyses.compare.run import Comparison
     from finger3d.mechanics.build import build
     from finger3d.results.comparison import Case
-    from finger3d.sensor.curve import Calibration
+    from finger3d.sensor import Calibration, ReadingCurve
 
     scene = finger3d.load(written(tmp_path, SECTION))
     mu = np.linspace(0.1, 1.0, 5)
@@ -89,7 +89,7 @@ def test_what_a_notebook_prints_of_the_other_objects_is_short_and_its_html_is_wh
     failed = Case("plane <b>", 2.0, 0.5, "swept", finger3d.Outcome.NO_CONVERGENCE)
     shown = {
         "Scene": scene,
-        "Calibration": Calibration("<g>", mu, 0.01 * mu, 1e-4, 0.1),
+        "Calibration": Calibration((ReadingCurve("<g>", mu, 0.01 * mu, 1e-4),), 0.1),
         "Comparison": Comparison((good, failed), ("2D would do",), tmp_path),
         "ReducedModel": finger3d.ReducedModel.of(build(scene.model())),
         "History": solid.history,
@@ -101,7 +101,7 @@ def test_what_a_notebook_prints_of_the_other_objects_is_short_and_its_html_is_wh
         assert "\n" not in repr(found)
     parts = {
         "Scene": ("E_MPa = 1.0", "domain = plane-stress", "steps = 4"),
-        "Calibration": ("Gauge &lt;g&gt;", "second-order fit", "usable from mu"),
+        "Calibration": ("Gauge &lt;g&gt;", "second-order fit", "mu is found to 0.1 or better"),
         "Comparison": ("1.50 ± 0.10", "plane &lt;b&gt;", escape(str(finger3d.Outcome.NO_CONVERGENCE)), "2D would do"),
     }
     for name, texts in parts.items():

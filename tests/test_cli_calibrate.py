@@ -79,23 +79,30 @@ def test_from_a_scene_to_mu_with_two_commands(tmp_path: Path, scene_file: Path, 
     options = [word for text in sure for word in ("--tolerance", text)]
     assert run("calibrate", scene_file, "--gauge", "g36", "--out", out, "--mu", "0:0.8:9", "--map", *options) == 0
     told = capsys.readouterr().out
-    for text in ("usable", "resolution at mu", "second-order fit", "tilt_deg", "gauge g36: usable from mu"):
+    for text in (
+        "mu within 0.1",
+        "by the noise alone",
+        "second-order fit",
+        "tilt_deg",
+        "gauge g36: mu is found to 0.1 or better",
+    ):
         assert text in told
     names = {p.name for p in out.iterdir() if p.name != ".finger3d.lock"}
     assert names == {"calibration.json", "calibration.csv", "calibration.png", "reduced.npz", "report.html",
                      "scene.toml", "map.png", "map.csv"}  # fmt: skip
     data = json.loads((out / "calibration.json").read_text())
-    assert (data["format"], data["version"], len(data["hash"])) == ("finger3d calibration", 2, 16)
+    assert (data["format"], data["version"], len(data["hash"])) == ("finger3d calibration", 3, 16)
     assert data["about"]["factorizations"] == 1
     assert ReducedModel.load(out / "reduced.npz").gauges == ("g36", "long")
     found = load(out / "calibration.json")
-    strain = float(found.at(0.4))
+    mu = float(found.mu[found.best])
+    strain = float(found["g36"].at(mu))
     assert run("estimate", out / "calibration.json", "--strain", repr(strain)) == 0
-    assert capsys.readouterr().out.startswith("mu = 0.4 +- ")
-    assert run("estimate", out / "calibration.json", "--strain", repr(strain), "--std", "1e-3", "--json") == 0
+    assert float(capsys.readouterr().out.split()[2]) == pytest.approx(mu, abs=0.01)
+    assert run("estimate", out / "calibration.json", "--strain", repr(strain), "--std", "5e-4", "--json") == 0
     answer = json.loads(capsys.readouterr().out)
-    assert answer["mu"] == pytest.approx(0.4, abs=1e-6)
-    assert answer["std"] > 0.0
+    assert answer["stds"] == {"g36": 5e-4}
+    assert answer["std"] > found.judged_at_mu[found.best].std
 
 
 @pytest.mark.parametrize(
@@ -132,7 +139,7 @@ def test_calibrate_prints_json_alone(tmp_path: Path, scene_file: Path, capsys: A
     none = [word for name in TOLERANCES for word in ("--tolerance", f"{name}=0")]
     options = ["--gauge", "g36", "--out", tmp_path / "cal", "--mu", ",".join(map(str, FEW)), "--json", *none]
     assert run("calibrate", scene_file, *options) == 0
-    assert json.loads(capsys.readouterr().out)["curve"]["mu"] == list(FEW)
+    assert json.loads(capsys.readouterr().out)["mu"] == list(FEW)
 
 
 def test_the_help_names_every_tolerance(capsys: Any) -> None:

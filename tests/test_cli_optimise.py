@@ -24,6 +24,9 @@ COARSE = [option for text in SETS for option in ("--set", text)]
         (("--gauges", "2", "--free", "finger.radius_mm=60:200"), "--gauges"),
         (("--gauges", "2", "--tolerance", "depht_mm=1"), '"depth_mm"'),
         (("--gauges", "2", "--mu", "0.1,0.2"), "three"),
+        (("--gauges", "2", "--free", "gauge.x_mm=100:200"), "--free gauge.x_mm=100:200: no gauge"),
+        (("--gauges", "2", "--free", "gauge.y_mm=-9:0"), "--free gauge.y_mm=-9:0: no gauge"),
+        (("--gauges", "2", "--noise", "1e300"), "--noise 1e+300: must be a finite number from 1e-12 to 1000"),
     ],
 )
 def test_what_is_refused(tmp_path: Path, capsys: Any, options: tuple[str, ...], told: str) -> None:
@@ -90,6 +93,8 @@ def test_an_objective_from_a_file_on_the_command_line(root, tmp_path, capsys) ->
         (["--free", "gauge.g36.x_mm=1:2", "--budget", "0"], "--budget 0"),
         (["--free", "gauge.g36.x_mm=1:2", "--mu", "0.5,0.1"], "ascending"),
         (["--free", "gauge.g36.x_mm=1:2", "--noise", "0"], "--noise 0"),
+        (["--free", "gauge.g36.x_mm=1:2", "--noise", "1e300"], "--noise 1e+300: must be a finite number"),
+        (["--free", "gauge.g36.x_mm=1:2", "--seed", "-1"], "--seed -1: must be a whole number from 0 up"),
     ],
 )
 def test_bad_input_is_one_line(options, expected, root, tmp_path, capsys) -> None:

@@ -25,7 +25,7 @@ def test_slopes_and_resolutions_of_a_strain_along_x(tmp_path: Path, figures: lis
     assert np.asarray(slope.collections[0].get_array()) == pytest.approx(np.full((6, 11), 1e-3), rel=1e-6)
     for axes in (along, best):
         shown = np.ma.filled(axes.collections[1].get_array(), np.nan)
-        assert shown == pytest.approx(np.full((6, 11), CURVE.noise / 1e-3), rel=1e-3)
+        assert shown == pytest.approx(np.full((6, 11), CURVE.noise[0] / 1e-3), rel=1e-3)
         assert [*axes.get_lines()[-1].get_xydata()[0]] == [36.0, 40.0]
     arrows = best.collections[-1]
     assert np.abs(arrows.V) == pytest.approx(np.zeros(len(arrows.V)), abs=1e-2)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
+import runpy
 import shlex
 import shutil
 from pathlib import Path
@@ -174,3 +175,31 @@ def test_the_readings_of_two_gauges_in_the_readme_give_the_mu_it_states(
     # the README states two figures of the strains, and the standard deviation 0.016
     assert float(found[1]) == pytest.approx(0.4, abs=0.005)
     assert float(found[2]) == pytest.approx(0.016, abs=0.002)
+
+
+@pytest.mark.slow
+def test_the_reading_of_one_gauge_in_the_readme_gives_the_mu_it_states(
+    root: Path, folder: Path, capsys: pytest.CaptureFixture
+) -> None:
+    assert main(["new", "scene.toml"]) == 0
+    one = [c for c in commands(root) if "--gauge g36 --out out/cal" in c or "--strain 0.05" in c]
+    assert len(one) == 2
+    for command in one:
+        assert main(shlex.split(command)[1:]) == 0
+    *_, told = capsys.readouterr().out.splitlines()
+    found = re.match(r"mu = ([\d.]+) \+- ([\d.]+) \(90 % interval [\d.]+ to [\d.]+\)$", told)
+    assert found, told
+    assert float(found[1]) == pytest.approx(0.43, abs=0.006)
+
+
+def test_every_estimate_of_the_tutorial_on_friction_finds_the_mu_that_was_read(
+    root: Path, folder: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("matplotlib.pyplot.show", lambda: None)
+    runpy.run_path(str(root / "docs" / "tutorials" / "friction.py"))
+    told = [line for line in capsys.readouterr().out.splitlines() if line.startswith("mu = ")]
+    found = [[float(number) for number in re.findall(r"\d\.\d+", line)] for line in told]
+    assert not any("coarser" in line for line in told)
+    for (mu, std, low, high), true in zip(found, (0.2, 0.3, 0.4) * 2, strict=True):
+        assert abs(mu - true) < std + 5e-4  # of three digits
+        assert low <= true <= high

@@ -14,6 +14,7 @@ def test_values_with_bounds_intervals_correlation_and_residuals(tmp_path: Path) 
     value = {"value": 0.371, "std": 0.012, "low": 0.36, "high": 0.384}
     data = {
         "scene": scene().as_dict(), "measured": "bench/a.csv", "presses": 11, "notes": ["the depth is off"],
+        "deviations": "of the noise",
         "values": {"material.E_MPa": value, "friction.mu": {**value, "value": 0.6}},
         "correlation": {
             "material.E_MPa": {"material.E_MPa": 1.0, "friction.mu": -0.25},

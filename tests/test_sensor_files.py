@@ -14,6 +14,8 @@ from finger3d.sensor import Tolerance, estimate, load, save
 from tests.commands import run
 from tests.sensor_cases import curve, saturating, straight
 
+G = ("readings", "g")
+
 
 def test_a_calibration_comes_back_from_its_file_as_it_was(tmp_path: Path) -> None:
     before = curve(
@@ -22,8 +24,8 @@ def test_a_calibration_comes_back_from_its_file_as_it_was(tmp_path: Path) -> Non
         failed=((0.3, "x"),),
     )
     after = load(save(before, tmp_path / "calibration.json"))
-    assert np.array_equal(after.reading, before.reading)
-    assert np.array_equal(after.tolerances[0].slope, before.tolerances[0].slope)
+    assert np.array_equal(after["g"].reading, before["g"].reading)
+    assert np.array_equal(after["g"].tolerances[0].slope, before["g"].tolerances[0].slope)
     assert after.failed == before.failed
     assert estimate(after, 0.005)[0] == estimate(before, 0.005)[0]
 
@@ -31,23 +33,32 @@ def test_a_calibration_comes_back_from_its_file_as_it_was(tmp_path: Path) -> Non
 def test_calibration_files_that_are_none(tmp_path: Path) -> None:
     good = save(curve(straight), tmp_path / "good.json").read_text()
     data = json.loads(good)
-    short = {**data, "curve": {"mu": data["curve"]["mu"][:5], "strain": data["curve"]["strain"]}}
+    own = data["readings"]["g"]
+
+    def changed(**changes: Any) -> str:
+        return json.dumps(data | {"readings": {"g": own | changes}})
+
     cases = {
         "not JSON, or cut short": good[: len(good) // 2],
-        "version 9, this finger3d reads version 2": json.dumps({**data, "version": 9}),
-        "version 1, this finger3d reads version 2": json.dumps({**data, "version": 1}),
+        "version 9, this finger3d reads version 3; calibrate again": json.dumps({**data, "version": 9}),
+        "version 2, this finger3d reads version 3; calibrate again": json.dumps({**data, "version": 2}),
+        "version 1 of several readings, this finger3d reads version 3; calibrate again": json.dumps(
+            {**data, "format": "finger3d joint calibration", "version": 1}
+        ),
         "no calibration": json.dumps([1, 2]),
-        "curve: missing": json.dumps({k: v for k, v in data.items() if k != "curve"}),
-        "noise = 0.0: must be a number from 1e-12 to 1000": json.dumps({**data, "noise": 0.0}),
-        "curve: must have a reading and tolerances for each of the 5": json.dumps(short),
-        "gauge: must be a text": json.dumps({**data, "gauge": 3}),
-        "curve: must be a table": json.dumps({**data, "curve": [1.0]}),
+        "readings: missing": json.dumps({k: v for k, v in data.items() if k != "readings"}),
+        "readings: there are none": json.dumps(data | {"readings": {}}),
+        "readings.g: must be a table": json.dumps(data | {"readings": {"g": 3}}),
+        "must be a name without control characters": json.dumps(data | {"readings": {"\033[31m": own}}),
+        "readings.g.kind = 'x': must be gauge": changed(kind="x"),
+        "readings.g.noise = 0.0: must be a number from 1e-12 to 1000": changed(noise=0.0),
+        "readings.g: must have a reading and tolerances for each of the 25": changed(curve=own["curve"][:5]),
+        "readings.g.curve: must be a list": changed(curve=3),
+        "readings.g.curve.0 = nan: must be": changed(curve=[float("nan")] * 25),
         "resolution_limit = True: must be a number": json.dumps({**data, "resolution_limit": True}),
         "failed.mu: missing": json.dumps({**data, "failed": ["x"]}),
-        "curve.strain.0 = nan: must be": json.dumps(data | {"curve": data["curve"] | {"strain": [float("nan")] * 25}}),
-        "curve.mu.0 = 'a': must be a number from 0": json.dumps(
-            {**data, "curve": {**data["curve"], "mu": ["a", 1.0, 2.0, 3.0]}}
-        ),
+        "mu.0 = 'a': must be a number from 0": json.dumps({**data, "mu": ["a", 1.0, 2.0, 3.0]}),
+        "mu: must be at least 4 values that ascend": json.dumps(data | {"mu": data["mu"][::-1]}),
     }
     for told, text in cases.items():
         path = tmp_path / "bad.json"
@@ -64,9 +75,9 @@ def test_calibration_files_that_are_none(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("place", "value"),
-    [(("noise",), 1e300), (("resolution_limit",), 1e300), (("curve", "strain", 3), -1e300),
-     (("curve", "mu", 24), 1e300), (("tolerances", "nu", "sd"), 1e300),
-     (("tolerances", "nu", "strain_per_unit", 2), 1e300), (("tolerances", "nu", "strain_sd", 2), 1e300)],
+    [((*G, "noise"), 1e300), (("resolution_limit",), 1e300), ((*G, "curve", 3), -1e300), (("mu", 24), 1e300),
+     ((*G, "tolerances", "nu", "sd"), 1e300), ((*G, "tolerances", "nu", "per_unit", 2), 1e300),
+     ((*G, "tolerances", "nu", "reading_sd", 2), 1e300)],
 )  # fmt: skip
 def test_a_number_that_would_overflow_is_refused(
     place: tuple[Any, ...], value: float, tmp_path: Path, capsys: Any

@@ -3,28 +3,29 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy import stats
 
-from finger3d.sensor import JointCalibration, estimate
+from finger3d.sensor import Calibration, Tolerance, estimate
 from finger3d.sensor.likelihood import chi_square_tail
-from tests.sensor_cases import curve, line, saturating, straight, together, tolerance, turning
+from tests.sensor_cases import curve, kinked, line, saturating, straight, together, tolerance, turning
 
 NOISE = 1.5e-4
 
 
-def read(joint: JointCalibration, values: Any, **options: Any) -> Any:
+def read(joint: Calibration, values: Any, **options: Any) -> Any:
     return estimate(joint, dict(zip(joint.names, values, strict=True)), **options)[0]
 
 
-def drawn(joint: JointCalibration, mu: float, random: np.random.Generator) -> Any:
+def drawn(joint: Calibration, mu: float, random: np.random.Generator) -> Any:
     return random.multivariate_normal(joint.at([mu])[0], joint.covariance([mu])[0])
 
 
-def joint_of_three() -> JointCalibration:
+def joint_of_three() -> Calibration:
     depth = tolerance("depth_mm", 0.1, 0.02)
     return together(
         curve(line(0.01), tolerances=(depth,)),
@@ -129,3 +130,44 @@ def test_broken_sensors_are_left_out() -> None:
 def test_the_tail_of_chi_square(freedom: int) -> None:
     for value in (0.0, 0.1, 2.0, 9.0, 40.0):
         assert chi_square_tail(value, freedom) == pytest.approx(stats.chi2.sf(value, freedom), rel=1e-9)
+
+
+@pytest.mark.parametrize("function", [straight, saturating, kinked, turning])
+def test_sets_and_deviations_of_one_reading_are_kept(function: Any) -> None:
+    """For mu drawn evenly the 90 % sets hold it in 90 % of the draws, and the mean square of z is 1, on any curve."""
+    grown = Tolerance("mesh", "error bar", 1.0, np.zeros(25), 3e-4 * np.linspace(0.0, 1.0, 25))
+    made, random = curve(function, tolerances=(grown,)), np.random.default_rng(20261122)
+    mu, g = random.uniform(0.02, 1.2, 1500), made["g"]
+    answers = estimate(made, g.at(mu) + random.normal(size=len(mu)) * g.reading_sd(mu))
+    hit = [any(low <= m <= high for low, high in a.intervals) for m, a in zip(mu, answers, strict=True)]
+    # three binomial deviations, and what the last node of the quadrature adds
+    assert np.mean(hit) == pytest.approx(0.9, abs=3.0 * math.sqrt(0.09 / len(mu)) + 0.01)
+    z = np.array([(a.mu - m) / a.std for m, a in zip(mu, answers, strict=True) if a.is_determined])
+    if function is not turning:  # there all but a few are ambiguous
+        assert len(z) > 500
+        assert abs(math.sqrt(np.mean(z**2)) - 1.0) < 0.1
+        assert np.mean(np.abs(z) > 3.0) < 0.02
+
+
+def test_the_fit_may_take_the_place_of_the_interpolation() -> None:
+    made = curve(lambda mu: 0.02 - 0.01 * mu + 0.003 * mu**2)
+    by_curve, by_fit = (estimate(made, made["g"].at(0.5), curve=shape)[0] for shape in ("interpolation", "fit"))
+    assert by_fit.mu == pytest.approx(by_curve.mu, abs=1e-4)
+    bent = curve(saturating)
+    off = estimate(bent, bent["g"].at(0.3), curve="fit")[0]
+    assert off.std > 2.0 * estimate(bent, bent["g"].at(0.3))[0].std  # the residual of the fit is an error of the curve
+
+
+def test_a_tolerance_that_hides_mu_is_named() -> None:
+    made = curve(straight, tolerances=(Tolerance("tilt_deg", "degree", 0.5, np.full(25, 0.02), np.full(25, 0.01)),))
+    (blind,) = estimate(made, straight(0.5))
+    assert blind.status == "blind"
+    assert re.search(r"100 % .*tilt_deg$", blind.verdict)
+    (clear,) = estimate(made, straight(0.5), tolerances=False)
+    assert clear.std == pytest.approx(0.1, rel=1e-3)  # the noise over the slope
+
+
+def test_a_blind_reading_without_tolerances_blames_the_noise() -> None:
+    made = curve(line(1e-6), tolerances=(tolerance("tilt_deg", 0.5, 1.0),))
+    assert estimate(made, 0.05)[0].verdict.endswith(" tilt_deg")
+    assert estimate(made, 0.05, tolerances=False)[0].verdict.endswith(" noise")

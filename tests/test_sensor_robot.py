@@ -31,7 +31,7 @@ def test_an_estimate_needs_no_library_but_numpy(tmp_path: Path) -> None:
     said = subprocess.run(
         [sys.executable, "-c", NUMPY_ONLY, str(kept), repr(straight(0.3))], capture_output=True, text=True, check=True
     )
-    assert float(said.stdout) == pytest.approx(0.3)
+    assert float(said.stdout) == pytest.approx(0.3, abs=2e-3)
 
 
 def test_several_readings_need_no_library_but_numpy(tmp_path: Path) -> None:
@@ -76,7 +76,7 @@ def test_the_ros_node_publishes_what_estimate_says(tmp_path: Path, monkeypatch: 
     own = runpy.run_path(str(Path(__file__).parents[1] / "docs" / "friction_node.py"))["FrictionNode"]()
     own.on_strain(SimpleNamespace(data=straight(0.3)))
     own.on_strain(SimpleNamespace(data=0.2))
-    assert published[0][0] == pytest.approx(0.3)
+    assert published[0][0] == pytest.approx(0.3, abs=2e-3)
     assert published[0][2] < 0.3 < published[0][3]
     assert len(published) == len(logged) == 1
     assert logged[0].startswith("out of range")

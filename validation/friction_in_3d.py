@@ -19,7 +19,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.analyses.calibrate.run import calibrated_together
+from finger3d.analyses.calibrate.run import calibrated
 from finger3d.analyses.calibrate.tolerances import with_defaults
 from finger3d.analyses.optimise.gauge_fields import GaugeFields
 from finger3d.analyses.optimise.gauge_search import Region, search
@@ -29,7 +29,7 @@ from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.readings import Marker
-from finger3d.sensor import JointCalibration
+from finger3d.sensor import Calibration
 
 from ._paper import columns
 from ._rows import Result, Row
@@ -114,7 +114,7 @@ def _free(body: Model, sets: Mapping[str, Sequence[Gauge]], quick: bool) -> dict
     names[MARKERS] = [f"{m.name}.x" for m in markers]
     whole = replace(body, gauges=gauges, markers=markers)
     off = {**IDEAL, "tilt_deg": 0.0} if quick else IDEAL
-    joint, _ = calibrated_together(whole, [n for some in names.values() for n in some], MUS, tolerances=off)
+    joint, _ = calibrated(whole, [n for some in names.values() for n in some], MUS, tolerances=off)
     return {name: _sd(joint.of(some)) for name, some in names.items()}
 
 
@@ -123,7 +123,7 @@ def _with_foils(body: Model, sets: Mapping[str, Sequence[Gauge]]) -> dict[str, F
     name = list(sets)[-1]
     gauges = tuple(_inside(body, replace(g, length_mm=4.0)) for g in sets[name])
     foils = FOIL.apply(replace(body, gauges=gauges))
-    joint, _ = calibrated_together(foils, [g.name for g in gauges], MUS, tolerances=IDEAL)
+    joint, _ = calibrated(foils, [g.name for g in gauges], MUS, tolerances=IDEAL)
     return {name: _sd(joint)}
 
 
@@ -137,7 +137,7 @@ def _inside(body: Model, gauge: Gauge) -> Gauge:
         gauge = replace(gauge, x_mm=0.98 * gauge.x_mm, y_mm=gauge.y_mm - 0.5)
 
 
-def _sd(joint: JointCalibration) -> Float:
+def _sd(joint: Calibration) -> Float:
     """Return the standard deviation of mu, at most that of a mu that may lie anywhere from 0.05 to 1."""
     return np.asarray(1.0 / np.sqrt(joint.mu_sd(np.array(MUS)) ** -2 + 12.0 / (MUS[-1] - MUS[0]) ** 2))
 

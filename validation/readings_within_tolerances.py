@@ -18,7 +18,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.analyses.calibrate.run import calibrated_together
+from finger3d.analyses.calibrate.run import calibrated
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
@@ -26,7 +26,7 @@ from finger3d.mechanics.build import build
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.readings import Taxel
 from finger3d.mechanics.solve import march
-from finger3d.sensor import JointCalibration, JointEstimate, estimate
+from finger3d.sensor import Calibration, Estimate, estimate
 
 from ._paper import columns
 from ._rows import Result, Row
@@ -102,9 +102,7 @@ def _judged(
     """Calibrate on several meshes with several numbers of increments, and judge readings of drawn presses by some."""
     curve = np.linspace(*MU, 25).tolist()
     calibrations = [
-        (n, calibrated_together(model(domain, size, n), THREE, curve, tolerances=ON)[0])
-        for n in counts
-        for size in sizes
+        (n, calibrated(model(domain, size, n), THREE, curve, tolerances=ON)[0]) for n in counts for size in sizes
     ]
     body = build(model(domain, min(sizes) / FINER, READ_STEPS[domain]), margin=math.inf)
     for _ in range(draws):
@@ -123,12 +121,12 @@ def _judged(
                 yield _judgement(domain, steps, names, mu, depth, modulus, answer)
 
 
-def _estimate(joint: JointCalibration, readings: dict[str, float]) -> JointEstimate:
+def _estimate(joint: Calibration, readings: dict[str, float]) -> Estimate:
     return estimate(joint, readings)[0]
 
 
 def _judgement(
-    domain: str, steps: int, names: tuple[str, ...], mu: float, depth: float, modulus: float, answer: JointEstimate
+    domain: str, steps: int, names: tuple[str, ...], mu: float, depth: float, modulus: float, answer: Estimate
 ) -> Judged:
     told = answer.status in ("ok", "coarse")
     inside = any(low <= mu <= high for low, high in answer.intervals)

@@ -29,7 +29,8 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
 from finger3d.plotting.strain_map import resolution_panel, slope_panel
-from finger3d.sensor import Calibration, estimate
+from finger3d.sensor import Calibration, ReadingCurve, estimate
+from finger3d.sensor.likelihood import CREDIBLE
 from finger3d.sensor.maps import StrainMap
 
 from ._paper import columns, said
@@ -65,18 +66,19 @@ def run(quick: bool) -> Result:
     maps: dict[Domain, StrainMap] = {}
     rows: list[Row] = []
     for domain, sizes in (QUICK if quick else SIZES).items():
-        free, points = calibrated(model(domain, sizes, 0.0, quick), "g", mus, NOISE, LIMIT, wanted)
+        free, points = calibrated(model(domain, sizes, 0.0, quick), "g", mus, {"gauge": NOISE}, LIMIT, wanted)
         found[domain, FREE] = free
         foil = FOIL.apply(model(domain, sizes, 4.0, quick))
-        found[domain, READ] = calibrated(foil, "g", mus, NOISE, LIMIT, OFF if quick else STEPS_ALONE)[0]
+        found[domain, READ] = calibrated(foil, "g", mus, {"gauge": NOISE}, LIMIT, OFF if quick else STEPS_ALONE)[0]
         maps[domain] = StrainMap.of(points.problem, points.frames)
         rows += _checks(domain, free, points)
     for (domain, kind), calibration in found.items():
         rows += _statements(f"{kind}, {NAMES[domain]}", calibration)
     rows += _widths(found)
     lines: list[tuple[Any, ...]] = []
-    for (domain, kind), c in found.items():
-        spread = c.mu_sd(c.mu) if c.tolerances else np.full(len(c.mu), np.nan)
+    for (domain, kind), calibration in found.items():
+        c = calibration.readings[0]
+        spread = calibration.mu_sd(c.mu) if c.tolerances else np.full(len(c.mu), np.nan)
         each = (
             c.mu,
             c.reading,
@@ -90,7 +92,7 @@ def run(quick: bool) -> Result:
     return Result(tuple(rows), columns(LINES, lines), lambda figure: _draw(figure, found, maps))
 
 
-def _checks(domain: Domain, c: Calibration, points: CurvePoints) -> list[Row]:
+def _checks(domain: Domain, calibration: Calibration, points: CurvePoints) -> list[Row]:
     """What must hold whatever the answer: maps, the reduced model, and the coverage of the intervals."""
     here = NAMES[domain]
     problem, (first, *_, last) = points.problem, points.mus
@@ -103,11 +105,12 @@ def _checks(domain: Domain, c: Calibration, points: CurvePoints) -> list[Row]:
     random = np.random.default_rng(20261121)
     count = 4000
     mu = random.uniform(first, last, count)
-    quiet = replace(c, tolerances=())
+    quiet = calibration.without_tolerances
+    c = quiet.readings[0]
     # what the set allows for, drawn whole
-    answers = estimate(quiet, c.at(mu) + random.normal(0.0, 1.0, count) * quiet.reading_sd(mu))
-    hit = np.mean([any(a.low <= m <= a.high for a in e.candidates) for m, e in zip(mu, answers, strict=True)])
-    share = math.erf(1.0 / math.sqrt(2.0))
+    answers = estimate(quiet, c.at(mu) + random.normal(0.0, 1.0, count) * c.reading_sd(mu))
+    hit = np.mean([any(low <= m <= high for low, high in e.intervals) for m, e in zip(mu, answers, strict=True)])
+    share = CREDIBLE
     return [
         Row(
             f"strain map at (36.5, 40.5) mm, mu = {last:g}, {here}", "gauge there, by its own row", float(row[1]),
@@ -119,16 +122,17 @@ def _checks(domain: Domain, c: Calibration, points: CurvePoints) -> list[Row]:
             1e-9, "from another start; both end at a residual of 1e-11",
         ),
         Row(
-            f"68 % intervals that contain the true mu, {count} readings, {here}", "erf(1/sqrt 2)", share, float(hit),
+            f"90 % sets that contain the true mu, {count} readings, {here}", "mu drawn evenly", share, float(hit),
             3.0 * math.sqrt(share * (1.0 - share) / count), "three binomial standard deviations", measure="absolute",
         ),
     ]  # fmt: skip
 
 
-def _statements(what: str, c: Calibration) -> list[Row]:
+def _statements(what: str, calibration: Calibration) -> list[Row]:
     """What Sec. IV says of the measured sensor."""
+    c = calibration.readings[0]
     steps = np.diff(c.reading)
-    usable = max((r.high for r in c.usable if r.low <= 0.3), default=0.0)
+    usable = max((high for low, high in calibration.usable if low <= 0.3), default=0.0)
     return [
         said(
             f"the strain falls as mu grows: rising steps over all movement, {what}", "Fig. 14", 0.0,
@@ -155,7 +159,7 @@ def _statements(what: str, c: Calibration) -> list[Row]:
     ]  # fmt: skip
 
 
-def _left(what: str, c: Calibration) -> list[Row]:
+def _left(what: str, c: ReadingCurve) -> list[Row]:
     """What the increments leave open of the change of the strain; none where that was not looked for."""
     names, mus = [t.name for t in c.tolerances], np.array([0.4, 0.6])
     if "increments" not in names:
@@ -168,7 +172,7 @@ def _left(what: str, c: Calibration) -> list[Row]:
 
 def _widths(found: Found) -> list[Row]:
     """What the plane strain section promises, held against the finger 20 mm wide."""
-    moved = {k: float(np.ptp(c.reading)) for k, c in found.items()}
+    moved = {k: float(np.ptp(c.readings[0].reading)) for k, c in found.items()}
     return [
         Row(
             f"change of the strain over all mu, 20 mm wide over plane strain, {kind}", "plane strain", 1.0,
@@ -190,7 +194,7 @@ def _draw(figure: Any, found: Found, maps: dict[Domain, StrainMap]) -> None:
     colours = {"plane-strain": "#2166ac", "solid": "#b2182b"}
     for axes, kind in zip(panels[0], (FREE, READ), strict=False):
         for domain, name in NAMES.items():
-            c = found[domain, kind]
+            c = found[domain, kind].readings[0]
             axes.plot(c.grid, 1e3 * c.at(c.grid), color=colours[domain], lw=1.5, label=name)
             axes.plot(c.mu, 1e3 * c.reading, "o", ms=3, color=colours[domain])
             axes.plot(c.grid, 1e3 * c.at(c.grid, "fit"), "--", color=colours[domain], lw=1.0, label="its second order")
@@ -198,7 +202,8 @@ def _draw(figure: Any, found: Found, maps: dict[Domain, StrainMap]) -> None:
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
         axes.legend(frameon=False, fontsize=8)
     right = panels[0, 2]
-    for (domain, kind), c in found.items():
+    for (domain, kind), calibration in found.items():
+        c = calibration.readings[0]
         style = "-" if kind == FREE else ":"
         shown = np.minimum(c.resolution(c.grid), 1e3)
         right.semilogy(c.grid, shown, style, color=colours[domain], lw=1.5, label=f"{NAMES[domain]}, {kind}")

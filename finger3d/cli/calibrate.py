@@ -56,9 +56,8 @@ def calibrate(
     from finger3d.analyses.calibrate.run import calibrate as run
     from finger3d.analyses.calibrate.settings import parsed_mus
     from finger3d.scene.parts import moduli
-    from finger3d.sensor.curve import summary
+    from finger3d.sensor.calibration import summary
     from finger3d.sensor.files import as_dict
-    from finger3d.sensor.joint import JointCalibration, joint_summary
 
     with job(json_, lambda done: f"{done.steps_done} of {done.steps_total} values of mu are kept in {out}") as report:
         found = run(
@@ -77,8 +76,7 @@ def calibrate(
     if json_:
         print_json(as_dict(found))
     else:
-        rows = joint_summary(found) if isinstance(found, JointCalibration) else summary(found)
-        print_rows(loaded.title, [*moduli(loaded.tables).items(), *rows, ("results", str(out))])
+        print_rows(loaded.title, [*moduli(loaded.tables).items(), *summary(found), ("results", str(out))])
         print(found.verdict())
     if found.failed:
         mu_failed, why = found.failed[0]

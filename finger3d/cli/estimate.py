@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import csv
+import math
+import os
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import IO, TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -17,12 +19,16 @@ from finger3d.errors import Finger3dError
 
 if TYPE_CHECKING:
     from finger3d._types import Tree
-    from finger3d.sensor import Calibration, Estimate, JointCalibration, JointEstimate
-
-    AnyEstimate = Estimate | JointEstimate
+    from finger3d.sensor import Calibration, Estimate
 
 _POLL_S = 0.02
 """Time between two looks at a file that is followed."""
+
+_LONGEST_LINE = 65536
+"""Characters of a line of a stream beyond which it is no line of readings."""
+
+_COLUMNS = ("mu", "std", "low", "high", "status", "chi_square", "p_value", "verdict")
+"""Columns of an estimate that follow those of its readings."""
 
 
 @app.command
@@ -35,7 +41,7 @@ def estimate(
         Parameter(
             negative=(),
             allow_leading_hyphen=True,
-            help="One strain reading; or NAME=READING, repeated for each of several calibrated readings.",
+            help="A reading; or NAME=READING, repeated for each of several calibrated readings.",
         ),
     ] = None,
     std: Annotated[
@@ -51,8 +57,8 @@ def estimate(
         Path | None,
         Parameter(
             name="--csv",
-            help="CSV file of readings: a column strain and, optionally, a column std; of several calibrated readings "
-            "a column for each, NAME, and optionally NAME_std.",
+            help="CSV file of readings: a column for each, NAME, and optionally NAME_std; of a single reading strain "
+            "and std will do.",
         ),
     ] = None,
     follow: Annotated[
@@ -65,7 +71,7 @@ def estimate(
     json_: Json = False,
     curve: Annotated[
         Literal["interpolation", "fit"],
-        Parameter(help="Curve of a single gauge to invert: the monotone interpolation or the second-order fit."),
+        Parameter(help="Curve of the readings over mu: the monotone interpolation or the second-order fit."),
     ] = "interpolation",
     tolerances: Annotated[
         bool,
@@ -78,7 +84,8 @@ def estimate(
 
     Example: finger3d estimate cal/calibration.json --strain 0.052
 
-    With --follow an estimate is printed as soon as its reading is written, until standard input ends or Ctrl-C.
+    With --follow an estimate is printed as soon as its reading is written, until standard input ends or Ctrl-C. A line
+    that is no reading has the status invalid and the reason; a file that is replaced or cut is read from its start.
 
     Parameters
     ----------
@@ -91,9 +98,9 @@ def estimate(
         raise Finger3dError("estimate: give either --strain NUMBER, --csv FILE or --follow FILE")
     if out is not None and csv_ is None:
         raise Finger3dError("estimate: --out goes with --csv")
-    job = _Job(read(calibration), std or (), curve, tolerances)
+    job = _Job.of(read(calibration), std or (), curve, tolerances)
     if strain is not None:
-        (found,) = job.estimates(job.named("--strain", strain), job.stds)
+        (found,) = job.estimates(job.named("--strain", strain), job.given_stds)
         if json_:
             print_json(asdict(found))
         else:
@@ -115,48 +122,44 @@ def _estimate_file(job: _Job, path: Path, out: Path | None, json_: bool) -> None
     if json_:
         print_json([asdict(e) for e in every])
     elif out is None:
-        print("\n".join([",".join(job.columns), *(",".join(map(_cell, job.line(e))) for e in every)]))
+        print("\n".join([",".join(map(_cell, job.columns)), *(",".join(map(_cell, job.line(e))) for e in every)]))
     else:
         from finger3d.io import write_csv
 
         lines = [job.line(e) for e in every]
         columns: Tree = {name: [line[i] for line in lines] for i, name in enumerate(job.columns)}
         write_csv(out, columns)
-        determined = sum(e.status in ("ok", "coarse") for e in every)
+        determined = sum(e.is_determined for e in every)
         print(f"{determined} of {len(every)} readings determine mu; results: {out}")
 
 
 @dataclass(frozen=True)
 class _Job:
-    """A calibration and how readings are to be turned into mu; a single gauge is called ``strain``, as its column."""
+    """A calibration, standard deviations by name, and how readings are to be turned into mu."""
 
-    calibration: Calibration | JointCalibration
-    given_stds: Sequence[str]
+    calibration: Calibration
+    given_stds: dict[str, float]
     curve: Literal["interpolation", "fit"]
     tolerances: bool
 
-    @property
-    def joint(self) -> bool:
-        from finger3d.sensor import JointCalibration
-
-        return isinstance(self.calibration, JointCalibration)
+    @classmethod
+    def of(
+        cls,
+        calibration: Calibration,
+        stds: Sequence[str],
+        curve: Literal["interpolation", "fit"],
+        tolerances: bool,
+    ) -> _Job:
+        """Return a job with the standard deviations of ``--std``."""
+        plain = cls(calibration, {}, curve, tolerances)
+        return replace(plain, given_stds=plain.named("--std", stds, plain_for_all=True))
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Columns of the readings."""
-        return self.calibration.names if self.joint else ("strain",)  # type: ignore[union-attr]
-
-    @property
-    def std_columns(self) -> tuple[str, ...]:
-        return tuple(f"{name}_std" for name in self.names) if self.joint else ("std",)
-
-    @property
-    def stds(self) -> dict[str, float]:
-        """Standard deviations of ``--std`` by name."""
-        return self.named("--std", self.given_stds, plain_for_all=True)
+        return self.calibration.names
 
     def named(self, option: str, texts: Sequence[str], plain_for_all: bool = False) -> dict[str, float]:
-        """Return the numbers of an option by name: of ``NAME=NUMBER``, or of the plain number for a single gauge."""
+        """Return the numbers of an option by name: of ``NAME=NUMBER``, or of the plain number for a single reading."""
         found: dict[str, float] = {}
         for text in texts:
             name, equals, value = text.rpartition("=")
@@ -171,17 +174,12 @@ class _Job:
         return found
 
     def _meant(self, option: str, text: str, name: str, plain_for_all: bool) -> tuple[str, ...]:
-        """Return the columns that a name stands for."""
-        if not self.joint:
-            own = self.calibration.name  # type: ignore[union-attr]
-            if name not in ("", own):
-                raise Finger3dError(f"{option} {text}: {name} is not calibrated; the gauge is {own}")
-            return ("strain",)
+        """Return the readings that a name stands for."""
         if name in self.names:
             return (name,)
         if name:
-            raise Finger3dError(f"{option} {text}: {name} is not calibrated; the readings are {', '.join(self.names)}")
-        if plain_for_all and len({c.kind for c in self.calibration.readings}) == 1:  # type: ignore[union-attr]
+            raise Finger3dError(f"{option} {text}: {name} is not calibrated; calibrated: {', '.join(self.names)}")
+        if len(self.names) == 1 or (plain_for_all and len({c.kind for c in self.calibration.readings}) == 1):
             return self.names
         raise Finger3dError(
             f"{option} {text}: {', '.join(self.names)} are calibrated; give the name of the reading, for instance "
@@ -190,70 +188,115 @@ class _Job:
 
     def estimates(
         self, values: Mapping[str, Sequence[float] | float], stds: Mapping[str, Sequence[float] | float]
-    ) -> Sequence[AnyEstimate]:
-        """Return an estimate for each reading, or set of readings."""
+    ) -> Sequence[Estimate]:
+        """Return an estimate for each set of readings."""
         from finger3d.sensor import estimate as run
 
-        if self.joint:
-            return run(self.calibration, values, stds, self.curve, self.tolerances)
-        return run(self.calibration, values["strain"], stds.get("strain"), self.curve, self.tolerances)
+        return run(self.calibration, values, stds, self.curve, self.tolerances)
 
     @property
     def columns(self) -> tuple[str, ...]:
         """Columns of the estimates."""
-        if self.joint:
-            return (*self.names, "mu", "std", "low", "high", "status", "chi_square", "p_value", "verdict")
-        return ("strain", "reading_std", "mu", "std", "low", "high", "status", "verdict")
+        return (*self.names, *_COLUMNS)
 
-    def line(self, found: AnyEstimate) -> list[object]:
+    def line(self, found: Estimate) -> list[object]:
         """Return the cells of an estimate."""
-        readings = found.readings if self.joint else {}  # type: ignore[union-attr]
-        return [readings[name] if name in readings else getattr(found, name) for name in self.columns]
+        return [*found.readings.values(), *(getattr(found, name) for name in _COLUMNS)]
+
+    def columns_of(self, source: Path | str, names: Sequence[str]) -> dict[str, str]:
+        """Return the columns of a file for ``NAME`` and ``NAME_std``; a missing column of readings is an error."""
+        found = {name: name for one in self.names for name in (one, f"{one}_std") if name in names}
+        if len(self.names) == 1:  # a single reading may be called strain
+            short = {self.names[0]: "strain", f"{self.names[0]}_std": "std"}
+            found = {name: column for name, column in short.items() if column in names} | found
+        missing = [name for name in self.names if name not in found]
+        missing = [f"{missing[0]} or strain"] if missing and len(self.names) == 1 else missing
+        if missing:
+            has = ", ".join(repr(name)[:40] for name in names) or "nothing"
+            raise Finger3dError(
+                f"{source}: must have a column named {' and one named '.join(missing)} and at least one reading; it "
+                f"has {has}"
+            )
+        return found
 
 
 def _followed(job: _Job, source: str) -> Iterator[str]:
-    """Yield a line of names, and a line for each reading as soon as it is written."""
-    rows = csv.DictReader(_written_lines(source))
-    yield ",".join(job.columns)
-    for number, row in enumerate(rows, start=2):
-        _check_columns(job, source, row)
-        values = {name: _number(source, number, name, row) for name in job.names}
-        stds = dict(job.stds)
-        for name, column in zip(job.names, job.std_columns, strict=True):
-            if column in row:
-                stds[name] = _number(source, number, column, row)
+    """Yield a line of names, and a line for each reading as soon as it is written.
+
+    A line that is no reading is answered with the reason, so that it does not stop a robot.
+    """
+    yield ",".join(map(_cell, job.columns))
+    names: list[str] = []
+    columns: dict[str, str] = {}
+    number = 0
+    for line in _written_lines(source):
+        number = number + 1 if line else 0
+        if line == "\n" or not line:
+            continue
+        cells = next(csv.reader([line]), []) if len(line) <= _LONGEST_LINE else []
+        stripped = [cell.strip() for cell in cells]
+        if not columns or (number == 1 and set(stripped) >= set(columns.values())):
+            names, columns = stripped, job.columns_of(source, stripped)
+            continue
         try:
-            (found,) = job.estimates(values, stds)
+            row = dict(zip(names, cells, strict=False))
+            found = {name: _number(source, number, column, row) for name, column in columns.items()}
+            stds = job.given_stds | {name: found[f"{name}_std"] for name in job.names if f"{name}_std" in found}
+            (answer,) = job.estimates({name: found[name] for name in job.names}, stds)
+            answered = job.line(answer)
         except Finger3dError as error:
-            raise Finger3dError(f"{source}: line {number}: {error}") from None
-        yield ",".join(map(_cell, job.line(found)))
+            nothing = dict.fromkeys(job.columns, math.nan)
+            answered = list((nothing | {"status": "invalid", "verdict": str(error)}).values())
+        yield ",".join(map(_cell, answered))
 
 
 def _written_lines(source: str) -> Iterator[str]:
-    """Yield the lines of a file as they are written, without end; those of standard input until it ends."""
+    """Yield the lines of a file as they are written, without end; those of standard input until it ends.
+
+    An empty string says that the file was replaced by another, or cut: what follows is from the start.
+    """
     if source == "-":
-        yield from sys.stdin
+        for whole in sys.stdin.buffer:
+            yield whole.decode("utf-8-sig", errors="replace")
         return
+    stream, begun = _opened(source), b""
     try:
-        stream = Path(source).open(encoding="utf-8-sig")
-    except OSError as error:
-        raise Finger3dError(f"{source}: cannot be read: {error.strerror}") from None
-    with stream:
-        begun = ""
         while True:
             begun += stream.readline()
-            if begun.endswith("\n"):
-                yield begun
-                begun = ""
+            if begun.endswith(b"\n"):
+                yield begun.decode("utf-8-sig", errors="replace")
+                begun = b""
+            elif _is_replaced(stream, source):
+                stream.close()
+                stream, begun = _opened(source), b""
+                yield ""
             else:
                 time.sleep(_POLL_S)
+    finally:
+        stream.close()
+
+
+def _opened(source: str) -> IO[bytes]:
+    try:
+        return Path(source).open("rb")
+    except OSError as error:
+        raise Finger3dError(f"{source}: cannot be read: {error.strerror}") from None
+
+
+def _is_replaced(stream: IO[bytes], source: str) -> bool:
+    """Return whether the file of this name is another one than that which is read, or is shorter than what was read."""
+    try:
+        now, read = os.stat(source), os.fstat(stream.fileno())
+    except FileNotFoundError:
+        return False  # between the removal of the old file and the creation of the new one
+    return (now.st_dev, now.st_ino) != (read.st_dev, read.st_ino) or now.st_size < stream.tell()
 
 
 def _cell(value: object) -> str:
     if isinstance(value, float):
         return repr(value)
     text = str(value)
-    return f'"{text}"' if "," in text else text
+    return '"' + text.replace('"', '""') + '"' if "," in text or '"' in text else text
 
 
 def _readings(job: _Job, path: Path) -> tuple[dict[str, list[float]], dict[str, list[float] | float]]:
@@ -269,27 +312,18 @@ def _readings(job: _Job, path: Path) -> tuple[dict[str, list[float]], dict[str, 
         raise Finger3dError(
             f"{path}: not a CSV file; it must have a line of names, then one line for each reading"
         ) from None
-    _check_columns(job, path, rows[0] if rows else {})
-    values = {name: [_number(path, i, name, row) for i, row in enumerate(rows, start=2)] for name in job.names}
-    stds: dict[str, list[float] | float] = dict(job.stds)
-    for name, column in zip(job.names, job.std_columns, strict=True):
-        if column in rows[0]:
-            stds[name] = [_number(path, i, column, row) for i, row in enumerate(rows, start=2)]
-    return values, stds
-
-
-def _check_columns(job: _Job, source: Path | str, row: Mapping[str, object]) -> None:
-    """Raise an error for a file without one of the columns."""
-    missing = [name for name in job.names if name not in row]
-    if missing:
-        raise Finger3dError(
-            f"{source}: must have a column named {' and one named '.join(missing)} and at least one reading; it has "
-            f"{', '.join(map(str, row)) or 'nothing'}"
-        )
+    columns = job.columns_of(path, [str(name) for name in rows[0]] if rows else [])
+    found = {
+        name: [_number(path, i, column, row) for i, row in enumerate(rows, start=2)] for name, column in columns.items()
+    }
+    stds: dict[str, list[float] | float] = {**job.given_stds}
+    stds |= {name: found[f"{name}_std"] for name in job.names if f"{name}_std" in found}
+    return {name: found[name] for name in job.names}, stds
 
 
 def _number(path: Path | str, line: int, name: str, row: Mapping[str, str | None]) -> float:
+    text = row.get(name) or ""
     try:
-        return float(row[name] or "")
+        return float(text)
     except ValueError:
-        raise Finger3dError(f"{path}: line {line}: {name} = {row[name]!r}: must be a number") from None
+        raise Finger3dError(f"{path}: line {line}: {name} = {text!r:.40}: must be a number") from None

@@ -45,6 +45,7 @@ def identify(
         The scene file (TOML).
     """
     from finger3d.analyses.free_keys import FreeKey
+    from finger3d.analyses.identify.run import DEVIATIONS
     from finger3d.analyses.identify.run import identify as run
     from finger3d.scene import tree
 
@@ -66,6 +67,7 @@ def identify(
                 (key, f"{value:.4g} +- {std:.2g} (68 % interval {low:.4g} to {high:.4g})")
                 for key, value, std, low, high in fitted
             ),
+            ("deviations", DEVIATIONS),
             *(("note", note) for note in found.notes),
             ("presses", f"{found.presses} solved"),
             ("results", str(out / "identified.toml")),

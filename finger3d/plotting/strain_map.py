@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from finger3d._types import Float
 from finger3d.mechanics.gauges import Gauge
 from finger3d.plotting.layout import sheet
-from finger3d.sensor.curve import Calibration
+from finger3d.sensor.calibration import Calibration
 from finger3d.sensor.maps import StrainMap
 
 if TYPE_CHECKING:
@@ -39,14 +39,14 @@ def draw_map(path: Path, found: StrainMap, gauge: Gauge, calibration: Calibratio
     mu : coefficient of friction of the first panel, limited to the range of the map
     """
     ends = f"mu = {found.mu[0]:g} to {found.mu[-1]:g}"
-    title = f"z = {found.z_mm:g} mm, {ends}, noise {calibration.noise:g}; circle: gauge {gauge.name}"
+    title = f"z = {found.z_mm:g} mm, {ends}, noise {float(calibration.noise[0]):g}; circle: gauge {gauge.name}"
     made = sheet(1, 3, (5.4, 3.9), (0.7, 0.15, 0.2, 0.35), title)
     figure, panels = made.figure, made.axes
     mu = float(np.clip(mu, found.mu[0], found.mu[-1]))
     degrees = math.degrees(gauge.angle)
     slope_panel(figure, panels[0], found, gauge.angle, mu)
     panels[0].set_title(f"d strain / d mu along {degrees:.4g}° at mu = {mu:.3g}")
-    noise = calibration.noise
+    noise = float(calibration.noise[0])
     resolution_panel(figure, panels[1], found, noise / _positive(found.worst_slope(gauge.angle)), calibration.limit)
     panels[1].set_title(f"worst resolution along {degrees:.4g}°")
     best, direction = found.best()

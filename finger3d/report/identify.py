@@ -39,13 +39,14 @@ def identify_page(folder: str | Path) -> Path:
             for n, rms in data["residual_rms"].items()
         ],
     )
+    told = f"Standard deviations are {data['deviations']}."
     scene = folder / "identified.toml"
     return write_page(
         folder,
         f"{title_of(data['scene'])}: values from {Path(data['measured']).name}",
         headline,
         [
-            PageSection("Values", [*data["notes"], found, *([correlation] if len(values) > 1 else [])]),
+            PageSection("Values", [told, *data["notes"], found, *([correlation] if len(values) > 1 else [])]),
             PageSection("Fit", [columns]),
             PageSection("Scene", how_modelled(data, folder)),
             PageSection("Use it", [Code(f"finger3d press {scene} --out {folder / 'pressed'}")]),

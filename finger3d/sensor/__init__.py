@@ -1,22 +1,9 @@
 """Calibration curves of readings, and the friction coefficient from readings with its uncertainty."""
 
-from finger3d.sensor.curve import Calibration, Fit, Range, Tolerance
+from finger3d.sensor.calibration import Calibration
+from finger3d.sensor.curve import Fit, ReadingCurve, Tolerance
 from finger3d.sensor.estimate import estimate
 from finger3d.sensor.files import load, save
-from finger3d.sensor.inverse import Candidate, Estimate
-from finger3d.sensor.joint import JointCalibration
-from finger3d.sensor.likelihood import JointEstimate
+from finger3d.sensor.likelihood import Estimate
 
-__all__ = [
-    "Calibration",
-    "Candidate",
-    "Estimate",
-    "Fit",
-    "JointCalibration",
-    "JointEstimate",
-    "Range",
-    "Tolerance",
-    "estimate",
-    "load",
-    "save",
-]
+__all__ = ["Calibration", "Estimate", "Fit", "ReadingCurve", "Tolerance", "estimate", "load", "save"]

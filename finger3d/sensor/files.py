@@ -10,12 +10,12 @@ import numpy as np
 
 from finger3d._types import Float, Tree
 from finger3d.errors import Finger3dError
-from finger3d.sensor.curve import FEWEST, LARGEST_SD, LARGEST_STRAIN, QUANTITIES, Calibration, Tolerance
-from finger3d.sensor.joint import JointCalibration
+from finger3d.sensor.calibration import Calibration
+from finger3d.sensor.curve import FEWEST, LARGEST_SD, LARGEST_STRAIN, QUANTITIES, ReadingCurve, Tolerance
 
-FORMAT, VERSION = "finger3d calibration", 2
+FORMAT, VERSION = "finger3d calibration", 3
 
-JOINT_FORMAT, JOINT_VERSION = "finger3d joint calibration", 1
+_FORMER_FORMAT = "finger3d joint calibration"
 
 _STEEPEST = 1e12  # strain per unit of what is not known exactly
 _LARGEST_MU, _LEAST_NOISE, _LARGEST_LIMIT = 1e6, 1e-12, 1e6
@@ -25,7 +25,7 @@ _TYPES: dict[type, str] = {dict: "table", list: "list", str: "text", object: "va
 Part = TypeVar("Part")
 
 
-def save(calibration: Calibration | JointCalibration, path: str | Path) -> Path:
+def save(calibration: Calibration, path: str | Path) -> Path:
     """Write calibration.json."""
     from finger3d.io import write_json
 
@@ -33,68 +33,21 @@ def save(calibration: Calibration | JointCalibration, path: str | Path) -> Path:
     return Path(path)
 
 
-def as_dict(calibration: Calibration | JointCalibration) -> Tree:
-    """Return the content of calibration.json, including what follows from the curve."""
-    return _joint_dict(calibration) if isinstance(calibration, JointCalibration) else _gauge_dict(calibration)
-
-
-def _joint_dict(c: JointCalibration) -> Tree:
-    return {
-        "format": JOINT_FORMAT,
-        "version": JOINT_VERSION,
-        "verdict": c.verdict(),
-        "mu": c.mu,
-        "readings": {
-            one.name: {
-                "kind": one.kind,
-                "unit": QUANTITIES[one.kind][1],
-                "noise": one.noise,
-                "curve": one.reading,
-                "tolerances": {
-                    t.name: {"unit": t.unit, "sd": t.sd, "per_unit": t.slope, "reading_sd": t.spread}
-                    for t in one.tolerances
-                },
-                "mu_sd": one.mu_sd(one.mu),
-            }
-            for one in c.readings
-        },
-        "mu_sd": c.mu_sd(c.mu),
-        "variance_reductions": c.reductions(c.mu),
-        "resolution_limit": c.limit,
-        "trusted": [{"low": low, "high": high} for low, high in c.trusted],
-        "failed": [{"mu": mu, "why": why} for mu, why in c.failed],
-        "scene": c.scene,
-        "hash": c.hash,
-        "about": c.about,
-    }
-
-
-def _gauge_dict(c: Calibration) -> Tree:
-    fit = c.fit
+def as_dict(calibration: Calibration) -> Tree:
+    """Return the content of calibration.json, including what follows from the curves."""
+    c = calibration
     return {
         "format": FORMAT,
         "version": VERSION,
-        "gauge": c.name,
         "verdict": c.verdict(),
-        "curve": {"mu": c.mu, "strain": c.reading},
-        "fit": {"coefficients": fit.coefficients, "residual_rms": fit.rms, "residual_largest": fit.largest},
-        "interpolation": {"kind": "PCHIP", "error": c.interpolation_error},
-        "noise": c.noise,
+        "mu": c.mu,
+        "readings": {one.name: _reading_dict(one) for one in c.readings},
+        "mu_sd": [e.std for e in c.judged_at_mu],
+        "status": [e.status for e in c.judged_at_mu],
+        "variance_reductions": c.reductions(c.mu),
         "resolution_limit": c.limit,
-        "resolution": c.resolution(c.mu),
-        "trusted": [{"low": r.low, "high": r.high} for r in c.trusted],
-        "usable": [{"low": r.low, "high": r.high, "same_strain_at": r.elsewhere} for r in c.usable],
-        "tolerances": {
-            t.name: {
-                "unit": t.unit,
-                "sd": t.sd,
-                "strain_per_unit": t.slope,
-                "strain_sd": t.spread,
-                "mu_sd": _mu_sd(c, i),
-            }
-            for i, t in enumerate(c.tolerances)
-        },
-        "mu_sd": c.mu_sd(c.mu),
+        "trusted": [{"low": low, "high": high} for low, high in c.trusted],
+        "usable": [{"low": low, "high": high} for low, high in c.usable],
         "failed": [{"mu": mu, "why": why} for mu, why in c.failed],
         "scene": c.scene,
         "hash": c.hash,
@@ -102,48 +55,47 @@ def _gauge_dict(c: Calibration) -> Tree:
     }
 
 
-def _mu_sd(c: Calibration, number: int) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    return c.mu_sd(c.mu, c.tolerance_sd(c.mu)[number])
+def _reading_dict(c: ReadingCurve) -> Tree:
+    return {
+        "kind": c.kind,
+        "unit": QUANTITIES[c.kind][1],
+        "noise": c.noise,
+        "curve": c.reading,
+        "fit": {"coefficients": c.fit.coefficients, "residual_rms": c.fit.rms, "residual_largest": c.fit.largest},
+        "resolution": c.resolution(c.mu),
+        "tolerances": {
+            t.name: {"unit": t.unit, "sd": t.sd, "per_unit": t.slope, "reading_sd": t.spread} for t in c.tolerances
+        },
+    }
 
 
-def write_table(calibration: Calibration | JointCalibration, path: Path) -> None:
-    """Write calibration.csv: every mu with its readings, their slopes, and standard deviations of mu."""
+def write_table(calibration: Calibration, path: Path) -> None:
+    """Write calibration.csv: every mu with its readings, and what an estimate from them says."""
     from finger3d.io import write_csv
 
     c = calibration
-    columns = _joint_columns(c) if isinstance(c, JointCalibration) else _gauge_columns(c)
-    columns["outcome"] = np.array(["converged"] * len(c.mu), dtype=object)
-    blank = [np.nan] * len(c.failed)
-    for name in columns:
-        added = {"mu": [mu for mu, _ in c.failed], "outcome": [why for _, why in c.failed]}.get(name, blank)
-        columns[name] = np.concatenate([columns[name], np.array(added, dtype=columns[name].dtype)])
-    write_csv(path, columns)
-
-
-def _gauge_columns(c: Calibration) -> Tree:
     columns: Tree = {
         "mu": c.mu,
-        "strain": c.reading,
-        "strain_fit": c.at(c.mu, "fit"),
-        "strain_per_mu": c.slope(c.mu),
-        "resolution": c.resolution(c.mu),
+        "mu_sd": np.array([e.std for e in c.judged_at_mu]),
+        "status": np.array([e.status for e in c.judged_at_mu], dtype=object),
     }
-    return columns | {f"mu_sd_{t.name}": _mu_sd(c, i) for i, t in enumerate(c.tolerances)}
-
-
-def _joint_columns(c: JointCalibration) -> Tree:
-    columns: Tree = {"mu": c.mu, "mu_sd": c.mu_sd(c.mu)}
     for one in c.readings:
         columns |= {
             one.name: one.reading,
-            f"{one.name}_per_mu": one.slope(one.mu),
-            f"{one.name}_sd": one.reading_sd(one.mu),
-            f"mu_sd_{one.name}": one.mu_sd(one.mu),
+            f"{one.name}_fit": one.at(c.mu, "fit"),
+            f"{one.name}_per_mu": one.slope(c.mu),
+            f"{one.name}_sd": one.reading_sd(c.mu),
+            f"{one.name}_resolution": one.resolution(c.mu),
         }
-    return columns
+    columns["outcome"] = np.array(["converged"] * len(c.mu), dtype=object)
+    blank = {"mu": [mu for mu, _ in c.failed], "outcome": [why for _, why in c.failed], "status": [""] * len(c.failed)}
+    for name, values in columns.items():
+        added = np.array(blank.get(name, [np.nan] * len(c.failed)), dtype=values.dtype)
+        columns[name] = np.concatenate([values, added])
+    write_csv(path, columns)
 
 
-def load(path: str | Path) -> Calibration | JointCalibration:
+def load(path: str | Path) -> Calibration:
     """Read calibration.json.
 
     Raises
@@ -160,111 +112,78 @@ def load(path: str | Path) -> Calibration | JointCalibration:
         raise Finger3dError(f"{path}: cannot be read: {error.strerror}") from None
     except (ValueError, RecursionError):
         raise Finger3dError(f"{path}: not JSON, or cut short; {again}") from None
-    if not isinstance(data, dict) or data.get("format") not in (FORMAT, JOINT_FORMAT):
+    if not isinstance(data, dict) or data.get("format") not in (FORMAT, _FORMER_FORMAT):
         raise Finger3dError(f"{path}: no calibration; finger3d calibrate writes calibration.json")
-    parse, wanted = (_calibration, VERSION) if data["format"] == FORMAT else (_joint_calibration, JOINT_VERSION)
-    if data.get("version") != wanted:
-        raise Finger3dError(f"{path}: version {data.get('version')}, this finger3d reads version {wanted}; {again}")
+    if data["format"] != FORMAT or data.get("version") != VERSION:
+        version = data.get("version") if data["format"] == FORMAT else f"{data.get('version')} of several readings"
+        raise Finger3dError(f"{path}: version {version}, this finger3d reads version {VERSION}; {again}")
     try:
-        return parse(data)
+        return _calibration(data)
     except ValueError as error:
         raise Finger3dError(f"{path}: {error}; {again}") from None
 
 
-def _joint_calibration(data: Tree) -> JointCalibration:
+def _calibration(data: Tree) -> Calibration:
     """Return the calibration; a ValueError names the key of a part that is missing or wrong."""
     readings = _part(data, "readings", dict)
     if not readings:
         raise ValueError("readings: there are none")
-    mu, failed = _coefficients(data, "mu"), _failed(data)
-    limit = _number(data, "resolution_limit", 0.0, _LARGEST_LIMIT)
-    found = []
-    for name in readings:
-        at = f"readings.{name}"
-        one = readings[name]
-        kind = _part(one, f"{at}.kind", str)
-        if kind not in QUANTITIES:
-            raise ValueError(f"{at}.kind = {kind!r:.40}: must be {', '.join(QUANTITIES)}")
-        tolerances = _part(one, f"{at}.tolerances", dict)
-        calibration = Calibration(
-            name=name,
-            mu=mu,
-            reading=_numbers(one, f"{at}.curve", -LARGEST_STRAIN, LARGEST_STRAIN),
-            noise=_number(one, f"{at}.noise", _LEAST_NOISE, LARGEST_STRAIN),
-            limit=limit,
-            tolerances=tuple(
-                _tolerance(t, _part(tolerances, f"{at}.tolerances.{t}", dict), ("per_unit", "reading_sd"))
-                for t in tolerances
-            ),
-            failed=failed,
-            kind=kind,
-        )
-        _check_lengths(at, calibration)
-        found.append(calibration)
-    return JointCalibration(
-        tuple(found), limit, _part(data, "scene", dict), _part(data, "hash", str), _part(data, "about", dict)
-    )
-
-
-def _coefficients(data: Tree, at: str) -> Float:
-    """Return ascending coefficients of friction."""
-    mu = _numbers(data, at, 0.0, _LARGEST_MU)
+    mu = _numbers(data, "mu", 0.0, _LARGEST_MU)
     if len(mu) < FEWEST or (np.diff(mu) <= 0.0).any():
-        raise ValueError(f"{at}: must be at least {FEWEST} values that ascend from 0 up")
-    return mu
-
-
-def _check_lengths(at: str, calibration: Calibration) -> None:
-    """Raise a ValueError unless every value of mu has a reading and tolerances."""
-    c = calibration
-    lengths = {len(c.mu), len(c.reading), *(len(v) for t in c.tolerances for v in (t.slope, t.spread))}
-    if len(lengths) > 1:
-        raise ValueError(f"{at}: must have a reading and tolerances for each of the {len(c.mu)} values of mu")
-
-
-def _failed(data: Tree) -> tuple[tuple[float, str], ...]:
-    failed = _part(data, "failed", list)
-    return tuple((_number(f, "failed.mu", 0.0, _LARGEST_MU), _part(f, "failed.why", str)) for f in failed)
-
-
-def _calibration(data: Tree) -> Calibration:
-    """Return the calibration; a ValueError names the key of a part that is missing or wrong."""
-    curve, tolerances = _part(data, "curve", dict), _part(data, "tolerances", dict)
-    mu = _coefficients(curve, "curve.mu")
-    calibration = Calibration(
-        name=_part(data, "gauge", str),
-        mu=mu,
-        reading=_numbers(curve, "curve.strain", -LARGEST_STRAIN, LARGEST_STRAIN),
-        noise=_number(data, "noise", _LEAST_NOISE, LARGEST_STRAIN),
+        raise ValueError(f"mu: must be at least {FEWEST} values that ascend")
+    return Calibration(
+        readings=tuple(_curve(name, _part(readings, f"readings.{name}", dict, name), mu) for name in readings),
         limit=_number(data, "resolution_limit", 0.0, _LARGEST_LIMIT),
-        tolerances=tuple(
-            _tolerance(name, _part(tolerances, f"tolerances.{name}", dict), ("strain_per_unit", "strain_sd"))
-            for name in tolerances
+        failed=tuple(
+            (_number(f, "failed.mu", 0.0, _LARGEST_MU), _part(f, "failed.why", str))
+            for f in _part(data, "failed", list)
         ),
-        failed=_failed(data),
         scene=_part(data, "scene", dict),
         hash=_part(data, "hash", str),
         about=_part(data, "about", dict),
     )
-    _check_lengths("curve", calibration)
-    return calibration
 
 
-def _tolerance(name: str, data: Tree, keys: tuple[str, str]) -> Tolerance:
-    """Return the tolerance of an entry with these keys of its slope and its spread."""
-    slope, spread = keys
+def _curve(name: str, data: Tree, mu: Float) -> ReadingCurve:
+    """Return the curve of an entry of `readings` at mu (n,)."""
+    at = f"readings.{name}"
+    if not name.isprintable():
+        raise ValueError(f"{at!r:.60}: must be a name without control characters")
+    kind = _part(data, f"{at}.kind", str)
+    if kind not in QUANTITIES:
+        raise ValueError(f"{at}.kind = {kind!r:.40}: must be {', '.join(QUANTITIES)}")
+    tolerances = _part(data, f"{at}.tolerances", dict)
+    curve = ReadingCurve(
+        name=name,
+        mu=mu,
+        reading=_numbers(data, f"{at}.curve", -LARGEST_STRAIN, LARGEST_STRAIN),
+        noise=_number(data, f"{at}.noise", _LEAST_NOISE, LARGEST_STRAIN),
+        tolerances=tuple(
+            _tolerance(f"{at}.tolerances.{t}", t, _part(tolerances, f"{at}.tolerances.{t}", dict, t))
+            for t in tolerances
+        ),
+        kind=kind,
+    )
+    lengths = {len(mu), len(curve.reading), *(len(v) for t in curve.tolerances for v in (t.slope, t.spread))}
+    if len(lengths) > 1:
+        raise ValueError(f"{at}: must have a reading and tolerances for each of the {len(mu)} values of mu")
+    return curve
+
+
+def _tolerance(at: str, name: str, data: Tree) -> Tolerance:
+    """Return the tolerance of an entry."""
     return Tolerance(
         name=name,
-        unit=_part(data, f"tolerances.{name}.unit", str),
-        sd=_number(data, f"tolerances.{name}.sd", 0.0, LARGEST_SD),
-        slope=_numbers(data, f"tolerances.{name}.{slope}", -_STEEPEST, _STEEPEST),
-        spread=_numbers(data, f"tolerances.{name}.{spread}", 0.0, LARGEST_STRAIN),
+        unit=_part(data, f"{at}.unit", str),
+        sd=_number(data, f"{at}.sd", 0.0, LARGEST_SD),
+        slope=_numbers(data, f"{at}.per_unit", -_STEEPEST, _STEEPEST),
+        spread=_numbers(data, f"{at}.reading_sd", 0.0, LARGEST_STRAIN),
     )
 
 
-def _part(data: Tree, at: str, kind: type[Part]) -> Part:
-    """Return the entry of `data` that the last word of a key names; it must be of a type."""
-    key = at.rpartition(".")[2]
+def _part(data: Tree, at: str, kind: type[Part], key: str = "") -> Part:
+    """Return the entry `key` of `data`, by default the last word of its place; it must be of a type."""
+    key = key or at.rpartition(".")[2]
     if not isinstance(data, dict) or key not in data:
         raise ValueError(f"{at}: missing")
     value = data[key]

@@ -1,18 +1,19 @@
-"""Friction coefficient from several readings: the likelihood of mu, and a test whether the readings agree.
+"""Friction coefficient from one or more readings: the likelihood of mu, and a test whether any mu explains them.
 
 With the residual ``d(mu) = r - e(mu)`` of the readings r and their covariance C(mu), the likelihood of mu is ``exp(-d^T
 C^-1 d / 2) / sqrt(det C)``.  Normalised over the calibrated range it gives the mean of mu, its standard deviation, and
 the smallest set that holds 90 % (a credible set for a mu that may lie anywhere in the range).  Where the likelihood
 has several peaks, that set is several intervals, all of which are reported.
 
-The smallest ``d^T C^-1 d`` follows a chi-square distribution with one degree of freedom less than there are readings,
-if these are of one press; readings with a p-value below 0.001 are said to contradict each other.
+The smallest ``d^T C^-1 d`` of several readings of one press follows a chi-square distribution with one degree of
+freedom less than there are readings; that of a single reading is at most as large as with one degree of freedom.
+Readings with a p-value below 0.001 are out of range, or contradict each other.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Literal
@@ -20,16 +21,16 @@ from typing import Literal
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.sensor.curve import ranges_text
-from finger3d.sensor.joint import JointCalibration
+from finger3d.sensor.curve import Shape
+from finger3d.sensor.model import SensorModel
 
-JointStatus = Literal["ok", "coarse", "ambiguous", "above", "below", "outside", "blind", "contradiction"]
+Status = Literal["ok", "coarse", "ambiguous", "above", "below", "outside", "blind", "contradiction"]
 
 CREDIBLE = 0.9
 """Share of the likelihood in the reported set."""
 
 LEAST_P = 1e-3
-"""Probability of so large a chi-square below which readings are said to contradict each other."""
+"""Probability of so large a chi-square below which no mu is said to have the readings."""
 
 _PLAUSIBLE = math.exp(-0.5 * 2.706)  # of the largest likelihood: the 90 % limit of a likelihood ratio
 _NEGLIGIBLE = 1e-12  # of the largest likelihood
@@ -37,8 +38,8 @@ _NODES, _ENOUGH, _ZOOMS = 400, 50, 6  # of a finer grid; where the likelihood is
 
 
 @dataclass(frozen=True)
-class JointEstimate:
-    """Estimate of mu from several readings.
+class Estimate:
+    """Estimate of mu from one or more readings.
 
     Attributes
     ----------
@@ -49,7 +50,7 @@ class JointEstimate:
     status : ok; coarse: worse than the calibration's limit; ambiguous: several intervals; above, below: beyond the end
         of the range in which mu is resolved; blind: no mu is resolved; outside: no mu has these readings;
         contradiction: they are not of one press
-    chi_square, p_value : of the test that the readings agree; the p-value of one reading tests whether it is in range
+    chi_square, p_value : of the test that a calibrated mu explains the readings
     verdict : the same in words
     """
 
@@ -60,10 +61,15 @@ class JointEstimate:
     low: float
     high: float
     intervals: tuple[tuple[float, float], ...]
-    status: JointStatus
+    status: Status
     chi_square: float
     p_value: float
     verdict: str
+
+    @property
+    def is_determined(self) -> bool:
+        """Whether the readings determine mu, to the limit of the calibration or worse."""
+        return self.status in ("ok", "coarse")
 
 
 @dataclass(frozen=True)
@@ -113,32 +119,41 @@ class _Likelihood:
 
 
 @dataclass(frozen=True)
-class JointEstimator:
+class Estimator:
     """Data shared by all estimates from the same readings: curves, inverse covariance and its determinant on the grid.
 
     Attributes
     ----------
+    limit : standard deviation of mu beyond which an estimate is called coarse
     at : (m, k) readings
     precision : (m, k, k) inverse covariance
     log_determinant : (m,) of the covariance
     """
 
-    calibration: JointCalibration
+    model: SensorModel
+    limit: float
     noise: Float
     at: Float
     precision: Float
     log_determinant: Float
 
     @classmethod
-    def of(cls, calibration: JointCalibration, noise: Float, tolerances: bool = True) -> JointEstimator:
+    def of(
+        cls,
+        model: SensorModel,
+        limit: float,
+        noise: Float,
+        shape: Shape = "interpolation",
+    ) -> Estimator:
         """Prepare estimates from readings with noise (k,)."""
-        covariance = calibration.covariance(calibration.grid, noise, tolerances)
-        scale = calibration.noise
+        covariance = model.covariance(model.grid, noise, shape=shape)
+        scale = model.noise
         scaled = covariance / np.outer(scale, scale)
         precision = np.linalg.inv(scaled) / np.outer(scale, scale)
-        return cls(calibration, noise, calibration.at(calibration.grid), precision, np.linalg.slogdet(scaled).logabsdet)
+        log_determinant = np.linalg.slogdet(scaled).logabsdet
+        return cls(model, limit, noise, model.at(model.grid, shape), precision, log_determinant)
 
-    def estimate(self, reading: Float) -> JointEstimate:
+    def estimate(self, reading: Float) -> Estimate:
         """Return the estimate from readings (k,)."""
         found = self._likelihood(reading)
         chi_square = float(found.chi_square.min())
@@ -146,11 +161,11 @@ class JointEstimator:
         p_value = chi_square_tail(chi_square, freedom)
         intervals = found.credible_set()
         status = self._status(found, p_value, len(intervals))
-        c = self.calibration
+        c = self.model
         below, above = found.reaches_ends(c.mu)
         known = status in ("ok", "coarse")
         none = status in ("outside", "contradiction")
-        return JointEstimate(
+        return Estimate(
             readings=dict(zip(c.names, map(float, reading), strict=True)),
             stds=dict(zip(c.names, map(float, self.noise), strict=True)),
             mu=found.mean if known else math.nan,
@@ -166,7 +181,7 @@ class JointEstimator:
 
     def _likelihood(self, reading: Float) -> _Likelihood:
         """Return the likelihood on the grid, or on a finer one around a peak that the grid does not resolve."""
-        mu = self.calibration.grid
+        mu = self.model.grid
         for _ in range(_ZOOMS):
             found = self._on(mu, reading)
             good = np.flatnonzero(found.density >= _NEGLIGIBLE)
@@ -177,7 +192,7 @@ class JointEstimator:
 
     def _on(self, mu: Float, reading: Float) -> _Likelihood:
         """Return the likelihood at mu (m,); between points of the grid, readings and precision are interpolated."""
-        grid = self.calibration.grid
+        grid = self.model.grid
         if mu is grid:
             return _Likelihood.of(mu, reading - self.at, self.precision, self.log_determinant)
         cell = np.clip(np.searchsorted(grid, mu, side="right") - 1, 0, len(grid) - 2)
@@ -186,12 +201,12 @@ class JointEstimator:
         precision = self.precision[cell] * (1.0 - share[:, :, None]) + self.precision[cell + 1] * share[:, :, None]
         return _Likelihood.of(mu, residual, precision, np.interp(mu, grid, self.log_determinant))
 
-    def _status(self, found: _Likelihood, p_value: float, intervals: int) -> JointStatus:
-        c = self.calibration
+    def _status(self, found: _Likelihood, p_value: float, intervals: int) -> Status:
+        mu = self.model.mu
         if p_value < LEAST_P:
             nearest = found.mu[np.argmin(found.chi_square)]
-            return "outside" if nearest in (c.mu[0], c.mu[-1]) or len(c.names) == 1 else "contradiction"
-        below, above = found.reaches_ends(c.mu)
+            return "outside" if nearest in (mu[0], mu[-1]) or len(self.noise) == 1 else "contradiction"
+        below, above = found.reaches_ends(mu)
         if intervals > 1:
             return "ambiguous"
         if below and above:
@@ -200,40 +215,48 @@ class JointEstimator:
             return "above"
         if below:
             return "below"
-        return "coarse" if found.std > c.limit else "ok"
+        return "coarse" if found.std > self.limit else "ok"
 
     def _verdict(
         self,
-        status: JointStatus,
+        status: Status,
         found: _Likelihood,
         intervals: tuple[tuple[float, float], ...],
         reading: Float,
         p_value: float,
     ) -> str:
-        c = self.calibration
-        first, last, low, high = c.mu[0], c.mu[-1], intervals[0][0], intervals[-1][1]
+        mu = self.model.mu
+        first, last, low, high = mu[0], mu[-1], intervals[0][0], intervals[-1][1]
+        these = "this reading" if len(reading) == 1 else "these readings"
         if status == "contradiction":
             return self._contradiction(found, reading, p_value)
         if status == "outside":
-            which = "this reading" if len(reading) == 1 else "these readings, or they contradict each other"
+            or_else = "" if len(reading) == 1 else ", or they contradict each other"
+            nearest = int(np.argmin(found.chi_square))
             return (
-                f"out of range: no mu from {first:g} to {last:g} has {which}; chi-square {found.chi_square.min():.3g} "
-                f"at mu = {found.mu[np.argmin(found.chi_square)]:.3g} (p = {p_value:.1g})"
+                f"out of range: no mu from {first:g} to {last:g} has {these}{or_else}; the nearest, mu = "
+                f"{found.mu[nearest]:.3g}, is {math.sqrt(found.chi_square[nearest]):.2g} standard deviations away "
+                f"(p = {p_value:.1g})"
             )
         if status == "ambiguous":
             return f"ambiguous: {ranges_text(intervals)} hold {100.0 * CREDIBLE:.0f} % of the likelihood"
         if status == "blind":
-            return f"out of range: no mu from {first:g} to {last:g} can be told apart by these readings"
+            share = {name: float(values[0]) for name, values in self.model.reductions([found.mean]).items()}
+            largest = max(share, key=lambda name: share[name])
+            return (
+                f"out of range: every mu from {first:g} to {last:g} is plausible"
+                + f"; {100.0 * share[largest]:.0f} % of the variance is from {largest}" * (share[largest] > 0.0)
+            )
         if status == "above":
             return f"out of range: mu > {low:.3g}, and the calibration ends at {last:g}"
         if status == "below":
             return f"out of range: mu < {high:.3g}, and the calibration begins at {first:g}"
         text = f"mu = {found.mean:.3g} +- {found.std:.2g} (90 % interval {low:.3g} to {high:.3g})"
-        return text if status == "ok" else f"{text}: coarser than the limit of {c.limit:g}"
+        return text if status == "ok" else f"{text}: coarser than the limit of {self.limit:g}"
 
     def _contradiction(self, found: _Likelihood, reading: Float, p_value: float) -> str:
         """Return the verdict that readings contradict each other, and without which one the others agree."""
-        c, text = self.calibration, ""
+        c, text = self.model, ""
         for i, name in enumerate(c.names if len(c.names) > 2 else ()):
             others = [j for j in range(len(reading)) if j != i]
             # the inverse of a block of the covariance, by the Schur complement of the precision
@@ -241,8 +264,9 @@ class JointEstimator:
             precision = self.precision[np.ix_(range(len(self.at)), others, others)] - (
                 row[:, :, None] * row[:, None, :] / self.precision[:, i, i, None, None]
             )
-            part = JointEstimator(
+            part = Estimator(
                 c.of([c.names[j] for j in others]),
+                self.limit,
                 self.noise[others],
                 self.at[:, others],
                 precision,
@@ -258,9 +282,14 @@ class JointEstimator:
 
 
 @lru_cache(maxsize=8)
-def estimator(calibration: JointCalibration, noise: tuple[float, ...], tolerances: bool) -> JointEstimator:
+def estimator(model: SensorModel, limit: float, noise: tuple[float, ...], shape: Shape = "interpolation") -> Estimator:
     """Return the estimator for readings with noise (k,); a few are kept, so that readings one by one are quick."""
-    return JointEstimator.of(calibration, np.array(noise), tolerances)
+    return Estimator.of(model, limit, np.array(noise), shape)
+
+
+def ranges_text(intervals: Sequence[tuple[float, float]]) -> str:
+    """Return intervals of mu in words."""
+    return ", ".join(f"mu = {low:.3g} to {high:.3g}" for low, high in intervals) or "nowhere"
 
 
 def chi_square_tail(value: float, freedom: int) -> float:

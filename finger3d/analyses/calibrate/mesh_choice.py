@@ -13,8 +13,7 @@ from finger3d.accuracy.cost import forecast
 from finger3d.accuracy.richardson import ORDER
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Model
-from finger3d.sensor.curve import Calibration
-from finger3d.sensor.joint import JointCalibration
+from finger3d.sensor.calibration import Calibration
 
 if TYPE_CHECKING:
     from finger3d.analyses.calibrate.run import CurvePoints
@@ -34,21 +33,19 @@ class CalibratedMesh:
     """A calibration, its presses, and a note on its mesh, which is empty if the mesh is fine enough."""
 
     curve: CurvePoints
-    calibration: Calibration | JointCalibration
+    calibration: Calibration
     note: str
 
 
-def mesh_share(calibration: Calibration | JointCalibration) -> float:
+def mesh_share(calibration: Calibration) -> float:
     """Return the largest share of the mesh in the variance of mu, over all calibrated mu."""
-    if isinstance(calibration, JointCalibration):
-        return float(np.max(calibration.reductions(calibration.mu).get("mesh", 0.0)))
-    return max(calibration.shares(float(mu)).get("mesh", 0.0) for mu in calibration.mu)
+    return float(np.max(calibration.reductions(calibration.mu).get("mesh", 0.0)))
 
 
 def choose_mesh(
     model: Model,
     automatic: bool,
-    calibrated: Callable[[Model], tuple[CurvePoints, Calibration | JointCalibration]],
+    calibrated: Callable[[Model], tuple[CurvePoints, Calibration]],
     say: Callable[[str], None],
     longest_s: float = LONGEST_S,
 ) -> CalibratedMesh:

@@ -13,11 +13,11 @@ from finger3d.io import atomic, write_csv
 from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
+from finger3d.plotting.calibration import draw
 from finger3d.progress import Progress
-from finger3d.report.calibrate import calibrate_page, joint_calibration_page
-from finger3d.sensor.curve import Calibration
+from finger3d.report.calibrate import calibrate_page
+from finger3d.sensor.calibration import Calibration
 from finger3d.sensor.files import save, write_table
-from finger3d.sensor.joint import JointCalibration
 
 if TYPE_CHECKING:
     from finger3d.analyses.calibrate.run import CurvePoints
@@ -37,8 +37,7 @@ def write_points(folder: Path, curve: CurvePoints, settings: CalibrationSettings
     mus = [p.mu for p in curve.presses]
     columns: Tree = {"mu": mus}
     for name in settings.names:
-        column = "strain" if settings.only_gauge else name
-        columns[column] = [frames[mu].readings[name] if mu in frames else math.nan for mu in mus]
+        columns[name] = [frames[mu].readings[name] if mu in frames else math.nan for mu in mus]
     write_csv(folder / "calibration.csv", columns | {"outcome": [failed.get(mu, "converged") for mu in mus]})
 
 
@@ -62,21 +61,13 @@ def write_map(folder: Path, calibration: Calibration, curve: CurvePoints, gauge:
     from finger3d.sensor.maps import StrainMap
 
     found = StrainMap.of(curve.problem, curve.frames, z_mm=gauge.z_mm)
-    found.write(folder / "map.csv", gauge.angle, calibration.noise)
+    found.write(folder / "map.csv", gauge.angle, float(calibration.noise[0]))
     draw_map(folder / "map.png", found, gauge, calibration)
 
 
-def write_curve(folder: Path, calibration: Calibration | JointCalibration) -> None:
+def write_curve(folder: Path, calibration: Calibration) -> None:
     """Write the curve, its figure and its page."""
     write_table(calibration, folder / "calibration.csv")
     save(calibration, folder / "calibration.json")
-    if isinstance(calibration, JointCalibration):
-        from finger3d.plotting.joint_calibration import draw_joint
-
-        draw_joint(folder / "calibration.png", calibration)
-        joint_calibration_page(folder)
-    else:
-        from finger3d.plotting.calibration import draw
-
-        draw(folder / "calibration.png", calibration)
-        calibrate_page(folder)
+    draw(folder / "calibration.png", calibration)
+    calibrate_page(folder)

@@ -30,17 +30,17 @@ from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
 from finger3d.progress import Progress
+from finger3d.sensor.calibration import Calibration
 from finger3d.sensor.curve import (
     MARKER_NOISE_MM,
     NOISE,
     NOISES,
     RESOLUTION,
     TAXEL_NOISE_MPA,
-    Calibration,
     Kind,
+    ReadingCurve,
     Tolerance,
 )
-from finger3d.sensor.joint import JointCalibration
 
 if TYPE_CHECKING:
     from finger3d.scene import Scene, Source
@@ -109,7 +109,7 @@ def calibrate(
     maps: bool = False,
     marker_noise_mm: float = MARKER_NOISE_MM,
     taxel_noise_MPa: float = TAXEL_NOISE_MPA,
-) -> Calibration | JointCalibration:
+) -> Calibration:
     """Calibrate a gauge, or several readings together: their values at the end of the scene's path, for every mu.
 
     Parameters
@@ -124,11 +124,6 @@ def calibrate(
     report : receives the progress
     maps : also map the sensitivity of strain to mu over the section
     marker_noise_mm, taxel_noise_MPa : standard deviation of a reading of a marker, and of a taxel
-
-    Returns
-    -------
-    Calibration
-        Of a single gauge; otherwise a JointCalibration.
 
     Raises
     ------
@@ -161,15 +156,15 @@ def calibrate(
 
 def _calibrate_scene(
     scene: Scene, model: Model, settings: CalibrationSettings, folder: Path | None, report: Progress
-) -> Calibration | JointCalibration:
+) -> Calibration:
     """Press every mu, apply the tolerances, and write the results."""
     start = time.perf_counter()
     if folder:
         _prepare(folder, scene)
 
-    def calibrate_model(changed: Model) -> tuple[CurvePoints, Calibration | JointCalibration]:
+    def calibrate_model(changed: Model) -> tuple[CurvePoints, Calibration]:
         curve = _press_all(changed, settings, report, folder)
-        return curve, _with_tolerances(curve, settings, report)
+        return curve, _calibration(curve, settings, report)
 
     automatic = not _SIZES & set(scene.given.get("mesh", {}))
     chosen = choose_mesh(model, automatic, calibrate_model, report.say)
@@ -185,8 +180,8 @@ def _calibrate_scene(
     if folder:
         report.stage("writing")
         write_body(folder, model, curve.problem, report)
-        if settings.maps and isinstance(calibration, Calibration):
-            gauge = next(g for g in model.gauges if g.name == calibration.name)
+        if settings.maps:
+            gauge = next(g for g in model.gauges if g.name == settings.only_gauge)
             write_map(folder, calibration, curve, gauge)
         write_curve(folder, calibration)
     return calibration
@@ -194,32 +189,19 @@ def _calibrate_scene(
 
 def calibrated(
     model: Model,
-    gauge: str,
-    mus: Sequence[float] = MUS,
-    noise: float = NOISE,
-    limit: float = RESOLUTION,
-    tolerances: Mapping[str, float] | None = None,
-    report: Progress | None = None,
-) -> tuple[Calibration, CurvePoints]:
-    """Return the calibration of a gauge of a model made in Python, and its presses; write nothing."""
-    joint, curve = calibrated_together(model, [gauge], mus, {"gauge": noise}, limit, tolerances, report)
-    return joint.readings[0], curve
-
-
-def calibrated_together(
-    model: Model,
-    names: Sequence[str],
+    names: str | Sequence[str],
     mus: Sequence[float] = MUS,
     noises: Mapping[Kind, float] = NOISES,
     limit: float = RESOLUTION,
     tolerances: Mapping[str, float] | None = None,
     report: Progress | None = None,
-) -> tuple[JointCalibration, CurvePoints]:
-    """Return the joint calibration of readings of a model made in Python, and its presses; write nothing."""
+) -> tuple[Calibration, CurvePoints]:
+    """Return the calibration of readings of a model made in Python, and its presses; write nothing."""
     report = report or Progress()
-    settings = CalibrationSettings(found_readings(model, names, noises), tuple(mus), limit, with_defaults(tolerances))
+    readings = found_readings(model, [names] if isinstance(names, str) else names, noises)
+    settings = CalibrationSettings(readings, tuple(mus), limit, with_defaults(tolerances))
     curve = _press_all(model, settings, report)
-    return _joint(curve, settings, report), curve
+    return _calibration(curve, settings, report), curve
 
 
 def _prepare(folder: Path, scene: Scene) -> None:
@@ -282,30 +264,15 @@ def _curve_points(problem: Problem, settings: CalibrationSettings, report: Progr
         yield curve
 
 
-def _with_tolerances(
-    curve: CurvePoints, settings: CalibrationSettings, report: Progress
-) -> Calibration | JointCalibration:
-    """Return the calibration of a single gauge, or of several readings."""
-    joint = _joint(curve, settings, report)
-    return replace(joint.readings[0], about=joint.about) if settings.only_gauge else joint
-
-
-def _joint(curve: CurvePoints, settings: CalibrationSettings, report: Progress) -> JointCalibration:
+def _calibration(curve: CurvePoints, settings: CalibrationSettings, report: Progress) -> Calibration:
     """Return the calibration of all readings with the effect of every tolerance; too few points are an error."""
     start = time.perf_counter()
     mu = np.array(list(curve.frames))
-    bare = tuple(
-        Calibration(
-            name=reading.name,
-            mu=mu,
-            reading=curve.reading(reading.name),
-            noise=reading.noise,
-            limit=settings.limit,
-            failed=tuple(sorted(curve.failed.items())),
-            kind=reading.kind,
-        )
+    curves = tuple(
+        ReadingCurve(reading.name, mu, curve.reading(reading.name), reading.noise, kind=reading.kind)
         for reading in settings.readings
     )
+    bare = Calibration(curves, settings.limit, tuple(sorted(curve.failed.items())))
     found: dict[str, list[Tolerance]] = {name: [] for name in settings.names}
     if settings.tolerances:
         frames = list(curve.frames.values())
@@ -321,9 +288,12 @@ def _joint(curve: CurvePoints, settings: CalibrationSettings, report: Progress) 
         )
         for name, tolerance in every:
             found[name].append(tolerance)
-    readings = tuple(replace(one, tolerances=tuple(found[one.name])) for one in bare)
     seconds = {**curve.seconds, "tolerances": time.perf_counter() - start}
-    return JointCalibration(readings, settings.limit, about={"seconds": seconds})
+    return replace(
+        bare,
+        readings=tuple(replace(one, tolerances=tuple(found[one.name])) for one in curves),
+        about={"seconds": seconds},
+    )
 
 
 def _sample(problem: Problem, count: int) -> NDArray[np.int64]:

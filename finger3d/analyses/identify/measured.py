@@ -25,6 +25,12 @@ STD = "_std"
 _FEWEST = 2
 """Least number of rows of a measured press."""
 
+_OPPOSITE = -0.5
+"""Cosine between a measured and a simulated column below which they have opposite signs."""
+
+_LEAST_STD, _LARGEST_STD = 1e-12, 1e12
+"""Standard deviations, in the unit of their column: squares of the residuals over them neither overflow nor vanish."""
+
 _UNIT_RATIO = 30.0
 """Ratio of a measured column to the simulated one beyond which its unit is in doubt; 100 is a percentage."""
 
@@ -52,6 +58,19 @@ class MeasuredPress:
     def count(self) -> int:
         """Number of measured values."""
         return len(self.at) * len(self.columns)
+
+    def check_signs(self, simulated: Sequence[Mapping[str, Float]]) -> None:
+        """Raise an error for a column that has the opposite sign of all simulated ones (n,), by name."""
+        for name, values in self.columns.items():
+            if all(
+                values @ one[name] < _OPPOSITE * np.linalg.norm(values) * np.linalg.norm(one[name]) for one in simulated
+            ):
+                row = int(np.argmax(np.abs(values)))
+                raise Finger3dError(
+                    f"{self.path}: line {row + 2}: {name} = {values[row]:g}: the scene gives "
+                    f"{simulated[0][name][row]:.2g}, of the opposite sign; a force that presses is positive, and so is "
+                    "a strain that lengthens"
+                )
 
     def check_units(self, smallest: Mapping[str, float], largest: Mapping[str, float]) -> None:
         """Raise an error for a column whose magnitude is far from that of the simulated ones.
@@ -93,9 +112,12 @@ def read_measured(path: Path, known: Sequence[str]) -> MeasuredPress:
     for name in names:
         base = name.removesuffix(STD)
         if base not in known and base not in INDEX:
-            near = nearest(base, list(known))
-            hint = f'; did you mean "{near}"?' if near else ""
-            raise Finger3dError(f'{path}: column "{name}" is unknown{hint} Columns are those of history.csv')
+            near = next((n for n in known if n.endswith(f"_{base}")), None) or nearest(base, list(known))
+            hint = f'did you mean "{near}"? ' if near else ""
+            raise Finger3dError(
+                f'{path}: column "{name}": {hint}it is none of the forces, lengths, areas, energies and readings of '
+                "history.csv, which are fitted; leave out other columns"
+            )
         if name.endswith(STD) and base not in columns:
             raise Finger3dError(f'{path}: column "{name}" has no column "{base}"')
     if not columns:
@@ -111,10 +133,12 @@ def read_measured(path: Path, known: Sequence[str]) -> MeasuredPress:
         raise Finger3dError(f"{path}: has {len(at)} rows; at least {_FEWEST} are needed")
     stds = {n: values[n + STD] for n in columns if n + STD in values}
     for name, own in stds.items():
-        bad = np.flatnonzero(own <= 0.0)
+        bad = np.flatnonzero((own < _LEAST_STD) | (own > _LARGEST_STD))
         if len(bad):
             line = rows[int(bad[0])][0]
-            raise Finger3dError(f"{path}: line {line}: {name}{STD} = {own[bad[0]]:g}: must be above 0")
+            raise Finger3dError(
+                f"{path}: line {line}: {name}{STD} = {own[bad[0]]:g}: must be from {_LEAST_STD:g} to {_LARGEST_STD:g}"
+            )
     return MeasuredPress(path, index, at, {n: values[n] for n in columns}, stds)
 
 
@@ -135,6 +159,8 @@ def _table(path: Path) -> tuple[list[str], list[tuple[int, dict[str, str]]]]:
         raise Finger3dError(f"{path}: cannot be read: {error.strerror}") from None
     except (UnicodeDecodeError, csv.Error):
         raise Finger3dError(f"{path}: not a CSV file; it must have a line of names, then a line for each row") from None
+    if len(names) == 1 and ";" in names[0]:
+        raise Finger3dError(f"{path}: semicolons separate the columns; write commas, and decimal points in numbers")
     twice = next((n for i, n in enumerate(names) if n in names[:i]), None)
     if twice is not None:
         raise Finger3dError(f'{path}: two columns are called "{twice}"')

@@ -11,10 +11,20 @@ from pathlib import Path
 import numpy as np
 
 from finger3d._types import Float, Tree, TreeView
-from finger3d.analyses.free_keys import FreeKey, check_distinct, scene_with
+from finger3d.analyses.free_keys import FreeKey, check_distinct
 from finger3d.analyses.identify.fit import FittedValues, Scale, fit, jacobian, misfit_text, uncertainty, values_at
 from finger3d.analyses.identify.measured import MeasuredPress, read_measured
-from finger3d.analyses.identify.simulated import MODULUS, OFFSET, Curve, Simulation, largest, names_of, row_mistake
+from finger3d.analyses.identify.simulated import (
+    MODULI,
+    OFFSET,
+    Curve,
+    Simulation,
+    check_rows,
+    fitted_scene,
+    largest,
+    names_of,
+    row_mistake,
+)
 from finger3d.errors import Finger3dError
 from finger3d.io import atomic, claimed, write_csv, write_json
 from finger3d.plotting.identify import Panel, draw
@@ -23,9 +33,14 @@ from finger3d.report.identify import identify_page
 from finger3d.results.journal import opened
 from finger3d.scene import Scene, parse, tree
 
+DEVIATIONS = (
+    "of the noise of the data alone; errors of the mesh and of the increments come on top: fit on a finer mesh, too"
+)
+"""What the standard deviations of an identification contain."""
+
 _SHARE = 0.02  # standard deviation in the first fit of a column without one, over its largest magnitude
 _LEAST_SHARE = 1e-4  # lower bound of the same when it is taken from the residuals
-_MODULI = 41  # values of Young's modulus that are tried at the start
+_TRIED_MODULI = 41  # values of Young's modulus that are tried at the start
 _FROM_BOUND = 0.05  # of the first shares: the method is slow near a bound
 _SHARPEST = 1e-9  # standard deviation of a column of zeros
 
@@ -88,6 +103,7 @@ class Identification:
                 name: {"from": "file" if name in self.measured.stds else "residuals", "rms": _rms(std)}
                 for name, std in self.stds.items()
             },
+            "deviations": DEVIATIONS,
             "notes": list(self.notes),
             "presses": self.presses,
         }
@@ -125,6 +141,8 @@ def identify(
         raise Finger3dError(f"--free {OFFSET}: the rows of {data.path} are ordered by {data.index}, not by depth_mm")
     if data.count <= len(free):
         raise Finger3dError(f"{data.path}: {data.count} measured values for {len(free)} free keys; give more rows")
+    for values in (start, [f.low for f in free], [f.high for f in free]):
+        check_rows(fitted_scene(given, free, values, path).model().legs, free, data)
     task = {
         "scene": tree.plain(given),
         "free": [[f.key, f.low, f.high] for f in free],
@@ -146,8 +164,7 @@ def _checked_start(given: TreeView, free: Sequence[FreeKey], path: Path | None) 
         raise Finger3dError("identify: nothing is free; give at least one --free, such as material.E_MPa=0.05:5")
     check_distinct([f.numbered(given) for f in free])
     values = [0.0 if f.key == OFFSET and f.low <= 0.0 <= f.high else f.start(given) for f in free]
-    scene_keys = [(f.numbered(given), v) for f, v in zip(free, values, strict=True) if f.key != OFFSET]
-    scene_with(given, [key for key, _ in scene_keys], [value for _, value in scene_keys], path)
+    fitted_scene(given, free, values, path)
     return np.array(values)
 
 
@@ -158,6 +175,7 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
     begin = np.array([scale.share(v) for scale, v in zip(scales, start, strict=True)])
     starts = [begin, np.zeros(len(scales)), np.ones(len(scales))]
     curves = [simulation.at(values_at(scales, shares), data) for shares in starts]
+    data.check_signs(curves)
     magnitudes = [largest(curve) for curve in curves]
     data.check_units(
         {n: min(m[n] for m in magnitudes) for n in data.columns},
@@ -206,11 +224,10 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
 
 def _with_modulus(simulation: Simulation, shares: Float) -> list[Float]:
     """Return the shares, and copies with several values of Young's modulus if these need no further solution."""
-    keys = [f.key for f in simulation.free]
-    if MODULUS not in keys or not simulation.scales_with_modulus:
+    own = np.array([f.key in MODULI for f in simulation.free])
+    if own.sum() != 1 or not simulation.scales_with_modulus:
         return [shares]
-    own = np.arange(len(keys)) == keys.index(MODULUS)
-    return [np.where(own, share, shares) for share in (shares[own][0], *np.linspace(0.0, 1.0, _MODULI))]
+    return [np.where(own, share, shares) for share in (shares[own][0], *np.linspace(0.0, 1.0, _TRIED_MODULI))]
 
 
 def _by_residuals(data: MeasuredPress, simulated: Mapping[str, Float], keys: int) -> dict[str, Float]:

@@ -17,14 +17,26 @@ from finger3d.analyses.free_keys import FreeKey, scene_with
 from finger3d.analyses.identify.measured import MeasuredPress
 from finger3d.analyses.shared_body import SharedBody, Variant, body_key
 from finger3d.errors import Finger3dError
+from finger3d.materials.shore import modulus_of_shore_00, modulus_of_shore_A
 from finger3d.mechanics.history import flat_readings, measure, without_readings
-from finger3d.mechanics.model import Model
+from finger3d.mechanics.model import Leg, Model
+from finger3d.mechanics.path import targets
 from finger3d.results.journal import Journal
 from finger3d.results.summary import PressStep
 from finger3d.scene import Scene
 
-MODULUS, OFFSET = "material.E_MPa", "depth_offset_mm"
-"""Keys that need no solution of their own: forces scale with the first; the second is added to the measured depth."""
+OFFSET = "depth_offset_mm"
+"""Key that is added to the measured depth; it needs no solution of its own."""
+
+MODULI: dict[str, Callable[[float], float]] = {
+    "material.E_MPa": float,
+    "material.shore_A": modulus_of_shore_A,
+    "material.shore_00": modulus_of_shore_00,
+}
+"""Young's modulus, MPa, by the keys that give it; forces scale with it, so that they need no solution of their own."""
+
+_SHORTEST = 1.0 / 30.0
+"""Measured part of the path of a scene below which the unit of the depths is in doubt."""
 
 _SCALED = ("_N", "_MPa", "_mJ", "_Nmm")
 """Endings of the names of numbers that are proportional to Young's modulus."""
@@ -84,8 +96,7 @@ class Simulation:
 
     def scene(self, values: Sequence[float] | Float) -> Scene:
         """Return the scene with values of the free keys; the offset of the depth is none of its keys."""
-        pairs = [(f.numbered(self.given), v) for f, v in zip(self.free, values, strict=True) if f.key != OFFSET]
-        return scene_with(self.given, [key for key, _ in pairs], [value for _, value in pairs], self.path)
+        return fitted_scene(self.given, self.free, values, self.path)
 
     def curve(self, values: Sequence[float] | Float) -> Curve:
         """Return the simulated curve, which begins at first touch, where everything is zero.
@@ -99,8 +110,9 @@ class Simulation:
         for i, free in enumerate(self.free):
             if free.key == OFFSET:
                 wanted[i] = 0.0
-            if free.key == MODULUS and self.scales_with_modulus:
-                factor, wanted[i] = wanted[i] / free.middle, free.middle
+            if free.key in MODULI and self.scales_with_modulus:
+                modulus = MODULI[free.key]
+                factor, wanted[i] = modulus(wanted[i]) / modulus(free.middle), free.middle
         point = tuple(wanted)
         if point not in self._known:
             row = self._solve(point)
@@ -116,18 +128,12 @@ class Simulation:
         curve = self.curve(values)
         at = curve[measured.index]
         if (np.diff(at) <= 0.0).any():
-            raise Finger3dError(
-                f"{measured.path}: {measured.index} does not rise throughout the path of the scene; measure time_s or "
-                "step instead"
-            )
+            raise Finger3dError(_not_rising(measured))
         offset = dict(zip((f.key for f in self.free), values, strict=True)).get(OFFSET, 0.0)
-        where = measured.at + (float(offset) if measured.index == "depth_mm" else 0.0)
-        if where[-1] > at[-1] * (1.0 + 1e-9):
-            raise Finger3dError(
-                f"{measured.path}: line {len(where) + 1}: {measured.index} = {where[-1]:g}: the path of the scene ends "
-                f"at {at[-1]:g}"
-            )
-        where = np.clip(where, 0.0, at[-1])
+        offset = float(offset) if measured.index == "depth_mm" else 0.0
+        if text := _beyond(measured, offset, float(at[-1])):
+            raise Finger3dError(text)
+        where = np.clip(measured.at + offset, 0.0, at[-1])
         return {name: np.asarray(PchipInterpolator(at, curve[name])(where)) for name in measured.columns}
 
     def _solve(self, point: tuple[float, ...]) -> Tree:
@@ -169,6 +175,48 @@ class Simulation:
 
     def _named(self, point: tuple[float, ...]) -> str:
         return ", ".join(f"{f.key} = {v:.5g}" for f, v in zip(self.free, point, strict=True))
+
+
+def fitted_scene(given: TreeView, free: Sequence[FreeKey], values: Sequence[float] | Float, path: Path | None) -> Scene:
+    """Return the scene with values of the free keys; the offset of the depth is none of its keys."""
+    pairs = [(f.numbered(given), v) for f, v in zip(free, values, strict=True) if f.key != OFFSET]
+    return scene_with(given, [key for key, _ in pairs], [value for _, value in pairs], path)
+
+
+def check_rows(legs: tuple[Leg, ...], free: Sequence[FreeKey], measured: MeasuredPress) -> None:
+    """Raise an error for measured depths that the path of the scene does not have, before anything is solved."""
+    if measured.index != "depth_mm" or any(leg.force_N is not None for leg in legs):
+        return
+    depths = [target.depth_mm for target in targets(legs)]
+    if (np.diff([0.0, *depths]) <= 0.0).any():
+        raise Finger3dError(_not_rising(measured))
+    largest_offset = max((f.high for f in free if f.key == OFFSET), default=0.0)
+    if text := _beyond(measured, largest_offset, depths[-1]):
+        raise Finger3dError(text)
+    if measured.at[-1] < _SHORTEST * depths[-1]:
+        raise Finger3dError(
+            f"{measured.path}: line {len(measured.at) + 1}: depth_mm = {measured.at[-1]:g}: the path of the scene "
+            f"ends at {depths[-1]:g}; are the depths in mm? if so, lower press.depth_mm"
+        )
+
+
+def _not_rising(measured: MeasuredPress) -> str:
+    other = "step" if measured.index == "time_s" else "time_s or step"
+    return f"{measured.path}: {measured.index} does not rise throughout the path of the scene; give {other} instead"
+
+
+def _beyond(measured: MeasuredPress, offset: float, end: float) -> str:
+    """Return what is wrong with rows beyond the end of the path of a scene; empty if there are none."""
+    last = float(measured.at[-1])
+    if last + offset <= end * (1.0 + 1e-9):
+        return ""
+    text = f"{measured.path}: line {len(measured.at) + 1}: {measured.index} = {last:g}: "
+    if last > end:
+        return f"{text}the path of the scene ends at {end:g}"
+    return (
+        f"{text}with {OFFSET} = {offset:g} it is {last + offset:g}, and the path of the scene ends at {end:g}; "
+        f"free the offset up to {end - last:g} only, or raise press.depth_mm"
+    )
 
 
 def row_mistake(free: Sequence[FreeKey]) -> Callable[[object], str]:

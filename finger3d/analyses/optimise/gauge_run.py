@@ -13,7 +13,7 @@ from finger3d._types import Float, Tree, TreeView
 from finger3d.analyses.calibrate.tolerances import with_defaults
 from finger3d.analyses.free_keys import FreeKey
 from finger3d.analyses.optimise.gauge_fields import GaugeFields
-from finger3d.analyses.optimise.gauge_search import Candidates, GaugeSet, Region, objectives, search
+from finger3d.analyses.optimise.gauge_search import NOWHERE, Candidates, GaugeSet, Region, objectives, search
 from finger3d.analyses.optimise.task import MUS
 from finger3d.errors import Finger3dError
 from finger3d.io import atomic, claimed, write_csv, write_json
@@ -134,7 +134,7 @@ def _check(count: int, mus: Sequence[float], noise: float) -> None:
     if len(mus) < 3 or any(b <= a for a, b in zip(mus, mus[1:], strict=False)):
         raise Finger3dError("--mu: must be at least three numbers, ascending")
     if not 1e-12 <= noise <= LARGEST_STRAIN:
-        raise Finger3dError(f"--noise {noise}: must be above 0")
+        raise Finger3dError(f"--noise {noise:g}: must be a finite number from 1e-12 to {LARGEST_STRAIN:g}")
 
 
 def _region(model: Model, free: Sequence[FreeKey]) -> Region:
@@ -149,7 +149,14 @@ def _region(model: Model, free: Sequence[FreeKey]) -> Region:
         ends = (key.low, key.high)
         bounds[_BOUNDS[key.key]] = ends if key.key != "gauge.angle_deg" else tuple(map(math.radians, ends))
     whole = Region.of(model)
-    return Region(*(bounds.get(name, getattr(whole, name)) for name in ("x", "y", "z", "angle")))
+    region = Region(*(bounds.get(name, getattr(whole, name)) for name in ("x", "y", "z", "angle")))
+    for key in free:
+        (low, high), own = getattr(region, _BOUNDS[key.key]), getattr(whole, _BOUNDS[key.key])
+        if key.key in ("gauge.x_mm", "gauge.y_mm") and (high <= own[0] or low >= own[1]):
+            raise Finger3dError(
+                f"--free {key.key}={key.low:g}:{key.high:g}: {NOWHERE}; it reaches from {own[0]:g} to {own[1]:g} mm"
+            )
+    return region
 
 
 def _map(found: GaugeSet, number: int, everywhere: Candidates) -> tuple[Float, Float]:

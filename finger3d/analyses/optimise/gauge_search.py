@@ -14,8 +14,11 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.analyses.optimise.gauge_fields import GaugeFields
+from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Model
 from finger3d.sensor.information import ReadingEffects, mu_sd, prior
+
+NOWHERE = "no gauge within these bounds lies in the finger"
 
 _PLACES = 1200
 """Places of the grid over the whole region, about."""
@@ -159,6 +162,8 @@ def search(fields: GaugeFields, region: Region, count: int, say: Callable[[str],
     found = GaugeSet((), prior(len(fields.shared), spread))
     points, spacing = region.grid()
     everywhere = Candidates.of(fields, points, region.angles())
+    if not len(everywhere.angles):
+        raise Finger3dError(f"optimise --gauges: {NOWHERE}; widen the bounds")
     for number in range(count):
         found = found.placed(_best(found.fisher(), everywhere)[0])
         say(f"{number + 1} gauge{'s' if number else ''}: mu +- {found.objective:.3g} in the mean")

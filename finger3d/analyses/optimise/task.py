@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ from finger3d._types import Float, Tree, TreeView
 from finger3d.analyses.free_keys import FreeKey, check_distinct, scene_with
 from finger3d.errors import Finger3dError
 from finger3d.scene import Scene, parse, tree
+from finger3d.sensor.curve import LARGEST_STRAIN
 
 Objective = Callable[["ObjectiveTable"], float]
 
@@ -145,8 +145,10 @@ def checked_start(problem: OptimisationProblem) -> tuple[float, ...]:
     check_distinct(keys)
     if len(problem.mus) < 2 or any(b <= a for a, b in zip(problem.mus, problem.mus[1:], strict=False)):
         raise Finger3dError("--mu: must be at least two numbers, ascending")
-    if not (math.isfinite(problem.noise) and problem.noise > 0.0):
-        raise Finger3dError(f"--noise {problem.noise}: must be above 0")
+    if problem.seed < 0:
+        raise Finger3dError(f"--seed {problem.seed}: must be a whole number from 0 up")
+    if not 1e-12 <= problem.noise <= LARGEST_STRAIN:
+        raise Finger3dError(f"--noise {problem.noise:g}: must be a finite number from 1e-12 to {LARGEST_STRAIN:g}")
     names = [g.name for g in parse(problem.given, problem.path).tables.gauge]
     if problem.objective == "sensitivity" and not names:
         raise Finger3dError("optimise: the objective reads a gauge, and the scene has no [[gauge]]; add one")

@@ -1,0 +1,182 @@
+"""Calibration of one or more readings: curves, tolerances, and where the readings determine mu.
+
+Where mu is determined is what an estimate says of readings without an error: a calibration and the estimates from it
+have one definition of the standard deviation of mu, of its interval, and of what is out of range.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from finger3d._types import Float, TreeView
+from finger3d.errors import MissingError
+from finger3d.sensor.curve import FEWEST, QUANTITIES, ReadingCurve, Shape
+from finger3d.sensor.likelihood import Estimate, estimator, ranges_text
+from finger3d.sensor.model import SensorModel
+
+_CUTS = 4  # of the distance between two calibrated mu, for the ends of the ranges
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Calibration(SensorModel):
+    """Readings (k) of gauges, markers and taxels at ascending mu (n,), of the presses that converged.
+
+    Attributes
+    ----------
+    readings : a curve for each reading, all at the same mu
+    limit : standard deviation of mu beyond which an estimate is called coarse
+    failed : (mu, why) of the presses that did not converge
+    scene, hash : what was pressed, and 16 digits that identify the scene
+    about : domain, effects, dofs, seconds, versions
+    """
+
+    limit: float
+    failed: tuple[tuple[float, str], ...] = ()
+    scene: TreeView = field(default_factory=dict)
+    hash: str = ""
+    about: TreeView = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Raise an error if there are too few points."""
+        if len(self.mu) < FEWEST:
+            raise MissingError(
+                f"calibrate: only {len(self.mu)} of {len(self.mu) + len(self.failed)} values of mu converged, {FEWEST} "
+                f"are needed; first failure: {self.failed[0][1] if self.failed else 'none'}"
+            )
+
+    @property
+    def title(self) -> str:
+        """The readings in words."""
+        one = self.readings[0]
+        return f"{one.kind} {one.name}" if len(self.readings) == 1 else f"readings {', '.join(self.names)} together"
+
+    def __repr__(self) -> str:
+        """Return one line: readings, range of mu, number of points."""
+        return f"<Calibration of {self.title}: {len(self.mu)} values of mu, {self.mu[0]:g} to {self.mu[-1]:g}>"
+
+    def _repr_html_(self) -> str:
+        from finger3d._notebook import card
+
+        rows = [(name.strip(), str(said)) for name, said in summary(self)]
+        return card(self.title.capitalize(), f"{len(self.mu)} values of mu", rows, [self.verdict()])
+
+    def estimates(
+        self, readings: Float, noise: Float | None = None, tolerances: bool = True, shape: Shape = "interpolation"
+    ) -> list[Estimate]:
+        """Return an estimate for each set of readings (m, k); `noise` (m, k) has their standard deviations."""
+        stds = np.broadcast_to(self.noise if noise is None else noise, readings.shape)
+        model = self if tolerances else self.without_tolerances
+        return [
+            estimator(model, self.limit, tuple(std.tolist()), shape).estimate(reading)
+            for reading, std in zip(readings, stds, strict=True)
+        ]
+
+    @cached_property
+    def without_tolerances(self) -> Calibration:
+        """Return the calibration of a sensor of which all is known exactly but the noise."""
+        return replace(self, readings=tuple(replace(c, tolerances=()) for c in self.readings))
+
+    @cached_property
+    def judged_mu(self) -> Float:
+        """Mu (m,) at which readings without an error are judged: the calibrated ones and three between any two."""
+        every = np.arange(_CUTS * (len(self.mu) - 1) + 1) / _CUTS
+        return np.asarray(np.interp(every, np.arange(len(self.mu)), self.mu))
+
+    @cached_property
+    def judged(self) -> list[Estimate]:
+        """Estimates (m,) from the readings at `judged_mu`, with all tolerances."""
+        return self.estimates(self.at(self.judged_mu))
+
+    @cached_property
+    def judged_by_noise(self) -> list[Estimate]:
+        """Estimates (m,) from the same readings with the noise alone."""
+        return self.estimates(self.at(self.judged_mu), tolerances=False)
+
+    @cached_property
+    def judged_at_mu(self) -> list[Estimate]:
+        """Estimates (n,) from the calibrated readings, with all tolerances."""
+        return self.judged[::_CUTS]
+
+    @cached_property
+    def trusted(self) -> tuple[tuple[float, float], ...]:
+        """Intervals in which estimates are within the limit, with all tolerances, the widest first."""
+        return self._ranges(self.judged)
+
+    @cached_property
+    def usable(self) -> tuple[tuple[float, float], ...]:
+        """The same with the noise alone."""
+        return self._ranges(self.judged_by_noise)
+
+    def _ranges(self, judged: Sequence[Estimate]) -> tuple[tuple[float, float], ...]:
+        good = np.array([False, *(one.status == "ok" for one in judged), False]).astype(int)
+        ends = np.flatnonzero(np.diff(good)).reshape(-1, 2)
+        found = [(float(self.judged_mu[a]), float(self.judged_mu[b - 1])) for a, b in ends if b - a > 1]
+        return tuple(sorted(found, key=lambda pair: pair[0] - pair[1]))
+
+    @property
+    def best(self) -> int | None:
+        """Number, among the calibrated mu, of the one that is known best; None if none is determined."""
+        known = [i for i, one in enumerate(self.judged_at_mu) if one.is_determined]
+        return min(known, key=lambda i: self.judged_at_mu[i].std, default=None)
+
+    def verdict(self) -> str:
+        """Return in one sentence where the readings determine mu."""
+        text = (
+            f"{self.title}: mu is found to {self.limit:g} or better, with all tolerances, {_from(self.trusted)}, and "
+            f"by the noise alone {_from(self.usable)}"
+        )
+        if self.best is None:
+            return text
+        mu = self.mu[self.best]
+        share = {name: float(values[0]) for name, values in self.reductions([mu]).items()}
+        cause = max(share, key=lambda name: share[name])
+        return (
+            f"{text}; to +- {self.judged_at_mu[self.best].std:.2g} at best (mu = {mu:.2g}; without the uncertainty of "
+            f"{cause} the variance would be {100.0 * share[cause]:.0f} % smaller)"
+        )
+
+
+def _from(intervals: Sequence[tuple[float, float]]) -> str:
+    return f"from {ranges_text(intervals)}" if intervals else "nowhere"
+
+
+def summary(calibration: Calibration) -> list[tuple[str, str]]:
+    """Return the table that concludes a calibration."""
+    c = calibration
+    i = c.best if c.best is not None else len(c.mu) // 2
+    mu = float(c.mu[i])
+    rows = [(one.name, _curve_text(one)) for one in c.readings]
+    if mesh := c.about.get("mesh"):
+        note = f"; {mesh['note']}" if mesh["note"] else ""
+        rows.append(("mesh", f"edges of {mesh['size_mm']:.3g} and {mesh['base_size_mm']:.3g} mm{note}"))
+    left = [(t.spread.max() / one.noise) for one in c.readings for t in one.tolerances if t.name == "increments"]
+    if left:
+        steps = ", ".join(str(n) for n in c.about.get("increments", {}).get("steps", ()))
+        rows.append((f"increments {steps}".strip(), f"leave an error of up to {max(left):.2g} times the noise"))
+    rows += [
+        (f"mu within {c.limit:g}", f"{ranges_text(c.trusted)}, with all tolerances"),
+        ("", f"{ranges_text(c.usable)}, by the noise alone"),
+        (f"at mu = {mu:.3g}", c.judged_at_mu[i].verdict),
+    ]
+    if len(c.readings) > 1:
+        rows += [(f"  {name} alone", c.of([name]).judged_at_mu[i].verdict) for name in c.names]
+    shares = sorted(c.reductions([mu]).items(), key=lambda item: -float(item[1][0]))
+    rows.append(("variance of mu", "would fall there by so much if one of these were known exactly"))
+    rows += [(f"  {name}", f"{100.0 * float(share[0]):.1f} %") for name, share in shares]
+    if c.failed:
+        rows.append(("failed", ", ".join(f"mu = {at:.4g}" for at, _ in c.failed)))
+    return rows
+
+
+def _curve_text(curve: ReadingCurve) -> str:
+    """Return the ends of a curve, its noise, and the residual of its second-order fit."""
+    quantity, unit = QUANTITIES[curve.kind]
+    unit = "" if unit == "1" else f" {unit}"
+    return (
+        f"{quantity} {curve.reading[0]:.4g}{unit} at mu = {curve.mu[0]:g} to {curve.reading[-1]:.4g}{unit} at mu = "
+        f"{curve.mu[-1]:g}; noise {curve.noise:g}{unit}; second-order fit within {curve.fit.rms:.2g}{unit} rms"
+    )

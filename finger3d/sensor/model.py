@@ -1,0 +1,136 @@
+"""Forward model of a sensor: its readings as functions of mu, and the covariance of their errors.
+
+The readings r = e(mu) + error have the covariance ``C = D + sum_t sd_t^2 s_t s_t^T``.  The sum is over the tolerances
+that all readings share (depth, modulus, Poisson's ratio, tilt) with the slopes s_t of the readings, and the diagonal D
+has what every reading has of its own: noise, interpolation, place of a gauge, mesh, increments, and the part of a
+shared tolerance that is not linear.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from finger3d._types import Float
+from finger3d.errors import Finger3dError
+from finger3d.sensor.curve import ReadingCurve, Shape
+
+SHARED = ("depth_mm", "E_percent", "nu", "tilt_deg")
+"""Tolerances that change all readings together."""
+
+_LEAST_NOISE = 1e-3  # relative to the noise of a calibration: an exact reading leaves the covariance regular
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class SensorModel:
+    """Curves of one or more readings (k) of the same presses, all at the same mu."""
+
+    readings: tuple[ReadingCurve, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the readings."""
+        return tuple(c.name for c in self.readings)
+
+    @property
+    def mu(self) -> Float:
+        """Calibrated coefficients of friction (n,), ascending."""
+        return self.readings[0].mu
+
+    @property
+    def grid(self) -> Float:
+        """Mu (m,) on which the likelihood is evaluated."""
+        return self.readings[0].grid
+
+    @property
+    def noise(self) -> Float:
+        """Standard deviation (k,) of the noise of every reading, in its unit."""
+        return np.array([c.noise for c in self.readings])
+
+    @property
+    def tolerance_names(self) -> tuple[str, ...]:
+        """Names of the tolerances of any reading."""
+        return tuple(dict.fromkeys(t.name for c in self.readings for t in c.tolerances))
+
+    def __getitem__(self, name: str) -> ReadingCurve:
+        """Return the curve of a reading."""
+        for curve in self.readings:
+            if curve.name == name:
+                return curve
+        raise Finger3dError(f"{name}: not calibrated; calibrated: {', '.join(self.names)}")
+
+    def of(self, names: Sequence[str]) -> Self:
+        """Return the same with some of the readings, in this order."""
+        return replace(self, readings=tuple(self[name] for name in names))
+
+    def at(self, mu: ArrayLike, shape: Shape = "interpolation") -> Float:
+        """Return the readings (m, k) at mu (m,)."""
+        return np.stack([c.at(mu, shape) for c in self.readings], axis=-1)
+
+    def slope(self, mu: ArrayLike) -> Float:
+        """Return d reading / d mu (m, k) at mu (m,)."""
+        return np.stack([c.slope(mu) for c in self.readings], axis=-1)
+
+    def covariance(
+        self,
+        mu: ArrayLike,
+        noise: Float | None = None,
+        without: str = "",
+        shape: Shape = "interpolation",
+    ) -> Float:
+        """Return the covariance (m, k, k) of the readings at mu (m,).
+
+        Parameters
+        ----------
+        noise : (k,) standard deviations in place of those of the calibration
+        without : name of a tolerance that is known exactly, or ``"noise"``
+        shape : the curve whose error counts
+        """
+        at = np.atleast_1d(np.asarray(mu, dtype=float))
+        scale = self.noise
+        own = np.array([c.curve_error(at, shape) ** 2 for c in self.readings]).T
+        if without != "noise":
+            own = own + np.maximum(scale if noise is None else noise, _LEAST_NOISE * scale) ** 2
+        shared = [np.zeros((len(at), len(self.readings))) for _ in SHARED]
+        for i, c in enumerate(self.readings):
+            for t in (t for t in c.tolerances if t.name != without):
+                square = np.interp(at, c.mu, t.spread) ** 2
+                if t.name in SHARED:
+                    effect = t.sd * np.interp(at, c.mu, t.slope)
+                    shared[SHARED.index(t.name)][:, i] = effect
+                    square = np.maximum(square - effect**2, 0.0)
+                own[:, i] += square
+        found = np.zeros((len(at), len(scale), len(scale)))
+        found[:, np.arange(len(scale)), np.arange(len(scale))] = np.maximum(own, (_LEAST_NOISE * scale) ** 2)
+        for effect in shared:
+            found += effect[:, :, None] * effect[:, None, :]
+        return found
+
+    def mu_sd(self, mu: ArrayLike, without: str = "") -> Float:
+        """Return the standard deviation (m,) of mu of a linear model, ``1 / sqrt(s^T C^-1 s)`` with the slopes s.
+
+        It holds where the curves are straight over several of these deviations; that of an estimate holds on any curve.
+        """
+        slope = np.atleast_2d(self.slope(np.atleast_1d(mu)))
+        slope = slope / self.noise
+        covariance = self.covariance(mu, without=without) / np.outer(self.noise, self.noise)
+        information = np.einsum("mi,mi->m", slope, np.linalg.solve(covariance, slope[:, :, None])[:, :, 0])
+        with np.errstate(divide="ignore"):
+            return np.asarray(1.0 / np.sqrt(np.maximum(information, 0.0)))
+
+    def reductions(self, mu: ArrayLike) -> dict[str, Float]:
+        """Return, for the noise and each tolerance, the share (m,) of the variance of mu that it alone adds.
+
+        It is the reduction of the variance of the linear model if that quantity were known exactly.  Shares of several
+        readings need not sum to 1.
+        """
+        whole = self.mu_sd(mu) ** 2
+        with np.errstate(invalid="ignore"):
+            return {
+                name: np.nan_to_num(1.0 - self.mu_sd(mu, without=name) ** 2 / whole)
+                for name in ("noise", *self.tolerance_names)
+            }
