@@ -18,7 +18,7 @@ from finger3d.accuracy.richardson import mesh_error
 from finger3d.cli import main
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.errors import Finger3dError
-from finger3d.io import RESULTANTS
+from finger3d.mechanics.columns import RESULTANTS
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem

@@ -25,9 +25,9 @@ from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.accuracy.richardson import ORDER, ORDERS, mesh_error
 from finger3d.accuracy.weighted_residuals import BodyErrors
 from finger3d.errors import Finger3dError
-from finger3d.io import AREAS, MAIN, RESULTANTS
+from finger3d.mechanics.columns import AREAS, MAIN, RESULTANTS, Column, by_key, in_space
 from finger3d.mechanics.cost import finite_strain_s
-from finger3d.mechanics.history import StepResult, flat_readings, measure
+from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.path import AUTO_START
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.step_halving import (
@@ -81,9 +81,7 @@ class ErrorEstimate(ErrorBars):
 def main_numbers(problem: Problem, frame: StepResult) -> dict[str, float]:
     """Return forces, lengths and areas of contact and stick, and readings, by name."""
     numbers = measure(problem.points, frame)
-    across = {f"marker_{name}_z_mm" for name in frame.markers} if problem.dim == 2 else set()  # zero, without an error
-    readings = {name: value for name, value in flat_readings(numbers).items() if name not in across}
-    return {name: numbers[name] for name in (*MAIN, *AREAS)} | readings
+    return {name: numbers[name] for name in (*MAIN, *AREAS)} | by_key(frame.readings)
 
 
 def press_numbers(problem: Problem, frame: StepResult) -> dict[str, float]:
@@ -102,7 +100,8 @@ def compared(
 ) -> dict[str, float]:
     """Return the discretisation error by name, from an increment of a problem and one of its companion."""
     resolutions = PointResolution.of(problem, frame), PointResolution.of(beside, last)
-    return mesh_error(numbers(problem, frame), numbers(beside, last), edge_ratio(problem, beside), resolutions)
+    ratio, columns = edge_ratio(problem, beside), in_space(frame.readings)
+    return mesh_error(numbers(problem, frame), numbers(beside, last), ratio, resolutions, columns)
 
 
 def reading_error(
@@ -116,10 +115,11 @@ def reading_error(
     fine, coarse : (m,) readings of the problem and of its companion
     kind : of the reading: gauge, marker or taxel
     """
-    names = [f"{kind}_{k}" for k in range(len(fine))]
-    numbers, other = (dict(zip(names, map(float, reading), strict=True)) for reading in (fine, coarse))
-    found = mesh_error(numbers, other, edge_ratio(problem, beside), (PointResolution.of(problem, frame),) * 2)
-    return np.array([found.get(name, math.nan) for name in names])
+    columns = [Column(str(k), kind) for k in range(len(fine))]
+    numbers, other = (by_key(dict(zip(columns, map(float, reading), strict=True))) for reading in (fine, coarse))
+    resolutions = (PointResolution.of(problem, frame),) * 2
+    found = mesh_error(numbers, other, edge_ratio(problem, beside), resolutions, columns)
+    return np.array([found.get(column.key, math.nan) for column in columns])
 
 
 def estimate(
@@ -135,7 +135,7 @@ def estimate(
     ----------
     problem, frames : the press as it was solved, all increments converged
     say : called with a line before a long stage
-    numbers : the numbers of an increment by name, names as in `finger3d.accuracy.richardson.Quantity.of`
+    numbers : the numbers of an increment by name, of the kinds in `finger3d.accuracy.richardson.kinds_of`
     runs : runs that chose automatic increments
 
     Returns

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.contact.friction import OPEN, STICK
-from finger3d.io import AREAS, MAIN
+from finger3d.mechanics.columns import AREAS, MAIN
 from finger3d.mechanics.history import ContactPoints, StepResult, measure
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.zones import ERROR_AT_ENDS

@@ -119,8 +119,7 @@ class PressResult:
             return rows.astype({name: int if name == "step" else float for name in rows if name != "marker"})
         if table != "history":
             raise Finger3dError(f'to_dataframe({table!r}): must be "history", "contact" or "markers"')
-        steps = self._numbers["steps"]
-        return pandas.DataFrame(history_table(steps) if steps else {})
+        return pandas.DataFrame(history_table(self.history.points, self.history.steps))
 
     def plot_contact(self) -> Picture:
         """Draw pressure, friction and its limit along x in the last good step, with the zones that stick and slip."""

@@ -34,7 +34,9 @@ MU_STEP = 0.02
 """Difference of mu over which the slope of the strain is taken, to both sides."""
 
 _KEPT = 64  # presses; a slider that goes back finds them
-_PLACES = ("gauge_x_mm", "gauge_y_mm", "gauge_angle_deg")
+_PLACES = {"gauge_x_mm": "x_mm", "gauge_y_mm": "y_mm", "gauge_angle_deg": "angle"}
+"""Tolerance of the place of a gauge, and the attribute of the gauge that it changes."""
+
 _ALONG = ("x_mm", "pressure_MPa", "shear_x_MPa", "shear_z_MPa", "status")
 _NUMBERS = ("normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm")
 
@@ -151,10 +153,10 @@ class LiveBody:
             return float((place.row(mesh, axes) @ press.displacement.ravel())[0])
 
         spread = [noise]
-        for name in _PLACES:
-            sd = TOLERANCES[name][0]
-            key, step = ("angle", math.radians(sd)) if name == "gauge_angle_deg" else (name.removeprefix("gauge_"), sd)
-            spread.append(strain(replace(gauge, **{key: getattr(gauge, key) + step}), middle) - strain(gauge, middle))
+        for tolerance, name in _PLACES.items():
+            sd = TOLERANCES[tolerance][0]
+            value = getattr(gauge, name) + (math.radians(sd) if name == "angle" else sd)
+            spread.append(strain(replace(gauge, **{name: value}), middle) - strain(gauge, middle))
         slope = (strain(gauge, high) - strain(gauge, low)) / (mu + MU_STEP - max(mu - MU_STEP, 0.0))
         strain_sd = float(np.linalg.norm(spread))
         mu_sd = strain_sd / abs(slope) if slope else math.inf

@@ -13,6 +13,7 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.contact.rules import STEP_DEPENDENT_RULES
 from finger3d.contact.state import ContactSolution, ContactState
+from finger3d.mechanics.columns import Column, in_order, strain_columns
 from finger3d.mechanics.energy import external_work, frictional_dissipation
 from finger3d.mechanics.force_control import deepest, depth_of_force
 from finger3d.mechanics.formulation import Workspace
@@ -88,17 +89,14 @@ def march(
             dissipation += frictional_dissipation(problem, part.before.contact, part.after.contact)
         previous = Move(at, target), state.contact.force
         state, at = found.state, target
-        read = formulation.readings(problem, state)
+        free_strain = _free_strain(problem, without_inclusions)
         yield StepResult(
             target=target,
             state=problem.symmetry.unfold(state.contact),
             meshed_state=state,
             lowest=problem.placed(target).lowest,
             moment=problem.symmetry.total_moment(formulation.loads(problem, state, target).moment),
-            gauges={g.name: read[g.name] for g in model.gauges} | _free_strain(problem, without_inclusions),
-            markers={m.name: tuple(read[name] for name in m.columns(problem.dim)) for m in model.markers},
-            taxels={t.name: read[t.name] for t in model.taxels},
-            other_readings={name: read[name] for r in model.other_readings for name in r.columns(problem.dim)},
+            readings=in_order(formulation.readings(problem, state) | free_strain),
             external_work_mJ=work,
             dissipation_mJ=dissipation,
             outcome=found.outcome,
@@ -118,13 +116,14 @@ def _march_without_inclusions(problem: Problem, workspace: Workspace) -> Iterato
     return march(replace(body, model=problem.model), workspace=workspace) if body else None
 
 
-def _free_strain(problem: Problem, without_inclusions: Iterator[StepResult] | None) -> dict[str, float]:
-    """Strain of every gauge by name, ``_free`` added, in the body without inclusions; NaN once its press has failed."""
+def _free_strain(problem: Problem, without_inclusions: Iterator[StepResult] | None) -> dict[Column, float]:
+    """Strain of every gauge in the body without inclusions; NaN once its press has failed."""
     if without_inclusions is None:
         return {}
     step = next(without_inclusions, None)
     known = step is not None and (step.outcome.ok or step.outcome.is_cycle)
-    return {f"{g.name}_free": step.gauges[g.name] if step and known else np.nan for g in problem.model.gauges}
+    columns = [strain_columns(gauge.name) for gauge in problem.model.gauges]
+    return {free: step.readings[own] if step and known else np.nan for own, free in columns}
 
 
 def _normal_force(problem: Problem, state: ContactState) -> float:

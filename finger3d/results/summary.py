@@ -10,6 +10,7 @@ from pathlib import Path
 
 from finger3d._types import Tree, TreeView
 from finger3d.errors import Finger3dError
+from finger3d.mechanics.columns import Column, displacement_columns, pressure_column, strain_columns
 from finger3d.mechanics.gauges import Gauge
 from finger3d.scene.tables import GaugeTable, record_of
 
@@ -82,6 +83,17 @@ class PressStep:
     taxels: Mapping[str, float] = field(default_factory=dict)
     other_readings: Mapping[str, float] = field(default_factory=dict)
 
+    @property
+    def readings(self) -> dict[Column, float | None]:
+        """Readings of gauges, markers and taxels by column."""
+        strains = {strain_columns(name)[0]: strain for name, strain in self.gauges.items()}
+        moved = {
+            column: value
+            for name, displacement in self.markers.items()
+            for column, value in zip(displacement_columns(name), displacement, strict=True)
+        }
+        return {**strains, **moved, **{pressure_column(name): value for name, value in self.taxels.items()}}
+
 
 def steps_of(summary: TreeView) -> tuple[PressStep, ...]:
     """Return the steps of a summary.
@@ -145,3 +157,9 @@ def gauges_of(scene: TreeView) -> list[Gauge]:
         If they are not as a press writes them.
     """
     return [record_of(Gauge, GaugeTable.model_validate(gauge)) for gauge in scene.get("gauge") or ()]
+
+
+def strains_of(scene: TreeView) -> list[Column]:
+    """Return the columns of the strains of a scene's gauges, then those of the strains without foils."""
+    columns = [strain_columns(gauge["name"]) for gauge in scene.get("gauge") or ()]
+    return [own for own, _ in columns] + [free for _, free in columns]

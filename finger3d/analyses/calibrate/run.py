@@ -94,7 +94,7 @@ class CurvePoints:
 
     def reading(self, name: str) -> Float:
         """Return a reading (n,) in the presses that converged."""
-        return np.array([frame.readings[name] for frame in self.frames.values()])
+        return np.array([frame.named_readings[name] for frame in self.frames.values()])
 
 
 def calibrate(
@@ -278,7 +278,7 @@ def _calibration(curve: CurvePoints, settings: CalibrationSettings, report: Prog
         frames = list(curve.frames.values())
         base = ReferenceReadings(
             mu=mu,
-            readings={name: curve.reading(name) for name in frames[0].readings},
+            readings={name: curve.reading(name) for name in frames[0].named_readings},
             sample=_sample(curve.problem, len(mu)),
             frame=frames[-1],
             pressed={p.mu: p for p in curve.presses if p.frame.outcome.ok},

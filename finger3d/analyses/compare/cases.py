@@ -13,7 +13,8 @@ from finger3d.accuracy.companions import FACTOR
 from finger3d.accuracy.estimate import estimate
 from finger3d.fem.simplex import CONTACT
 from finger3d.mechanics.build import build
-from finger3d.mechanics.history import ContactPoints, StepResult, contact_table, flat_readings, measure
+from finger3d.mechanics.columns import by_key, in_space, of_kind
+from finger3d.mechanics.history import ContactPoints, StepResult, contact_table, measure
 from finger3d.mechanics.model import Domain, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.step_halving import Run, march_automatic
@@ -80,7 +81,8 @@ def _pressed(name: str, model: Model) -> tuple[Problem, tuple[StepResult, ...], 
     mesher = "swept" if problem.dim == 2 else model.mesh.mesher
     case = Case(name, model.design.width_mm, model.mesh.size_mm, mesher, frame.outcome)
     if frame.outcome.ok:
-        case = replace(case, numbers=quantities(problem.points, frame), lines=lines_along_x(problem.points, frame))
+        numbers, lines = quantities(problem.points, frame), lines_along_x(problem.points, frame)
+        case = replace(case, numbers=numbers, lines=lines, strains=of_kind(frame.readings, "gauge"))
     return problem, frames, runs, replace(case, seconds=time.perf_counter() - start)
 
 
@@ -104,7 +106,7 @@ def quantities(points: ContactPoints, frame: StepResult) -> dict[str, float]:
         out["moment_y_Nmm_per_mm"] = numbers["moment_y_Nmm"] / width
     middle = lines_along_x(points, frame)["z = 0"]
     out["peak_pressure_MPa"] = float(np.max(middle["pressure_MPa"], initial=0.0))
-    return out | flat_readings(numbers)
+    return out | by_key(in_space(frame.readings))
 
 
 def lines_along_x(points: ContactPoints, frame: StepResult) -> dict[str, Tree]:

@@ -210,10 +210,9 @@ def _others(planes: Sequence[Case], solid: Case) -> list[str]:
             f"Sum of |friction along z|, which is zero in a section: solid {across:.3g} N per mm, "
             f"{100 * across / total:.0f} % of the sum of |friction|."
         )
-    for key in solid.numbers:
-        if key.startswith("gauge_"):
-            values = ", ".join(f"{c.model} {_with_error(c, key)}" for c in (solid, *planes))
-            out.append(f"Gauge {key.removeprefix('gauge_')}: {values}.")
+    for column in solid.strains:
+        values = ", ".join(f"{c.model} {_with_error(c, column.key)}" for c in (solid, *planes))
+        out.append(f"Gauge {column.sensor}: {values}.")
     return out
 
 
@@ -234,7 +233,7 @@ def _sufficient(planes: Sequence[Case], solid: Case) -> str:
         "friction_sum_N_per_mm": "friction sum",
         "peak_pressure_MPa": "peak pressure",
     }
-    names |= {k: f"gauge {k.removeprefix('gauge_')}" for k in solid.numbers if k.startswith("gauge_")}
+    names |= {column.key: f"gauge {column.sensor}" for column in solid.strains}
     parts = []
     for plane in planes:
         sides: dict[str, list[str]] = {"more than": [], "less than": [], "not significantly more or less than": []}

@@ -26,6 +26,7 @@ from finger3d.analyses.optimise.task import (
 from finger3d.analyses.shared_body import SharedBody, Variant, body_key
 from finger3d.errors import Finger3dError
 from finger3d.io import atomic, claimed, write_csv, write_json
+from finger3d.mechanics.columns import strain_columns
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.history import StepResult, measure
@@ -91,8 +92,8 @@ class _DesignBody:
         body = self.shared
         if self._own_press:
             (variant,) = self._variants((0.0,), self._model.legs)
-            strains = [body.strains(variant, frame.gauges) for frame in ends]
-            return lambda g: np.array([strain[g.name] for strain in strains])
+            read = [body.readings_of(variant, frame.readings) for frame in ends]
+            return lambda g: np.array([readings[strain_columns(g.name)[0]] for readings in read])
         mesh, axes = body.problem.mesh, body.problem.axes
         fields = formulation_of(body.problem.model).unknowns(body.problem, [f.meshed_state for f in ends])
         u = np.array([x[: mesh.points.size] for x in fields])
