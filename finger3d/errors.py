@@ -76,6 +76,13 @@ class Outcome(Enum):
         "large deformation did not settle; the steps before are good; try more steps or a shallower press, and a "
         "fillet where a sharp edge of the finger folds over"
     )
+    FORCE_NOT_REACHED = (
+        "the prescribed force is not reached within the finger's height; prescribe a smaller force, or a depth"
+    )
+    FORCE_JUMPS = (
+        "the prescribed force is not reached: the force jumps with the depth; prescribe a depth, or use [contact] "
+        "rule = 'projection' and a constant friction coefficient"
+    )
     INDEFINITE = "the compliance is not positive: the body is not held; fix its base, or check the mesh"
     UNRESOLVED = "the object passes between the contact points; try a smaller mesh.size_mm"
     NOT_FINITE = "the compliance or the gap contains NaN or infinity; check the mesh and the material"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from finger3d.mechanics.finite_body import FiniteBody
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.relaxation import InternalVariables
-from finger3d.objects import ObjectPose
+from finger3d.objects import ObjectPose, between
 
 _CURVATURE_STEP = 0.1
 """Step of the differences of the object's normals, over the edge length of the mesh."""
@@ -39,6 +39,20 @@ class DeformedState(ContactState):
     unknowns: Float
     memory: InternalVariables | None = None
     previous: tuple[ObjectPose, Float] | None = None
+
+
+def expecting(
+    state: ContactState, a: ObjectPose, b: ObjectPose, ends: tuple[ContactState, ContactState], share: float
+) -> ContactState:
+    """Return a state from which the increment from pose a to b begins its iteration at an expected end.
+
+    At finite strain it is `ends[0] + share (ends[0] - ends[1])`; at small strain the forces alone say what to expect.
+    """
+    one, other = ends
+    if not (isinstance(state, DeformedState) and isinstance(one, DeformedState) and isinstance(other, DeformedState)):
+        return state
+    end = one.unknowns + share * (one.unknowns - other.unknowns)
+    return replace(state, previous=(between(a, b, -1.0), 2.0 * state.unknowns - end))
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,10 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.contact.rules import STEP_DEPENDENT_RULES
 from finger3d.contact.state import ContactSolution, ContactState
+from finger3d.errors import Outcome
 from finger3d.mechanics.energy import external_work, frictional_dissipation
-from finger3d.mechanics.force_control import deepest, depth_of_force
+from finger3d.mechanics.finite_state import expecting
+from finger3d.mechanics.force_control import DepthSearch, Trial, deepest
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.path import prescribed_forces, stride_ratio, targets
@@ -77,9 +79,7 @@ def march(
             if load[0] == 1:
                 start_force = _normal_force(problem, state)
             wanted = start_force + load[0] / load[1] * (load[2] - start_force)
-            found, substeps, target = _to_force(
-                problem, workspace, state, at, target, most_cuts, (wanted, load[2]), previous
-            )
+            found, substeps, target = _to_force(problem, workspace, state, at, target, most_cuts, wanted, previous)
         for part in substeps:
             work += external_work(problem, part.before, part.after, part.a, part.b)
             dissipation += frictional_dissipation(problem, part.before, part.after)
@@ -135,32 +135,39 @@ def _to_force(
     a: ObjectPose,
     b: ObjectPose,
     cuts: int,
-    load: tuple[float, float],
+    wanted: float,
     previous: tuple[ObjectPose, Float] | None,
 ) -> tuple[ContactSolution, list[_Substep], ObjectPose]:
-    """Advance from a to the pose b, at the depth where the normal force is `load[0]`, N; the leg ends at `load[1]`."""
+    """Advance from a to the pose b, at the depth where the normal force is `wanted`, N.
 
-    def pose(depth: float) -> ObjectPose:
-        return replace(b, depth_mm=depth)
+    Every trial begins at what those before it let expect.  If the force is not reached, the solution says why, with the
+    state and the pose at the beginning.
+    """
+    parts: dict[float, list[_Substep]] = {}
+    same_path = replace(b, depth_mm=a.depth_mm, time_s=a.time_s) == a
+    rest = ContactSolution(state, Outcome.CONVERGED, 0.0, 0, "none")
+    start = Trial(a.depth_mm, rest, _normal_force(problem, state)) if same_path else None
 
-    def force_at(depth: float) -> float:
-        found, _ = _increment(problem, workspace, state, a, pose(depth), cuts)
-        if not found.outcome.ok:
-            raise _FailedError
-        return _normal_force(problem, found.state)
+    def trial_at(depth: float, good: Sequence[Trial]) -> Trial:
+        end = replace(b, depth_mm=depth)
+        begin, force = state, extrapolated_force(state, a, end, previous)
+        if good:
+            one, other = good[-1], good[-2] if len(good) > 1 else start
+            share = (depth - one.depth) / (one.depth - other.depth) if other else 0.0
+            share = share if abs(share) < 1.0 else 0.0
+            ends = one.solution.state, other.solution.state if other else one.solution.state
+            force = ends[0].force + share * (ends[0].force - ends[1].force)
+            begin = expecting(state, a, end, ends, share)
+        found, parts[depth] = _increment(problem, workspace, begin, a, end, cuts, force)
+        return Trial(depth, found, _normal_force(problem, found.state) if found.outcome.ok else np.nan)
 
     most = deepest(problem.model.object, problem.system.first_contact_mm, problem.model.design.height_mm)
-    guess = a.depth_mm + (a.depth_mm - previous[0].depth_mm if previous else b.depth_mm)
-    try:
-        target = pose(depth_of_force(force_at, load[0], a.depth_mm, guess, most, load[1]))
-    except _FailedError:
-        target = b
-    found, substeps = _increment(problem, workspace, state, a, target, cuts)
-    return found, substeps, target
-
-
-class _FailedError(Exception):
-    """An increment at a trial depth did not converge."""
+    search = DepthSearch(trial_at, wanted, a.depth_mm, most, start)
+    trial = search.run(a.depth_mm + (a.depth_mm - previous[0].depth_mm if previous else b.depth_mm))
+    spent = sum(t.solution.iterations for t in (*search.good, *search.failed))
+    if not trial.ok:
+        return replace(trial.solution, state=state, iterations=spent), [], a
+    return replace(trial.solution, iterations=spent), parts[trial.depth], replace(b, depth_mm=trial.depth)
 
 
 def extrapolated_force(
