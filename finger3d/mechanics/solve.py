@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError
 from dataclasses import dataclass, replace
 from threading import Event
@@ -41,6 +41,7 @@ def march(
     near: Sequence[Float] = (),
     workspace: Workspace | None = None,
     cancel: Event | None = None,
+    trial: Callable[[str], None] = lambda text: None,
 ) -> Iterator[StepResult]:
     """Yield the result of every increment of all legs; ends after the first that does not converge.
 
@@ -55,6 +56,8 @@ def march(
         What an earlier press of the same body left; empty unless given.
     cancel : Event, optional
         Once it is set, the press ends before its next increment.
+    trial : function of a text, optional
+        Called with the depth and the force of every trial while a prescribed force is searched for.
 
     Raises
     ------
@@ -62,8 +65,8 @@ def march(
         If `cancel` is set.
     """
     model = problem.model
-    most_cuts = 0 if model.rule in STEP_DEPENDENT_RULES else _CUTS
     workspace = workspace or model.formulation.workspace()
+    press = _Press(problem, workspace, 0 if model.rule in STEP_DEPENDENT_RULES else _CUTS, cancel, trial)
     without_inclusions = _march_without_inclusions(problem, workspace)
     state, at = model.formulation.start(problem), problem.origin
     previous: tuple[ObjectPose, Float] | None = None
@@ -74,12 +77,12 @@ def march(
             raise CancelledError
         guess = near[number] if number < len(near) else extrapolated_force(state, at, target, previous)
         if load is None:
-            found, substeps = _increment(problem, workspace, state, at, target, most_cuts, guess)
+            found, substeps = press.advanced(state, at, target, guess)
         else:
             if load[0] == 1:
                 start_force = _normal_force(problem, state)
             wanted = start_force + load[0] / load[1] * (load[2] - start_force)
-            found, substeps, target = _to_force(problem, workspace, state, at, target, most_cuts, wanted, previous)
+            found, substeps, target = press.advanced_to_force(state, at, target, wanted, previous)
         for part in substeps:
             work += external_work(problem, part.before, part.after, part.a, part.b)
             dissipation += frictional_dissipation(problem, part.before, part.after)
@@ -128,46 +131,85 @@ def _normal_force(problem: Problem, state: ContactState) -> float:
     return -float(problem.world_force(state)[:, 1].sum())
 
 
-def _to_force(
-    problem: Problem,
-    workspace: Workspace,
-    state: ContactState,
-    a: ObjectPose,
-    b: ObjectPose,
-    cuts: int,
-    wanted: float,
-    previous: tuple[ObjectPose, Float] | None,
-) -> tuple[ContactSolution, list[_Substep], ObjectPose]:
-    """Advance from a to the pose b, at the depth where the normal force is `wanted`, N.
+@dataclass(frozen=True)
+class _Press:
+    """A press that advances from one pose of the object to another.
 
-    Every trial begins at what those before it let expect.  If the force is not reached, the solution says why, with the
-    state and the pose at the beginning.
+    Attributes
+    ----------
+    cuts : times that an increment which does not converge is halved, at most
+    cancel : ends the search for a force once it is set
+    say : called with the depth and the force of every trial
     """
-    parts: dict[float, list[_Substep]] = {}
-    same_path = replace(b, depth_mm=a.depth_mm, time_s=a.time_s) == a
-    rest = ContactSolution(state, Outcome.CONVERGED, 0.0, 0, "none")
-    start = Trial(a.depth_mm, rest, _normal_force(problem, state)) if same_path else None
 
-    def trial_at(depth: float, good: Sequence[Trial]) -> Trial:
-        end = replace(b, depth_mm=depth)
-        begin, force = state, extrapolated_force(state, a, end, previous)
-        if good:
-            one, other = good[-1], good[-2] if len(good) > 1 else start
-            share = (depth - one.depth) / (one.depth - other.depth) if other else 0.0
-            share = share if abs(share) < 1.0 else 0.0
-            ends = one.solution.state, other.solution.state if other else one.solution.state
-            force = ends[0].force + share * (ends[0].force - ends[1].force)
-            begin = expecting(state, a, end, ends, share)
-        found, parts[depth] = _increment(problem, workspace, begin, a, end, cuts, force)
-        return Trial(depth, found, _normal_force(problem, found.state) if found.outcome.ok else np.nan)
+    problem: Problem
+    workspace: Workspace
+    cuts: int
+    cancel: Event | None
+    say: Callable[[str], None]
 
-    most = deepest(problem.model.object, problem.system.first_contact_mm, problem.model.design.height_mm)
-    search = DepthSearch(trial_at, wanted, a.depth_mm, most, start)
-    trial = search.run(a.depth_mm + (a.depth_mm - previous[0].depth_mm if previous else b.depth_mm))
-    spent = sum(t.solution.iterations for t in (*search.good, *search.failed))
-    if not trial.ok:
-        return replace(trial.solution, state=state, iterations=spent), [], a
-    return replace(trial.solution, iterations=spent), parts[trial.depth], replace(b, depth_mm=trial.depth)
+    def advanced(
+        self, state: ContactState, a: ObjectPose, b: ObjectPose, guess: Float | None = None
+    ) -> tuple[ContactSolution, list[_Substep]]:
+        """Advance from a to b; an increment that does not converge is halved and repeated from the same state."""
+        found = self.problem.model.formulation.increment(self.problem, state, a, b, guess, self.workspace)
+        if found.outcome.ok or self.cuts == 0:
+            return found, [_Substep(state, found.state, a, b)]
+        halves, middle = replace(self, cuts=self.cuts - 1), between(a, b, 0.5)
+        first, done = halves.advanced(state, a, middle)
+        if not first.outcome.ok:
+            return replace(first, state=state, iterations=first.iterations + found.iterations), done
+        second, more = halves.advanced(first.state, middle, b)
+        return replace(
+            second,
+            residual=max(first.residual, second.residual),
+            iterations=found.iterations + first.iterations + second.iterations,
+            method="cut back",
+        ), done + more
+
+    def advanced_to_force(
+        self,
+        state: ContactState,
+        a: ObjectPose,
+        b: ObjectPose,
+        wanted: float,
+        previous: tuple[ObjectPose, Float] | None,
+    ) -> tuple[ContactSolution, list[_Substep], ObjectPose]:
+        """Advance from a to the pose b, at the depth where the normal force is `wanted`, N.
+
+        Every trial begins at the end expected from those before it.  If the force is not reached, the solution says
+        why, and state and pose are those at the beginning.
+        """
+        problem, parts = self.problem, dict[float, list[_Substep]]()
+        rest = ContactSolution(state, Outcome.CONVERGED, 0.0, 0, "none")
+        only_deeper = replace(b, depth_mm=a.depth_mm, time_s=a.time_s) == a
+        begin = Trial(a.depth_mm, rest, _normal_force(problem, state)) if only_deeper else None
+
+        def trial_at(depth: float, good: Sequence[Trial]) -> Trial:
+            if self.cancel is not None and self.cancel.is_set():
+                raise CancelledError
+            end = replace(b, depth_mm=depth)
+            start, force = state, extrapolated_force(state, a, end, previous)
+            if good:
+                one, other = good[-1], good[-2] if len(good) > 1 else begin
+                share = (depth - one.depth) / (one.depth - other.depth) if other and one.depth != other.depth else 0.0
+                share = share if abs(share) < 1.0 else 0.0
+                ends = one.solution.state, other.solution.state if other else one.solution.state
+                force = ends[0].force + share * (ends[0].force - ends[1].force)
+                start = expecting(state, a, end, ends, share)
+            found, parts[depth] = self.advanced(start, a, end, force)
+            reached = _normal_force(problem, found.state) if found.outcome.ok else np.nan
+            text = f"{reached:.5g} N" if found.outcome.ok else "no solution"
+            self.say(f"{wanted:.5g} N wanted, {text} at a depth of {depth:.4g} mm")
+            return Trial(depth, found, reached)
+
+        most = deepest(problem.model.object, problem.system.first_contact_mm, problem.model.design.height_mm)
+        search = DepthSearch(trial_at, wanted, a.depth_mm, most, begin)
+        last = search.run(a.depth_mm + (a.depth_mm - previous[0].depth_mm if previous else b.depth_mm))
+        spent = sum(tried.solution.iterations for tried in (*search.good, *search.failed))
+        if not last.ok:
+            return replace(last.solution, state=state, iterations=spent), [], a
+        return replace(last.solution, iterations=spent), parts[last.depth], replace(b, depth_mm=last.depth)
 
 
 def extrapolated_force(
@@ -179,29 +221,3 @@ def extrapolated_force(
     pose, force = previous
     ratio = stride_ratio(pose, a, b)
     return None if ratio is None else state.force + ratio * (state.force - force)
-
-
-def _increment(
-    problem: Problem,
-    workspace: Workspace,
-    state: ContactState,
-    a: ObjectPose,
-    b: ObjectPose,
-    cuts: int,
-    guess: Float | None = None,
-) -> tuple[ContactSolution, list[_Substep]]:
-    """Advance from a to b; an increment that does not converge is halved and repeated from the same state."""
-    found = problem.model.formulation.increment(problem, state, a, b, guess, workspace)
-    if found.outcome.ok or cuts == 0:
-        return found, [_Substep(state, found.state, a, b)]
-    middle = between(a, b, 0.5)
-    first, done = _increment(problem, workspace, state, a, middle, cuts - 1)
-    if not first.outcome.ok:
-        return replace(first, state=state, iterations=first.iterations + found.iterations), done
-    second, more = _increment(problem, workspace, first.state, middle, b, cuts - 1)
-    return replace(
-        second,
-        residual=max(first.residual, second.residual),
-        iterations=found.iterations + first.iterations + second.iterations,
-        method="cut back",
-    ), done + more
