@@ -100,18 +100,17 @@ class DepthSearch:
         """Return the trial that has the force, or one whose outcome and detail say why there is none."""
         depth = min(max(guess, -self.most), self.most)
         stride = max(abs(depth - self.start), 1e-3 * self.most)
-        last_error, widths = math.inf, [math.inf]
+        errors = [math.inf, math.inf]
         for _ in range(_TRIALS):
             trial = self._tried(depth)
             if trial.ok:
                 error = abs(trial.force - self.wanted) / self.wanted
-                if error <= _TARGET or 0.3 * last_error < error <= FORCE_TOLERANCE:
+                if error <= _TARGET or 0.3 * errors[-1] < error <= FORCE_TOLERANCE:
                     return trial
-                last_error = error
+                errors.append(error)
             low, high = self._bracket()
             if low and high:
-                widths.append(high.depth - low.depth)
-                if widths[-1] <= _RESOLUTION * self.most:
+                if high.depth - low.depth <= _RESOLUTION * self.most:
                     text = f"{low.force:.6g} N and {high.force:.6g} N on either side of {low.depth:.6g} mm"
                     return self._ended(Outcome.FORCE_JUMPS, text)
             elif (low and low.depth >= self.most) or (high and high.depth <= -self.most):
@@ -121,7 +120,7 @@ class DepthSearch:
                 break
             if len(self.failed) > _FAILURES:
                 break
-            depth = self._next(low, high, bounds, stride, len(widths) > 3 and widths[-1] > 0.5 * widths[-3])
+            depth = self._next(low, high, bounds, stride, len(errors) > 4 and errors[-1] > 0.5 * errors[-3])
             stride *= 2.0
         cause = self.failed[-1].solution.outcome if self.failed else Outcome.FORCE_NOT_REACHED
         untouched = self.good and all(t.force <= 0.0 for t in self.good)
@@ -170,7 +169,7 @@ class DepthSearch:
     def _next(
         self, low: Trial | None, high: Trial | None, bounds: tuple[float, float], stride: float, slow: bool
     ) -> float:
-        """Return the next depth: interpolated from the last trials unless it is out of bounds or the bracket lags."""
+        """Return the next depth: interpolated from the last trials unless that is out of bounds or too slow."""
         middle = 0.5 * (bounds[0] + bounds[1])
         if not self.good:
             return middle

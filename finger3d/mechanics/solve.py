@@ -25,6 +25,9 @@ from finger3d.objects import ObjectPose, between
 _CUTS = 6
 """Times that an increment which does not converge is halved, at most."""
 
+_LEAST_POWER = 2.0 / 3.0
+"""Power of the force with which the depth grows under a ball (Hertz 1881); a longer first trial is not taken."""
+
 
 @dataclass(frozen=True)
 class _Substep:
@@ -205,7 +208,10 @@ class _Press:
 
         most = deepest(problem.model.object, problem.system.first_contact_mm, problem.model.design.height_mm)
         search = DepthSearch(trial_at, wanted, a.depth_mm, most, begin)
-        last = search.run(a.depth_mm + (a.depth_mm - previous[0].depth_mm if previous else b.depth_mm))
+        guess = a.depth_mm + (a.depth_mm - previous[0].depth_mm if previous else b.depth_mm)
+        if begin and wanted > begin.force > 0.0 and a.depth_mm > 0.0:
+            guess = min(guess, a.depth_mm * (wanted / begin.force) ** _LEAST_POWER)
+        last = search.run(guess)
         spent = sum(tried.solution.iterations for tried in (*search.good, *search.failed))
         if not last.ok:
             return replace(last.solution, state=state, iterations=spent), [], a
