@@ -204,7 +204,7 @@ class DepthSearch:
             return f"{self.wanted:.6g} N asked; no depth that was tried gave a solution"
         forces = [trial.force for trial in self.good]
         kind = "largest" if max(forces) < self.wanted else "least" if min(forces) > self.wanted else "nearest"
-        best = min(self.good, key=lambda trial: abs(trial.force - self.wanted))
+        best = min(self.good, key=lambda trial: (abs(trial.force - self.wanted), -trial.depth))
         if best.force <= 0.0:
             return f"{self.wanted:.6g} N asked; the object does not touch the finger down to {best.depth:.4g} mm"
         return f"{self.wanted:.6g} N asked; the {kind} force is {best.force:.6g} N, at a depth of {best.depth:.4g} mm"
