@@ -18,6 +18,7 @@ from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.mechanics.build import build
 from finger3d.mechanics.force_control import DepthSearch, Trial, at_depth_reached, forecast_depth
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.solve import march
@@ -134,7 +135,7 @@ def test_a_force_under_the_papers_rule_is_reached_or_ends_the_press(large: bool)
 def test_a_force_at_large_deformation_takes_at_most_twice_the_factorisations_of_a_depth() -> None:
     def factors(legs: tuple[Leg, ...]) -> tuple[int, float]:
         problem = build(LargeDeformation().apply(block(legs=legs, domain="plane-strain")))
-        workspace = problem.model.formulation.workspace()
+        workspace = formulation_of(problem.model).workspace()
         last = list(march(problem, workspace=workspace))[-1]
         assert last.outcome.ok
         return workspace.factorizations, measure(problem.points, last)["normal_force_N"]
