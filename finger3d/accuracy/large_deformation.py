@@ -22,7 +22,7 @@ from dataclasses import replace
 from finger3d.accuracy.changes import ChangeEstimate, attempted, budget_s, changing_numbers, check_kind, judged
 from finger3d.accuracy.companions import LEAST_RATIO, built_like, coarser, edge_ratio
 from finger3d.accuracy.cost import forecast
-from finger3d.effects.base import fill
+from finger3d.effects import fill
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Model

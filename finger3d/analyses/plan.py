@@ -14,7 +14,7 @@ from finger3d.geometry.design import Design
 from finger3d.geometry.imported import FileDesign
 from finger3d.mechanics.resolution import warnings_before_meshing
 from finger3d.mechanics.symmetry import symmetry
-from finger3d.scene.parts import moduli
+from finger3d.scene.derived import moduli
 
 if TYPE_CHECKING:
     from finger3d.scene import Scene

@@ -44,7 +44,7 @@ def press(
     begin = time.perf_counter()
     loaded = load(scene, set_, out)
     from finger3d.analyses.press import press as run
-    from finger3d.scene.parts import moduli
+    from finger3d.scene.derived import moduli
 
     with job(json_, lambda report: _kept(out, report)) as report:
         result = run(loaded, out, report, figures=figures, error=error)
@@ -85,8 +85,7 @@ _NUMBERS = {
 
 def _rows(summary: TreeView, out: Path, seconds: float) -> Iterator[tuple[str, str]]:
     """Yield the rows of the closing table: numbers of the last step with their errors, cost, and files."""
-    from finger3d.accuracy.error_bars import ErrorBars
-    from finger3d.results.format import with_error
+    from finger3d.accuracy.error_bars import ErrorBars, with_error
     from finger3d.results.summary import steps_of
 
     bars, estimate, steps = ErrorBars.of_summary(summary), summary.get("error_estimate"), summary["steps"]

@@ -9,8 +9,7 @@ from dataclasses import dataclass, fields
 from typing import Literal
 
 from finger3d.errors import Finger3dError
-from finger3d.mold.printers import PRINTERS, Printer, PrinterName
-from finger3d.mold.screws import SCREWS, Screw, ScrewName
+from finger3d.mold.hardware import PRINTERS, SCREWS, Printer, PrinterName, Screw, ScrewName
 
 BAND_DEPTH_MM = 1.5
 """Depth of the grooves for rubber bands."""

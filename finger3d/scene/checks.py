@@ -14,8 +14,8 @@ from finger3d.mechanics.columns import displacement_columns, pressure_column, st
 from finger3d.mechanics.model import Domain, MeshOptions
 from finger3d.meshing.given import GivenMesh
 from finger3d.objects import RigidObject
+from finger3d.scene.derived import check_parts
 from finger3d.scene.messages import dotted, shown
-from finger3d.scene.parts import check_parts
 from finger3d.scene.tables import GaugeTable, LegTable, MarkerTable, MeshTable, SceneTable, TaxelTable
 
 Box = tuple[float, float, float, float]

@@ -10,13 +10,13 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from finger3d._types import Tree
+from finger3d.effects import effect_names, effect_type
 from finger3d.geometry.registry import designs
 from finger3d.materials.elastic import MODULUS_KEYS
 from finger3d.objects import OBJECTS
 from finger3d.scene import tables
 from finger3d.scene.files import FINGER_SUFFIXES
 from finger3d.scene.reference import descriptions
-from finger3d.scene.registry import effect_names, effect_type
 from finger3d.scene.tables import LegsTable, LegTable, PressTable, SceneTable, TomlTable, table_of
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"

@@ -133,7 +133,7 @@ def calibrate(
         If fewer than four values of mu converge; the others are in calibration.csv.
     """
     from finger3d.scene import scene_of
-    from finger3d.scene.parts import largest_spread
+    from finger3d.scene.derived import largest_spread
 
     report = report or Progress()
     scene = scene_of(scene)

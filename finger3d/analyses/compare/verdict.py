@@ -10,9 +10,9 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.accuracy.companions import FACTOR
+from finger3d.accuracy.error_bars import with_error
 from finger3d.accuracy.richardson import gain
 from finger3d.results.comparison import FORCE, Case
-from finger3d.results.format import with_error
 
 WITHIN = 0.05
 """Relative deviation from the solid below which a plane model is called sufficient."""

@@ -27,7 +27,7 @@ from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.step_halving import with_steps
 from finger3d.objects import Plane
-from finger3d.sensor.information import ReadingEffects
+from finger3d.sensor.likelihood import ReadingEffects
 from finger3d.sensor.maps import Reader
 
 Say = Callable[[str], None]

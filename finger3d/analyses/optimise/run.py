@@ -14,14 +14,16 @@ import numpy as np
 from finger3d._types import Float, Tree
 from finger3d.analyses.calibrate.increments import choose_increments, error_of_increments
 from finger3d.analyses.free_keys import FreeKey
-from finger3d.analyses.optimise.evaluation import Evaluation, evaluation_of, row_check
 from finger3d.analyses.optimise.task import (
     METHODS,
+    Evaluation,
     Objective,
     ObjectiveTable,
     OptimisationProblem,
     checked_start,
+    evaluation_of,
     objective_of,
+    row_check,
 )
 from finger3d.analyses.shared_body import SharedBody, Variant, body_key
 from finger3d.errors import Finger3dError
