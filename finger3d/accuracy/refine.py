@@ -231,12 +231,12 @@ def _run_round(model: Model, tolerance: float, goal: str) -> tuple[Problem, Roun
     """Press on one mesh; return its problem, its round, and the edge lengths to try next."""
     start = time.perf_counter()
     problem = build(model)
-    frame = last_step(problem)
-    numbers = press_numbers(problem, frame)
+    step = last_step(problem)
+    numbers = press_numbers(problem, step)
     other = companion(problem)
     last = last_step(other)
-    kinds = kinds_of(frame.readings)
-    error = relative_error(numbers, kinds, goal, compared(problem, frame, other, last, press_numbers)[goal])
+    kinds = kinds_of(step.readings)
+    error = relative_error(numbers, kinds, goal, compared(problem, step, other, last, press_numbers)[goal])
     # a finer companion changes both lengths, so that their effects cannot be separated
     coarse = press_numbers(other, last) if other.model.mesh.base_size_mm >= model.mesh.base_size_mm else None
     sizes = _next_sizes(problem, (goal, kinds[goal]), error, tolerance, numbers, coarse)

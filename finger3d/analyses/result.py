@@ -143,10 +143,10 @@ class PressResult:
         return grid(self.out, step)
 
     def _contact(self) -> Tree:
-        frames = self.history.steps
-        if not frames:
+        steps = self.history.steps
+        if not steps:
             raise Finger3dError(f"{self.out}: no step was finished, so there is no contact to show")
-        last = next((f for f in reversed(frames) if f.outcome.ok), frames[-1])
+        last = next((f for f in reversed(steps) if f.outcome.ok), steps[-1])
         return contact_table(self.history.points, last.state)
 
     def __repr__(self) -> str:
