@@ -144,23 +144,23 @@ def assemble_in_place(problem: ContactProblem, active: ActiveSet, precision: Pre
     return matrix[: active.size, : active.size].T
 
 
-def chord_iterations(problem: ContactProblem, system: ActiveSetSystem, found: Iterate) -> Iterate:
+def chord_iterations(problem: ContactProblem, system: ActiveSetSystem, initial: Iterate) -> Iterate:
     """Return the better of an iterate and the result of chord iterations with its factors.
 
     They update the slip directions and remove the round-off of single precision, while the active set stays the same.
     """
-    if found.at_roundoff(problem) or system.is_exact:
-        return found
-    best = Iterate.of(problem, _scale_to_slip_limit(system.active, found.force))
+    if initial.at_roundoff(problem) or system.is_exact:
+        return initial
+    best = Iterate.of(problem, _scale_to_slip_limit(system.active, initial.force))
     for _ in range(_CHORD_ITERATIONS):
-        if best.at_roundoff(problem) or (best.status != found.status).any():
+        if best.at_roundoff(problem) or (best.status != initial.status).any():
             break
         candidate = Iterate.of(problem, chord_step(system, best.force, best.force - best.projected))
         stalls = not candidate.mismatch <= _CHORD_RATIO * best.mismatch
         best = min(best, candidate, key=lambda iterate: iterate.mismatch)
         if stalls:
             break
-    return min(found, best, key=lambda iterate: iterate.mismatch)
+    return min(initial, best, key=lambda iterate: iterate.mismatch)
 
 
 def chord_step(system: ActiveSetSystem, force: Float, mismatch: Float) -> Float:
@@ -216,11 +216,11 @@ def _deepest(gap: Float, closing: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 def _submatrix(problem: ContactProblem, dofs: NDArray[np.int64], precision: Precision) -> Array:
     """Return the Delassus operator (k, k) between directions (k,); some rows at a time stay in the cache."""
-    found = np.empty((len(dofs), len(dofs)), precision)
+    submatrix = np.empty((len(dofs), len(dofs)), precision)
     for first in range(0, len(dofs), _ROWS_IN_CACHE):
         part = slice(first, first + _ROWS_IN_CACHE)
-        found[part] = problem.delassus[dofs[part]].take(dofs, axis=1)
-    return found
+        submatrix[part] = problem.delassus[dofs[part]].take(dofs, axis=1)
+    return submatrix
 
 
 def _normal_contact(
