@@ -73,7 +73,8 @@ def accelerated_newton(problem: ContactProblem, expected: Float, limit: int, dam
     """Solve as `finger3d.contact.newton.newton` does, from expected forces (c, d), N, with all accelerations."""
     problem = _ShortProducts(**vars(problem))
     start = warm_start(problem, expected)
-    precision, spent = _PRECISION[start.shape[1]], 0
+    precision = _PRECISION[start.shape[1]]
+    spent = 0
     if precision is np.float32 and problem.friction.max(initial=0.0) <= _FLOAT32_MAX_MU:
         single = newton(problem, start, _FLOAT32_ITERATIONS, damped, precision, chord_iterations, assemble_in_place)
         if single.solved:
@@ -177,7 +178,8 @@ def chord_step(system: ActiveSetSystem, force: Float, mismatch: Float) -> Float:
 
 def _scale_to_slip_limit(active: ActiveSet, force: Float) -> Float:
     """Return the forces (c, d) with friction of length mu r_n at slipping points, its direction unchanged."""
-    scaled, slip = force.copy(), active.slip_points
+    scaled = force.copy()
+    slip = active.slip_points
     length = lengths(scaled[slip, 1:])
     limit = lengths(active.slip_force_direction) * scaled[slip, 0]
     scaled[slip, 1:] *= (limit / np.where(length > 0.0, length, 1.0))[:, None]
@@ -275,8 +277,10 @@ class _ActivePoints(NamedTuple):
         dofs = (np.arange(d)[:, None] + points * d).ravel()
         block = _submatrix(problem, dofs, _PRECISION[d])
         free, rho = (a.ravel()[dofs].astype(block.dtype) for a in (problem.free_motion, problem.augmentation))
-        coupling, tangential, rho = block[:k, k:], block[k:, k:], rho[k:]
-        mu, step = problem.friction[points].astype(block.dtype), rho / _spectral_radius(tangential, rho)
+        coupling, tangential = block[:k, k:], block[k:, k:]
+        rho = rho[k:]
+        mu = problem.friction[points].astype(block.dtype)
+        step = rho / _spectral_radius(tangential, rho)
         return cls(free[:k], free[k:], solve_normal, coupling, tangential, mu, step)
 
     def slip_and_limit(self, normal: Array) -> tuple[Array, Array]:

@@ -65,12 +65,14 @@ def solve_increment(problem: ContactProblem, guess: Float | None = None) -> Cont
     ContactSolution
         Its outcome is CONVERGED only if the residual of the conditions, evaluated afterwards, is at most `TOLERANCE`.
     """
-    previous, law = problem.previous, problem.law.friction
+    previous = problem.previous
+    law = problem.law.friction
     if problem.refusal:
         return ContactSolution(previous, problem.refusal, np.inf, 0, "none")
     with threads_for(problem.free_motion.size):
         start = previous.force if guess is None else guess
-        limits, total = _SMALL_STRAIN if problem.is_definite else _FINITE_STRAIN, 0
+        limits = _SMALL_STRAIN if problem.is_definite else _FINITE_STRAIN
+        total = 0
         for _ in range(_FRICTION_UPDATES + len(start)):
             method, solution, error, spent = _solve_once(problem, start, guess is None, limits)
             total += spent
@@ -80,7 +82,8 @@ def solve_increment(problem: ContactProblem, guess: Float | None = None) -> Cont
             if np.abs(mu - problem.friction).max(initial=0.0) <= _FRICTION_TOLERANCE * mu.max(initial=0.0):
                 state = next_state(previous, solution.force, solution.relative_displacement, solution.status)
                 return ContactSolution(state, Outcome.CONVERGED, error, total, method)
-            problem, start = replace(problem, friction=mu), solution.force
+            problem = replace(problem, friction=mu)
+            start = solution.force
     return ContactSolution(previous, Outcome.NO_CONVERGENCE, error, total, method)
 
 
@@ -88,7 +91,8 @@ def _solve_once(
     problem: ContactProblem, start: Float, path_turns: bool, limits: _Limits
 ) -> tuple[str, NewtonResult | None, float, int]:
     """Return method, solution, residual and iterations; None and the least residual if all attempts fail."""
-    spent, least = 0, np.inf
+    spent = 0
+    least = np.inf
     for method, attempt in _attempts(problem, start, path_turns, limits):
         spent += attempt.iterations
         if not attempt.solved:
@@ -164,7 +168,9 @@ def _friction_continuation(problem: ContactProblem, start: Float) -> NewtonResul
         trial = newton(replace(problem, friction=mu), solution.force, 40, damped=True)
         spent += trial.iterations
         if trial.solved:
-            solution, reached, stride = trial, scale, stride * 1.5
+            solution = trial
+            reached = scale
+            stride *= 1.5
         else:
             stride *= 0.5
     return replace(solution, solved=reached >= 1.0, iterations=spent)
