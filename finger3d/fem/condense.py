@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from finger3d.fem import mumps, pardiso
 
 
-_SOLVE_CHUNK = 64
+_ROWS_AT_ONCE = 64
 
 
 class _Factor(Protocol):
@@ -210,8 +210,8 @@ def stiffened(compliance: Float, springs: Float) -> Float:
     if not len(springs):
         return compliance
     first = len(compliance) - len(springs)
-    found = compliance + compliance[:, first:] @ spring_forces(compliance, springs, compliance)
-    return 0.5 * (found + found.T)
+    reduced = compliance + compliance[:, first:] @ spring_forces(compliance, springs, compliance)
+    return 0.5 * (reduced + reduced.T)
 
 
 def default_solver() -> str:
@@ -241,10 +241,10 @@ class _Pattern:
 
     def values(self, upper: sp.csr_matrix, rows: sp.csr_matrix) -> Float:
         """Return the entries (nnz,) of the augmented matrix."""
-        found = np.zeros(len(self.is_stiffness))
-        found[self.is_stiffness] = upper.data[self.is_kept]
-        found[self.row_places] = rows.data[self.row_entries]
-        return found
+        entries = np.zeros(len(self.is_stiffness))
+        entries[self.is_stiffness] = upper.data[self.is_kept]
+        entries[self.row_places] = rows.data[self.row_entries]
+        return entries
 
 
 @dataclass(frozen=True)
@@ -299,12 +299,12 @@ def _augmented(upper: sp.csr_matrix, free: Int, rows: sp.csr_matrix) -> tuple[_P
     is_free[free] = True
     kept = is_free[upper.indices]
     kept &= np.repeat(is_free, np.diff(upper.indptr))
-    own = np.add.reduceat(kept, upper.indptr[:-1], dtype=np.int64)[free]  # no row is empty: it has its diagonal
+    row_lengths = np.add.reduceat(kept, upper.indptr[:-1], dtype=np.int64)[free]  # no row is empty: it has its diagonal
     numbered = sp.csr_matrix((np.arange(rows.nnz), rows.indices, rows.indptr), rows.shape)
     transposed = numbered[:, free].T.tocsr()
     more = np.diff(transposed.indptr)
-    indptr = np.concatenate([[0], np.cumsum(np.concatenate([own + more, np.ones(r, dtype=np.int64)]))])
-    row_places = np.arange(transposed.nnz) + np.repeat(np.cumsum(own), more)
+    indptr = np.concatenate([[0], np.cumsum(np.concatenate([row_lengths + more, np.ones(r, dtype=np.int64)]))])
+    row_places = np.arange(transposed.nnz) + np.repeat(np.cumsum(row_lengths), more)
     stiffness = np.ones(indptr[-1], dtype=np.bool_)
     stiffness[row_places] = False
     stiffness[len(stiffness) - r :] = False
@@ -338,8 +338,8 @@ class _SuperLU(WholeSolutions):
 
     def compliance(self) -> Float:
         """Return ``R K^-1 R^T`` (r, r)."""
-        found = np.empty((self.rows.shape[0], self.rows.shape[0]))
-        for start in range(0, len(found), _SOLVE_CHUNK):
-            part = slice(start, start + _SOLVE_CHUNK)
-            found[:, part] = self.rows @ self.solve(self.rows[part].T.toarray())
-        return found
+        compliance = np.empty((self.rows.shape[0], self.rows.shape[0]))
+        for start in range(0, len(compliance), _ROWS_AT_ONCE):
+            part = slice(start, start + _ROWS_AT_ONCE)
+            compliance[:, part] = self.rows @ self.solve(self.rows[part].T.toarray())
+        return compliance

@@ -186,7 +186,7 @@ def deformed_contact(
     gap: Float,
     normal: Float,
     axes: tuple[str, ...],
-    share: Float | None = None,
+    object_share: Float | None = None,
 ) -> DeformedContact:
     """Contact of a deformed face.
 
@@ -200,23 +200,23 @@ def deformed_contact(
         Unit normals into the body at the samples, along which the gap is measured.
     axes : tuple of str
         Normals of the symmetry planes, in which the normals of points on them lie.
-    share : (c,) array, optional
+    object_share : (c,) array, optional
         Share of an elastic object in the compliance of each point; the common normal turns from that of the object
         towards that of the body by this share.
     """
     area = _Area.of(face, points, displacement)
     total = face.average @ area.ratio
     mean_normal = (face.average @ (normal * area.ratio[:, None])) / total[:, None]
-    if share is not None:
-        own = outward_normals(area.moved)
-        own = (face.average @ (own * area.ratio[:, None])) / total[:, None]
-        own *= (np.linalg.norm(mean_normal, axis=1) / np.linalg.norm(own, axis=1))[:, None]
-        mean_normal = (1.0 - share[:, None]) * mean_normal - share[:, None] * own
+    if object_share is not None:
+        body_normal = outward_normals(area.moved)
+        body_normal = (face.average @ (body_normal * area.ratio[:, None])) / total[:, None]
+        body_normal *= (np.linalg.norm(mean_normal, axis=1) / np.linalg.norm(body_normal, axis=1))[:, None]
+        mean_normal = (1.0 - object_share[:, None]) * mean_normal - object_share[:, None] * body_normal
     mean_gap = (face.average @ (gap * area.ratio)) / total
     for k in axis_numbers(axes):
         mean_normal[face.points[:, k] == 0.0, k] = 0.0
     bases = bases_of(mean_normal / np.linalg.norm(mean_normal, axis=1)[:, None])
-    return DeformedContact(face, mean_gap, bases, gap, normal, area, share is None)
+    return DeformedContact(face, mean_gap, bases, gap, normal, area, object_share is None)
 
 
 def _rows(parts: Sequence[sp.csr_matrix]) -> sp.csr_matrix:

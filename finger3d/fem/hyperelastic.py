@@ -260,8 +260,8 @@ class TotalLagrangian:
     def slopes(self, x: Float) -> Float:
         """Return the displacement gradients (m, d, d) at the quadrature points, row the component."""
         d = self.mesh.dim
-        found = self._operators[0] @ displacement(self.mesh, x)
-        return np.swapaxes(found.reshape(-1, d, d), 1, 2)
+        slopes = self._operators[0] @ displacement(self.mesh, x)
+        return np.swapaxes(slopes.reshape(-1, d, d), 1, 2)
 
     def pressures(self, x: Float) -> Float | None:
         """Return the pressure (m,) MPa at the quadrature points in the mixed form."""
@@ -290,8 +290,8 @@ class TotalLagrangian:
         if hats is None or p is None:
             return np.asarray(force.ravel())
         excess = (determinant(f) - 1.0 - p / self.material.bulk) * weights.ravel()
-        share = 1.0 if relaxing is None else relaxing.volumetric
-        volume = share * self.pressure_scale * (hats.T @ excess)
+        volumetric = 1.0 if relaxing is None else relaxing.volumetric
+        volume = volumetric * self.pressure_scale * (hats.T @ excess)
         return np.concatenate([force.ravel(), volume])
 
     def tangent(self, x: Float, relaxing: Relaxing | None = None) -> Stiffness:
@@ -303,15 +303,15 @@ class TotalLagrangian:
         slopes = self.slopes(x).reshape(e, q, d, d)
         hats, _ = quadrature(d, 2)
         data = np.zeros(len(self.pattern.indices))
-        share = 1.0 if relaxing is None else relaxing.volumetric
-        scale = share * self.pressure_scale
+        volumetric = 1.0 if relaxing is None else relaxing.volumetric
+        scale = volumetric * self.pressure_scale
         mass = -scale * self.pressure_scale * np.einsum("qp,qr->qpr", hats, hats)
         for part in cell_parts(mesh):
             points = slice(part.start * q, part.stop * q)
-            own = relaxing.of_points(points) if relaxing else None
+            local_relaxing = relaxing.of_points(points) if relaxing else None
             local, w, material = gradients[part], weights[part], self.material.of_points(points)
-            f = material.deformation(slopes[part].reshape(-1, d, d), own)
-            _, tangent = material.stress_and_tangent(f, None if p is None else p[points], own)
+            f = material.deformation(slopes[part].reshape(-1, d, d), local_relaxing)
+            _, tangent = material.stress_and_tangent(f, None if p is None else p[points], local_relaxing)
             if material.plane_stress:
                 tangent = material.in_plane(tangent)
             k = local.shape[3]
@@ -342,12 +342,12 @@ class TotalLagrangian:
 
 def stretch(mesh: Mesh, u: Float, point: Float, direction: Float) -> float:
     """Relative elongation |F d| - 1 at `point` (d,) along the unit `direction` (d,), mean over cells that hold it."""
-    found = []
+    elongations = []
     for cell, bary in cells_at(mesh, point):
         nodes = mesh.cells[cell]
         slope = u[nodes].T @ mesh.element.physical_gradients(mesh.points[nodes][None], bary[None])[0][0, 0]
-        found.append(np.linalg.norm(direction + slope @ direction) - 1.0)
-    return float(np.mean(found))
+        elongations.append(np.linalg.norm(direction + slope @ direction) - 1.0)
+    return float(np.mean(elongations))
 
 
 def nodal_fields(body: TotalLagrangian, x: Float) -> tuple[Float, Float, Float]:

@@ -87,6 +87,6 @@ def _by_part(part: Int, function: Callable[[int, Float], Float], values: Float) 
     """Return a function of part and values (k, ...), of the shape of the values, applied part by part."""
     out = np.empty_like(values)
     for number in np.unique(part):
-        own = part == number
-        out[own] = function(int(number), values[own])
+        in_part = part == number
+        out[in_part] = function(int(number), values[in_part])
     return out

@@ -201,11 +201,11 @@ class RecoveredErrors:
 def _patches(corner: Int, count: int, least: int) -> sp.csr_matrix:
     """Return which cells (v, e) are fitted around each vertex, at least so many where the mesh has them."""
     cells = len(corner)
-    at = sp.csr_matrix(
+    adjacent = sp.csr_matrix(
         (np.ones(corner.size), (corner.ravel(), np.repeat(np.arange(cells), corner.shape[1]))), (count, cells)
     )
-    few = (np.diff(at.indptr) < least).astype(float)
-    out = sp.csr_matrix(sp.diags_array(1.0 - few) @ at + sp.diags_array(few) @ at @ (at.T @ at))
+    few = (np.diff(adjacent.indptr) < least).astype(float)
+    out = sp.csr_matrix(sp.diags_array(1.0 - few) @ adjacent + sp.diags_array(few) @ adjacent @ (adjacent.T @ adjacent))
     out.eliminate_zeros()
     out.sort_indices()
     return out

@@ -38,9 +38,9 @@ def averaged(mesh: Mesh, of_part: Callable[[MeshPart], tuple[Float, ...]]) -> tu
     weight /= weight.sum(axis=0)
     total: list[Float] = []
     for row, part in zip(weight, parts, strict=True):
-        found = of_part(part)
-        total = total or [np.zeros((len(mesh.points), *field.shape[1:])) for field in found]
-        for sum_, field in zip(total, found, strict=True):
+        fields = of_part(part)
+        total = total or [np.zeros((len(mesh.points), *field.shape[1:])) for field in fields]
+        for sum_, field in zip(total, fields, strict=True):
             sum_[part.nodes] += row[part.nodes].reshape(-1, *[1] * (field.ndim - 1)) * field
     return tuple(total)
 

@@ -99,8 +99,8 @@ def surface(mesh: Mesh, label: str, thickness: float = 1.0) -> BoundarySurface:
     m, q = weights.shape
     area: Float = np.bincount(number.ravel(), hat.sum(axis=1).ravel(), minlength=len(nodes)).astype(np.float64)
     which = np.broadcast_to(number[:, None, :], hat.shape)
-    at = np.broadcast_to(np.arange(m * q).reshape(m, q, 1), hat.shape)
-    places = (which.ravel(), at.ravel())
+    sample_of = np.broadcast_to(np.arange(m * q).reshape(m, q, 1), hat.shape)
+    places = (which.ravel(), sample_of.ravel())
     average = sp.csr_matrix(((hat / area[which]).ravel(), places), shape=(len(nodes), m * q))
     hats = sp.csr_matrix((np.broadcast_to(phi, hat.shape).ravel(), places), shape=average.shape)
     spread = np.broadcast_to(facets[:, None, :], (m, q, facets.shape[1]))
@@ -185,36 +185,36 @@ def local_rows(surface: BoundarySurface, frame: Float) -> sp.csr_matrix:
 
 def strain_row(mesh: Mesh, point: Float, direction: Float) -> sp.csr_matrix:
     """Row (1, n d) of the normal strain at `point` (d,) along a unit `direction` (d,), mean over cells that hold it."""
-    found = _holding(mesh, point)
+    cells = _holding(mesh, point)
     row = np.zeros(mesh.points.shape)
-    for cell, bary in found:
+    for cell, bary in cells:
         nodes = mesh.cells[cell]
         slope = mesh.element.physical_gradients(mesh.points[nodes][None], bary[None])[0][0, 0]
-        np.add.at(row, nodes, np.outer(slope @ direction, direction) / len(found))
+        np.add.at(row, nodes, np.outer(slope @ direction, direction) / len(cells))
     return sp.csr_matrix(row.reshape(1, -1))
 
 
 def displacement_row(mesh: Mesh, point: Float, direction: Float) -> sp.csr_matrix:
     """Row (1, n d) of the displacement at `point` (d,) along `direction` (d,)."""
-    found = _holding(mesh, point)
+    cells = _holding(mesh, point)
     row = np.zeros(mesh.points.shape)
-    for cell, bary in found:
+    for cell, bary in cells:
         values = mesh.element.shape(bary[None])[0]
-        np.add.at(row, mesh.cells[cell], np.outer(values, direction) / len(found))
+        np.add.at(row, mesh.cells[cell], np.outer(values, direction) / len(cells))
     return sp.csr_matrix(row.reshape(1, -1))
 
 
 def displacement_rows(mesh: Mesh, point: Float, signs: Float) -> sp.csr_matrix:
     """Rows (d, n d) of the displacement at `point` (d,), each component multiplied by one of the signs (d,)."""
-    found = _holding(mesh, point)
+    cells = _holding(mesh, point)
     row = np.zeros(len(mesh.points))
-    for cell, bary in found:
-        np.add.at(row, mesh.cells[cell], mesh.element.shape(bary[None])[0] / len(found))
+    for cell, bary in cells:
+        np.add.at(row, mesh.cells[cell], mesh.element.shape(bary[None])[0] / len(cells))
     return sp.kron(sp.csr_matrix(row), np.diag(signs), format="csr")
 
 
 def _holding(mesh: Mesh, point: Float) -> list[tuple[int, Float]]:
-    found = cells_at(mesh, point)
-    if not found:
+    cells = cells_at(mesh, point)
+    if not cells:
         raise Finger3dError(f"gauge: the point {tuple(round(float(x), 6) for x in point)} mm lies outside the body")
-    return found
+    return cells

@@ -20,12 +20,12 @@ class WholeSolutions(ABC):
 
     def eliminated(self, load: Float) -> tuple[Float, Float]:
         """Return ``K^-1 load`` (n, m) and ``R K^-1 load`` (r, m) of loads (n, m)."""
-        found = self.solve(load)
-        return found, self.rows @ found
+        solution = self.solve(load)
+        return solution, self.rows @ solution
 
     def substituted(self, eliminated: Float | None, force: Float) -> Float:
         """Return ``K^-1 (load + R^T force)`` (n, m) for loads eliminated, if any, and forces (r, m)."""
         if eliminated is not None and not force.any():
             return eliminated
-        found = self.solve(self.rows.T @ force)
-        return found if eliminated is None else eliminated + found
+        solution = self.solve(self.rows.T @ force)
+        return solution if eliminated is None else eliminated + solution
