@@ -89,7 +89,8 @@ class Pattern:
         n, d = mesh.points.shape
         vertices, corner = mesh.part_corners if mixed else (np.zeros(0, dtype=np.int64), mesh.cells[:, :0])
         count = n + len(vertices)
-        k, corners = mesh.cells.shape[1], d + 1 if mixed else 0
+        k = mesh.cells.shape[1]
+        corners = d + 1 if mixed else 0
         (a, b), (p, r) = _pairs(k), _pairs(corners)
         pairs = len(a) + corners * k + len(p)
         size = len(mesh.cells) * pairs
@@ -120,7 +121,8 @@ class Pattern:
         e, k, d = cell.shape[:3]
         flat = cell.reshape(e, -1)
         a, b = _pairs(k)
-        first, swapped = (a * d * k + b) * d, self.swapped[part]
+        first = (a * d * k + b) * d
+        swapped = self.swapped[part]
         parts = [[np.take(flat, first + (i * k * d + j), axis=1) for j in range(d)] for i in range(d)]
         slot = self.slot[part, : len(a)]
         for i, positions in enumerate(_rows(self.start[slot], self.length[slot], d)):
@@ -183,7 +185,8 @@ def _places(row: Int, col: Int, n: int, pressures: int, d: int) -> tuple[AnyInt,
     indices = np.empty(indptr[-1], dtype=kind)
     of_nodes, of_pressures = col < n, row >= n
     for part, tall, wide in ((of_nodes, d, d), (~of_nodes & ~of_pressures, d, 1), (of_pressures, 1, 1)):
-        beside, column = row[part] < col[part], unknown[col[part]].astype(kind)
+        beside = row[part] < col[part]
+        column = unknown[col[part]].astype(kind)
         for i, positions in enumerate(_rows(start[part], length[part], tall)):
             for j in range(wide):
                 stored = slice(None) if j >= i else beside

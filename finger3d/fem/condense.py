@@ -147,7 +147,8 @@ def condense(
         compliance, but can no longer solve.
     """
     start = time.perf_counter()
-    upper, size = stiffness.upper, stiffness.upper.shape[0]
+    upper = stiffness.upper
+    size = upper.shape[0]
     if not upper.has_sorted_indices:
         upper = upper.sorted_indices()
     solver = solver or os.environ.get("FINGER3D_SOLVER") or default_solver()
@@ -157,7 +158,8 @@ def condense(
     padded = sp.csr_matrix((rows.data, rows.indices, rows.indptr), shape=(rows.shape[0], size))
     # PARDISO perturbs pivots below 1e-13 of the largest entry of [[K, R^T], [R, 0]]: K and every row of R are scaled to
     # entries of order 1, by powers of two, so that neither the modulus nor the unit of a row changes a digit.
-    unit, units = _power_of_two(upper.data), _row_scales(padded)
+    unit = _power_of_two(upper.data)
+    units = _row_scales(padded)
     scaled = sp.csr_matrix((upper.data / unit, upper.indices, upper.indptr), shape=upper.shape)
     entries = padded.data / np.repeat(units, np.diff(padded.indptr))
     read = sp.csr_matrix((entries, padded.indices, padded.indptr), shape=padded.shape)

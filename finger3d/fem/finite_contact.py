@@ -36,7 +36,8 @@ class _Area:
         """Return the areas at displacements u (n, d) of the nodes."""
         rest, moved = ([slope @ x for slope in face.along] for x in (points, points + u))
         if u.shape[1] == 2:
-            vector, initial = moved[0], np.linalg.norm(rest[0], axis=1)
+            vector = moved[0]
+            initial = np.linalg.norm(rest[0], axis=1)
         else:
             vector = np.cross(moved[0], moved[1])
             initial = np.linalg.norm(np.cross(rest[0], rest[1]), axis=1)
@@ -68,7 +69,8 @@ class _Area:
 
     def second_derivative(self, weights: Float) -> sp.csr_matrix:
         """Return the sum (n d, n d) of the second derivatives with weights (q,)."""
-        d, length = self.moved[0].shape[1], self.ratio * self.initial
+        d = self.moved[0].shape[1]
+        length = self.ratio * self.initial
         parts = [_change(self.face, self.moved, i) for i in range(d)]
         stretched = sp.diags_array(weights / (length * self.initial))
         total = sum(part.T @ stretched @ part for part in parts)
@@ -124,7 +126,8 @@ class DeformedContact:
 
     def nodal_forces(self, force: Float) -> Float:
         """Return the nodal forces (n, d) of forces (c, d) at the points, along their directions."""
-        face, area, tangential = self.face, self.area, force.copy()
+        face, area = self.face, self.area
+        tangential = force.copy()
         tangential[:, 0] = force[:, 0] * (not self.follows_area)
         out: Float = face.trace.T @ np.einsum("ctk,ct->ck", self.bases, tangential)
         if self.follows_area:
@@ -137,7 +140,8 @@ class DeformedContact:
     @cached_property
     def rows(self) -> sp.csr_matrix:
         """Rows (c d, n d) of `displacements`."""
-        face, (c, d) = self.face, self.bases.shape[:2]
+        face = self.face
+        c, d = self.bases.shape[:2]
         blocks = [_rows([sp.diags_array(self.bases[:, t, k]) @ face.trace for k in range(d)]) for t in range(d)]
         if self.follows_area:
             weight = sp.diags_array(1.0 / self._mean_area) @ face.average
@@ -162,7 +166,8 @@ class DeformedContact:
         curvature : (q, d, d) array, 1/mm, optional
             Second derivatives of the gap at the samples; zero unless given.
         """
-        face, spread = self.face, self.area.derivative
+        face = self.face
+        spread = self.area.derivative
         per_area = sp.diags_array(force / self._mean_area)
         pressure = sp.diags_array(face.average.T @ per_area.diagonal())
         normal = self.rows[:: self.bases.shape[1]]

@@ -60,7 +60,8 @@ def locate(mesh: Mesh, points: Float) -> tuple[Int, Float]:
     count = min(_NEAREST_CELLS[d], len(mesh.cells))
     _, near = cKDTree(corners[:, : d + 1].mean(axis=1)).query(points, k=count)
     near = near.reshape(len(points), count)
-    best, where = np.full(len(points), -np.inf), np.full((len(points), d + 1), 1.0 / (d + 1))
+    best = np.full(len(points), -np.inf)
+    where = np.full((len(points), d + 1), 1.0 / (d + 1))
     cell = np.full(len(points), -1)
     for k in range(count):
         left = np.flatnonzero(best < _INSIDE)

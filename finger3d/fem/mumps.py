@@ -97,7 +97,8 @@ class MumpsFactor(WholeSolutions):
 
     def __init__(self, upper: sp.csr_matrix, rows: int) -> None:
         self._ffi, self._lib = _library()
-        self._upper, self._n = upper.tocsr(), upper.shape[0] - rows
+        self._upper = upper.tocsr()
+        self._n = upper.shape[0] - rows
         places = self._upper.tocoo()
         self._i, self._j = (np.array(part + 1, dtype=np.int32) for part in (places.row, places.col))
         self._take(self._upper.data)

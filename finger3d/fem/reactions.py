@@ -46,7 +46,8 @@ def mean_traction_weights(
     These are as many unknowns as there are forces in 2D and fewer in 3D, where the fit minimises the norm of what is
     left.
     """
-    facets, nodes = mesh.facets[label], np.unique(mesh.facets[label])
+    facets = mesh.facets[label]
+    nodes = np.unique(mesh.facets[label])
     rank = np.unique(np.asarray(moduli)[part_of_facets(mesh, facets)], return_inverse=True)[1] if len(moduli) else 0
     keys, column = np.unique(facets * (np.max(rank) + 1) + np.reshape(rank, (-1, 1)), return_inverse=True)
     column = column.reshape(facets.shape)
@@ -54,7 +55,8 @@ def mean_traction_weights(
     measure = mesh.facet_element.surface_measure(mesh.points[facets], bary) * (w * thickness)
     shape = mesh.facet_element.shape(bary)
     mass = np.einsum("mq,qi,qj->mij", measure, shape, shape)
-    load, area = np.zeros(len(keys)), 0.0
+    load = np.zeros(len(keys))
+    area = 0.0
     for facet, values in _integrals(mesh, facets, boxes, (measure @ shape) / thickness):
         np.add.at(load, column[facet], values)
         area += float(values.sum())
@@ -113,7 +115,8 @@ def _integrals(mesh: Mesh, facets: Int, boxes: Float, whole: Float) -> list[tupl
 
     `whole` (m, nodes) are the integrals over whole facets.
     """
-    element, across = mesh.facet_element, [0] if mesh.dim == 2 else [0, 2]
+    element = mesh.facet_element
+    across = [0] if mesh.dim == 2 else [0, 2]
     bary, w = quadrature(mesh.dim - 1, _TRACTION_DEGREE)
     corners = mesh.points[facets[:, : mesh.dim]][:, :, across]
     integrals: list[tuple[int, Float]] = []
@@ -135,7 +138,8 @@ def _pieces(corners: Float, low: Float, high: Float) -> list[Float]:
     """Return simplices (d, d), barycentric, of the part of a facet with corners (d, d - 1) that lies within bounds."""
     polygon = np.eye(len(corners))
     for distance in (*(corners - low).T, *(high - corners).T):
-        value, kept = polygon @ distance, []
+        value = polygon @ distance
+        kept = []
         for i, point in enumerate(polygon):
             j = (i + 1) % len(polygon)
             if value[i] >= 0.0:

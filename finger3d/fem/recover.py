@@ -64,10 +64,12 @@ def strain_and_stress(
     -------
     strain, stress : (n, d, d), or (n, 3, 3) with `across`
     """
-    u, vertex_pressure = displacement(mesh, unknowns), pressure_scale * unknowns[mesh.points.size :]
+    u = displacement(mesh, unknowns)
+    vertex_pressure = pressure_scale * unknowns[mesh.points.size :]
 
     def of_part(part: MeshPart) -> tuple[Float, Float]:
-        law, strain = laws[part.number], nodal_strain(part.mesh, u[part.nodes])
+        law = laws[part.number]
+        strain = nodal_strain(part.mesh, u[part.nodes])
         sigma = law.stress(strain)
         if law.mixed:
             p = nodal_pressure(part.mesh, vertex_pressure[part.corners])

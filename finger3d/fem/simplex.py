@@ -98,7 +98,8 @@ class Mesh:
         if self.part is None:
             everything = np.arange(len(self.points)), np.arange(len(self.cells))
             return (MeshPart(0, self, *everything, slice(None)),)
-        parts, first = [], 0
+        parts = []
+        first = 0
         for number in np.unique(self.part):
             cells = np.flatnonzero(self.part == number)
             nodes, local = np.unique(self.cells[cells], return_inverse=True)

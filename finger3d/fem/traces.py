@@ -86,7 +86,8 @@ class BoundarySurface:
 def surface(mesh: Mesh, label: str, thickness: float = 1.0) -> BoundarySurface:
     """Contact points of the boundary `label`; `thickness` (mm) is the width of a 2D section."""
     d = mesh.dim
-    facets, element = mesh.facets[label], mesh.facet_element
+    facets = mesh.facets[label]
+    element = mesh.facet_element
     bary, w = quadrature(d - 1, _SURFACE_DEGREE)
     coords = mesh.points[facets]
     weights = element.surface_measure(coords, bary) * (w * thickness)
@@ -110,7 +111,8 @@ def surface(mesh: Mesh, label: str, thickness: float = 1.0) -> BoundarySurface:
         data = np.broadcast_to(nodal, spread.shape).ravel()
         return sp.csr_matrix((data, (sample, spread.ravel())), shape=(m * q, len(mesh.points)))
 
-    values, slopes = sampled(psi), element.gradient(bary)
+    values = sampled(psi)
+    slopes = element.gradient(bary)
     along = tuple(sampled(slopes[:, :, k]) for k in range(d - 1))
     trace = (average @ values).tocsr()
     normals = np.asarray(average @ outward_normals([slope @ mesh.points for slope in along]))
