@@ -22,7 +22,7 @@ import scipy.sparse as sp
 
 from finger3d._types import Array, Float
 from finger3d.errors import MissingError
-from finger3d.fem.whole_solutions import WholeSolutions
+from finger3d.fem.factors import WholeSolutions
 
 _SYMMETRIC, _HOST_WORKS, _NO_MPI = 2, 1, -987654
 _START, _END, _ANALYSE, _FACTORIZE, _SOLVE = -1, -2, 1, 2, 3  # values of job
