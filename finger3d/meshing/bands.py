@@ -27,8 +27,8 @@ class Band:
 
     Attributes
     ----------
-    at : function of u (n,) and a share
-        Points (n, 2), mm: on the upper curve at share 1, on the lower curve at share 0, and between them.
+    points : function of u (n,) and a level
+        Points (n, 2), mm: on the upper curve at level 1, on the lower curve at level 0, and between them.
     end : largest parameter; the contact curve ends at 1, the wall at 2
     parts : (from, to, part)
         Ranges of u and the numbers of the parts there; the ends of the ranges are nodes of every row.
@@ -37,7 +37,7 @@ class Band:
     corner : parameter of a corner of the lower curve, which is one of its nodes
     """
 
-    at: Callable[[Float, float], Float]
+    points: Callable[[Float, float], Float]
     end: float
     parts: tuple[tuple[float, float, int], ...]
     right: str
@@ -46,7 +46,7 @@ class Band:
 
     def travel(self, u: Float) -> Float:
         """Return the distance (n,), mm, of the curves at parameters (n,)."""
-        across = self.at(u, 1.0) - self.at(u, 0.0)
+        across = self.points(u, 1.0) - self.points(u, 0.0)
         return np.asarray(np.hypot(across[:, 0], across[:, 1]))
 
     @property
@@ -84,13 +84,13 @@ def bands(section: Section) -> Bands:
     """Divide a section into bands."""
     number = {label: i for i, label in enumerate(section.part_labels, start=1)}
     inner = section.inner
-    found = _below(inner, number)
+    below = _below(inner, number)
     if section.layer is None:
-        return found
+        return below
     right = "walls" if section.edge_height_mm > 0.0 else "base"
     parts = ((0.0, 1.0, number[section.layer.label]),)
     layer = Band(_between(section.contact.at, inner.contact.at), 1.0, parts, right)
-    return Bands((layer, *found.bands), found.walled, found.core)
+    return Bands((layer, *below.bands), below.walled, below.core)
 
 
 def _below(section: Section, number: dict[str, int]) -> Bands:
@@ -151,11 +151,11 @@ def _diagonal(section: Section, core: Core) -> float:
 def _sides(core: Core, corner: float, end: float) -> Callable[[Float], Float]:
     """Return the curve along the core's upper side, for u <= corner, and down its vertical side."""
 
-    def at(u: Float) -> Float:
+    def curve(u: Float) -> Float:
         x = np.interp(u, [0.0, corner], [0.0, core.half_length_mm])
         return np.stack([x, np.interp(u, [corner, end], [core.height_mm, 0.0])], axis=1)
 
-    return at
+    return curve
 
 
 def thin_places(section: Section) -> tuple[Float, Float]:
