@@ -95,7 +95,8 @@ def bands(section: Section) -> Bands:
 
 def _below(section: Section, number: dict[str, int]) -> Bands:
     """Divide a section without a layer."""
-    wall, core = section.edge_height_mm, section.core
+    wall = section.edge_height_mm
+    core = section.core
     steep = getattr(section.contact, "angle", 0.0) > _STEEP
     foot = core.height_mm if core else 0.0
     if wall - foot >= _LOW_WALL * (section.height_mm - foot) and not steep:
@@ -135,7 +136,8 @@ def _above_and_beside(section: Section, core: Core, part: int) -> Bands:
 
 def _diagonal(section: Section, core: Core) -> float:
     """Return the parameter of the outline where the line at 45 degrees through the core's corner leaves the section."""
-    x, y, length = core.half_length_mm, core.height_mm, section.half_length_mm
+    x, y = core.half_length_mm, core.height_mm
+    length = section.half_length_mm
     on_wall = y + length - x
     if on_wall <= section.edge_height_mm:
         return 2.0 - on_wall / section.edge_height_mm
@@ -160,7 +162,8 @@ def _sides(core: Core, corner: float, end: float) -> Callable[[Float], Float]:
 
 def thin_places(section: Section) -> tuple[Float, Float]:
     """Return places (k, 3) where parts are thin, and the edge lengths (k,), mm, that cells there may have."""
-    inner, places, sizes = section.inner, [], []
+    inner = section.inner
+    places, sizes = [], []
 
     def add(points: Float, size: Float | float) -> None:
         places.append(points)
@@ -170,7 +173,8 @@ def thin_places(section: Section) -> tuple[Float, Float]:
         thickness = section.height_mm - inner.height_mm
         add(_along(inner.contact.at, inner.contact.length_mm, thickness), 1.5 * thickness)
     if core := inner.core:
-        x, y, beside = core.half_length_mm, core.height_mm, inner.half_length_mm - core.half_length_mm
+        x, y = core.half_length_mm, core.height_mm
+        beside = inner.half_length_mm - core.half_length_mm
         upper = _along(lambda u: np.stack([x * u, np.full_like(u, y)], axis=1), x, y)
         gap = inner.contact.height(upper[:, 0]) - y
         add(upper, 2.0 * np.minimum(np.minimum(gap, y), x))

@@ -51,9 +51,11 @@ def refined(mesh: Mesh, size: Callable[[Float], Float], check: Callable[[int], N
     check : called with the number of cells before each round; it may raise
     """
     d = mesh.dim
-    points, cells = mesh.points, mesh.cells[:, : d + 1]
+    points = mesh.points
+    cells = mesh.cells[:, : d + 1]
     facets = {label: f[:, :d] for label, f in mesh.facets.items()}
-    parents, places = np.arange(len(cells)), np.tile(np.eye(d + 1), (len(cells), 1, 1))
+    parents = np.arange(len(cells))
+    places = np.tile(np.eye(d + 1), (len(cells), 1, 1))
     while True:
         check(len(cells))
         edges, number, ranks = _edges(points, cells)
@@ -135,16 +137,19 @@ def _split(simplices: Int, places: Float, marked: _Marked) -> tuple[Int, Int, Fl
     places : (n, k, ...) of the corners, those of new ones halfway between old ones
     """
     done: list[tuple[Int, Int, Float]] = []
-    pairs, origin = _pairs(simplices.shape[1]), np.arange(len(simplices))
+    pairs = _pairs(simplices.shape[1])
+    origin = np.arange(len(simplices))
     while True:
         number = marked.of(simplices[:, pairs])
         rank = np.where(number >= 0, marked.ranks[number], -1)
-        longest, whole = rank.argmax(axis=1), rank.max(axis=1, initial=-1) < 0
+        longest = rank.argmax(axis=1)
+        whole = rank.max(axis=1, initial=-1) < 0
         done.append((simplices[whole], origin[whole], places[whole]))
         if whole.all():
             return _joined(done)
         simplices, origin, places = simplices[~whole], origin[~whole], places[~whole]
-        every, (i, j) = np.arange(len(simplices)), pairs[longest[~whole]].T
+        every = np.arange(len(simplices))
+        i, j = pairs[longest[~whole]].T
         middle = marked.middles[number[~whole][every, longest[~whole]]]
         halfway = 0.5 * (places[every, i] + places[every, j])
         halves = []

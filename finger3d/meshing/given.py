@@ -147,7 +147,8 @@ def _wanted(design: GivenMesh, zone: Zone, finer: float, everywhere: float) -> C
     """Return the wanted edge length (n,) at points (n, 3): that of the mesh times `finer` in the zone."""
     from scipy.spatial import cKDTree
 
-    mesh, facets = design.mesh, design.mesh.facets["contact"][:, :3]
+    mesh = design.mesh
+    facets = design.mesh.facets["contact"][:, :3]
     corners = mesh.points[mesh.cells[:, :4]]
     longest = np.linalg.norm(corners[:, EDGES[3][:, 0]] - corners[:, EDGES[3][:, 1]], axis=2).max(axis=1) / _TOO_LONG
     centroids = cKDTree(corners.mean(axis=1))

@@ -184,7 +184,8 @@ def rows(section: Section, sizes: Sizes) -> GridLayout:
             places[-1] += new.pop(0)
         places += new
         start += length
-    laid, count = [], 0
+    laid = []
+    count = 0
     for k, row_places in enumerate(places):
         params = _on_row(section, sizes, u, row_places, first=k == 0)
         points = row_places[-1].band.points(params, row_places[-1].level)

@@ -189,7 +189,8 @@ def _names_of_entities(names: bytes, entities: bytes, is_binary: bool, word: int
 
 def _groups(entities: bytes, is_binary: bool, word: int) -> dict[tuple[int, int], list[int]]:
     """Return the physical groups of each entity (dimension, tag), without the sign, which tells the orientation."""
-    stream, words = io.BytesIO(entities), iter(entities.split() if not is_binary else [])
+    stream = io.BytesIO(entities)
+    words = iter(entities.split() if not is_binary else [])
 
     def take(kind: str, count: int) -> list[int]:
         if not is_binary:
@@ -197,7 +198,8 @@ def _groups(entities: bytes, is_binary: bool, word: int) -> dict[tuple[int, int]
         values = np.frombuffer(stream.read(count * np.dtype(kind).itemsize), kind, count)
         return [int(value) for value in values.tolist()]
 
-    size, groups = f"<u{word}", {}
+    size = f"<u{word}"
+    groups = {}
     for dim, count in enumerate(take(size, 4)):
         for _ in range(count):
             (tag,) = take("<i4", 1)
@@ -243,13 +245,15 @@ def _vtu(path: Path) -> tuple[Float, list[_Block]]:
     import pyvista
 
     grid = pyvista.wrap(reader.GetOutput())
-    types, count = np.asarray(grid.celltypes), grid.n_cells
+    types = np.asarray(grid.celltypes)
+    count = grid.n_cells
     offset = np.asarray(pyvista.convert_array(grid.GetCells().GetOffsetsArray()), dtype=np.int64)
     nodes = np.asarray(grid.cell_connectivity, dtype=np.int64)
     label, part = (_names(path, grid, key, count) for key in (LABEL, PART))
     blocks = []
     for number in np.unique(types).tolist():
-        kind, of_type = _VTK.get(number, f"{number} of VTK"), np.flatnonzero(types == number)
+        kind = _VTK.get(number, f"{number} of VTK")
+        of_type = np.flatnonzero(types == number)
         width = {**_TETS, **_TRIANGLES}.get(kind)
         if width is None:
             blocks.append(_Block(kind, np.zeros((len(of_type), 0), dtype=np.int64), np.full(len(of_type), "")))
@@ -281,7 +285,8 @@ def _names(path: Path, grid: Any, key: str, count: int) -> NDArray[np.str_]:
     values = np.asarray(grid.cell_data[key])
     if values.dtype.kind in "US":
         return values.astype(str)
-    where, names = f"{path}: cell data '{key}'", f"{key}_names"
+    where = f"{path}: cell data '{key}'"
+    names = f"{key}_names"
     if values.ndim != 1 or values.dtype.kind not in "iuf" or (values != np.round(values)).any():
         raise Finger3dError(f"{where} must hold a text or a whole number for each cell")
     if names not in grid.field_data:

@@ -81,7 +81,8 @@ def _straighten_inverted(mesh: Mesh) -> Mesh:
     bad = curved_jacobians(mesh) <= 0.0
     if not bad.any() or bad.mean() > _MAX_STRAIGHTENED:
         return mesh
-    cells, points = mesh.cells[bad], mesh.points.copy()
+    cells = mesh.cells[bad]
+    points = mesh.points.copy()
     points[cells[:, 4:]] = points[cells[:, TET4.edges]].mean(axis=2)
     return replace(mesh, points=points)
 
@@ -178,7 +179,8 @@ def project(points: Float, sets: Bool, faces: tuple[CadFace, ...]) -> Float:
 
 def _projection(points: Float, sets: Bool, faces: tuple[CadFace, ...]) -> tuple[Float, Bool]:
     """Return the points of :func:`project`, and a mask (n,) of those that do not lie on all surfaces of their sets."""
-    points, failed = points.copy(), np.zeros(len(points), dtype=bool)
+    points = points.copy()
+    failed = np.zeros(len(points), dtype=bool)
     scale = max((float((f.high - f.low).max()) for f in faces), default=0.0)
     groups, member = np.unique(sets, axis=0, return_inverse=True)
     member = member.reshape(-1)
@@ -261,7 +263,8 @@ def _snap_mid_edge_nodes(mesh: Mesh, owner: Int, vertex_sets: Bool, seams: Seams
     faces = np.vstack(list(mesh.facets.values()))
     sets = np.zeros((len(mesh.points), len(seams.faces)), dtype=bool)
     sets[faces[:, 3:].ravel(), np.repeat(owner, 3)] = True
-    candidates, reach = np.zeros_like(sets), np.zeros(len(sets))
+    candidates = np.zeros_like(sets)
+    reach = np.zeros(len(sets))
     for middle, (a, b) in zip(faces[:, 3:].T, faces[:, TRI3.edges].transpose(1, 2, 0), strict=True):
         candidates[middle] = vertex_sets[a] | vertex_sets[b]
         reach[middle] = 0.5 * _MAX_MOVE * np.linalg.norm(mesh.points[a] - mesh.points[b], axis=1)

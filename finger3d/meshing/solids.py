@@ -125,7 +125,8 @@ def _check_volumes(mesh: Mesh, body: Tessellation) -> None:
 
     part = np.zeros(len(mesh.cells), dtype=np.int64) if mesh.part is None else mesh.part
     for number, label in enumerate(("", *body.part_labels)):
-        surface, in_part = body.part(number), part == number
+        surface = body.part(number)
+        in_part = part == number
         wanted = surface.volume if len(surface.faces) else 0.0
         volume = curved_volume(replace(mesh, cells=mesh.cells[in_part], part=None)) if in_part.any() else 0.0
         if not math.isclose(volume, wanted, rel_tol=VOLUME_TOLERANCE):

@@ -102,7 +102,8 @@ def _with_parts(mesh: Mesh, section: Section, part: Int) -> Mesh:
 def _on_curves(mesh: Mesh, curves: tuple[tuple[Arc | Flat, Float], ...]) -> Mesh:
     """Move the nodes in the middle of edges between points of a curve onto it; every vertex (v,) has its parameter."""
     points = mesh.points.copy()
-    pairs, middle = mesh.cells[:, mesh.element.edges].reshape(-1, 2), mesh.cells[:, mesh.dim + 1 :].ravel()
+    pairs = mesh.cells[:, mesh.element.edges].reshape(-1, 2)
+    middle = mesh.cells[:, mesh.dim + 1 :].ravel()
     for curve, u in curves:
         ends = u[pairs]
         bent = np.isfinite(ends).all(axis=1) & (ends[:, 0] != ends[:, 1])  # edges along z are straight
