@@ -147,8 +147,7 @@ def _wanted(design: GivenMesh, zone: Zone, finer: float, everywhere: float) -> C
     """Return the wanted edge length (n,) at points (n, 3): that of the mesh times `finer` in the zone."""
     from scipy.spatial import cKDTree
 
-    mesh = design.mesh
-    facets = design.mesh.facets["contact"][:, :3]
+    mesh, facets = design.mesh, design.mesh.facets["contact"][:, :3]
     corners = mesh.points[mesh.cells[:, :4]]
     longest = np.linalg.norm(corners[:, EDGES[3][:, 0]] - corners[:, EDGES[3][:, 1]], axis=2).max(axis=1) / _TOO_LONG
     centroids = cKDTree(corners.mean(axis=1))
@@ -158,8 +157,8 @@ def _wanted(design: GivenMesh, zone: Zone, finer: float, everywhere: float) -> C
     touched = cKDTree(mesh.points[np.unique(facets[inside] if inside.any() else facets)])
 
     def wanted(points: Float) -> Float:
-        present = longest[centroids.query(points)[1]]
-        return np.asarray(np.minimum(everywhere * present, finer * present + _RATE * touched.query(points)[0]))
+        own = longest[centroids.query(points)[1]]
+        return np.asarray(np.minimum(everywhere * own, finer * own + _RATE * touched.query(points)[0]))
 
     return wanted
 

@@ -50,7 +50,7 @@ class Grading:
         classes = np.round(_CLASSES_PER_DOUBLING * np.log2(self.sizes)).astype(int)
         out = np.full(len(points), math.inf)
         for one in np.unique(classes):
-            in_class = classes == one
-            distance = cKDTree(self.points[in_class]).query(places)[0]
+            own = classes == one
+            distance = cKDTree(self.points[own]).query(places)[0]
             out = np.minimum(out, 2.0 ** (one / _CLASSES_PER_DOUBLING) + rate * distance)
         return out

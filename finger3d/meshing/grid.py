@@ -17,7 +17,7 @@ from finger3d.geometry.section import Arc, Core, Flat, Section
 from finger3d.meshing.bands import Band, Bands, bands, ranges, thin_places
 from finger3d.meshing.grading import Grading
 
-RATE = 0.25
+STRUCTURED_GROWTH = 0.25
 """Growth of the edge length per length away from the contact zone."""
 
 _ASPECT = 3.0  # quadratic elements tolerate 5:1; joining rows with different numbers of points uses up the rest
@@ -42,10 +42,10 @@ class Sizes:
 
         `longest` returns the largest distance of rows at depths; without it, it follows from the edge lengths alone.
         """
-        grow = max(0.0, (self.base_mm - self.size_mm) / RATE)  # depth at which the base size is reached
+        grow = max(0.0, (self.base_mm - self.size_mm) / STRUCTURED_GROWTH)  # depth at which the base size is reached
 
         def count(depth: Float) -> Float:
-            near = np.log1p(RATE * np.minimum(depth, grow) / self.size_mm) / RATE
+            near = np.log1p(STRUCTURED_GROWTH * np.minimum(depth, grow) / self.size_mm) / STRUCTURED_GROWTH
             return near + np.maximum(depth - grow, 0.0) / self.base_mm
 
         sample = np.concatenate([np.linspace(0.0, length, 4001), np.geomspace(1e-6 * length, length, 2000)])
@@ -63,8 +63,8 @@ class Sizes:
         """Edge length (n,) at points (n, 2): the contact size, growing with the distance from the zone."""
         x = np.clip(points[:, 0], self.low, self.high)
         reach = np.hypot(points[:, 0] - x, points[:, 1] - section.contact.height(x))
-        size: Float = np.minimum(self.base_mm, self.size_mm + RATE * reach)
-        return size if self.grading is None else np.minimum(size, self.grading.at(points, RATE))
+        size: Float = np.minimum(self.base_mm, self.size_mm + STRUCTURED_GROWTH * reach)
+        return size if self.grading is None else np.minimum(size, self.grading.at(points, STRUCTURED_GROWTH))
 
 
 @dataclass(frozen=True)
@@ -266,7 +266,7 @@ def _longest(sizes: Sizes, band: Band, u: Float, length: float) -> Callable[[Flo
     travel = band.travel(places)
     stations = np.linspace(0.0, length, _STATIONS)
     points = np.vstack([band.points(places, level) for level in 1.0 - stations / length])
-    size = grading.at(points, RATE).reshape(_STATIONS, _PLACES)
+    size = grading.at(points, STRUCTURED_GROWTH).reshape(_STATIONS, _PLACES)
     least = (size * length / np.maximum(travel, 1e-3 * length)).min(axis=1)
     return lambda depth: np.interp(depth, stations, least)
 
