@@ -191,26 +191,26 @@ class Triangles:
         face : (n,) triangle, -1 where the line misses the surface
         bary : (n, 3) barycentric coordinates in it
         """
-        at = np.stack([x, z], axis=1).astype(float)
+        places = np.stack([x, z], axis=1).astype(float)
         slack = _SLACK * self.size
 
         facing, tree = self._facing_down if lowest else self._facing_up
         boxes = [b[:, [0, 2, 3, 5]] + np.array([-slack, -slack, slack, slack]) for b in tree.boxes]
 
         def inside(query: Int, level: int, node: Int) -> NDArray[np.bool_]:
-            p, box = at[query], boxes[level][node]
+            p, box = places[query], boxes[level][node]
             inside: NDArray[np.bool_] = (
                 (box[:, 0] <= p[:, 0]) & (box[:, 1] <= p[:, 1]) & (p[:, 0] <= box[:, 2]) & (p[:, 1] <= box[:, 3])
             )
             return inside
 
-        face = np.full(len(at), -1, dtype=np.int64)
-        bary = np.zeros((len(at), 3))
-        best = np.full(len(at), np.inf)
+        face = np.full(len(places), -1, dtype=np.int64)
+        bary = np.zeros((len(places), 3))
+        best = np.full(len(places), np.inf)
         flat = self.corners[:, :, ::2]
-        for query, number in tree.pairs(len(at), inside):
+        for query, number in tree.pairs(len(places), inside):
             item = facing[number]
-            weight, met = _barycentric(at[query], flat[item], slack)
+            weight, met = _barycentric(places[query], flat[item], slack)
             query, item, weight = query[met], item[met], weight[met]
             y = np.einsum("ij,ij->i", weight, self.corners[item, :, 1]) * (1.0 if lowest else -1.0)
             order = np.lexsort((item, y, query))  # the number breaks ties, so that a result can be repeated
@@ -222,8 +222,8 @@ class Triangles:
         """Return the height (mm) of the lowest or highest point at x, z, exact on the triangles; nan outside."""
         x, z = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(z, dtype=float))
         face, bary = self.hits(x.ravel(), z.ravel(), lowest)
-        found = np.where(face < 0, np.nan, np.einsum("ij,ij->i", bary, self.corners[face, :, 1]))
-        return found.reshape(x.shape)
+        height = np.where(face < 0, np.nan, np.einsum("ij,ij->i", bary, self.corners[face, :, 1]))
+        return height.reshape(x.shape)
 
     def closest(self, points: Float) -> tuple[Float, Int, Int]:
         """Find the closest points of the surface.
