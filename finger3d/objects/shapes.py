@@ -92,13 +92,13 @@ class Cylinder(Prism):
 
     def held_body(self, finger: Design, solid: bool) -> HeldBody:
         """Return the lower half, held on its cut; a section along the axis is a rectangle."""
-        known, half, width = designs(), finger.half_length_mm, finger.width_mm
+        catalogue, half, width = designs(), finger.half_length_mm, finger.width_mm
         if self.axis == "z":
-            along_z = known["half_cylinder"](radius_mm=self.radius_mm, width_mm=width)
+            along_z = catalogue["half_cylinder"](radius_mm=self.radius_mm, width_mm=width)
             return HeldBody(design=along_z, place=np.array([self.x_mm, 0.0, 0.0]))
         if not solid:
-            return HeldBody(design=known["block"](half_length_mm=half, height_mm=self.radius_mm, width_mm=width))
-        along_x = known["half_cylinder"](radius_mm=self.radius_mm, width_mm=2.0 * half)
+            return HeldBody(design=catalogue["block"](half_length_mm=half, height_mm=self.radius_mm, width_mm=width))
+        along_x = catalogue["half_cylinder"](radius_mm=self.radius_mm, width_mm=2.0 * half)
         return HeldBody(design=along_x, turn=CROSSWISE, place=np.array([0.0, 0.0, self.z_mm]))
 
     def drawing(self, reach_mm: float) -> Triangles:
@@ -226,14 +226,14 @@ def _circle_distance(r: Float, y: Float, radius: float) -> tuple[Float, Float, F
     """Return the signed distance (n,) from a circle whose lowest point is the origin, and its derivatives."""
     out = y - radius
     length = np.hypot(r, out)
-    known = length > 0.0
-    divisor = np.where(known, length, 1.0)
+    regular = length > 0.0
+    divisor = np.where(regular, length, 1.0)
     # length - radius would lose the digits of points near a large circle
     total = np.where(length + radius > 0.0, length + radius, 1.0)
     return (
         (r**2 + y**2 - 2.0 * y * radius) / total,
-        np.where(known, r / divisor, 0.0),
-        np.where(known, out / divisor, -1.0),
+        np.where(regular, r / divisor, 0.0),
+        np.where(regular, out / divisor, -1.0),
     )
 
 
