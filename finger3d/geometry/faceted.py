@@ -62,7 +62,8 @@ class Network:
 
 def _on_segments(points: Float, segments: Float) -> Float:
     """Closest points (n, 3) of segments (s, 2, 3)."""
-    out, best = np.zeros_like(points), np.full(len(points), np.inf)
+    out = np.zeros_like(points)
+    best = np.full(len(points), np.inf)
     for start, stop in segments:
         along = stop - start
         t = np.clip((points - start) @ along / max(float(along @ along), 1e-300), 0.0, 1.0)
@@ -162,7 +163,8 @@ def _neighbours(surface: Triangles) -> tuple[Int, Int, Int]:
     """Triangles a (e,) and b (e,) on both sides of every edge (e, 2) that has two."""
     edges = np.sort(surface.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     order = np.lexsort(edges.T)
-    edges, owner = edges[order], np.repeat(np.arange(len(surface.faces)), 3)[order]
+    edges = edges[order]
+    owner = np.repeat(np.arange(len(surface.faces)), 3)[order]
     pair = np.flatnonzero((edges[1:] == edges[:-1]).all(axis=1))
     return owner[pair], owner[pair + 1], edges[pair]
 

@@ -198,7 +198,7 @@ def imported(path: str | Path, upside_down: bool = False, scale: float = 1.0) ->
         if upside_down and not base:
             moves.append(_upside_down)
         for move in moves:
-            solid, parts = move(solid), {label: [move(s) for s in solids] for label, solids in parts.items()}
+            solid, parts = move(solid), {label: [move(s) for s in found] for label, found in parts.items()}
         surface = tessellated(solid)
         if reason := mistake(surface, may_be_hollow=True):
             raise Finger3dError(f"{path}: the body {reason}")
@@ -206,8 +206,8 @@ def imported(path: str | Path, upside_down: bool = False, scale: float = 1.0) ->
         surface = read_surface(path, scale)
         if upside_down:
             surface = Triangles(surface.points * [-1.0, -1.0, 1.0], surface.faces)
-    design = _on_its_base(str(path), content(path), scale, upside_down, surface, solid)
-    return replace(design, named_base=bool(base), parts=_moved(parts, design.middle))
+    found = _on_its_base(str(path), content(path), scale, upside_down, surface, solid)
+    return replace(found, named_base=bool(base), parts=_moved(parts, found.middle))
 
 
 def united(path: Path, read: StepBody) -> tuple[Solid, dict[str, list[Solid]]]:

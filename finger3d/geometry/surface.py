@@ -121,7 +121,8 @@ class Triangles:
 
         Pieces are closer to their bounding cylinders than a slender triangle is.
         """
-        corners, owner = self.corners, np.arange(len(self.faces))
+        corners = self.corners
+        owner = np.arange(len(self.faces))
         for _ in range(_MOST_CUTS):
             edges = np.linalg.norm(corners[:, [1, 2, 0]] - corners, axis=2)
             longest = edges.max(axis=1)
@@ -198,7 +199,8 @@ class Triangles:
         boxes = [b[:, [0, 2, 3, 5]] + np.array([-slack, -slack, slack, slack]) for b in tree.boxes]
 
         def inside(query: Int, level: int, node: Int) -> NDArray[np.bool_]:
-            p, box = places[query], boxes[level][node]
+            p = places[query]
+            box = boxes[level][node]
             inside: NDArray[np.bool_] = (
                 (box[:, 0] <= p[:, 0]) & (box[:, 1] <= p[:, 1]) & (p[:, 0] <= box[:, 2]) & (p[:, 1] <= box[:, 3])
             )
@@ -235,8 +237,10 @@ class Triangles:
         feature : (n,) 0 inside the triangle, 1 to 3 on its edge 01, 12, 20, 4 to 6 at its corner
         """
         reach = self._distance_bound(points)
-        closest, face = np.zeros_like(points), np.full(len(points), -1, dtype=np.int64)
-        feature, best = np.zeros(len(points), dtype=np.int64), np.full(len(points), np.inf)
+        closest = np.zeros_like(points)
+        face = np.full(len(points), -1, dtype=np.int64)
+        feature = np.zeros(len(points), dtype=np.int64)
+        best = np.full(len(points), np.inf)
 
         def near(query: Int, level: int, node: Int) -> NDArray[np.bool_]:
             return cylinder_distance(points[query], self._bounding_cylinders[level][node]) <= reach[query]
@@ -265,7 +269,8 @@ class Triangles:
             node = 4 * node + np.argmin(children, axis=0)
         for column in range(tree.items.shape[1]):
             piece = tree.items[node, column]
-            item, there = owner[piece], piece >= 0
+            item = owner[piece]
+            there = piece >= 0
             p = _closest_on_triangle(points[there], self.corners[item[there]], self.normals[item[there]])[0]
             reach[there] = np.minimum(reach[there], np.linalg.norm(points[there] - p, axis=1))
         value: Float = reach * (1.0 + 1e-9) + 1e-12 * self.size
@@ -327,7 +332,8 @@ def _closest_on_triangle(p: Float, corner: Float, normal: Float) -> tuple[Float,
         q = corner[:, i] + t[:, None] * along
         distance = np.einsum("ij,ij->i", p - q, p - q)
         closer = distance < best
-        best[closer], out[closer] = distance[closer], q[closer]
+        best[closer] = distance[closer]
+        out[closer] = q[closer]
         feature[closer] = np.where(t <= 0.0, 4 + i, np.where(t >= 1.0, 4 + j, 1 + k))[closer]
         inside &= np.einsum("ij,ij->i", np.cross(along, start), normal) > 0.0
     height = np.einsum("ij,ij->i", p - corner[:, 0], normal)

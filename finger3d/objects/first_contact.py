@@ -92,7 +92,8 @@ def _touching(
         hints = hints * [1.0, 0.0]
     points = np.vstack([_grid(half_length, half_width), hints[np.all(np.abs(hints) <= limit, axis=1)]])
     differences = difference(points)
-    best, place = float(differences.max()), points[np.argmax(differences)]
+    best = float(differences.max())
+    place = points[np.argmax(differences)]
     step = 2.0 * limit / (np.array(_GRID) - 1)
     places = _apart(points, differences, 1.5 * step)
     for _ in range(_ZOOMS):
@@ -104,7 +105,8 @@ def _touching(
         places = points[np.arange(len(places)), highest]
         peaks = differences.max(axis=1)
         if peaks.max() > best:
-            best, place = float(peaks.max()), places[int(peaks.argmax())]
+            best = float(peaks.max())
+            place = places[int(peaks.argmax())]
         step = step * 2.0 / (_ZOOM - 1)
     return best, place
 

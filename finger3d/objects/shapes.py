@@ -92,7 +92,8 @@ class Cylinder(Prism):
 
     def held_body(self, finger: Design, solid: bool) -> HeldBody:
         """Return the lower half, held on its cut; a section along the axis is a rectangle."""
-        catalogue, half, width = designs(), finger.half_length_mm, finger.width_mm
+        catalogue = designs()
+        half, width = finger.half_length_mm, finger.width_mm
         if self.axis == "z":
             along_z = catalogue["half_cylinder"](radius_mm=self.radius_mm, width_mm=width)
             return HeldBody(design=along_z, place=np.array([self.x_mm, 0.0, 0.0]))
@@ -160,7 +161,8 @@ class Sphere(RigidObject):
 
     def drawing(self, reach_mm: float) -> Triangles:
         """Return the sphere, or its lowest part if its radius exceeds the reach."""
-        polar, turn = _polar(self.radius_mm, reach_mm)[DRAWN // 2 :: 4], np.linspace(0.0, 2.0 * math.pi, 49)
+        polar = _polar(self.radius_mm, reach_mm)[DRAWN // 2 :: 4]
+        turn = np.linspace(0.0, 2.0 * math.pi, 49)
         r, y = self.radius_mm * np.sin(polar), self.radius_mm * (1.0 - np.cos(polar))
         level = np.broadcast_to(y[:, None], (len(polar), len(turn)))
         return sheet(np.stack([np.outer(r, np.cos(turn)), level, np.outer(r, np.sin(turn))], axis=-1))
@@ -183,7 +185,8 @@ class Wedge(Prism):
 
     def section_distance(self, r: Float, y: Float) -> tuple[Float, Float, Float]:
         """Return the distance to a sharp edge through the circle's middle, less the circle's radius."""
-        c, s, side = math.cos(self.angle), math.sin(self.angle), np.where(r < 0.0, -1.0, 1.0)
+        c, s = math.cos(self.angle), math.sin(self.angle)
+        side = np.where(r < 0.0, -1.0, 1.0)
         y = y - self.tip_radius_mm
         along = c * np.abs(r) + s * y
         value, by_r, by_y = _circle_distance(r, y + self.tip_radius_mm, self.tip_radius_mm)

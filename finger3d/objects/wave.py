@@ -37,7 +37,8 @@ class Wave(Prism):
         """Return the distance to the nearest point, found by Newton's method between the best of many starts."""
         nearest = self._nearest(r, y)
         height, slope = self.section_profile(nearest), self._slope(nearest)
-        out_r, out_y, root = r - nearest, y - height, np.sqrt(1.0 + slope**2)
+        out_r, out_y = r - nearest, y - height
+        root = np.sqrt(1.0 + slope**2)
         sign = np.where(y > self.section_profile(r), -1.0, 1.0)
         # The normal of the nearest point is the gradient, on the surface too, where the difference is round-off.
         return sign * np.hypot(out_r, out_y), slope / root, -1.0 / root
