@@ -21,7 +21,7 @@ from finger3d._types import Float, Int, freeze_arrays
 from finger3d.fem.assembly import Pattern, Stiffness, cell_parts, pressure_scale
 from finger3d.fem.elements import quadrature
 from finger3d.fem.laws import IsochoricLaw
-from finger3d.fem.laws.inhomogeneous import Inhomogeneous
+from finger3d.fem.laws.base import Inhomogeneous
 from finger3d.fem.locate import cells_at
 from finger3d.fem.material import LEAST_COMPRESSIBILITY, MIXED_FROM, Isotropic
 from finger3d.fem.recover import averaged, displacement, nodal_gradient, nodal_pressure

@@ -7,13 +7,22 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.fem.laws.base import Derivatives
 from finger3d.fem.tensors import cofactor, determinant
+
+
+class Derivatives(NamedTuple):
+    """First and second derivatives (...,) MPa of an energy by two invariants; None for what is zero everywhere."""
+
+    w1: Float
+    w2: Float | None = None
+    w11: Float | None = None
+    w12: Float | None = None
+    w22: Float | None = None
 
 
 @dataclass(frozen=True)
