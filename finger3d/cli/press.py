@@ -86,7 +86,7 @@ _NUMBERS = {
 def _rows(summary: TreeView, out: Path, seconds: float) -> Iterator[tuple[str, str]]:
     """Yield the rows of the closing table: numbers of the last step with their errors, cost, and files."""
     from finger3d.accuracy.error_bars import ErrorBars, with_error
-    from finger3d.results.summary import steps_of
+    from finger3d.results.summary import readings_of
 
     bars, estimate, steps = ErrorBars.of_summary(summary), summary.get("error_estimate"), summary["steps"]
 
@@ -106,7 +106,7 @@ def _rows(summary: TreeView, out: Path, seconds: float) -> Iterator[tuple[str, s
         for name, (key, factor, digits, unit) in _NUMBERS.items():
             yield name, number(last[key], key, digits, factor) + unit + of_modulus(key, unit.split(" at ")[0], factor)
         yield "residual", f"{max(step['residual'] for step in steps):.1e}, the largest of all steps"
-        readings = steps_of(summary)[-1].readings
+        readings = readings_of(last["gauges"], last["markers"], last["taxels"])
         for (kind, sensor), group in groupby(readings, key=lambda c: (c.kind, c.sensor)):
             columns = list(group)
             key, unit = columns[0].key, f" {columns[0].unit}".rstrip()

@@ -31,8 +31,8 @@ def sweep_page(folder: str | Path) -> Path:
     failed = [row for row in rows if row["outcome"] != "converged"]
     forces = [float(row["normal_force_N"]) for row in rows if row["outcome"] == "converged"]
     names = [*data["vary"], "normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm"]
-    strains = [column for column in strains_of(data["scene"]) if rows and column.key in rows[0]]
-    names += [*(column.key for column in strains), "outcome"]
+    strains = strains_of(data["scene"])
+    names += [*(column.key for column in strains if rows and column.key in rows[0]), "outcome"]
     headline = [
         HeadlineRow("points", f"{len(rows)} of {data['points']}"),
         HeadlineRow("bodies", str(len(data["bodies"]))),
@@ -84,7 +84,8 @@ def sweep_charts(
     values = {key: {row[key] for row in good} for key in keys}
     along = [key for key, of in values.items() if len(of) > 1 and all(isinstance(v, float) for v in of)]
     titles = {"normal_force_N": ("Normal force", "normal force (N)")}
-    titles |= {c.key: (f"Strain, {c.sensor}", f"strain, {c.sensor}") for c in strains[:_MOST_GAUGES]}
+    shown_strains = [column for column in strains if good and column.key in good[0]][:_MOST_GAUGES]
+    titles |= {c.key: (f"Strain, {c.sensor}", f"strain, {c.sensor}") for c in shown_strains}
     found = []
     for name, (quantity, title) in titles.items():
         for key in along[:_MOST_KEYS]:

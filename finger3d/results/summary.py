@@ -86,13 +86,20 @@ class PressStep:
     @property
     def readings(self) -> dict[Column, float | None]:
         """Readings of gauges, markers and taxels by column."""
-        strains = {strain_columns(name)[0]: strain for name, strain in self.gauges.items()}
-        moved = {
-            column: value
-            for name, displacement in self.markers.items()
-            for column, value in zip(displacement_columns(name), displacement, strict=True)
-        }
-        return {**strains, **moved, **{pressure_column(name): value for name, value in self.taxels.items()}}
+        return readings_of(self.gauges, self.markers, self.taxels)
+
+
+def readings_of(
+    gauges: Mapping[str, float | None], markers: Mapping[str, Sequence[float]], taxels: Mapping[str, float]
+) -> dict[Column, float | None]:
+    """Return readings by column from those of an entry of ``steps``, which are sorted by the kind of their sensors."""
+    strains = {strain_columns(name)[0]: strain for name, strain in gauges.items()}
+    displacements = {
+        column: component
+        for name, displacement in markers.items()
+        for column, component in zip(displacement_columns(name), displacement, strict=True)
+    }
+    return {**strains, **displacements, **{pressure_column(name): pressure for name, pressure in taxels.items()}}
 
 
 def steps_of(summary: TreeView) -> tuple[PressStep, ...]:
