@@ -119,11 +119,11 @@ def test_a_picture_is_legible_on_a_page_and_its_parts_do_not_overlap(
 
 
 def test_axes_stand_in_equal_cells_below_the_title(tmp_path: Path) -> None:
-    made = sheet(2, 3, (2.0, 1.0), (0.2, 0.1, 0.3, 0.1))
+    made = sheet(6, 3, (2.0, 1.0), (0.2, 0.1, 0.3, 0.1))
     box = made.axes[4].get_position()
     assert (box.x0 * 6.0, box.y0 * 2.0) == pytest.approx((2.2, 0.3))
     assert (box.width * 6.0, box.height * 2.0) == pytest.approx((1.7, 0.6))
-    titled = sheet(2, 3, (2.0, 1.0), (0.2, 0.1, 0.3, 0.1), "a title")
+    titled = sheet(6, 3, (2.0, 1.0), (0.2, 0.1, 0.3, 0.1), "a title")
     assert titled.figure.get_figheight() > 2.0
     top = titled.axes[0].get_position()
     assert top.y1 * titled.figure.get_figheight() == pytest.approx(1.9)
@@ -132,6 +132,6 @@ def test_axes_stand_in_equal_cells_below_the_title(tmp_path: Path) -> None:
 def test_a_picture_is_written_at_its_size(tmp_path: Path) -> None:
     from PIL import Image
 
-    sheet(1, 2, (3.0, 2.0), (0.5, 0.1, 0.5, 0.1)).save(tmp_path / "ü.png")
+    sheet(2, 2, (3.0, 2.0), (0.5, 0.1, 0.5, 0.1)).save(tmp_path / "ü.png")
     with Image.open(tmp_path / "ü.png") as image:
         assert image.size == (6 * DPI, 2 * DPI)

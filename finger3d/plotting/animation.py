@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 
-_DPI = {"png": 120, "gif": 65}  # pixels per inch
+_DPI = 65  # pixels per inch of an animation
 _FRAME_MS, _LAST_MS = 450, 1500  # duration of a frame and of the last frame of an animation
 _WINDOW = {"picture": (1600, 1200), "animation": (1000, 750)}  # width and height of rendered frames, in pixels
 
@@ -85,12 +85,6 @@ def mesh_of(states: States) -> Mesh:
     return Mesh(states.points.astype(float), states.cells.astype(int), facets, part)
 
 
-def write_png(path: str | Path, figure: Figure) -> None:
-    """Write one frame as a PNG file."""
-    with atomic(path) as temporary:
-        figure.savefig(temporary, format="png", dpi=_DPI["png"])
-
-
 def write_gif(path: str | Path, figures: Sequence[Figure]) -> None:
     """Write the frames as an animation that repeats and holds its last frame longer."""
     images = [_pixels(figure) for figure in figures]
@@ -103,7 +97,7 @@ def _pixels(figure: Figure) -> Image:
     from PIL import Image
 
     stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=_DPI["gif"])
+    figure.savefig(stream, format="png", dpi=_DPI)
     # The octree method preserves the colours of small areas, such as the legend.
     return Image.open(stream).convert("RGB").quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
 

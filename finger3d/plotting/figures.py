@@ -18,7 +18,7 @@ from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
 from finger3d.fem.simplex import CONTACT, FREE_FACES, Mesh
 from finger3d.plotting.camera import flat
 from finger3d.plotting.gauges import Mark, draw_marks
-from finger3d.plotting.layout import WIDEST, save, sheet, style
+from finger3d.plotting.layout import WIDEST, finish, save, sheet
 from finger3d.plotting.outlines import edges_of, interfaces_of, outline_of
 from finger3d.plotting.panels import Marks, highest_of, keys, palette, patches, pressure_colours, sliced, two_panels
 from finger3d.plotting.solid import (
@@ -200,7 +200,7 @@ def force_figure(path: str | Path, steps: Sequence[Mapping[str, object]], title:
     slides = bool(np.any(at[:, 1:] != 0.0))
     if slides:
         depth = np.cumsum(np.linalg.norm(np.diff(at, axis=0, prepend=0.0), axis=1))
-    made = sheet(1, 2, (WIDEST, 4.4), (0.8, 0.15, 0.55, 0.15), title)
+    made = sheet(2, 2, (WIDEST, 4.4), (0.8, 0.15, 0.55, 0.15), title)
     left, right = made.axes
     left.plot(depth, values("normal_force_N"), "o-", color="#222222", ms=4, label="normal force")
     left.plot(depth, values("friction_sum_N"), "s-", color="#c0392b", ms=4, label="sum of |friction|")
@@ -212,8 +212,7 @@ def force_figure(path: str | Path, steps: Sequence[Mapping[str, object]], title:
         axes.set_xlabel("path length of the object (mm)" if slides else "depth (mm)")
         axes.set_xlim(left=float(depth.min(initial=0.0)))
         axes.set_ylim(bottom=0.0, top=1.15 * axes.get_ylim()[1])  # room for the legend
-        style(axes)
-        axes.legend(frameon=False, loc="upper left")
+        finish(axes, loc="upper left")
     made.save(path)
 
 
@@ -282,10 +281,7 @@ def _contact_line(axes: Axes, x: Float, fn: Float, fx: Float, fz: Float, status:
         reach = 1.15 * float(np.abs(x[touching]).max()) or float(np.abs(x).max()) or 1.0
         axes.set_xlim(-reach, reach)
     handles += patches(_SHADES, [s for s in (STICK, SLIP) if np.any(status == s)])
-    axes.legend(
-        handles=handles, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=3, columnspacing=1.4
-    )
-    style(axes)
+    finish(axes, handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=3, columnspacing=1.4)
     axes.grid(False, axis="x")
 
 

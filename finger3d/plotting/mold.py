@@ -11,9 +11,8 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.geometry.surface import Triangles
-from finger3d.io import atomic
 from finger3d.plotting.camera import viewer_axes
-from finger3d.plotting.layout import blank
+from finger3d.plotting.layout import blank, save
 from finger3d.plotting.renderer import Camera, Drawing, Image, Polygons, render
 
 if TYPE_CHECKING:
@@ -182,18 +181,13 @@ def picture(path: Path, assembled: Mapping[str, Triangles], title: str, sizes: M
     high = _WIDTH * height / (_LABEL_FACTOR * width) + _TITLE_HEIGHT
     figure = blank(_WIDTH, high)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0 - _TITLE_HEIGHT / high))
-    if image is None:
-        draw(axes, view)
-    else:
-        axes.imshow(image, extent=(-width, width, -height, height), interpolation="nearest")
+    show(axes, view, image)
     for name, part in view.parts.items():
         if name in sizes:
             _label(axes, view, name, part, sizes[name])
-    axes.set(xlim=(-_LABEL_FACTOR * width, _LABEL_FACTOR * width), ylim=(-height, height), aspect="equal")
-    axes.set_axis_off()
+    axes.set_xlim(-_LABEL_FACTOR * width, _LABEL_FACTOR * width)
     figure.text(0.5, 1.0 - 0.5 * _TITLE_HEIGHT / high, title, fontsize=11, ha="center", va="center")
-    with atomic(path) as temporary:
-        figure.savefig(temporary, dpi=_DPI)
+    save(figure, path, _DPI)
     return "matplotlib" if image is None else "pyvista"
 
 
@@ -216,6 +210,17 @@ def _label(axes: Axes, view: Scenery, name: str, part: Triangles, remark: str) -
         arrowprops=line,
         annotation_clip=False,
     )
+
+
+def show(axes: Axes, view: Scenery, image: Image | None) -> None:
+    """Show the rendered image of a view in its axes, or draw the view with matplotlib."""
+    width, height = view.half
+    if image is None:
+        draw(axes, view)
+    else:
+        axes.imshow(image, extent=(-width, width, -height, height), interpolation="nearest")
+    axes.set(xlim=(-width, width), ylim=(-height, height), aspect="equal")
+    axes.set_axis_off()
 
 
 def draw(axes: Axes, view: Scenery) -> None:

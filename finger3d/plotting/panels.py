@@ -9,7 +9,7 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
-from finger3d.plotting.layout import WIDEST, blank
+from finger3d.plotting.layout import WIDEST, blank, head
 from finger3d.plotting.solid import BODY, COLOURS
 
 if TYPE_CHECKING:
@@ -50,8 +50,7 @@ def two_panels(aspect: float, title: str, ticks: bool = False) -> tuple[Figure, 
         axes.set_title(name, fontsize=11)
         axes.set_aspect("equal")
         panels.append(axes)
-    if title:
-        figure.suptitle(title, fontsize=13, y=1.0 - 0.12 / total, va="top")
+    head(figure, title, 13.0, 0.12)
     return figure, panels
 
 
