@@ -169,10 +169,10 @@ def _tolerances(
         found = [(step, _interpolated(mu, known, change[i])) for step, change in effects]
         own = [(step, change) for step, change in found if np.isfinite(change).all()]
         if own:
-            yield reading.name, _tolerance(name, sd, own)
+            yield reading.name, tolerance_of(name, sd, own)
 
 
-def _tolerance(name: str, sd: float, effects: list[Effect]) -> Tolerance:
+def tolerance_of(name: str, sd: float, effects: list[Effect]) -> Tolerance:
     """Return a tolerance from its effects, each scaled to one standard deviation."""
     scaled = np.array([change * sd / step for step, change in effects])
     (a, change_a), (b, change_b) = [*effects, (0.0, np.zeros(scaled.shape[1]))][:2]
