@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from finger3d.accuracy.cost import forecast
+from finger3d.accuracy.cost import AddedCost, forecast
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
 from finger3d.fem.material import Isotropic
@@ -159,3 +159,10 @@ def test_a_mesh_that_needs_no_mesher_is_counted_exactly(domain: Domain) -> None:
     expected, problem = forecast(model), build(model)
     assert expected["contact_points"] == len(problem.surface.nodes)
     assert expected["dofs"] == problem.body.stiffness.upper.shape[0]
+
+
+def test_a_cost_is_told_with_its_reason() -> None:
+    text = str(AddedCost(seconds=12.345, memory_mb=678.9, reason="a mesh of its own"))
+    assert "12 s" in text
+    assert "6.8e+02 MB" in text
+    assert text.endswith("a mesh of its own")
