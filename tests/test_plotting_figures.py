@@ -109,7 +109,7 @@ def test_force_against_depth_is_drawn(tmp_path: Path) -> None:
     ],
 )
 def test_the_line_that_is_drawn(z: list[float], expected: tuple[float, list[int]]) -> None:
-    top, wall = FREE_FACES[CONTACT], FREE_FACES[CONTACT] + 1
+    top, wall = FREE_FACES[CONTACT], FREE_FACES[CONTACT + 1]
     table = {
         "face": [top] * 8 + [wall], "x_mm": [0.1 * k for k in range(9)], "z_mm": [*z, 0.0],
         "pressure_MPa": [0.1 * k for k in range(9)],
