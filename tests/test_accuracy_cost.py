@@ -18,6 +18,7 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.solve import march
+from finger3d.objects import Plane, Sphere
 from finger3d.scene import load
 from finger3d.scene.registry import effect_names, effect_type
 
@@ -166,3 +167,15 @@ def test_a_cost_is_told_with_its_reason() -> None:
     assert "12 s" in text
     assert "6.8e+02 MB" in text
     assert text.endswith("a mesh of its own")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sphere", [True, False])
+def test_an_unstructured_solid_has_the_size_that_was_foretold(sphere: bool) -> None:
+    thing = Sphere(radius_mm=20.0) if sphere else Plane()
+    depth = 3.0 if sphere else 6.0
+    plain = replace(baseline("solid"), legs=(Leg(depth, steps=2),), object=thing)
+    model = replace(plain, mesh=MeshOptions(1.5 if sphere else 2.0, 8.0, "ftetwild"))
+    expected, problem = forecast(model), build(model)
+    assert 0.8 < problem.body.stiffness.upper.shape[0] / expected["dofs"] < 1.25
+    assert 0.6 < len(problem.surface.nodes) / expected["contact_points"] < 1.25

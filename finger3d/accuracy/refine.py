@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 
+from finger3d._cost import GROWTH, PRESS_TO_ROUND
 from finger3d._ranges import four_digits
 from finger3d._types import Tree
 from finger3d.accuracy.adjoint_bars import NoAdjointBarsError, adjoint_bars, applies, short_press
@@ -42,8 +43,6 @@ _FEWEST_POINTS = 8
 """Contact points that the half-length of contact keeps on a coarser mesh."""
 
 _SAFETY = 0.9  # of the tolerance, so that the last round does not just miss it
-_PRESS_TO_ROUND = 1.3  # time of a press over that of its last round: contact is solved again and drawn
-_EXPONENT = {2: 1.2, 3: 1.6}  # seconds grow with this power of the unknowns (measured from 161 000 to 523 000 in 3D)
 
 
 @dataclass(frozen=True)
@@ -304,9 +303,9 @@ def _with_swept_mesher(problem: Problem, options: MeshOptions) -> MeshOptions:
 
 def _affordable(now: MeshOptions, wanted: MeshOptions, seconds: float, left: float, dim: int) -> MeshOptions | None:
     """Return the wanted edge lengths, or longer ones if time is short; None if no refinement is affordable."""
-    left /= _PRESS_TO_ROUND
+    left /= PRESS_TO_ROUND
     factor = min(wanted.size_mm / now.size_mm, wanted.base_size_mm / now.base_size_mm)
-    power = dim * _EXPONENT[dim]
+    power = dim * GROWTH[dim]
     if seconds * factor**-power <= left:
         return wanted
     least = (seconds / left) ** (1.0 / power) if left > 0.0 else 1.0
@@ -324,4 +323,4 @@ def _graded_seconds(problem: Problem, wanted: MeshOptions, seconds: float) -> fl
     """Return the forecast seconds of a press on a graded mesh, from those of a round on the mesh that it follows."""
     at_contact = (problem.model.mesh.size_mm / wanted.size_mm) ** (problem.dim - 1)
     growth = max(cell_growth(problem, wanted), at_contact)
-    return float(_PRESS_TO_ROUND * seconds * growth ** _EXPONENT[problem.dim])
+    return float(PRESS_TO_ROUND * seconds * growth ** GROWTH[problem.dim])

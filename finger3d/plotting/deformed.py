@@ -88,7 +88,7 @@ def _sections(fingers: Sequence[DeformedFinger], highest: float) -> list[Figure]
     mesh = fingers[0].mesh
     everywhere = np.concatenate([mesh.points, *(finger.moved for finger in fingers)])
     low, span = everywhere.min(axis=0), np.ptp(everywhere, axis=0)
-    figures = []
+    rest, figures = outline_of(mesh, mesh.points), []
     for finger in fingers:
         halves, pressure, status = _coloured_halves(finger)
         figure, panels = two_panels(1.14 * span[1] / (1.08 * span[0]), finger.title, ticks=True)
@@ -97,7 +97,7 @@ def _sections(fingers: Sequence[DeformedFinger], highest: float) -> list[Figure]
         for axes, colours in zip(panels, (pressure_colours(pressure, highest), palette()[status]), strict=True):
             for path, face, edge, width in lines:
                 axes.add_artist(PathPatch(path, facecolor=face, edgecolor=edge, lw=width))
-            axes.add_artist(PathPatch(outline_of(mesh, mesh.points), facecolor="none", edgecolor=REST, lw=0.8, ls=":"))
+            axes.add_artist(PathPatch(rest, facecolor="none", edgecolor=REST, lw=0.8, ls=":"))
             if finger.thing is not None:
                 axes.add_collection(LineCollection(list(sliced(finger.thing)), colors=OBJECT, lw=1.2, zorder=2))
             axes.add_collection(LineCollection(list(halves), colors=colours, lw=5, capstyle="butt", zorder=3))
