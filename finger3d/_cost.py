@@ -44,7 +44,7 @@ _NODES_PER_TET, _VERTICES_PER_TET = 1.55, 0.24
 _DOFS_PER_TRIANGLE = 4.1
 """Sizes of quadratic meshes."""
 
-_ITERATIONS = 9
+_ITERATIONS_AN_INCREMENT = 9
 """Iterations of an increment at finite strain, which has about one factorisation of the tangent."""
 
 _NUMERIC_FACTORISATION = 0.85
@@ -97,7 +97,7 @@ class PressSize:
     @property
     def finite_strain_s(self) -> float:
         """Seconds that finite strain adds to an increment."""
-        return _NUMERIC_FACTORISATION * self.condensation_s + _ITERATIONS * _ITERATION_S * self.dofs
+        return _NUMERIC_FACTORISATION * self.condensation_s + _ITERATIONS_AN_INCREMENT * _ITERATION_S * self.dofs
 
     @property
     def factor_mb(self) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 
 from finger3d._types import Array, Float, freeze_arrays
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
-from finger3d.analyses.calibrate.tolerances import displaced_gauges, tolerance_of
+from finger3d.analyses.calibrate.tolerances import GAUGE_PLACES, displaced_gauges, tolerance_of
 from finger3d.errors import Finger3dError
 from finger3d.fem.recover import displacement
 from finger3d.mechanics.build import build
@@ -36,7 +36,6 @@ MU_STEP = 0.02
 """Distance of the values of mu that the strain is calibrated at."""
 
 _KEPT = 64  # presses; a slider that goes back finds them
-_PLACES = ("gauge_x_mm", "gauge_y_mm", "gauge_angle_deg")
 _ALONG = ("x_mm", "pressure_MPa", "shear_x_MPa", "shear_z_MPa", "status")
 _NUMBERS = ("normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm")
 
@@ -155,7 +154,7 @@ class LiveBody:
             return np.asarray((place.row(mesh, axes) @ displacements)[0])
 
         own, tolerances = strains(gauge), []
-        for name in _PLACES:
+        for name in GAUGE_PLACES:
             sd = TOLERANCES[name][0]
             displaced = displaced_gauges(model, gauge, {name: sd})
             tolerances.append(tolerance_of(name, sd, [(d.step, strains(d.gauge) - own) for d in displaced]))

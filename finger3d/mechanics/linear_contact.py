@@ -31,7 +31,7 @@ from finger3d.objects import DistanceTracker, Move, vertical_frame
 _TARGET = 1e-9
 """Error of the geometry at which the iteration ends; below `TOLERANCE`, to which other errors add."""
 
-_ITERATIONS = 30
+_MOST_SOLUTIONS = 30
 """Largest number of solutions of an increment."""
 
 _HOLD_FROM, _HOLD_ABOVE = 4, 1e-4
@@ -100,7 +100,7 @@ def solve_increment(
     spent, error, start = 0, np.inf, guess
     tried: list[Float] = []
     found: list[Float] = []
-    for iteration in range(1, _ITERATIONS + 1):
+    for iteration in range(1, _MOST_SOLUTIONS + 1):
         solution = increment.solve(geometry, at, start)
         spent += solution.iterations
         if not (solution.outcome.ok or solution.outcome.is_cycle):

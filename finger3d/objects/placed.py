@@ -16,7 +16,7 @@ from finger3d.objects.triangulated import MeshObject
 _SURFACE = 1e-13
 """Distance at which a point on a vertical line counts as on the surface, over the coordinates."""
 
-_ITERATIONS = 200
+_MOST_STRIDES = 200
 """Largest number of steps along a vertical line."""
 
 _LOWEST_START = 1e7
@@ -110,7 +110,7 @@ class PlacedObject:
         inside = self.object.clearance(self.to_own(at)) < 0.0
         out[inside] = -np.inf
         moving = np.flatnonzero(~inside)
-        for _ in range(_ITERATIONS):
+        for _ in range(_MOST_STRIDES):
             if self.object.is_convex:
                 value, gradient = self.distance(at[moving])
                 rate = -gradient[:, 1]

@@ -45,7 +45,7 @@ LABELS = {"half_a": "half A", "half_b": "half B", "strips": "gauge strips"}
 _VIEW = np.array([0.55, 0.5, 1.0])  # direction towards the viewer
 _POURING_AXES = np.diag([1.0, -1.0, -1.0])  # orientation while pouring: dome down, lid on top
 _SEPARATION = 0.45  # distance between the parts, relative to their largest extent
-_MARGIN = 1.08  # size of the window over that of the parts
+_WINDOW_OVER_PARTS = 1.08  # size of the window over that of the parts
 _WIDTH, _TITLE_HEIGHT = 10.0, 0.5  # of the figure and of its title, in inches
 _DPI = 130  # pixels per inch
 _LABEL_FACTOR = 1.6  # width of the figure over that of the parts; the rest holds the labels
@@ -151,7 +151,7 @@ def scenery(parts: Mapping[str, Triangles], towards: Float = _VIEW, opaque: bool
     axes = viewer_axes(towards)
     seen = np.vstack([part.points for part in parts.values()]) @ axes.T
     low, high = seen.min(axis=0), seen.max(axis=0)
-    return Scenery(dict(parts), axes, 0.5 * (low + high) @ axes, _MARGIN * 0.5 * (high - low)[:2], opaque)
+    return Scenery(dict(parts), axes, 0.5 * (low + high) @ axes, _WINDOW_OVER_PARTS * 0.5 * (high - low)[:2], opaque)
 
 
 def picture(path: Path, assembled: Mapping[str, Triangles], title: str, sizes: Mapping[str, str]) -> str:
