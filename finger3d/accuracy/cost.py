@@ -25,7 +25,7 @@ from finger3d._cost import (
     tet_mesh,
 )
 from finger3d._types import Tree
-from finger3d.mechanics.build import MARGIN, WHOLE_FACE, candidate_points, contact_box, poses
+from finger3d.mechanics.build import MARGIN, WHOLE_FACE, candidate_points, poses
 from finger3d.mechanics.gauge_refinement import refined_at_gauges
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.path import AUTO_START
@@ -35,7 +35,7 @@ from finger3d.mechanics.symmetry import symmetry
 from finger3d.meshing.given import GivenMesh
 from finger3d.meshing.limits import check_memory
 from finger3d.meshing.sizing import Sizing
-from finger3d.objects import PlacedObject, initial_contact
+from finger3d.objects import PlacedObject
 
 _USUAL = 80
 """Median of automatic increments over the cases of validation/error_bars.py."""
@@ -141,11 +141,11 @@ def _size(model: Model, axes: tuple[str, ...]) -> tuple[int, PressSize]:
     from finger3d.meshing.generate import mesh_solid
     from finger3d.meshing.swept import mesh_section
 
-    zone = contact_box(model)
+    zone = model.first_contact.contact_box
     if model.domain != "solid" or model.mesh.mesher == "swept" or isinstance(model.design, GivenMesh):
         make = mesh_solid if model.domain == "solid" else mesh_section
         mesh, report = refined_at_gauges(model, *make(model.design, model.mesh, zone, axes), axes)
-        first = initial_contact(model.contact_path).first_contact_mm
+        first = model.first_contact.first_contact_mm
         touching = len(candidate_points(model, free_surface(model, mesh, 1.0), first, MARGIN).nodes)
         dofs = mesh.dim * report.points + (len(mesh.part_corners[0]) if model.mixed else 0)
         return report.cells, PressSize(mesh.dim, dofs, touching)
@@ -167,7 +167,7 @@ def _candidates(model: Model, field: Sizing) -> float:
     area = np.sqrt(1.0 + slopes[0] ** 2 + slopes[1] ** 2) * span[0] * span[2] / _LATTICE**2
     edge = field.at(np.stack([x, np.where(inside, top, 0.0), z], axis=-1).reshape(-1, 3)).reshape(x.shape)
     vertices = np.where(inside, area / (0.866 * edge**2), 0.0)
-    path, touch = poses(model), initial_contact(model.contact_path).first_contact_mm
+    path, touch = poses(model), model.first_contact.first_contact_mm
     objects = (PlacedObject.of(model.object, touch, pose) for pose in path)
     overlap = np.max([obj.overlap(x.ravel(), top.ravel(), z.ravel()) for obj in objects], axis=0).reshape(x.shape)
     near = float(vertices[overlap > -MARGIN * max(pose.depth_mm for pose in path)].sum())
