@@ -14,7 +14,7 @@ from finger3d.errors import Outcome
 from finger3d.mechanics.model import Gauge
 from finger3d.plotting.calibration import draw as draw_calibration
 from finger3d.plotting.comparison import draw as draw_comparison
-from finger3d.plotting.figures import contact_figure, finger_picture, force_figure
+from finger3d.plotting.figures import contact_figure, force_figure
 from finger3d.plotting.gauges import marks_of
 from finger3d.plotting.layout import DPI, sheet
 from finger3d.plotting.optimise import draw as draw_search
@@ -23,7 +23,7 @@ from finger3d.report.sweep import sweep_charts
 from finger3d.report.sweep_figure import draw as draw_sweep
 from finger3d.results.comparison import Case
 from finger3d.sensor.maps import StrainMap
-from tests.pictures import CURVE, MU, MUS, STEPS, finger, pressed
+from tests.pictures import CURVE, MU, MUS, STEPS, finger, finger_picture, pressed
 
 SHOWN = 960  # CSS pixels of the narrowest picture in a page: 60 rem
 LEGIBLE = 7  # CSS pixels of an em: below, lower-case letters have less than four pixels

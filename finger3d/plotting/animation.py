@@ -48,11 +48,10 @@ def frames(states: States, numbers: Sequence[int], title: str, gauges: Sequence[
     marks = marks_of(mesh, gauges, near=mesh.dim == 3)
     fingers = []
     for k, title_of_step in zip(numbers, titles, strict=True):
-        u = states.displacement[k].astype(float)
         fingers.append(
             DeformedFinger(
                 mesh=mesh,
-                displacement=u,
+                displacement=states.displacement[k].astype(float),
                 pressure=states.pressure[k],
                 shear=np.column_stack([states.shear_x[k], states.shear_y[k], states.shear_z[k]]),
                 status=states.status[k].astype(int),
@@ -60,7 +59,7 @@ def frames(states: States, numbers: Sequence[int], title: str, gauges: Sequence[
                 faces=states.face,
                 thing=states.object_at(k),
                 title=title_of_step,
-                marks=[(mark.label, mark.of(mesh.points + u)) for mark in marks],
+                marks=marks,
             )
         )
     return draw_fingers(fingers, _WINDOW if len(fingers) > 1 else WINDOW, arrows=False)[0]

@@ -16,7 +16,7 @@ from finger3d._types import Float, Int
 from finger3d.contact.friction import OPEN
 from finger3d.fem.simplex import CONTACT, FREE_FACES, Mesh
 from finger3d.plotting.camera import WINDOW, flat
-from finger3d.plotting.gauges import draw_marks
+from finger3d.plotting.gauges import Mark, draw_marks
 from finger3d.plotting.outlines import edges_of, interfaces_of, outline_of
 from finger3d.plotting.panels import Marks, highest_of, keys, palette, pressure_colours, sliced, two_panels
 from finger3d.plotting.solid import BODY, FEATURE, LINE, OBJECT, OBJECT_TINT, REST, draw_solid, render_solids, skin_of
@@ -38,7 +38,7 @@ class DeformedFinger:
     nodes, faces : (c,) their nodes, and the numbers in `finger3d.fem.simplex.FREE_FACES` of their faces
     thing : (t, 3, 3) corners of the object's triangles, mm; None without it
     title : of the picture
-    marks : gauges
+    marks : gauges, from `finger3d.plotting.gauges.marks_of`
     """
 
     mesh: Mesh
@@ -50,12 +50,17 @@ class DeformedFinger:
     faces: Int
     thing: Float | None
     title: str = ""
-    marks: Marks = ()
+    marks: Sequence[Mark] = ()
 
     @property
     def moved(self) -> Float:
         """Positions (n, d) of the nodes, mm."""
         return self.mesh.points + self.displacement
+
+    @property
+    def lines(self) -> Marks:
+        """Labels of the gauges and their lines (3, d), mm."""
+        return [(mark.label, mark.of(self.moved)) for mark in self.marks]
 
 
 def draw_fingers(
@@ -94,7 +99,7 @@ def _sections(fingers: Sequence[DeformedFinger], highest: float) -> list[Figure]
         figure, panels = two_panels(1.14 * span[1] / (1.08 * span[0]), finger.title, ticks=True)
         paths = [draw(mesh, finger.moved) for draw in (outline_of, edges_of, interfaces_of)]
         lines = [(paths[0], BODY, LINE, 0.5), (paths[1], "none", LINE, 0.25), (paths[2], "none", FEATURE, 0.9)]
-        for axes, colours in zip(panels, (pressure_colours(pressure, highest), palette()[status]), strict=True):
+        for axes, colours in zip(panels, (pressure_colours(pressure, highest, status), palette()[status]), strict=True):
             for path, face, edge, width in lines:
                 axes.add_artist(PathPatch(path, facecolor=face, edgecolor=edge, lw=width))
             axes.add_artist(PathPatch(rest, facecolor="none", edgecolor=REST, lw=0.8, ls=":"))
@@ -105,7 +110,7 @@ def _sections(fingers: Sequence[DeformedFinger], highest: float) -> list[Figure]
             axes.set_xlabel("x (mm)", labelpad=1)
             axes.spines[["top", "right"]].set_visible(False)
         panels[0].set_ylabel("y (mm)")
-        draw_marks(panels[0], finger.marks)
+        draw_marks(panels[0], finger.lines)
         keys(figure, highest, {"finger at rest": REST} | ({} if finger.thing is None else {"object": OBJECT}))
         figures.append(figure)
     return figures
@@ -138,7 +143,10 @@ def _solids(
     pictures = []
     for skin in skins:
         by_status = np.repeat(palette()[skin.status][:, None], 3, axis=1)
-        pictures += [(skin, pressure_colours(skin.pressure, highest), False), (skin, by_status, arrows)]
+        pictures += [
+            (skin, pressure_colours(skin.pressure, highest, skin.status[:, None]), False),
+            (skin, by_status, arrows),
+        ]
     images, extent = render_solids(pictures, window) or (None, None)
     seen = np.concatenate([flat(skin.points) for skin in skins])
     low, span = seen.min(axis=0), np.ptp(seen, axis=0)
@@ -153,7 +161,7 @@ def _solids(
                 draw_solid(axes, *pictures[number])
                 axes.set(xlim=(low[0], low[0] + span[0]), ylim=(low[1], low[1] + span[1]))
             axes.set_axis_off()
-        draw_marks(panels[0], [(label, flat(line)) for label, line in finger.marks])
+        draw_marks(panels[0], [(label, flat(line)) for label, line in finger.lines])
         if finger.marks:
             panels[0].set_title("contact pressure; gauges projected onto the front face", fontsize=11)
         if arrows and skin.largest_shear > 0.0:

@@ -1,4 +1,4 @@
-"""Pictures of a press, drawn without a display: the deformed finger, the contact tractions, and force against depth."""
+"""Pictures of a press, drawn without a display: the contact tractions, and force against depth."""
 
 from __future__ import annotations
 
@@ -11,10 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from finger3d._types import Float, Int
 from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
-from finger3d.fem.simplex import CONTACT, FREE_FACES, Mesh
-from finger3d.plotting.deformed import DeformedFinger, draw_fingers
-from finger3d.plotting.gauges import Mark
-from finger3d.plotting.layout import WIDEST, finish, save, sheet
+from finger3d.fem.simplex import CONTACT, FREE_FACES
+from finger3d.plotting.layout import WIDEST, finish, sheet
 from finger3d.plotting.panels import patches
 from finger3d.plotting.solid import COLOURS
 
@@ -27,53 +25,6 @@ _ON_LINE = 1e-6
 """Distance from a line z = const, in half widths, below which a point lies on it."""
 
 _SHADES = {STICK: "#c9d9ee", SLIP: "#fde3c4"}
-
-
-def finger_picture(
-    path: str | Path,
-    mesh: Mesh,
-    displacement: Float,
-    table: Mapping[str, ArrayLike],
-    contact_nodes: ArrayLike,
-    title: str = "",
-    thing: Float | None = None,
-    marks: Sequence[Mark] = (),
-) -> str:
-    """Draw the deformed finger to scale: contact pressure on the left, stick and slip on the right.
-
-    Parameters
-    ----------
-    path : PNG file to write
-    mesh : undeformed mesh of the whole finger (unfolded, if symmetry was used), mm
-    displacement : (n, d) array, mm
-    table : columns of contact.csv, each (c,); face, pressure_MPa, the shears and status are used
-    contact_nodes : (c,) array
-        Nodes of `mesh` that are the contact points.
-    title : title of the picture
-    thing : (t, 3, 3) array, mm
-        Corners of the object's triangles, drawn half transparent, or in a section as the line z = 0.
-    marks : gauges to draw, from `finger3d.plotting.gauges.marks_of`
-
-    Returns
-    -------
-    str
-        The renderer, ``pyvista`` or ``matplotlib``.
-    """
-    finger = DeformedFinger(
-        mesh=mesh,
-        displacement=displacement,
-        pressure=_column(table, "pressure_MPa"),
-        shear=np.column_stack([_column(table, f"shear_{axis}_MPa") for axis in "xyz"]),
-        status=_status(table),
-        nodes=np.asarray(contact_nodes, dtype=np.int64),
-        faces=np.array([FREE_FACES.index(name) for name in np.asarray(table["face"]).tolist()], dtype=np.int64),
-        thing=thing,
-        title=title,
-        marks=[(mark.label, mark.of(mesh.points + displacement)) for mark in marks],
-    )
-    (figure,), renderer = draw_fingers([finger])
-    save(figure, path)
-    return renderer
 
 
 def middle_line(
