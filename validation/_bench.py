@@ -147,7 +147,7 @@ def _child(size: float) -> dict[str, float]:
 
     Where MKL is loaded, MUMPS calls MKL's BLAS in place of its own, and takes half the time.
     """
-    command = [sys.executable, __file__, json.dumps(size)]
+    command = [sys.executable, "-m", "validation._bench", json.dumps(size)]
     found, seconds = (json.loads(_run([*command, *more]).stdout.splitlines()[-1]) for more in ((), ("mumps",)))
     return dict(found) | {"mumps": seconds}
 
