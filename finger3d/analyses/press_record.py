@@ -12,6 +12,7 @@ import numpy as np
 from finger3d._machine import peak_memory_MB, versions
 from finger3d._types import Tree
 from finger3d.contact.friction import OPEN
+from finger3d.geometry.imported import extent
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import History, StepResult, measure
 
@@ -141,6 +142,7 @@ class PressRecord:
 def _mesh(problem: Problem) -> Tree:
     report = problem.body.report
     return {
+        "finger": extent(problem.model.design),
         "points": report.points,
         "cells": report.cells,
         "dofs": int(problem.body.stiffness.upper.shape[0]),

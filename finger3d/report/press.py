@@ -74,6 +74,7 @@ _ROUND_OFF = 1e-9  # magnitude of round-off, relative to the force that a number
 class MeshSummary(TypedDict):
     """The ``mesh`` of summary.json."""
 
+    finger: NotRequired[str]
     points: int
     cells: int
     dofs: int
@@ -272,6 +273,7 @@ def _steps(good: Sequence[PressStep]) -> PageSection:
 
 def _mesh(mesh: MeshSummary) -> Table:
     rows: list[tuple[str, object]] = [
+        ("finger", mesh.get("finger", "unknown")),
         ("nodes, cells", f"{mesh['points']}, {mesh['cells']}"),
         ("unknowns", str(mesh["dofs"])),
         ("contact points", str(mesh["contact_points"])),
