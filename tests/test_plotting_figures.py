@@ -100,6 +100,13 @@ def test_force_against_depth_is_drawn(tmp_path: Path) -> None:
     assert share(tmp_path / "f.png", render.COLOURS[STICK], within=0.05) > 1e-4
 
 
+def test_many_increments_are_a_curve_without_markers(tmp_path: Path) -> None:
+    many = [{**STEPS[-1], "depth_mm": 0.01 * k, "friction_sum_N": 0.01 * k} for k in range(320)]
+    force_figure(tmp_path / "many.png", many)
+    force_figure(tmp_path / "few.png", many[::10])
+    assert share(tmp_path / "many.png", "#c0392b", within=0.05) < share(tmp_path / "few.png", "#c0392b", within=0.05)
+
+
 @pytest.mark.parametrize(
     ("z", "expected"),
     [
@@ -109,7 +116,7 @@ def test_force_against_depth_is_drawn(tmp_path: Path) -> None:
     ],
 )
 def test_the_line_that_is_drawn(z: list[float], expected: tuple[float, list[int]]) -> None:
-    top, wall = FREE_FACES[CONTACT], FREE_FACES[CONTACT] + 1
+    top, wall = FREE_FACES[CONTACT], FREE_FACES[CONTACT + 1]
     table = {
         "face": [top] * 8 + [wall], "x_mm": [0.1 * k for k in range(9)], "z_mm": [*z, 0.0],
         "pressure_MPa": [0.1 * k for k in range(9)],

@@ -199,7 +199,7 @@ class ResultWriter:
             table,
             problem.points.nodes,
             thing=placed.to_scene(thing.points)[thing.faces],
-            title=f"{steps[-1]['normal_force_N']:.4g} N at {good[-1].target.depth_mm:g} mm",
+            title=f"{steps[-1]['normal_force_N']:.4g} N at {good[-1].target.depth_mm:.3g} mm deep",
             marks=marks_of(mesh, problem.model.gauges, near=mesh.dim == 3),
         )
 

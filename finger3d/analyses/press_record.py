@@ -198,4 +198,4 @@ def point_count_warning(record: PressRecord) -> list[str]:
     count = max((int(np.count_nonzero(step.state.status != OPEN)) for step in record.steps), default=0)
     if not count or count >= _RESOLVED_POINTS[record.problem.dim]:
         return []
-    return [f"Only {count} points touch: too few for contact and stick lengths. Lower mesh.size_mm."]
+    return [f"Only {count} points touch: too few for the extents of contact and stick zone. Lower mesh.size_mm."]

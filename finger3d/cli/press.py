@@ -74,8 +74,8 @@ def _kept(out: Path, report: Progress) -> str:
 _NUMBERS = {
     "normal force": ("normal_force_N", 1.0, 5, " N"),
     "friction sum": ("friction_sum_N", 1.0, 5, " N"),
-    "contact length": ("contact_half_length_mm", 2.0, 4, " mm at z = 0"),
-    "stick length": ("stick_half_length_mm", 2.0, 4, " mm at z = 0"),
+    "contact extent": ("contact_half_length_mm", 2.0, 4, " mm at z = 0"),
+    "stick extent": ("stick_half_length_mm", 2.0, 4, " mm at z = 0"),
     "contact area": ("contact_area_mm2", 1.0, 4, " mm2"),
     "stick area": ("stick_area_mm2", 1.0, 4, " mm2"),
 }

@@ -73,7 +73,7 @@ def frames(states: States, numbers: Sequence[int], title: str, gauges: Sequence[
         skin = skin_of(mesh, u, states.pressure[k], shear, status, states.nodes, states.face, thing)
         skins.append(skin)
         by_status = np.repeat(view.palette()[skin.status][:, None], 3, axis=1)
-        colours.append((view.pressure_colours(skin.pressure, highest), by_status))
+        colours.append((view.pressure_colours(skin.pressure, highest, skin.status[:, None]), by_status))
     return _solids(skins, colours, titles, highest, marks)
 
 
@@ -125,10 +125,9 @@ def _sections(
         middle = at[arc[:, 2]] if arc.shape[1] == 3 else at[arc].mean(axis=1)
         halves = np.stack([at[arc[:, :2]], np.repeat(middle[:, None], 2, axis=1)], axis=2).reshape(-1, 2, 2)
         pressure, status = (states.on_points(name, k)[arc[:, :2]].ravel() for name in ("pressure", "status"))
+        by_pressure = view.pressure_colours(pressure, highest, status)
         figure, panels = view.two_panels(1.15 * span[1] / span[0], title, ticks=True)
-        for axes, colours in zip(
-            panels, (view.pressure_colours(pressure, highest), view.palette()[status.astype(int)]), strict=True
-        ):
+        for axes, colours in zip(panels, (by_pressure, view.palette()[status.astype(int)]), strict=True):
             axes.add_collection(PolyCollection(list(at[corners]), facecolor=BODY, edgecolor=BODY, lw=0.3))
             axes.add_collection(LineCollection(list(states.points[outline]), colors=REST, lw=0.8, linestyles=":"))
             axes.add_collection(LineCollection(list(at[outline]), colors=LINE, lw=0.8))

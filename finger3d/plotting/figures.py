@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from matplotlib.patches import Patch
 
 _FEWEST_ON_LINE = 5
+_MOST_MARKERS = 40  # increments that are marked on a curve
 _ON_LINE = 1e-6
 """Distance from a line z = const, in half widths, below which a point lies on it."""
 
@@ -178,7 +179,7 @@ def contact_figure(
 
 
 def force_figure(path: str | Path, steps: Sequence[Mapping[str, object]], title: str = "") -> None:
-    """Draw forces (N) and the half lengths (mm) of the contact and the stick zone against depth (mm).
+    """Draw forces (N) and half the extents (mm) of the contact and the stick zone against depth (mm).
 
     If the object slides, the length of its path (mm) since first contact replaces the depth.
 
@@ -202,12 +203,14 @@ def force_figure(path: str | Path, steps: Sequence[Mapping[str, object]], title:
         depth = np.cumsum(np.linalg.norm(np.diff(at, axis=0, prepend=0.0), axis=1))
     made = sheet(1, 2, (WIDEST, 4.4), (0.8, 0.15, 0.55, 0.15), title)
     left, right = made.axes
-    left.plot(depth, values("normal_force_N"), "o-", color="#222222", ms=4, label="normal force")
-    left.plot(depth, values("friction_sum_N"), "s-", color="#c0392b", ms=4, label="sum of |friction|")
+    marked = len(depth) <= _MOST_MARKERS
+    dot, square = ("o-", "s-") if marked else ("-", "-")
+    left.plot(depth, values("normal_force_N"), dot, color="#222222", ms=4, label="normal force")
+    left.plot(depth, values("friction_sum_N"), square, color="#c0392b", ms=4, label="sum of |friction|")
     left.set_ylabel("force (N)")
-    right.plot(depth, values("contact_half_length_mm"), "o-", color="#555555", ms=4, label="contact")
-    right.plot(depth, values("stick_half_length_mm"), "s-", color=COLOURS[STICK], ms=4, label="stick")
-    right.set_ylabel("half length along x, z = 0 (mm)")
+    right.plot(depth, values("contact_half_length_mm"), dot, color="#555555", ms=4, label="contact")
+    right.plot(depth, values("stick_half_length_mm"), square, color=COLOURS[STICK], ms=4, label="stick")
+    right.set_ylabel("half extent along x at z = 0 (mm)")
     for axes in (left, right):
         axes.set_xlabel("path length of the object (mm)" if slides else "depth (mm)")
         axes.set_xlim(left=float(depth.min(initial=0.0)))
@@ -323,9 +326,10 @@ def _section(
     low, span = moved.min(axis=0), np.ptp(moved, axis=0)
     limits = low - 0.04 * span, low + 1.08 * span
     figure, panels = two_panels(span[1] / span[0], title, ticks=True)
-    by_status = palette()[np.concatenate(of_state)]
+    states = np.concatenate(of_state)
+    by_pressure, by_status = pressure_colours(np.concatenate(of_half), highest, states), palette()[states]
     outline, edges, interfaces = (draw(mesh, moved) for draw in (outline_of, edges_of, interfaces_of))
-    for axes, colours in zip(panels, (pressure_colours(np.concatenate(of_half), highest), by_status), strict=True):
+    for axes, colours in zip(panels, (by_pressure, by_status), strict=True):
         axes.add_artist(PathPatch(outline, facecolor=BODY, edgecolor=LINE, lw=0.5))
         axes.add_artist(PathPatch(edges, facecolor="none", edgecolor=LINE, lw=0.25))
         axes.add_artist(PathPatch(interfaces, facecolor="none", edgecolor=FEATURE, lw=0.9))
@@ -349,7 +353,7 @@ def _section(
 def _solid(skin: Skin, title: str, marks: Marks) -> tuple[Figure, str]:
     """Draw a solid; return the figure and the name of the renderer."""
     highest = highest_of(skin.pressure)
-    by_pressure = pressure_colours(skin.pressure, highest)
+    by_pressure = pressure_colours(skin.pressure, highest, skin.status[:, None])
     by_status = np.repeat(palette()[skin.status][:, None], 3, axis=1)
     images, extent = render_solids([(skin, by_pressure, False), (skin, by_status, True)]) or (None, None)
     aspect = skin.aspect if images is None else images[0].shape[0] / images[0].shape[1]

@@ -22,8 +22,8 @@ _HEADLINE = {
     "normal_force_N": ("normal force", 1.0, "N"),
     "friction_sum_N": ("sum of |friction|", 1.0, "N"),
     "tangential_force_x_N": ("tangential force along x", 1.0, "N"),
-    "contact_half_length_mm": ("contact length at z = 0", 2.0, "mm"),
-    "stick_half_length_mm": ("stick length at z = 0", 2.0, "mm"),
+    "contact_half_length_mm": ("contact, extent along x at z = 0", 2.0, "mm"),
+    "stick_half_length_mm": ("stick, extent along x at z = 0", 2.0, "mm"),
     "contact_area_mm2": ("contact area", 1.0, "mm²"),
     "stick_area_mm2": ("stick area", 1.0, "mm²"),
     "external_work_mJ": ("work done on the finger", 1.0, "mJ"),
@@ -35,7 +35,7 @@ _PICTURES = {
     "finger.png": "Deformed finger to scale: contact pressure, and stick and slip zones",
     "contact.png": "Traction on the finger along x, with the friction limit and the stick and slip zones",
     "markers.png": "Displacements of the markers",
-    "force.png": "Forces, and half lengths of contact and stick zone, against depth",
+    "force.png": "Forces, and half the extents of contact and stick zone along x, against depth",
 }
 
 _STEP_COLUMNS = {

@@ -229,8 +229,8 @@ def _sufficient(planes: Sequence[Case], solid: Case) -> str:
     """Name the quantities of each plane model that deviate by more and by less than the limit."""
     names = {
         FORCE: "force",
-        "contact_length_mm": "contact length",
-        "stick_length_mm": "stick length",
+        "contact_length_mm": "extent of contact",
+        "stick_length_mm": "extent of the stick zone",
         "friction_sum_N_per_mm": "friction sum",
         "peak_pressure_MPa": "peak pressure",
     }
