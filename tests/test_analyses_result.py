@@ -90,7 +90,7 @@ def test_what_a_notebook_prints_of_the_other_objects_is_short_and_its_html_is_wh
     shown = {
         "Scene": scene,
         "Calibration": Calibration((ReadingCurve("<g>", mu, 0.01 * mu, 1e-4),), 0.1),
-        "Comparison": Comparison((good, failed), ("2D would do",), tmp_path),
+        "Comparison": Comparison((good, failed), ("2D would do",), (), tmp_path),
         "ReducedModel": finger3d.ReducedModel.of(build(scene.model())),
         "History": solid.history,
         "Mesh": build(scene.model()).mesh,

@@ -121,5 +121,7 @@ def score(rows: Sequence[Row]) -> str:
     if by_paper:
         parts.append(f"{sum(row.within for row in by_paper)} of the paper's {len(by_paper)} statements hold")
     if others:
-        parts.append(f"{sum(row.within for row in others)} of {len(others)} {'other ' if by_paper else ''}statements hold")
+        parts.append(
+            f"{sum(row.within for row in others)} of {len(others)} {'other ' if by_paper else ''}statements hold"
+        )
     return ", ".join(parts)

@@ -357,11 +357,12 @@ def _parts(skin: Skin, colours: Float, arrows: bool) -> tuple[Polygons | Polylin
     )
     parts: list[Polygons | Polylines | Arrows] = [Polygons(*unshared(at), colour) for at, colour in surfaces if len(at)]
     parts += [part for part in lines if part.points.size]
+    before = 0.004 * skin.size * AXES[2]
     for state, colour in ARROWS.items() if arrows else ():
         on = skin.arrow_status == state
         if on.any():
-            before = skin.arrow_at[on] + 0.004 * skin.size * AXES[2]
-            parts.append(Arrows(before, skin.arrow_length * skin.arrow[on], colour))
+            parts.append(Arrows(skin.arrow_at[on] + before, skin.arrow_length * skin.arrow[on], colour))
     if len(skin.thing):
-        parts.append(Polygons(*unshared(skin.thing), OBJECT_TINT, opacity=OBJECT_OPACITY))
+        # before the surface that it touches, with which it would mix in spots
+        parts.append(Polygons(*unshared(skin.thing + before), OBJECT_TINT, opacity=OBJECT_OPACITY))
     return tuple(parts)

@@ -21,6 +21,7 @@ def compare_page(folder: str | Path) -> Path:
     """
     folder = Path(folder)
     data = read_json(folder / "compare.json")
+    numbers = data.get("table", ())
     own = data["scene"]["finger"].get("width_mm")
     cases = [c for c in data["cases"] if c["numbers"]]
     headline = [
@@ -50,7 +51,7 @@ def compare_page(folder: str | Path) -> Path:
         f"{title_of(data['scene'])}: 2D against 3D",
         headline,
         [
-            PageSection("Verdict", list(data["verdict"])),
+            PageSection("Verdict", [*data["verdict"], *([Table(numbers[0], numbers[1:])] if numbers else [])]),
             PageSection("Scene", how_modelled(data, folder)),
             PageSection("Every case", [proof, _BARS, Table(head, rows)]),
         ],
