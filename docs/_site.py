@@ -206,6 +206,18 @@ class MathML:
         raise nodes.SkipNode
 
 
+class FullSizeFigures(SphinxPostTransform):
+    """Figures of validation/ are wider than a page: Sphinx links an image that is scaled to its full size."""
+
+    default_priority = 6
+
+    def run(self, **kwargs: Any) -> None:
+        """Scale the figures to the width of the page."""
+        for image in self.document.findall(nodes.image):
+            if "validation/figures/" in image["uri"]:
+                image["width"] = "100%"
+
+
 class ProjectLinks(SphinxPostTransform):
     """Links to files outside docs/: pages of the site where they are included, downloads otherwise."""
 

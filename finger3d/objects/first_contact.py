@@ -149,7 +149,7 @@ def initial_contact(way: ContactPath) -> InitialContact:
     touch, place = _touching(top, obj, half_length, half_width, way.landmarks)
     if touch == math.inf:
         raise Finger3dError(
-            "object: in the pose it comes in, it extends downwards without end over the finger, which would start "
+            "object: as it is turned at the start, it extends downwards without end over the finger, which would start "
             "inside it; change its turn_x_deg, turn_y_deg, turn_z_deg"
         )
     if not math.isfinite(touch):
