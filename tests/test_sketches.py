@@ -1,4 +1,4 @@
-"""Sketches of the theory: the script draws those that are committed, and pages open with them, in words, before formulas."""
+"""Sketches of the theory: the script draws the committed ones, and each page opens with one, and in words."""
 
 from __future__ import annotations
 

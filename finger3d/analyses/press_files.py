@@ -40,7 +40,7 @@ _WRITE_EVERY_S = 0.5
 _WRITE_SHARE = 10.0
 """Shortest time between two writes over the time of one: a table holds all increments, and grows with them."""
 
-_INCOMPLETE = "incomplete: the press was still running, or was interrupted; the steps written are valid"
+_INCOMPLETE = "incomplete: the press was still running, or was interrupted; the increments written are valid"
 _SUMMARY, _SCENE = "summary.json", "scene.toml"
 _FILES = (
     "history.csv", "contact.csv", "fields.vtu", "error_shares.vtu", "steps.npz", "report.html",

@@ -43,8 +43,8 @@ def compare_page(folder: str | Path) -> Path:
     ]
     head = ("model", "width (mm)", "edges (mm)", *keys, "seconds", "outcome")
     proof = (
-        "Each case is a separate press. It has numbers only if every step satisfies Eqs. (1)-(4) of Maeno 2004, and "
-        "friction opposes slip, to 1e-8. finger3d press reports the steps of a scene."
+        "Each case is a separate press. It has numbers only if every increment satisfies Eqs. (1)-(4) of Maeno 2004, "
+        "and friction opposes slip, to 1e-8. finger3d press reports the increments of a scene."
     )
     return write_page(
         folder,
