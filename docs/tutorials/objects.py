@@ -66,7 +66,7 @@ ball
 
 # %% [markdown]
 # The middle of the ball is 3 mm beside the apex of the dome. Contact forces act along the normals of the ball, so
-# that the finger is also pushed towards -x, although the ball moves straight down. The remark is right: lengths need
+# that the finger is also pushed towards -x, although the ball moves straight down. The remark is right: extents need
 # more contact points, hence a smaller `size_mm` and more time. All numbers have their units in their names.
 
 # %%
