@@ -17,6 +17,7 @@ from typing import Any
 from docutils import nodes
 from docutils.utils.math import latex2mathml
 from sphinx import addnodes
+from sphinx.transforms import SphinxTransform
 from sphinx.transforms.post_transforms import SphinxPostTransform
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -206,12 +207,12 @@ class MathML:
         raise nodes.SkipNode
 
 
-class FullSizeFigures(SphinxPostTransform):
+class FullSizeFigures(SphinxTransform):
     """Figures of validation/ are wider than a page: Sphinx links an image that is scaled to its full size."""
 
-    default_priority = 6
+    default_priority = 800  # after parsing
 
-    def run(self, **kwargs: Any) -> None:
+    def apply(self, **kwargs: Any) -> None:
         """Scale the figures to the width of the page."""
         for image in self.document.findall(nodes.image):
             if "validation/figures/" in image["uri"]:
