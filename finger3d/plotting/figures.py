@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.patches import Patch
 
 _FEWEST_ON_LINE = 5
+_MOST_MARKERS = 40  # increments that are marked on a curve
 _ON_LINE = 1e-6
 """Distance from a line z = const, in half widths, below which a point lies on it."""
 
@@ -112,7 +113,7 @@ def contact_figure(
 
 
 def force_figure(path: str | Path, steps: Sequence[Mapping[str, object]], title: str = "") -> None:
-    """Draw forces (N) and the half lengths (mm) of the contact and the stick zone against depth (mm).
+    """Draw forces (N) and half the extents (mm) of the contact and the stick zone against depth (mm).
 
     If the object slides, the length of its path (mm) since first contact replaces the depth.
 
@@ -136,12 +137,14 @@ def force_figure(path: str | Path, steps: Sequence[Mapping[str, object]], title:
         depth = np.cumsum(np.linalg.norm(np.diff(at, axis=0, prepend=0.0), axis=1))
     made = sheet(2, 2, (WIDEST, 4.4), (0.8, 0.15, 0.55, 0.15), title)
     left, right = made.axes
-    left.plot(depth, values("normal_force_N"), "o-", color="#222222", ms=4, label="normal force")
-    left.plot(depth, values("friction_sum_N"), "s-", color="#c0392b", ms=4, label="sum of |friction|")
+    marked = len(depth) <= _MOST_MARKERS
+    dot, square = ("o-", "s-") if marked else ("-", "-")
+    left.plot(depth, values("normal_force_N"), dot, color="#222222", ms=4, label="normal force")
+    left.plot(depth, values("friction_sum_N"), square, color="#c0392b", ms=4, label="sum of |friction|")
     left.set_ylabel("force (N)")
-    right.plot(depth, values("contact_half_length_mm"), "o-", color="#555555", ms=4, label="contact")
-    right.plot(depth, values("stick_half_length_mm"), "s-", color=COLOURS[STICK], ms=4, label="stick")
-    right.set_ylabel("half length along x, z = 0 (mm)")
+    right.plot(depth, values("contact_half_length_mm"), dot, color="#555555", ms=4, label="contact")
+    right.plot(depth, values("stick_half_length_mm"), square, color=COLOURS[STICK], ms=4, label="stick")
+    right.set_ylabel("half extent along x at z = 0 (mm)")
     for axes in (left, right):
         axes.set_xlabel("path length of the object (mm)" if slides else "depth (mm)")
         axes.set_xlim(left=float(depth.min(initial=0.0)))
@@ -217,3 +220,88 @@ def _contact_line(axes: Axes, x: Float, fn: Float, fx: Float, fz: Float, status:
     handles += patches(_SHADES, [s for s in (STICK, SLIP) if np.any(status == s)])
     finish(axes, handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=3, columnspacing=1.4)
     axes.grid(False, axis="x")
+<<<<<<< HEAD
+=======
+
+
+# --- 2D models ----------------------------------------------------------------------------------------------------
+
+
+def _section(
+    mesh: Mesh,
+    u: Float,
+    pressure: Float,
+    status: Int,
+    nodes: Int,
+    faces: Int,
+    thing: Float | None,
+    title: str,
+    marks: Marks,
+) -> Figure:
+    """Draw a 2D model, with the pressure and the status along the faces that may touch."""
+    from matplotlib.collections import LineCollection
+    from matplotlib.patches import PathPatch
+
+    moved = mesh.points + u
+    halves, of_half, of_state = [], [], []
+    for k in np.union1d(faces, CONTACT):
+        arc, own = mesh.facets.get(FREE_FACES[k], mesh.facets["contact"][:0]), faces == k
+        value, state = np.zeros(len(moved)), np.full(len(moved), OPEN)
+        value[nodes[own]], state[nodes[own]] = pressure[own], status[own]
+        middle = moved[arc[:, 2]] if mesh.element.is_quadratic else moved[arc].mean(axis=1)
+        # Each facet is drawn in two halves, coloured by the mean pressure of the half and by the status of its end.
+        pairs = np.stack([moved[arc[:, :2]], np.repeat(middle[:, None], 2, axis=1)], axis=2)
+        halves.append(pairs.reshape(-1, 2, 2))
+        of_half.append((0.75 * value[arc[:, :2]] + 0.25 * value[arc[:, 1::-1]]).ravel())
+        of_state.append(state[arc[:, :2]].ravel())
+    highest = highest_of(pressure)
+    low, span = moved.min(axis=0), np.ptp(moved, axis=0)
+    limits = low - 0.04 * span, low + 1.08 * span
+    figure, panels = two_panels(span[1] / span[0], title, ticks=True)
+    states = np.concatenate(of_state)
+    by_pressure, by_status = pressure_colours(np.concatenate(of_half), highest, states), palette()[states]
+    outline, edges, interfaces = (draw(mesh, moved) for draw in (outline_of, edges_of, interfaces_of))
+    for axes, colours in zip(panels, (by_pressure, by_status), strict=True):
+        axes.add_artist(PathPatch(outline, facecolor=BODY, edgecolor=LINE, lw=0.5))
+        axes.add_artist(PathPatch(edges, facecolor="none", edgecolor=LINE, lw=0.25))
+        axes.add_artist(PathPatch(interfaces, facecolor="none", edgecolor=FEATURE, lw=0.9))
+        if thing is not None:
+            axes.add_collection(LineCollection(list(thing), colors=OBJECT, lw=1.2, zorder=2))
+        axes.add_collection(
+            LineCollection(list(np.concatenate(halves)), colors=colours, lw=5, capstyle="butt", zorder=3)
+        )
+        axes.set(xlim=(limits[0][0], limits[1][0]), ylim=(limits[0][1], limits[1][1]))
+        axes.set_xlabel("x (mm)", labelpad=1)
+        axes.spines[["top", "right"]].set_visible(False)
+    panels[0].set_ylabel("y (mm)")
+    draw_marks(panels[0], marks)
+    keys(figure, highest, {} if thing is None else {"object": OBJECT})
+    return figure
+
+
+# --- solids -------------------------------------------------------------------------------------------------------
+
+
+def _solid(skin: Skin, title: str, marks: Marks) -> tuple[Figure, str]:
+    """Draw a solid; return the figure and the name of the renderer."""
+    highest = highest_of(skin.pressure)
+    by_pressure = pressure_colours(skin.pressure, highest, skin.status[:, None])
+    by_status = np.repeat(palette()[skin.status][:, None], 3, axis=1)
+    images, extent = render_solids([(skin, by_pressure, False), (skin, by_status, True)]) or (None, None)
+    aspect = skin.aspect if images is None else images[0].shape[0] / images[0].shape[1]
+    figure, panels = two_panels(aspect, title)
+    for number, (axes, colours) in enumerate(zip(panels, (by_pressure, by_status), strict=True)):
+        if images is not None:
+            axes.imshow(images[number], interpolation="antialiased", extent=extent)
+        else:
+            draw_solid(axes, skin, colours, arrows=number == 1)
+        axes.set_axis_off()
+    draw_marks(panels[0], [(label, flat(line)) for label, line in marks])
+    if marks:
+        panels[0].set_title("contact pressure; gauges projected onto the front face", fontsize=11)
+    if skin.largest_shear > 0.0:
+        text = f"stick and slip; arrows: friction on the finger, at most {skin.largest_shear:.3g} MPa"
+        panels[1].set_title(text, fontsize=11)
+    keys(figure, highest, {"finger at rest": REST} | ({"object": OBJECT_TINT} if len(skin.thing) else {}))
+    return figure, "matplotlib" if images is None else "pyvista"
+>>>>>>> w1
