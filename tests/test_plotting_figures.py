@@ -100,6 +100,13 @@ def test_force_against_depth_is_drawn(tmp_path: Path) -> None:
     assert share(tmp_path / "f.png", render.COLOURS[STICK], within=0.05) > 1e-4
 
 
+def test_many_increments_are_a_curve_without_markers(tmp_path: Path) -> None:
+    many = [{**STEPS[-1], "depth_mm": 0.01 * k, "friction_sum_N": 0.01 * k} for k in range(320)]
+    force_figure(tmp_path / "many.png", many)
+    force_figure(tmp_path / "few.png", many[::10])
+    assert share(tmp_path / "many.png", "#c0392b", within=0.05) < share(tmp_path / "few.png", "#c0392b", within=0.05)
+
+
 @pytest.mark.parametrize(
     ("z", "expected"),
     [

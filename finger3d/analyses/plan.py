@@ -6,12 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from finger3d._types import Tree, TreeView
 from finger3d.accuracy.cost import forecast
-from finger3d.geometry.design import Design
-from finger3d.geometry.imported import FileDesign
+from finger3d.geometry.imported import extent
 from finger3d.mechanics.resolution import warnings_before_meshing
 from finger3d.mechanics.symmetry import symmetry
 from finger3d.scene.derived import moduli
@@ -74,22 +71,8 @@ def plan(scene: Scene) -> Plan:
     """Forecast size, time and memory of a press without solving anything."""
     model = scene.model()
     expected, warnings = forecast(model), warnings_before_meshing(model, symmetry(model))
-    expected = {"finger": _extent(model.design)} | expected
+    expected = {"finger": extent(model.design)} | expected
     tolerance = scene.tables.mesh.tolerance
     if tolerance is not None:
         expected = {"mesh": f"the first of those refined to tolerance = {tolerance:g}"} | expected
     return Plan(scene.title, moduli(scene.tables), scene.as_dict()["effects"], expected, tuple(warnings))
-
-
-def _extent(design: Design) -> str:
-    """Return the size of a finger along the axes of the scene, and that of the base of one from a file."""
-    if not isinstance(design, FileDesign):
-        return _millimetres(2.0 * design.half_length_mm, design.height_mm, design.width_mm) + " (x, y up, z)"
-    corners = design.surface.corners
-    base = corners[(corners[:, :, 1] == 0.0).all(axis=1)].reshape(-1, 3)
-    size, foot = design.surface.high - design.surface.low, np.ptp(base, axis=0)
-    return f"{_millimetres(*size)} (x, y up, z), base {_millimetres(foot[0], foot[2])}"
-
-
-def _millimetres(*extents: float) -> str:
-    return " x ".join(f"{extent:.4g}" for extent in extents) + " mm"

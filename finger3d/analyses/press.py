@@ -160,7 +160,7 @@ def _march(record: PressRecord, writer: ResultWriter, report: Progress) -> None:
 
     for warning in record.warnings:
         report.say(f"warning: {warning}")
-    writer.progress(record, "incomplete: no step was finished")
+    writer.progress(record, "incomplete: no increment was finished")
     try:
         if automatic(record.problem.model):
             _march_automatically(record, writer, report)

@@ -33,7 +33,7 @@ _WRITE_EVERY_S = 0.5
 _WRITE_SHARE = 10.0
 """Shortest time between two writes over the time of one: a table holds all increments, and grows with them."""
 
-_INCOMPLETE = "incomplete: the press was still running, or was interrupted; the steps written are valid"
+_INCOMPLETE = "incomplete: the press was still running, or was interrupted; the increments written are valid"
 _SUMMARY, _SCENE = "summary.json", "scene.toml"
 _FILES = (
     "history.csv", "contact.csv", "fields.vtu", "error_shares.vtu", "steps.npz", "report.html",
@@ -196,7 +196,7 @@ class ResultWriter:
             nodes=problem.points.nodes,
             faces=problem.points.face.astype(int),
             thing=placed.to_scene(thing.points)[thing.faces],
-            title=f"{steps[-1]['normal_force_N']:.4g} N at {good[-1].target.depth_mm:g} mm",
+            title=f"{steps[-1]['normal_force_N']:.4g} N at {good[-1].target.depth_mm:.3g} mm deep",
             marks=marks_of(mesh, problem.model.gauges, near=mesh.dim == 3),
         )
         (figure,), _ = draw_fingers([finger])

@@ -88,5 +88,5 @@ def _run(arguments: Sequence[str], program: App) -> int:
         # The loaders of OCP and VTK turn a KeyboardInterrupt into an ImportError.
         if not isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
             raise
-        complain("interrupted while a package was loading; finished steps are kept")
+        complain("interrupted while a package was loading; finished increments are kept")
         return 130

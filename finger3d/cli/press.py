@@ -69,14 +69,18 @@ def _kept(out: Path, report: Progress) -> str:
     except (Finger3dError, KeyError):
         steps = []
     good = sum(step["outcome"] == "converged" for step in steps)
-    return f"{good} of {report.steps_total} steps are kept in {out}" if good else "no step was finished, none is kept"
+    return (
+        f"{good} of {report.steps_total} increments are kept in {out}"
+        if good
+        else "no increment was finished, none is kept"
+    )
 
 
 _NUMBERS = {
     "normal force": ("normal_force_N", 1.0, 5, " N"),
     "friction sum": ("friction_sum_N", 1.0, 5, " N"),
-    "contact length": ("contact_half_length_mm", 2.0, 4, " mm at z = 0"),
-    "stick length": ("stick_half_length_mm", 2.0, 4, " mm at z = 0"),
+    "contact extent": ("contact_half_length_mm", 2.0, 4, " mm at z = 0"),
+    "stick extent": ("stick_half_length_mm", 2.0, 4, " mm at z = 0"),
     "contact area": ("contact_area_mm2", 1.0, 4, " mm2"),
     "stick area": ("stick_area_mm2", 1.0, 4, " mm2"),
 }
@@ -102,10 +106,10 @@ def _rows(summary: TreeView, out: Path, seconds: float) -> Iterator[tuple[str, s
     if steps:
         last = steps[-1]
         depth = number(last["depth_mm"], "depth_mm", 4) + " mm" + of_modulus("depth_mm", " mm")
-        yield "depth", f"{depth}, step {len(steps)}"
+        yield "depth", f"{depth}, increment {len(steps)}"
         for name, (key, factor, digits, unit) in _NUMBERS.items():
             yield name, number(last[key], key, digits, factor) + unit + of_modulus(key, unit.split(" at ")[0], factor)
-        yield "residual", f"{max(step['residual'] for step in steps):.1e}, the largest of all steps"
+        yield "residual", f"{max(step['residual'] for step in steps):.1e}, the largest of all increments"
         readings = readings_of(last["gauges"], last["markers"], last["taxels"])
         for (kind, sensor), group in groupby(readings, key=lambda c: (c.kind, c.sensor)):
             columns = list(group)

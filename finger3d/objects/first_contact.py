@@ -151,7 +151,7 @@ def initial_contact(way: ContactPath) -> InitialContact:
     first_contact_mm, place = _touching(top, obj, half_length, half_width, way.landmarks)
     if first_contact_mm == math.inf:
         raise Finger3dError(
-            "object: in the pose it comes in, it extends downwards without end over the finger, which would start "
+            "object: as it is turned at the start, it extends downwards without end over the finger, which would start "
             "inside it; change its turn_x_deg, turn_y_deg, turn_z_deg"
         )
     if not math.isfinite(first_contact_mm):

@@ -97,7 +97,11 @@ def _mu_sd(axes: Axes, c: Calibration) -> None:
 
 
 def _reductions(axes: Axes, c: Calibration) -> None:
-    sds = {t.name: f" ± {t.sd:g}" for one in c.readings for t in one.tolerances}
+    sds = {
+        t.name: f" ± {t.sd:g}" + (" error bar" if t.unit == "error bar" else "")
+        for one in c.readings
+        for t in one.tolerances
+    }
     for name, share in c.reductions(c.grid).items():
         if share.max() >= _LEAST_SHARE:
             axes.plot(c.grid, share, lw=1.4, label=f"{name}{sds.get(name, '')}")

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 _COLOURS = {"plane strain": "#b2182b", "plane stress": "#2166ac", "solid": "#222222", "solid, ends held": "#e08214"}
 _QUANTITIES = {
     FORCE: "force",
-    "contact_length_mm": "contact\nlength",
-    "stick_length_mm": "stick\nlength",
+    "contact_length_mm": "extent of\ncontact",
+    "stick_length_mm": "extent of\nstick",
     "friction_sum_N_per_mm": "sum of\n|friction|",
     "friction_along_x_N_per_mm": "|friction\nalong x|",
     "peak_pressure_MPa": "peak\npressure",

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.patches import Patch
 
 _FEWEST_ON_LINE = 5
+_MOST_MARKERS = 40  # increments that are marked on a curve
 _ON_LINE = 1e-6
 """Distance from a line z = const, in half widths, below which a point lies on it."""
 
@@ -112,7 +113,7 @@ def contact_figure(
 
 
 def force_figure(path: str | Path, steps: Sequence[Mapping[str, object]], title: str = "") -> None:
-    """Draw forces (N) and the half lengths (mm) of the contact and the stick zone against depth (mm).
+    """Draw forces (N) and half the extents (mm) of the contact and the stick zone against depth (mm).
 
     If the object slides, the length of its path (mm) since first contact replaces the depth.
 
@@ -136,12 +137,14 @@ def force_figure(path: str | Path, steps: Sequence[Mapping[str, object]], title:
         depth = np.cumsum(np.linalg.norm(np.diff(at, axis=0, prepend=0.0), axis=1))
     made = sheet(2, 2, (WIDEST, 4.4), (0.8, 0.15, 0.55, 0.15), title)
     left, right = made.axes
-    left.plot(depth, values("normal_force_N"), "o-", color="#222222", ms=4, label="normal force")
-    left.plot(depth, values("friction_sum_N"), "s-", color="#c0392b", ms=4, label="sum of |friction|")
+    marked = len(depth) <= _MOST_MARKERS
+    dot, square = ("o-", "s-") if marked else ("-", "-")
+    left.plot(depth, values("normal_force_N"), dot, color="#222222", ms=4, label="normal force")
+    left.plot(depth, values("friction_sum_N"), square, color="#c0392b", ms=4, label="sum of |friction|")
     left.set_ylabel("force (N)")
-    right.plot(depth, values("contact_half_length_mm"), "o-", color="#555555", ms=4, label="contact")
-    right.plot(depth, values("stick_half_length_mm"), "s-", color=COLOURS[STICK], ms=4, label="stick")
-    right.set_ylabel("half length along x, z = 0 (mm)")
+    right.plot(depth, values("contact_half_length_mm"), dot, color="#555555", ms=4, label="contact")
+    right.plot(depth, values("stick_half_length_mm"), square, color=COLOURS[STICK], ms=4, label="stick")
+    right.set_ylabel("half extent along x at z = 0 (mm)")
     for axes in (left, right):
         axes.set_xlabel("path length of the object (mm)" if slides else "depth (mm)")
         axes.set_xlim(left=float(depth.min(initial=0.0)))

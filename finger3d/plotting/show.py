@@ -78,7 +78,7 @@ def _number(folder: str | Path, states: States, step: int | None) -> int:
     if step is None:
         return len(kept) - 1
     if step not in kept:
-        raise Finger3dError(f"{folder}: step {step} is not among those kept: {', '.join(map(str, kept))}")
+        raise Finger3dError(f"{folder}: increment {step} is not among the kept ones: {', '.join(map(str, kept))}")
     return kept.index(step)
 
 
@@ -96,7 +96,9 @@ def show_window(folder: str | Path) -> None:
     require("show: a window", "pyvista", instead="add --png FILE for a picture")
     linux = sys.platform.startswith("linux")
     if linux and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        raise MissingError("show: there is no display here; add --png FILE for a picture, or --gif FILE for the steps")
+        raise MissingError(
+            "show: there is no display here; add --png FILE for a picture, or --gif FILE for the increments"
+        )
     why = run_child([sys.executable, "-P", "-m", "finger3d.plotting.window", str(Path(folder).resolve())], window=True)
     if why is not None:
         raise MissingError(f"show: no window could be opened: {why}; add --png FILE for a picture")

@@ -95,7 +95,7 @@ def grid(folder: str | Path, step: int | None = None) -> pyvista.UnstructuredGri
     states = load_states(Path(folder) / "steps.npz")
     kept = states.step.tolist()
     if step not in kept:
-        raise Finger3dError(f"{folder}: step {step} is not among those kept, {', '.join(map(str, kept))}")
+        raise Finger3dError(f"{folder}: increment {step} is not among the kept ones, {', '.join(map(str, kept))}")
     found.point_data.clear()
     k, flat = kept.index(step), states.dim == 2
     u = states.displacement[k]

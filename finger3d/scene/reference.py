@@ -14,6 +14,7 @@ from finger3d.scene.messages import described, listed, shown
 from finger3d.scene.tables import (
     ContactTable,
     DomainTable,
+    FileTable,
     FrictionTable,
     GaugeTable,
     LegTable,
@@ -51,6 +52,7 @@ def _tables() -> Iterator[tuple[str, list[_Row]]]:
     )
     for name, design in designs().items():
         yield f'[finger] geometry = "{name}"', _rows(table_of(design), design)
+    yield "[finger] with a STEP or STL file", _rows(FileTable)
     yield "[material]", _rows(MaterialTable)
     yield "[parts.LABEL]", _rows(PartTable)
     common = _rows(table_of(RigidObject), RigidObject)

@@ -27,7 +27,6 @@ from finger3d.scene import checks, files, material, messages, tree
 from finger3d.scene.derived import legs_of, parts_of
 from finger3d.scene.messages import Place, choose, described, dotted, listed, messages_from, nearest, shown, unknown
 from finger3d.scene.tables import (
-    FileTable,
     LegsTable,
     LegTable,
     PressTable,
@@ -298,7 +297,7 @@ def _design(geometry: str, dimensions: TomlTable | None, found: dict[Place, str]
         design: Design | None = _built(designs()[geometry], dimensions, ("finger",), found)
         return design
     try:
-        return files.finger(geometry)
+        return files.finger(geometry, dimensions)
     except Finger3dError as error:
         found["finger", "geometry"] = f"finger.geometry: {error}"
         return None
@@ -352,8 +351,8 @@ def _named(
             )
             return "", None
         rest, mistakes = {k: v for k, v in given_table.items() if k != key}, dict[Place, str]()
-        table = _checked(FileTable, rest, (name,), mistakes, also=(key,))
-        found |= {p: t.replace("no such key", "no such key beside a file, take it out") for p, t in mistakes.items()}
+        table = _checked(files.table_of_file(value), rest, (name,), mistakes, also=(key,))
+        found |= {p: t.replace("no such key", "no such key beside this file, take it out") for p, t in mistakes.items()}
         return value, table
     if name == "finger" and isinstance(value, str) and "." in value:
         found[name, key] = f"{name}.{key} = {shown(value)}: a file must be named {listed(files.FINGER_SUFFIXES)}"

@@ -6,18 +6,28 @@ keys, such as a depth below the finger's height, are checked when the scene is l
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from finger3d._types import Tree
 from finger3d.effects import effect_names, effect_type
+from finger3d.geometry.files import SUFFIXES
 from finger3d.geometry.registry import designs
 from finger3d.materials.elastic import MODULUS_KEYS
+from finger3d.meshing.mesh_files import MESH_SUFFIXES
 from finger3d.objects import OBJECTS
 from finger3d.scene import tables
-from finger3d.scene.files import FINGER_SUFFIXES
 from finger3d.scene.reference import descriptions
-from finger3d.scene.tables import LegsTable, LegTable, PressTable, SceneTable, TomlTable, table_of
+from finger3d.scene.tables import (
+    FileTable,
+    LegsTable,
+    LegTable,
+    MeshFileTable,
+    PressTable,
+    SceneTable,
+    TomlTable,
+    table_of,
+)
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
@@ -33,7 +43,7 @@ def schema() -> Tree:
     """
     root = _of(SceneTable)
     keys = root["properties"]
-    keys["finger"] = _one_of("what is pressed", [*map(_design, designs().items()), _file()])
+    keys["finger"] = _one_of("what is pressed", [*map(_design, designs().items()), *_files()])
     shapes = [_named("shape", name, table_of(record), record) for name, record in OBJECTS.items()]
     plane = next(shape for shape in shapes if shape["properties"]["shape"]["const"] == "plane")
     plane["required"].remove("shape")  # [object] without a shape is a plane
@@ -65,16 +75,15 @@ def _named(key: str, name: str, table: type[TomlTable], documented: type) -> Tre
     return found
 
 
-def _file() -> Tree:
-    suffixes = "|".join(suffix.removeprefix(".") for suffix in FINGER_SUFFIXES)
-    path = {"type": "string", "pattern": rf"\.({_any_case(suffixes)})$", "description": "path from the scene's folder"}
-    return {
-        "title": "file",
-        "type": "object",
-        "additionalProperties": False,
-        "properties": {"geometry": path},
-        "required": ["geometry"],
-    }
+def _files() -> list[Tree]:
+    kinds = (("STEP or STL file", SUFFIXES, FileTable), ("mesh file", MESH_SUFFIXES, MeshFileTable))
+    return [_file(title, suffixes, _of(table)) for title, suffixes, table in kinds]
+
+
+def _file(title: str, suffixes: Sequence[str], table: Tree) -> Tree:
+    names = _any_case("|".join(suffix.removeprefix(".") for suffix in suffixes))
+    path = {"type": "string", "pattern": rf"\.({names})$", "description": "path from the scene's folder"}
+    return table | {"title": title, "properties": {"geometry": path} | table["properties"], "required": ["geometry"]}
 
 
 def _any_case(text: str) -> str:
