@@ -31,7 +31,7 @@ from finger3d.contact.conditions import ContactProblem, augmentation_parameters
 from finger3d.contact.friction import OPEN, SLIP
 from finger3d.contact.newton import ActiveSet
 from finger3d.contact.state import ContactState
-from finger3d.fem.directions import rotated_delassus
+from finger3d.fem.tensors import rotated_delassus
 from finger3d.mechanics.columns import Column
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult
