@@ -19,7 +19,7 @@ from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.path import AUTO_START
 from finger3d.mechanics.symmetry import symmetry
 from finger3d.meshing.report import MeshReport
-from finger3d.objects import Move, ObjectPose, PlacedObject, initial_contact
+from finger3d.objects import Move, ObjectPose, PlacedObject
 
 PENALTY = 200.0
 """Pressure over overlap, times the depth over Young's modulus: the surfaces overlap by less than a percent of the
@@ -70,7 +70,7 @@ def press_deck(model: Model, title: str = "", say: Callable[[str], None] = lambd
         If CalculiX has no equal of an effect, a law, or a leg.
     """
     _check(model)
-    contact, axes = initial_contact(model.contact_path), symmetry(model)
+    contact, axes = model.first_contact, symmetry(model)
     mesh, report = mesh_part(model, contact.contact_box, axes, say)
     finite = model.finite_strain
     law = _law(model)
