@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from finger3d._cost import PressSize
 from finger3d.accuracy.estimate import press_numbers
 from finger3d.contact.friction import Coulomb, TwoCoefficients
 from finger3d.contact.rules import RULES
@@ -124,7 +125,10 @@ def test_the_remaining_error_is_exact_at_the_first_order_and_keeps_the_largest()
 @pytest.mark.parametrize("domain", ["solid", "plane-strain"])
 def test_most_automatic_increments_fall_with_the_size_of_the_contact(domain: Domain) -> None:
     model = fig9(domain=domain)
-    found = [limits(model, 1e4 * points, points) for points in (30, 300, 3000)]
+    found = [
+        limits(model, PressSize(2 if domain == "plane-strain" else 3, 1e4 * points, points))
+        for points in (30, 300, 3000)
+    ]
     assert all(first == 5 and last >= 20 for first, last in found)
     assert found[0][1] >= found[1][1] >= found[2][1]
-    assert limits(replace(model, hyperelastic_law=NeoHooke(1.0)), 1e4, 100) == (3, 12)
+    assert limits(replace(model, hyperelastic_law=NeoHooke(1.0)), PressSize(3, 1e4, 100)) == (3, 12)

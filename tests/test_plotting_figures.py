@@ -13,8 +13,8 @@ import pytest
 from finger3d.contact.friction import OPEN, SLIP, STICK
 from finger3d.fem.simplex import CONTACT, FREE_FACES, Mesh
 from finger3d.plotting import solid as render
-from finger3d.plotting.figures import contact_figure, finger_picture, force_figure, middle_line, zones
-from tests.pictures import MU, STEPS, finger, pixels, pressed, share, solid_finger
+from finger3d.plotting.figures import contact_figure, force_figure, middle_line, zones
+from tests.pictures import MU, STEPS, finger, finger_picture, pixels, pressed, share, solid_finger
 
 pytestmark = pytest.mark.usefixtures("fresh_renderer")
 
@@ -34,7 +34,7 @@ def test_a_section_is_drawn_without_vtk(tmp_path: Path) -> None:
 
 def test_what_draws_loads_neither_the_solver_nor_a_renderer() -> None:
     code = (
-        "import sys, finger3d.plotting.figures;"
+        "import sys, finger3d.plotting.figures, finger3d.plotting.deformed;"
         "print({'matplotlib', 'vtkmodules', 'scipy', 'finger3d.mechanics'} & set(sys.modules))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -109,7 +109,7 @@ def test_force_against_depth_is_drawn(tmp_path: Path) -> None:
     ],
 )
 def test_the_line_that_is_drawn(z: list[float], expected: tuple[float, list[int]]) -> None:
-    top, wall = FREE_FACES[CONTACT], FREE_FACES[CONTACT] + 1
+    top, wall = FREE_FACES[CONTACT], FREE_FACES[CONTACT + 1]
     table = {
         "face": [top] * 8 + [wall], "x_mm": [0.1 * k for k in range(9)], "z_mm": [*z, 0.0],
         "pressure_MPa": [0.1 * k for k in range(9)],

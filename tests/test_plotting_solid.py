@@ -11,8 +11,7 @@ import pytest
 from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES
 from finger3d.fem.simplex import Mesh
 from finger3d.plotting import solid as render
-from finger3d.plotting.figures import finger_picture
-from tests.pictures import OBJECT, assert_shows_the_zones, solid_finger, top
+from tests.pictures import OBJECT, assert_shows_the_zones, finger_picture, solid_finger, top
 
 pytestmark = pytest.mark.usefixtures("fresh_renderer")
 

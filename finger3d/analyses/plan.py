@@ -51,12 +51,12 @@ class Plan:
 
     @property
     def total_s(self) -> float:
-        """Time of the press, s; the real time is 0.6 to 2.5 times this."""
+        """Time of the press, s; the real time is 0.5 to 2.5 times this."""
         return float(self.forecast["total_s"])
 
     @property
     def memory_MB(self) -> float:
-        """Peak memory, MB; the real one may be 1.6 times this for solids meshed by fTetWild."""
+        """Peak memory, MB; the real one is 0.8 to 1.3 times this."""
         return float(self.forecast["memory_MB"])
 
     def summary(self) -> Tree:

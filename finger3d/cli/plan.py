@@ -32,7 +32,7 @@ def plan(scene: Path, /, *, set_: Set = None, json_: Json = False) -> None:
     print_rows("material", found.moduli.items())
     print_rows("effects", effect_rows(loaded))
     print_rows(loaded.title, [(key.replace("_", " "), value) for key, value in found.forecast.items()])
-    print("The real time is 0.6 to 2.5 times the forecast, the real memory up to 1.6 times.")
+    print("The real time is 0.5 to 2.5 times the forecast, the real memory 0.8 to 1.3 times.")
     for text in found.warnings:
         print(f"warning: {text}")
 

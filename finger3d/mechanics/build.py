@@ -53,7 +53,7 @@ MARGIN = 0.3
 _STATIONS = 4, 20
 """Least and largest number of poses along a leg at which rigid gaps are taken to find the candidate points."""
 
-_WHOLE_FACE = 0.95
+WHOLE_FACE = 0.95
 """Share of the contact face from which all its points are candidates: a few more rows cost less than the check."""
 
 _MANY_READINGS = 100
@@ -230,7 +230,7 @@ def candidate_points(model: Model, free: BoundarySurface, touch: float, margin: 
     touch : height of the object's lowest point at first touch, mm
     margin : rigid gap that the points reach to, in depths of the press
     """
-    path = [ObjectPose(0.0), *targets(tuple(replace(leg, steps=_stations(leg)) for leg in model.legs))]
+    path = poses(model)
     reach = folding = margin * max(pose.depth_mm for pose in path)
     tracker, near = DistanceTracker(), reach + model.mesh.size_mm if math.isfinite(reach) else 0.0
 
@@ -251,10 +251,15 @@ def candidate_points(model: Model, free: BoundarySurface, touch: float, margin: 
         apart = cKDTree(free.points[chosen]).query(free.points[turning])[0]
         chosen[turning[apart <= folding + model.mesh.size_mm]] = True
         nearest = np.minimum(nearest, later)
-    if np.count_nonzero(chosen & on_contact) >= _WHOLE_FACE * np.count_nonzero(on_contact):
+    if np.count_nonzero(chosen & on_contact) >= WHOLE_FACE * np.count_nonzero(on_contact):
         chosen |= on_contact
     order = np.argsort(nearest, kind="stable")  # so that points which touch come before those which do not
     return restrict(free, order[chosen[order]])
+
+
+def poses(model: Model) -> list[ObjectPose]:
+    """Return the poses at which rigid gaps are taken to find the candidate points."""
+    return [ObjectPose(0.0), *targets(tuple(replace(leg, steps=_stations(leg)) for leg in model.legs))]
 
 
 def _stations(leg: Leg) -> int:

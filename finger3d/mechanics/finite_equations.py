@@ -26,6 +26,7 @@ from finger3d.contact.state import ContactSolution, ContactState, next_state
 from finger3d.errors import Outcome
 from finger3d.fem.assembly import on_places
 from finger3d.fem.condense import condense
+from finger3d.fem.directions import rotated_delassus
 from finger3d.fem.finite_contact import DeformedContact
 from finger3d.fem.recover import displacement
 from finger3d.fem.tensors import InvertedError
@@ -36,7 +37,6 @@ from finger3d.mechanics.finite_state import (
     Linearisation,
     contact_of,
     curvature_of,
-    rotated,
 )
 from finger3d.mechanics.formulation import length_scale
 from finger3d.mechanics.linear_contact import carried_by_object, transported
@@ -218,10 +218,10 @@ class IncrementEquations:
         """
         problem, start, bases = self.problem, transported(self.start.contact, now.contact.bases), now.contact.bases
         active, rotation = problem.system.active_dofs, linearisation.rotation(bases)
-        delassus = rotated(linearisation.delassus, rotation)
+        delassus = rotated_delassus(linearisation.delassus, rotation)
         compliance = problem.system.object_compliance
         if compliance is not None:
-            delassus = delassus + rotated(compliance, bases @ vertical_frame(problem.dim).T)
+            delassus = delassus + rotated_delassus(compliance, bases @ vertical_frame(problem.dim).T)
         moved = np.zeros(force.size)
         moved[active] = displacement
         free = self._relative_displacement(now, force)

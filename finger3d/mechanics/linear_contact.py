@@ -13,7 +13,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finger3d._types import Float
 from finger3d.contact.conditions import TOLERANCE, ContactProblem
@@ -21,6 +20,7 @@ from finger3d.contact.friction import OPEN
 from finger3d.contact.rules import RULES
 from finger3d.contact.state import ContactSolution, ContactState, next_state
 from finger3d.errors import Outcome
+from finger3d.fem.directions import rotated_delassus
 from finger3d.mechanics.contact_geometry import ContactGeometry, contact_geometry
 from finger3d.mechanics.formulation import Workspace, length_scale
 from finger3d.mechanics.passing import moves_too_far, passes_through, pulls
@@ -31,7 +31,7 @@ from finger3d.objects import DistanceTracker, Move, vertical_frame
 _TARGET = 1e-9
 """Error of the geometry at which the iteration ends; below `TOLERANCE`, to which other errors add."""
 
-_ITERATIONS = 30
+_MOST_SOLUTIONS = 30
 """Largest number of solutions of an increment."""
 
 _HOLD_FROM, _HOLD_ABOVE = 4, 1e-4
@@ -69,21 +69,6 @@ class LinearBody:
         return np.asarray(moved @ frame)
 
 
-def turned_delassus(delassus: Float, rotations: Float, points: NDArray[np.intp]) -> Float:
-    """Return the Delassus operator (k, d, k, d) of some points along their own directions.
-
-    Parameters
-    ----------
-    delassus : (c, d, c, d) mm/N, in the directions of an upright object
-    rotations : (k, d, d) from these directions
-    points : (k,)
-    """
-    k, d = len(points), rotations.shape[-1]
-    own = delassus[points[:, None, None, None], np.arange(d)[:, None, None], points[:, None], np.arange(d)]
-    half = (rotations @ own.reshape(k, d, k * d)).reshape(k * d, k, d)
-    return (half.transpose(1, 0, 2) @ rotations.transpose(0, 2, 1)).transpose(1, 0, 2).reshape(k, d, k, d)
-
-
 def solve_increment(
     problem: Problem,
     state: State[Float],
@@ -115,7 +100,7 @@ def solve_increment(
     spent, error, start = 0, np.inf, guess
     tried: list[Float] = []
     found: list[Float] = []
-    for iteration in range(1, _ITERATIONS + 1):
+    for iteration in range(1, _MOST_SOLUTIONS + 1):
         solution = increment.solve(geometry, at, start)
         spent += solution.iterations
         if not (solution.outcome.ok or solution.outcome.is_cycle):
@@ -212,7 +197,7 @@ class _Increment:
             return rule(ContactProblem.of(start, free, self.body.delassus, law, scale, area=area), guess)
         expected = start.force if guess is None else guess
         near = np.flatnonzero((geometry.gap < 2.0 * _NEAR * scale) | (expected[:, 0] > 0.0))
-        delassus = turned_delassus(self.body.delassus, rotations[near], near)
+        delassus = rotated_delassus(self.body.delassus, rotations[near], near)
         contact = ContactProblem.of(start.of_points(near), free[near], delassus, law, scale, area=area[near])
         part = rule(contact, expected[near])
         force, status = np.zeros_like(expected), np.full(len(expected), OPEN, dtype=np.int8)

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._cost import PressSize
 from finger3d._types import Float, freeze_arrays
 from finger3d.contact.newton import uniqueness
 from finger3d.contact.state import ContactState
@@ -176,6 +177,11 @@ class Problem:
     def factorizations(self) -> int:
         """Number of factorisations of the build; a press counts its own in its workspace."""
         return self.body.condensed.factorizations + self.system.object_factorizations
+
+    @property
+    def size(self) -> PressSize:
+        """Size of the meshed part, from which times are modelled."""
+        return PressSize(self.dim, self.body.stiffness.upper.shape[0], len(self.surface.nodes))
 
     @property
     def origin(self) -> ObjectPose:

@@ -315,7 +315,7 @@ def resolving_size(model: Model, touch_mm: float, found: UnresolvedOverlap, land
         there = replace(model, legs=(leg,), mesh=replace(model.mesh, size_mm=size))
         seen = unresolved_overlap(there, points, touch_mm, landmarks)
         if seen.in_contact and seen.share <= _RESOLVED:
-            return _rounded(min(size, _resolving(model.object)))
+            return _rounded_down(min(size, _resolving(model.object)))
     return None
 
 
@@ -333,8 +333,7 @@ def _horizontal(points: Float) -> Float:
 def _overlap(model: Model, at: Float, touch: float, target: ObjectPose) -> Float:
     """Return the vertical overlap (n,), mm, of the object with points (n, d) of the finger; -inf outside the object."""
     z = at[:, 2] if at.shape[1] == 3 else np.zeros(len(at))
-    height = PlacedObject.of(model.object, touch, target).height(at[:, 0], z)
-    return np.nan_to_num(at[:, 1] - height, nan=-np.inf)
+    return PlacedObject.of(model.object, touch, target).overlap(at[:, 0], at[:, 1], z)
 
 
 def _mean_overlap(model: Model, face: BoundarySurface, touch: float, target: ObjectPose) -> Float:
@@ -378,12 +377,12 @@ def unresolved_details(model: Model) -> list[str]:
         return []
     return [
         f"object.{detail.key} = {detail.length_mm:g}: contact points {size:g} mm apart (mesh.size_mm) see only "
-        f"averages of it; mesh.size_mm = {_rounded(largest):g} resolves it"
+        f"averages of it; mesh.size_mm = {_rounded_down(largest):g} resolves it"
     ]
 
 
-def _rounded(size: float) -> float:
-    """Round down to two significant digits."""
+def _rounded_down(size: float) -> float:
+    """Return an edge length rounded down to two digits."""
     unit = 10.0 ** (math.floor(math.log10(size)) - 1)
     return float(f"{math.floor(size / unit * (1.0 + 1e-12)) * unit:.2g}")
 

@@ -63,11 +63,12 @@ def show(
     Finger3dError
         If the folder or the step does not exist, or a file cannot be written.
     """
-    from finger3d.plotting.animation import frames, write_gif, write_png
+    from finger3d.plotting.animation import frames, write_gif
+    from finger3d.plotting.layout import save
 
     states, title, gauges = found(folder)
     if png is not None:
-        write_png(png, frames(states, [_number(folder, states, step)], title, gauges)[0])
+        save(frames(states, [_number(folder, states, step)], title, gauges)[0], png)
     if gif is not None:
         write_gif(gif, frames(states, range(len(states.step)), title, gauges))
 

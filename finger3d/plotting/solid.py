@@ -80,12 +80,6 @@ class Skin:
         return float(np.ptp(self.points, axis=0).max())
 
     @property
-    def aspect(self) -> float:
-        """Height over width of the picture."""
-        width, height = self.frame[1]
-        return float(height / width)
-
-    @property
     def arrow_length(self) -> float:
         """Length of the longest arrow, mm; limited by the distance between arrows."""
         across = np.ptp(flat(self.arrow_at), axis=0) if len(self.arrow_at) else np.zeros(2)

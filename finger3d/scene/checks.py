@@ -7,7 +7,7 @@ from collections import Counter
 
 import numpy as np
 
-from finger3d._ranges import LONGEST_SLIDE, at_least, at_most
+from finger3d._ranges import LONGEST_SLIDE, at_least, at_most, four_digits
 from finger3d._types import Float, Tree
 from finger3d.geometry.design import Design, lacks_section
 from finger3d.mechanics.model import Domain, MeshOptions
@@ -206,9 +206,9 @@ def chosen(mesh: MeshTable, design: Design, domain: Domain, obj: RigidObject, bo
     if size is None:
         # A thin finger gets two elements across its width; four significant digits keep scene.toml readable.
         coarse = min(share * SIZE_SHARE, smallest_mm(design, solid) / 2.0, base or math.inf)
-        size = _rounded(max(min(coarse, _detail(obj, design, box, solid, mesh.mesher)), coarse * _FINEST))
+        size = four_digits(max(min(coarse, _detail(obj, design, box, solid, mesh.mesher)), coarse * _FINEST))
     if base is None:
-        base = max(_rounded(min(share * BASE_SHARE, smallest_mm(design, solid=False))), size)
+        base = max(four_digits(min(share * BASE_SHARE, smallest_mm(design, solid=False))), size)
     return MeshOptions(size, base, mesh.mesher, gauge_refinement=mesh.gauge_refinement)
 
 
@@ -230,10 +230,6 @@ def _detail(obj: RigidObject, design: Design, box: Box, solid: bool, mesher: str
     if not solid:
         return min(wanted)
     return max(min(wanted), min(min(least), math.sqrt(math.prod(sides) / _MOST_POINTS)))
-
-
-def _rounded(value: float) -> float:
-    return float(f"{value:.4g}")
 
 
 def _place(at: tuple[str, int], it: GaugeTable | MarkerTable, along: Float, angle: float, design: Design) -> list[str]:
