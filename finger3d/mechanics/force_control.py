@@ -219,7 +219,14 @@ class DepthSearch:
         return float(barycentric_interpolate(forces, depths, self.wanted))
 
     def _extreme(self) -> str:
-        """Return the force found that is nearest to the one wanted, with its depth."""
+        """Return the force found that is nearest to the one wanted, with its depth, and at how many there was none."""
+        cycles = sum(trial.solution.outcome.is_cycle for trial in self.failed)
+        if cycles:
+            rule = f"the paper's rule has no answer at {cycles} of the depths tried; use [contact] rule = 'projection'"
+            return f"{self._nearest()}; {rule}"
+        return self._nearest()
+
+    def _nearest(self) -> str:
         if not self.good:
             return f"{self.wanted:.6g} N asked; no depth that was tried gave a solution"
         forces = [trial.force for trial in self.good]
