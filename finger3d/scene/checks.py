@@ -10,40 +10,13 @@ import numpy as np
 from finger3d._ranges import LONGEST_SLIDE, at_least, at_most
 from finger3d._types import Float, Tree
 from finger3d.geometry.design import Design, lacks_section
-from finger3d.mechanics.model import Domain, MeshOptions
 from finger3d.meshing.given import GivenMesh
-from finger3d.objects import RigidObject
+from finger3d.scene.mesh_sizes import smallest_mm
 from finger3d.scene.messages import dotted, shown
 from finger3d.scene.parts import check_parts
 from finger3d.scene.tables import GaugeTable, LegTable, MarkerTable, MeshTable, SceneTable, TaxelTable
 
-Box = tuple[float, float, float, float]
-
-SIZE_SHARE, BASE_SHARE = 1 / 25, 1 / 6.25
-"""Default edge lengths in a solid as shares of the finger's height; sections take a quarter of them. They leave less
-than 1 % of the force in both, and .3 % of a gauge in a section (validation/cost_of_accuracy.py)."""
-
 _MOST_MARKERS = 20_000
-
-_ACROSS = {"swept": 20.0, "ftetwild": 30.0, "netgen": 30.0}
-"""Number of edges across the overlap of a curved object, which is about 1.4 times as wide as the contact. Penetration
-between points at the edge of contact has, over 38 presses of random solids, a median of 0.8 (edges across)^-1.6 times
-the depth, and is below 1 % of it from 20 edges on, except at sharp tips and at rims of the finger. Unstructured meshes,
-whose edges differ in length, need 1.5 times as many."""
-
-_LEAST_ACROSS = 12.0
-"""The same if the overlap ends at edges of the finger or the object, and contact extends over all of it; also the least
-number of edges in a wavelength."""
-
-_PER_WAVE = 25.0
-"""Edges in a wavelength, whose crests touch over up to some 0.8 of it."""
-
-_MOST_POINTS = 600.0
-"""Contact points of a solid across the overlap from which edges stay at `_LEAST_ACROSS`: a press under a long edge took
-88 s instead of 18 s to lower the penetration from 1.3 to 0.8 % of the depth."""
-
-_FINEST = 0.2
-"""Least edge length over the default: finer is left to those who ask for it."""
 
 
 def check(tables: SceneTable, legs: tuple[LegTable, ...], design: Design) -> list[str]:
@@ -138,14 +111,6 @@ def _target(leg: LegTable) -> tuple[float | None, ...]:
     return leg.force_N, leg.depth_mm, leg.slide_x_mm, leg.slide_z_mm, leg.turn_x_deg, leg.turn_y_deg, leg.turn_z_deg
 
 
-def smallest_mm(design: Design, solid: bool) -> float:
-    """Return the smallest extent of the meshed part, mm."""
-    extents = [design.height_mm, 2.0 * design.half_length_mm]
-    if solid:
-        extents.append(design.width_mm)
-    return min(extents)
-
-
 def _sizes(mesh: MeshTable, design: Design, solid: bool) -> list[str]:
     if isinstance(design, GivenMesh) and (line := _beside_a_mesh(mesh, design)):
         return [line]
@@ -192,48 +157,6 @@ def _beside_a_mesh(mesh: MeshTable, design: GivenMesh) -> str:
                 f"coarser; must be at most {at_most(own)}, or be taken out"
             )
     return ""
-
-
-def chosen(mesh: MeshTable, design: Design, domain: Domain, obj: RigidObject, box: Box) -> MeshOptions:
-    """Return the mesh options, with sizes chosen where they are absent, from all else and the box of contact."""
-    if isinstance(design, GivenMesh):
-        finest = mesh.size_mm or design.size_mm
-        longest = max(mesh.base_size_mm or design.base_size_mm, finest)
-        return MeshOptions(finest, longest, mesh.mesher, gauge_refinement=mesh.gauge_refinement)
-    solid = domain == "solid"
-    share = design.height_mm * (1.0 if solid else 0.25)
-    size, base = mesh.size_mm, mesh.base_size_mm
-    if size is None:
-        # A thin finger gets two elements across its width; four significant digits keep scene.toml readable.
-        coarse = min(share * SIZE_SHARE, smallest_mm(design, solid) / 2.0, base or math.inf)
-        size = _rounded(max(min(coarse, _detail(obj, design, box, solid, mesh.mesher)), coarse * _FINEST))
-    if base is None:
-        base = max(_rounded(min(share * BASE_SHARE, smallest_mm(design, solid=False))), size)
-    return MeshOptions(size, base, mesh.mesher, gauge_refinement=mesh.gauge_refinement)
-
-
-def _detail(obj: RigidObject, design: Design, box: Box, solid: bool, mesher: str) -> float:
-    """Return the edge length, mm, that gives a curved object some elements across its contact or its crest."""
-    if obj.is_flat:
-        return math.inf
-    sides, edges = [box[1] - box[0], box[3] - box[2]], _ACROSS[mesher if solid else "swept"]
-    halves = (design.half_length_mm, 0.5 * design.width_mm) if solid else (design.half_length_mm,)
-    wanted, least = [math.inf], [math.inf]
-    for side, low, high, half in zip(sides, box[::2], box[1::2], halves, strict=False):
-        opens_inside = min(-low, high) < half * (1.0 - 1e-9) and not obj.has_edges
-        wanted.append(side / (edges if opens_inside else _LEAST_ACROSS))
-        least.append(side / _LEAST_ACROSS)
-    detail = obj.detail
-    if detail and detail.kind == "wavelength":
-        wanted.append(detail.length_mm / _PER_WAVE)
-        least.append(detail.length_mm / _LEAST_ACROSS)
-    if not solid:
-        return min(wanted)
-    return max(min(wanted), min(min(least), math.sqrt(math.prod(sides) / _MOST_POINTS)))
-
-
-def _rounded(value: float) -> float:
-    return float(f"{value:.4g}")
 
 
 def _place(at: tuple[str, int], it: GaugeTable | MarkerTable, along: Float, angle: float, design: Design) -> list[str]:

@@ -24,6 +24,7 @@ from finger3d.mechanics.readings import Marker, Taxel
 from finger3d.objects import OBJECTS, RigidObject, initial_contact
 from finger3d.scene import checks, files, material, messages, tree
 from finger3d.scene.legs import legs_of
+from finger3d.scene.mesh_sizes import mesh_options
 from finger3d.scene.messages import Place, choose, described, dotted, listed, messages_from, nearest, shown, unknown
 from finger3d.scene.parts import parts_of
 from finger3d.scene.registry import effect_names, effect_type
@@ -226,7 +227,7 @@ class _Parts:
         domain = self.tables.model.domain
         legs = legs_of([dict(leg) for leg in self.legs], self.design, self.object, self.tables)
         way = contact_path(self.design, self.object, legs, domain)
-        return checks.chosen(self.tables.mesh, self.design, domain, self.object, initial_contact(way).contact_box)
+        return mesh_options(self.tables.mesh, self.design, domain, self.object, initial_contact(way).contact_box)
 
     def filled_in(self, mesh: MeshOptions) -> SceneTable:
         """Return the tables with every default."""
