@@ -154,9 +154,9 @@ class MoldOptions:
             "printer": PRINTERS, "screw": SCREWS, "split": "zx",
             "seal": ("tongue", "cord", "none"), "fasten": ("screws", "bands", "none"),
         }  # fmt: skip
-        for name, known in choices.items():
-            if getattr(self, name) not in known:
-                raise _refused(name, getattr(self, name), " or ".join(known))
+        for name, values in choices.items():
+            if getattr(self, name) not in values:
+                raise _refused(name, getattr(self, name), " or ".join(values))
         for name, most in _LARGEST_MM.items():
             if getattr(self, name) is not None:
                 self._within(name, 0.0, most, f"above 0, and at most {most:g}", open_low=True)
@@ -260,8 +260,8 @@ class MoldOptions:
     def bed_mm(self) -> tuple[float, float, float]:
         """Length, width and height of the printer."""
         text = self.machine.bed if self.bed is None else self.bed
-        found = re.fullmatch(r"\s*(\d+(?:\.\d*)?)\s*[x*]\s*(\d+(?:\.\d*)?)\s*[x*]\s*(\d+(?:\.\d*)?)\s*", text)
-        sizes = tuple(float(size) for size in found.groups()) if found else (0.0,)
+        match = re.fullmatch(r"\s*(\d+(?:\.\d*)?)\s*[x*]\s*(\d+(?:\.\d*)?)\s*[x*]\s*(\d+(?:\.\d*)?)\s*", text)
+        sizes = tuple(float(size) for size in match.groups()) if match else (0.0,)
         if min(sizes) <= 0.0:
             raise _refused("bed", text, "three sizes in mm, such as 220x220x250")
         return sizes[0], sizes[1], sizes[2]
