@@ -12,7 +12,7 @@ from finger3d._types import Float, Tree
 from finger3d.geometry.design import Design, lacks_section
 from finger3d.meshing.given import GivenMesh
 from finger3d.scene.mesh_sizes import smallest_mm
-from finger3d.scene.messages import dotted, shown
+from finger3d.scene.messages import Place, dotted, shown
 from finger3d.scene.parts import check_parts
 from finger3d.scene.tables import GaugeTable, LegTable, MarkerTable, MeshTable, SceneTable, TaxelTable
 
@@ -79,31 +79,31 @@ def _legs(press: Tree, legs: tuple[LegTable, ...], design: Design, solid: bool) 
     lines = []
     height, half_length = design.height_mm, design.half_length_mm
     for i, leg in enumerate(legs):
-        at = ("press", "leg", i) if "leg" in press else ("press",)
+        place = ("press", "leg", i) if "leg" in press else ("press",)
         allowed = f"a number above 0 and below the finger's height of {at_most(height)} mm"
         if i > 0 and _target(leg) == _target(legs[i - 1]) and leg.duration_s is None:
-            lines.append(f"{dotted(at)}: goes nowhere, its target is that of the leg before; take it out")
+            lines.append(f"{dotted(place)}: goes nowhere, its target is that of the leg before; take it out")
         if (leg.depth_mm is None) == (leg.force_N is None):
             both = f"must not stand beside force_N = {shown(leg.force_N)}; give either a depth or a force"
-            what = f"{dotted((*at, 'depth_mm'))}"
+            what = f"{dotted((*place, 'depth_mm'))}"
             lines.append(f"{what} is missing: give it, or force_N" if leg.force_N is None else f"{what}: {both}")
             continue
         if leg.depth_mm is None:
             pass
         elif i == 0 and leg.depth_mm == 0.0 and any(_target(leg)[2:]):
-            lines.append(f"{dotted(at)}: moves before first touch; give the first leg a depth_mm above 0")
+            lines.append(f"{dotted(place)}: moves before first touch; give the first leg a depth_mm above 0")
         elif leg.depth_mm >= height or (i == 0 and leg.depth_mm == 0.0):
-            lines.append(f"{dotted((*at, 'depth_mm'))} = {shown(leg.depth_mm)}: must be {allowed}")
+            lines.append(f"{dotted((*place, 'depth_mm'))} = {shown(leg.depth_mm)}: must be {allowed}")
         for key in ("slide_x_mm", "slide_z_mm"):
             far = LONGEST_SLIDE * half_length
             if abs(value := getattr(leg, key)) > far:
                 lines.append(
-                    f"{dotted((*at, key))} = {shown(value)}: must be a number from -{at_most(far)} to {at_most(far)}, "
-                    f"{LONGEST_SLIDE:g} times the finger's half length"
+                    f"{dotted((*place, key))} = {shown(value)}: must be a number from -{at_most(far)} to "
+                    f"{at_most(far)}, {LONGEST_SLIDE:g} times the finger's half length"
                 )
         for key in () if solid else ("slide_z_mm", "turn_x_deg", "turn_y_deg"):
             if (value := getattr(leg, key)) != 0.0:
-                lines.append(f"{dotted((*at, key))} = {shown(value)}: must be 0.0 in a 2D domain")
+                lines.append(f"{dotted((*place, key))} = {shown(value)}: must be 0.0 in a 2D domain")
     return lines
 
 
@@ -149,20 +149,20 @@ def _beside_a_mesh(mesh: MeshTable, design: GivenMesh) -> str:
             f"mesh.tolerance = {shown(mesh.tolerance)}: the mesh {design.name} is used as it is; take it out, and "
             "lower mesh.size_mm, which halves cells at the contact, until the results agree"
         )
-    for key, own in (("size_mm", design.size_mm), ("base_size_mm", design.base_size_mm)):
+    for key, edge in (("size_mm", design.size_mm), ("base_size_mm", design.base_size_mm)):
         value = getattr(mesh, key)
-        if value is not None and value > own * (1.0 + 1e-9):
+        if value is not None and value > edge * (1.0 + 1e-9):
             return (
-                f"mesh.{key} = {shown(value)}: the mesh {design.name} has edges of {shown(own)} mm and is not made "
-                f"coarser; must be at most {at_most(own)}, or be taken out"
+                f"mesh.{key} = {shown(value)}: the mesh {design.name} has edges of {shown(edge)} mm and is not made "
+                f"coarser; must be at most {at_most(edge)}, or be taken out"
             )
     return ""
 
 
-def _place(at: tuple[str, int], it: GaugeTable | MarkerTable, along: Float, angle: float, design: Design) -> list[str]:
+def _place(place: Place, it: GaugeTable | MarkerTable, along: Float, angle: float, design: Design) -> list[str]:
     """Check the place of a gauge or marker, and the ends of a gauge: distances `along` from its middle, mm."""
     half_length, height = design.half_length_mm, design.height_mm
-    half_width, what = design.width_mm / 2.0, f"{at[0]} {shown(it.name)}"
+    half_width, what = design.width_mm / 2.0, f"{place[0]} {shown(it.name)}"
     for key, value, low, high in (
         ("x_mm", it.x_mm, -half_length, half_length),
         ("y_mm", it.y_mm, 0.0, height),
@@ -170,7 +170,7 @@ def _place(at: tuple[str, int], it: GaugeTable | MarkerTable, along: Float, angl
     ):
         if not low <= value <= high:
             return [
-                f"{dotted((*at, key))} = {shown(value)}: {what} is outside the finger; "
+                f"{dotted((*place, key))} = {shown(value)}: {what} is outside the finger; "
                 f"must be a number from {at_least(low)} to {at_most(high)}"
             ]
     x, y = it.x_mm + along * math.cos(angle), it.y_mm + along * math.sin(angle)
@@ -181,16 +181,16 @@ def _place(at: tuple[str, int], it: GaugeTable | MarkerTable, along: Float, angl
     here = float(design.top(np.array([it.x_mm]), np.array([it.z_mm]))[0])
     if math.isnan(here):
         return [
-            f"{dotted((*at, 'z_mm'))} = {shown(it.z_mm)}: {what} is outside the finger; "
+            f"{dotted((*place, 'z_mm'))} = {shown(it.z_mm)}: {what} is outside the finger; "
             f"must be nearer to 0 at x_mm = {shown(it.x_mm)}"
         ]
     if isinstance(it, GaugeTable) and it.length_mm and it.y_mm <= here + slack:
         return [
-            f"{dotted((*at, 'length_mm'))} = {shown(it.length_mm)}: an end of {what} "
+            f"{dotted((*place, 'length_mm'))} = {shown(it.length_mm)}: an end of {what} "
             "leaves the finger; must be shorter, or the gauge moved inward"
         ]
     return [
-        f"{dotted((*at, 'y_mm'))} = {shown(it.y_mm)}: {what} is outside the finger; "
+        f"{dotted((*place, 'y_mm'))} = {shown(it.y_mm)}: {what} is outside the finger; "
         f"must be a number from 0 to {at_most(here)} at x_mm = {shown(it.x_mm)}"
     ]
 
