@@ -110,7 +110,7 @@ def test_round_trip(extra, defaults) -> None:
 @given(
     nu=st.floats(0.0, 0.5),
     mu=st.floats(0.0, 1e6),
-    depth=st.floats(1e-2, 49.0),
+    depth=st.floats(1e-2, 38.0),  # deeper tilted ones reach the base, and are refused
     tilt=st.floats(-20.0, 20.0),  # steeper ones touch an edge first, and are refused
     x=st.floats(-50.0, 50.0),
 )
