@@ -253,9 +253,8 @@ def _read(document: TreeView, mistakes: dict[Place, str]) -> _Parts | None:
     mistakes |= material.mistakes(tables.material, ("material",)) if tables else {}
     geometry, dimensions = _named(document, "finger", "geometry", designs(), mistakes)
     design = _design(geometry, dimensions, mistakes)
-    shape, placed = _named(
-        {**document, "object": _shaped(document.get("object", {}))}, "object", "shape", OBJECTS, mistakes
-    )
+    shaped = {**document, "object": _shaped(document.get("object", {}))}
+    shape, placed = _named(shaped, "object", "shape", OBJECTS, mistakes)
     rigid = _object(shape, placed, mistakes)
     press = _press(document, mistakes)
     settings, effects = _effects(document, mistakes)
@@ -343,7 +342,7 @@ def _named(
         )
         mistakes[name, misspelt or key] = line
         return "", None
-    value = given_table[key]
+    value, rest = given_table[key], {k: v for k, v in given_table.items() if k != key}
     if isinstance(value, str) and not one_line(value):
         mistakes[name, key] = f"{name}.{key} = {shown(value)}: must be {described(PathName)}"
         return "", None
@@ -355,11 +354,9 @@ def _named(
                 f"{listed(types)}"
             )
             return "", None
-        rest, file_mistakes = {k: v for k, v in given_table.items() if k != key}, dict[Place, str]()
-        table = _checked(FileTable, rest, (name,), file_mistakes, also=(key,))
-        mistakes |= {
-            p: t.replace("no such key", "no such key beside a file, take it out") for p, t in file_mistakes.items()
-        }
+        extra: dict[Place, str] = {}
+        table = _checked(FileTable, rest, (name,), extra, also=(key,))
+        mistakes |= {p: t.replace("no such key", "no such key beside a file, take it out") for p, t in extra.items()}
         return value, table
     if name == "finger" and isinstance(value, str) and "." in value:
         mistakes[name, key] = f"{name}.{key} = {shown(value)}: a file must be named {listed(files.FINGER_SUFFIXES)}"
@@ -368,7 +365,6 @@ def _named(
     elif not isinstance(value, str) or value not in types:
         mistakes[name, key] = choose((name, key), value, list(types))
     else:
-        rest = {k: v for k, v in given_table.items() if k != key}
         return value, _checked(table_of(types[value]), rest, (name,), mistakes, also=(key,))
     return "", None
 
