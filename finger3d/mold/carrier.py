@@ -49,11 +49,6 @@ class Keys:
     neck_mm: float
     head_mm: float
 
-    @property
-    def neck_area_mm2(self) -> float:
-        """Area of all necks, which holds the silicone."""
-        return len(self.places) * math.pi * self.neck_mm**2 / 4.0
-
     def volume_mm3(self, cover_mm: float) -> float:
         """Return the volume of the holes in a carrier of this thickness."""
         a, b = self.neck_mm / 2.0, self.head_mm / 2.0

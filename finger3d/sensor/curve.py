@@ -120,11 +120,6 @@ class ReadingCurve:
             return np.asarray(self.noise / np.abs(self.slope(mu, shape)))
 
     @cached_property
-    def interpolation_error(self) -> float:
-        """Error of the interpolation, rms over mu: see :meth:`curve_error`."""
-        return float(np.sqrt(np.mean(self._missed[1:-1] ** 2)))
-
-    @cached_property
     def _missed(self) -> Float:
         """Error (n,) of the interpolation near every mu."""
         errors = np.zeros(len(self.mu))
@@ -160,8 +155,7 @@ class ReadingCurve:
         rows = [np.interp(mus, self.mu, t.spread) for t in self.tolerances]
         return np.array(rows).reshape(len(rows), len(mus))
 
-    def reading_sd(self, mu: ArrayLike, std: ArrayLike | None = None, shape: Shape = "interpolation") -> Float:
-        """Return the standard deviation of a reading: noise (or `std`), error of the curve, and tolerances."""
-        noise = np.asarray(self.noise if std is None else std, dtype=float)
-        squares = noise**2 + self.curve_error(mu, shape) ** 2 + np.sum(self.tolerance_sd(mu) ** 2, axis=0)
+    def reading_sd(self, mu: ArrayLike) -> Float:
+        """Return the standard deviation of a reading: noise, error of the interpolation, and tolerances."""
+        squares = self.noise**2 + self.curve_error(mu) ** 2 + np.sum(self.tolerance_sd(mu) ** 2, axis=0)
         return np.asarray(np.sqrt(squares))
