@@ -52,11 +52,11 @@ def listed(names: Iterable[str], last: str = "or") -> str:
 
 def nearest(name: str, names: Iterable[str]) -> str | None:
     """Return the known name that `name` was probably meant to be, ignoring case and a missing unit."""
-    known = {n.lower(): n for n in names}
-    bare = {n.removesuffix("_mm").removesuffix("_deg").removesuffix("_mpa"): n for n in known}
-    for pool in (known, bare):
-        if found := difflib.get_close_matches(name.lower(), pool, n=1, cutoff=0.6):
-            return known[found[0]] if pool is known else known[bare[found[0]]]
+    spelling = {n.lower(): n for n in names}
+    bare = {n.removesuffix("_mm").removesuffix("_deg").removesuffix("_mpa"): n for n in spelling}
+    for pool in (spelling, bare):
+        if matches := difflib.get_close_matches(name.lower(), pool, n=1, cutoff=0.6):
+            return spelling[matches[0]] if pool is spelling else spelling[bare[matches[0]]]
     return None
 
 
