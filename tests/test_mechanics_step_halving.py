@@ -27,7 +27,10 @@ from tests.models import block, fig9
 
 def test_automatic_increments_end_within_their_estimate() -> None:
     problem = build(fig9(domain="plane-strain", legs=(Leg(10.0, steps="auto"),)))
-    *_, (frames, estimate) = refine(problem)
+    seen: list[tuple[int, int]] = []
+    *_, (frames, estimate) = refine(problem, advanced=lambda done, total, step: seen.append((done, total)))
+    assert seen[:6] == [(1, 5), (2, 5), (3, 5), (4, 5), (5, 5), (1, 10)]
+    assert seen[-1] == (len(frames), len(frames))
     assert estimate is not None
     assert estimate.met
     assert max(estimate.normal_force, estimate.friction_sum, estimate.gauges) <= 0.01

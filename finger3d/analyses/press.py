@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 
 _SHOWN_EVERY_S = 1.0
-"""Seconds between reports of trial depths under a prescribed force."""
+"""Seconds between reports of the trial depths under a prescribed force, and of the increments of a trial run."""
 
 
 def press(
@@ -177,14 +178,8 @@ def _march_through(record: PressRecord, writer: ResultWriter, report: Progress) 
 
     total = len(targets(record.problem.model.legs))
     report.stage("pressing")
-    begin = shown = time.perf_counter()
-
-    def trial(text: str) -> None:
-        nonlocal shown
-        if time.perf_counter() - shown > _SHOWN_EVERY_S:
-            report.step(len(record.steps), total, text)
-            shown = time.perf_counter()
-
+    begin = time.perf_counter()
+    trial = _now_and_then(lambda text: report.step(len(record.steps), total, text))
     for step in march(record.problem, workspace=record.workspace, trial=trial):
         record.steps.append(step)
         record.seconds["contact"] += time.perf_counter() - begin
@@ -199,7 +194,8 @@ def _march_automatically(record: PressRecord, writer: ResultWriter, report: Prog
 
     report.stage("pressing, increments chosen by their error")
     begin = time.perf_counter()
-    for steps, estimate in refine(record.problem, record.workspace):
+    advanced = _now_and_then(lambda done, total, step: report.step(done, total, _remark(record.problem, step)))
+    for steps, estimate in refine(record.problem, record.workspace, advanced=advanced):
         record.seconds["contact"] += time.perf_counter() - begin
         record.steps, record.step_estimate = list(steps), estimate
         writer.progress(record)
@@ -207,6 +203,19 @@ def _march_automatically(record: PressRecord, writer: ResultWriter, report: Prog
         begin = time.perf_counter()
     if record.step_estimate and record.step_estimate.warning:
         record.warnings.append(record.step_estimate.warning)
+
+
+def _now_and_then(show: Callable[..., None]) -> Callable[..., None]:
+    """Return a function that calls `show` if it last did so more than `_SHOWN_EVERY_S` ago."""
+    last = time.perf_counter()
+
+    def shown(*arguments: object) -> None:
+        nonlocal last
+        if time.perf_counter() - last > _SHOWN_EVERY_S:
+            show(*arguments)
+            last = time.perf_counter()
+
+    return shown
 
 
 def _remark(problem: Problem, step: StepResult) -> str:

@@ -72,9 +72,9 @@ def page(body: LiveBody, mu: float) -> Dash:
         [Output(name, "figure") for name in ("traction", "section")],
         [Input(name, "value") for name in sliders],
     )
-    def answer(*given: object) -> tuple[str, str, str, go.Figure, go.Figure]:
+    def answer(*positions: object) -> tuple[str, str, str, go.Figure, go.Figure]:
         try:
-            values = [slider.checked(value) for slider, value in zip(sliders.values(), given, strict=True)]
+            values = [slider.checked(value) for slider, value in zip(sliders.values(), positions, strict=True)]
         except Finger3dError as error:
             return "", "", str(error), go.Figure(), go.Figure()
         mu, depth, x, y, angle = values

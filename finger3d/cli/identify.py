@@ -49,27 +49,27 @@ def identify(
     from finger3d.analyses.identify.run import identify as run
     from finger3d.scene import tree
 
-    given = tree.override(tree.read(scene), set_ or [])
+    tables = tree.override(tree.read(scene), set_ or [])
     keys = [FreeKey.of(text) for text in free]
     check_writable(out, scene)
     kept = f"every press is kept in {out}; the same command continues"
     with job(json_, lambda _: kept) as report:
-        found = run(given, measured, keys, out, scene, report)
+        result = run(tables, measured, keys, out, scene, report)
     if json_:
-        print_json(found.as_dict())
+        print_json(result.as_dict())
         return
-    f = found.fitted
-    fitted = zip(found.keys, f.values, f.stds, f.low, f.high, strict=True)
+    f = result.fitted
+    fitted = zip(result.keys, f.values, f.stds, f.low, f.high, strict=True)
     print_rows(
-        found.scene.title,
+        result.scene.title,
         [
             *(
                 (key, f"{value:.4g} +- {std:.2g} (68 % interval {low:.4g} to {high:.4g})")
                 for key, value, std, low, high in fitted
             ),
             ("deviations", DEVIATIONS),
-            *(("note", note) for note in found.notes),
-            ("presses", f"{found.presses} solved"),
+            *(("note", note) for note in result.notes),
+            ("presses", f"{result.presses} solved"),
             ("results", str(out / "identified.toml")),
             ("", str(out / "report.html")),
         ],

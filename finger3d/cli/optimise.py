@@ -88,24 +88,24 @@ def optimise(
     check_writable(out, scene)
     kept = f"every evaluated design is kept in {out}; the same command continues"
     with job(json_, lambda _: kept) as report:
-        found = optimise(problem, out, report)
-    _print_design(problem, found, out, json_)
+        result = optimise(problem, out, report)
+    _print_design(problem, result, out, json_)
 
 
-def _print_design(problem: OptimisationProblem, found: OptimisationResult, out: Path, json_: bool) -> None:
+def _print_design(problem: OptimisationProblem, result: OptimisationResult, out: Path, json_: bool) -> None:
     """Print the best design."""
     from finger3d.results.summary import read_json
 
     if json_:
         print_json(read_json(out / "design.json"))
         return
-    chosen = zip((f.key for f in problem.free), found.best.values, strict=True)
+    chosen = zip((f.key for f in problem.free), result.best.values, strict=True)
     print_rows(
-        found.scene.title,
+        result.scene.title,
         [
-            ("objective", f"{found.best.value:.5g}, at the start {found.start.value:.5g}"),
+            ("objective", f"{result.best.value:.5g}, at the start {result.start.value:.5g}"),
             *((key, f"{value:.5g}") for key, value in chosen),
-            ("evaluated", f"{found.distinct_designs} designs, {found.bodies} bodies condensed"),
+            ("evaluated", f"{result.distinct_designs} designs, {result.bodies} bodies condensed"),
             ("results", str(out / "best.toml")),
             ("", str(out / "evaluations.csv")),
             ("", str(out / "report.html")),
@@ -130,13 +130,13 @@ def _place_gauges(
     from finger3d.analyses.optimise.task import MUS
     from finger3d.scene import tree
 
-    given = tree.override(tree.read(scene), set_ or [])
+    tables = tree.override(tree.read(scene), set_ or [])
     keys = [FreeKey.of(text) for text in free]
     check_writable(out, scene)
     with job(json_, lambda _: "nothing was written") as report:
-        mus, known = _mus(mu) if mu else MUS, parsed_tolerances(tolerance)
-        found = place_gauges(given, count, out, keys, mus, noise, known, scene, report)
-    data = found.as_dict()
+        mus, tolerances = _mus(mu) if mu else MUS, parsed_tolerances(tolerance)
+        result = place_gauges(tables, count, out, keys, mus, noise, tolerances, scene, report)
+    data = result.as_dict()
     if json_:
         print_json(data)
         return
@@ -149,10 +149,10 @@ def _place_gauges(
         for g in data["gauges"]
     ]
     print_rows(
-        found.scene.title,
+        result.scene.title,
         [
             *rows,
-            ("together", f"mu +- {data['mean_mu_sd']:.3g}, mean over mu = {found.mus[0]:g} to {found.mus[-1]:g}"),
+            ("together", f"mu +- {data['mean_mu_sd']:.3g}, mean over mu = {result.mus[0]:g} to {result.mus[-1]:g}"),
             ("results", str(out / "best.toml")),
             ("", str(out / "report.html")),
         ],

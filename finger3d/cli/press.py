@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from finger3d.cli.common import Json, Set, app, job, load, print_json, print_rows
-from finger3d.errors import Finger3dError, MissingError
+from finger3d.errors import Finger3dError, MissingError, Outcome
 
 if TYPE_CHECKING:
     from finger3d._types import TreeView
@@ -88,11 +88,12 @@ _NUMBERS = {
 
 
 def _rows(summary: TreeView, out: Path, seconds: float) -> Iterator[tuple[str, str]]:
-    """Yield the rows of the closing table: numbers of the last step with their errors, cost, and files."""
+    """Yield the rows of the closing table: numbers of the last step that converged, with their errors, and files."""
     from finger3d.accuracy.error_bars import ErrorBars, with_error
     from finger3d.results.summary import readings_of
 
-    bars, estimate, steps = ErrorBars.of_summary(summary), summary.get("error_estimate"), summary["steps"]
+    bars, estimate = ErrorBars.of_summary(summary), summary.get("error_estimate")
+    steps = [step for step in summary["steps"] if step["outcome"] == str(Outcome.CONVERGED)]
 
     def number(value: float, key: str, digits: int, factor: float = 1.0) -> str:
         error = bars.total(key)
@@ -106,7 +107,7 @@ def _rows(summary: TreeView, out: Path, seconds: float) -> Iterator[tuple[str, s
     if steps:
         last = steps[-1]
         depth = number(last["depth_mm"], "depth_mm", 4) + " mm" + of_modulus("depth_mm", " mm")
-        yield "depth", f"{depth}, increment {len(steps)}"
+        yield "depth", f"{depth}, increment {summary['steps'].index(last) + 1}"
         for name, (key, factor, digits, unit) in _NUMBERS.items():
             yield name, number(last[key], key, digits, factor) + unit + of_modulus(key, unit.split(" at ")[0], factor)
         yield "residual", f"{max(step['residual'] for step in steps):.1e}, the largest of all increments"

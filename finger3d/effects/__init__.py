@@ -54,5 +54,5 @@ def effect_names() -> tuple[str, ...]:
 
 def effect_type(name: str) -> type[Effect]:
     """Import one effect and return its settings: a frozen dataclass with ``apply(model) -> model``."""
-    found: type[Effect] = importlib.import_module(f"finger3d.effects.{name}").Effect
-    return found
+    effect: type[Effect] = importlib.import_module(f"finger3d.effects.{name}").Effect
+    return effect

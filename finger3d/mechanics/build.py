@@ -215,19 +215,19 @@ def _widened(rows: sp.csr_matrix, size: int) -> sp.csr_matrix:
 def contact_rows(rows: Float, active: NDArray[np.int64], face: BoundarySurface, readings: int) -> tuple[Float, Float]:
     """Return compliance of contact points, and readings per contact force, from the compliance of rows."""
     count, dim = face.points.shape
-    found = np.zeros((readings, count * dim))
-    found[:, active] = rows[len(active) : len(active) + readings, : len(active)]
-    return scatter_to_points(rows, active, count, dim), found
+    reading_rows = np.zeros((readings, count * dim))
+    reading_rows[:, active] = rows[len(active) : len(active) + readings, : len(active)]
+    return scatter_to_points(rows, active, count, dim), reading_rows
 
 
-def candidate_points(model: Model, free: BoundarySurface, touch: float, margin: float) -> BoundarySurface:
+def candidate_points(model: Model, free: BoundarySurface, first_contact_mm: float, margin: float) -> BoundarySurface:
     """Return the points of the free faces that come near the object on its path, the nearest first.
 
     At finite strain points that do not face the object at rest may turn towards it: those near others are included.
 
     Parameters
     ----------
-    touch : height of the object's lowest point at first touch, mm
+    first_contact_mm : height of the object's lowest point at first touch, mm
     margin : rigid gap that the points reach to, in depths of the press
     """
     path = poses(model)
@@ -236,7 +236,7 @@ def candidate_points(model: Model, free: BoundarySurface, touch: float, margin: 
 
     def gaps(pose: ObjectPose) -> tuple[Float, Float]:
         """Gaps of points that face the object at rest, and of those that may do so later; infinite for others."""
-        placed = PlacedObject.of(model.object, touch, pose)
+        placed = PlacedObject.of(model.object, first_contact_mm, pose)
         geometry = contact_geometry(lambda points: tracker.distance(placed, points, near), free)
         normal = geometry.bases[:, 0]
         allowed = may_touch(free, normal), may_touch(free, normal, model.finite_strain)

@@ -95,11 +95,11 @@ def curvature_of(problem: Problem, face: BoundarySurface, u: Float, target: Obje
     if problem.model.object.is_flat:
         return None
     d, placed = problem.dim, problem.placed(target)
-    at = face.samples + face.interpolate @ u
-    tangents = bases_of(placed.distance(at)[1])[:, 1:]
-    out, step = np.zeros((len(at), d, d)), _CURVATURE_STEP * problem.model.mesh.size_mm
+    samples = face.samples + face.interpolate @ u
+    tangents = bases_of(placed.distance(samples)[1])[:, 1:]
+    out, step = np.zeros((len(samples), d, d)), _CURVATURE_STEP * problem.model.mesh.size_mm
     for t in range(d - 1):
-        ahead, behind = (placed.distance(at + sign * step * tangents[:, t])[1] for sign in (1.0, -1.0))
+        ahead, behind = (placed.distance(samples + sign * step * tangents[:, t])[1] for sign in (1.0, -1.0))
         turn = np.einsum("qk,qtk->qt", ahead - behind, tangents) / (2.0 * step)
         out += np.einsum("qs,qsi,qj->qij", turn, tangents, tangents[:, t])
     return 0.5 * (out + np.swapaxes(out, 1, 2))

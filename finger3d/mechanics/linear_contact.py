@@ -90,18 +90,18 @@ def solve_increment(
     if moves_too_far(problem, move, gap_before, carried_by_object(problem, move, state.body)):
         return ContactSolution(state, Outcome.PASSED_THROUGH, np.inf, 0, "none")
     flat = problem.model.object.is_flat
-    at = (
+    expansion_point = (
         np.zeros_like(body.past)
         if flat
         else body.displacement(state.contact.force if guess is None else guess, state.contact.own_bases)
     )
-    geometry = increment.geometry(at)
-    held = np.zeros(len(at), dtype=bool)
+    geometry = increment.geometry(expansion_point)
+    held = np.zeros(len(expansion_point), dtype=bool)
     spent, error, start = 0, np.inf, guess
     tried: list[Float] = []
-    found: list[Float] = []
+    displacements: list[Float] = []
     for iteration in range(1, _MOST_SOLUTIONS + 1):
-        solution = increment.solve(geometry, at, start)
+        solution = increment.solve(geometry, expansion_point, start)
         spent += solution.iterations
         if not (solution.outcome.ok or solution.outcome.is_cycle):
             return replace(solution.with_state(state), iterations=spent)
@@ -117,14 +117,14 @@ def solve_increment(
         if iteration >= _HOLD_FROM:
             change = np.linalg.norm(after.gradient - geometry.gradient, axis=1)
             held |= (change > _HOLD_ABOVE) & (start[:, 0] > 0.0)
-        tried, found = [*tried, at][-_MEMORY:], [*found, displacement][-_MEMORY:]
-        at = _extrapolated(tried, found)
-        following = after if at is displacement else increment.geometry(at)
+        tried, displacements = [*tried, expansion_point][-_MEMORY:], [*displacements, displacement][-_MEMORY:]
+        expansion_point = _extrapolated(tried, displacements)
+        following = after if expansion_point is displacement else increment.geometry(expansion_point)
         geometry = following.holding(held, geometry)
     if error > TOLERANCE:
         return ContactSolution(state, Outcome.NO_CONVERGENCE, float(error), spent, "none")
     gap = None if flat else increment.geometry(displacement, np.inf).holding(held, geometry).gap
-    after_state = increment.reached(geometry, at, displacement, solution.state, gap)
+    after_state = increment.reached(geometry, expansion_point, displacement, solution.state, gap)
     through = passes_through(problem, move, state.body, displacement, gap_before)
     if through or pulls(problem, state.contact, after_state.contact, move):
         return ContactSolution(state, Outcome.PASSED_THROUGH, float(error), spent, "none")
@@ -140,24 +140,24 @@ def solve_linearised(
     """
     if problem.contact_geometry is None or move.end not in problem.contact_geometry:
         return ContactSolution(state, Outcome.NO_CONVERGENCE, np.inf, 0, "none")
-    geometry, at = problem.contact_geometry[move.end]
+    geometry, expansion_point = problem.contact_geometry[move.end]
     increment = _Increment(problem, state, move, body, DistanceTracker())
-    solution = increment.solve(geometry, at, guess)
+    solution = increment.solve(geometry, expansion_point, guess)
     if not solution.outcome.ok:
         return solution.with_state(state)
     displacement = body.displacement(solution.state.force, geometry.bases)
-    return solution.with_state(increment.reached(geometry, at, displacement, solution.state, None))
+    return solution.with_state(increment.reached(geometry, expansion_point, displacement, solution.state, None))
 
 
-def _extrapolated(tried: list[Float], found: list[Float]) -> Float:
+def _extrapolated(tried: list[Float], results: list[Float]) -> Float:
     """Return the next displacement from those tried and those found from them, by Anderson's method."""
     if len(tried) == 1:
-        return found[-1]
-    residuals = np.stack([(g - x).ravel() for x, g in zip(tried, found, strict=True)])
+        return results[-1]
+    residuals = np.stack([(g - x).ravel() for x, g in zip(tried, results, strict=True)])
     change = residuals[1:] - residuals[:-1]
-    moved = np.stack([(b - a).ravel() for a, b in zip(found, found[1:], strict=False)])
+    moved = np.stack([(b - a).ravel() for a, b in zip(results, results[1:], strict=False)])
     weights = np.linalg.lstsq(change.T, residuals[-1], rcond=1e-10)[0]
-    return np.asarray(found[-1] - (weights @ moved).reshape(found[-1].shape))
+    return np.asarray(results[-1] - (weights @ moved).reshape(results[-1].shape))
 
 
 @dataclass(frozen=True)
@@ -176,19 +176,21 @@ class _Increment:
         It is exact for points nearer to the object than `within`, over the depth.
         """
         problem, reach = self.problem, within * length_scale(self.problem, self.move)
-        placed, share = problem.placed(self.move.end), problem.system.object_share
+        placed, object_share = problem.placed(self.move.end), problem.system.object_share
 
         def distance(points: Float) -> tuple[Float, Float]:
             return self.tracker.distance(placed, points, reach)
 
-        return contact_geometry(distance, problem.surface, displacement, problem.axes, share)
+        return contact_geometry(distance, problem.surface, displacement, problem.axes, object_share)
 
-    def solve(self, geometry: ContactGeometry, at: Float, guess: Float | None) -> ContactSolution[ContactState]:
+    def solve(
+        self, geometry: ContactGeometry, expansion_point: Float, guess: Float | None
+    ) -> ContactSolution[ContactState]:
         """Solve contact with the gaps linearised at a displacement (c, d); far points cannot touch."""
         problem, bases = self.problem, geometry.bases
         d = bases.shape[-1]
         start = transported(self.state.contact, bases)
-        free = self._relative(geometry, at, self.body.past @ vertical_frame(d))
+        free = self._relative(geometry, expansion_point, self.body.past @ vertical_frame(d))
         free[:, 1:] += start.tangential_displacement
         scale, area = length_scale(problem, self.move), problem.surface.area
         rule, law = RULES[problem.model.rule], problem.model.contact_law
@@ -204,34 +206,42 @@ class _Increment:
         force[near], status[near] = part.state.force, part.state.status
         return replace(part, state=replace(start, force=force, status=status))
 
-    def _relative(self, geometry: ContactGeometry, at: Float, displacement: Float) -> Float:
-        """Return gap and slip (c, d) mm of the increment at a displacement, the gap linearised at another one, `at`."""
+    def _relative(self, geometry: ContactGeometry, expansion_point: Float, displacement: Float) -> Float:
+        """Return gap and slip (c, d) mm of the increment at a displacement, the gap linearised at another one."""
         bases = geometry.bases
-        out: Float = np.einsum("cak,ck->ca", bases, displacement - at)
+        out: Float = np.einsum("cak,ck->ca", bases, displacement - expansion_point)
         out[:, 0] += geometry.gap
-        slid = displacement - self.state.body - carried_by_object(self.problem, self.move, at)
+        slid = displacement - self.state.body - carried_by_object(self.problem, self.move, expansion_point)
         out[:, 1:] = np.einsum("ctk,ck->ct", bases[:, 1:], slid)
         return out
 
-    def error(self, after: ContactGeometry, turned: Float, displacement: Float, found: ContactState) -> float:
+    def error(self, after: ContactGeometry, turned: Float, displacement: Float, contact: ContactState) -> float:
         """Return the largest violation by gaps at the displacement found, and by directions that have turned.
 
         Gaps are divided by the depth; turns (c,) rad count by the force of their point over the largest.
         """
         scale = length_scale(self.problem, self.move)
-        closed = found.status != OPEN
+        closed = contact.status != OPEN
         gap = np.where(closed, np.abs(after.gap), np.maximum(-after.gap, 0.0)) / scale
-        size = np.linalg.norm(found.force, axis=1)
+        size = np.linalg.norm(contact.force, axis=1)
         return float(max(gap.max(initial=0.0), (turned * size).max(initial=0.0) / (size.max(initial=0.0) or 1.0)))
 
     def reached(
-        self, geometry: ContactGeometry, at: Float, displacement: Float, found: ContactState, gap: Float | None
+        self,
+        geometry: ContactGeometry,
+        expansion_point: Float,
+        displacement: Float,
+        contact: ContactState,
+        gap: Float | None,
     ) -> State[Float]:
-        """Return the state at the end of the increment, with gaps (c,) or those linearised at a displacement, `at`."""
-        start, relative = transported(self.state.contact, geometry.bases), self._relative(geometry, at, displacement)
+        """Return the state at the end of the increment, with gaps (c,) or those linearised at a displacement."""
+        start, relative = (
+            transported(self.state.contact, geometry.bases),
+            self._relative(geometry, expansion_point, displacement),
+        )
         if gap is not None:
             relative[:, 0] = gap
-        after = next_state(start, found.force, relative, found.status)
+        after = next_state(start, contact.force, relative, contact.status)
         return State(replace(after, bases=geometry.bases), displacement)
 
 
@@ -251,14 +261,14 @@ def transported(state: ContactState, bases: Float) -> ContactState:
     )
 
 
-def carried_by_object(problem: Problem, move: Move, at: Float) -> Float:
-    """Return how far (c, d) mm the object moves where the points are, displaced by `at` (c, d).
+def carried_by_object(problem: Problem, move: Move, displacement: Float) -> Float:
+    """Return how far (c, d) mm the object moves where the points are, displaced by `displacement` (c, d).
 
     The displacement of a point is the mean over its hat function; the mean of a turn is that of the centroid.
     """
-    d, start, end = at.shape[1], move.start, move.end
+    d, start, end = displacement.shape[1], move.start, move.end
     if start.turns == end.turns:
-        return np.broadcast_to((end.displacement - start.displacement)[:d], at.shape)
-    points = np.zeros((len(at), 3))
-    points[:, :d] = problem.surface.centroids + at
+        return np.broadcast_to((end.displacement - start.displacement)[:d], displacement.shape)
+    points = np.zeros((len(displacement), 3))
+    points[:, :d] = problem.surface.centroids + displacement
     return problem.placed(end).moved_from(problem.placed(start), points)[:, :d]

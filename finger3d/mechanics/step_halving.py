@@ -26,7 +26,7 @@ from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.model import Leg, Model
-from finger3d.mechanics.path import AUTO_START
+from finger3d.mechanics.path import AUTO_START, stations
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
 
@@ -150,21 +150,28 @@ def increment_error(counts: Sequence[int], values: Sequence[float], count: int) 
 
 
 def refine(
-    problem: Problem, workspace: Workspace | None = None, cancel: Event | None = None
+    problem: Problem,
+    workspace: Workspace | None = None,
+    cancel: Event | None = None,
+    advanced: Callable[[int, int, StepResult], None] = lambda done, total, step: None,
 ) -> Iterator[tuple[tuple[StepResult, ...], StepEstimate | None]]:
     """Yield the results of runs with more and more increments, each with its estimate; the first run has none.
 
     The iteration ends when the tolerances are met or the largest number of increments is reached.  A run that fails is
-    omitted if one with fewer increments converged or one with twice as many does.  `workspace` and `cancel` are
-    arguments of `march`.
+    omitted if one with fewer increments converged or one with twice as many does.
+
+    Parameters
+    ----------
+    problem, workspace, cancel : see `march`
+    advanced : function, optional
+        Called after every increment of a run with the number of those solved, of all in the run, and its result.
     """
     workspace = workspace or formulation_of(problem.model).workspace()
     steps, last = limits(problem.model, problem.size)
     runs: list[Run] = []
     failed: tuple[StepResult, ...] = ()
     while steps <= last:
-        trial = with_steps(problem, steps)
-        results = tuple(march(trial, workspace=workspace, cancel=cancel))
+        results = _run(with_steps(problem, steps), workspace, cancel, advanced)
         if not results[-1].outcome.ok:
             if runs:
                 return
@@ -180,6 +187,16 @@ def refine(
         steps *= 2
     if not runs:
         yield failed, None
+
+
+def _run(
+    problem: Problem, workspace: Workspace, cancel: Event | None, advanced: Callable[[int, int, StepResult], None]
+) -> tuple[StepResult, ...]:
+    total, results = len(stations(problem.model.legs)), list[StepResult]()
+    for step in march(problem, workspace=workspace, cancel=cancel):
+        results.append(step)
+        advanced(len(results), total, step)
+    return tuple(results)
 
 
 def march_automatic(

@@ -100,10 +100,10 @@ def export(
     else:
         solid = design.solid()
         body = shell(solid, tolerance_mm, design.name)
-    made = None
+    assembly = None
     if mold is not None:
         report.stage("mold")
-        made = _mold(scene, triangles if solid is None else solid, mold)
+        assembly = _mold(scene, triangles if solid is None else solid, mold)
     with claimed(out):
         _clear(out)
         files, remarks = [], []
@@ -115,18 +115,18 @@ def export(
         write_stl(out / "finger.stl", body.surface, text)
         files.append(out / "finger.stl")
         silicone = None
-        if made is not None:
+        if assembly is not None:
             from finger3d.mold.extras import extra_parts, write_extras
             from finger3d.mold.output import write_mold
 
             name = scene.tables.material.silicone
             named = silicone_named(name) if name else None
-            extras = extra_parts(scene, made, out)
-            written, told = write_mold(scene.title, made, body, out, text, report, extras.parts, named)
-            more, also = write_extras(scene, made, solid, out)
+            extras = extra_parts(scene, assembly, out)
+            written, told = write_mold(scene.title, assembly, body, out, text, report, extras.parts, named)
+            more, also = write_extras(scene, assembly, solid, out)
             files += written + more
             remarks += [*told, *extras.remarks, *also]
-            silicone = made.silicone_mm3 / 1e3
+            silicone = assembly.silicone_mm3 / 1e3
     return Exported(
         tuple(files), _volume(design, solid, body), body.surface.volume, body.tolerance_mm, silicone, tuple(remarks)
     )

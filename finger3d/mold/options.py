@@ -236,8 +236,8 @@ class MoldOptions:
     def bed_mm(self) -> tuple[float, float, float]:
         """Length, width and height of the printer."""
         text = self.machine.bed if self.bed is None else self.bed
-        found = re.fullmatch(r"\s*(\d+(?:\.\d*)?)\s*[x*]\s*(\d+(?:\.\d*)?)\s*[x*]\s*(\d+(?:\.\d*)?)\s*", text)
-        sizes = tuple(float(size) for size in found.groups()) if found else (0.0,)
+        match = re.fullmatch(r"\s*(\d+(?:\.\d*)?)\s*[x*]\s*(\d+(?:\.\d*)?)\s*[x*]\s*(\d+(?:\.\d*)?)\s*", text)
+        sizes = tuple(float(size) for size in match.groups()) if match else (0.0,)
         if min(sizes) <= 0.0:
             raise _refused("bed", text, "three sizes in mm, such as 220x220x250")
         return sizes[0], sizes[1], sizes[2]

@@ -70,7 +70,6 @@ def contact_figure(
     mu: ArrayLike,
     band_mm: float | None = None,
     half_width_mm: float | None = None,
-    title: str = "",
 ) -> None:
     """Draw tractions f_n and f_t and the friction limit mu f_n along x, with stick and slip zones (Maeno 2004, Fig. 4).
 
@@ -85,7 +84,6 @@ def contact_figure(
     band_mm : largest distance from z = 0 of the points that represent that line if the mesh has no points on it;
         default 0.4 times the typical distance of neighbouring points
     half_width_mm : half the width of a solid, which adds a panel for its end z = half_width_mm; None for a 2D model
-    title : title of the picture
     """
     x, z, status = _column(table, "x_mm"), _column(table, "z_mm"), _status(table)
     if band_mm is None:
@@ -100,7 +98,7 @@ def contact_figure(
             lines.append((f"at the end, z = {half_width_mm:g} mm", end[np.argsort(x[end], kind="stable")]))
     fn, fx, fz = (_column(table, name) for name in ("pressure_MPa", "shear_x_MPa", "shear_z_MPa"))
     coefficient = np.broadcast_to(np.asarray(mu, dtype=np.float64), x.shape)
-    made = sheet(len(lines), 1, (WIDEST, 4.4), (0.95, 0.15, 1.25, 0.35), title)
+    made = sheet(len(lines), 1, (WIDEST, 4.4), (0.95, 0.15, 1.25, 0.35))
     for axes, (where, on) in zip(made.axes, lines, strict=True):
         _contact_line(axes, x[on], fn[on], fx[on], fz[on], status[on], coefficient[on])
         axes.set_title(where, fontsize=10, loc="left")
@@ -112,7 +110,7 @@ def contact_figure(
     made.save(path)
 
 
-def force_figure(path: str | Path, steps: Sequence[Mapping[str, object]], title: str = "") -> None:
+def force_figure(path: str | Path, steps: Sequence[Mapping[str, object]]) -> None:
     """Draw forces (N) and half the extents (mm) of the contact and the stick zone against depth (mm).
 
     If the object slides, the length of its path (mm) since first contact replaces the depth.
@@ -121,7 +119,6 @@ def force_figure(path: str | Path, steps: Sequence[Mapping[str, object]], title:
     ----------
     path : PNG file to write
     steps : the ``steps`` of summary.json
-    title : title of the picture
     """
 
     def values(key: str) -> Float:
@@ -135,7 +132,7 @@ def force_figure(path: str | Path, steps: Sequence[Mapping[str, object]], title:
     slides = bool(np.any(at[:, 1:] != 0.0))
     if slides:
         depth = np.cumsum(np.linalg.norm(np.diff(at, axis=0, prepend=0.0), axis=1))
-    made = sheet(2, 2, (WIDEST, 4.4), (0.8, 0.15, 0.55, 0.15), title)
+    made = sheet(2, 2, (WIDEST, 4.4), (0.8, 0.15, 0.55, 0.15))
     left, right = made.axes
     marked = len(depth) <= _MOST_MARKERS
     dot, square = ("o-", "s-") if marked else ("-", "-")

@@ -33,10 +33,10 @@ def table_of_file(path: str) -> type[TomlTable]:
     return MeshFileTable if path.lower().endswith(MESH_SUFFIXES) else FileTable
 
 
-def absolute(given: TreeView, scene: Path | None) -> Tree:
+def absolute(document: TreeView, scene: Path | None) -> Tree:
     """Return the tree with absolute paths of its bodies; those in it are relative to the file of the scene."""
     folder = scene.parent if scene else Path()
-    tree = dict(given)
+    tree = dict(document)
     for table, key in (("finger", "geometry"), ("object", "path")):
         old = tree.get(table)
         if isinstance(old, Mapping) and isinstance(value := old.get(key), str) and (key == "path" or is_file(value)):

@@ -96,9 +96,9 @@ def _default(field: typing.Any) -> str:
 
 def descriptions(documented: type) -> dict[str, str]:
     """Return the description of each key in the docstrings of a class and its bases."""
-    found: dict[str, str] = {}
+    texts: dict[str, str] = {}
     for base in reversed(documented.__mro__):
         for names, text in _SAID.findall(base.__doc__ or ""):
-            found |= dict.fromkeys(names.split(", "), " ".join(text.split()))
+            texts |= dict.fromkeys(names.split(", "), " ".join(text.split()))
     missing = [f.name for f in dataclasses.fields(documented)] if dataclasses.is_dataclass(documented) else []
-    return dict.fromkeys(missing, "") | found
+    return dict.fromkeys(missing, "") | texts

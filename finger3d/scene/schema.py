@@ -68,11 +68,11 @@ def _design(item: tuple[str, type]) -> Tree:
 
 def _named(key: str, name: str, table: type[TomlTable], documented: type) -> Tree:
     """Return the schema of a table whose `key` must be `name`."""
-    found = _of(table, documented)
-    found["title"] = name
-    found["properties"] = {key: {"const": name}} | found["properties"]
-    found["required"] = [key, *found["required"]]
-    return found
+    table_schema = _of(table, documented)
+    table_schema["title"] = name
+    table_schema["properties"] = {key: {"const": name}} | table_schema["properties"]
+    table_schema["required"] = [key, *table_schema["required"]]
+    return table_schema
 
 
 def _files() -> list[Tree]:
@@ -100,10 +100,10 @@ def _press() -> Tree:
 
 
 def _legs() -> Tree:
-    found = _of(LegsTable)
+    table_schema = _of(LegsTable)
     leg = _of(LegTable) | _depth_or_force()
-    found["properties"]["leg"] |= {"items": leg, "description": "targets, each reached from the one before"}
-    return found | {"title": "legs"}
+    table_schema["properties"]["leg"] |= {"items": leg, "description": "targets, each reached from the one before"}
+    return table_schema | {"title": "legs"}
 
 
 def _depth_or_force() -> Tree:
@@ -116,41 +116,41 @@ def _documented(record: type) -> Tree:
 
 def _of(table: type[TomlTable], documented: type | None = None) -> Tree:
     """Return the schema of a table, with the descriptions of its keys, in its own tables too."""
-    found = table.model_json_schema()
-    nested = found.pop("$defs", {})
-    _describe(found, documented or table)
+    table_schema = table.model_json_schema()
+    nested = table_schema.pop("$defs", {})
+    _describe(table_schema, documented or table)
     for name, one in nested.items():
         _describe(one, getattr(tables, name))
-    result: Tree = _tidy(found, nested)
+    result: Tree = _tidy(table_schema, nested)
     return {"properties": {}, "required": []} | result
 
 
-def _describe(found: Tree, documented: type) -> None:
+def _describe(table_schema: Tree, documented: type) -> None:
     """Put the descriptions of a docstring beside the keys of a schema."""
-    found.pop("description", None)  # the docstring of the table
+    table_schema.pop("description", None)  # the docstring of the table
     said = descriptions(documented)
-    for key, value in found["properties"].items():
+    for key, value in table_schema["properties"].items():
         if text := said.get(key) or said.get(key.removesuffix("_deg")):
             value["description"] = text
 
 
-def _tidy(node: Any, found: Tree) -> Any:
+def _tidy(node: Any, definitions: Tree) -> Any:
     """Inline references, and drop null, which TOML has not, titles, and defaults of whole tables."""
     if isinstance(node, list):
-        return [_tidy(item, found) for item in node]
+        return [_tidy(item, definitions) for item in node]
     if not isinstance(node, Mapping):
         return node
     if "$ref" in node:
-        inlined = found[node["$ref"].rpartition("/")[2]]
-        return _tidy({**inlined, **{k: v for k, v in node.items() if k != "$ref"}}, found)
+        inlined = definitions[node["$ref"].rpartition("/")[2]]
+        return _tidy({**inlined, **{k: v for k, v in node.items() if k != "$ref"}}, definitions)
     out = {}
     for key, value in node.items():
         if key in ("properties", "$defs"):
-            out[key] = {name: _tidy(item, found) for name, item in value.items()}
+            out[key] = {name: _tidy(item, definitions) for name, item in value.items()}
         elif key == "title" or (key == "default" and (value is None or isinstance(value, list | dict))):
             continue
         else:
-            out[key] = _tidy(value, found)
+            out[key] = _tidy(value, definitions)
     return _without_null(out)
 
 

@@ -160,7 +160,7 @@ class DomainTable(TomlTable):
 
 
 class MeshTable(TomlTable):
-    """[mesh]: absent sizes are chosen from the finger (see `finger3d.scene.checks`).
+    """[mesh]: absent sizes are chosen from the finger (see `finger3d.scene.mesh_sizes`).
 
     Attributes
     ----------

@@ -71,10 +71,8 @@ def force_deviation(plane: Case, solid: Case) -> Deviation:
     return Deviation(found.width_mm, found.value, min(found.error, max(error, _COMMON * found.error)))
 
 
-def crossing_width(
-    found: Sequence[Deviation], narrow: bool, limit: float = WITHIN
-) -> tuple[float, float, float] | None:
-    """Return the width at which the deviation reaches a limit, and the ends of its error bar, mm; None if it does not.
+def crossing_width(found: Sequence[Deviation], narrow: bool) -> tuple[float, float, float] | None:
+    """Return the width at which the deviation reaches `WITHIN`, and the ends of its error bar, mm; None if it does not.
 
     Parameters
     ----------
@@ -86,7 +84,7 @@ def crossing_width(
     value, error = np.array([abs(d.value) for d in ordered]), np.array([d.error for d in ordered])
     # The deviation from plane strain falls as 1/width; that from plane stress grows in proportion to the width.
     scale = width if narrow else 1.0 / width
-    at = [_crossing(scale, v, limit) for v in (value, np.maximum(value - error, 0.0), value + error)]
+    at = [_crossing(scale, v, WITHIN) for v in (value, np.maximum(value - error, 0.0), value + error)]
     if at[0] is None:
         return None
     sizes = [float("nan") if a is None else (a if narrow else 1.0 / a) for a in at]
