@@ -103,7 +103,7 @@ def test_the_examples_of_adding_work_and_are_short(root: Path, folder: Path) -> 
 
     geometry, effect, study = python(root, "How to add", "CONTRIBUTING.md")
     assert all(len(example.splitlines()) < 20 for example in (geometry, effect, study))
-    names: dict = {}
+    names: dict = {"__package__": "validation"}  # where the study lies
     for example in (geometry, effect, study):
         execute(example, names)
     pad = names["Pad"](10.0, 5.0)

@@ -17,7 +17,6 @@ from finger3d.contact.friction import STICK
 from finger3d.errors import Finger3dError
 from finger3d.fem.simplex import CONTACT, FREE_FACES, Mesh, axis_numbers, middles, unfold
 from finger3d.io import atomic, write_csv, write_json
-from finger3d.mechanics.formulations import acting_places
 from finger3d.mechanics.history import ContactPoints, StepResult, contact_table, measure, table_row
 from finger3d.mechanics.marker_grid import marker_table
 from finger3d.results.states import object_drawing, states_of, write_states
@@ -111,10 +110,7 @@ class ResultWriter:
         if record.steps:
             write_csv(self.folder / "history.csv", history_table(record.problem.points, record.steps))
             last = next((step for step in reversed(record.steps) if step.outcome.ok), record.steps[-1])
-            columns = contact_table(record.problem.points, last.state)
-            acting = acting_places(record.problem, last.meshed_state)
-            columns |= {f"acting_{axis}_mm": acting[:, k] for k, axis in enumerate("xyz")}
-            write_csv(self.folder / "contact.csv", columns)
+            write_csv(self.folder / "contact.csv", contact_table(record.problem.points, last.state))
         self._written = time.perf_counter()
         self._seconds = self._written - begin
 

@@ -78,19 +78,6 @@ class Symmetry:
             bases=self._unfold_bases(state.bases),
         )
 
-    def unfold_places(self, places: Float, at_rest: Float) -> Float:
-        """Return places (m, 3) mm of the whole finger from those (c, d) of the part's points.
-
-        A point on a symmetry plane at rest, as `at_rest` (m, 3) tells, stands for both of its halves, whose middle is
-        in the plane.
-        """
-        d = places.shape[1]
-        out = np.zeros_like(at_rest)
-        out[:, :d] = places[self.image_of] * self.mirror_sign[:, LOCAL_DIRECTIONS[:d]]
-        for axis in axis_numbers(self.axes):
-            out[at_rest[:, axis] == 0.0, axis] = 0.0
-        return out
-
     def total(self, values: Float) -> float:
         """Return the sum over the whole finger of values (c,) at the part's points."""
         return float((values[self.image_of] * self.multiplicity).sum())
