@@ -5,18 +5,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from finger3d.accuracy.cost import forecast
 from finger3d.accuracy.richardson import ORDER
+from finger3d.analyses.calibrate.presses import CurvePoints
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Model
 from finger3d.sensor.calibration import Calibration
-
-if TYPE_CHECKING:
-    from finger3d.analyses.calibrate.run import CurvePoints
 
 SHARE = 0.1
 """Largest share of the mesh in the variance of mu."""

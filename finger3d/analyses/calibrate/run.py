@@ -6,7 +6,7 @@ import hashlib
 import math
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._machine import versions
-from finger3d._types import Float
-from finger3d.analyses.calibrate.increments import Increments, choose_increments
+from finger3d.analyses.calibrate.increments import choose_increments
 from finger3d.analyses.calibrate.mesh_choice import choose_mesh
 from finger3d.analyses.calibrate.output import write_body, write_curve, write_map, write_points, write_scene
-from finger3d.analyses.calibrate.presses import Press, presses
+from finger3d.analyses.calibrate.presses import CurvePoints, presses
 from finger3d.analyses.calibrate.reference import ReferenceReadings, read
 from finger3d.analyses.calibrate.settings import MUS, CalibrationSettings, found_readings
 from finger3d.analyses.calibrate.tolerances import displaced_gauges, evaluate_tolerances, with_defaults
@@ -26,7 +25,6 @@ from finger3d.errors import Finger3dError
 from finger3d.io import claimed
 from finger3d.mechanics.build import MARGIN, build
 from finger3d.mechanics.coverage import contact_within_candidates
-from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
 from finger3d.progress import Progress
@@ -51,50 +49,6 @@ _SIZES = {"size_mm", "base_size_mm", "tolerance"}
 """Keys of [mesh] with which a scene chooses its own mesh."""
 
 _SLOPES = {True: 7, False: 3}  # values of mu at which tolerances are evaluated, in small and finite strain
-
-
-@dataclass(frozen=True)
-class CurvePoints:
-    """Presses of one condensed body, one for every mu that is finished.
-
-    Attributes
-    ----------
-    problem : the condensed body; its gauges include the displaced ones, which give the tolerances of position
-    mus, increments : all values of mu of the calibration, ascending; the increments of every press
-    presses : ascending in mu
-    seconds : wall time of the build and of the presses
-    factorizations_before : factorisations of an earlier attempt with too few candidate points
-    """
-
-    problem: Problem
-    mus: tuple[float, ...]
-    increments: Increments
-    presses: tuple[Press, ...]
-    seconds: Mapping[str, float]
-    factorizations_before: int = 0
-
-    @property
-    def frames(self) -> dict[float, StepResult]:
-        """Last increment of every press that converged, by mu."""
-        return {p.mu: p.frame for p in self.presses if p.frame.outcome.ok}
-
-    @property
-    def failed(self) -> dict[float, str]:
-        """Outcome of every press that did not converge, by mu."""
-        return {
-            p.mu: f"at depth {p.frame.target.depth_mm:.4g} mm: {p.frame.outcome}"
-            for p in self.presses
-            if not p.frame.outcome.ok
-        }
-
-    @property
-    def factorizations(self) -> int:
-        """Factorisations of the body, in its build and in the presses."""
-        return self.factorizations_before + self.problem.factorizations + sum(p.factorizations for p in self.presses)
-
-    def reading(self, name: str) -> Float:
-        """Return a reading (n,) in the presses that converged."""
-        return np.array([frame.readings[name] for frame in self.frames.values()])
 
 
 def calibrate(
