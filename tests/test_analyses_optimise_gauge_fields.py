@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from finger3d.analyses.calibrate.presses import presses
-from finger3d.analyses.calibrate.run import calibrated_together
+from finger3d.analyses.calibrate.run import calibrated
 from finger3d.analyses.optimise.gauge_fields import GaugeFields, StrainField
 from finger3d.mechanics.build import build
 from finger3d.mechanics.gauges import Gauge
@@ -38,7 +38,7 @@ def test_fields_judge_as_a_calibration_does() -> None:
     mus = np.linspace(0.1, 0.7, 7)
     given = {name: sd for name, sd in FEW.items() if sd}
     fields = GaugeFields.of(model, mus, 1.5e-4, given, lambda text: None)
-    joint, _ = calibrated_together(replace(model, gauges=gauges), ["g0", "g1"], mus, tolerances=FEW)
+    joint, _ = calibrated(replace(model, gauges=gauges), ["g0", "g1"], mus, tolerances=FEW)
     for gauge, own in zip(gauges, joint.readings, strict=True):
         effects = fields.effects(np.array([gauge.middle]), np.array([gauge.angle]))
         strain = fields.nominal.strain(np.array([gauge.middle]), np.array([gauge.angle]))[0, 0]

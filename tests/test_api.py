@@ -46,6 +46,13 @@ def test_every_command_is_a_function_with_documented_parameters(name: str) -> No
     assert all(re.search(rf"^(\w+, )*{p}(, \w+)* :", inspect.getdoc(function) or "", re.M) for p in parameters)
 
 
+@pytest.mark.parametrize("name", [name for name in (*COMMANDS, "place_gauges") if name != "estimate"])
+def test_every_analysis_takes_a_scene_and_overrides(name: str) -> None:
+    parameters = inspect.signature(getattr(finger3d, name)).parameters
+    assert next(iter(parameters)) == "scene"
+    assert parameters["overrides"].default == ()
+
+
 def test_the_import_is_quick_and_loads_neither_cad_nor_a_renderer() -> None:
     code = "import finger3d, sys; print({'OCP', 'vtkmodules', 'matplotlib', 'scipy', 'numpy'} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -30,6 +31,7 @@ def press(
     report: Progress | None = None,
     figures: bool | None = None,
     error: bool = True,
+    overrides: Sequence[str] = (),
 ) -> PressResult:
     """Press a scene, and write its results into a folder.
 
@@ -40,6 +42,7 @@ def press(
     report : receives the progress
     figures : whether to draw PNG files and to write report.html; None: if a folder is given
     error : whether to estimate the errors due to the mesh and the increments
+    overrides : other keys to set, such as ``"mesh.size_mm=1.0"``
 
     Returns
     -------
@@ -51,14 +54,13 @@ def press(
     >>> import finger3d
     >>> finger3d.press("scene.toml", "out").last.outcome
     'converged'
-    >>> stiff = finger3d.load("scene.toml", ["material.E_MPa=2.0"])
-    >>> len(finger3d.press(stiff).steps)
+    >>> len(finger3d.press("scene.toml", overrides=["material.E_MPa=2.0"]).steps)
     4
     """
     from finger3d.scene import scene_of
 
     started = time.perf_counter()
-    scene = scene_of(scene)
+    scene = scene_of(scene, overrides)
     temporary = TemporaryDirectory(prefix="finger3d-") if out is None else None
     figures = temporary is None if figures is None else figures
     with claimed(temporary.name if temporary else str(out), "press") as folder:

@@ -63,6 +63,7 @@ def calibrate(
     maps: bool = False,
     marker_noise_mm: float = MARKER_NOISE_MM,
     taxel_noise_MPa: float = TAXEL_NOISE_MPA,
+    overrides: Sequence[str] = (),
 ) -> Calibration:
     """Calibrate a gauge, or several readings together: their values at the end of the scene's path, for every mu.
 
@@ -78,6 +79,7 @@ def calibrate(
     report : receives the progress
     maps : also map the sensitivity of strain to mu over the section
     marker_noise_mm, taxel_noise_MPa : standard deviation of a reading of a marker, and of a taxel
+    overrides : other keys to set, such as ``"mesh.size_mm=1.0"``
 
     Raises
     ------
@@ -90,7 +92,7 @@ def calibrate(
     from finger3d.scene.parts import largest_spread
 
     report = report or Progress()
-    scene = scene_of(scene)
+    scene = scene_of(scene, overrides)
     model = scene.model()
     noises: dict[Kind, float] = {"gauge": noise, "marker": marker_noise_mm, "taxel": taxel_noise_MPa}
     readings = found_readings(model, [gauge] if isinstance(gauge, str) else gauge, noises)

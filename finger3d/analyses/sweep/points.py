@@ -164,7 +164,6 @@ def combinations(
     source: Source,
     overrides: Sequence[str],
     texts: Sequence[str],
-    say: Callable[[int, int], None] = lambda done, total: None,
 ) -> Sweep:
     """Read a scene and check every combination of some values.
 
@@ -172,7 +171,6 @@ def combinations(
     ----------
     overrides : as for ``--set``
     texts : as for ``--vary``, such as ``friction.mu=0.06,0.25,1``
-    say : told how many points are checked
 
     Raises
     ------
@@ -183,7 +181,7 @@ def combinations(
     count = math.prod(len(v.texts) for v in vary)
     if count > MOST:
         raise Finger3dError(f"--vary: {count} combinations; at most {MOST} in one sweep, split it")
-    return _checked(source, overrides, vary, "--vary", say)
+    return _checked(source, overrides, vary, "--vary")
 
 
 def listed_points(
@@ -191,7 +189,6 @@ def listed_points(
     overrides: Sequence[str],
     columns: tuple[Vary, ...],
     option: str,
-    say: Callable[[int, int], None] = lambda done, total: None,
 ) -> Sweep:
     """Read a scene and check every point of a list.
 
@@ -200,7 +197,6 @@ def listed_points(
     overrides : as for ``--set``
     columns : the keys, each with its value at every point
     option : what gave them, for messages
-    say : told how many points are checked
 
     Raises
     ------
@@ -210,7 +206,7 @@ def listed_points(
     count = len(columns[0].texts)
     if count > MOST:
         raise Finger3dError(f"{option}: {count} points; at most {MOST} in one sweep, split it")
-    return replace(_checked(source, overrides, columns, option, say, zip), is_list=True)
+    return replace(_checked(source, overrides, columns, option, zip), is_list=True)
 
 
 def _checked(
@@ -218,7 +214,6 @@ def _checked(
     overrides: Sequence[str],
     vary: tuple[Vary, ...],
     option: str,
-    say: Callable[[int, int], None],
     joined: Callable[..., Iterable[tuple[Any, ...]]] = itertools.product,
 ) -> Sweep:
     """Return the sweep over values that `joined` makes points of, each a checked scene."""
@@ -239,7 +234,6 @@ def _checked(
                 "instance what finger3d press has chosen, in its summary.json"
             )
         scenes.append(scene)
-        say(len(scenes), len(settings))
     values = joined(*(v.values for v in vary))
     points, members = [], dict[str, list[tuple[Scene, Variant]]]()
     for number, (scene, here) in enumerate(zip(scenes, values, strict=True)):
