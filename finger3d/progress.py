@@ -41,6 +41,10 @@ class Progress:
         """Print a permanent line, for instance that a mesh was read from the cache."""
 
 
+QUIET = Progress()
+"""Receiver that prints nothing, for what only announces stages."""
+
+
 class PlainProgress(Progress):
     """Progress as one line for each event, with the seconds since the start; for logs and pipes."""
 

@@ -58,8 +58,8 @@ def test_contact_beyond_the_candidate_points_is_solved_again(tmp_path: Path, mon
     scene = written(tmp_path, SECTION)
     build = module.build
 
-    def narrow(model, say, margin=-0.8):  # candidates only where the rigid overlap is deep
-        return build(model, say, margin)
+    def narrow(model, report, margin=-0.8):  # candidates only where the rigid overlap is deep
+        return build(model, report, margin)
 
     monkeypatch.setattr(module, "build", narrow)
     result = press.press(scene, tmp_path / "narrow", figures=False)

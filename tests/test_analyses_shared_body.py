@@ -19,6 +19,7 @@ from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.solve import march
 from finger3d.scene import Scene, parse, tree
+from tests.logs import Log
 
 BLOCK = {
     "finger": {"geometry": "block", "half_length_mm": 4.0, "height_mm": 3.0, "width_mm": 4.0},
@@ -94,12 +95,12 @@ def test_a_shallower_press_on_the_mesh_of_the_deepest() -> None:
 def test_candidates_are_widened_when_contact_reaches_beyond_them(monkeypatch) -> None:
     model = scene("friction.mu=0.0").model()
     wide = SharedBody(model, [Variant.of(model)]).press(Variant.of(model))
-    said = []
-    first = [lambda m, say, margin=-0.8: build(m, say, margin)]
-    monkeypatch.setattr("finger3d.mechanics.build.build", lambda m, say, *margin: first[0](m, say, *margin))
-    narrow = SharedBody(model, [Variant.of(model)], said.append)
+    said = Log()
+    first = [lambda m, report, margin=-0.8: build(m, report, margin)]
+    monkeypatch.setattr("finger3d.mechanics.build.build", lambda m, report, *margin: first[0](m, report, *margin))
+    narrow = SharedBody(model, [Variant.of(model)], said)
     again = narrow.press(Variant.of(model))
-    assert any("beyond" in text for text in said)
+    assert any("beyond" in text for text in said.lines)
     assert again.numbers["normal_force_N"] == pytest.approx(wide.numbers["normal_force_N"], rel=1e-9)
 
 
@@ -229,7 +230,7 @@ NARROW = -0.8
 
 
 def narrowed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("finger3d.mechanics.build.build", lambda m, say, margin=NARROW: build(m, say, margin))
+    monkeypatch.setattr("finger3d.mechanics.build.build", lambda m, report, margin=NARROW: build(m, report, margin))
 
 
 @pytest.mark.parametrize("threads", [False, True], ids=["in turn", "at once"])
@@ -245,10 +246,10 @@ def test_presses_together_are_the_presses_alone(threads, monkeypatch) -> None:
     wide = SharedBody(models[1], variants)
     alone = [wide.press(v) for v in variants]
     narrowed(monkeypatch)
-    said: list[str] = []
-    body = SharedBody(models[1], variants, said.append)
+    said = Log()
+    body = SharedBody(models[1], variants, said)
     together = list(body.presses(variants))
-    assert sum("beyond" in text for text in said) == 1
+    assert sum("beyond" in text for text in said.lines) == 1
     for one, other in zip(alone, together, strict=True):
         assert other.numbers == pytest.approx(one.numbers, rel=1e-9)
         assert other.gauges == pytest.approx(one.gauges, rel=1e-9)
@@ -304,10 +305,10 @@ def test_a_body_that_cannot_be_widened_fails_those_that_need_it_only(monkeypatch
     models = [scene(change).model() for change in ("friction.mu=0.1", "press.depth_mm=0.03", "friction.mu=1.0")]
     variants = [Variant.of(m) for m in models]
 
-    def once(model, say, margin=NARROW):
+    def once(model, report, margin=NARROW):
         if margin == math.inf:
             raise MemoryError
-        return build(model, say, margin)
+        return build(model, report, margin)
 
     monkeypatch.setattr("finger3d.mechanics.build.build", once)
     found = list(SharedBody(models[0], variants).presses(variants))

@@ -19,7 +19,7 @@ import numpy as np
 
 from finger3d._types import Float, Tree
 from finger3d.accuracy.adjoint_bars import AdjointBars, NoAdjointBarsError, adjoint_bars, applies
-from finger3d.accuracy.companions import Say, companion, edge_ratio, is_unstructured
+from finger3d.accuracy.companions import companion, edge_ratio, is_unstructured
 from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.accuracy.richardson import ORDER, ORDERS, mesh_error
@@ -42,6 +42,7 @@ from finger3d.mechanics.step_halving import (
     with_increments_of,
 )
 from finger3d.meshing.given import GivenMesh
+from finger3d.progress import QUIET, Progress
 
 Measure = Callable[[Problem, StepResult], dict[str, float]]
 
@@ -125,7 +126,7 @@ def reading_error(
 def estimate(
     problem: Problem,
     frames: Sequence[StepResult],
-    say: Say = lambda text: None,
+    report: Progress = QUIET,
     numbers: Measure = main_numbers,
     runs: Sequence[Run] = (),
 ) -> ErrorEstimate:
@@ -134,7 +135,7 @@ def estimate(
     Parameters
     ----------
     problem, frames : the press as it was solved, all increments converged
-    say : called with a line before a long stage
+    report : receives the messages
     numbers : the numbers of an increment by name, names as in `finger3d.accuracy.richardson.Quantity.of`
     runs : runs that chose automatic increments
 
@@ -152,7 +153,7 @@ def estimate(
     own = replace(problem, model=replace(problem.model, legs=with_increments_of(problem.model.legs, len(frames))))
     beside, where = None, ""
     try:
-        found, beside, where = discretisation(own, frames, say, numbers, used)
+        found, beside, where = discretisation(own, frames, report, numbers, used)
     except _FAILURES as error:
         found = ErrorEstimate(method=f"mesh: no estimate: {_reason(error)}")
     try:
@@ -210,7 +211,7 @@ def _reason(error: Exception) -> str:
 def discretisation(
     own: Problem,
     frames: Sequence[StepResult],
-    say: Say = lambda text: None,
+    report: Progress = QUIET,
     numbers: Measure = main_numbers,
     runs: Sequence[Run] = (),
 ) -> tuple[ErrorEstimate, Problem, str]:
@@ -231,7 +232,7 @@ def discretisation(
             replace(bars.coarse, model=own.model),  # with the object itself, since it is pressed to other poses
             "with every second multiplier",
         )
-    beside = companion(own, say)
+    beside = companion(own, report)
     last = last_step(beside)
     ratio = edge_ratio(own, beside)
     kind = "coarse" if ratio > 1.0 else "finer"

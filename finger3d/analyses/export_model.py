@@ -67,7 +67,7 @@ def export_mesh(
         raise Finger3dError(f"--out {out}: holds {own.name}, the finger's own file; name another folder")
     report.stage("meshing")
     axes = symmetry(model)
-    part, _ = mesh_part(model, contact_box(model), axes, report.say)
+    part, _ = mesh_part(model, contact_box(model), axes, report)
     whole, _, _ = unfold(part, axis_numbers(axes))
     with claimed(out):
         write_mesh_vtu(out / MESH_FILES[0], whole)
@@ -97,7 +97,7 @@ def export_deck(
 
     out, report, scene = Path(out), report or Progress(), scene_of(scene, overrides)
     report.stage("meshing")
-    made = press_deck(scene.model(), scene.title, report.say)
+    made = press_deck(scene.model(), scene.title, report)
     report.stage("writing the deck")
     with claimed(out), atomic(out / DECK_FILE) as temporary:
         temporary.write_text(made.deck.text(), encoding="ascii")

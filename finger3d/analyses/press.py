@@ -117,21 +117,21 @@ def _solve(scene: Scene, writer: ResultWriter, report: Progress, started: float)
     writer.scene(scene.to_toml())
     model = scene.model()
     report.stage("meshing")
-    problem = (refinement.problem if refinement else None) or build(model, report.say)
+    problem = (refinement.problem if refinement else None) or build(model, report)
     record = PressRecord(scene, problem, started, refinement)
     _march(record, writer, report)
     reached = max((step.target.depth_mm for step in record.converged_steps), default=0.0)
     if legs := at_depth_reached(problem.model.legs, reached):
         report.say(f"the force is reached at {reached:.3g} mm, deeper than was forecast; meshing again")
         report.stage("meshing")
-        problem = build(replace(problem.model, legs=legs), report.say)
+        problem = build(replace(problem.model, legs=legs), report)
         record = PressRecord(scene, problem, started, refinement, record.all_factorizations)
         _march(record, writer, report)
     record.surface_checks = check_surface(problem, record.converged_steps)
     if not all(check.within_candidates for check in record.surface_checks):
         report.say("contact reached beyond the candidate points; solving again with all points of the free faces")
         report.stage("meshing")
-        problem = build(problem.model, report.say, math.inf)
+        problem = build(problem.model, report, math.inf)
         record = PressRecord(scene, problem, started, refinement, record.all_factorizations)
         _march(record, writer, report)
         record.surface_checks = check_surface(problem, record.converged_steps)
@@ -149,7 +149,7 @@ def _refine_mesh(scene: Scene, report: Progress) -> Refinement | None:
 
     goal = mesh.goal or GOAL
     report.stage(f"refining to an error of {mesh.tolerance:g} in {goal}")
-    return refine_mesh(scene.model(), mesh.tolerance, mesh.max_seconds, report.say, goal)
+    return refine_mesh(scene.model(), mesh.tolerance, mesh.max_seconds, report, goal)
 
 
 def _march(record: PressRecord, writer: ResultWriter, report: Progress) -> None:
@@ -241,7 +241,7 @@ def _estimate_errors(record: PressRecord, report: Progress) -> None:
 
     report.stage("estimating the error")
     runs = record.step_estimate.runs if record.step_estimate else ()
-    found = estimate(record.problem, record.steps, report.say, press_numbers, runs)
+    found = estimate(record.problem, record.steps, report, press_numbers, runs)
     spread = record.scene.tables.material.constants.spread
     by_modulus = modulus_errors(record.problem, record.converged_steps, spread, press_numbers)
     record.error_estimate = replace(found, modulus=by_modulus)

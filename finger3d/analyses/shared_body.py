@@ -11,7 +11,7 @@ import json
 import math
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from itertools import dropwhile
@@ -25,6 +25,7 @@ from finger3d.errors import Finger3dError, Outcome
 from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.history import StepResult, flat_readings, measure, without_readings
 from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.progress import QUIET, Progress
 from finger3d.scene import Scene
 
 if TYPE_CHECKING:
@@ -119,7 +120,7 @@ class SharedBody:
     ----------
     model : any model of the family, with the mesh that all share
     variants : all variants that will be pressed
-    say : receives messages about meshing and condensation
+    report : receives the messages
     grid_mm : spacing of a grid of markers, whose displacements are among the numbers; None without one
 
     Attributes
@@ -132,14 +133,14 @@ class SharedBody:
         self,
         model: Model,
         variants: Sequence[Variant],
-        say: Callable[[str], None] = lambda text: None,
+        report: Progress = QUIET,
         grid_mm: float | None = None,
     ) -> None:
         # Scenes are sorted by body without loading SciPy and the solver.
         from finger3d.mechanics.build import build
 
         start = time.perf_counter()
-        self._say, self._grid_mm = say, grid_mm
+        self._report, self._grid_mm = report, grid_mm
         gauges = model.gauges
         if model.inclusions is None:
             # Each place has one gauge, whose name is a number; variants may use one name for different places.
@@ -147,7 +148,7 @@ class SharedBody:
             gauges = tuple(replace(place, name=str(i)) for i, place in enumerate(places))
         self._names = {replace(g, name=""): g.name for g in gauges}
         self._gauges_are_inclusions = model.inclusions is not None
-        self.problem = build(replace(model, legs=shared_legs(variants), gauges=gauges), say)
+        self.problem = build(replace(model, legs=shared_legs(variants), gauges=gauges), report)
         self.seconds = time.perf_counter() - start
         self._results: dict[Variant, VariantResult | Exception] = {}
 
@@ -253,9 +254,9 @@ class SharedBody:
         from finger3d.mechanics.build import build
 
         start = time.perf_counter()
-        self._say("contact reached beyond the candidate points; condensing all of the contact face")
+        self._report.say("contact reached beyond the candidate points; condensing all of the contact face")
         try:
-            self.problem = build(self.problem.model, self._say, math.inf)
+            self.problem = build(self.problem.model, self._report, math.inf)
         except TROUBLE as error:
             return error.with_traceback(None)
         self.seconds += time.perf_counter() - start

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
@@ -23,6 +22,7 @@ from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
 from finger3d.mechanics.step_halving import march_automatic
 from finger3d.plotting.figures import middle_line
+from finger3d.progress import QUIET, Progress
 
 if TYPE_CHECKING:
     from finger3d.scene import Scene
@@ -101,7 +101,7 @@ class LiveBody:
     steps: int
 
     @classmethod
-    def of(cls, scene: Scene, say: Callable[[str], None] = lambda text: None) -> LiveBody:
+    def of(cls, scene: Scene, report: Progress = QUIET) -> LiveBody:
         """Condense the finger of a scene.
 
         Raises
@@ -116,8 +116,8 @@ class LiveBody:
             raise Finger3dError(f"app: not with effects.{name}, which takes seconds to press; take the effect out")
         if len(model.legs) > 1 or model.legs[0].moves_sideways:
             depth = model.largest_depth_mm
-            return cls(scene.title, build(replace(model, legs=(Leg(depth, steps=STEPS),)), say), depth, STEPS)
-        problem = build(model, say)
+            return cls(scene.title, build(replace(model, legs=(Leg(depth, steps=STEPS),)), report), depth, STEPS)
+        problem = build(model, report)
         steps, _ = march_automatic(problem)
         _check(steps[-1], scene.tables.friction.mu)
         return cls(scene.title, problem, steps[-1].target.depth_mm, len(steps))

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,6 +30,7 @@ from finger3d.meshing.solids import (
     run_mesher,
     tessellated,
 )
+from finger3d.progress import Progress
 
 if TYPE_CHECKING:
     from finger3d.geometry.parts import Glued
@@ -42,7 +42,7 @@ _SECONDS_A_TET = 8e-4  # measured 4e-4 on a loaded machine
 
 
 def new_mesh(
-    design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...], say: Callable[[str], None]
+    design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...], report: Progress
 ) -> tuple[Mesh, float, float]:
     """Return the mesh, the volume (mm3) of the whole body, and the seconds spent on CAD."""
     from finger3d.meshing.snap import UnusableMeshError
@@ -54,7 +54,7 @@ def new_mesh(
     low, high = box(design, symmetry)
     field = sizing(design, options, zone, low, high)
     check_count(forecast(design, field), 3, options, MAX_TETS)
-    say("building the CAD solid")
+    report.say("building the CAD solid")
     glued = glued_solids(design, symmetry)
     body = tessellated(design, glued, _CHORD_ERROR * float(np.linalg.norm(high - low)))
     check_volume(design, body, symmetry)
@@ -62,7 +62,7 @@ def new_mesh(
     cells = forecast(design, field)
     check_count(cells, 3, options, MAX_TETS)
     cad_seconds = time.perf_counter() - start
-    say(f"meshing by netgen, about {cells:.0f} tetrahedra")
+    report.say(f"meshing by netgen, about {cells:.0f} tetrahedra")
     try:
         points, tets = run_child(glued, field, 60.0 + 5.0 * _SECONDS_A_TET * cells)
         return on_cad(points, tets, body, "netgen"), design.volume_mm3, cad_seconds

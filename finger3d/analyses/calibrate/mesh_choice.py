@@ -13,6 +13,7 @@ from finger3d.accuracy.richardson import ORDER
 from finger3d.analyses.calibrate.presses import CurvePoints
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Model
+from finger3d.progress import Progress
 from finger3d.sensor.calibration import Calibration
 
 SHARE = 0.1
@@ -43,7 +44,7 @@ def choose_mesh(
     model: Model,
     automatic: bool,
     calibrated: Callable[[Model], tuple[CurvePoints, Calibration]],
-    say: Callable[[str], None],
+    report: Progress,
     longest_s: float = LONGEST_S,
 ) -> CalibratedMesh:
     """Calibrate on finer and finer meshes, until the mesh matters little or the next one would take too long.
@@ -77,7 +78,7 @@ def choose_mesh(
         found = CalibratedMesh(curve, calibration, note)
         if not automatic or seconds > longest_s:
             return found
-        say(f"{note}; calibrating again")
+        report.say(f"{note}; calibrating again")
         model = finer
 
 

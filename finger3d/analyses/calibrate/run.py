@@ -123,7 +123,7 @@ def _calibrate_scene(
         return curve, _calibration(curve, settings, report)
 
     automatic = not _SIZES & set(scene.given.get("mesh", {}))
-    chosen = choose_mesh(model, automatic, calibrate_model, report.say)
+    chosen = choose_mesh(model, automatic, calibrate_model, report)
     curve, calibration, used = chosen.curve, chosen.calibration, chosen.curve.problem.model.mesh
     if used != model.mesh:
         scene = scene.with_mesh(used)
@@ -181,7 +181,7 @@ def _press_all(
     for margin in (MARGIN, math.inf):
         start = time.perf_counter()
         report.stage("condensing")
-        problem = build(model, report.say, margin)
+        problem = build(model, report, margin)
         seconds = {"build": time.perf_counter() - start}
         for curve in _curve_points(problem, settings, report):
             curve = replace(curve, seconds={**seconds, **curve.seconds}, factorizations_before=spent)
@@ -240,7 +240,7 @@ def _calibration(curve: CurvePoints, settings: CalibrationSettings, report: Prog
             pressed={p.mu: p for p in curve.presses if p.frame.outcome.ok},
         )
         every = evaluate_tolerances(
-            curve.problem, settings.readings, settings.tolerances, base, curve.increments, report.stage
+            curve.problem, settings.readings, settings.tolerances, base, curve.increments, report
         )
         for name, tolerance in every:
             found[name].append(tolerance)

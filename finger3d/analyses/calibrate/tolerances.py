@@ -34,6 +34,7 @@ from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.path import targets
 from finger3d.mechanics.problem import Problem
 from finger3d.objects import Plane
+from finger3d.progress import Progress
 from finger3d.sensor.curve import LARGEST_SD, Tolerance
 
 _LEAST_POINTS = {2: 150, 3: 500}
@@ -115,7 +116,7 @@ def evaluate_tolerances(
     tolerances: Mapping[str, float],
     base: ReferenceReadings,
     increments: Increments,
-    say: Callable[[str], None],
+    report: Progress,
 ) -> Iterator[tuple[str, Tolerance]]:
     """Yield the name of a reading and a tolerance, with its effect at all values of mu of `base`.
 
@@ -126,7 +127,7 @@ def evaluate_tolerances(
     tolerances : standard deviations by name
     base : readings of the nominal body; without inclusions they include those of displaced gauges
     increments : of its path
-    say : receives a line about each tolerance
+    report : receives the messages
 
     Notes
     -----
@@ -143,11 +144,11 @@ def evaluate_tolerances(
     coarse_suffices = len(problem.points.nodes) >= 2 ** (problem.dim - 1) * _LEAST_POINTS[problem.dim]
     coarse = None
     if "mesh" in tolerances or (coarse_suffices and others):
-        say("a coarser body")
-        coarse = _on_coarser_mesh(body, say)
+        report.stage("a coarser body")
+        coarse = _on_coarser_mesh(body, report)
     varied = coarse if coarse and coarse_suffices else body
     for name, sd in tolerances.items():
-        say(f"tolerance {name}")
+        report.stage(f"tolerance {name}")
         known = mu
         if name == "mesh":
             effects = [(sd, sd * _mesh_errors(body, coarse, base.frame, readings))] if coarse else []
@@ -320,10 +321,10 @@ def _scaled_to_path(body: ReferenceBody, legs: tuple[Leg, ...]) -> PressesByMu:
     return {mu: replace(press, forces=extrapolated(press.forces)) for mu, press in body.pressed.items()}
 
 
-def _on_coarser_mesh(body: ReferenceBody, say: Callable[[str], None]) -> ReferenceBody | None:
+def _on_coarser_mesh(body: ReferenceBody, report: Progress) -> ReferenceBody | None:
     """Return the body on the coarser mesh that the error bar comes from; None if there is no coarser mesh."""
     try:
-        return ReferenceBody.of(companion(body.problem, say), body.names, body.mu)
+        return ReferenceBody.of(companion(body.problem, report), body.names, body.mu)
     except Finger3dError:
         return None
 

@@ -199,18 +199,18 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
         simulated = simulation.at(values, data)
         return np.concatenate([(simulated[n] - v) / stds[n] for n, v in data.columns.items()])
 
-    def say(values: Float) -> None:
+    def announce(values: Float) -> None:
         named = ", ".join(f"{f.key} = {v:.5g}" for f, v in zip(simulation.free, values, strict=True))
         report.stage(f"fitting, {simulation.solved} presses: {named}")
 
     tried = [trial for shares in starts for trial in _with_modulus(simulation, shares)]
     costs = [float(np.sum(residuals(values_at(scales, shares)) ** 2)) for shares in tried]
     shares = np.clip(tried[int(np.argmin(costs))], _FROM_BOUND, 1.0 - _FROM_BOUND)
-    shares = fit(scales, shares, residuals, say)
+    shares = fit(scales, shares, residuals, announce)
     weighted = _by_residuals(data, simulation.at(values_at(scales, shares), data), len(scales))
     if weighted:
         stds |= weighted
-        shares = fit(scales, shares, residuals, say)
+        shares = fit(scales, shares, residuals, announce)
         stds |= _by_residuals(data, simulation.at(values_at(scales, shares), data), len(scales))
     values = values_at(scales, shares)
     fitted = uncertainty(scales, shares, jacobian(scales, shares, residuals), residuals)

@@ -27,10 +27,9 @@ from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.step_halving import with_steps
 from finger3d.objects import Plane
+from finger3d.progress import Progress
 from finger3d.sensor.information import ReadingEffects
 from finger3d.sensor.maps import Reader
-
-Say = Callable[[str], None]
 
 _STEPS = 20
 """Number of increments of a leg with automatic increments; few suffice, as places are only compared."""
@@ -96,22 +95,22 @@ class GaugeFields:
 
     @classmethod
     def of(
-        cls, model: Model, mus: Sequence[float], noise: float, tolerances: Mapping[str, float], say: Say
+        cls, model: Model, mus: Sequence[float], noise: float, tolerances: Mapping[str, float], report: Progress
     ) -> GaugeFields:
         """Press the body of a model, and those that its tolerances make of it."""
         model = replace(model, gauges=(), markers=(), taxels=())
-        say("pressing the body")
-        nominal = _nominal(model, mus, say)
+        report.stage("pressing the body")
+        nominal = _nominal(model, mus, report)
         problem, shared = nominal.problem, {}
         for name, make in (("depth_mm", _depth), ("E_percent", _modulus), ("nu", _nu), ("tilt_deg", _tilt)):
             if name in tolerances:
-                say(f"tolerance {name}")
+                report.stage(f"tolerance {name}")
                 found = make(nominal, mus, tolerances[name])
                 if found is not None:
                     shared[name] = found
         coarse, ratio = None, 1.0
         if "mesh" in tolerances:
-            say("tolerance mesh")
+            report.stage("tolerance mesh")
             beside = companion(problem)
             coarse, ratio = StrainField.of(beside, mus), gain(edge_ratio(problem, beside), ORDERS[Kind.STRAIN])
         return cls(nominal, tuple(mus), noise, tolerances, shared, coarse, ratio)
@@ -160,10 +159,10 @@ class GaugeFields:
         return 0.5 * (self.nominal.strain(points + step, angles) - self.nominal.strain(points - step, angles))
 
 
-def _nominal(model: Model, mus: Sequence[float], say: Say) -> StrainField:
+def _nominal(model: Model, mus: Sequence[float], report: Progress) -> StrainField:
     """Press the body; again with all of the contact face if contact leaves the candidate points."""
     for margin in (MARGIN, math.inf):
-        problem = build(model, say, margin)
+        problem = build(model, report, margin)
         if any(leg.steps == "auto" for leg in model.legs):
             problem = with_steps(problem, _STEPS)
         frames = [p.frame for p in sorted(presses(problem, list(mus)), key=lambda p: p.mu)]

@@ -125,10 +125,8 @@ def place_gauges(
         )
     region = _region(model, keys)
     with claimed(out, "optimise") as folder:
-        fields = GaugeFields.of(
-            model, mus, noise, with_defaults(tolerances, largest_spread(scene.tables)), report.stage
-        )
-        found, everywhere = search(fields, region, count, report.stage)
+        fields = GaugeFields.of(model, mus, noise, with_defaults(tolerances, largest_spread(scene.tables)), report)
+        found, everywhere = search(fields, region, count, report)
         maps = tuple(_map(found, i, everywhere) for i in range(count))
         result = GaugePlaces(tuple(mus), found, maps, _with_gauges(given, path, found))
         report.stage("writing")

@@ -54,10 +54,12 @@ def _gauges_need_own_press(model: Model) -> bool:
 class _DesignBody:
     """Body of a design, built once and pressed with several values of mu."""
 
-    def __init__(self, model: Model, mus: Sequence[float], say: Callable[[str], None]) -> None:
+    def __init__(self, model: Model, mus: Sequence[float], report: Progress) -> None:
         self._model, self._own_press = model, _gauges_need_own_press(model)
         variants = self._variants(mus, model.legs)
-        self.shared = SharedBody(model, variants if self._own_press else [replace(v, gauges=()) for v in variants], say)
+        self.shared = SharedBody(
+            model, variants if self._own_press else [replace(v, gauges=()) for v in variants], report
+        )
 
     def _variants(self, mus: Sequence[float], legs: tuple[Leg, ...]) -> list[Variant]:
         laws = [self._model.friction.with_mu(mu) for mu in mus]
@@ -142,7 +144,7 @@ class Search:
     def _press_body(self, model: Model) -> _PressedBody:
         mus = self.problem.mus
         try:
-            body = _DesignBody(model, mus, self.report.say)
+            body = _DesignBody(model, mus, self.report)
             ends = body.ends(mus, self._legs(body, model))
         except Finger3dError as error:
             return _PressedBody(outcome=" ".join(str(error).split()))
@@ -172,7 +174,7 @@ class Search:
         try:
             model = self.problem.scene(start).model()
             if any(leg.steps == "auto" for leg in model.legs):
-                self._legs(_DesignBody(model, _first_middle_last(self.problem.mus), self.report.say), model)
+                self._legs(_DesignBody(model, _first_middle_last(self.problem.mus), self.report), model)
         except Finger3dError:
             pass  # as in a new search, the increments are chosen at the first design that can be built
 
@@ -182,7 +184,7 @@ class Search:
         gauge, mus = self._gauge(model), _first_middle_last(self.problem.mus)
         if gauge is None:
             return {}
-        body = _DesignBody(model, mus, self.report.say)
+        body = _DesignBody(model, mus, self.report)
         legs = self._legs(body, model)
         problem = replace(body.shared.problem, model=replace(body.shared.problem.model, legs=legs))
 
