@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.calibrate.presses import CurvePoints
+from finger3d.analyses.calibrate.curve_points import CurvePoints
 from finger3d.analyses.calibrate.run import calibrated
 from finger3d.analyses.calibrate.settings import MUS
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES

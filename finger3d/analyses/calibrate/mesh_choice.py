@@ -10,7 +10,7 @@ import numpy as np
 
 from finger3d.accuracy.cost import forecast
 from finger3d.accuracy.richardson import ORDER
-from finger3d.analyses.calibrate.presses import CurvePoints
+from finger3d.analyses.calibrate.curve_points import CurvePoints
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Model
 from finger3d.progress import Progress

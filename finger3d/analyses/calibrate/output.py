@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from finger3d._types import Tree
-from finger3d.analyses.calibrate.presses import CurvePoints
+from finger3d.analyses.calibrate.curve_points import CurvePoints
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.io import atomic, write_csv
 from finger3d.mechanics.gauges import Gauge

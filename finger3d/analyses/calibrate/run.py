@@ -14,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._machine import versions
+from finger3d.analyses.calibrate.curve_points import CurvePoints
 from finger3d.analyses.calibrate.increments import choose_increments
 from finger3d.analyses.calibrate.mesh_choice import choose_mesh
 from finger3d.analyses.calibrate.output import write_body, write_curve, write_map, write_points, write_scene
-from finger3d.analyses.calibrate.presses import CurvePoints, presses
 from finger3d.analyses.calibrate.reference import ReferenceReadings, read
 from finger3d.analyses.calibrate.settings import MUS, CalibrationSettings, found_readings
 from finger3d.analyses.calibrate.tolerances import displaced_gauges, evaluate_tolerances, with_defaults
+from finger3d.analyses.pressed_body import presses
 from finger3d.errors import Finger3dError
 from finger3d.io import claimed
 from finger3d.mechanics.build import MARGIN, build

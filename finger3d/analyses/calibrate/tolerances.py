@@ -22,11 +22,11 @@ from finger3d._types import Float
 from finger3d.accuracy.companions import companion
 from finger3d.accuracy.estimate import reading_error
 from finger3d.analyses.calibrate.increments import Increments, error_of_increments
-from finger3d.analyses.calibrate.presses import PressesByMu
 from finger3d.analyses.calibrate.reference import ReferenceBody, ReferenceReadings, read, reading_only
 from finger3d.analyses.calibrate.settings import CalibratedReading
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.analyses.calibrate.variations import deeper, poisson_step, tilted_mesh, with_modulus
+from finger3d.analyses.pressed_body import PressesByMu
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.history import StepResult

@@ -15,8 +15,8 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.accuracy.companions import built_like, companion, edge_ratio
 from finger3d.accuracy.richardson import ORDERS, Kind, gain
-from finger3d.analyses.calibrate.presses import presses
 from finger3d.analyses.calibrate.variations import deeper, poisson_step, tilted_mesh, with_modulus
+from finger3d.analyses.pressed_body import presses
 from finger3d.errors import Finger3dError
 from finger3d.fem.recover import displacement
 from finger3d.mechanics.build import MARGIN, build

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from finger3d.analyses.calibrate import presses as pressing
+from finger3d.analyses import pressed_body as pressing
 from finger3d.analyses.calibrate import run as runs
 from finger3d.contact import acceleration
 from finger3d.contact.conditions import ContactProblem
