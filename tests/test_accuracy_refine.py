@@ -82,7 +82,7 @@ def test_a_mesh_that_is_finer_than_the_tolerance_asks_for_is_made_coarser(adjoin
     # and the error is below the tolerance
     coarse, fine = (build(replace(model, mesh=mesh)) for mesh in (found.mesh, MeshOptions(0.04, 0.2, "swept")))
     ends = [list(march(p))[-1] for p in (coarse, fine)]
-    numbers = [e.target.depth_mm * -e.meshed_state.scene_force[:, 1].sum() for e in ends]  # the one that is not given
+    numbers = [e.target.depth_mm * -e.meshed_state.contact.scene_force[:, 1].sum() for e in ends]
     assert numbers[0] == pytest.approx(numbers[1], rel=0.02)
 
 

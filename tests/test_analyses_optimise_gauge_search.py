@@ -39,4 +39,4 @@ def test_bounds_without_a_place_in_the_body_are_refused() -> None:
 
     fields: Any = SimpleNamespace(mus=(0.1, 1.0), shared=(), effects=outside)
     with pytest.raises(Finger3dError, match="no gauge within these bounds"):
-        search(fields, Region((49.0, 50.0), (48.0, 50.0), (0.0, 0.0), (0.0, 1.0)), 2, lambda _: None)
+        search(fields, Region((49.0, 50.0), (48.0, 50.0), (0.0, 0.0), (0.0, 1.0)), 2, QUIET)

@@ -13,7 +13,7 @@ from finger3d.contact.friction import Coulomb
 from finger3d.fem.recover import displacement
 from finger3d.fem.traces import surface
 from finger3d.mechanics.build import build
-from finger3d.mechanics.coverage import beyond_candidates, contact_within_candidates
+from finger3d.mechanics.coverage import beyond_candidates, check_surface
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg
@@ -97,7 +97,7 @@ def test_candidates_are_widened_when_contact_reaches_beyond_them(monkeypatch) ->
     wide = SharedBody(model, [Variant.of(model)]).press(Variant.of(model))
     said = Log()
     first = [lambda m, report, margin=-0.8: build(m, report, margin)]
-    monkeypatch.setattr("finger3d.mechanics.build.build", lambda m, report, *margin: first[0](m, report, *margin))
+    monkeypatch.setattr("finger3d.analyses.pressed_body.build", lambda m, report, *margin: first[0](m, report, *margin))
     narrow = SharedBody(model, [Variant.of(model)], said)
     again = narrow.press(Variant.of(model))
     assert any("beyond" in text for text in said.lines)
@@ -199,11 +199,8 @@ def test_several_presses_are_proved_as_each_on_its_own(effect) -> None:
             kinematics.gap(problem, displacement(problem.mesh, x), frame.target, face)[0] for x in (unknowns, alone)
         )
         assert np.abs(found - expected).max() <= 1e-12 * frame.target.depth_mm
-    assert (
-        contact_within_candidates(problem, ends)
-        == [contact_within_candidates(problem, [frame])[0] for frame in ends]
-        == [True] * 3
-    )
+    assert all(check.within_candidates for check in check_surface(problem, ends))
+    assert all(check_surface(problem, [end])[0].within_candidates for end in ends)
 
 
 def test_one_solver_proves_as_the_other(monkeypatch) -> None:
@@ -230,7 +227,9 @@ NARROW = -0.8
 
 
 def narrowed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("finger3d.mechanics.build.build", lambda m, report, margin=NARROW: build(m, report, margin))
+    monkeypatch.setattr(
+        "finger3d.analyses.pressed_body.build", lambda m, report, margin=NARROW: build(m, report, margin)
+    )
 
 
 @pytest.mark.parametrize("threads", [False, True], ids=["in turn", "at once"])
@@ -255,11 +254,6 @@ def test_presses_together_are_the_presses_alone(threads, monkeypatch) -> None:
         assert other.gauges == pytest.approx(one.gauges, rel=1e-9)
     assert together[1].gauges != together[3].gauges
     assert [p.seconds > 0.0 for p in together] == [True, True, True, False]
-    # frames speak of the body as it is in the end
-    again = SharedBody(models[1], variants)
-    assert {f[-1].meshed_state.contact.force.shape for f in again.frames(variants)} == {
-        (len(again.problem.surface.nodes), 2)
-    }
 
 
 @pytest.mark.parametrize("threads", [False, True], ids=["in turn", "at once"])
@@ -297,7 +291,7 @@ def test_presses_that_cannot_be_proved_fail_and_what_failed_before_keeps_its_rea
         raise MemoryError("no proof")
 
     monkeypatch.setattr("finger3d.mechanics.step_halving.march", failing)
-    monkeypatch.setattr("finger3d.mechanics.coverage.check_surface", unproved)
+    monkeypatch.setattr("finger3d.analyses.shared_body.check_surface", unproved)
     assert [str(p) for p in body.presses(variants)] == ["no proof", "its own"]
 
 
@@ -310,7 +304,7 @@ def test_a_body_that_cannot_be_widened_fails_those_that_need_it_only(monkeypatch
             raise MemoryError
         return build(model, report, margin)
 
-    monkeypatch.setattr("finger3d.mechanics.build.build", once)
+    monkeypatch.setattr("finger3d.analyses.pressed_body.build", once)
     found = list(SharedBody(models[0], variants).presses(variants))
     assert [isinstance(p, MemoryError) for p in found] == [True, False, True]
     assert found[1].outcome == "converged"

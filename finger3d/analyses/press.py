@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING
 from finger3d._types import Tree
 from finger3d.analyses.press_files import Fields, ResultWriter
 from finger3d.analyses.press_record import PressRecord, depth_warning, point_count_warning
+from finger3d.analyses.pressed_body import PressedBody
 from finger3d.analyses.result import PressResult
 from finger3d.io import claimed
 from finger3d.mechanics.formulations import formulation_of
@@ -107,34 +107,21 @@ def _solve(scene: Scene, writer: ResultWriter, report: Progress, started: float)
     """Build the problem and march through its increments, again with all points of the free faces if contact reaches
     beyond the candidate points.
     """
-    from finger3d.mechanics.build import build
-    from finger3d.mechanics.coverage import check_surface
-    from finger3d.mechanics.force_control import at_depth_reached
-
     refinement = _refine_mesh(scene, report)
     if refinement:
         scene = scene.with_mesh(refinement.mesh)
     writer.scene(scene.to_toml())
-    model = scene.model()
     report.stage("meshing")
-    problem = (refinement.problem if refinement else None) or build(model, report)
-    record = PressRecord(scene, problem, started, refinement)
-    _march(record, writer, report)
-    reached = max((step.target.depth_mm for step in record.converged_steps), default=0.0)
-    if legs := at_depth_reached(problem.model.legs, reached):
-        report.say(f"the force is reached at {reached:.3g} mm, deeper than was forecast; meshing again")
-        report.stage("meshing")
-        problem = build(replace(problem.model, legs=legs), report)
-        record = PressRecord(scene, problem, started, refinement, record.all_factorizations)
+    body = PressedBody(scene.model(), report, refinement.problem if refinement else None)
+
+    def press_all(problem: Problem, before: PressRecord | None) -> tuple[PressRecord, list[StepResult]]:
+        spent = before.all_factorizations if before else 0
+        record = PressRecord(scene, problem, started, refinement, spent)
         _march(record, writer, report)
-    record.surface_checks = check_surface(problem, record.converged_steps)
-    if not all(check.within_candidates for check in record.surface_checks):
-        report.say("contact reached beyond the candidate points; solving again with all points of the free faces")
-        report.stage("meshing")
-        problem = build(problem.model, report, math.inf)
-        record = PressRecord(scene, problem, started, refinement, record.all_factorizations)
-        _march(record, writer, report)
-        record.surface_checks = check_surface(problem, record.converged_steps)
+        return record, record.converged_steps
+
+    record, checks = body.pressed(press_all)
+    record.surface_checks = checks
     record.keep_penetration()
     writer.progress(record)
     return record

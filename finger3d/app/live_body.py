@@ -11,16 +11,15 @@ import numpy as np
 
 from finger3d._types import Array, Float, freeze_arrays
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
+from finger3d.analyses.pressed_body import PressedBody, under
 from finger3d.errors import Finger3dError
 from finger3d.fem.recover import displacement
-from finger3d.mechanics.build import build
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.history import StepResult, contact_table, measure
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
-from finger3d.mechanics.step_halving import march_automatic
 from finger3d.plotting.figures import middle_line
 from finger3d.progress import QUIET, Progress
 
@@ -115,12 +114,11 @@ class LiveBody:
             name = next(slots[slot] for slot in ("hyperelastic_law", "relaxation", "inclusions") if slot in slots)
             raise Finger3dError(f"app: not with effects.{name}, which takes seconds to press; take the effect out")
         if len(model.legs) > 1 or model.legs[0].moves_sideways:
-            depth = model.largest_depth_mm
-            return cls(scene.title, build(replace(model, legs=(Leg(depth, steps=STEPS),)), report), depth, STEPS)
-        problem = build(model, report)
-        steps, _ = march_automatic(problem)
+            model = replace(model, legs=(Leg(model.largest_depth_mm, steps=STEPS),))
+        body = PressedBody(model, report)
+        steps = body.steps()
         _check(steps[-1], scene.tables.friction.mu)
-        return cls(scene.title, problem, steps[-1].target.depth_mm, len(steps))
+        return cls(scene.title, body.problem, steps[-1].target.depth_mm, len(steps))
 
     def press(self, mu: float, depth_mm: float) -> LivePress:
         """Press with a coefficient of friction to a depth; the last presses are kept.
@@ -171,9 +169,8 @@ class LiveBody:
 @lru_cache(maxsize=_KEPT)
 def _pressed(body: LiveBody, mu: float, depth_mm: float) -> LivePress:
     problem = body.problem
-    friction = problem.model.friction.with_mu(mu)
-    legs = (Leg(depth_mm, steps=body.steps),)
-    steps = list(march(replace(problem, model=replace(problem.model, friction=friction, legs=legs))))
+    pressed = under(problem, problem.model.friction.with_mu(mu), (Leg(depth_mm, steps=body.steps),))
+    steps = list(march(pressed))
     _check(steps[-1], mu)
     measured = measure(problem.points, steps[-1])
     table = contact_table(problem.points, steps[-1].state)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -21,11 +20,10 @@ from finger3d.analyses.calibrate.output import write_body, write_curve, write_ma
 from finger3d.analyses.calibrate.reference import ReferenceReadings, read
 from finger3d.analyses.calibrate.settings import MUS, CalibrationSettings, found_readings
 from finger3d.analyses.calibrate.tolerances import displaced_gauges, evaluate_tolerances, with_defaults
-from finger3d.analyses.pressed_body import presses
+from finger3d.analyses.pressed_body import PressedBody, presses, under
 from finger3d.errors import Finger3dError
 from finger3d.io import claimed
-from finger3d.mechanics.build import MARGIN, build
-from finger3d.mechanics.coverage import contact_within_candidates
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
 from finger3d.progress import Progress
@@ -178,21 +176,19 @@ def _press_all(
     chosen = [] if model.inclusions else [g for g in model.gauges if g.name in settings.names]
     extra = [d.gauge for gauge in chosen for d in displaced_gauges(model, gauge, settings.tolerances)]
     model = replace(model, gauges=(*model.gauges, *extra))
-    spent = 0
-    for margin in (MARGIN, math.inf):
-        start = time.perf_counter()
-        report.stage("condensing")
-        problem = build(model, report, margin)
-        seconds = {"build": time.perf_counter() - start}
+    report.stage("condensing")
+    body = PressedBody(model, report)
+
+    def press_all(problem: Problem, before: CurvePoints | None) -> tuple[CurvePoints, list[StepResult]]:
+        spent = before.factorizations if before else 0
         for curve in _curve_points(problem, settings, report):
-            curve = replace(curve, seconds={**seconds, **curve.seconds}, factorizations_before=spent)
+            seconds = {"build": body.seconds, **curve.seconds}
+            curve = replace(curve, seconds=seconds, factorizations_before=spent)
             if folder:
                 write_points(folder, curve, settings)
-        if all(contact_within_candidates(curve.problem, list(curve.frames.values()))):
-            break
-        spent = curve.factorizations
-        report.say("contact reached beyond the candidate points; once more with all of the contact face")
-    return curve
+        return curve, list(curve.frames.values())
+
+    return body.pressed(press_all)[0]
 
 
 def _curve_points(problem: Problem, settings: CalibrationSettings, report: Progress) -> Iterator[CurvePoints]:
@@ -204,7 +200,7 @@ def _curve_points(problem: Problem, settings: CalibrationSettings, report: Progr
     increments = choose_increments(problem, lambda p: (read(p, settings.names, three) / settings.noise).ravel())
     if increments.chosen:
         report.say(str(increments))
-    problem = replace(problem, model=replace(problem.model, legs=increments.legs))
+    problem = under(problem, legs=increments.legs)
     if problem.model.finite_strain:
         formulation = dict(problem.model.filled).get("hyperelastic_law", "this body")
         report.say(

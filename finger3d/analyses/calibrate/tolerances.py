@@ -26,7 +26,7 @@ from finger3d.analyses.calibrate.reference import ReferenceBody, ReferenceReadin
 from finger3d.analyses.calibrate.settings import CalibratedReading
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.analyses.calibrate.variations import deeper, poisson_step, tilted_mesh, with_modulus
-from finger3d.analyses.pressed_body import PressesByMu
+from finger3d.analyses.pressed_body import PressesByMu, under
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.history import StepResult
@@ -140,7 +140,7 @@ def evaluate_tolerances(
     others = set(tolerances) - {*_GAUGE_PLACES, "increments"}
     if others and increments.comparison_legs != problem.model.legs:
         legs = increments.comparison_legs
-        body = ReferenceBody.of(replace(problem, model=replace(problem.model, legs=legs)), names, mu)
+        body = ReferenceBody.of(under(problem, legs=legs), names, mu)
     coarse_suffices = len(problem.points.nodes) >= 2 ** (problem.dim - 1) * _LEAST_POINTS[problem.dim]
     coarse = None
     if "mesh" in tolerances or (coarse_suffices and others):
@@ -222,7 +222,7 @@ def _vary_depth(body: ReferenceBody, readings: Sequence[CalibratedReading], sd: 
     shallowest = min(leg.depth_mm for leg in model.legs if leg.depth_mm > 0.0)
     for step in (sd, -min(sd, 0.5 * shallowest)):
         legs = deeper(model.legs, step)
-        yield step, body.change(replace(problem, model=replace(model, legs=legs)), _scaled_to_path(body, legs))
+        yield step, body.change(under(problem, legs=legs), _scaled_to_path(body, legs))
 
 
 def _vary_modulus(body: ReferenceBody, readings: Sequence[CalibratedReading], sd: float) -> Iterator[Effect]:

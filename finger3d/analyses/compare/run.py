@@ -87,7 +87,14 @@ def compare(
     from finger3d.scene import scene_of
 
     report = report or Progress()
-    solid = _as_solid(scene_of(scene, overrides))
+    scene = scene_of(scene, overrides)
+    tolerance = scene.tables.mesh.tolerance
+    if tolerance is not None:
+        raise Finger3dError(
+            f"{scene.path or scene.title}: mesh.tolerance = {tolerance:g}: compare needs fixed edge lengths; press "
+            "determines them and writes them to the scene.toml of its results, which compare accepts"
+        )
+    solid = _as_solid(scene)
     model = solid.model()
     other_widths = _other_widths(model, widths)
     _check(model, other_widths)

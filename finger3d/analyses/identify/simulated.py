@@ -15,7 +15,8 @@ from scipy.interpolate import PchipInterpolator
 from finger3d._types import Float, Tree, TreeView
 from finger3d.analyses.free_keys import FreeKey, scene_with
 from finger3d.analyses.identify.measured import MeasuredPress
-from finger3d.analyses.shared_body import SharedBody, Variant, body_key
+from finger3d.analyses.pressed_body import PressedBody
+from finger3d.analyses.shared_body import body_key
 from finger3d.errors import Finger3dError
 from finger3d.materials.shore import modulus_of_shore_00, modulus_of_shore_A
 from finger3d.mechanics.history import flat_readings, measure, without_readings
@@ -77,7 +78,7 @@ class Simulation:
     free: tuple[FreeKey, ...]
     journal: Journal
     _known: dict[tuple[float, ...], Curve | str] = field(default_factory=dict)
-    _bodies: dict[str, SharedBody] = field(default_factory=dict)
+    _bodies: dict[str, PressedBody] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Take over the solutions of an earlier run."""
@@ -141,7 +142,7 @@ class Simulation:
             scene = self.scene(point)
             model = scene.model()
             body = self._body(scene, model)
-            (frames,) = body.frames([Variant.of(model)])
+            frames = body.steps(model.friction, model.rule)
         except Finger3dError as error:
             return {"values": list(point), "outcome": " ".join(str(error).split()), "curve": {}}
         bad = next((f for f in frames if not f.outcome.ok), None)
@@ -151,18 +152,17 @@ class Simulation:
         rows = []
         for number, frame in enumerate(frames, start=1):
             entry = measure(body.problem.points, frame)
-            entry["gauges"] = body.strains(Variant.of(model), entry["gauges"])
             rows.append({"step": float(number)} | without_readings(entry) | flat_readings(entry))
         columns = {n: [0.0, *(r[n] for r in rows)] for n in rows[0] if isinstance(rows[0][n], int | float)}
         return {"values": list(point), "outcome": "converged", "curve": columns}
 
-    def _body(self, scene: Scene, model: Model) -> SharedBody:
+    def _body(self, scene: Scene, model: Model) -> PressedBody:
         """Return the condensed body of a scene; the last ones are kept."""
         key = json.dumps([body_key(scene), scene.as_dict()["press"], repr(model.gauges)])
         if key not in self._bodies:
             while len(self._bodies) >= _MAX_STORED:
                 self._bodies.pop(next(iter(self._bodies)))
-            self._bodies[key] = SharedBody(model, [Variant.of(model)])
+            self._bodies[key] = PressedBody(model)
         return self._bodies[key]
 
     def _keep(self, row: Mapping[str, Any]) -> None:

@@ -21,7 +21,8 @@ from finger3d.analyses.optimise.task import (
     ObjectiveTable,
     OptimisationProblem,
 )
-from finger3d.analyses.shared_body import SharedBody, Variant, body_key
+from finger3d.analyses.pressed_body import PressedBody, under
+from finger3d.analyses.shared_body import body_key
 from finger3d.errors import Finger3dError
 from finger3d.io import write_csv
 from finger3d.mechanics.formulations import formulation_of
@@ -38,7 +39,7 @@ _MAX_STORED = 4  # bodies with their increments
 
 
 @dataclass(frozen=True)
-class _PressedBody:
+class _PressedDesign:
     """Increments of a body for every mu, which gauges are read from, or the reason why there are none."""
 
     steps: tuple[dict[str, float], ...] = ()
@@ -51,40 +52,26 @@ def _gauges_need_own_press(model: Model) -> bool:
     return model.inclusions is not None or model.finite_strain
 
 
-class _DesignBody:
+class _DesignBody(PressedBody):
     """Body of a design, built once and pressed with several values of mu."""
 
-    def __init__(self, model: Model, mus: Sequence[float], report: Progress) -> None:
-        self._model, self._own_press = model, _gauges_need_own_press(model)
-        variants = self._variants(mus, model.legs)
-        self.shared = SharedBody(
-            model, variants if self._own_press else [replace(v, gauges=()) for v in variants], report
-        )
-
-    def _variants(self, mus: Sequence[float], legs: tuple[Leg, ...]) -> list[Variant]:
-        laws = [self._model.friction.with_mu(mu) for mu in mus]
-        return [Variant.of(replace(self._model, friction=law, legs=legs)) for law in laws]
-
-    def ends(self, mus: Sequence[float], legs: tuple[Leg, ...]) -> list[StepResult]:
-        """Return the last increment for every mu."""
-        return [frames[-1] for frames in self.shared.frames(self._variants(mus, legs))]
+    def __init__(self, model: Model, report: Progress) -> None:
+        self._own_press = _gauges_need_own_press(model)
+        super().__init__(model if self._own_press else replace(model, gauges=()), report)
 
     def reader(self, ends: Sequence[StepResult]) -> Callable[[Gauge], Float]:
         """Return a function that gives the strain (m,) of any gauge in increments (m,)."""
-        body = self.shared
         if self._own_press:
-            (variant,) = self._variants((0.0,), self._model.legs)
-            strains = [body.strains(variant, frame.gauges) for frame in ends]
-            return lambda g: np.array([strain[g.name] for strain in strains])
-        mesh, axes = body.problem.mesh, body.problem.axes
-        fields = formulation_of(body.problem.model).unknowns(body.problem, [f.meshed_state for f in ends])
+            return lambda g: np.array([end.gauges[g.name] for end in ends])
+        mesh, axes = self.problem.mesh, self.problem.axes  # all that is kept of the body
+        fields = formulation_of(self.problem.model).unknowns(self.problem, [end.meshed_state for end in ends])
         u = np.array([x[: mesh.points.size] for x in fields])
         return lambda g: np.asarray(g.row(mesh, axes)[:, : mesh.points.size] @ u.T).ravel()
 
     def strain(self, gauge: Gauge, mus: Sequence[float], legs: tuple[Leg, ...]) -> Float:
         """Return the strain (m,) of a gauge for values of mu (m,), NaN where a press failed."""
         ends = self.ends(mus, legs)
-        return np.where([f.outcome.ok for f in ends], self.reader(ends)(gauge), math.nan)
+        return np.where([end.outcome.ok for end in ends], self.reader(ends)(gauge), math.nan)
 
 
 class _BudgetExhausted(Exception):
@@ -104,7 +91,7 @@ class Search:
     bodies: int = 0
     evaluated: int = 0
     chosen: tuple[int | Literal["auto"], ...] | None = None
-    _stored: dict[str, _PressedBody] = field(default_factory=dict)
+    _stored: dict[str, _PressedDesign] = field(default_factory=dict)
 
     def evaluate(self, values: Sequence[float] | Float) -> Evaluation:
         """Evaluate a design unless it is known; a new evaluation is appended to the journal at once."""
@@ -129,7 +116,7 @@ class Search:
         value = self.objective(table)
         return Evaluation(point, value, "converged" if math.isfinite(value) else "the objective is no finite number")
 
-    def _press(self, scene: Scene) -> _PressedBody:
+    def _press(self, scene: Scene) -> _PressedDesign:
         key = json.dumps([body_key(scene), scene.as_dict()["press"], scene.as_dict()["contact"]])
         model = scene.model()
         if _gauges_need_own_press(model):
@@ -141,17 +128,17 @@ class Search:
             self.bodies += 1
         return self._stored[key]
 
-    def _press_body(self, model: Model) -> _PressedBody:
+    def _press_body(self, model: Model) -> _PressedDesign:
         mus = self.problem.mus
         try:
-            body = _DesignBody(model, mus, self.report)
+            body = _DesignBody(model, self.report)
             ends = body.ends(mus, self._legs(body, model))
         except Finger3dError as error:
-            return _PressedBody(outcome=" ".join(str(error).split()))
+            return _PressedDesign(outcome=" ".join(str(error).split()))
         for mu, frame in zip(mus, ends, strict=True):
             if not frame.outcome.ok:
-                return _PressedBody(outcome=f"mu = {mu:g}: {frame.outcome}")
-        return _PressedBody(tuple(measure(body.shared.problem.points, frame) for frame in ends), body.reader(ends))
+                return _PressedDesign(outcome=f"mu = {mu:g}: {frame.outcome}")
+        return _PressedDesign(tuple(measure(body.problem.points, frame) for frame in ends), body.reader(ends))
 
     def _gauge(self, model: Model) -> Gauge | None:
         """Return the gauge that is optimised, if the scene has one."""
@@ -164,7 +151,7 @@ class Search:
             return model.legs
         if self.chosen is None:
             mus, noise = _first_middle_last(self.problem.mus), self.problem.noise
-            found = choose_increments(body.shared.problem, lambda p: body.strain(gauge, mus, p.model.legs) / noise)
+            found = choose_increments(body.problem, lambda p: body.strain(gauge, mus, p.model.legs) / noise)
             self.report.say(str(found))
             self.chosen = tuple(leg.steps for leg in found.legs)
         return tuple(replace(leg, steps=n) for leg, n in zip(model.legs, self.chosen, strict=True))
@@ -174,7 +161,7 @@ class Search:
         try:
             model = self.problem.scene(start).model()
             if any(leg.steps == "auto" for leg in model.legs):
-                self._legs(_DesignBody(model, _first_middle_last(self.problem.mus), self.report), model)
+                self._legs(_DesignBody(model, self.report), model)
         except Finger3dError:
             pass  # as in a new search, the increments are chosen at the first design that can be built
 
@@ -184,9 +171,9 @@ class Search:
         gauge, mus = self._gauge(model), _first_middle_last(self.problem.mus)
         if gauge is None:
             return {}
-        body = _DesignBody(model, mus, self.report)
+        body = _DesignBody(model, self.report)
         legs = self._legs(body, model)
-        problem = replace(body.shared.problem, model=replace(body.shared.problem.model, legs=legs))
+        problem = under(body.problem, legs=legs)
 
         def strain(other: Any) -> Float:
             return body.strain(gauge, mus, other.model.legs)
