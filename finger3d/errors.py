@@ -72,6 +72,13 @@ class Outcome(Enum):
         "large deformation did not settle; the steps before are good; try more steps or a shallower press, and a "
         "fillet where a sharp edge of the finger folds over"
     )
+    FORCE_NOT_REACHED = (
+        "the prescribed force is not reached within the finger's height; prescribe a smaller force, or a depth"
+    )
+    FORCE_JUMPS = (
+        "the prescribed force is not reached: the force jumps with the depth; prescribe a depth, or use [contact] "
+        "rule = 'projection' and a constant friction coefficient"
+    )
     INDEFINITE = "the compliance is not positive: the body is not held; fix its base, or check the mesh"
     PASSED_THROUGH = (
         "the object would pass through the finger's surface within an increment, or the surface through it; the steps "

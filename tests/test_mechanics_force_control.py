@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+import json
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from finger3d.cli import main
+from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.effects.viscosity import Effect as Viscosity
-from finger3d.errors import Finger3dError, MissingError
+from finger3d.errors import Finger3dError, Outcome
 from finger3d.mechanics.build import build
-from finger3d.mechanics.force_control import at_depth_reached, depth_of_force, forecast_depth
+from finger3d.mechanics.force_control import DepthSearch, Trial, at_depth_reached, forecast_depth
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.solve import march
+from finger3d.objects import Plane
 from finger3d.scene import load
 from tests.models import block, fig9
 
@@ -55,18 +62,87 @@ def test_a_force_is_reached_with_an_effect(effect: LargeDeformation | Viscosity)
     assert creeps > 0.01 if isinstance(effect, Viscosity) else abs(creeps) < 1e-6
 
 
-def test_a_force_beyond_the_height_is_refused_with_the_largest_that_can() -> None:
-    model = block(legs=(Leg(1.0, steps=1, force_N=1e6),))
-    with pytest.raises(MissingError, match=r"force_N = 1e\+06: "):
-        list(march(build(model)))
+def test_a_force_beyond_the_height_ends_the_press_with_the_largest_that_was_found() -> None:
+    last = list(march(build(block(legs=(Leg(1.0, steps=1, force_N=1e6),)))))[-1]
+    assert last.outcome is Outcome.FORCE_NOT_REACHED
+    assert "1e+06 N asked; the largest force is" in last.detail
+
+
+def search_of(force: Callable[[float], float], wanted: float, start: float) -> DepthSearch:
+    """A search in a function of the depth, mm; NaN stands for an increment that fails."""
+
+    def trial(depth: float, good: Sequence[Trial]) -> Trial:
+        value = force(depth)
+        outcome = Outcome.NEWTON if np.isnan(value) else Outcome.CONVERGED
+        return Trial(depth, ContactSolution(REST, outcome, 0.0, 1, "none"), value)
+
+    return DepthSearch(trial, wanted, start, 10.0)
+
+
+REST = ContactState.at_rest(np.zeros(1), 2)
 
 
 def test_the_depth_of_a_force_is_a_root() -> None:
-    def force(depth: float) -> float:
-        return depth**1.5
-
     for start, guess in ((0.0, 0.1), (2.0, 3.0), (0.0, 5.0)):
-        assert depth_of_force(force, 1.0, start, guess, 10.0, 1.0) == pytest.approx(1.0, rel=1e-9)
+        search = search_of(lambda depth: max(depth, 0.0) ** 1.5, 1.0, start)
+        assert search.run(guess).depth == pytest.approx(1.0, rel=1e-8)
+        assert len(search.good) <= 10
+
+
+def test_a_trial_that_fails_is_followed_by_one_nearer() -> None:
+    search = search_of(lambda depth: depth if depth < 2.0 else np.nan, 1.9, 0.0)
+    assert search.run(8.0).depth == pytest.approx(1.9, rel=1e-8)
+    assert search_of(lambda depth: depth if depth < 2.0 else np.nan, 2.5, 0.0).run(8.0).solution.outcome is (
+        Outcome.NEWTON
+    )
+
+
+def test_an_object_that_has_passed_through_does_not_hide_the_force() -> None:
+    for far in (0.0, -3.0):
+        search = search_of(lambda depth, far=far: depth if depth < 2.0 else far, 1.5, 0.0)  # type: ignore[misc]
+        assert search.run(6.0).depth == pytest.approx(1.5, rel=1e-8)
+
+
+def test_a_force_that_jumps_is_not_reached() -> None:
+    found = search_of(lambda depth: depth + (depth > 1.0), 1.5, 0.0).run(0.4)
+    assert found.solution.outcome is Outcome.FORCE_JUMPS
+    assert "1 N and 2 N on either side of 1 mm" in found.solution.detail
+
+
+def test_a_slide_that_loses_the_contact_says_so() -> None:
+    found = search_of(lambda depth: 0.0, 1.5, 0.0).run(0.4)
+    assert found.solution.outcome is Outcome.FORCE_NOT_REACHED
+    assert "does not touch" in found.solution.detail
+
+
+def test_a_turn_under_a_constant_force_lifts_the_object_above_first_touch() -> None:
+    legs = (Leg(0.2, steps=1, force_N=0.5), Leg(0.2, steps=2, force_N=0.5, turn_z=math.radians(10.0)))
+    found = ends(block(legs=legs, domain="plane-strain", object=Plane()))
+    assert [step["normal_force_N"] for step in found] == pytest.approx([0.5] * 3, rel=1e-6)
+    assert found[-1]["depth_mm"] < 0.0
+
+
+@pytest.mark.parametrize("large", [False, True])
+def test_a_force_under_the_papers_rule_is_reached_or_ends_the_press(large: bool) -> None:
+    model = replace(block(legs=(Leg(0.2, steps=1, force_N=5.0),), domain="plane-strain"), rule="paper")
+    model = LargeDeformation().apply(model) if large else model
+    last = list(march(build(model)))[-1]
+    assert not last.outcome.is_cycle
+    if last.outcome.ok:
+        assert measure(build(model).points, last)["normal_force_N"] == pytest.approx(5.0, rel=1e-6)
+
+
+def test_a_force_at_large_deformation_takes_at_most_twice_the_factorisations_of_a_depth() -> None:
+    def factors(legs: tuple[Leg, ...]) -> tuple[int, float]:
+        problem = build(LargeDeformation().apply(block(legs=legs, domain="plane-strain")))
+        workspace = formulation_of(problem.model).workspace()
+        last = list(march(problem, workspace=workspace))[-1]
+        assert last.outcome.ok
+        return workspace.factorizations, measure(problem.points, last)["normal_force_N"]
+
+    by_depth, force = factors((Leg(1.0, steps=5),))
+    by_force, _ = factors((Leg(1.0, steps=5, force_N=force),))
+    assert by_force <= 2 * by_depth
 
 
 def test_a_forecast_is_good_to_a_factor_of_two() -> None:
@@ -126,4 +202,7 @@ def test_a_press_by_force_tells_the_depth(tmp_path: Path, capsys: pytest.Capture
     assert main(["press", str(path), "--out", str(tmp_path / "out"), "--no-figures", "--no-error"]) == 0
     assert "0.5 N" in capsys.readouterr().out
     assert main(["press", str(path), "--out", str(tmp_path / "far"), "--set", "press.force_N=1e4"]) == 3
-    assert capsys.readouterr().err.strip().count("\n") < 8
+    error = capsys.readouterr().err
+    assert "5000 N asked; the largest force is" in error
+    summary = json.loads((tmp_path / "far" / "summary.json").read_text())
+    assert "prescribed force is not reached" in summary["outcome"]

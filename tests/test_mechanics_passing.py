@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -28,7 +29,7 @@ def section(obj: RigidObject, *legs: Leg, finite: bool = False, **changes: objec
         design=body, object=obj, legs=legs, domain="plane-strain", mesh=MeshOptions(0.4, 2.0, "swept"),
         friction=Coulomb(0.5),
     )  # fmt: skip
-    model = Model(**(vars(model) | changes))
+    model = replace(model, **changes)
     return LargeDeformation().apply(model) if finite else model
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 
@@ -27,7 +28,7 @@ def penetration(obj: RigidObject, size: float, mu: float, base: float = 2.0) -> 
     design = designs()["block"](half_length_mm=7.0, height_mm=HEIGHT, width_mm=HEIGHT)
     options = MeshOptions(size, base * size, "swept")
     model = Model(design, Isotropic(1.0, 0.4), options, (Leg(DEPTH, steps=3),), object=obj, friction=Coulomb(mu))
-    model = Effect().apply(Model(**(vars(model) | {"domain": "plane-strain"})))
+    model = Effect().apply(replace(model, domain="plane-strain"))
     problem = build(model)
     steps = list(march(problem))
     assert all(step.outcome.ok for step in steps)
@@ -75,12 +76,12 @@ def test_a_ball_enters_a_solid_by_less_than_a_hundredth_of_the_depth_by_default(
 
 def test_the_edge_length_that_is_advised_leaves_a_hundredth_of_the_depth() -> None:
     scene = parse({**SOLID, "object": {"shape": "sphere", "radius_mm": 6.8}})
-    model = Model(**(vars(scene.model()) | {"mesh": MeshOptions(0.6, 2.0, "swept")}))
+    model = replace(scene.model(), mesh=MeshOptions(0.6, 2.0, "swept"))
     problem, check = pressed(model)
     assert not penetration_warnings(problem, [check])
     (line,) = penetration_advice(problem, [check])
     (length,) = re.findall(r"mesh\.size_mm = ([\d.]+) .*\b1%", line)
-    finer = Model(**(vars(model) | {"mesh": MeshOptions(float(length), 2.0, "swept")}))
+    finer = replace(model, mesh=MeshOptions(float(length), 2.0, "swept"))
     assert "fillet" not in line
     assert 0.2 < float(length) < 0.6
     problem, check = pressed(finer)

@@ -36,7 +36,7 @@ from finger3d.fem.material import Isotropic
 from finger3d.geometry.files import read_surface
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
-from finger3d.mechanics.build import build, contact_box
+from finger3d.mechanics.build import build
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
@@ -209,7 +209,7 @@ def _warm_cache(size: float) -> tuple[float, float]:
             seconds = []
             for _ in range(2):
                 begin = time.perf_counter()
-                mesh_solid(model.design, model.mesh, contact_box(model), symmetry(model))
+                mesh_solid(model.design, model.mesh, model.first_contact.contact_box, symmetry(model))
                 seconds.append(time.perf_counter() - begin)
         finally:
             os.environ.pop("FINGER3D_CACHE")

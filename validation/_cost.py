@@ -33,7 +33,7 @@ from finger3d.mechanics.symmetry import active_dofs, held_dofs, symmetry, unfold
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.report import MeshReport
 from finger3d.meshing.swept import mesh_section
-from finger3d.objects import initial_contact, vertical_frame
+from finger3d.objects import vertical_frame
 
 Float = NDArray[np.float64]
 
@@ -127,7 +127,7 @@ class Parts:
 
 def assembled(model: Model, element: str) -> Parts:
     """Mesh and assemble a model with elements of a kind."""
-    way, axes = initial_contact(model.contact_path), symmetry(model)
+    way, axes = model.first_contact, symmetry(model)
     make = mesh_solid if model.domain == "solid" else mesh_section
     mesh, report = make(model.design, model.mesh, way.contact_box, axes)
     start = time.perf_counter()

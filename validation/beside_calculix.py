@@ -24,7 +24,6 @@ from typing import Any
 from finger3d._machine import versions
 from finger3d.analyses.calculix.run import program
 from finger3d.errors import MissingError
-from finger3d.mechanics.build import contact_box
 from finger3d.mechanics.symmetry import symmetry
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.swept import mesh_section
@@ -110,7 +109,7 @@ def _pressed(case: Case) -> Pressed:
     model = model_of(case)
     make = mesh_solid if case.body == SOLID else mesh_section
     axes = symmetry(model)
-    mesh, _ = make(model.design, model.mesh, contact_box(model), axes)
+    mesh, _ = make(model.design, model.mesh, model.first_contact.contact_box, axes)
     return Pressed(mesh, 1.0, NU, model.friction.mu, 10.0, case.counts[0], model.design.width_mm, axes)
 
 

@@ -30,7 +30,7 @@ from finger3d.fem.recover import displacement
 from finger3d.geometry.design import Design
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
-from finger3d.mechanics.build import MARGIN, build, contact_box
+from finger3d.mechanics.build import MARGIN, build
 from finger3d.mechanics.coverage import SurfaceCheck, check_surface
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult
@@ -124,7 +124,7 @@ def ball(radius_mm: float, depth_mm: float) -> Model:
 def _by_default(model: Model) -> Model:
     """Return a model with the edge lengths of a scene that gives none."""
     table = MeshTable(mesher="swept")
-    return replace(model, mesh=chosen(table, model.design, model.domain, model.object, contact_box(model)))
+    return replace(model, mesh=chosen(table, model.design, model.domain, model.object, model.first_contact.contact_box))
 
 
 def _finger(rng: np.random.Generator, width: float) -> Design:

@@ -27,7 +27,7 @@ from finger3d.fem.material import Elasticity, Isotropic
 from finger3d.fem.traces import local_rows
 from finger3d.fem.transfer import facing_trace
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.build import build, contact_box
+from finger3d.mechanics.build import build
 from finger3d.mechanics.elastic_object import ObjectBody
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
@@ -191,7 +191,7 @@ def _third_law_rows() -> list[Row]:
     assert frame.outcome.ok
     forces = problem.upright_force(frame.meshed_state.contact)
     force = forces.ravel()
-    other, _ = ObjectBody(model, 5.0, contact_box(model), (), QUIET).mesh()
+    other, _ = ObjectBody(model, 5.0, model.first_contact.contact_box, (), QUIET).mesh()
     axes = vertical_frame(2)
     ends, moved = [], np.zeros_like(force)
     for mesh, rows, (modulus, nu) in (

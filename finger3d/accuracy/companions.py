@@ -15,7 +15,7 @@ import numpy as np
 
 from finger3d.errors import Finger3dError, UnresolvedError
 from finger3d.fem.traces import contact_face, surface
-from finger3d.mechanics.build import build, contact_box
+from finger3d.mechanics.build import build
 from finger3d.mechanics.model import MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.symmetry import symmetry
@@ -126,7 +126,7 @@ def _built_if(problem: Problem, model: Model, enough: Callable[[float], bool], r
     """
     if model.domain != "solid" or model.mesh.mesher == "swept":
         made = mesh_solid if model.domain == "solid" else mesh_section
-        mesh = made(model.design, model.mesh, contact_box(model), symmetry(model))[0]
+        mesh = made(model.design, model.mesh, model.first_contact.contact_box, symmetry(model))[0]
         if not enough((problem.mesh.points.size / mesh.points.size) ** (1.0 / problem.dim)):
             return None
     try:
@@ -165,12 +165,12 @@ def _unknowns(problem: Problem) -> int:
     if model.mesh.gauge_refinement == 1.0 or not model.gauges:
         return int(problem.body.stiffness.upper.shape[0])
     made = mesh_solid if model.domain == "solid" else mesh_section
-    return int(made(model.design, model.mesh, contact_box(model), symmetry(model))[0].points.size)
+    return int(made(model.design, model.mesh, model.first_contact.contact_box, symmetry(model))[0].points.size)
 
 
 def _spacing(problem: Problem) -> float:
     """Return the typical distance (mm) of contact points where contact is predicted."""
-    x0, x1, z0, z1 = contact_box(problem.model)
+    x0, x1, z0, z1 = problem.model.first_contact.contact_box
     at = problem.points.points
     inside = (at[:, 0] >= x0) & (at[:, 0] <= x1) & (at[:, 2] >= z0) & (at[:, 2] <= z1)
     return float(np.sqrt(np.median(problem.points.area[inside if inside.any() else slice(None)])))

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from finger3d._types import Tree
-from finger3d.mechanics.build import MARGIN, candidate_points, contact_box
+from finger3d.mechanics.build import MARGIN, candidate_points
 from finger3d.mechanics.cost import PressCost, added_cost, state_size
 from finger3d.mechanics.gauge_refinement import refined_at_gauges
 from finger3d.mechanics.model import Model
@@ -20,7 +20,6 @@ from finger3d.mechanics.step_halving import automatic, condensation_s, contact_s
 from finger3d.mechanics.symmetry import symmetry
 from finger3d.meshing.given import GivenMesh
 from finger3d.meshing.limits import check_memory, rows_gb
-from finger3d.objects import initial_contact
 
 _BASE_MB = 170.0
 _TETWILD_MB = 500.0  # while meshing, even for a small mesh
@@ -47,7 +46,7 @@ def forecast(model: Model) -> Tree:
     """
     d = 3 if model.domain == "solid" else 2
     axes = symmetry(model)
-    zone = contact_box(model)
+    zone = model.first_contact.contact_box
     mixed = model.mixed
     size = _size(model, zone, axes, mixed)
     runs, free = _runs(model, size, d), sum(leg.steps == "auto" for leg in model.legs)
@@ -112,7 +111,7 @@ def _size(model: Model, zone: tuple[float, float, float, float], axes: tuple[str
         mesh, report = refined_at_gauges(model, *make(model.design, model.mesh, zone, axes), axes)
         d, vertices = mesh.dim, len(mesh.part_corners[0])
         points, cells = report.points, report.cells
-        first = initial_contact(model.contact_path).first_contact_mm
+        first = model.first_contact.first_contact_mm
         touching = len(candidate_points(model, free_surface(model, mesh, 1.0), first, MARGIN).nodes)
     else:
         from finger3d.meshing.sizing import forecast as count_cells

@@ -229,7 +229,7 @@ def discretisation(
         method = "mesh: dual-weighted residuals, and every second multiplier"
         return (
             ErrorEstimate(discretisation=named, method=method, body=bars.body),
-            replace(bars.coarse, model=own.model),  # with the object itself, since it is pressed to other poses
+            replace(bars.coarse, model=own.model, contact_geometry=None),  # it is pressed to other poses
             "with every second multiplier",
         )
     beside = companion(own, report)

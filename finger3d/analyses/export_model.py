@@ -54,7 +54,7 @@ def export_mesh(
         If the scene is a section, or the folder holds the finger's own file.
     """
     from finger3d.fem.simplex import axis_numbers, unfold
-    from finger3d.mechanics.build import contact_box, mesh_part
+    from finger3d.mechanics.build import mesh_part
     from finger3d.mechanics.symmetry import symmetry
     from finger3d.meshing.mesh_output import write_mesh_msh, write_mesh_vtu
 
@@ -67,7 +67,7 @@ def export_mesh(
         raise Finger3dError(f"--out {out}: holds {own.name}, the finger's own file; name another folder")
     report.stage("meshing")
     axes = symmetry(model)
-    part, _ = mesh_part(model, contact_box(model), axes, report)
+    part, _ = mesh_part(model, model.first_contact.contact_box, axes, report)
     whole, _, _ = unfold(part, axis_numbers(axes))
     with claimed(out):
         write_mesh_vtu(out / MESH_FILES[0], whole)

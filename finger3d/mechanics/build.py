@@ -38,7 +38,7 @@ from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.limits import check_rows
 from finger3d.meshing.report import MeshReport
 from finger3d.meshing.swept import mesh_section
-from finger3d.objects import DistanceTracker, ObjectPose, PlacedObject, initial_contact, vertical_frame
+from finger3d.objects import DistanceTracker, ObjectPose, PlacedObject, vertical_frame
 from finger3d.progress import QUIET, Progress
 
 if TYPE_CHECKING:
@@ -58,11 +58,6 @@ _MANY_READINGS = 100
 """Gauges whose placing is announced: each takes some milliseconds."""
 
 
-def contact_box(model: Model) -> tuple[float, float, float, float]:
-    """Return the box (x_min, x_max, z_min, z_max) mm over which the rigid object would overlap the finger at rest."""
-    return initial_contact(model.contact_path).contact_box
-
-
 def build(model: Model, report: Progress = QUIET, margin: float = MARGIN) -> Problem:
     """Mesh, assemble and condense a model.
 
@@ -76,7 +71,7 @@ def build(model: Model, report: Progress = QUIET, margin: float = MARGIN) -> Pro
     UnresolvedError
         If the object passes between the contact points.
     """
-    contact, axes = initial_contact(model.contact_path), symmetry(model)
+    contact, axes = model.first_contact, symmetry(model)
     mesh, mesh_report = mesh_part(model, contact.contact_box, axes, report)
     thickness = 1.0 if mesh.dim == 3 else model.design.width_mm
     free = free_surface(model, mesh, thickness)

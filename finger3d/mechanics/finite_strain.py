@@ -86,21 +86,10 @@ class FiniteStrain:
         workspace: FiniteStrainWorkspace,
     ) -> ContactSolution[State[DeformedBody]]:
         """Iterate until equilibrium and contact conditions hold in the deformed configuration."""
-        known, workspace.known = workspace.known, None
-        before, gap = problem.surface.trace @ displacement(problem.mesh, state.body.unknowns), state.contact.gap
-        if moves_too_far(problem, move, gap, carried_by_object(problem, move, before)):
+        if _moves_too_far(problem, state, move):
             return ContactSolution(state, Outcome.PASSED_THROUGH, np.inf, 0, "none")
-        found = known
-        if found is None:
-            increment = self._increment(problem, state, move, workspace)
-            found = self._remembered(increment, increment.solve(guess))
-        if not found.outcome.ok:
-            return found
-        after = problem.surface.trace @ displacement(problem.mesh, found.state.body.unknowns)
-        through = passes_through(problem, move, before, after, gap)
-        if through or pulls(problem, state.contact, found.state.contact, move):
-            return replace(found, state=state, outcome=Outcome.PASSED_THROUGH)
-        return found
+        increment = self._increment(problem, state, move, workspace)
+        return self._kept_outside(increment, self._remembered(increment, increment.solve(guess)))
 
     def increments(
         self,
@@ -112,15 +101,23 @@ class FiniteStrain:
     ) -> list[ContactSolution[State[DeformedBody]] | None]:
         """Advance several presses of one body at once, from their states and with their guesses of the forces.
 
-        See `finger3d.mechanics.finite_together.solve_together`.
+        Returns
+        -------
+        Solution of each press; None where it is to be solved by itself, see
+        `finger3d.mechanics.finite_together.solve_together`.
         """
+        if any(_moves_too_far(problem, state, move) for problem, (state, _) in zip(problems, starts, strict=True)):
+            return [None] * len(problems)
         increments = [
             self._increment(problem, state, move, workspace)
             for problem, (state, _) in zip(problems, starts, strict=True)
         ]
         found = solve_together(increments, [guess for _, guess in starts], leader)
-        pairs = zip(increments, found, strict=True)
-        return [None if one is None else self._remembered(increment, one) for increment, one in pairs]
+        solutions = [
+            one and self._kept_outside(increment, self._remembered(increment, one))
+            for increment, one in zip(increments, found, strict=True)
+        ]
+        return [one if one is not None and one.outcome.ok else None for one in solutions]
 
     def _increment(
         self,
@@ -134,6 +131,19 @@ class FiniteStrain:
         if self.relaxation is not None and memory is not None:
             body = body.over(self.relaxation, memory, move.duration_s)
         return FiniteIncrement(problem, body, state, move, workspace)
+
+    def _kept_outside(
+        self, increment: FiniteIncrement, found: ContactSolution[State[DeformedBody]]
+    ) -> ContactSolution[State[DeformedBody]]:
+        """Return a solution, as not converged if the finger or the object passed through the other."""
+        if not found.outcome.ok:
+            return found
+        problem, start, move = increment.problem, increment.start, increment.move
+        before, after = (_moved_points(problem, state) for state in (start, found.state))
+        through = passes_through(problem, move, before, after, start.contact.gap)
+        if through or pulls(problem, start.contact, found.state.contact, move):
+            return replace(found, state=start, outcome=Outcome.PASSED_THROUGH)
+        return found
 
     def _remembered(
         self, increment: FiniteIncrement, found: ContactSolution[State[DeformedBody]]
@@ -197,3 +207,13 @@ class FiniteStrain:
             nodal = extrapolated(problem.mesh, lost[: 9 * body.points].reshape(-1, 3, 3))
             cauchy = cauchy + f @ nodal @ np.swapaxes(f, 1, 2) / determinant(f)[:, None, None]
         return displacement(problem.mesh, x), strain, cauchy
+
+
+def _moved_points(problem: Problem, state: State[DeformedBody]) -> Float:
+    """Return the displacements (c, d) mm of the contact points."""
+    return np.asarray(problem.surface.trace @ displacement(problem.mesh, state.body.unknowns))
+
+
+def _moves_too_far(problem: Problem, state: State[DeformedBody], move: Move) -> bool:
+    carried = carried_by_object(problem, move, _moved_points(problem, state))
+    return moves_too_far(problem, move, state.contact.gap, carried)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
@@ -28,12 +28,10 @@ class Workspace:
     ----------
     factorizations : number of factorisations made with this workspace
     tracker : distances of the finger's surface from the object
-    known : solution of the next increment, if it has been found already together with those of other presses
     """
 
     factorizations: int = 0
     tracker: DistanceTracker = field(default_factory=DistanceTracker)
-    known: ContactSolution[State[Any]] | None = None
 
 
 class Loads(NamedTuple):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Literal
 
 from finger3d.contact.friction import Coulomb, FrictionLaw
@@ -17,7 +18,15 @@ from finger3d.mechanics.readings import Marker, Reading, Taxel
 from finger3d.mechanics.relaxation import Relaxation
 from finger3d.meshing.grading import Grading
 from finger3d.meshing.options import Mesher
-from finger3d.objects import ContactPath, Move, ObjectPose, Plane, RigidObject
+from finger3d.objects import (
+    ContactPath,
+    InitialContact,
+    Move,
+    ObjectPose,
+    Plane,
+    RigidObject,
+    initial_contact,
+)
 
 Domain = Literal["solid", "plane-strain", "plane-stress"]
 
@@ -214,6 +223,11 @@ class Model:
     def largest_depth_mm(self) -> float:
         """Depth of the deepest leg."""
         return max(leg.depth_mm for leg in self.legs)
+
+    @cached_property
+    def first_contact(self) -> InitialContact:
+        """Where the rigid object touches first, and the box over which it would overlap the finger at rest."""
+        return initial_contact(self.contact_path)
 
     @property
     def contact_path(self) -> ContactPath:

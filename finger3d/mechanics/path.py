@@ -1,6 +1,8 @@
-"""Path of the object: the poses at the end of every increment."""
+"""Path of the object: the stations at the ends of all increments."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 from finger3d.mechanics.model import Leg
 from finger3d.objects import Move, ObjectPose
@@ -9,23 +11,45 @@ AUTO_START = 10
 """Increments that ``steps = "auto"`` begins with."""
 
 
-def targets(legs: tuple[Leg, ...]) -> list[ObjectPose]:
-    """Return the pose at the end of every increment of the legs, in order."""
-    out: list[ObjectPose] = []
+@dataclass(frozen=True)
+class Load:
+    """Normal force prescribed at the end of an increment.
+
+    Attributes
+    ----------
+    force_N : at the end of the leg
+    share : of the way to it from the force at the start of the leg
+    begins : whether the increment is the first of its leg
+    """
+
+    force_N: float
+    share: float
+    begins: bool
+
+
+@dataclass(frozen=True)
+class Station:
+    """End of an increment: the pose of the object, and the force to which the depth is found, if one is prescribed."""
+
+    pose: ObjectPose
+    load: Load | None = None
+
+
+def stations(legs: tuple[Leg, ...]) -> list[Station]:
+    """Return the stations at the ends of all increments of the legs, in order."""
+    out: list[Station] = []
     at = ObjectPose(0.0)
     for leg in legs:
         count = leg.steps if isinstance(leg.steps, int) else AUTO_START
         end = leg.end(at)
-        out += [Move(at, end).at(k / count) for k in range(1, count)] + [end]
+        poses = [Move(at, end).at(k / count) for k in range(1, count)] + [end]
+        for k, pose in enumerate(poses, 1):
+            load = None if leg.force_N is None else Load(leg.force_N, k / count, k == 1)
+            out.append(Station(pose, load))
         at = end
     return out
 
 
-def prescribed_forces(legs: tuple[Leg, ...]) -> list[tuple[int, int, float] | None]:
-    """Return the number of every increment in its leg, the leg's count and force (N); None in a leg with a depth."""
-    out: list[tuple[int, int, float] | None] = []
-    for leg in legs:
-        count = leg.steps if isinstance(leg.steps, int) else AUTO_START
-        force = leg.force_N
-        out += [None if force is None else (k, count, force) for k in range(1, count + 1)]
-    return out
+def targets(legs: tuple[Leg, ...]) -> list[ObjectPose]:
+    """Return the pose at the end of every increment of the legs, in order."""
+    return [station.pose for station in stations(legs)]

@@ -29,7 +29,7 @@ from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.path import targets
 from finger3d.mechanics.problem import Problem, rigid_gap
 from finger3d.mechanics.regular_points import Box, regular_points
-from finger3d.objects import ObjectPose, PlacedObject, RigidObject, initial_contact
+from finger3d.objects import ObjectPose, PlacedObject, RigidObject
 
 REFUSE_ABOVE, _WARN_ABOVE = 0.5, 0.1
 """Unresolved overlap, over the depth of the press, above which a press is refused, and above which it warns."""
@@ -253,7 +253,7 @@ def warnings(problem: Problem) -> list[str]:
 
 def warnings_before_meshing(model: Model, axes: tuple[str, ...]) -> list[str]:
     """Return the same warnings before meshing, for a regular grid of contact points around first touch."""
-    contact, size = initial_contact(model.contact_path), model.mesh.size_mm
+    contact, size = model.first_contact, model.mesh.size_mm
     reach = _REACH * size
     (x0, x1, z0, z1), (x, z) = contact.contact_box, contact.place
     box = (max(x0, x - reach), min(x1, x + reach), max(z0, z - reach), min(z1, z + reach))

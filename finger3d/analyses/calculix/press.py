@@ -18,7 +18,7 @@ from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.path import AUTO_START
 from finger3d.mechanics.symmetry import symmetry
 from finger3d.meshing.report import MeshReport
-from finger3d.objects import Move, ObjectPose, PlacedObject, initial_contact
+from finger3d.objects import Move, ObjectPose, PlacedObject
 from finger3d.progress import QUIET, Progress
 
 PENALTY = 200.0
@@ -70,7 +70,7 @@ def press_deck(model: Model, title: str = "", report: Progress = QUIET) -> Press
         If CalculiX has no equal of an effect, a law, or a leg.
     """
     _check(model)
-    contact, axes = initial_contact(model.contact_path), symmetry(model)
+    contact, axes = model.first_contact, symmetry(model)
     mesh, mesh_report = mesh_part(model, contact.contact_box, axes, report)
     finite = model.finite_strain
     law = _law(model)
