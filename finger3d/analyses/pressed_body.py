@@ -44,7 +44,7 @@ _NEAR = 0.1
 
 
 @dataclass(frozen=True)
-class Press:
+class PressAtMu:
     """A press with one mu.
 
     Attributes
@@ -61,12 +61,12 @@ class Press:
     factorizations: int = 0
 
     @classmethod
-    def of(cls, mu: float, steps: Sequence[StepResult], factorizations: int) -> Press:
+    def of(cls, mu: float, steps: Sequence[StepResult], factorizations: int) -> PressAtMu:
         """Return the press with these increments."""
         return cls(mu, steps[-1], tuple(step.meshed_state.contact.force for step in steps), factorizations)
 
 
-PressesByMu = Mapping[float, Press]
+PressesByMu = Mapping[float, PressAtMu]
 """Presses by mu, as initial guesses for those of a similar body or path."""
 
 
@@ -99,10 +99,10 @@ def _poses(legs: tuple[Leg, ...]) -> list[Leg]:
 def press(
     problem: Problem,
     mu: float,
-    near: Sequence[Press] = (),
+    near: Sequence[PressAtMu] = (),
     workspace: Workspace | None = None,
     cancel: Event | None = None,
-) -> Press:
+) -> PressAtMu:
     """Press the condensed body with this mu; the last two presses of `near` give the initial guess."""
     problem = under(problem, problem.model.friction.with_mu(mu))
     workspace = workspace or formulation_of(problem.model).workspace()
@@ -111,10 +111,10 @@ def press(
         steps, _ = march_automatic(problem, workspace, cancel)
     else:
         steps = tuple(march(problem, _start(problem, mu, near), workspace, cancel))
-    return Press.of(mu, steps, workspace.factorizations - before)
+    return PressAtMu.of(mu, steps, workspace.factorizations - before)
 
 
-def presses(problem: Problem, mus: Sequence[float], initial: PressesByMu | None = None) -> Iterator[Press]:
+def presses(problem: Problem, mus: Sequence[float], initial: PressesByMu | None = None) -> Iterator[PressAtMu]:
     """Yield a press for each of ascending values of mu, started from the press of `initial` with the same mu if any.
 
     At finite strain they come in another order than that of mu; see `march_in_groups`.
@@ -124,13 +124,13 @@ def presses(problem: Problem, mus: Sequence[float], initial: PressesByMu | None 
         return
     known = initial or {}
 
-    def pressed(mu: float, before: Sequence[Press], workspace: Workspace, cancel: Event) -> Press:
+    def pressed(mu: float, before: Sequence[PressAtMu], workspace: Workspace, cancel: Event) -> PressAtMu:
         return press(problem, mu, [known[mu]] if mu in known else before, workspace, cancel)
 
     yield from map_parallel(problem, pressed, mus)
 
 
-def _together(problem: Problem, mus: Sequence[float]) -> Iterator[Press]:
+def _together(problem: Problem, mus: Sequence[float]) -> Iterator[PressAtMu]:
     """Yield the presses with all values of mu, which share factors."""
     from finger3d.mechanics.groups import march_in_groups  # a press in small strain needs none of it
 
@@ -138,10 +138,10 @@ def _together(problem: Problem, mus: Sequence[float]) -> Iterator[Press]:
     problems = [under(problem, problem.model.friction.with_mu(mu)) for mu in mus]
     for number, steps in march_in_groups(problems, workspace, Event()):
         new, counted = workspace.factorizations - counted, workspace.factorizations
-        yield Press.of(mus[number], steps, new)
+        yield PressAtMu.of(mus[number], steps, new)
 
 
-def _start(problem: Problem, mu: float, near: Sequence[Press]) -> list[Float]:
+def _start(problem: Problem, mu: float, near: Sequence[PressAtMu]) -> list[Float]:
     """Return the forces extrapolated in mu from the last two presses; none if these have other contact points."""
     shape = problem.delassus.shape[:2]
     good = [p for p in near if p.forces[0].shape == shape]

@@ -9,7 +9,7 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.analyses.calibrate.increments import Increments
-from finger3d.analyses.pressed_body import Press
+from finger3d.analyses.pressed_body import PressAtMu
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.problem import Problem
 
@@ -30,7 +30,7 @@ class CurvePoints:
     problem: Problem
     mus: tuple[float, ...]
     increments: Increments
-    presses: tuple[Press, ...]
+    presses: tuple[PressAtMu, ...]
     seconds: Mapping[str, float]
     factorizations_before: int = 0
 
