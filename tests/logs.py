@@ -16,3 +16,6 @@ class Log(Progress):
 
     def say(self, text: str) -> None:
         self.lines.append(text)
+
+    def remark(self, text: str) -> None:
+        self.lines.append(text)

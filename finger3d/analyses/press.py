@@ -25,10 +25,6 @@ if TYPE_CHECKING:
     from finger3d.scene import Scene, Source
 
 
-_SHOWN_EVERY_S = 1.0
-"""Seconds between reports of trial depths under a prescribed force."""
-
-
 def press(
     scene: Source,
     out: str | Path | None = None,
@@ -166,15 +162,8 @@ def _march_through(record: PressRecord, writer: ResultWriter, report: Progress) 
 
     total = len(targets(record.problem.model.legs))
     report.stage("pressing")
-    begin = shown = time.perf_counter()
-
-    def trial(text: str) -> None:
-        nonlocal shown
-        if time.perf_counter() - shown > _SHOWN_EVERY_S:
-            report.step(len(record.steps), total, text)
-            shown = time.perf_counter()
-
-    for step in march(record.problem, workspace=record.workspace, trial=trial):
+    begin = time.perf_counter()
+    for step in march(record.problem, workspace=record.workspace, report=report):
         record.steps.append(step)
         record.seconds["contact"] += time.perf_counter() - begin
         writer.progress_if_due(record)
