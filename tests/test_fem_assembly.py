@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import splu
 
-from finger3d.fem.assembly import _CHUNK, stiffness
+from finger3d.fem.assembly import _CELLS_IN_CACHE, stiffness
 from finger3d.fem.elements import quadrature
 from finger3d.fem.material import Elasticity
 from finger3d.fem.simplex import Mesh, quadratic
@@ -67,7 +67,7 @@ def test_rigid_motions_cost_nothing_and_nothing_else_does(dim: int, mixed: bool)
 @pytest.mark.parametrize("mixed", [False, True])
 def test_other_numbers_of_the_nodes_give_the_same_matrix_in_another_order(dim: int, mixed: bool) -> None:
     mesh = mapped(grid((20, 8) if dim == 2 else (5, 3, 4), 0.2), lambda x: x + 0.05 * np.sin(2 * x[:, ::-1]))
-    assert len(mesh.cells) > _CHUNK
+    assert len(mesh.cells) > _CELLS_IN_CACHE
     n, elastic = len(mesh.points), Elasticity.of(1.0, 0.3, mixed=mixed)
     to = np.random.default_rng(0).permutation(n)
     turned = Mesh(mesh.points[np.argsort(to)], to[mesh.cells], {})

@@ -9,8 +9,7 @@ import pytest
 
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws import IsochoricLaw, MooneyRivlin, NeoHooke, Ogden, Yeoh
-from finger3d.fem.laws.base import Derivatives
-from finger3d.fem.laws.invariants import InvariantLaw
+from finger3d.fem.laws.invariants import Derivatives, InvariantLaw
 from finger3d.fem.laws.stability import least_stiffness, unstable_from
 from finger3d.fem.tensors import InvertedError
 

@@ -103,5 +103,5 @@ def test_equal_bodies_with_and_without_parts_have_equal_outlines() -> None:
     assert not len(thin_places(plain)[0])
     u = np.linspace(0.0, 2.0, 9)
     np.testing.assert_array_equal(outline(plain, u), outline(skinned, u))
-    inner = bands(skinned).bands[0].at(u[:5], 0.0)
+    inner = bands(skinned).bands[0].points(u[:5], 0.0)
     assert np.hypot(inner[:, 0], inner[:, 1] - plain.contact.at(np.zeros(1))[0, 1] + 100.0) == pytest.approx(98.0)

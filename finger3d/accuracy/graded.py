@@ -25,7 +25,7 @@ from finger3d.mechanics.gauge_refinement import edge_lengths_at_gauges
 from finger3d.mechanics.model import MeshOptions
 from finger3d.mechanics.problem import Problem
 from finger3d.meshing.grading import Grading
-from finger3d.meshing.grid import RATE
+from finger3d.meshing.grid import STRUCTURED_GROWTH
 
 _POWER = 3.0
 """Order p of a share: 4 where the solution is smooth, 2 lambda = 1.2 at the bonded corners."""
@@ -128,7 +128,7 @@ def cell_growth(problem: Problem, options: MeshOptions) -> float:
     """Return the estimated number of cells of a graded mesh, over that of the present mesh."""
     assert options.grading is not None
     places, model = _centroids(problem), replace(problem.model, mesh=options)
-    wanted = options.grading.at(places, RATE)
+    wanted = options.grading.at(places, STRUCTURED_GROWTH)
     if options.gauge_refinement > 1.0:
         wanted = np.minimum(wanted, edge_lengths_at_gauges(model, problem.mesh, problem.axes)(places))
     return float(np.mean((_edge_lengths(problem.mesh) / wanted) ** problem.dim))

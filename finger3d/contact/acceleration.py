@@ -73,7 +73,8 @@ def accelerated_newton(problem: ContactProblem, expected: Float, limit: int, dam
     """Solve as `finger3d.contact.newton.newton` does, from expected forces (c, d), N, with all accelerations."""
     problem = _ShortProducts(**vars(problem))
     start = warm_start(problem, expected)
-    precision, spent = _PRECISION[start.shape[1]], 0
+    precision = _PRECISION[start.shape[1]]
+    spent = 0
     if precision is np.float32 and problem.friction.max(initial=0.0) <= _FLOAT32_MAX_MU:
         single = newton(problem, start, _FLOAT32_ITERATIONS, damped, precision, chord_iterations, assemble_in_place)
         if single.solved:
@@ -144,23 +145,23 @@ def assemble_in_place(problem: ContactProblem, active: ActiveSet, precision: Pre
     return matrix[: active.size, : active.size].T
 
 
-def chord_iterations(problem: ContactProblem, system: ActiveSetSystem, found: Iterate) -> Iterate:
+def chord_iterations(problem: ContactProblem, system: ActiveSetSystem, initial: Iterate) -> Iterate:
     """Return the better of an iterate and the result of chord iterations with its factors.
 
     They update the slip directions and remove the round-off of single precision, while the active set stays the same.
     """
-    if found.at_roundoff(problem) or system.is_exact:
-        return found
-    best = Iterate.of(problem, _scale_to_slip_limit(system.active, found.force))
+    if initial.at_roundoff(problem) or system.is_exact:
+        return initial
+    best = Iterate.of(problem, _scale_to_slip_limit(system.active, initial.force))
     for _ in range(_CHORD_ITERATIONS):
-        if best.at_roundoff(problem) or (best.status != found.status).any():
+        if best.at_roundoff(problem) or (best.status != initial.status).any():
             break
         candidate = Iterate.of(problem, chord_step(system, best.force, best.force - best.projected))
         stalls = not candidate.mismatch <= _CHORD_RATIO * best.mismatch
         best = min(best, candidate, key=lambda iterate: iterate.mismatch)
         if stalls:
             break
-    return min(found, best, key=lambda iterate: iterate.mismatch)
+    return min(initial, best, key=lambda iterate: iterate.mismatch)
 
 
 def chord_step(system: ActiveSetSystem, force: Float, mismatch: Float) -> Float:
@@ -177,7 +178,8 @@ def chord_step(system: ActiveSetSystem, force: Float, mismatch: Float) -> Float:
 
 def _scale_to_slip_limit(active: ActiveSet, force: Float) -> Float:
     """Return the forces (c, d) with friction of length mu r_n at slipping points, its direction unchanged."""
-    scaled, slip = force.copy(), active.slip_points
+    scaled = force.copy()
+    slip = active.slip_points
     length = lengths(scaled[slip, 1:])
     limit = lengths(active.slip_force_direction) * scaled[slip, 0]
     scaled[slip, 1:] *= (limit / np.where(length > 0.0, length, 1.0))[:, None]
@@ -216,11 +218,11 @@ def _deepest(gap: Float, closing: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 def _submatrix(problem: ContactProblem, dofs: NDArray[np.int64], precision: Precision) -> Array:
     """Return the Delassus operator (k, k) between directions (k,); some rows at a time stay in the cache."""
-    found = np.empty((len(dofs), len(dofs)), precision)
+    submatrix = np.empty((len(dofs), len(dofs)), precision)
     for first in range(0, len(dofs), _ROWS_IN_CACHE):
         part = slice(first, first + _ROWS_IN_CACHE)
-        found[part] = problem.delassus[dofs[part]].take(dofs, axis=1)
-    return found
+        submatrix[part] = problem.delassus[dofs[part]].take(dofs, axis=1)
+    return submatrix
 
 
 def _normal_contact(
@@ -275,8 +277,10 @@ class _ActivePoints(NamedTuple):
         dofs = (np.arange(d)[:, None] + points * d).ravel()
         block = _submatrix(problem, dofs, _PRECISION[d])
         free, rho = (a.ravel()[dofs].astype(block.dtype) for a in (problem.free_motion, problem.augmentation))
-        coupling, tangential, rho = block[:k, k:], block[k:, k:], rho[k:]
-        mu, step = problem.friction[points].astype(block.dtype), rho / _spectral_radius(tangential, rho)
+        coupling, tangential = block[:k, k:], block[k:, k:]
+        rho = rho[k:]
+        mu = problem.friction[points].astype(block.dtype)
+        step = rho / _spectral_radius(tangential, rho)
         return cls(free[:k], free[k:], solve_normal, coupling, tangential, mu, step)
 
     def slip_and_limit(self, normal: Array) -> tuple[Array, Array]:

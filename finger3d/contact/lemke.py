@@ -38,7 +38,8 @@ def lemke(matrix: Float, q: Float, limit: int) -> Float | None:
     shift = 1e-9 * np.abs(q).max() * np.random.default_rng(0).uniform(1.0, 2.0, m)
     table = np.hstack([np.eye(m), -matrix, -np.ones((m, 1)), (q + shift)[:, None]])
     basis = np.arange(m)
-    entering, row = 2 * m, int(np.argmin(q + shift))
+    entering = 2 * m
+    row = int(np.argmin(q + shift))
     for _ in range(limit):
         table[row] /= table[row, entering]
         column = table[:, entering].copy()

@@ -141,7 +141,8 @@ class ActiveSet:
         friction_force = augmented_force[slip, 1:]
         length = lengths(friction_force)
         length = np.where(length > 0.0, length, 1.0)
-        e, mu = friction_force / length[:, None], problem.friction[slip]
+        e = friction_force / length[:, None]
+        mu = problem.friction[slip]
         return cls(
             shape=(c, d),
             active_dofs=np.concatenate([(stick[:, None] * d + np.arange(d)).ravel(), slip * d]),
@@ -204,7 +205,8 @@ class ActiveSet:
 
     def weight_matrix(self, augmentation: Float) -> Any:
         """Return D (k, c d), sparse: the rows of the equations from displacements, with rho (c, d) N/mm."""
-        m, s, rho = len(self.active_dofs), len(self.slip_points), augmentation.ravel()
+        m, s = len(self.active_dofs), len(self.slip_points)
+        rho = augmentation.ravel()
         entries = [(np.arange(m), self.active_dofs, rho[self.active_dofs])]
         if self.is_3d:
             across = np.arange(m, m + s)

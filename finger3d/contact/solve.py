@@ -65,22 +65,25 @@ def solve_increment(problem: ContactProblem, guess: Float | None = None) -> Cont
     ContactSolution
         Its outcome is CONVERGED only if the residual of the conditions, evaluated afterwards, is at most `TOLERANCE`.
     """
-    previous, law = problem.previous, problem.law.friction
+    previous = problem.previous
+    law = problem.law.friction
     if problem.refusal:
         return ContactSolution(previous, problem.refusal, np.inf, 0, "none")
     with threads_for(problem.free_motion.size):
         start = previous.force if guess is None else guess
-        limits, total = _SMALL_STRAIN if problem.is_definite else _FINITE_STRAIN, 0
+        limits = _SMALL_STRAIN if problem.is_definite else _FINITE_STRAIN
+        total = 0
         for _ in range(_FRICTION_UPDATES + len(start)):
-            method, found, error, spent = _solve_once(problem, start, guess is None, limits)
+            method, solution, error, spent = _solve_once(problem, start, guess is None, limits)
             total += spent
-            if found is None:
+            if solution is None:
                 break
-            mu = law.updated(problem.friction, found.status, pressure(found.force, problem.area))
+            mu = law.updated(problem.friction, solution.status, pressure(solution.force, problem.area))
             if np.abs(mu - problem.friction).max(initial=0.0) <= _FRICTION_TOLERANCE * mu.max(initial=0.0):
-                state = next_state(previous, found.force, found.relative_displacement, found.status)
+                state = next_state(previous, solution.force, solution.relative_displacement, solution.status)
                 return ContactSolution(state, Outcome.CONVERGED, error, total, method)
-            problem, start = replace(problem, friction=mu), found.force
+            problem = replace(problem, friction=mu)
+            start = solution.force
     return ContactSolution(previous, Outcome.NO_CONVERGENCE, error, total, method)
 
 
@@ -88,7 +91,8 @@ def _solve_once(
     problem: ContactProblem, start: Float, path_turns: bool, limits: _Limits
 ) -> tuple[str, NewtonResult | None, float, int]:
     """Return method, solution, residual and iterations; None and the least residual if all attempts fail."""
-    spent, least = 0, np.inf
+    spent = 0
+    least = np.inf
     for method, attempt in _attempts(problem, start, path_turns, limits):
         spent += attempt.iterations
         if not attempt.solved:
@@ -133,10 +137,10 @@ def _lemke_start(problem: ContactProblem, start: Float, rows: int) -> NewtonResu
         capped = replace(problem, friction=np.minimum(problem.friction, cap))
         candidates = (problem.free_motion[:, 0] < 0.0) | (start[:, 0] > 0.0)
         for _ in range(5):
-            found = friction_start(capped, np.flatnonzero(candidates), rows)
-            if found is None:
+            active_set = friction_start(capped, np.flatnonzero(candidates), rows)
+            if active_set is None:
                 break
-            status, direction = found
+            status, direction = active_set
             try:
                 force = force_of_sets(problem, status, np.hstack([np.zeros((len(status), 1)), direction]))
             except np.linalg.LinAlgError:
@@ -154,17 +158,19 @@ def _lemke_start(problem: ContactProblem, start: Float, rows: int) -> NewtonResu
 
 def _friction_continuation(problem: ContactProblem, start: Float) -> NewtonResult:
     """Follow the solution from no friction to the coefficients of the problem, halving the stride where that fails."""
-    found = newton(replace(problem, friction=np.zeros_like(problem.friction)), start, 60, damped=True)
-    spent = found.iterations
+    solution = newton(replace(problem, friction=np.zeros_like(problem.friction)), start, 60, damped=True)
+    spent = solution.iterations
     reached, stride = 0.0, 0.25
-    # large coefficients only extend the stick zone, so that mu saturates as a function of the share
-    while found.solved and reached < 1.0 and stride > _SMALLEST_STRIDE:
-        share = min(reached + stride, 1.0)
-        mu = problem.friction if share == 1.0 else problem.friction * share / (1.0 + (1.0 - share) * problem.friction)
-        trial = newton(replace(problem, friction=mu), found.force, 40, damped=True)
+    # large coefficients only extend the stick zone, so that mu saturates as a function of the scale
+    while solution.solved and reached < 1.0 and stride > _SMALLEST_STRIDE:
+        scale = min(reached + stride, 1.0)
+        mu = problem.friction if scale == 1.0 else problem.friction * scale / (1.0 + (1.0 - scale) * problem.friction)
+        trial = newton(replace(problem, friction=mu), solution.force, 40, damped=True)
         spent += trial.iterations
         if trial.solved:
-            found, reached, stride = trial, share, stride * 1.5
+            solution = trial
+            reached = scale
+            stride *= 1.5
         else:
             stride *= 0.5
-    return replace(found, solved=reached >= 1.0, iterations=spent)
+    return replace(solution, solved=reached >= 1.0, iterations=spent)

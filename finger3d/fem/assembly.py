@@ -21,7 +21,7 @@ from finger3d.fem.simplex import Mesh
 AnyInt = NDArray[np.int32] | NDArray[np.int64]
 
 # Cells assembled at a time: few enough for their matrices to stay in a core's cache, so that memory is reused.
-_CHUNK = 256
+_CELLS_IN_CACHE = 256
 
 
 @dataclass(frozen=True)
@@ -51,10 +51,10 @@ def on_places(matrix: sp.csr_matrix, places: sp.csr_matrix) -> Float:
     """Return the values (nnz,) of a matrix on the sparsity pattern of another that includes its own."""
     wide = places.shape[1]
     rows = np.repeat(np.arange(places.shape[0]), np.diff(places.indptr))
-    found = matrix.tocoo()
-    at = np.searchsorted(rows * wide + places.indices, found.row.astype(np.int64) * wide + found.col)
+    entries = matrix.tocoo()
+    positions = np.searchsorted(rows * wide + places.indices, entries.row.astype(np.int64) * wide + entries.col)
     out = np.zeros(places.nnz)
-    np.add.at(out, at, found.data)
+    np.add.at(out, positions, entries.data)
     return out
 
 
@@ -89,7 +89,8 @@ class Pattern:
         n, d = mesh.points.shape
         vertices, corner = mesh.part_corners if mixed else (np.zeros(0, dtype=np.int64), mesh.cells[:, :0])
         count = n + len(vertices)
-        k, corners = mesh.cells.shape[1], d + 1 if mixed else 0
+        k = mesh.cells.shape[1]
+        corners = d + 1 if mixed else 0
         (a, b), (p, r) = _pairs(k), _pairs(corners)
         pairs = len(a) + corners * k + len(p)
         size = len(mesh.cells) * pairs
@@ -102,8 +103,8 @@ class Pattern:
             cells = mesh.cells[part]
             pressures = n + corner[part]
             beside = (cells[:, None] * count + pressures[:, :, None]).reshape(len(cells), -1)
-            found = [_key(cells[:, a], cells[:, b], count), beside, _key(pressures[:, p], pressures[:, r], count)]
-            np.concatenate(found, axis=1, out=of_cells[part])
+            part_keys = [_key(cells[:, a], cells[:, b], count), beside, _key(pressures[:, p], pressures[:, r], count)]
+            np.concatenate(part_keys, axis=1, out=of_cells[part])
             swapped[part] = cells[:, a] > cells[:, b]
         blocks, slot = _numbered(keys)
         del keys, of_cells
@@ -120,14 +121,15 @@ class Pattern:
         e, k, d = cell.shape[:3]
         flat = cell.reshape(e, -1)
         a, b = _pairs(k)
-        first, swapped = (a * d * k + b) * d, self.swapped[part]
+        first = (a * d * k + b) * d
+        swapped = self.swapped[part]
         parts = [[np.take(flat, first + (i * k * d + j), axis=1) for j in range(d)] for i in range(d)]
         slot = self.slot[part, : len(a)]
-        for i, at in enumerate(_rows(self.start[slot], self.length[slot], d)):
+        for i, positions in enumerate(_rows(self.start[slot], self.length[slot], d)):
             for j in range(d):
                 value = np.where(swapped, parts[j][i], parts[i][j])
-                own = 0 if j >= i else k  # the pairs of a node with itself come first
-                np.add.at(data[j:], at[:, own:].ravel(), value[:, own:].ravel())
+                first_pair = 0 if j >= i else k  # the pairs of a node with itself come first
+                np.add.at(data[j:], positions[:, first_pair:].ravel(), value[:, first_pair:].ravel())
 
     def add_pressure(self, data: Float, part: slice, coupling: Float, mass: Float) -> None:
         """Add couplings (e, p, k, d) of some cells' pressures and nodes, and symmetric (e, p, p) of their pressures."""
@@ -135,14 +137,14 @@ class Pattern:
         p, r = _pairs(corners)
         end = self.slot.shape[1] - len(p)
         slot = self.slot[part, end - corners * k : end]
-        for i, at in enumerate(_rows(self.start[slot], self.length[slot], d)):
-            np.add.at(data, at.ravel(), coupling[..., i].ravel())
+        for i, positions in enumerate(_rows(self.start[slot], self.length[slot], d)):
+            np.add.at(data, positions.ravel(), coupling[..., i].ravel())
         np.add.at(data, self.start[self.slot[part, end:]].ravel(), mass[:, p, r].ravel())
 
 
 def cell_parts(mesh: Mesh) -> Iterator[slice]:
     """Yield slices of the cells, in portions of limited memory."""
-    return (slice(start, start + _CHUNK) for start in range(0, len(mesh.cells), _CHUNK))
+    return (slice(start, start + _CELLS_IN_CACHE) for start in range(0, len(mesh.cells), _CELLS_IN_CACHE))
 
 
 def _pairs(k: int) -> tuple[Int, Int]:
@@ -183,11 +185,12 @@ def _places(row: Int, col: Int, n: int, pressures: int, d: int) -> tuple[AnyInt,
     indices = np.empty(indptr[-1], dtype=kind)
     of_nodes, of_pressures = col < n, row >= n
     for part, tall, wide in ((of_nodes, d, d), (~of_nodes & ~of_pressures, d, 1), (of_pressures, 1, 1)):
-        beside, column = row[part] < col[part], unknown[col[part]].astype(kind)
-        for i, at in enumerate(_rows(start[part], length[part], tall)):
+        beside = row[part] < col[part]
+        column = unknown[col[part]].astype(kind)
+        for i, positions in enumerate(_rows(start[part], length[part], tall)):
             for j in range(wide):
                 stored = slice(None) if j >= i else beside
-                indices[(at + j)[stored]] = (column + j)[stored]
+                indices[(positions + j)[stored]] = (column + j)[stored]
     return indptr.astype(kind), indices, start, length
 
 

@@ -77,7 +77,8 @@ class Bars:
     def tangent(self, u: Float, relaxation: BarRelaxation | None = None) -> sp.csr_matrix:
         """Return the derivative (n d, n d) of the forces, N/mm."""
         vectors, length = self._vectors(u)
-        unit, count = vectors / length[:, None], len(length)
+        unit = vectors / length[:, None]
+        count = len(length)
         d = unit.shape[1]
         along = sp.csr_matrix((unit.ravel(), np.arange(count * d), np.arange(count + 1) * d)) @ self.relative
         across = np.eye(d) - unit[:, :, None] * unit[:, None, :]

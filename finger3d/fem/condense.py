@@ -11,7 +11,7 @@ import math
 import os
 import time
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -19,27 +19,10 @@ from numpy.typing import NDArray
 
 from finger3d._types import Float, Int, freeze_arrays
 from finger3d.fem.assembly import Stiffness
-from finger3d.fem.whole_solutions import WholeSolutions
+from finger3d.fem.factors import Factor, SuperLUFactor
 
 if TYPE_CHECKING:
-    from scipy.sparse.linalg import SuperLU
-
     from finger3d.fem import mumps, pardiso
-
-
-_SOLVE_CHUNK = 64
-
-
-class _Factor(Protocol):
-    """Factor of the stiffness K of the free unknowns, with rows R."""
-
-    def eliminated(self, load: Float) -> tuple[Float, Float]:
-        """Return the intermediate result that `substituted` takes, and ``R K^-1 load`` (r, m), for loads (n, m)."""
-        ...
-
-    def substituted(self, eliminated: Float | None, force: Float) -> Float:
-        """Return ``K^-1 (load + R^T force)`` (n, m) for loads eliminated, if any, and forces (r, m)."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -63,7 +46,7 @@ class Condensation:
     solver: str
     rows: sp.csr_matrix = field(repr=False)
     _free: Int = field(repr=False)
-    _factor: _Factor = field(repr=False)
+    _factor: Factor = field(repr=False)
     _scale: float = field(repr=False)  # of the stiffness, as it was factored
     _row_scales: Float = field(repr=False)
 
@@ -147,7 +130,8 @@ def condense(
         compliance, but can no longer solve.
     """
     start = time.perf_counter()
-    upper, size = stiffness.upper, stiffness.upper.shape[0]
+    upper = stiffness.upper
+    size = upper.shape[0]
     if not upper.has_sorted_indices:
         upper = upper.sorted_indices()
     solver = solver or os.environ.get("FINGER3D_SOLVER") or default_solver()
@@ -157,17 +141,18 @@ def condense(
     padded = sp.csr_matrix((rows.data, rows.indices, rows.indptr), shape=(rows.shape[0], size))
     # PARDISO perturbs pivots below 1e-13 of the largest entry of [[K, R^T], [R, 0]]: K and every row of R are scaled to
     # entries of order 1, by powers of two, so that neither the modulus nor the unit of a row changes a digit.
-    unit, units = _power_of_two(upper.data), _row_scales(padded)
+    unit = _power_of_two(upper.data)
+    units = _row_scales(padded)
     scaled = sp.csr_matrix((upper.data / unit, upper.indices, upper.indptr), shape=upper.shape)
     entries = padded.data / np.repeat(units, np.diff(padded.indptr))
     read = sp.csr_matrix((entries, padded.indices, padded.indptr), shape=padded.shape)
-    factor: _Factor
+    factor: Factor
     if solver in ("pardiso", "mumps"):
         before = replaced._factor if replaced and replaced.solver == solver else None
         factor = _Augmented.of(solver, scaled, free, read, before if isinstance(before, _Augmented) else None)
         schur, perturbed = factor.factor.schur, factor.factor.perturbed
     else:
-        factor = _SuperLU.of(scaled[free][:, free], read[:, free].tocsr())
+        factor = SuperLUFactor.of(scaled[free][:, free], read[:, free].tocsr())
         schur, perturbed = -factor.compliance(), 0
     compliance = schur + schur.T  # scaled in place: with 10 000 rows each copy takes 0.8 GB
     compliance *= (-0.5 / unit) * units[:, None]
@@ -210,8 +195,8 @@ def stiffened(compliance: Float, springs: Float) -> Float:
     if not len(springs):
         return compliance
     first = len(compliance) - len(springs)
-    found = compliance + compliance[:, first:] @ spring_forces(compliance, springs, compliance)
-    return 0.5 * (found + found.T)
+    reduced = compliance + compliance[:, first:] @ spring_forces(compliance, springs, compliance)
+    return 0.5 * (reduced + reduced.T)
 
 
 def default_solver() -> str:
@@ -241,10 +226,10 @@ class _Pattern:
 
     def values(self, upper: sp.csr_matrix, rows: sp.csr_matrix) -> Float:
         """Return the entries (nnz,) of the augmented matrix."""
-        found = np.zeros(len(self.is_stiffness))
-        found[self.is_stiffness] = upper.data[self.is_kept]
-        found[self.row_places] = rows.data[self.row_entries]
-        return found
+        entries = np.zeros(len(self.is_stiffness))
+        entries[self.is_stiffness] = upper.data[self.is_kept]
+        entries[self.row_places] = rows.data[self.row_entries]
+        return entries
 
 
 @dataclass(frozen=True)
@@ -264,11 +249,11 @@ class _Augmented:
         return self.number == self.factor.factorizations
 
     def eliminated(self, load: Float) -> tuple[Float, Float]:
-        """See `_Factor`."""
+        """See `Factor`."""
         return self._current().eliminated(load)
 
     def substituted(self, eliminated: Float | None, force: Float) -> Float:
-        """See `_Factor`."""
+        """See `Factor`."""
         return self._current().substituted(eliminated, force)
 
     def _current(self) -> pardiso.PardisoFactor | mumps.MumpsFactor:
@@ -299,12 +284,12 @@ def _augmented(upper: sp.csr_matrix, free: Int, rows: sp.csr_matrix) -> tuple[_P
     is_free[free] = True
     kept = is_free[upper.indices]
     kept &= np.repeat(is_free, np.diff(upper.indptr))
-    own = np.add.reduceat(kept, upper.indptr[:-1], dtype=np.int64)[free]  # no row is empty: it has its diagonal
+    row_lengths = np.add.reduceat(kept, upper.indptr[:-1], dtype=np.int64)[free]  # no row is empty: it has its diagonal
     numbered = sp.csr_matrix((np.arange(rows.nnz), rows.indices, rows.indptr), rows.shape)
     transposed = numbered[:, free].T.tocsr()
     more = np.diff(transposed.indptr)
-    indptr = np.concatenate([[0], np.cumsum(np.concatenate([own + more, np.ones(r, dtype=np.int64)]))])
-    row_places = np.arange(transposed.nnz) + np.repeat(np.cumsum(own), more)
+    indptr = np.concatenate([[0], np.cumsum(np.concatenate([row_lengths + more, np.ones(r, dtype=np.int64)]))])
+    row_places = np.arange(transposed.nnz) + np.repeat(np.cumsum(row_lengths), more)
     stiffness = np.ones(indptr[-1], dtype=np.bool_)
     stiffness[row_places] = False
     stiffness[len(stiffness) - r :] = False
@@ -316,30 +301,3 @@ def _augmented(upper: sp.csr_matrix, free: Int, rows: sp.csr_matrix) -> tuple[_P
     key = (upper.indptr, upper.indices, free, rows.indptr, rows.indices)
     pattern = _Pattern(key, kept, stiffness, row_places, transposed.data)
     return pattern, sp.csr_matrix((pattern.values(upper, rows), indices, indptr), shape=(n + r, n + r))
-
-
-@dataclass(frozen=True)
-class _SuperLU(WholeSolutions):
-    """SuperLU's factor of a stiffness, and rows."""
-
-    factor: SuperLU
-    rows: sp.csr_matrix
-
-    @classmethod
-    def of(cls, upper: sp.csr_matrix, rows: sp.csr_matrix) -> _SuperLU:
-        from scipy.sparse.linalg import splu
-
-        full = (upper + sp.triu(upper, 1).T).tocsc()
-        return cls(splu(full, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}), rows)
-
-    def solve(self, load: Float) -> Float:
-        """See `WholeSolutions`."""
-        return np.asarray(self.factor.solve(load))
-
-    def compliance(self) -> Float:
-        """Return ``R K^-1 R^T`` (r, r)."""
-        found = np.empty((self.rows.shape[0], self.rows.shape[0]))
-        for start in range(0, len(found), _SOLVE_CHUNK):
-            part = slice(start, start + _SOLVE_CHUNK)
-            found[:, part] = self.rows @ self.solve(self.rows[part].T.toarray())
-        return found

@@ -148,7 +148,8 @@ def quadrature(dim: int, degree: int) -> tuple[Float, Float]:
         values = [9.0 / 80.0, *[(155.0 - root) / 2400.0] * 3, *[(155.0 + root) / 2400.0] * 3]
         return np.vstack(points), np.array(values)
     if degree == 5 and dim == 3:
-        orbits, b = [0.31088591926330060980, 0.092735250310891226402], 0.045503704125649649492
+        orbits = [0.31088591926330060980, 0.092735250310891226402]
+        b = 0.045503704125649649492
         near_edges = [[0.5 - b if k in edge else b for k in range(4)] for edge in EDGES[3].tolist()]
         points = [*[np.full((4, 4), a) + (1.0 - 4.0 * a) * np.eye(4) for a in orbits], np.array(near_edges)]
         values = [0.11268792571801585080, 0.073493043116361949544, 0.042546020777081466438]

@@ -36,7 +36,8 @@ class _Area:
         """Return the areas at displacements u (n, d) of the nodes."""
         rest, moved = ([slope @ x for slope in face.along] for x in (points, points + u))
         if u.shape[1] == 2:
-            vector, initial = moved[0], np.linalg.norm(rest[0], axis=1)
+            vector = moved[0]
+            initial = np.linalg.norm(rest[0], axis=1)
         else:
             vector = np.cross(moved[0], moved[1])
             initial = np.linalg.norm(np.cross(rest[0], rest[1]), axis=1)
@@ -68,7 +69,8 @@ class _Area:
 
     def second_derivative(self, weights: Float) -> sp.csr_matrix:
         """Return the sum (n d, n d) of the second derivatives with weights (q,)."""
-        d, length = self.moved[0].shape[1], self.ratio * self.initial
+        d = self.moved[0].shape[1]
+        length = self.ratio * self.initial
         parts = [_change(self.face, self.moved, i) for i in range(d)]
         stretched = sp.diags_array(weights / (length * self.initial))
         total = sum(part.T @ stretched @ part for part in parts)
@@ -124,7 +126,8 @@ class DeformedContact:
 
     def nodal_forces(self, force: Float) -> Float:
         """Return the nodal forces (n, d) of forces (c, d) at the points, along their directions."""
-        face, area, tangential = self.face, self.area, force.copy()
+        face, area = self.face, self.area
+        tangential = force.copy()
         tangential[:, 0] = force[:, 0] * (not self.follows_area)
         out: Float = face.trace.T @ np.einsum("ctk,ct->ck", self.bases, tangential)
         if self.follows_area:
@@ -137,7 +140,8 @@ class DeformedContact:
     @cached_property
     def rows(self) -> sp.csr_matrix:
         """Rows (c d, n d) of `displacements`."""
-        face, (c, d) = self.face, self.bases.shape[:2]
+        face = self.face
+        c, d = self.bases.shape[:2]
         blocks = [_rows([sp.diags_array(self.bases[:, t, k]) @ face.trace for k in range(d)]) for t in range(d)]
         if self.follows_area:
             weight = sp.diags_array(1.0 / self._mean_area) @ face.average
@@ -162,7 +166,8 @@ class DeformedContact:
         curvature : (q, d, d) array, 1/mm, optional
             Second derivatives of the gap at the samples; zero unless given.
         """
-        face, spread = self.face, self.area.derivative
+        face = self.face
+        spread = self.area.derivative
         per_area = sp.diags_array(force / self._mean_area)
         pressure = sp.diags_array(face.average.T @ per_area.diagonal())
         normal = self.rows[:: self.bases.shape[1]]
@@ -186,7 +191,7 @@ def deformed_contact(
     gap: Float,
     normal: Float,
     axes: tuple[str, ...],
-    share: Float | None = None,
+    object_share: Float | None = None,
 ) -> DeformedContact:
     """Contact of a deformed face.
 
@@ -200,23 +205,23 @@ def deformed_contact(
         Unit normals into the body at the samples, along which the gap is measured.
     axes : tuple of str
         Normals of the symmetry planes, in which the normals of points on them lie.
-    share : (c,) array, optional
+    object_share : (c,) array, optional
         Share of an elastic object in the compliance of each point; the common normal turns from that of the object
         towards that of the body by this share.
     """
     area = _Area.of(face, points, displacement)
     total = face.average @ area.ratio
     mean_normal = (face.average @ (normal * area.ratio[:, None])) / total[:, None]
-    if share is not None:
-        own = outward_normals(area.moved)
-        own = (face.average @ (own * area.ratio[:, None])) / total[:, None]
-        own *= (np.linalg.norm(mean_normal, axis=1) / np.linalg.norm(own, axis=1))[:, None]
-        mean_normal = (1.0 - share[:, None]) * mean_normal - share[:, None] * own
+    if object_share is not None:
+        body_normal = outward_normals(area.moved)
+        body_normal = (face.average @ (body_normal * area.ratio[:, None])) / total[:, None]
+        body_normal *= (np.linalg.norm(mean_normal, axis=1) / np.linalg.norm(body_normal, axis=1))[:, None]
+        mean_normal = (1.0 - object_share[:, None]) * mean_normal - object_share[:, None] * body_normal
     mean_gap = (face.average @ (gap * area.ratio)) / total
     for k in axis_numbers(axes):
         mean_normal[face.points[:, k] == 0.0, k] = 0.0
     bases = bases_of(mean_normal / np.linalg.norm(mean_normal, axis=1)[:, None])
-    return DeformedContact(face, mean_gap, bases, gap, normal, area, share is None)
+    return DeformedContact(face, mean_gap, bases, gap, normal, area, object_share is None)
 
 
 def _rows(parts: Sequence[sp.csr_matrix]) -> sp.csr_matrix:

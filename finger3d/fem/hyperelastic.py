@@ -21,7 +21,7 @@ from finger3d._types import Float, Int, freeze_arrays
 from finger3d.fem.assembly import Pattern, Stiffness, cell_parts, pressure_scale
 from finger3d.fem.elements import quadrature
 from finger3d.fem.laws import IsochoricLaw
-from finger3d.fem.laws.inhomogeneous import Inhomogeneous
+from finger3d.fem.laws.base import Inhomogeneous
 from finger3d.fem.locate import cells_at
 from finger3d.fem.material import LEAST_COMPRESSIBILITY, MIXED_FROM, Isotropic
 from finger3d.fem.recover import averaged, displacement, nodal_gradient, nodal_pressure
@@ -127,7 +127,8 @@ class Hyperelastic:
         low, high = np.zeros_like(area), np.full_like(area, np.inf)
         for _ in range(_THICKNESS_ITERATIONS):
             stress, tangent = self.law.stress_and_tangent(f)
-            stretch, scale = f[..., 2, 2], 1.0 / (a_vol * self.bulk * area)
+            stretch = f[..., 2, 2]
+            scale = 1.0 / (a_vol * self.bulk * area)
             excess = a_iso * stress[..., 2, 2] - stretch * past[..., 2, 2]
             slope = area + scale * (a_iso * tangent[..., 2, 2, 2, 2] - past[..., 2, 2])
             short = 1.0 - area * stretch - scale * excess
@@ -235,14 +236,17 @@ class TotalLagrangian:
         """Gradient (e q d, n) of nodal fields, weights (e, q), and values (e q, v) of fields linear in every cell."""
         mesh, d = self.mesh, self.mesh.dim
         bary, w = quadrature(d, 2)
-        cells, q = mesh.cells, len(bary)
+        cells = mesh.cells
+        q = len(bary)
         e, k = cells.shape
         data, weights = np.empty((e, q, d, k)), np.empty((e, q))
         for part in cell_parts(mesh):
             gradients, det = mesh.element.physical_gradients(mesh.points[cells[part]], bary)
-            data[part], weights[part] = np.swapaxes(gradients, 2, 3), det * (w * self.thickness)
+            data[part] = np.swapaxes(gradients, 2, 3)
+            weights[part] = det * (w * self.thickness)
         indices = np.broadcast_to(cells[:, None, None, :], data.shape).ravel()
-        rows, n = e * q * d, len(mesh.points)
+        rows = e * q * d
+        n = len(mesh.points)
         gradient = sp.csr_matrix((data.ravel(), indices, np.arange(rows + 1) * k), shape=(rows, n))
         if not self.material.mixed:
             return gradient, weights, None
@@ -260,8 +264,8 @@ class TotalLagrangian:
     def slopes(self, x: Float) -> Float:
         """Return the displacement gradients (m, d, d) at the quadrature points, row the component."""
         d = self.mesh.dim
-        found = self._operators[0] @ displacement(self.mesh, x)
-        return np.swapaxes(found.reshape(-1, d, d), 1, 2)
+        slopes = self._operators[0] @ displacement(self.mesh, x)
+        return np.swapaxes(slopes.reshape(-1, d, d), 1, 2)
 
     def pressures(self, x: Float) -> Float | None:
         """Return the pressure (m,) MPa at the quadrature points in the mixed form."""
@@ -282,7 +286,8 @@ class TotalLagrangian:
         InvertedError
             If a cell is inverted.
         """
-        d, p = self.mesh.dim, self.pressures(x)
+        d = self.mesh.dim
+        p = self.pressures(x)
         gradient, weights, hats = self._operators
         f = self.deformation(x, relaxing)
         stress = self.material.stress(f, p, relaxing)[:, :d, :d] * weights.reshape(-1, 1, 1)
@@ -290,28 +295,30 @@ class TotalLagrangian:
         if hats is None or p is None:
             return np.asarray(force.ravel())
         excess = (determinant(f) - 1.0 - p / self.material.bulk) * weights.ravel()
-        share = 1.0 if relaxing is None else relaxing.volumetric
-        volume = share * self.pressure_scale * (hats.T @ excess)
+        volumetric = 1.0 if relaxing is None else relaxing.volumetric
+        volume = volumetric * self.pressure_scale * (hats.T @ excess)
         return np.concatenate([force.ravel(), volume])
 
     def tangent(self, x: Float, relaxing: Relaxing | None = None) -> Stiffness:
         """Return the tangent stiffness, the derivative of the internal forces; may raise InvertedError."""
-        mesh, d, p = self.mesh, self.mesh.dim, self.pressures(x)
+        mesh, d = self.mesh, self.mesh.dim
+        p = self.pressures(x)
         gradient, weights, _ = self._operators
         e, q = weights.shape
         gradients = gradient.data.reshape(e, q, d, -1)
         slopes = self.slopes(x).reshape(e, q, d, d)
         hats, _ = quadrature(d, 2)
         data = np.zeros(len(self.pattern.indices))
-        share = 1.0 if relaxing is None else relaxing.volumetric
-        scale = share * self.pressure_scale
+        volumetric = 1.0 if relaxing is None else relaxing.volumetric
+        scale = volumetric * self.pressure_scale
         mass = -scale * self.pressure_scale * np.einsum("qp,qr->qpr", hats, hats)
         for part in cell_parts(mesh):
             points = slice(part.start * q, part.stop * q)
-            own = relaxing.of_points(points) if relaxing else None
-            local, w, material = gradients[part], weights[part], self.material.of_points(points)
-            f = material.deformation(slopes[part].reshape(-1, d, d), own)
-            _, tangent = material.stress_and_tangent(f, None if p is None else p[points], own)
+            local_relaxing = relaxing.of_points(points) if relaxing else None
+            local, w = gradients[part], weights[part]
+            material = self.material.of_points(points)
+            f = material.deformation(slopes[part].reshape(-1, d, d), local_relaxing)
+            _, tangent = material.stress_and_tangent(f, None if p is None else p[points], local_relaxing)
             if material.plane_stress:
                 tangent = material.in_plane(tangent)
             k = local.shape[3]
@@ -330,7 +337,8 @@ class TotalLagrangian:
 
     def energy(self, x: Float) -> float:
         """Return the elastic energy, mJ."""
-        material, f = self.material, self.deformation(x)
+        material = self.material
+        f = self.deformation(x)
         j, p = determinant(f), self.pressures(x)
         volumetric = 0.5 * material.bulk * (j - 1.0) ** 2 if p is None else p * (j - 1.0) - 0.5 * p**2 / material.bulk
         return float((material.law.energy(f) + volumetric) @ self._operators[1].ravel())
@@ -342,12 +350,12 @@ class TotalLagrangian:
 
 def stretch(mesh: Mesh, u: Float, point: Float, direction: Float) -> float:
     """Relative elongation |F d| - 1 at `point` (d,) along the unit `direction` (d,), mean over cells that hold it."""
-    found = []
+    elongations = []
     for cell, bary in cells_at(mesh, point):
         nodes = mesh.cells[cell]
         slope = u[nodes].T @ mesh.element.physical_gradients(mesh.points[nodes][None], bary[None])[0][0, 0]
-        found.append(np.linalg.norm(direction + slope @ direction) - 1.0)
-    return float(np.mean(found))
+        elongations.append(np.linalg.norm(direction + slope @ direction) - 1.0)
+    return float(np.mean(elongations))
 
 
 def nodal_fields(body: TotalLagrangian, x: Float) -> tuple[Float, Float, Float]:
@@ -356,7 +364,8 @@ def nodal_fields(body: TotalLagrangian, x: Float) -> tuple[Float, Float, Float]:
     They follow from the volume-weighted mean of the displacement gradient at every node.  At a node where it is folded
     over they are those of a quadrature point beside it.
     """
-    points, u = len(quadrature(body.mesh.dim, 2)[0]), displacement(body.mesh, x)
+    points = len(quadrature(body.mesh.dim, 2)[0])
+    u = displacement(body.mesh, x)
     vertex_pressure = body.pressure_scale * x[body.mesh.points.size :]
 
     def of_part(part: MeshPart) -> tuple[Float, Float]:

@@ -99,8 +99,8 @@ class FoilPatches:
             size = np.hypot(self._sizes(body)[:, :, None, None], other._sizes(body))
             displacement = body.displacement(offset, self.direction, other.direction, _REGULARISATION * size)
         steps = [np.diff(np.eye(len(f.along) - 1), axis=0) / np.diff(_middles(f.along))[:, None] for f in (self, other)]
-        found = np.einsum("ia,akbl,jb->ikjl", steps[0], displacement, steps[1], optimize=True)
-        return np.asarray(found.reshape(len(self.area), len(other.area)))
+        strain = np.einsum("ia,akbl,jb->ikjl", steps[0], displacement, steps[1], optimize=True)
+        return np.asarray(strain.reshape(len(self.area), len(other.area)))
 
     def _sizes(self, body: InfiniteBody) -> Float:
         """Extent (n, m) mm of the patches."""

@@ -8,7 +8,7 @@ from finger3d._types import Float, Int
 from finger3d.fem.elements import Element
 from finger3d.fem.simplex import Mesh
 
-_ITERATIONS = 8
+_NEWTON_ITERATIONS = 8
 """Newton iterations on a quadratic element; the map of a linear one is inverted exactly by the first."""
 
 _INSIDE = -1e-6
@@ -26,7 +26,7 @@ def inverse_map(element: Element, nodes: Float, points: Float, start: Float | No
     """
     d = element.dim
     bary = np.full((len(points), d + 1), 1.0 / (d + 1)) if start is None else start.copy()
-    for _ in range(_ITERATIONS if element.is_quadratic else 1):
+    for _ in range(_NEWTON_ITERATIONS if element.is_quadratic else 1):
         miss = points - np.einsum("mk,mkd->md", element.shape(bary), nodes)
         jacobian = np.einsum("mkD,mkd->mDd", nodes, element.gradient(bary))
         regular = np.abs(np.linalg.det(jacobian)) > 1e-12 * np.abs(jacobian).max(axis=(1, 2), initial=0.0) ** d
@@ -60,7 +60,8 @@ def locate(mesh: Mesh, points: Float) -> tuple[Int, Float]:
     count = min(_NEAREST_CELLS[d], len(mesh.cells))
     _, near = cKDTree(corners[:, : d + 1].mean(axis=1)).query(points, k=count)
     near = near.reshape(len(points), count)
-    best, where = np.full(len(points), -np.inf), np.full((len(points), d + 1), 1.0 / (d + 1))
+    best = np.full(len(points), -np.inf)
+    where = np.full((len(points), d + 1), 1.0 / (d + 1))
     cell = np.full(len(points), -1)
     for k in range(count):
         left = np.flatnonzero(best < _INSIDE)

@@ -22,7 +22,7 @@ import scipy.sparse as sp
 
 from finger3d._types import Array, Float
 from finger3d.errors import MissingError
-from finger3d.fem.whole_solutions import WholeSolutions
+from finger3d.fem.factors import WholeSolutions
 
 _SYMMETRIC, _HOST_WORKS, _NO_MPI = 2, 1, -987654
 _START, _END, _ANALYSE, _FACTORIZE, _SOLVE = -1, -2, 1, 2, 3  # values of job
@@ -97,7 +97,8 @@ class MumpsFactor(WholeSolutions):
 
     def __init__(self, upper: sp.csr_matrix, rows: int) -> None:
         self._ffi, self._lib = _library()
-        self._upper, self._n = upper.tocsr(), upper.shape[0] - rows
+        self._upper = upper.tocsr()
+        self._n = upper.shape[0] - rows
         places = self._upper.tocoo()
         self._i, self._j = (np.array(part + 1, dtype=np.int32) for part in (places.row, places.col))
         self._take(self._upper.data)

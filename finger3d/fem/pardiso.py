@@ -27,9 +27,9 @@ _NO_MEMORY = -2
 def _library() -> Call:
     if "PYPARDISO_MKL_RT" not in os.environ:
         # pypardiso's own search walks the whole environment, which costs more than a small solve.
-        found = sorted(Path(sys.prefix, "lib").glob("libmkl_rt.so*"))
-        if found:
-            os.environ["PYPARDISO_MKL_RT"] = str(found[0])
+        libraries = sorted(Path(sys.prefix, "lib").glob("libmkl_rt.so*"))
+        if libraries:
+            os.environ["PYPARDISO_MKL_RT"] = str(libraries[0])
     from pypardiso.pardiso_wrapper import PyPardisoSolver
 
     library = PyPardisoSolver().libmkl

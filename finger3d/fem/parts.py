@@ -75,18 +75,18 @@ class ElasticityByPart:
 
     def contract(self, outer: Float) -> Float:
         """Return the element matrices of all cells; see `finger3d.fem.material.LinearElasticity.contract`."""
-        return _by_part(self.part, lambda number, own: self.laws[number].contract(own), outer)
+        return _by_part(self.part, lambda number, values: self.laws[number].contract(values), outer)
 
     def stress(self, strain: Float) -> Float:
         """Return the stress (e k, d, d), MPa, of k strains in each cell."""
         part = np.repeat(self.part, len(strain) // max(len(self.part), 1))
-        return _by_part(part, lambda number, own: self.laws[number].stress(own), strain)
+        return _by_part(part, lambda number, values: self.laws[number].stress(values), strain)
 
 
 def _by_part(part: Int, function: Callable[[int, Float], Float], values: Float) -> Float:
     """Return a function of part and values (k, ...), of the shape of the values, applied part by part."""
     out = np.empty_like(values)
     for number in np.unique(part):
-        own = part == number
-        out[own] = function(int(number), values[own])
+        in_part = part == number
+        out[in_part] = function(int(number), values[in_part])
     return out

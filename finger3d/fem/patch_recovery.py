@@ -58,14 +58,16 @@ class PatchRecovery:
         bary, _ = quadrature(mesh.dim, 2)
         samples, coefficients = len(bary), _basis(np.zeros((1, mesh.dim))).shape[1]
         vertices, corner = mesh.part_corners
-        centre, v = mesh.points[vertices], len(vertices)
+        centre = mesh.points[vertices]
+        v = len(vertices)
         patches = _patches(corner, v, math.ceil(_SAMPLES_PER_COEFFICIENT * coefficients / samples))
         places = mesh.element.shape(bary) @ mesh.points[mesh.cells]
         scale, weights = np.empty(v), np.empty((coefficients, patches.nnz, samples))
         for start in range(0, v, _PATCHES_AT_ONCE):
             some = slice(start, min(start + _PATCHES_AT_ONCE, v))
             first = patches.indptr[start : some.stop + 1]
-            entries, begins = slice(first[0], first[-1]), first[:-1] - first[0]
+            entries = slice(first[0], first[-1])
+            begins = first[:-1] - first[0]
             of = np.repeat(np.arange(len(begins)), np.diff(first))
             relative = places[patches.indices[entries]] - centre[some][of][:, None]
             scale[some] = np.maximum.reduceat(np.abs(relative).max(axis=(1, 2)), begins)
@@ -75,7 +77,8 @@ class PatchRecovery:
             weights[:, entries] = np.moveaxis(basis @ inverse[of], 2, 0)
         # of the type of the patches' indices, so that all fits share them
         columns = (patches.indices[:, None] * samples + np.arange(samples, dtype=patches.indices.dtype)).ravel()
-        rows, shape = patches.indptr * samples, (v, len(mesh.cells) * samples)
+        rows = patches.indptr * samples
+        shape = (v, len(mesh.cells) * samples)
         fits = tuple(sp.csr_matrix((w.ravel(), columns, rows), shape=shape) for w in weights)
         return cls(mesh, corner, centre, scale, fits)
 
@@ -122,7 +125,8 @@ class RecoveredErrors:
 
     def _products(self, cells: Int, first: slice, second: slice) -> Float:
         """Return the energy products (e', a, b) in cells (e',)."""
-        d, elastic = self.recovery.mesh.dim, self.elastic
+        d = self.recovery.mesh.dim
+        elastic = self.elastic
         bary, weights = quadrature(d, 5)
         pairs = _components(d)
         double = np.array([1.0 if i == j else 2.0 for i, j in pairs])
@@ -182,7 +186,8 @@ class RecoveredErrors:
 
     def _strain(self, cells: Int, bary: Float) -> tuple[Float, Float]:
         """Return the components of strain (e', q, k, f) and the determinants (e', q) of cells."""
-        mesh, d = self.recovery.mesh, self.recovery.mesh.dim
+        mesh = self.recovery.mesh
+        d = self.recovery.mesh.dim
         nodes = mesh.cells[cells]
         gradients, determinant = mesh.element.physical_gradients(mesh.points[nodes], bary)
         u = self.unknowns[: mesh.points.size].reshape(len(mesh.points), d, -1)[nodes]
@@ -201,11 +206,11 @@ class RecoveredErrors:
 def _patches(corner: Int, count: int, least: int) -> sp.csr_matrix:
     """Return which cells (v, e) are fitted around each vertex, at least so many where the mesh has them."""
     cells = len(corner)
-    at = sp.csr_matrix(
+    adjacent = sp.csr_matrix(
         (np.ones(corner.size), (corner.ravel(), np.repeat(np.arange(cells), corner.shape[1]))), (count, cells)
     )
-    few = (np.diff(at.indptr) < least).astype(float)
-    out = sp.csr_matrix(sp.diags_array(1.0 - few) @ at + sp.diags_array(few) @ at @ (at.T @ at))
+    few = (np.diff(adjacent.indptr) < least).astype(float)
+    out = sp.csr_matrix(sp.diags_array(1.0 - few) @ adjacent + sp.diags_array(few) @ adjacent @ (adjacent.T @ adjacent))
     out.eliminate_zeros()
     out.sort_indices()
     return out

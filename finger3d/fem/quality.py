@@ -10,7 +10,7 @@ from finger3d._types import Float, Int
 from finger3d.fem.elements import EDGES, quadrature
 from finger3d.fem.simplex import FACETS, Mesh
 
-_DEGREE = {2: 2, 3: 3}
+_JACOBIAN_DEGREE = {2: 2, 3: 3}
 """Degree of the Jacobian determinant of a quadratic element, by dimension."""
 
 
@@ -29,7 +29,7 @@ def _determinants(mesh: Mesh, bary: Float) -> Float:
 
 def curved_volume(mesh: Mesh) -> float:
     """Volume (area in 2D) of a quadratic mesh, mm^d."""
-    bary, weights = quadrature(mesh.dim, _DEGREE[mesh.dim])
+    bary, weights = quadrature(mesh.dim, _JACOBIAN_DEGREE[mesh.dim])
     return float((weights @ _determinants(mesh, bary)).sum())
 
 

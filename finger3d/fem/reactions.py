@@ -13,8 +13,8 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.elements import quadrature
 from finger3d.fem.simplex import Mesh, part_of_facets
 
-_DEGREE = 5  # products of quadratic functions, and a little curvature
-_COVERED = 0.99  # least share of the boxes on the face: facets at a curved border are cut along their chords
+_TRACTION_DEGREE = 5  # products of quadratic functions, and a little curvature
+_LEAST_BOX_COVERAGE = 0.99  # least share of the boxes on the face: facets at a curved border are cut along their chords
 
 
 def mean_traction_weights(
@@ -46,20 +46,22 @@ def mean_traction_weights(
     These are as many unknowns as there are forces in 2D and fewer in 3D, where the fit minimises the norm of what is
     left.
     """
-    facets, nodes = mesh.facets[label], np.unique(mesh.facets[label])
+    facets = mesh.facets[label]
+    nodes = np.unique(mesh.facets[label])
     rank = np.unique(np.asarray(moduli)[part_of_facets(mesh, facets)], return_inverse=True)[1] if len(moduli) else 0
     keys, column = np.unique(facets * (np.max(rank) + 1) + np.reshape(rank, (-1, 1)), return_inverse=True)
     column = column.reshape(facets.shape)
-    bary, w = quadrature(mesh.dim - 1, _DEGREE)
+    bary, w = quadrature(mesh.dim - 1, _TRACTION_DEGREE)
     measure = mesh.facet_element.surface_measure(mesh.points[facets], bary) * (w * thickness)
     shape = mesh.facet_element.shape(bary)
     mass = np.einsum("mq,qi,qj->mij", measure, shape, shape)
-    load, area = np.zeros(len(keys)), 0.0
+    load = np.zeros(len(keys))
+    area = 0.0
     for facet, values in _integrals(mesh, facets, boxes, (measure @ shape) / thickness):
         np.add.at(load, column[facet], values)
         area += float(values.sum())
     wanted = float(np.prod(boxes[:, 1] - boxes[:, 0], axis=1).sum())
-    if not area >= _COVERED * wanted:
+    if not area >= _LEAST_BOX_COVERAGE * wanted:
         raise Finger3dError(f"{100.0 * (1.0 - area / wanted):.3g} % of it is not on the face {label}")
     row = np.broadcast_to(np.searchsorted(nodes, facets)[:, :, None], mass.shape)
 
@@ -99,13 +101,13 @@ def _linear_beside_stiffer(facets: Int, column: Int, rank: Int, mesh: Mesh) -> s
     ends = np.stack([column[:, start][along], column[:, stop][along]], axis=1)
     middle, first = np.unique(middle, return_index=True)
     size = column.max() + 1
-    own = np.setdiff1d(np.arange(size), middle)
+    independent = np.setdiff1d(np.arange(size), middle)
     unknown = np.full(size, -1)
-    unknown[own] = np.arange(len(own))
-    rows = np.concatenate([own, middle.repeat(2)])
-    values = np.concatenate([np.ones(len(own)), np.full(2 * len(middle), 0.5)])
-    columns = np.concatenate([unknown[own], unknown[ends[first]].ravel()])
-    return sp.csr_matrix((values, (rows, columns)), shape=(size, len(own)))
+    unknown[independent] = np.arange(len(independent))
+    rows = np.concatenate([independent, middle.repeat(2)])
+    values = np.concatenate([np.ones(len(independent)), np.full(2 * len(middle), 0.5)])
+    columns = np.concatenate([unknown[independent], unknown[ends[first]].ravel()])
+    return sp.csr_matrix((values, (rows, columns)), shape=(size, len(independent)))
 
 
 def _integrals(mesh: Mesh, facets: Int, boxes: Float, whole: Float) -> list[tuple[int, Float]]:
@@ -113,27 +115,31 @@ def _integrals(mesh: Mesh, facets: Int, boxes: Float, whole: Float) -> list[tupl
 
     `whole` (m, nodes) are the integrals over whole facets.
     """
-    element, across = mesh.facet_element, [0] if mesh.dim == 2 else [0, 2]
-    bary, w = quadrature(mesh.dim - 1, _DEGREE)
+    element = mesh.facet_element
+    across = [0] if mesh.dim == 2 else [0, 2]
+    bary, w = quadrature(mesh.dim - 1, _TRACTION_DEGREE)
     corners = mesh.points[facets[:, : mesh.dim]][:, :, across]
-    found: list[tuple[int, Float]] = []
+    integrals: list[tuple[int, Float]] = []
     for low, high in boxes:
         inside = ((corners >= low) & (corners <= high)).all(axis=(1, 2))
         apart = ((corners.max(axis=1) <= low) | (corners.min(axis=1) >= high)).any(axis=1)
-        found += [(int(k), whole[k]) for k in np.flatnonzero(inside)]
+        integrals += [(int(k), whole[k]) for k in np.flatnonzero(inside)]
         for k in np.flatnonzero(~inside & ~apart):
             for piece in _pieces(corners[k], low, high):
-                at = bary @ piece
-                share = abs(float(np.linalg.det(piece))) * element.surface_measure(mesh.points[facets[k]][None], at)[0]
-                found.append((int(k), (w * share) @ element.shape(at)))
-    return found
+                places = bary @ piece
+                measure = (
+                    abs(float(np.linalg.det(piece))) * element.surface_measure(mesh.points[facets[k]][None], places)[0]
+                )
+                integrals.append((int(k), (w * measure) @ element.shape(places)))
+    return integrals
 
 
 def _pieces(corners: Float, low: Float, high: Float) -> list[Float]:
     """Return simplices (d, d), barycentric, of the part of a facet with corners (d, d - 1) that lies within bounds."""
     polygon = np.eye(len(corners))
     for distance in (*(corners - low).T, *(high - corners).T):
-        value, kept = polygon @ distance, []
+        value = polygon @ distance
+        kept = []
         for i, point in enumerate(polygon):
             j = (i + 1) % len(polygon)
             if value[i] >= 0.0:

@@ -38,9 +38,9 @@ def averaged(mesh: Mesh, of_part: Callable[[MeshPart], tuple[Float, ...]]) -> tu
     weight /= weight.sum(axis=0)
     total: list[Float] = []
     for row, part in zip(weight, parts, strict=True):
-        found = of_part(part)
-        total = total or [np.zeros((len(mesh.points), *field.shape[1:])) for field in found]
-        for sum_, field in zip(total, found, strict=True):
+        fields = of_part(part)
+        total = total or [np.zeros((len(mesh.points), *field.shape[1:])) for field in fields]
+        for sum_, field in zip(total, fields, strict=True):
             sum_[part.nodes] += row[part.nodes].reshape(-1, *[1] * (field.ndim - 1)) * field
     return tuple(total)
 
@@ -64,10 +64,12 @@ def strain_and_stress(
     -------
     strain, stress : (n, d, d), or (n, 3, 3) with `across`
     """
-    u, vertex_pressure = displacement(mesh, unknowns), pressure_scale * unknowns[mesh.points.size :]
+    u = displacement(mesh, unknowns)
+    vertex_pressure = pressure_scale * unknowns[mesh.points.size :]
 
     def of_part(part: MeshPart) -> tuple[Float, Float]:
-        law, strain = laws[part.number], nodal_strain(part.mesh, u[part.nodes])
+        law = laws[part.number]
+        strain = nodal_strain(part.mesh, u[part.nodes])
         sigma = law.stress(strain)
         if law.mixed:
             p = nodal_pressure(part.mesh, vertex_pressure[part.corners])

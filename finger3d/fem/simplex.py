@@ -54,7 +54,7 @@ class Mesh:
     def __repr__(self) -> str:
         """One line: the arrays would fill pages."""
         kind = "quadratic" if self.element.is_quadratic else "linear"
-        labels = ", ".join(f"{label} {len(found)}" for label, found in self.facets.items())
+        labels = ", ".join(f"{label} {len(facets)}" for label, facets in self.facets.items())
         parts = f"; parts: {', '.join(self.part_labels)}" if self.part_labels else ""
         return (
             f"<Mesh of {len(self.cells)} {kind} cells, {len(self.points)} points, {self.dim}D; facets: {labels}{parts}>"
@@ -98,15 +98,16 @@ class Mesh:
         if self.part is None:
             everything = np.arange(len(self.points)), np.arange(len(self.cells))
             return (MeshPart(0, self, *everything, slice(None)),)
-        found, first = [], 0
+        parts = []
+        first = 0
         for number in np.unique(self.part):
             cells = np.flatnonzero(self.part == number)
-            nodes, own = np.unique(self.cells[cells], return_inverse=True)
-            mesh = Mesh(self.points[nodes], own.reshape(len(cells), -1), {})
+            nodes, local = np.unique(self.cells[cells], return_inverse=True)
+            mesh = Mesh(self.points[nodes], local.reshape(len(cells), -1), {})
             last = first + len(mesh.vertices)
-            found.append(MeshPart(int(number), mesh, nodes, cells, slice(first, last)))
+            parts.append(MeshPart(int(number), mesh, nodes, cells, slice(first, last)))
             first = last
-        return tuple(found)
+        return tuple(parts)
 
 
 @dataclass(frozen=True)

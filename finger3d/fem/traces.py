@@ -86,7 +86,8 @@ class BoundarySurface:
 def surface(mesh: Mesh, label: str, thickness: float = 1.0) -> BoundarySurface:
     """Contact points of the boundary `label`; `thickness` (mm) is the width of a 2D section."""
     d = mesh.dim
-    facets, element = mesh.facets[label], mesh.facet_element
+    facets = mesh.facets[label]
+    element = mesh.facet_element
     bary, w = quadrature(d - 1, _SURFACE_DEGREE)
     coords = mesh.points[facets]
     weights = element.surface_measure(coords, bary) * (w * thickness)
@@ -99,8 +100,8 @@ def surface(mesh: Mesh, label: str, thickness: float = 1.0) -> BoundarySurface:
     m, q = weights.shape
     area: Float = np.bincount(number.ravel(), hat.sum(axis=1).ravel(), minlength=len(nodes)).astype(np.float64)
     which = np.broadcast_to(number[:, None, :], hat.shape)
-    at = np.broadcast_to(np.arange(m * q).reshape(m, q, 1), hat.shape)
-    places = (which.ravel(), at.ravel())
+    sample_of = np.broadcast_to(np.arange(m * q).reshape(m, q, 1), hat.shape)
+    places = (which.ravel(), sample_of.ravel())
     average = sp.csr_matrix(((hat / area[which]).ravel(), places), shape=(len(nodes), m * q))
     hats = sp.csr_matrix((np.broadcast_to(phi, hat.shape).ravel(), places), shape=average.shape)
     spread = np.broadcast_to(facets[:, None, :], (m, q, facets.shape[1]))
@@ -110,7 +111,8 @@ def surface(mesh: Mesh, label: str, thickness: float = 1.0) -> BoundarySurface:
         data = np.broadcast_to(nodal, spread.shape).ravel()
         return sp.csr_matrix((data, (sample, spread.ravel())), shape=(m * q, len(mesh.points)))
 
-    values, slopes = sampled(psi), element.gradient(bary)
+    values = sampled(psi)
+    slopes = element.gradient(bary)
     along = tuple(sampled(slopes[:, :, k]) for k in range(d - 1))
     trace = (average @ values).tocsr()
     normals = np.asarray(average @ outward_normals([slope @ mesh.points for slope in along]))
@@ -185,36 +187,36 @@ def local_rows(surface: BoundarySurface, frame: Float) -> sp.csr_matrix:
 
 def strain_row(mesh: Mesh, point: Float, direction: Float) -> sp.csr_matrix:
     """Row (1, n d) of the normal strain at `point` (d,) along a unit `direction` (d,), mean over cells that hold it."""
-    found = _holding(mesh, point)
+    cells = _holding(mesh, point)
     row = np.zeros(mesh.points.shape)
-    for cell, bary in found:
+    for cell, bary in cells:
         nodes = mesh.cells[cell]
         slope = mesh.element.physical_gradients(mesh.points[nodes][None], bary[None])[0][0, 0]
-        np.add.at(row, nodes, np.outer(slope @ direction, direction) / len(found))
+        np.add.at(row, nodes, np.outer(slope @ direction, direction) / len(cells))
     return sp.csr_matrix(row.reshape(1, -1))
 
 
 def displacement_row(mesh: Mesh, point: Float, direction: Float) -> sp.csr_matrix:
     """Row (1, n d) of the displacement at `point` (d,) along `direction` (d,)."""
-    found = _holding(mesh, point)
+    cells = _holding(mesh, point)
     row = np.zeros(mesh.points.shape)
-    for cell, bary in found:
+    for cell, bary in cells:
         values = mesh.element.shape(bary[None])[0]
-        np.add.at(row, mesh.cells[cell], np.outer(values, direction) / len(found))
+        np.add.at(row, mesh.cells[cell], np.outer(values, direction) / len(cells))
     return sp.csr_matrix(row.reshape(1, -1))
 
 
 def displacement_rows(mesh: Mesh, point: Float, signs: Float) -> sp.csr_matrix:
     """Rows (d, n d) of the displacement at `point` (d,), each component multiplied by one of the signs (d,)."""
-    found = _holding(mesh, point)
+    cells = _holding(mesh, point)
     row = np.zeros(len(mesh.points))
-    for cell, bary in found:
-        np.add.at(row, mesh.cells[cell], mesh.element.shape(bary[None])[0] / len(found))
+    for cell, bary in cells:
+        np.add.at(row, mesh.cells[cell], mesh.element.shape(bary[None])[0] / len(cells))
     return sp.kron(sp.csr_matrix(row), np.diag(signs), format="csr")
 
 
 def _holding(mesh: Mesh, point: Float) -> list[tuple[int, Float]]:
-    found = cells_at(mesh, point)
-    if not found:
+    cells = cells_at(mesh, point)
+    if not cells:
         raise Finger3dError(f"gauge: the point {tuple(round(float(x), 6) for x in point)} mm lies outside the body")
-    return found
+    return cells

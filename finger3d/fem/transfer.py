@@ -13,8 +13,8 @@ from finger3d.fem.simplex import Mesh
 from finger3d.fem.traces import BoundarySurface
 from finger3d.geometry.surface import Triangles
 
-_BEYOND = 0.25  # a curved facet's border bulges at most this far, in barycentric coordinates
-_COVERED = 0.5  # least share of a point's hat that must be under the other surface
+_LARGEST_BULGE = 0.25  # a curved facet's border bulges at most this far, in barycentric coordinates
+_LEAST_HAT_COVERAGE = 0.5  # least share of a point's hat that must be under the other surface
 
 
 def facing_trace(surface: BoundarySurface, mesh: Mesh, label: str) -> sp.csr_matrix:
@@ -24,8 +24,8 @@ def facing_trace(surface: BoundarySurface, mesh: Mesh, label: str) -> sp.csr_mat
     1, or to 0 where less than half of the hat function of the point has facets above it.
     """
     values, there = values_over(mesh, label, surface.samples)
-    share = np.asarray(surface.average @ there.astype(float))
-    scale = np.where(share >= _COVERED, 1.0 / np.maximum(share, _COVERED), 0.0)
+    coverage = np.asarray(surface.average @ there.astype(float))
+    scale = np.where(coverage >= _LEAST_HAT_COVERAGE, 1.0 / np.maximum(coverage, _LEAST_HAT_COVERAGE), 0.0)
     return sp.csr_matrix(sp.diags_array(scale) @ surface.average @ values)
 
 
@@ -59,20 +59,20 @@ def _edges_over(coords: Float, x: Float) -> tuple[Int, Float]:
     low, high = np.minimum(start, stop), np.maximum(start, stop)
     slack = 1e-12 * float(np.ptp(coords[:, :, 0]))
     order = np.argsort(low)
-    at = np.clip(np.searchsorted(low[order], x, side="right") - 1, 0, len(low) - 1)
-    face = order[at]
+    position = np.clip(np.searchsorted(low[order], x, side="right") - 1, 0, len(low) - 1)
+    face = order[position]
     t = np.clip((x - start[face]) / (stop - start)[face], 0.0, 1.0)
     face = np.where((x < low[face] - slack) | (x > high[face] + slack), -1, face)
     return face, np.stack([1.0 - t, t], axis=1)
 
 
-def _curved(element: Element, nodes: Float, straight: Float, at: Float) -> Float:
+def _curved(element: Element, nodes: Float, straight: Float, points: Float) -> Float:
     """Barycentric coordinates on curved facets (q, k, d - 1), seen from below, from those on the straight ones.
 
     A point whose coordinates lie far outside its facet keeps those on the straight facet.
     """
     if not element.is_quadratic:
         return straight
-    found = inverse_map(element, nodes, at, straight)
-    lost = ~np.isfinite(found).all(axis=1) | (found.min(axis=1) < -_BEYOND)
-    return np.where(lost[:, None], straight, found)
+    bary = inverse_map(element, nodes, points, straight)
+    lost = ~np.isfinite(bary).all(axis=1) | (bary.min(axis=1) < -_LARGEST_BULGE)
+    return np.where(lost[:, None], straight, bary)

@@ -59,7 +59,7 @@ def read(path: Array) -> Mapping[str, Array]:
         return _error("CAD calls its solid invalid; mend it where it was drawn")
     labels = [_label(_entity_name(solid, reader)) for solid in solids]
     if len(solids) > 1 and not all(labels):
-        labels = [own or _label(name) for own, name in zip(labels, _product_names(str(path), solids), strict=True)]
+        labels = [label or _label(name) for label, name in zip(labels, _product_names(str(path), solids), strict=True)]
     faces = [_entity_name(face, reader) for solid in solids for face in _inside(solid, TopAbs_ShapeEnum.TopAbs_FACE)]
     stream = io.BytesIO()
     BinTools.Write_s(shape, stream)
@@ -76,9 +76,9 @@ def _inside(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> Sequence[TopoDS_Shap
     from OCP.collections import IndexedMap_TopoDS_Shape_TopTools_ShapeMapHasher
     from OCP.TopExp import TopExp
 
-    found = IndexedMap_TopoDS_Shape_TopTools_ShapeMapHasher()
-    TopExp.MapShapes_s(shape, kind, found)
-    return [found.FindKey(k) for k in range(1, found.Extent() + 1)]
+    shapes = IndexedMap_TopoDS_Shape_TopTools_ShapeMapHasher()
+    TopExp.MapShapes_s(shape, kind, shapes)
+    return [shapes.FindKey(k) for k in range(1, shapes.Extent() + 1)]
 
 
 def _entity_name(shape: TopoDS_Shape, reader: STEPControl_Reader) -> str:
@@ -114,7 +114,7 @@ def _product_names(path: str, solids: Sequence[TopoDS_Shape]) -> list[str]:
     reader.SetNameMode(True)
     reader.ReadFile(path)
     reader.Transfer(document)
-    found: list[tuple[Float, str]] = []
+    named_solids: list[tuple[Float, str]] = []
 
     def visit(entry: TDF_Label, location: TopLoc_Location) -> None:
         product = entry
@@ -128,7 +128,9 @@ def _product_names(path: str, solids: Sequence[TopoDS_Shape]) -> list[str]:
                 visit(component, location)
         else:
             shape = XCAFDoc_ShapeTool.GetShape_s(product).Moved(location)
-            found.extend((_centre(s), _attribute(product)) for s in _inside(shape, TopAbs_ShapeEnum.TopAbs_SOLID))
+            named_solids.extend(
+                (_centre(s), _attribute(product)) for s in _inside(shape, TopAbs_ShapeEnum.TopAbs_SOLID)
+            )
 
     free = Sequence_TDF_Label()
     XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).GetFreeShapes(free)
@@ -136,10 +138,10 @@ def _product_names(path: str, solids: Sequence[TopoDS_Shape]) -> list[str]:
         return [""] * len(solids)
     for entry in free:
         visit(entry, TopLoc_Location())
-    if not found:
+    if not named_solids:
         return [""] * len(solids)
-    centres = np.array([centre for centre, _ in found])
-    return [found[int(np.linalg.norm(centres - _centre(solid), axis=1).argmin())][1] for solid in solids]
+    centres = np.array([centre for centre, _ in named_solids])
+    return [named_solids[int(np.linalg.norm(centres - _centre(solid), axis=1).argmin())][1] for solid in solids]
 
 
 def _centre(solid: TopoDS_Shape) -> Float:
@@ -149,8 +151,8 @@ def _centre(solid: TopoDS_Shape) -> Float:
 
     properties = GProp_GProps()
     BRepGProp.VolumeProperties_s(solid, properties)
-    at = properties.CentreOfMass()
-    return np.array([at.X(), at.Y(), at.Z()])
+    centre = properties.CentreOfMass()
+    return np.array([centre.X(), centre.Y(), centre.Z()])
 
 
 def _attribute(entry: TDF_Label) -> str:

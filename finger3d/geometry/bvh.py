@@ -86,9 +86,9 @@ class Tree:
                     query, node = np.repeat(query, _ARITY), (_ARITY * node[:, None] + np.arange(_ARITY)).ravel()
                 keep = test(query, level, node)
                 query, node = query[keep], node[keep]
-            found = self.items[node].ravel()
+            items = self.items[node].ravel()
             query = np.repeat(query, _ARITY)
-            yield query[found >= 0], found[found >= 0]
+            yield query[items >= 0], items[items >= 0]
 
 
 def cylinder_distance(p: Float, cylinder: Float) -> Float:

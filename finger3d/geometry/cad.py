@@ -85,9 +85,11 @@ def sound(shape: Part | Shape, name: str) -> Solid:
         )
     solid = solids[0]
     solid.label = name
-    found = {face.label for face in labelled_faces(solid)}
-    if not {"contact", "base"} <= found:
-        raise Finger3dError(f"{name}: the solid has faces {sorted(found)}; it needs a base on y = 0 and a contact face")
+    labels = {face.label for face in labelled_faces(solid)}
+    if not {"contact", "base"} <= labels:
+        raise Finger3dError(
+            f"{name}: the solid has faces {sorted(labels)}; it needs a base on y = 0 and a contact face"
+        )
     return solid
 
 

@@ -39,11 +39,11 @@ class Network:
     @cached_property
     def at_point(self) -> list[set[int]]:
         """Patches that meet in every point."""
-        found: list[set[int]] = [set() for _ in range(len(self.surface.points))]
+        patches_at: list[set[int]] = [set() for _ in range(len(self.surface.points))]
         pairs = np.stack([self.surface.faces.ravel(), np.repeat(self.patch, 3)], axis=1)
         for v, p in np.unique(pairs, axis=0):
-            found[v].add(int(p))
-        return found
+            patches_at[v].add(int(p))
+        return patches_at
 
     def meeting(self, patches: tuple[int, ...], points: Float) -> Float | None:
         """Return the closest points (n, 3) where all these patches meet, or None if they do not meet."""
@@ -52,24 +52,25 @@ class Network:
             shared = edges[np.all(sides == sorted(patches), axis=1)]
             if len(shared):
                 return _on_segments(points, self.surface.points[shared])
-        corners = [v for v, at in enumerate(self.at_point) if at.issuperset(patches)]
+        corners = [v for v, here in enumerate(self.at_point) if here.issuperset(patches)]
         if not corners:
             return None
-        known = self.surface.points[corners]
-        value: Float = known[np.argmin(np.linalg.norm(points[:, None] - known, axis=2), axis=1)]
+        corner_points = self.surface.points[corners]
+        value: Float = corner_points[np.argmin(np.linalg.norm(points[:, None] - corner_points, axis=2), axis=1)]
         return value
 
 
 def _on_segments(points: Float, segments: Float) -> Float:
     """Closest points (n, 3) of segments (s, 2, 3)."""
-    out, best = np.zeros_like(points), np.full(len(points), np.inf)
+    out = np.zeros_like(points)
+    best = np.full(len(points), np.inf)
     for start, stop in segments:
         along = stop - start
         t = np.clip((points - start) @ along / max(float(along @ along), 1e-300), 0.0, 1.0)
-        at = start + t[:, None] * along
-        distance = np.linalg.norm(points - at, axis=1)
+        projected = start + t[:, None] * along
+        distance = np.linalg.norm(points - projected, axis=1)
         closer = distance < best
-        out[closer], best[closer] = at[closer], distance[closer]
+        out[closer], best[closer] = projected[closer], distance[closer]
     return out
 
 
@@ -140,9 +141,9 @@ def _looks_up(surface: Triangles, base: NDArray[np.bool_]) -> NDArray[np.bool_]:
     up = (surface.normals[:, 1] > _LEAST_UPWARD_NORMAL) & ~base
     smooth = _joined(surface, base.astype(np.int64))
     area = np.linalg.norm(surface.area_vectors, axis=1)
-    share = np.bincount(smooth, area * up) / np.maximum(np.bincount(smooth, area), 1e-300)
-    up[(share > 1.0 - _MINORITY)[smooth]] = True
-    up[(share < _MINORITY)[smooth]] = False
+    upward = np.bincount(smooth, area * up) / np.maximum(np.bincount(smooth, area), 1e-300)
+    up[(upward > 1.0 - _MINORITY)[smooth]] = True
+    up[(upward < _MINORITY)[smooth]] = False
     return up
 
 
@@ -162,7 +163,8 @@ def _neighbours(surface: Triangles) -> tuple[Int, Int, Int]:
     """Triangles a (e,) and b (e,) on both sides of every edge (e, 2) that has two."""
     edges = np.sort(surface.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     order = np.lexsort(edges.T)
-    edges, owner = edges[order], np.repeat(np.arange(len(surface.faces)), 3)[order]
+    edges = edges[order]
+    owner = np.repeat(np.arange(len(surface.faces)), 3)[order]
     pair = np.flatnonzero((edges[1:] == edges[:-1]).all(axis=1))
     return owner[pair], owner[pair + 1], edges[pair]
 
@@ -175,11 +177,11 @@ def coarser(body: Tessellation, tolerance: float) -> Tessellation:
     """
     if len(body.triangles) <= _DECIMATE_FROM:
         return body
-    for share in (1.0, 0.5, 0.2, 0.1):
-        found = _decimated(body, share * tolerance)
-        if not mistake(found):
-            nearest = Triangles(body.points, body.triangles).closest(found.corners.mean(axis=1))[1]
-            return replace(body, points=found.points, triangles=found.faces, face=body.face[nearest])
+    for factor in (1.0, 0.5, 0.2, 0.1):
+        coarse = _decimated(body, factor * tolerance)
+        if not mistake(coarse):
+            nearest = Triangles(body.points, body.triangles).closest(coarse.corners.mean(axis=1))[1]
+            return replace(body, points=coarse.points, triangles=coarse.faces, face=body.face[nearest])
     return body
 
 

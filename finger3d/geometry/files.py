@@ -72,10 +72,10 @@ def _check_crossings(path: Path, surface: Triangles) -> None:
     """Raise a Finger3dError if triangles intersect."""
     crossed = crossings(surface)
     if len(crossed):
-        at = surface.corners[crossed[0]].mean(axis=0)
+        place = surface.corners[crossed[0]].mean(axis=0)
         raise Finger3dError(
             f"{path}: the body's surface runs through itself at {len(crossed)} triangles, the first near "
-            f"({at[0]:.4g}, {at[1]:.4g}, {at[2]:.4g}) mm; mend it where it was drawn"
+            f"({place[0]:.4g}, {place[1]:.4g}, {place[2]:.4g}) mm; mend it where it was drawn"
         )
 
 

@@ -68,19 +68,19 @@ def glue(solids: Mapping[str, Solid | Compound], name: str) -> Glued:
     from OCP.collections import List_TopoDS_Shape
 
     labels = ("", *(label for label in solids if label))
-    given = [(labels.index(label), solid) for label, body in solids.items() for solid in body.solids()]
+    numbered = [(labels.index(label), solid) for label, body in solids.items() for solid in body.solids()]
     arguments = List_TopoDS_Shape()
-    for _, solid in given:
+    for _, solid in numbered:
         arguments.Append(solid.wrapped)
     builder = BRepAlgoAPI_BuilderAlgo()
     builder.SetArguments(arguments)
     builder.Build()
     shape = Compound(builder.Shape())
-    whole = sum(solid.volume for _, solid in given)
-    if not builder.IsDone() or abs(shape.volume - whole) > _OVERLAP * min(solid.volume for _, solid in given):
+    whole = sum(solid.volume for _, solid in numbered)
+    if not builder.IsDone() or abs(shape.volume - whole) > _OVERLAP * min(solid.volume for _, solid in numbered):
         raise Finger3dError(f"{name}: the solids overlap; cut one by the other where they were drawn")
     owners: dict[Face, list[tuple[int, Face]]] = {}
-    for number, solid in given:
+    for number, solid in numbered:
         images = [*builder.Modified(solid.wrapped)] or [solid.wrapped]  # a solid that touches none is not modified
         for image in images:
             for face in Shape.cast(image).faces():  # faces are equal whichever way they are turned
@@ -94,7 +94,7 @@ def glue(solids: Mapping[str, Solid | Compound], name: str) -> Glued:
         if len(numbers) == 1:
             label_face(first)
         faces.append(GluedFace(first, numbers[0], numbers[1] if len(numbers) == 2 else OUTSIDE))
-    volumes = tuple(math.fsum(s.volume for number, s in given if number == i) for i in range(len(labels)))
+    volumes = tuple(math.fsum(s.volume for number, s in numbered if number == i) for i in range(len(labels)))
     return Glued(shape, labels, volumes, tuple(faces))
 
 
@@ -113,29 +113,32 @@ def check_gaps(glued: Glued, solids: Sequence[Solid], name: str) -> None:
     for glued_face in glued.faces:
         if glued_face.outside != OUTSIDE:
             continue
-        at = _inner_point(glued_face.face)
+        place = _inner_point(glued_face.face)
         near = [
             solid
             for box, solid in boxes
-            if all(lo - least <= c <= hi + least for lo, c, hi in zip(box.min, at, box.max, strict=True))
+            if all(lo - least <= c <= hi + least for lo, c, hi in zip(box.min, place, box.max, strict=True))
         ]
         if len(near) < 2:
             continue
-        ways = sorted((solid.distance_to_with_closest_points(Vertex(*at)) for solid in near), key=lambda way: way[0])
+        ways = sorted((solid.distance_to_with_closest_points(Vertex(*place)) for solid in near), key=lambda way: way[0])
         gap, there, _ = ways[1]  # the first solid is the face's own
-        facing = glued_face.face.normal_at(Vector(*at)).dot(there - Vector(*at)) >= 0.5 * gap  # not beside a thin part
+        # not beside a thin part
+        facing = glued_face.face.normal_at(Vector(*place)).dot(there - Vector(*place)) >= 0.5 * gap
         if gap < least and facing:
-            raise Finger3dError(f"{name}: {_apart(gap, at)}; draw them with common faces, or a gap that can be meshed")
+            raise Finger3dError(
+                f"{name}: {_apart(gap, place)}; draw them with common faces, or a gap that can be meshed"
+            )
 
 
 def apart(a: Solid, b: Solid) -> str:
     """Return a clause that tells how far two solids are apart, and where."""
-    gap, at, _ = a.distance_to_with_closest_points(b)
-    return _apart(gap, (at.X, at.Y, at.Z))
+    gap, place, _ = a.distance_to_with_closest_points(b)
+    return _apart(gap, (place.X, place.Y, place.Z))
 
 
-def _apart(gap: float, at: tuple[float, float, float]) -> str:
-    x, y, z = at
+def _apart(gap: float, place: tuple[float, float, float]) -> str:
+    x, y, z = place
     return f"solids do not touch, but are {gap:.2g} mm apart near ({x:.4g}, {y:.4g}, {z:.4g}) mm"
 
 
@@ -155,7 +158,7 @@ def _inner_point(face: Face) -> tuple[float, float, float]:
         return float(abs((b.X() - a.X()) * (c.Y() - a.Y()) - (c.X() - a.X()) * (b.Y() - a.Y())))
 
     largest = max(corners, key=area)
-    at = BRepAdaptor_Surface(face.wrapped).Value(
+    point = BRepAdaptor_Surface(face.wrapped).Value(
         math.fsum(p.X() for p in largest) / 3.0, math.fsum(p.Y() for p in largest) / 3.0
     )
-    return at.X(), at.Y(), at.Z()
+    return point.X(), point.Y(), point.Z()

@@ -121,7 +121,8 @@ class Triangles:
 
         Pieces are closer to their bounding cylinders than a slender triangle is.
         """
-        corners, owner = self.corners, np.arange(len(self.faces))
+        corners = self.corners
+        owner = np.arange(len(self.faces))
         for _ in range(_MOST_CUTS):
             edges = np.linalg.norm(corners[:, [1, 2, 0]] - corners, axis=2)
             longest = edges.max(axis=1)
@@ -191,26 +192,27 @@ class Triangles:
         face : (n,) triangle, -1 where the line misses the surface
         bary : (n, 3) barycentric coordinates in it
         """
-        at = np.stack([x, z], axis=1).astype(float)
+        places = np.stack([x, z], axis=1).astype(float)
         slack = _SLACK * self.size
 
         facing, tree = self._facing_down if lowest else self._facing_up
         boxes = [b[:, [0, 2, 3, 5]] + np.array([-slack, -slack, slack, slack]) for b in tree.boxes]
 
         def inside(query: Int, level: int, node: Int) -> NDArray[np.bool_]:
-            p, box = at[query], boxes[level][node]
+            p = places[query]
+            box = boxes[level][node]
             inside: NDArray[np.bool_] = (
                 (box[:, 0] <= p[:, 0]) & (box[:, 1] <= p[:, 1]) & (p[:, 0] <= box[:, 2]) & (p[:, 1] <= box[:, 3])
             )
             return inside
 
-        face = np.full(len(at), -1, dtype=np.int64)
-        bary = np.zeros((len(at), 3))
-        best = np.full(len(at), np.inf)
+        face = np.full(len(places), -1, dtype=np.int64)
+        bary = np.zeros((len(places), 3))
+        best = np.full(len(places), np.inf)
         flat = self.corners[:, :, ::2]
-        for query, number in tree.pairs(len(at), inside):
+        for query, number in tree.pairs(len(places), inside):
             item = facing[number]
-            weight, met = _barycentric(at[query], flat[item], slack)
+            weight, met = _barycentric(places[query], flat[item], slack)
             query, item, weight = query[met], item[met], weight[met]
             y = np.einsum("ij,ij->i", weight, self.corners[item, :, 1]) * (1.0 if lowest else -1.0)
             order = np.lexsort((item, y, query))  # the number breaks ties, so that a result can be repeated
@@ -222,8 +224,8 @@ class Triangles:
         """Return the height (mm) of the lowest or highest point at x, z, exact on the triangles; nan outside."""
         x, z = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(z, dtype=float))
         face, bary = self.hits(x.ravel(), z.ravel(), lowest)
-        found = np.where(face < 0, np.nan, np.einsum("ij,ij->i", bary, self.corners[face, :, 1]))
-        return found.reshape(x.shape)
+        height = np.where(face < 0, np.nan, np.einsum("ij,ij->i", bary, self.corners[face, :, 1]))
+        return height.reshape(x.shape)
 
     def closest(self, points: Float) -> tuple[Float, Int, Int]:
         """Find the closest points of the surface.
@@ -235,8 +237,10 @@ class Triangles:
         feature : (n,) 0 inside the triangle, 1 to 3 on its edge 01, 12, 20, 4 to 6 at its corner
         """
         reach = self._distance_bound(points)
-        closest, face = np.zeros_like(points), np.full(len(points), -1, dtype=np.int64)
-        feature, best = np.zeros(len(points), dtype=np.int64), np.full(len(points), np.inf)
+        closest = np.zeros_like(points)
+        face = np.full(len(points), -1, dtype=np.int64)
+        feature = np.zeros(len(points), dtype=np.int64)
+        best = np.full(len(points), np.inf)
 
         def near(query: Int, level: int, node: Int) -> NDArray[np.bool_]:
             return cylinder_distance(points[query], self._bounding_cylinders[level][node]) <= reach[query]
@@ -265,7 +269,8 @@ class Triangles:
             node = 4 * node + np.argmin(children, axis=0)
         for column in range(tree.items.shape[1]):
             piece = tree.items[node, column]
-            item, there = owner[piece], piece >= 0
+            item = owner[piece]
+            there = piece >= 0
             p = _closest_on_triangle(points[there], self.corners[item[there]], self.normals[item[there]])[0]
             reach[there] = np.minimum(reach[there], np.linalg.norm(points[there] - p, axis=1))
         value: Float = reach * (1.0 + 1e-9) + 1e-12 * self.size
@@ -327,7 +332,8 @@ def _closest_on_triangle(p: Float, corner: Float, normal: Float) -> tuple[Float,
         q = corner[:, i] + t[:, None] * along
         distance = np.einsum("ij,ij->i", p - q, p - q)
         closer = distance < best
-        best[closer], out[closer] = distance[closer], q[closer]
+        best[closer] = distance[closer]
+        out[closer] = q[closer]
         feature[closer] = np.where(t <= 0.0, 4 + i, np.where(t >= 1.0, 4 + j, 1 + k))[closer]
         inside &= np.einsum("ij,ij->i", np.cross(along, start), normal) > 0.0
     height = np.einsum("ij,ij->i", p - corner[:, 0], normal)

@@ -89,12 +89,12 @@ def crossings(surface: Triangles) -> Int:
         inside: NDArray[np.bool_] = np.all((box[:, :3] <= high[query]) & (low[query] <= box[:, 3:]), axis=1)
         return inside
 
-    found = []
+    pierced = []
     for query, item in surface.tree.pairs(len(ends), overlap):
         apart = ~np.any(surface.faces[item][:, :, None] == ends[query][:, None, :], axis=(1, 2))
         query, item = query[apart], item[apart]
-        found.append(item[_pierced(start[query], stop[query], surface.corners[item], 1e-9 * surface.size)])
-    return np.unique(np.concatenate(found))
+        pierced.append(item[_pierced(start[query], stop[query], surface.corners[item], 1e-9 * surface.size)])
+    return np.unique(np.concatenate(pierced))
 
 
 def _pierced(start: Float, stop: Float, corner: Float, slack: float) -> NDArray[np.bool_]:
@@ -105,10 +105,10 @@ def _pierced(start: Float, stop: Float, corner: Float, slack: float) -> NDArray[
     a = np.einsum("ij,ij->i", start - corner[:, 0], normal)
     b = np.einsum("ij,ij->i", stop - corner[:, 0], normal)
     through: NDArray[np.bool_] = (np.minimum(a, b) < -slack) & (np.maximum(a, b) > slack) & (length > 0.0)
-    at = start + (a / np.where(through, a - b, 1.0))[:, None] * (stop - start)
+    crossing = start + (a / np.where(through, a - b, 1.0))[:, None] * (stop - start)
     for i, j in ((0, 1), (1, 2), (2, 0)):
         along = corner[:, j] - corner[:, i]
         inward = np.cross(normal, along)
         inward /= np.maximum(np.linalg.norm(inward, axis=1), 1e-300)[:, None]
-        through &= np.einsum("ij,ij->i", at - corner[:, i], inward) > -slack
+        through &= np.einsum("ij,ij->i", crossing - corner[:, i], inward) > -slack
     return through

@@ -82,8 +82,8 @@ class Tessellation:
         inside, outside = (
             np.array([getattr(f, side) for f in self.faces])[self.face] for side in ("inside", "outside")
         )
-        own, other = self.triangles[inside == number], self.triangles[outside == number]
-        return Triangles(self.points, np.vstack([own, other[:, ::-1]]))
+        outward, other = self.triangles[inside == number], self.triangles[outside == number]
+        return Triangles(self.points, np.vstack([outward, other[:, ::-1]]))
 
 
 def tessellate(
@@ -113,19 +113,19 @@ def tessellate_parts(
 ) -> Tessellation:
     """Tessellate glued solids like :func:`tessellate`; faces between them have their triangles once."""
     points, triangles, face = triangulated(body.shape, [f.face for f in body.faces], tolerance_mm, angle)
-    known = []
+    cad_faces = []
     for i, f in enumerate(body.faces):
-        found = _cad_face(f.face, points, triangles[face == i], surface_of(f.face, exact))
-        label = found.label if f.outside == OUTSIDE else ""
+        cad_face = _cad_face(f.face, points, triangles[face == i], surface_of(f.face, exact))
+        label = cad_face.label if f.outside == OUTSIDE else ""
         if label and voids is not None and len(voids.faces):
             middle = points[triangles[face == i][:1]].mean(axis=1)
             label = "cavity" if np.linalg.norm(voids.closest(middle)[0] - middle) < 4.0 * tolerance_mm else label
-        known.append(replace(found, label=label, inside=f.inside, outside=f.outside))
+        cad_faces.append(replace(cad_face, label=label, inside=f.inside, outside=f.outside))
     touching = np.unique(np.stack([triangles.ravel(), np.repeat(face, 3)], axis=1), axis=0)
     several = np.bincount(touching[:, 0], minlength=len(points)) >= 3
     many = np.flatnonzero(several & (_seams_at_points(triangles, face, len(points)) >= 3))
     sets = tuple(tuple(int(i) for i in touching[touching[:, 0] == v, 1]) for v in many)
-    return Tessellation(points, triangles, face, tuple(known), points[many], sets, body.labels[1:])
+    return Tessellation(points, triangles, face, tuple(cad_faces), points[many], sets, body.labels[1:])
 
 
 def voids_of(solid: Solid | Compound, tolerance_mm: float) -> Triangles:

@@ -48,21 +48,21 @@ def youngs_modulus(silicone: Silicone) -> YoungsModulus:
     Examples
     --------
     >>> from finger3d.materials.silicones import silicone_named
-    >>> found = youngs_modulus(silicone_named("Dragon Skin 20"))
-    >>> round(found.E_MPa, 2), round(found.spread, 2)
+    >>> modulus = youngs_modulus(silicone_named("Dragon Skin 20"))
+    >>> round(modulus.E_MPa, 2), round(modulus.spread, 2)
     (0.42, 0.25)
     """
-    found = _estimates(silicone)
-    if not found:
+    estimates = _estimates(silicone)
+    if not estimates:
         by_hardness = of_shore(silicone.scale, silicone.shore)
         return YoungsModulus(by_hardness.E_MPa, by_hardness.spread, f"{silicone.name}, {by_hardness.origin}")
-    logarithms = [math.log(value) for value, _, _ in found]
-    mean = math.fsum(logarithms) / len(found)
-    if len(found) == 1:
-        error = found[0][1]
+    logarithms = [math.log(value) for value, _, _ in estimates]
+    mean = math.fsum(logarithms) / len(estimates)
+    if len(estimates) == 1:
+        error = estimates[0][1]
     else:
-        error = math.sqrt(math.fsum((x - mean) ** 2 for x in logarithms) / (len(found) - 1) / len(found))
-    *others, last = (origin for _, _, origin in found)
+        error = math.sqrt(math.fsum((x - mean) ** 2 for x in logarithms) / (len(estimates) - 1) / len(estimates))
+    *others, last = (origin for _, _, origin in estimates)
     origin = f"{silicone.name}, {', '.join(others)}{' and ' if others else ''}{last}"
     return YoungsModulus(math.exp(mean), math.hypot(BATCH, error), origin)
 
@@ -77,19 +77,19 @@ def of_shore(scale: str, shore: float) -> YoungsModulus:
 
 def _estimates(silicone: Silicone) -> list[tuple[float, float, str]]:
     """Return every estimate of the modulus, MPa, its relative standard deviation, and its origin."""
-    found = []
+    estimates = []
     if silicone.modulus_100_MPa is not None:
-        found.append((*_between(silicone.modulus_100_MPa, NEO_HOOKEAN), "100 % modulus of the data sheet"))
+        estimates.append((*_between(silicone.modulus_100_MPa, NEO_HOOKEAN), "100 % modulus of the data sheet"))
     if silicone.tangent_tension_MPa is not None:
-        found.append((*_between(silicone.tangent_tension_MPa, SHOULDERS), "a tensile test"))
+        estimates.append((*_between(silicone.tangent_tension_MPa, SHOULDERS), "a tensile test"))
     if silicone.modulus_compression_MPa is not None:
-        found.append((silicone.modulus_compression_MPa, 0.0, "a compression test"))
+        estimates.append((silicone.modulus_compression_MPa, 0.0, "a compression test"))
     if silicone.modulus_fit_MPa is not None:
-        found.append((silicone.modulus_fit_MPa, 0.0, "a published hyperelastic law"))
+        estimates.append((silicone.modulus_fit_MPa, 0.0, "a published hyperelastic law"))
     if silicone.modulus_range_MPa is not None:
         low, high = silicone.modulus_range_MPa
-        found.append((*_between(low, high / low), "tensile tests of several cure temperatures"))
-    return found
+        estimates.append((*_between(low, high / low), "tensile tests of several cure temperatures"))
+    return estimates
 
 
 def _between(low: float, ratio: float) -> tuple[float, float]:

@@ -37,12 +37,12 @@ def _row(cells: list[str]) -> str:
 
 
 def _cells(one: Silicone, numbers: dict[str, int]) -> list[str]:
-    found = youngs_modulus(one)
+    modulus = youngs_modulus(one)
     return [
         one.name,
         f"{one.shore:g} A" if one.scale == "A" else f"00-{one.shore:g}",
-        f"{found.E_MPa:.3g}",
-        f"{100.0 * (found.spread or 0.0):.0f} %",
+        f"{modulus.E_MPa:.3g}",
+        f"{100.0 * (modulus.spread or 0.0):.0f} %",
         _number(one.modulus_100_psi),
         _number(one.tangent_tension_MPa),
         _number(one.modulus_compression_MPa),

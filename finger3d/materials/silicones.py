@@ -95,8 +95,8 @@ def _content() -> Mapping[str, object]:
 @functools.cache
 def sources() -> Mapping[str, str]:
     """Return the text of every source by its key."""
-    found: Mapping[str, str] = _content()["sources"]  # type: ignore[assignment]
-    return found
+    texts: Mapping[str, str] = _content()["sources"]  # type: ignore[assignment]
+    return texts
 
 
 @functools.cache
@@ -107,10 +107,10 @@ def silicones() -> Mapping[str, Silicone]:
 
 
 def _silicone(row: Mapping[str, object]) -> Silicone:
-    given = {key: tuple(value) if isinstance(value, list) else value for key, value in row.items()}
+    values = {key: tuple(value) if isinstance(value, list) else value for key, value in row.items()}
     if isinstance(mix := row.get("mix"), Mapping):
-        given["mix"] = Mix(**mix)
-    return Silicone(**given)  # type: ignore[arg-type]
+        values["mix"] = Mix(**mix)
+    return Silicone(**values)  # type: ignore[arg-type]
 
 
 def silicone_named(name: str) -> Silicone:
@@ -126,13 +126,13 @@ def silicone_named(name: str) -> Silicone:
     >>> silicone_named("dragonskin 20").name
     'Dragon Skin 20'
     """
-    known = {_plain(one): one for one in silicones()}
+    names = {_plain(one): one for one in silicones()}
     wanted = _plain(name)
     for speed in ("", *_SPEEDS):
-        if wanted.endswith(speed) and (found := known.get(wanted.removesuffix(speed))):
-            return silicones()[found]
-    near = difflib.get_close_matches(wanted, known, n=1, cutoff=0.5)
-    hint = f'did you mean "{known[near[0]]}"? ' if near else ""
+        if wanted.endswith(speed) and (match := names.get(wanted.removesuffix(speed))):
+            return silicones()[match]
+    near = difflib.get_close_matches(wanted, names, n=1, cutoff=0.5)
+    hint = f'did you mean "{names[near[0]]}"? ' if near else ""
     raise Finger3dError(f"{hint}must be one of {', '.join(silicones())}; or give shore_A, shore_00 or E_MPa instead")
 
 

@@ -11,7 +11,7 @@ from finger3d._types import Float
 from finger3d.fem.assembly import Pattern, Stiffness
 from finger3d.fem.bars import BarRelaxation, Bars
 from finger3d.fem.hyperelastic import Hyperelastic, Relaxing, TotalLagrangian
-from finger3d.fem.laws.inhomogeneous import Inhomogeneous
+from finger3d.fem.laws.base import Inhomogeneous
 from finger3d.fem.laws.stability import least_stiffness, unstable_from
 from finger3d.fem.recover import displacement
 from finger3d.mechanics.problem import Problem

@@ -95,7 +95,7 @@ def contact_of(problem: Problem, face: BoundarySurface, u: Float, target: Object
         gap=gap,
         normal=normal,
         axes=problem.axes,
-        share=problem.system.object_share if face is problem.surface else None,
+        object_share=problem.system.object_share if face is problem.surface else None,
     )
 
 

@@ -28,7 +28,7 @@ def pytetwild(
     """Return points (n, 3) and positive tets (m, 4) inside a surface, graded by a background mesh."""
     import pytetwild
 
-    found, tets = pytetwild.tetrahedralize(
+    nodes, tets = pytetwild.tetrahedralize(
         points,
         triangles.astype(np.int32),
         edge_length_abs=float(edge_length),
@@ -42,7 +42,7 @@ def pytetwild(
         bg_tets=bg_tets.astype(np.int32),
         bg_values=bg_values,
     )
-    return {"points": np.asarray(found, dtype=np.float64), "tets": np.asarray(tets, dtype=np.int64)}
+    return {"points": np.asarray(nodes, dtype=np.float64), "tets": np.asarray(tets, dtype=np.int64)}
 
 
 def netgen(step: Array, rate: Array, largest: Array, points: Float, sizes: Float) -> Mapping[str, Array]:

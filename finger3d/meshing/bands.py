@@ -27,8 +27,8 @@ class Band:
 
     Attributes
     ----------
-    at : function of u (n,) and a share
-        Points (n, 2), mm: on the upper curve at share 1, on the lower curve at share 0, and between them.
+    points : function of u (n,) and a level
+        Points (n, 2), mm: on the upper curve at level 1, on the lower curve at level 0, and between them.
     end : largest parameter; the contact curve ends at 1, the wall at 2
     parts : (from, to, part)
         Ranges of u and the numbers of the parts there; the ends of the ranges are nodes of every row.
@@ -37,7 +37,7 @@ class Band:
     corner : parameter of a corner of the lower curve, which is one of its nodes
     """
 
-    at: Callable[[Float, float], Float]
+    points: Callable[[Float, float], Float]
     end: float
     parts: tuple[tuple[float, float, int], ...]
     right: str
@@ -46,7 +46,7 @@ class Band:
 
     def travel(self, u: Float) -> Float:
         """Return the distance (n,), mm, of the curves at parameters (n,)."""
-        across = self.at(u, 1.0) - self.at(u, 0.0)
+        across = self.points(u, 1.0) - self.points(u, 0.0)
         return np.asarray(np.hypot(across[:, 0], across[:, 1]))
 
     @property
@@ -84,18 +84,19 @@ def bands(section: Section) -> Bands:
     """Divide a section into bands."""
     number = {label: i for i, label in enumerate(section.part_labels, start=1)}
     inner = section.inner
-    found = _below(inner, number)
+    below = _below(inner, number)
     if section.layer is None:
-        return found
+        return below
     right = "walls" if section.edge_height_mm > 0.0 else "base"
     parts = ((0.0, 1.0, number[section.layer.label]),)
     layer = Band(_between(section.contact.at, inner.contact.at), 1.0, parts, right)
-    return Bands((layer, *found.bands), found.walled, found.core)
+    return Bands((layer, *below.bands), below.walled, below.core)
 
 
 def _below(section: Section, number: dict[str, int]) -> Bands:
     """Divide a section without a layer."""
-    wall, core = section.edge_height_mm, section.core
+    wall = section.edge_height_mm
+    core = section.core
     steep = getattr(section.contact, "angle", 0.0) > _STEEP
     foot = core.height_mm if core else 0.0
     if wall - foot >= _LOW_WALL * (section.height_mm - foot) and not steep:
@@ -135,7 +136,8 @@ def _above_and_beside(section: Section, core: Core, part: int) -> Bands:
 
 def _diagonal(section: Section, core: Core) -> float:
     """Return the parameter of the outline where the line at 45 degrees through the core's corner leaves the section."""
-    x, y, length = core.half_length_mm, core.height_mm, section.half_length_mm
+    x, y = core.half_length_mm, core.height_mm
+    length = section.half_length_mm
     on_wall = y + length - x
     if on_wall <= section.edge_height_mm:
         return 2.0 - on_wall / section.edge_height_mm
@@ -151,16 +153,17 @@ def _diagonal(section: Section, core: Core) -> float:
 def _sides(core: Core, corner: float, end: float) -> Callable[[Float], Float]:
     """Return the curve along the core's upper side, for u <= corner, and down its vertical side."""
 
-    def at(u: Float) -> Float:
+    def curve(u: Float) -> Float:
         x = np.interp(u, [0.0, corner], [0.0, core.half_length_mm])
         return np.stack([x, np.interp(u, [corner, end], [core.height_mm, 0.0])], axis=1)
 
-    return at
+    return curve
 
 
 def thin_places(section: Section) -> tuple[Float, Float]:
     """Return places (k, 3) where parts are thin, and the edge lengths (k,), mm, that cells there may have."""
-    inner, places, sizes = section.inner, [], []
+    inner = section.inner
+    places, sizes = [], []
 
     def add(points: Float, size: Float | float) -> None:
         places.append(points)
@@ -170,7 +173,8 @@ def thin_places(section: Section) -> tuple[Float, Float]:
         thickness = section.height_mm - inner.height_mm
         add(_along(inner.contact.at, inner.contact.length_mm, thickness), 1.5 * thickness)
     if core := inner.core:
-        x, y, beside = core.half_length_mm, core.height_mm, inner.half_length_mm - core.half_length_mm
+        x, y = core.half_length_mm, core.height_mm
+        beside = inner.half_length_mm - core.half_length_mm
         upper = _along(lambda u: np.stack([x * u, np.full_like(u, y)], axis=1), x, y)
         gap = inner.contact.height(upper[:, 0]) - y
         add(upper, 2.0 * np.minimum(np.minimum(gap, y), x))

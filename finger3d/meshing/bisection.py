@@ -36,8 +36,8 @@ class _Marked(NamedTuple):
     def of(self, edges: Int) -> Int:
         """Return the number of each edge (..., 2) among the marked ones, -1 for others."""
         keys = _keys(edges, self.base)
-        found = np.minimum(np.searchsorted(self.keys, keys), len(self.keys) - 1)
-        return np.where(self.keys[found] == keys, found, -1)
+        positions = np.minimum(np.searchsorted(self.keys, keys), len(self.keys) - 1)
+        return np.where(self.keys[positions] == keys, positions, -1)
 
 
 def refined(mesh: Mesh, size: Callable[[Float], Float], check: Callable[[int], None] = lambda cells: None) -> Mesh:
@@ -51,9 +51,11 @@ def refined(mesh: Mesh, size: Callable[[Float], Float], check: Callable[[int], N
     check : called with the number of cells before each round; it may raise
     """
     d = mesh.dim
-    points, cells = mesh.points, mesh.cells[:, : d + 1]
+    points = mesh.points
+    cells = mesh.cells[:, : d + 1]
     facets = {label: f[:, :d] for label, f in mesh.facets.items()}
-    parents, places = np.arange(len(cells)), np.tile(np.eye(d + 1), (len(cells), 1, 1))
+    parents = np.arange(len(cells))
+    places = np.tile(np.eye(d + 1), (len(cells), 1, 1))
     while True:
         check(len(cells))
         edges, number, ranks = _edges(points, cells)
@@ -65,8 +67,8 @@ def refined(mesh: Mesh, size: Callable[[Float], Float], check: Callable[[int], N
         cell, edge = np.nonzero(halved[number])
         _, first = np.unique(number[cell, edge], return_index=True)
         ends = _pairs(d + 1)[edge[first]]
-        at = places[cell[first, None], ends].mean(axis=1)
-        points = np.vstack([points, _positions(mesh, parents[cell[first]], at)])
+        bary = places[cell[first, None], ends].mean(axis=1)
+        points = np.vstack([points, _positions(mesh, parents[cell[first]], bary)])
         marked = _Marked(_keys(edges[chosen], len(points)), middles, ranks[chosen], len(points))
         cells, origin, places = _split(cells, places, marked)
         parents = parents[origin]
@@ -77,11 +79,11 @@ def refined(mesh: Mesh, size: Callable[[Float], Float], check: Callable[[int], N
     renumbered = {label: np.searchsorted(used, f) for label, f in facets.items()}
     part = None if mesh.part is None else mesh.part[parents]
     linear = replace(mesh, points=points[used], cells=compact.reshape(cells.shape), facets=renumbered, part=part)
-    made = quadratic(linear)
-    curved = made.points.copy()
+    straight = quadratic(linear)
+    curved = straight.points.copy()
     for k, (i, j) in enumerate(EDGES[d]):
-        curved[made.cells[:, d + 1 + k]] = _positions(mesh, parents, 0.5 * (places[:, i] + places[:, j]))
-    return replace(made, points=curved)
+        curved[straight.cells[:, d + 1 + k]] = _positions(mesh, parents, 0.5 * (places[:, i] + places[:, j]))
+    return replace(straight, points=curved)
 
 
 def _pairs(corners: int) -> Int:
@@ -135,23 +137,26 @@ def _split(simplices: Int, places: Float, marked: _Marked) -> tuple[Int, Int, Fl
     places : (n, k, ...) of the corners, those of new ones halfway between old ones
     """
     done: list[tuple[Int, Int, Float]] = []
-    pairs, origin = _pairs(simplices.shape[1]), np.arange(len(simplices))
+    pairs = _pairs(simplices.shape[1])
+    origin = np.arange(len(simplices))
     while True:
-        found = marked.of(simplices[:, pairs])
-        rank = np.where(found >= 0, marked.ranks[found], -1)
-        longest, whole = rank.argmax(axis=1), rank.max(axis=1, initial=-1) < 0
+        number = marked.of(simplices[:, pairs])
+        rank = np.where(number >= 0, marked.ranks[number], -1)
+        longest = rank.argmax(axis=1)
+        whole = rank.max(axis=1, initial=-1) < 0
         done.append((simplices[whole], origin[whole], places[whole]))
         if whole.all():
             return _joined(done)
         simplices, origin, places = simplices[~whole], origin[~whole], places[~whole]
-        every, (i, j) = np.arange(len(simplices)), pairs[longest[~whole]].T
-        middle = marked.middles[found[~whole][every, longest[~whole]]]
+        every = np.arange(len(simplices))
+        i, j = pairs[longest[~whole]].T
+        middle = marked.middles[number[~whole][every, longest[~whole]]]
         halfway = 0.5 * (places[every, i] + places[every, j])
         halves = []
         for replaced in (i, j):
-            corners, at = simplices.copy(), places.copy()
-            corners[every, replaced], at[every, replaced] = middle, halfway
-            halves.append((corners, origin, at))
+            corners, corner_places = simplices.copy(), places.copy()
+            corners[every, replaced], corner_places[every, replaced] = middle, halfway
+            halves.append((corners, origin, corner_places))
         simplices, origin, places = _joined(halves)
 
 

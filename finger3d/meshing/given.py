@@ -181,10 +181,10 @@ def _labelled(path: Path, contents: MeshContents) -> Mesh:
     """Return the quadratic mesh with its boundary facets by label, and its parts; nodes of no cell are left out."""
     missing = [name for name in NEEDED if name not in contents.label]
     if missing:
-        known = ", ".join(f"'{name}'" for name in np.unique(contents.label)) or "none"
+        names = ", ".join(f"'{name}'" for name in np.unique(contents.label)) or "none"
         how = "physical surface" if path.suffix.lower() == ".msh" else "value of the cell data 'label'"
         raise Finger3dError(
-            f"{path}: no facets are named '{missing[0]}' (a {how}); named are: {known}; name the facets of the fixed "
+            f"{path}: no facets are named '{missing[0]}' (a {how}); named are: {names}; name the facets of the fixed "
             "base 'base' and those that may touch first 'contact'"
         )
     if cuts := [name for name in _CUTS if name in contents.label]:
@@ -198,9 +198,9 @@ def _labelled(path: Path, contents: MeshContents) -> Mesh:
     facets, key = _boundary(mesh)
     named = np.sort(numbers[contents.triangles], axis=1)
     label = _labels(path, contents, named, key)
-    found = {name: facets[label == name] for name in _KEPT}
+    labelled = {name: facets[label == name] for name in _KEPT}
     part, part_labels = _parts(contents)
-    whole = replace(mesh, facets=found, part=part, part_labels=part_labels)
+    whole = replace(mesh, facets=labelled, part=part, part_labels=part_labels)
     return whole if mesh.element.is_quadratic else quadratic(whole)
 
 
@@ -226,15 +226,15 @@ def _labels(path: Path, contents: MeshContents, named: Int, boundary: Int) -> np
     for k, name in zip(range(len(named)), contents.label.tolist(), strict=True):
         if name not in _KEPT:
             continue
-        at = number.get(tuple(named[k].tolist()))
-        if at is None:
+        facet = number.get(tuple(named[k].tolist()))
+        if facet is None:
             raise Finger3dError(
                 f"{path}: facet {k + 1} of those with a name, '{name}', lies on no outer face of a tetrahedron; name "
                 "facets of the surface, and merge nodes at the same place"
             )
-        if taken.setdefault(at, name) != name:
-            raise Finger3dError(f"{path}: a facet is named both '{taken[at]}' and '{name}'; give it one name")
-        label[at] = name
+        if taken.setdefault(facet, name) != name:
+            raise Finger3dError(f"{path}: a facet is named both '{taken[facet]}' and '{name}'; give it one name")
+        label[facet] = name
     return label
 
 
@@ -260,10 +260,10 @@ def _check_cells(path: Path, mesh: Mesh) -> None:
     ):
         bad = np.flatnonzero(~(determinants > 0.0))
         if len(bad):
-            at = mesh.points[mesh.cells[bad[0], :4]].mean(axis=0)
+            place = mesh.points[mesh.cells[bad[0], :4]].mean(axis=0)
             raise Finger3dError(
                 f"{path}: {len(bad)} of {len(mesh.cells)} tetrahedra are {what}, the first is number {bad[0] + 1}, "
-                f"near ({at[0]:.4g}, {at[1]:.4g}, {at[2]:.4g}); mend the mesh where it was made"
+                f"near ({place[0]:.4g}, {place[1]:.4g}, {place[2]:.4g}); mend the mesh where it was made"
             )
 
 

@@ -17,7 +17,7 @@ from finger3d.geometry.section import Arc, Core, Flat, Section
 from finger3d.meshing.bands import Band, Bands, bands, ranges, thin_places
 from finger3d.meshing.grading import Grading
 
-RATE = 0.25
+STRUCTURED_GROWTH = 0.25
 """Growth of the edge length per length away from the contact zone."""
 
 _ASPECT = 3.0  # quadratic elements tolerate 5:1; joining rows with different numbers of points uses up the rest
@@ -42,10 +42,10 @@ class Sizes:
 
         `longest` returns the largest distance of rows at depths; without it, it follows from the edge lengths alone.
         """
-        grow = max(0.0, (self.base_mm - self.size_mm) / RATE)  # depth at which the base size is reached
+        grow = max(0.0, (self.base_mm - self.size_mm) / STRUCTURED_GROWTH)  # depth at which the base size is reached
 
         def count(depth: Float) -> Float:
-            near = np.log1p(RATE * np.minimum(depth, grow) / self.size_mm) / RATE
+            near = np.log1p(STRUCTURED_GROWTH * np.minimum(depth, grow) / self.size_mm) / STRUCTURED_GROWTH
             return near + np.maximum(depth - grow, 0.0) / self.base_mm
 
         sample = np.concatenate([np.linspace(0.0, length, 4001), np.geomspace(1e-6 * length, length, 2000)])
@@ -63,8 +63,8 @@ class Sizes:
         """Edge length (n,) at points (n, 2): the contact size, growing with the distance from the zone."""
         x = np.clip(points[:, 0], self.low, self.high)
         reach = np.hypot(points[:, 0] - x, points[:, 1] - section.contact.height(x))
-        size: Float = np.minimum(self.base_mm, self.size_mm + RATE * reach)
-        return size if self.grading is None else np.minimum(size, self.grading.at(points, RATE))
+        size: Float = np.minimum(self.base_mm, self.size_mm + STRUCTURED_GROWTH * reach)
+        return size if self.grading is None else np.minimum(size, self.grading.at(points, STRUCTURED_GROWTH))
 
 
 @dataclass(frozen=True)
@@ -141,10 +141,10 @@ def _spread(u: Float, points: Float, size: Float, least: int) -> Float:
 
 @dataclass(frozen=True)
 class _Place:
-    """A row in a band: its share, and the largest edge length (n,), mm, that its distance from other rows allows."""
+    """A row in a band: its level, and the largest edge length (n,), mm, that its distance from other rows allows."""
 
     band: Band
-    share: float
+    level: float
     longest: Float
 
 
@@ -164,33 +164,34 @@ class GridRow:
 
 def rows(section: Section, sizes: Sizes) -> GridLayout:
     """Lay out the rows and the points on them."""
-    found = bands(section)
+    division = bands(section)
     sizes = _with_thin_places(section, sizes)
-    u = _samples(section, sizes, found)
+    u = _samples(section, sizes, division)
     places: list[list[_Place]] = []
     start = 0.0
-    for band in found.bands:
-        own = u[u <= band.end]
-        length = _middle(section, sizes, found, band)
-        longest = _longest(sizes, band, own, length) if sizes.grading else None
+    for band in division.bands:
+        u_band = u[u <= band.end]
+        length = _middle(section, sizes, division, band)
+        longest = _longest(sizes, band, u_band, length) if sizes.grading else None
         depth = sizes.steps(length, longest, start)
         scales = 1.0 - depth / length
         scales[-1] = 0.0
         gaps = np.diff(depth)
         gap = np.minimum(np.append(gaps, gaps[-1]), np.insert(gaps, 0, gaps[0]))
-        travel = band.travel(own)
+        travel = band.travel(u_band)
         new = [[_Place(band, float(s), _ASPECT * g * travel / length)] for s, g in zip(scales, gap, strict=True)]
         if places:
             places[-1] += new.pop(0)
         places += new
         start += length
-    laid, count = [], 0
-    for k, at in enumerate(places):
-        params = _on_row(section, sizes, u, at, first=k == 0)
-        points = at[-1].band.at(params, at[-1].share)
+    laid = []
+    count = 0
+    for k, row_places in enumerate(places):
+        params = _on_row(section, sizes, u, row_places, first=k == 0)
+        points = row_places[-1].band.points(params, row_places[-1].level)
         laid.append(GridRow(count + np.arange(len(params)), params, points))
         count += len(params)
-    return _joined(section, sizes, found, places, laid)
+    return _joined(section, sizes, division, places, laid)
 
 
 def _with_thin_places(section: Section, sizes: Sizes) -> Sizes:
@@ -199,52 +200,52 @@ def _with_thin_places(section: Section, sizes: Sizes) -> Sizes:
     few = wanted < sizes.at(points[:, :2], section)
     if not few.any():
         return sizes
-    known = sizes.grading or Grading(np.zeros((0, 3)), np.zeros(0))
+    present = sizes.grading or Grading(np.zeros((0, 3)), np.zeros(0))
     return replace(
         sizes,
-        grading=Grading(np.vstack([known.points, points[few]]), np.concatenate([known.sizes, wanted[few]])),
+        grading=Grading(np.vstack([present.points, points[few]]), np.concatenate([present.sizes, wanted[few]])),
     )
 
 
-def _samples(section: Section, sizes: Sizes, found: Bands) -> Float:
+def _samples(section: Section, sizes: Sizes, division: Bands) -> Float:
     """Return parameters at which curves are sampled, with those of corners and borders."""
     samples = int(np.clip(4.0 * section.contact.length_mm / sizes.size_mm, 400, 20_000))
     u = np.linspace(0.0, 1.0, samples + 1)
-    if found.bands[-1].end > 1.0:
+    if division.bands[-1].end > 1.0:
         u = np.concatenate([u, np.linspace(1.0, 2.0, samples // 4 + 2)[1:]])
-    breaks = [b for band in found.bands for b in (*band.borders, band.corner) if b is not None]
+    breaks = [b for band in division.bands for b in (*band.borders, band.corner) if b is not None]
     return np.union1d(u, breaks) if breaks else u
 
 
-def _middle(section: Section, sizes: Sizes, found: Bands, band: Band) -> float:
+def _middle(section: Section, sizes: Sizes, division: Bands, band: Band) -> float:
     """Return the distance of a band's curves below the middle of the contact zone, mm."""
     x = 0.5 * (sizes.low + sizes.high) if sizes.low > 0.0 else 0.0
-    if len(found.bands) == 1 and found.core is None:
+    if len(division.bands) == 1 and division.core is None:
         middle = section.contact.at(np.zeros(1))[0]
         if x > 0.0:
             middle = np.array([x, float(section.contact.height(np.array(x)))])
-        return float(middle[1]) if found.walled else float(np.hypot(*middle))
+        return float(middle[1]) if division.walled else float(np.hypot(*middle))
     return float(band.travel(section.contact.fraction(np.array([x])))[0])
 
 
-def _on_row(section: Section, sizes: Sizes, u: Float, at: list[_Place], first: bool) -> Float:
+def _on_row(section: Section, sizes: Sizes, u: Float, row_places: list[_Place], first: bool) -> Float:
     """Return the parameters of the points on a row."""
-    last = at[-1]
+    last = row_places[-1]
     band = last.band
-    if last.share == 0.0 and band.shrinks:
+    if last.level == 0.0 and band.shrinks:
         return np.zeros(1)
     u = u[u <= band.end]
-    points = band.at(u, last.share)
+    points = band.points(u, last.level)
     size = sizes.at(points, section)
-    for place in at:
+    for place in row_places:
         reach = len(place.longest)
         size[:reach] = np.minimum(size[:reach], place.longest)
-    breaks = sorted({b for place in at for b in place.band.borders})
-    breaks += [place.band.corner for place in at if place.share == 0.0 and place.band.corner is not None]
+    breaks = sorted({b for place in row_places for b in place.band.borders})
+    breaks += [place.band.corner for place in row_places if place.level == 0.0 and place.band.corner is not None]
     breaks = sorted(set(breaks))
     if not breaks and u[-1] > 1.0:
         corner = int(np.searchsorted(u, 1.0))
-        below = _spread(u[corner:], points[corner:], size[corner:], 1 if first or len(at) > 1 else 0)
+        below = _spread(u[corner:], points[corner:], size[corner:], 1 if first or len(row_places) > 1 else 0)
         if len(below) > 1:
             above = _spread(u[: corner + 1], points[: corner + 1], size[: corner + 1], 1)
             return np.concatenate([above, below[1:]])
@@ -264,28 +265,28 @@ def _longest(sizes: Sizes, band: Band, u: Float, length: float) -> Callable[[Flo
     places = u[np.linspace(0, len(u) - 1, _PLACES).astype(int)]
     travel = band.travel(places)
     stations = np.linspace(0.0, length, _STATIONS)
-    at = np.vstack([band.at(places, share) for share in 1.0 - stations / length])
-    size = grading.at(at, RATE).reshape(_STATIONS, _PLACES)
+    points = np.vstack([band.points(places, level) for level in 1.0 - stations / length])
+    size = grading.at(points, STRUCTURED_GROWTH).reshape(_STATIONS, _PLACES)
     least = (size * length / np.maximum(travel, 1e-3 * length)).min(axis=1)
     return lambda depth: np.interp(depth, stations, least)
 
 
 def _joined(
-    section: Section, sizes: Sizes, found: Bands, places: list[list[_Place]], laid: list[GridRow]
+    section: Section, sizes: Sizes, division: Bands, places: list[list[_Place]], laid: list[GridRow]
 ) -> GridLayout:
     """Return the strips between the rows, the boundary, and the curves."""
     strips: list[Strip] = []
     ends: dict[str, list[int]] = {}
-    for at, upper, lower in zip(places, laid[:-1], laid[1:], strict=False):
-        band = at[-1].band
+    for row_places, upper, lower in zip(places, laid[:-1], laid[1:], strict=False):
+        band = row_places[-1].band
         for low, high, part in band.parts:
             (a, ua), (b, ub) = upper.part(low, high), lower.part(low, high)
             strips.append(Strip(a, b, ua, ub, part))
         ends.setdefault(band.right, [int(strips[-1].upper[-1])]).append(int(strips[-1].lower[-1]))
     right = {label: np.array(nodes) for label, nodes in ends.items()}
     side = laid[-1]
-    if found.core:
-        core, part = found.core
+    if division.core:
+        core, part = division.core
         filling = _core_rows(section, sizes, core, side)
         strips += [Strip(a.nodes, b.nodes, a.u, b.u, part) for a, b in pairwise(filling)]
         laid = [*laid, *filling[1:]]
@@ -298,7 +299,7 @@ def _joined(
         axis, value = (0, section.half_length_mm) if label == "walls" else (1, 0.0)
         points[nodes, axis] = value
     bottom = laid[-1].nodes
-    if found.walled or found.core:
+    if division.walled or division.core:
         points[bottom, 1] = 0.0
     facets = {
         "contact": _edges(laid[0].part(0.0, 1.0)[0])[:, ::-1],
@@ -312,7 +313,7 @@ def _joined(
     }
     borders = [(section, laid[0])]
     if section.layer:
-        borders.append((section.inner, laid[next(k for k, at in enumerate(places) if len(at) > 1)]))
+        borders.append((section.inner, laid[next(k for k, row_places in enumerate(places) if len(row_places) > 1)]))
     curves = []
     for owner, row in borders:
         beyond = row.part(1.0, 2.0)[0]
@@ -337,7 +338,7 @@ def _core_rows(section: Section, sizes: Sizes, core: Core, around: GridRow) -> l
     x, y = around.points.T
     on_top, beside = y == core.height_mm, x == core.half_length_mm
     side, heights = around.nodes[beside], y[beside]
-    found = [GridRow(around.nodes[on_top], x[on_top] / core.half_length_mm, around.points[on_top])]
+    core_rows = [GridRow(around.nodes[on_top], x[on_top] / core.half_length_mm, around.points[on_top])]
     count = int(around.nodes[-1]) + 1
     u = np.linspace(0.0, 1.0, _STATIONS + 1)
     for k in range(1, len(side)):
@@ -347,8 +348,8 @@ def _core_rows(section: Section, sizes: Sizes, core: Core, around: GridRow) -> l
         nodes = np.append(count + np.arange(len(params) - 1), side[k])
         count += len(params) - 1
         points = np.stack([core.half_length_mm * params, np.full_like(params, heights[k])], axis=1)
-        found.append(GridRow(nodes, params, points))
-    return found
+        core_rows.append(GridRow(nodes, params, points))
+    return core_rows
 
 
 def _zip(upper: Int, lower: Int, at_upper: Float, at_lower: Float) -> Int:

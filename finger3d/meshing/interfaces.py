@@ -48,16 +48,16 @@ def part_facets(tets: Int, part: Int | None = None) -> PartFacets:
     single = ~(np.append(twice, False) | np.append(False, twice))
     first, second = order[:-1][twice], order[1:][twice]
     between = owner[first] != owner[second]
-    found = np.concatenate([order[single], first[between]])
+    chosen = np.concatenate([order[single], first[between]])
     outside = np.concatenate([np.full(single.sum(), OUTSIDE), owner[second[between]]])
-    back = np.argsort(found, kind="stable")  # in the order of the cells
-    found, outside = found[back], outside[back]
-    return PartFacets(faces[found], owner[found], outside)
+    back = np.argsort(chosen, kind="stable")  # in the order of the cells
+    chosen, outside = chosen[back], outside[back]
+    return PartFacets(faces[chosen], owner[chosen], outside)
 
 
 def parts_of(points: Float, body: Tessellation) -> Int:
     """Return the number (n,) of the part that holds each point (n, 3), OUTSIDE for points in none."""
-    found = np.full(len(points), OUTSIDE)
+    parts = np.full(len(points), OUTSIDE)
     depth = np.zeros(len(points))
     for number in range(len(body.part_labels) + 1):
         surface = body.part(number)
@@ -67,8 +67,8 @@ def parts_of(points: Float, body: Tessellation) -> Int:
         distance = np.ones(len(points))
         distance[box] = surface.signed_distance(points[box])[0]
         deeper = distance < depth
-        found[deeper], depth[deeper] = number, distance[deeper]
-    return found
+        parts[deeper], depth[deeper] = number, distance[deeper]
+    return parts
 
 
 def thickness(surface: Triangles) -> float:

@@ -169,8 +169,8 @@ def _msh(path: Path) -> tuple[Float, list[_Block]]:
 def _without(content: bytes, section: bytes) -> tuple[bytes, bytes]:
     """Return a file without a section, and what is between the lines that begin and end it."""
     first, last = b"$" + section, b"$End" + section
-    before, found, rest = content.partition(first)
-    if not found:
+    before, separator, rest = content.partition(first)
+    if not separator:
         return content, b""
     inside, _, after = rest.partition(last)
     return before + after.lstrip(), inside[inside.index(b"\n") + 1 :]
@@ -179,33 +179,35 @@ def _without(content: bytes, section: bytes) -> tuple[bytes, bytes]:
 def _names_of_entities(names: bytes, entities: bytes, is_binary: bool, word: int) -> dict[tuple[int, int], str]:
     """Return the name of the physical group of each entity (dimension, tag); of several groups the first named."""
     lines = re.findall(r'^[ \t]*(\d+)[ \t]+(\d+)[ \t]+"(.*)"', names.decode(), re.MULTILINE)
-    known = [(int(dim), int(group), name) for dim, group, name in lines]
+    physical_names = [(int(dim), int(group), name) for dim, group, name in lines]
     groups = _groups(entities, is_binary, word) if entities else {}
     return {
-        (dim, tag): next((name for d, g, name in known if d == dim and g in own), "")
-        for (dim, tag), own in groups.items()
+        (dim, tag): next((name for d, g, name in physical_names if d == dim and g in numbers), "")
+        for (dim, tag), numbers in groups.items()
     }
 
 
 def _groups(entities: bytes, is_binary: bool, word: int) -> dict[tuple[int, int], list[int]]:
     """Return the physical groups of each entity (dimension, tag), without the sign, which tells the orientation."""
-    stream, words = io.BytesIO(entities), iter(entities.split() if not is_binary else [])
+    stream = io.BytesIO(entities)
+    words = iter(entities.split() if not is_binary else [])
 
     def take(kind: str, count: int) -> list[int]:
         if not is_binary:
             return [int(float(next(words))) for _ in range(count)]
-        found = np.frombuffer(stream.read(count * np.dtype(kind).itemsize), kind, count)
-        return [int(value) for value in found.tolist()]
+        values = np.frombuffer(stream.read(count * np.dtype(kind).itemsize), kind, count)
+        return [int(value) for value in values.tolist()]
 
-    size, found = f"<u{word}", {}
+    size = f"<u{word}"
+    groups = {}
     for dim, count in enumerate(take(size, 4)):
         for _ in range(count):
             (tag,) = take("<i4", 1)
             take("<f8", 3 if dim == 0 else 6)  # its box
-            found[dim, tag] = [abs(group) for group in take("<i4", *take(size, 1))]
+            groups[dim, tag] = [abs(group) for group in take("<i4", *take(size, 1))]
             if dim > 0:
                 take("<i4", *take(size, 1))  # its boundary
-    return found
+    return groups
 
 
 def _msh_header(path: Path) -> tuple[bool, int]:
@@ -243,21 +245,23 @@ def _vtu(path: Path) -> tuple[Float, list[_Block]]:
     import pyvista
 
     grid = pyvista.wrap(reader.GetOutput())
-    types, count = np.asarray(grid.celltypes), grid.n_cells
+    types = np.asarray(grid.celltypes)
+    count = grid.n_cells
     offset = np.asarray(pyvista.convert_array(grid.GetCells().GetOffsetsArray()), dtype=np.int64)
     nodes = np.asarray(grid.cell_connectivity, dtype=np.int64)
     label, part = (_names(path, grid, key, count) for key in (LABEL, PART))
     blocks = []
     for number in np.unique(types).tolist():
-        kind, own = _VTK.get(number, f"{number} of VTK"), np.flatnonzero(types == number)
+        kind = _VTK.get(number, f"{number} of VTK")
+        of_type = np.flatnonzero(types == number)
         width = {**_TETS, **_TRIANGLES}.get(kind)
         if width is None:
-            blocks.append(_Block(kind, np.zeros((len(own), 0), dtype=np.int64), np.full(len(own), "")))
+            blocks.append(_Block(kind, np.zeros((len(of_type), 0), dtype=np.int64), np.full(len(of_type), "")))
             continue
-        if (np.diff(offset)[own] != width).any():
+        if (np.diff(offset)[of_type] != width).any():
             raise Finger3dError(f"{path}: a cell has not the {width} nodes of its type; save the mesh again")
         names = part if kind in _TETS else label
-        blocks.append(_Block(kind, nodes[offset[own][:, None] + np.arange(width)], names[own]))
+        blocks.append(_Block(kind, nodes[offset[of_type][:, None] + np.arange(width)], names[of_type]))
     return np.asarray(grid.points, dtype=float), blocks
 
 
@@ -281,17 +285,18 @@ def _names(path: Path, grid: Any, key: str, count: int) -> NDArray[np.str_]:
     values = np.asarray(grid.cell_data[key])
     if values.dtype.kind in "US":
         return values.astype(str)
-    where, names = f"{path}: cell data '{key}'", f"{key}_names"
+    where = f"{path}: cell data '{key}'"
+    names = f"{key}_names"
     if values.ndim != 1 or values.dtype.kind not in "iuf" or (values != np.round(values)).any():
         raise Finger3dError(f"{where} must hold a text or a whole number for each cell")
     if names not in grid.field_data:
         raise Finger3dError(
             f"{where} holds numbers, and there is no field data '{names}' with the names they stand for"
         )
-    known = np.asarray(grid.field_data[names]).astype(str).reshape(-1)
+    labels = np.asarray(grid.field_data[names]).astype(str).reshape(-1)
     number = values.astype(np.int64)
-    if number.max(initial=-1) >= len(known):
+    if number.max(initial=-1) >= len(labels):
         raise Finger3dError(
-            f"{where} has the number {number.max()}, and '{names}' has {len(known)} names, counted from 0"
+            f"{where} has the number {number.max()}, and '{names}' has {len(labels)} names, counted from 0"
         )
-    return np.append(known, "")[np.where(number < 0, len(known), number)]
+    return np.append(labels, "")[np.where(number < 0, len(labels), number)]

@@ -52,7 +52,9 @@ def write_mesh_msh(path: Path, mesh: Mesh) -> None:
     box = " ".join(f"{x:.17g}" for x in (*mesh.points.min(axis=0), *mesh.points.max(axis=0)))
     text = io.StringIO()
     text.write(f"$MeshFormat\n{MSH_VERSION} 0 8\n$EndMeshFormat\n$PhysicalNames\n{len(surfaces) + len(volumes)}\n")
-    groups = [(dim, k, name) for dim, found in ((2, surfaces), (3, volumes)) for k, (name, _) in enumerate(found, 1)]
+    groups = [
+        (dim, k, name) for dim, entities in ((2, surfaces), (3, volumes)) for k, (name, _) in enumerate(entities, 1)
+    ]
     text.writelines(f'{dim} {k} "{name}"\n' for dim, k, name in groups)
     text.write(f"$EndPhysicalNames\n$Entities\n0 0 {len(surfaces)} {len(volumes)}\n")
     text.writelines(f"{k} {box} 1 {k} 0\n" for _, k, _ in groups)
@@ -63,8 +65,8 @@ def write_mesh_msh(path: Path, mesh: Mesh) -> None:
     total = len(mesh.cells) + sum(len(facets) for _, facets in surfaces)
     text.write(f"$EndNodes\n$Elements\n{len(groups)} {total} 1 {total}\n")
     first = 1
-    for dim, kind, found in ((2, _GMSH_TRIANGLE6, surfaces), (3, _GMSH_TET10, volumes)):
-        for k, (_, cells) in enumerate(found, 1):
+    for dim, kind, entities in ((2, _GMSH_TRIANGLE6, surfaces), (3, _GMSH_TET10, volumes)):
+        for k, (_, cells) in enumerate(entities, 1):
             text.write(f"{dim} {k} {kind} {len(cells)}\n")
             ordered = cells[:, _GMSH_TET10_ORDER] if dim == 3 else cells
             _write_rows(text, np.column_stack([first + np.arange(len(cells)), ordered + 1]), "%d")

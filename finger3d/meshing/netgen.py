@@ -80,7 +80,8 @@ def size_points(field: Sizing) -> tuple[Float, Float]:
     middles = [low + (np.arange(n) + 0.5) * e for low, n, e in zip(field.low, counts, extent, strict=True)]
     centre = np.stack(np.meshgrid(*middles, indexing="ij"), axis=-1).reshape(-1, 3)
     octants = np.stack(np.meshgrid(*[[-0.25, 0.25]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
-    points, sizes, total = [], [], 0
+    points, sizes = [], []
+    total = 0
     while len(centre):
         size = field.at(centre)
         large = extent.max() > size

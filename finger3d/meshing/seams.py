@@ -40,9 +40,9 @@ class Seams:
         used = [np.unique(t.faces) for t in self._triangles]
         for i, j in combinations(range(len(body.faces)), 2):
             if len(shared := np.intersect1d(used[i], used[j])):
-                at = body.points[shared]
-                a, b = (body.faces[k].sign * body.faces[k].surface.distance(at)[1] for k in (i, j))
-                self._samples[i, j] = at, np.einsum("ij,ij->i", a, b) > SMOOTH
+                seam_points = body.points[shared]
+                a, b = (body.faces[k].sign * body.faces[k].surface.distance(seam_points)[1] for k in (i, j))
+                self._samples[i, j] = seam_points, np.einsum("ij,ij->i", a, b) > SMOOTH
 
     def one_per_smooth_group(self, points: Float, sets: Bool, candidates: Bool | None = None) -> Bool:
         """Return the sets (n, f) with one face of each smooth group: an exact plane, or the one nearest to the point.
@@ -54,12 +54,12 @@ class Seams:
         from scipy.spatial import cKDTree
 
         count = sets.shape[1]
-        known = sets if candidates is None else sets | candidates
+        members = sets if candidates is None else sets | candidates
         links = []
-        for (i, j), (at, smooth) in self._samples.items():
-            both = np.flatnonzero(known[:, i] & known[:, j])
+        for (i, j), (seam_points, smooth) in self._samples.items():
+            both = np.flatnonzero(members[:, i] & members[:, j])
             if len(both) and smooth.any():
-                both = both[smooth[cKDTree(at).query(points[both])[1]]]
+                both = both[smooth[cKDTree(seam_points).query(points[both])[1]]]
                 links.append(np.stack([both * count + i, both * count + j]))
         if not links or not (pairs := np.hstack(links)).size:
             return sets

@@ -59,10 +59,10 @@ class Sizing:
         if self._fills_width:
             counts[2] = 1
         axes = [np.linspace(a, b, n + 1) for a, b, n in zip(low, high, counts, strict=True)]
-        at = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
         if self._fills_width:
-            at[:, 2] = np.clip(at[:, 2], self.zone[:, 2].min(), self.zone[:, 2].max())
-        return axes, self.at(at).reshape(counts + 1)
+            points[:, 2] = np.clip(points[:, 2], self.zone[:, 2].min(), self.zone[:, 2].max())
+        return axes, self.at(points).reshape(counts + 1)
 
     def background(self) -> tuple[Float, Int, Float]:
         """Return the background mesh: points (n, 3), tets (m, 4) by Kuhn's subdivision, edge lengths (n,)."""

@@ -81,7 +81,8 @@ def _straighten_inverted(mesh: Mesh) -> Mesh:
     bad = curved_jacobians(mesh) <= 0.0
     if not bad.any() or bad.mean() > _MAX_STRAIGHTENED:
         return mesh
-    cells, points = mesh.cells[bad], mesh.points.copy()
+    cells = mesh.cells[bad]
+    points = mesh.points.copy()
     points[cells[:, 4:]] = points[cells[:, TET4.edges]].mean(axis=2)
     return replace(mesh, points=points)
 
@@ -178,7 +179,8 @@ def project(points: Float, sets: Bool, faces: tuple[CadFace, ...]) -> Float:
 
 def _projection(points: Float, sets: Bool, faces: tuple[CadFace, ...]) -> tuple[Float, Bool]:
     """Return the points of :func:`project`, and a mask (n,) of those that do not lie on all surfaces of their sets."""
-    points, failed = points.copy(), np.zeros(len(points), dtype=bool)
+    points = points.copy()
+    failed = np.zeros(len(points), dtype=bool)
     scale = max((float((f.high - f.low).max()) for f in faces), default=0.0)
     groups, member = np.unique(sets, axis=0, return_inverse=True)
     member = member.reshape(-1)
@@ -186,12 +188,12 @@ def _projection(points: Float, sets: Bool, faces: tuple[CadFace, ...]) -> tuple[
         chosen = [faces[i] for i in np.flatnonzero(row)]
         if not chosen:
             continue
-        at = np.flatnonzero(member == g)
-        p = points[at]
+        nodes = np.flatnonzero(member == g)
+        p = points[nodes]
         if faceted := [f.surface for f in chosen if isinstance(f.surface, Faceted)]:
             onto = moved_onto(faceted, p)
-            failed[at] = onto is None
-            points[at] = p if onto is None else onto
+            failed[nodes] = onto is None
+            points[nodes] = p if onto is None else onto
             continue
         for _ in range(20):
             pairs = [f.surface.distance(p) for f in chosen]
@@ -201,11 +203,11 @@ def _projection(points: Float, sets: Bool, faces: tuple[CadFace, ...]) -> tuple[
                 break
             inverse = np.linalg.pinv(normals, rcond=_RANK_TOLERANCE)
             p = p - np.einsum("nxk,nk->nx", inverse, distance)
-        failed[at] = ~(np.abs(distance).max(axis=1) <= 1e-7 * scale)
+        failed[nodes] = ~(np.abs(distance).max(axis=1) <= 1e-7 * scale)
         for f in chosen:
             if isinstance(f.surface, ImplicitPlane) and f.surface.axis is not None:
                 p[:, f.surface.axis] = f.surface.origin[f.surface.axis]
-        points[at] = p
+        points[nodes] = p
     return points, failed
 
 
@@ -252,17 +254,18 @@ def _collapse_edge(points: Float, tets: Int, sets: Bool, part: Int | None, cell:
     raise UnusableMeshError("a flat cell at the surface could not be removed")
 
 
-def _snap_mid_edge_nodes(mesh: Mesh, owner: Int, known: Bool, seams: Seams) -> Mesh:
+def _snap_mid_edge_nodes(mesh: Mesh, owner: Int, vertex_sets: Bool, seams: Seams) -> Mesh:
     """Move the mid-edge nodes of boundary facets onto the CAD faces (m,) of these facets.
 
     A face that joins one of them smoothly is used instead if it is nearer and an end of the edge lies on it, which
-    `known` (n, f) states.
+    `vertex_sets` (n, f) states.
     """
     faces = np.vstack(list(mesh.facets.values()))
     sets = np.zeros((len(mesh.points), len(seams.faces)), dtype=bool)
     sets[faces[:, 3:].ravel(), np.repeat(owner, 3)] = True
-    candidates, reach = np.zeros_like(sets), np.zeros(len(sets))
+    candidates = np.zeros_like(sets)
+    reach = np.zeros(len(sets))
     for middle, (a, b) in zip(faces[:, 3:].T, faces[:, TRI3.edges].transpose(1, 2, 0), strict=True):
-        candidates[middle] = known[a] | known[b]
+        candidates[middle] = vertex_sets[a] | vertex_sets[b]
         reach[middle] = 0.5 * _MAX_MOVE * np.linalg.norm(mesh.points[a] - mesh.points[b], axis=1)
     return replace(mesh, points=snap_nodes(mesh.points, sets, seams, reach, candidates)[0])

@@ -82,8 +82,8 @@ def finer_in_layers(field: Sizing, body: Tessellation) -> Sizing:
         few = places[field.at(places) > limit]
         points.append(np.abs(few) * [1, 0, 1] + few * [0, 1, 0])  # where a Grading has its points
         sizes.append(np.full(len(few), limit))
-    known = field.grading or Grading(points[0], sizes[0])
-    grading = Grading(np.vstack([known.points, *points]), np.concatenate([known.sizes, *sizes]))
+    present = field.grading or Grading(points[0], sizes[0])
+    grading = Grading(np.vstack([present.points, *points]), np.concatenate([present.sizes, *sizes]))
     return replace(field, grading=grading) if len(grading.sizes) else field
 
 
@@ -125,11 +125,12 @@ def _check_volumes(mesh: Mesh, body: Tessellation) -> None:
 
     part = np.zeros(len(mesh.cells), dtype=np.int64) if mesh.part is None else mesh.part
     for number, label in enumerate(("", *body.part_labels)):
-        surface, own = body.part(number), part == number
+        surface = body.part(number)
+        in_part = part == number
         wanted = surface.volume if len(surface.faces) else 0.0
-        found = curved_volume(replace(mesh, cells=mesh.cells[own], part=None)) if own.any() else 0.0
-        if not math.isclose(found, wanted, rel_tol=VOLUME_TOLERANCE):
-            raise UnusableMeshError(f"the volume of {label or 'the main body'} is {found:.6g} mm3, not {wanted:.6g}")
+        volume = curved_volume(replace(mesh, cells=mesh.cells[in_part], part=None)) if in_part.any() else 0.0
+        if not math.isclose(volume, wanted, rel_tol=VOLUME_TOLERANCE):
+            raise UnusableMeshError(f"the volume of {label or 'the main body'} is {volume:.6g} mm3, not {wanted:.6g}")
 
 
 def check_tets(points: Float, tets: Int, volume_mm3: float, mesher: str = "pytetwild") -> None:
@@ -145,14 +146,14 @@ def check_tets(points: Float, tets: Int, volume_mm3: float, mesher: str = "pytet
         raise UnusableMeshError(f"its volume is {volumes.sum():.6g} mm3, the body's {volume_mm3:.6g}")
 
 
-def run_mesher(mesher: Callable[..., Mapping[str, Array]], limit: float, **given: ArrayLike) -> tuple[Float, Int]:
+def run_mesher(mesher: Callable[..., Mapping[str, Array]], limit: float, **arguments: ArrayLike) -> tuple[Float, Int]:
     """Run a mesher in a child process; return points (n, 3), mm, and tets (t, 4).
 
     Parameters
     ----------
     mesher : a function of :mod:`finger3d.meshing._meshers`, named like its package
     limit : seconds
-    given : its arguments
+    arguments : of the mesher
 
     Raises
     ------
@@ -162,7 +163,7 @@ def run_mesher(mesher: Callable[..., Mapping[str, Array]], limit: float, **given
     from finger3d.meshing.snap import UnusableMeshError
 
     try:
-        result = in_child(mesher, limit, **given)
+        result = in_child(mesher, limit, **arguments)
     except ChildError as error:
         raise UnusableMeshError(f"{mesher.__name__} {error}") from error
     return result["points"], result["tets"]

@@ -64,19 +64,19 @@ def mesh_swept(
     grid, section = _grid(design, options, zone, 3, 3 * layers * 2 ** len(axes))
     levels = np.linspace(0.0, half, layers + 1)
     swept = _with_parts(_sweep(grid, levels), section, np.tile(np.tile(grid.part, 3), layers))
-    mesh = _on_curves(quadratic(swept), tuple((curve, np.tile(at, layers + 1)) for curve, at in grid.curves))
+    mesh = _on_curves(quadratic(swept), tuple((curve, np.tile(u, layers + 1)) for curve, u in grid.curves))
     whole = unfold(mesh, axes)[0]
     seconds = {"cad": 0.0, "mesh": time.perf_counter() - start}
     multiple = 4.0 / 2 ** len(axes)
     return whole, _fit(mesh_report(whole, multiple, section.area_mm2 * design.width_mm, seconds), design, options)
 
 
-def _fit(made: MeshReport, design: Design, options: MeshSizes) -> MeshReport:
+def _fit(quality: MeshReport, design: Design, options: MeshSizes) -> MeshReport:
     """Return the report, or raise a Finger3dError for cells that are too flat."""
-    if made.min_dihedral_deg >= _LEAST_ANGLE_DEG:
-        return made
+    if quality.min_dihedral_deg >= _LEAST_ANGLE_DEG:
+        return quality
     raise Finger3dError(
-        f"{design.name}: mesh.size_mm = {options.size_mm:g} gives cells of {made.min_dihedral_deg:.2g} deg, flatter "
+        f"{design.name}: mesh.size_mm = {options.size_mm:g} gives cells of {quality.min_dihedral_deg:.2g} deg, flatter "
         f"than {_LEAST_ANGLE_DEG:g}; a wall or an edge is too thin for it: choose smaller sizes, or edge_height_mm = 0"
     )
 
@@ -102,9 +102,10 @@ def _with_parts(mesh: Mesh, section: Section, part: Int) -> Mesh:
 def _on_curves(mesh: Mesh, curves: tuple[tuple[Arc | Flat, Float], ...]) -> Mesh:
     """Move the nodes in the middle of edges between points of a curve onto it; every vertex (v,) has its parameter."""
     points = mesh.points.copy()
-    pairs, middle = mesh.cells[:, mesh.element.edges].reshape(-1, 2), mesh.cells[:, mesh.dim + 1 :].ravel()
-    for curve, at in curves:
-        ends = at[pairs]
+    pairs = mesh.cells[:, mesh.element.edges].reshape(-1, 2)
+    middle = mesh.cells[:, mesh.dim + 1 :].ravel()
+    for curve, u in curves:
+        ends = u[pairs]
         bent = np.isfinite(ends).all(axis=1) & (ends[:, 0] != ends[:, 1])  # edges along z are straight
         points[middle[bent], :2] = curve.at(ends[bent].mean(axis=1))
     points[mesh.facets["symmetry_x"].ravel(), 0] = 0.0

@@ -82,43 +82,45 @@ def _touching(
     """Return the height of the lowest point at first touch, and its place (2,); -inf without overlap in plan."""
     placed = PlacedObject.of(obj, 0.0)
 
-    def difference(at: Float) -> Float:
-        return np.nan_to_num(top(at[:, 0], at[:, 1]) - placed.height(at[:, 0], at[:, 1]), nan=-np.inf, posinf=np.inf)
+    def difference(xz: Float) -> Float:
+        return np.nan_to_num(top(xz[:, 0], xz[:, 1]) - placed.height(xz[:, 0], xz[:, 1]), nan=-np.inf, posinf=np.inf)
 
     limit = np.array([half_length, half_width])
     hints = placed.to_scene(obj.landmarks())[:, ::2]
     hints = hints if marks is None else np.vstack([hints, marks])
     if half_width == 0.0:
         hints = hints * [1.0, 0.0]
-    at = np.vstack([_grid(half_length, half_width), hints[np.all(np.abs(hints) <= limit, axis=1)]])
-    found = difference(at)
-    best, place = float(found.max()), at[np.argmax(found)]
+    points = np.vstack([_grid(half_length, half_width), hints[np.all(np.abs(hints) <= limit, axis=1)]])
+    differences = difference(points)
+    best = float(differences.max())
+    place = points[np.argmax(differences)]
     step = 2.0 * limit / (np.array(_GRID) - 1)
-    places = _apart(at, found, 1.5 * step)
+    places = _apart(points, differences, 1.5 * step)
     for _ in range(_ZOOMS):
         t = np.linspace(-1.0, 1.0, _ZOOM)
         window = np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1).reshape(1, -1, 2) * step
-        at = np.clip(places[:, None] + window, -limit, limit)
-        found = difference(at.reshape(-1, 2)).reshape(len(places), -1)
-        highest = found.argmax(axis=1)
-        places = at[np.arange(len(places)), highest]
-        top_found = found.max(axis=1)
-        if top_found.max() > best:
-            best, place = float(top_found.max()), places[int(top_found.argmax())]
+        points = np.clip(places[:, None] + window, -limit, limit)
+        differences = difference(points.reshape(-1, 2)).reshape(len(places), -1)
+        highest = differences.argmax(axis=1)
+        places = points[np.arange(len(places)), highest]
+        peaks = differences.max(axis=1)
+        if peaks.max() > best:
+            best = float(peaks.max())
+            place = places[int(peaks.argmax())]
         step = step * 2.0 / (_ZOOM - 1)
     return best, place
 
 
-def _apart(at: Float, value: Float, distance: Float) -> Float:
+def _apart(points: Float, value: Float, distance: Float) -> Float:
     """Return the places (k, 2) of the largest values, at least `distance` (2,) apart."""
     order = np.argsort(-value, kind="stable")[:2000]
     kept: list[Float] = []
     for i in order:
-        if np.isfinite(value[i]) and all((np.abs(at[i] - k) > distance).any() for k in kept):
-            kept.append(at[i])
+        if np.isfinite(value[i]) and all((np.abs(points[i] - k) > distance).any() for k in kept):
+            kept.append(points[i])
             if len(kept) == _PLACES:
                 break
-    return np.array(kept).reshape(-1, 2) if kept else at[order[:1]]
+    return np.array(kept).reshape(-1, 2) if kept else points[order[:1]]
 
 
 def first_contact_height(
@@ -146,39 +148,41 @@ def initial_contact(way: ContactPath) -> InitialContact:
     """
     top, obj, path = way.top, way.object, way.poses
     half_length, half_width = way.half_length_mm, way.half_width_mm
-    touch, place = _touching(top, obj, half_length, half_width, way.landmarks)
-    if touch == math.inf:
+    first_contact_mm, place = _touching(top, obj, half_length, half_width, way.landmarks)
+    if first_contact_mm == math.inf:
         raise Finger3dError(
             "object: in the pose it comes in, it extends downwards without end over the finger, which would start "
             "inside it; change its turn_x_deg, turn_y_deg, turn_z_deg"
         )
-    if not math.isfinite(touch):
+    if not math.isfinite(first_contact_mm):
         raise Finger3dError(
             f"object: no part of it is above the finger (|x| <= {half_length:g}, |z| <= {half_width:g} mm), so that it "
             "never touches; change x_mm, z_mm"
         )
-    _clear_of_base(way, touch)
+    _clear_of_base(way, first_contact_mm)
     if obj.is_flat:  # it has no end that could hang down
-        return InitialContact(touch, _box(top, obj, half_length, half_width, touch, place, path), _pair(place))
-    deepest = max(pose.depth_mm for pose in path)
-    if touch <= deepest:
-        raise Finger3dError(
-            f"object: at depth {deepest:g} mm its lowest point, beside the finger, is {deepest - touch:.4g} mm below "
-            "the finger's base: it touches the base first; press less deep, or change x_mm, z_mm"
+        return InitialContact(
+            first_contact_mm, _box(top, obj, half_length, half_width, first_contact_mm, place, path), _pair(place)
         )
-    _stays_on_finger(way, touch)
-    zone = _box(top, obj, half_length, half_width, touch, place, path)
+    deepest = max(pose.depth_mm for pose in path)
+    if first_contact_mm <= deepest:
+        raise Finger3dError(
+            f"object: at depth {deepest:g} mm its lowest point, beside the finger, is {deepest - first_contact_mm:.4g} "
+            "mm below the finger's base: it touches the base first; press less deep, or change x_mm, z_mm"
+        )
+    _stays_on_finger(way, first_contact_mm)
+    zone = _box(top, obj, half_length, half_width, first_contact_mm, place, path)
     if not way.walls_touch:
         _not_a_wall(obj, place, half_length, half_width)
-        _no_side(way, touch)
-    return InitialContact(touch, zone, _pair(place))
+        _no_side(way, first_contact_mm)
+    return InitialContact(first_contact_mm, zone, _pair(place))
 
 
 def _pair(place: Float) -> tuple[float, float]:
     return float(place[0]), float(place[1])
 
 
-def _clear_of_base(way: ContactPath, touch: float) -> None:
+def _clear_of_base(way: ContactPath, first_contact_mm: float) -> None:
     """Raise an error if a plane, or another object that is turned on its path, reaches the finger's base."""
     across = [-1.0, 1.0] if way.object.is_flat else np.linspace(-1.0, 1.0, _GRID[1])  # of a plane, corners reach most
     x, z = np.meshgrid(across, across if way.half_width_mm else [0.0], indexing="ij")
@@ -186,25 +190,26 @@ def _clear_of_base(way: ContactPath, touch: float) -> None:
     before = ObjectPose(0.0)
     for pose in way.poses:
         count = max(1, math.ceil(float(np.abs(np.subtract(pose.turns, before.turns)).max()) / _TURN))
-        for share in np.arange(1, count + 1) / count:
-            at = Move(before, pose).at(float(share))
-            if not (way.object.is_flat or at.is_turned):
+        for fraction in np.arange(1, count + 1) / count:
+            between = Move(before, pose).at(float(fraction))
+            if not (way.object.is_flat or between.is_turned):
                 continue
-            if (PlacedObject.of(way.object, touch, at).distance(base)[0] < 0.0).any():
-                x, y, z = np.degrees(at.turns)
+            if (PlacedObject.of(way.object, first_contact_mm, between).distance(base)[0] < 0.0).any():
+                x, y, z = np.degrees(between.turns)
                 raise Finger3dError(
-                    f"press: turned by {x:.4g}, {y:.4g}, {z:.4g} deg about x, y, z at a depth of {at.depth_mm:.4g} mm, "
-                    "the object reaches the finger's base, which is held; turn it less, or press less deep"
+                    f"press: turned by {x:.4g}, {y:.4g}, {z:.4g} deg about x, y, z at a depth of "
+                    f"{between.depth_mm:.4g} mm, the object reaches the finger's base, which is held; turn it less, or "
+                    "press less deep"
                 )
         before = pose
 
 
-def _stays_on_finger(way: ContactPath, touch: float) -> None:
+def _stays_on_finger(way: ContactPath, first_contact_mm: float) -> None:
     """Raise an error if a turn takes the object off the finger."""
-    at = _grid(way.half_length_mm, way.half_width_mm, _COARSE)
+    points = _grid(way.half_length_mm, way.half_width_mm, _COARSE)
     for pose in way.poses:
         turned = pose.is_turned and pose.depth_mm > 0.0
-        if turned and not (_overlap(way.top, way.object, at, touch, pose) > 0.0).any():
+        if turned and not (_overlap(way.top, way.object, points, first_contact_mm, pose) > 0.0).any():
             x, y, z = np.degrees(pose.turns)
             raise Finger3dError(
                 f"press: turned by {x:.4g}, {y:.4g}, {z:.4g} deg about x, y, z at a depth of {pose.depth_mm:.4g} mm, "
@@ -217,19 +222,19 @@ def _box(
     obj: RigidObject,
     half_length: float,
     half_width: float,
-    touch: float,
+    first_contact_mm: float,
     place: Float,
     path: Sequence[ObjectPose],
 ) -> tuple[float, float, float, float]:
     limit = np.array([half_length, half_width])
     t = np.linspace(-1.0, 1.0, _ZOOM)
     window = np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1).reshape(-1, 2) * 2.0 * limit / (np.array(_COARSE) - 1)
-    at = [_grid(half_length, half_width, _COARSE)]
+    grids = [_grid(half_length, half_width, _COARSE)]
     for k in range(_ZOOMS):  # a tip may lie between the points of the grid
         near = window * 10.0**-k
         slides = {(pose.slide_x_mm, pose.slide_z_mm) for pose in path}
-        at += [np.clip(place + [sx, sz] + near, -limit, limit) for sx, sz in slides]
-    points = np.vstack(at)
+        grids += [np.clip(place + [sx, sz] + near, -limit, limit) for sx, sz in slides]
+    points = np.vstack(grids)
     inside = np.zeros(len(points), dtype=bool)
     deepest: dict[tuple[float, ...], ObjectPose] = {}
     for pose in path:  # deeper at the same place covers what was touched before
@@ -237,7 +242,7 @@ def _box(
         if key not in deepest or pose.depth_mm > deepest[key].depth_mm:
             deepest[key] = pose
     for pose in deepest.values():
-        inside |= _overlap(top, obj, points, touch, pose) > 0.0
+        inside |= _overlap(top, obj, points, first_contact_mm, pose) > 0.0
     (x0, z0), (x1, z1) = (f(points[inside], axis=0) if inside.any() else place for f in (np.min, np.max))
     if x1 - x0 <= _NOTHING * half_length or z1 - z0 < _NOTHING * half_width:
         raise Finger3dError(
@@ -261,8 +266,8 @@ def _not_a_wall(obj: RigidObject, place: Float, half_length: float, half_width: 
             continue
         step = np.zeros(2)
         step[axis] = math.copysign(reach, place[axis])
-        at = np.stack([place, place + step, place - step], axis=1)
-        here, beside, before = PlacedObject.of(obj, 0.0).height(*at)
+        points = np.stack([place, place + step, place - step], axis=1)
+        here, beside, before = PlacedObject.of(obj, 0.0).height(*points)
         if here - beside > _STEEP * reach or before - here > _STEEP * reach:
             raise Finger3dError(
                 f"object: it touches the finger's rim at x = {place[0]:.4g}, z = {place[1]:.4g} mm with a flank that "
@@ -270,7 +275,7 @@ def _not_a_wall(obj: RigidObject, place: Float, half_length: float, half_width: 
             )
 
 
-def _no_side(way: ContactPath, touch: float) -> None:
+def _no_side(way: ContactPath, first_contact_mm: float) -> None:
     """Raise an error if a wall of the object runs into the side of the finger as it slides or turns."""
     t = np.linspace(-1.0, 1.0, _GRID[1])
     sides = np.vstack([np.stack([t, s + 0.0 * t], axis=1) for s in (-1.0, 1.0)])
@@ -283,14 +288,14 @@ def _no_side(way: ContactPath, touch: float) -> None:
         stride = math.hypot(change[1], change[2]) + reach * float(np.abs(change[4:]).sum())
         count = max(1, math.ceil(_STRIDES * stride / way.half_length_mm))
         over = None
-        for share in np.linspace(0.0, 1.0, count + 1) if stride else ():
-            at = Move(before, pose).at(float(share))
-            now = np.maximum(_overlap(way.top, way.object, rim, touch, at), 0.0)
-            if over is not None and (jump := now - over - _STEEP * stride / count).max() > 0.02 * touch:
+        for fraction in np.linspace(0.0, 1.0, count + 1) if stride else ():
+            between = Move(before, pose).at(float(fraction))
+            now = np.maximum(_overlap(way.top, way.object, rim, first_contact_mm, between), 0.0)
+            if over is not None and (jump := now - over - _STEEP * stride / count).max() > 0.02 * first_contact_mm:
                 x, z = rim[np.argmax(jump)]
                 raise Finger3dError(
-                    f"object: near slide ({at.slide_x_mm:.4g}, {at.slide_z_mm:.4g}) mm a wall of it runs into the "
-                    f"finger's side at x = {x:.4g}, z = {z:.4g} mm; move it less, or change x_mm, z_mm"
+                    f"object: near slide ({between.slide_x_mm:.4g}, {between.slide_z_mm:.4g}) mm a wall of it runs "
+                    f"into the finger's side at x = {x:.4g}, z = {z:.4g} mm; move it less, or change x_mm, z_mm"
                 )
             over = now
         before = pose

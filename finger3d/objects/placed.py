@@ -16,7 +16,7 @@ from finger3d.objects.triangulated import MeshObject
 _SURFACE = 1e-13
 """Distance at which a point on a vertical line counts as on the surface, over the coordinates."""
 
-_ITERATIONS = 200
+_MOST_STRIDES = 200
 """Largest number of steps along a vertical line."""
 
 _LOWEST_START = 1e7
@@ -79,8 +79,8 @@ class PlacedObject:
         In two dimensions it is that from the section z = 0: exact on the surface and wherever the section is the same
         along z, else to first order.
         """
-        at = points if points.shape[1] == 3 else np.column_stack([points, np.zeros(len(points))])
-        value, gradient = self.object.distance(self.to_own(at))
+        in_space = points if points.shape[1] == 3 else np.column_stack([points, np.zeros(len(points))])
+        value, gradient = self.object.distance(self.to_own(in_space))
         gradient = self.to_scene_direction(gradient)
         return (value, gradient) if points.shape[1] == 3 else in_section(value, gradient)
 
@@ -105,26 +105,26 @@ class PlacedObject:
         Steps have the length of a lower bound of the distance; for a convex body they are Newton steps, which never
         overshoot the zero of a convex function.
         """
-        at = np.stack([x, np.full(len(x), -_LOWEST_START), z], axis=1)
+        points = np.stack([x, np.full(len(x), -_LOWEST_START), z], axis=1)
         out = np.full(len(x), np.nan)
-        inside = self.object.clearance(self.to_own(at)) < 0.0
+        inside = self.object.clearance(self.to_own(points)) < 0.0
         out[inside] = -np.inf
         moving = np.flatnonzero(~inside)
-        for _ in range(_ITERATIONS):
+        for _ in range(_MOST_STRIDES):
             if self.object.is_convex:
-                value, gradient = self.distance(at[moving])
+                value, gradient = self.distance(points[moving])
                 rate = -gradient[:, 1]
                 step = np.where(rate > _SURFACE, value / np.where(rate > _SURFACE, rate, 1.0), np.inf)
             else:
-                step = self.object.clearance(self.to_own(at[moving]))
-            arrived = np.abs(step) <= _SURFACE * (1.0 + np.abs(at[moving, 1]))
-            missed = ~(at[moving, 1] + step < _LOWEST_START)
-            out[moving[arrived]] = at[moving[arrived], 1]
+                step = self.object.clearance(self.to_own(points[moving]))
+            arrived = np.abs(step) <= _SURFACE * (1.0 + np.abs(points[moving, 1]))
+            missed = ~(points[moving, 1] + step < _LOWEST_START)
+            out[moving[arrived]] = points[moving[arrived], 1]
             moving, step = moving[~(arrived | missed)], step[~(arrived | missed)]
-            at[moving, 1] += step
+            points[moving, 1] += step
             if not len(moving):
                 break
-        out[moving] = at[moving, 1]
+        out[moving] = points[moving, 1]
         return out
 
     @property
@@ -145,11 +145,11 @@ class PlacedObject:
         value = self.distance(probes)[0]
         bound = 1e-6 if isinstance(self.object, MeshObject) else 1e-10
         scale = bound * max(self.object.probe_reach, float(np.abs(self.place).max()))
-        found = []
+        axes = []
         for axis, image in (("x", [-1.0, 1.0, 1.0]), ("z", [1.0, 1.0, -1.0])):
             if np.abs(self.distance(probes * image)[0] - value).max() <= scale:
-                found.append(axis)
-        return tuple(found)
+                axes.append(axis)
+        return tuple(axes)
 
 
 def in_section(value: Float, gradient: Float) -> tuple[Float, Float]:

@@ -92,13 +92,14 @@ class Cylinder(Prism):
 
     def held_body(self, finger: Design, solid: bool) -> HeldBody:
         """Return the lower half, held on its cut; a section along the axis is a rectangle."""
-        known, half, width = designs(), finger.half_length_mm, finger.width_mm
+        catalogue = designs()
+        half, width = finger.half_length_mm, finger.width_mm
         if self.axis == "z":
-            along_z = known["half_cylinder"](radius_mm=self.radius_mm, width_mm=width)
+            along_z = catalogue["half_cylinder"](radius_mm=self.radius_mm, width_mm=width)
             return HeldBody(design=along_z, place=np.array([self.x_mm, 0.0, 0.0]))
         if not solid:
-            return HeldBody(design=known["block"](half_length_mm=half, height_mm=self.radius_mm, width_mm=width))
-        along_x = known["half_cylinder"](radius_mm=self.radius_mm, width_mm=2.0 * half)
+            return HeldBody(design=catalogue["block"](half_length_mm=half, height_mm=self.radius_mm, width_mm=width))
+        along_x = catalogue["half_cylinder"](radius_mm=self.radius_mm, width_mm=2.0 * half)
         return HeldBody(design=along_x, turn=CROSSWISE, place=np.array([0.0, 0.0, self.z_mm]))
 
     def drawing(self, reach_mm: float) -> Triangles:
@@ -160,7 +161,8 @@ class Sphere(RigidObject):
 
     def drawing(self, reach_mm: float) -> Triangles:
         """Return the sphere, or its lowest part if its radius exceeds the reach."""
-        polar, turn = _polar(self.radius_mm, reach_mm)[DRAWN // 2 :: 4], np.linspace(0.0, 2.0 * math.pi, 49)
+        polar = _polar(self.radius_mm, reach_mm)[DRAWN // 2 :: 4]
+        turn = np.linspace(0.0, 2.0 * math.pi, 49)
         r, y = self.radius_mm * np.sin(polar), self.radius_mm * (1.0 - np.cos(polar))
         level = np.broadcast_to(y[:, None], (len(polar), len(turn)))
         return sheet(np.stack([np.outer(r, np.cos(turn)), level, np.outer(r, np.sin(turn))], axis=-1))
@@ -183,7 +185,8 @@ class Wedge(Prism):
 
     def section_distance(self, r: Float, y: Float) -> tuple[Float, Float, Float]:
         """Return the distance to a sharp edge through the circle's middle, less the circle's radius."""
-        c, s, side = math.cos(self.angle), math.sin(self.angle), np.where(r < 0.0, -1.0, 1.0)
+        c, s = math.cos(self.angle), math.sin(self.angle)
+        side = np.where(r < 0.0, -1.0, 1.0)
         y = y - self.tip_radius_mm
         along = c * np.abs(r) + s * y
         value, by_r, by_y = _circle_distance(r, y + self.tip_radius_mm, self.tip_radius_mm)
@@ -226,14 +229,14 @@ def _circle_distance(r: Float, y: Float, radius: float) -> tuple[Float, Float, F
     """Return the signed distance (n,) from a circle whose lowest point is the origin, and its derivatives."""
     out = y - radius
     length = np.hypot(r, out)
-    known = length > 0.0
-    divisor = np.where(known, length, 1.0)
+    regular = length > 0.0
+    divisor = np.where(regular, length, 1.0)
     # length - radius would lose the digits of points near a large circle
     total = np.where(length + radius > 0.0, length + radius, 1.0)
     return (
         (r**2 + y**2 - 2.0 * y * radius) / total,
-        np.where(known, r / divisor, 0.0),
-        np.where(known, out / divisor, -1.0),
+        np.where(regular, r / divisor, 0.0),
+        np.where(regular, out / divisor, -1.0),
     )
 
 

@@ -89,8 +89,8 @@ class MeshObject(RigidObject):
 
     def probes(self) -> Float:
         """Return corners and middles of triangles."""
-        at = np.vstack([self.landmarks(), self.triangles.corners.mean(axis=1)])
-        return at[:: len(at) // _MOST + 1]
+        points = np.vstack([self.landmarks(), self.triangles.corners.mean(axis=1)])
+        return points[:: len(points) // _MOST + 1]
 
     @property
     def probe_reach(self) -> float:

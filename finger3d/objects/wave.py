@@ -35,9 +35,10 @@ class Wave(Prism):
 
     def section_distance(self, r: Float, y: Float) -> tuple[Float, Float, Float]:
         """Return the distance to the nearest point, found by Newton's method between the best of many starts."""
-        at = self._nearest(r, y)
-        height, slope = self.section_profile(at), self._slope(at)
-        out_r, out_y, root = r - at, y - height, np.sqrt(1.0 + slope**2)
+        nearest = self._nearest(r, y)
+        height, slope = self.section_profile(nearest), self._slope(nearest)
+        out_r, out_y = r - nearest, y - height
+        root = np.sqrt(1.0 + slope**2)
         sign = np.where(y > self.section_profile(r), -1.0, 1.0)
         # The normal of the nearest point is the gradient, on the surface too, where the difference is round-off.
         return sign * np.hypot(out_r, out_y), slope / root, -1.0 / root

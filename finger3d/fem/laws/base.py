@@ -1,10 +1,11 @@
-"""Interface of the hyperelastic laws, and the base class of those that depend on the invariants of deformation."""
+"""Interface of the isochoric laws, and the law of a body whose shear modulus differs from point to point."""
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol, Self
+from dataclasses import dataclass, replace
+from typing import Protocol, Self
 
-from finger3d._types import Float
+from finger3d._types import Float, freeze_arrays
 
 
 class IsochoricLaw(Protocol):
@@ -48,11 +49,54 @@ class IsochoricLaw(Protocol):
         ...
 
 
-class Derivatives(NamedTuple):
-    """First and second derivatives (...,) MPa of an energy by two invariants; None for what is zero everywhere."""
+@dataclass(frozen=True)
+class Inhomogeneous:
+    """A law with a shear modulus for each of m points, at which it is evaluated; see `IsochoricLaw`.
 
-    w1: Float
-    w2: Float | None = None
-    w11: Float | None = None
-    w12: Float | None = None
-    w22: Float | None = None
+    Attributes
+    ----------
+    law : with the shear modulus by which stresses are scaled
+    relative : (m,) shear modulus of each point over that of the law
+    """
+
+    law: IsochoricLaw
+    relative: Float
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
+
+    @property
+    def shear(self) -> float:
+        """Shear modulus by which stresses are scaled, MPa."""
+        return self.law.shear
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether the law is stable at all strains: the shear modulus does not matter."""
+        return self.law.is_stable
+
+    def with_shear(self, shear: float) -> Self:
+        """Return the law with another shear modulus by which stresses are scaled, MPa."""
+        return replace(self, law=self.law.with_shear(shear))
+
+    def of_points(self, points: slice) -> Inhomogeneous:
+        """Return the law at some of the points."""
+        return Inhomogeneous(self.law, self.relative[points])
+
+    def energy(self, f: Float) -> Float:
+        """Return the energy (m,) MPa of deformation gradients (m, 3, 3)."""
+        return self.relative * self.law.energy(f)
+
+    def stress(self, f: Float) -> Float:
+        """Return the first Piola-Kirchhoff stress (m, 3, 3) MPa."""
+        return self.relative[:, None, None] * self.law.stress(f)
+
+    def stress_and_tangent(self, f: Float) -> tuple[Float, Float]:
+        """Return the stress and its derivative (m, 3, 3, 3, 3) MPa."""
+        stress, tangent = self.law.stress_and_tangent(f)
+        return self.relative[:, None, None] * stress, self.relative[:, None, None, None, None] * tangent
+
+    def principal_stress(self, stretches: Float) -> tuple[Float, Float]:
+        """Return principal Kirchhoff stresses (m, 3) and their derivative (m, 3, 3), MPa."""
+        stress, derivative = self.law.principal_stress(stretches)
+        return self.relative[:, None] * stress, self.relative[:, None, None] * derivative

@@ -7,13 +7,22 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.fem.laws.base import Derivatives
 from finger3d.fem.tensors import cofactor, determinant
+
+
+class Derivatives(NamedTuple):
+    """First and second derivatives (...,) MPa of an energy by two invariants; None for what is zero everywhere."""
+
+    w1: Float
+    w2: Float | None = None
+    w11: Float | None = None
+    w12: Float | None = None
+    w22: Float | None = None
 
 
 @dataclass(frozen=True)
@@ -59,7 +68,8 @@ class InvariantLaw(ABC):
     def stress_and_tangent(self, f: Float) -> tuple[Float, Float]:
         """Return the stress and its derivative (..., 3, 3, 3, 3)."""
         x1, x2 = _invariants(f)
-        by, inverse = self.derivatives(x1, x2), _inverse_transpose(f)
+        by = self.derivatives(x1, x2)
+        inverse = _inverse_transpose(f)
         g1 = _gradient_1(f, inverse, x1)
         stress, tangent = _wide(by.w1) * g1, _wide4(by.w1) * _hessian_1(f, inverse, x1)
         if by.w11 is not None:
@@ -78,7 +88,8 @@ class InvariantLaw(ABC):
         square = stretches**2
         inverse = 1.0 / square
         by = self.derivatives(square.sum(axis=-1), inverse.sum(axis=-1))
-        g1, g2, zero = 2.0 * square, -2.0 * inverse, np.zeros(stretches.shape[:-1])
+        g1, g2 = 2.0 * square, -2.0 * inverse
+        zero = np.zeros(stretches.shape[:-1])
         w2, w11, w12, w22 = (zero if w is None else w for w in (by.w2, by.w11, by.w12, by.w22))
         stress = _wide1(by.w1) * g1 + _wide1(w2) * g2
         diagonal = _wide1(by.w1) * 2.0 * g1 - _wide1(w2) * 2.0 * g2
@@ -158,12 +169,14 @@ def _hessian_1(f: Float, inverse: Float, x1: Float) -> Float:
 
 
 def _hessian_2(f: Float, inverse: Float, x2: Float) -> Float:
-    scale, c = determinant(f) ** (-4.0 / 3.0), _right_cauchy_green(f)
+    scale = determinant(f) ** (-4.0 / 3.0)
+    c = _right_cauchy_green(f)
     out = _scaled_hessian(4.0 / 3.0, x2, 2.0 * _wide(scale) * _cofactor_rate(f), inverse)
     # d(I1 F - F C)_iJ / dF_kL = 2 F_iJ F_kL + I1 d_ik d_JL - d_ik C_LJ - F_iL F_kJ - (F F^T)_ik d_JL
     pair = _outer(f, f)
     rate = 2.0 * pair - np.swapaxes(pair, -1, -3)
-    left, i1 = f @ np.swapaxes(f, -1, -2), np.trace(c, axis1=-2, axis2=-1)
+    left = f @ np.swapaxes(f, -1, -2)
+    i1 = np.trace(c, axis1=-2, axis2=-1)
     for i in range(3):
         rate[..., i, :, i, :] -= c
         rate[..., :, i, :, i] -= left

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from finger3d.fem.whole_solutions import WholeSolutions
+from finger3d.fem.factors import WholeSolutions
 
 STIFFNESS = np.array([[4.0, 1.0, 0.0], [1.0, 3.0, 1.0], [0.0, 1.0, 2.0]])
 
