@@ -44,7 +44,7 @@ def __getattr__(name: str) -> object:
         return version("finger3d")
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(str(_HOMES[name])), name)
+    return getattr(import_module(_HOMES[name]), name)
 
 
 def __dir__() -> list[str]:
